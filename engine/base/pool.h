@@ -1,0 +1,36 @@
+// Threads from oneTBB. Only pool.cpp knows the library.
+#pragma once
+
+#include <memory>
+
+namespace ptc {
+
+/// An arena with one slot per thread, the calling thread's among them.
+class Pool {
+ public:
+  /// @param threads  at least 1
+  explicit Pool(unsigned threads);
+  ~Pool();
+  Pool(const Pool&) = delete;
+  Pool& operator=(const Pool&) = delete;
+
+  /// What run() calls.
+  class Work {
+   public:
+    virtual void work(unsigned slot) noexcept = 0;
+
+   protected:
+    ~Work() = default;
+  };
+
+  /// Calls work.work(slot) `times` times, each on whichever thread of the arena is free; `slot` is
+  /// below the number of threads and differs between calls that run at the same time. A thread that
+  /// waits in run() takes no work of an enclosing run(), which would come under the same slot.
+  void run(unsigned times, Work& work);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ptc

@@ -1,0 +1,130 @@
+// Progress written to a file: a bar on a terminal, plain lines elsewhere.
+#include "engine/base/progress.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <limits>
+#include <mutex>
+#include <string_view>
+#include <utility>
+
+#include "engine/base/progress_text.h"
+
+namespace ptc {
+namespace {
+
+constexpr double kRedrawSeconds = 0.1;  // on a terminal
+constexpr double kLineSeconds = 10;     // elsewhere
+
+class FileProgress final : public Progress {
+ public:
+  FileProgress(int fd, bool terminal, Clock clock)
+      : fd_(fd), terminal_(terminal), clock_(std::move(clock)) {}
+
+  // A stage that was left by an exception ends its line, so that the message starts on its own.
+  ~FileProgress() override {
+    if (running_ && terminal_) write("\n");
+  }
+
+  void begin(const std::string& stage, std::uint64_t total, const std::string& unit) override {
+    end();
+    const std::lock_guard lock(mutex_);
+    state_ = {stage, unit, total, 0, 0};
+    done_ = 0;
+    start_ = clock_();
+    running_ = true;
+    const std::string count =
+        total == 0 ? unit : format_count(static_cast<double>(total)) + " " + unit;
+    if (!terminal_) write(stage + ": " + count + "\n");
+    next_report_ = start_ + interval();
+  }
+
+  // Cheap unless a report is due; then one thread writes it and the others go on.
+  void advance(std::uint64_t count) override {
+    done_.fetch_add(count, std::memory_order_relaxed);
+    if (clock_() < next_report_.load(std::memory_order_relaxed)) return;
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock.owns_lock() || !running_) return;
+    const double now = clock_();
+    if (now < next_report_) return;
+    next_report_ = now + interval();
+    const StageState& state = update(now);
+    terminal_ ? redraw(progress_bar(state, columns())) : write(progress_line(state) + '\n');
+  }
+
+  void end() override {
+    const std::lock_guard lock(mutex_);
+    if (!running_) return;
+    running_ = false;
+    next_report_ = std::numeric_limits<double>::infinity();
+    const std::string summary = progress_summary(update(clock_()));
+    if (terminal_) redraw(summary);
+    write(terminal_ ? "\n" : summary + '\n');
+  }
+
+ private:
+  [[nodiscard]] double interval() const noexcept {
+    return terminal_ ? kRedrawSeconds : kLineSeconds;
+  }
+
+  const StageState& update(double now) {
+    state_.done = done_.load(std::memory_order_relaxed);
+    state_.elapsed_seconds = now - start_;
+    return state_;
+  }
+
+  // One column is left free: a line as wide as the terminal wraps on some.
+  [[nodiscard]] std::size_t columns() const noexcept {
+    winsize size{};
+    if (ioctl(fd_, TIOCGWINSZ, &size) != 0 || size.ws_col < 2) return 79;
+    return size.ws_col - 1u;
+  }
+
+  // Over what the line showed before; the rest of it is erased.
+  void redraw(const std::string& text) const {
+    std::string line = "\r";
+    line.append(text).append("\x1b[K");
+    write(line);
+  }
+
+  // A report that cannot be written is no reason to stop the work.
+  void write(std::string_view text) const noexcept {
+    while (!text.empty()) {
+      const ssize_t n = ::write(fd_, text.data(), text.size());
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) return;
+      text.remove_prefix(static_cast<std::size_t>(n));
+    }
+  }
+
+  const int fd_;
+  const bool terminal_;
+  const Clock clock_;
+  std::atomic<std::uint64_t> done_{0};
+  std::atomic<double> next_report_{std::numeric_limits<double>::infinity()};
+  std::mutex mutex_;  // guards what follows
+  StageState state_;
+  double start_ = 0;
+  bool running_ = false;
+};
+
+double steady_seconds() {
+  using std::chrono::steady_clock;
+  return std::chrono::duration<double>(steady_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+std::unique_ptr<Progress> make_progress(int fd, bool terminal, Clock clock) {
+  return std::make_unique<FileProgress>(fd, terminal, std::move(clock));
+}
+
+std::unique_ptr<Progress> make_stderr_progress() {
+  return make_progress(STDERR_FILENO, isatty(STDERR_FILENO) == 1, steady_seconds);
+}
+
+}  // namespace ptc

@@ -1,0 +1,26 @@
+// Sorted surfels to a container: point pages, octree, node pages.
+#pragma once
+
+#include <cstdint>
+
+#include "engine/base/progress.h"
+#include "engine/sort/external_sort.h"
+#include "engine/store/writer.h"
+
+namespace ptc {
+
+struct BuildOptions {
+  std::uint32_t leaf_points = 8;  ///< a cell with no more points is not split, 1 to kMaxLeafPoints
+  /// Levels of groups that share a stream of node pages: 1 keeps each level to itself, 63 puts all
+  /// in the order in which they are finished, which is depth-first (spec/nodes.md#page-order).
+  int levels_per_stream = 1;
+};
+
+/// Writes the pages of all points and nodes in one pass.
+/// @param points  ascending keys in `frame`'s lattice
+/// @return  the superblock for ContainerWriter::finish(), its counts, frame, bounds and totals filled
+/// Memory: one open page per stream, a page of points.   Deterministic.
+[[nodiscard]] Superblock build_pages(PointStream& points, const Frame& frame, ContainerWriter& writer,
+                                     const BuildOptions& options, Progress& progress);
+
+}  // namespace ptc

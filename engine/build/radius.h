@@ -1,0 +1,20 @@
+// Radii for clouds that come without.
+#pragma once
+
+#include <memory>
+
+#include "engine/sort/external_sort.h"
+
+namespace ptc {
+
+/// Gives every sorted surfel whose radius is 0 one that lets its disc reach its neighbours:
+/// r = d sqrt(pi / 12), d the distance to the 6th nearest point, which circumscribes the square cell
+/// of an even sampling; held to 3 times the median of its chunk, so that stray points stay small.
+///
+/// Neighbours are searched among 2^16 points of the Z-curve and 2^13 on either side: chunks are
+/// counted from the first point, so the result does not depend on memory or threads.
+/// @param sorted  must outlive the result
+/// @param unit    lattice unit in scene units
+[[nodiscard]] std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit);
+
+}  // namespace ptc

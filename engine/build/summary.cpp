@@ -1,0 +1,121 @@
+// What a node knows of its surfels (spec/nodes.md#summary).
+#include <algorithm>
+#include <cmath>
+
+#include "engine/build/octree.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+using Vec3 = std::array<double, 3>;
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double distance(const Vec3& a, const Vec3& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
+Vec3 mean_normal(const NodeSummary& node) {
+  return {node.facing[0] - node.facing[1], node.facing[2] - node.facing[3],
+          node.facing[4] - node.facing[5]};
+}
+
+/// Axis of the normal cone; +z with a full cone when the normals cancel out.
+bool set_cone_axis(NodeSummary& node) {
+  const Vec3 sum = mean_normal(node);
+  const double length = std::sqrt(dot(sum, sum));
+  node.cone_axis = {0, 0, 1};
+  if (!(length > 1e-6 * node.area)) return false;
+  for (std::size_t k = 0; k < 3; ++k) node.cone_axis[k] = static_cast<float>(sum[k] / length);
+  return true;
+}
+
+/// One colour for all directions where the surfels face nearly the same way: there the split by
+/// axis only adds quantisation (measured in spec/nodes.md#summary).
+void flatten(NodeSummary& node) {
+  constexpr double kFlat = 0.3;  // largest (area - |vector area|) / |vector area|
+  const Vec3 sum = mean_normal(node);
+  const double vector_area = std::sqrt(dot(sum, sum));
+  if (node.area - vector_area > kFlat * vector_area) return;
+  double weight = 0;
+  Vec3 flux{};
+  for (std::size_t k = 0; k < 6; ++k) {
+    weight += node.facing[k];
+    for (std::size_t c = 0; c < 3; ++c) flux[c] += node.flux[k][c];
+  }
+  if (!(weight > 0)) return;
+  for (std::size_t k = 0; k < 6; ++k) {
+    for (std::size_t c = 0; c < 3; ++c) node.flux[k][c] = node.facing[k] * flux[c] / weight;
+  }
+}
+
+}  // namespace
+
+NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
+  NodeSummary node;
+  const auto position = [](const PointRecord& p) {
+    const LatticePoint q = decode_morton(p.key);
+    return Vec3{static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])};
+  };
+  double weight = 0;
+  const bool has_area = std::ranges::any_of(points, [](const PointRecord& p) { return p.radius > 0; });
+  for (const PointRecord& p : points) {
+    const double area = 2.0 * p.radius * p.radius;
+    const double w = has_area ? area : 1.0;  // points without extent still have a middle
+    const Vec3 at = position(p);
+    for (std::size_t k = 0; k < 3; ++k) node.mean[k] += w * at[k];
+    weight += w;
+    node.area += area;
+    const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double facing = area * std::max(0.0, static_cast<double>(k % 2 == 0 ? n[k / 2] : -n[k / 2]));
+      node.facing[k] += facing;
+      for (std::size_t c = 0; c < 3; ++c) {
+        node.flux[k][c] += facing * static_cast<double>(decode_half(p.radiance[c]));
+      }
+    }
+  }
+  for (double& m : node.mean) m /= weight;
+  const bool has_axis = set_cone_axis(node);
+  node.cone_cos = has_axis ? 1.0F : -1.0F;
+  for (const PointRecord& p : points) {
+    node.radius = std::max(node.radius, distance(position(p), node.mean) + static_cast<double>(p.radius) / unit);
+    if (!has_axis) continue;
+    const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
+    const float cosine = n[0] * node.cone_axis[0] + n[1] * node.cone_axis[1] + n[2] * node.cone_axis[2];
+    node.cone_cos = std::clamp(cosine, -1.0F, node.cone_cos);
+  }
+  flatten(node);
+  return node;
+}
+
+NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
+  NodeSummary sum;
+  double weight = 0;
+  const bool has_area = std::ranges::any_of(nodes, [](const NodeSummary* n) { return n->area > 0; });
+  for (const NodeSummary* node : nodes) {
+    const double w = has_area ? node->area : 1.0;
+    for (std::size_t k = 0; k < 3; ++k) sum.mean[k] += w * node->mean[k];
+    weight += w;
+    sum.area += node->area;
+    for (std::size_t k = 0; k < 6; ++k) {
+      sum.facing[k] += node->facing[k];
+      for (std::size_t c = 0; c < 3; ++c) sum.flux[k][c] += node->flux[k][c];
+    }
+  }
+  for (double& m : sum.mean) m /= weight;
+  double angle = set_cone_axis(sum) ? 0 : M_PI;
+  for (const NodeSummary* node : nodes) {
+    sum.radius = std::max(sum.radius, distance(node->mean, sum.mean) + node->radius);
+    const double cosine = static_cast<double>(sum.cone_axis[0] * node->cone_axis[0] +
+                                              sum.cone_axis[1] * node->cone_axis[1] +
+                                              sum.cone_axis[2] * node->cone_axis[2]);
+    angle = std::max(angle, std::acos(std::clamp(cosine, -1.0, 1.0)) +
+                                std::acos(std::clamp(static_cast<double>(node->cone_cos), -1.0, 1.0)));
+  }
+  sum.cone_cos = angle >= M_PI ? -1.0F : static_cast<float>(std::cos(angle));
+  flatten(sum);
+  return sum;
+}
+
+}  // namespace ptc

@@ -1,0 +1,115 @@
+// Pages in memory under a hard cap: a shared LRU level and a per-thread level in front of it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "engine/store/reader.h"
+
+namespace ptc {
+
+struct CacheOptions {
+  std::uint64_t memory_bytes = std::uint64_t{512} << 20;  ///< frames and tables together
+  unsigned threads = 1;                                   ///< how many readers will exist at once
+  ContainerReader::Access access = ContainerReader::Access::pread;
+  /// Pages that a reader keeps pinned, a power of two up to 256; 0: as many as the frames allow.
+  std::uint32_t local_slots = 0;
+};
+
+struct CacheStatistics {
+  std::uint64_t lookups = 0;      ///< PageReader::get calls: the sum of the next three
+  std::uint64_t local_hits = 0;   ///< answered by the thread's own level
+  std::uint64_t shared_hits = 0;  ///< found in a frame, or joined another thread's read
+  std::uint64_t misses = 0;       ///< pages read, failed reads included
+  std::uint64_t evictions = 0;
+  std::uint64_t bytes_read = 0;   ///< stored bytes of pages that arrived, headers included
+  std::uint64_t frames = 0;       ///< frames there are: what the cap allows and the file can use
+  std::uint64_t peak_frames = 0;  ///< most that were in use at once
+  [[nodiscard]] double hit_rate() const noexcept;  ///< 1 - misses / lookups; 1 without lookups
+};
+
+/// The shared level. A page is read once even when several threads ask for it at the same time
+/// (single flight); reading and verifying happen outside the lock. Of the pages that no reader has
+/// pinned, the one unpinned longest ago leaves first.
+///
+/// A page that cannot be read fails for all who wait for it; who asks later tries again.
+/// Memory: frames of one page size each in one block, 4 bytes a page of the container, and for each
+/// reader its table, its decoder and a buffer for one stored page; all of it within the cap. The
+/// container's own directory is not counted.
+/// Threads: a PageCache may be shared; each thread makes its own PageReader.
+class PageCache {
+ public:
+  /// @param container  outlives the cache
+  /// @throws std::invalid_argument naming the least cap that works, when the cap is below it, or
+  /// when there are no threads or local_slots is not a power of two that the frames allow
+  PageCache(const ContainerReader& container, const CacheOptions& options);
+  ~PageCache();
+  PageCache(const PageCache&) = delete;
+  PageCache& operator=(const PageCache&) = delete;
+
+  /// Least cap for so many threads: two frames each, and the tables.
+  [[nodiscard]] static std::uint64_t least_bytes(const ContainerReader& container,
+                                                 unsigned threads);
+  /// Least cap that gives so many frames.
+  [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads,
+                                               std::uint64_t frames);
+  [[nodiscard]] const ContainerReader& container() const noexcept;
+  /// Sums over the shared level and all readers that have ended. Of a living reader, local hits
+  /// since it last went to the shared level are missing.
+  [[nodiscard]] CacheStatistics statistics() const;
+  /// Pages that each reader keeps pinned.
+  [[nodiscard]] std::uint32_t local_slots() const noexcept;
+
+ private:
+  friend class PageReader;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A thread's way to pages: a direct-mapped table of pinned pages, so a repeated access takes no
+/// lock and writes nothing shared. Not thread-safe: one per thread.
+class PageReader {
+ public:
+  /// @param cache  outlives the reader
+  /// @throws std::invalid_argument when as many readers as CacheOptions::threads exist already
+  explicit PageReader(PageCache& cache);
+  ~PageReader();
+  PageReader(const PageReader&) = delete;
+  PageReader& operator=(const PageReader&) = delete;
+
+  /// A resident page. `payload` stays valid until the next get() of this reader, aligned to 64.
+  /// Bytes up to 64 past the payload may be read (they are zero or stale, never unmapped).
+  struct Page {
+    const std::byte* payload = nullptr;
+    std::uint32_t bytes = 0;
+    std::uint32_t record_count = 0;
+  };
+  /// @param page  below the container's page count
+  /// @throws FormatError, DataError, std::system_error when the page cannot be read, the same for
+  /// all who wait for it; std::invalid_argument when there is no such page. The reader stays
+  /// usable.
+  [[nodiscard]] Page get(std::uint32_t page) {
+    const Slot& slot = table_[page & mask_];
+    ++lookups_;
+    if (slot.page == page) return slot.view;
+    return load(page);
+  }
+
+ private:
+  struct Slot {
+    std::uint32_t page = kNoPage;
+    std::uint32_t frame = 0;  ///< pinned while `page` is not kNoPage
+    Page view;
+  };
+  Page load(std::uint32_t page);
+
+  PageCache& cache_;
+  std::unique_ptr<Slot[]> table_;
+  std::uint32_t mask_;
+  std::uint64_t lookups_ = 0;  ///< since the shared level was last told
+  PageDecoder decoder_;
+};
+
+}  // namespace ptc

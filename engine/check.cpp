@@ -1,0 +1,87 @@
+#include "engine/check.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/memory.h"
+#include "engine/scene/mesh_reference.h"
+#include "engine/shade/brute_force.h"
+#include "engine/stages.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kMostSurfels = 50'000'000;
+
+CheckError errors(std::span<const Shading> ours, std::span<const Shading> rays) {
+  CheckError e;
+  double irradiance_square = 0;
+  const double count = static_cast<double>(ours.size());
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    const double occlusion = static_cast<double>(ours[i].occlusion - rays[i].occlusion);
+    e.occlusion_rms += occlusion * occlusion / count;
+    e.occlusion_bias += occlusion / count;
+    e.occlusion_mean += static_cast<double>(rays[i].occlusion) / count;
+    for (int c = 0; c < 3; ++c) {
+      const double irradiance = static_cast<double>(ours[i].irradiance[c] - rays[i].irradiance[c]);
+      irradiance_square += irradiance * irradiance / (3 * count);
+      e.irradiance_bias += irradiance / (3 * count);
+      e.irradiance_mean += static_cast<double>(rays[i].irradiance[c]) / (3 * count);
+    }
+  }
+  e.occlusion_rms = std::sqrt(e.occlusion_rms);
+  if (e.irradiance_mean > 0) {
+    e.irradiance_rms = std::sqrt(irradiance_square) / e.irradiance_mean;
+    e.irradiance_bias /= e.irradiance_mean;
+  }
+  return e;
+}
+
+/// Calls body(i) for all i and returns the CPU microseconds of one call.
+template <class Body>
+double timed(std::size_t count, const Executor& executor, const Body& body) {
+  const double before = cpu_seconds();
+  executor.for_each(count, [&](std::size_t i, unsigned) { body(i); });
+  return (cpu_seconds() - before) * 1e6 / static_cast<double>(count);
+}
+
+}  // namespace
+
+CheckSample::CheckSample(const CheckRequest& request, std::uint64_t expected)
+    : request_(request),
+      stride_(request.receivers == 0 ? 0 : std::max<std::uint64_t>(1, expected / request.receivers)) {}
+
+void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shading> results) {
+  if (stride_ == 0) return;
+  for (std::size_t i = 0; i < receivers.size(); ++i) {
+    if (seen_++ % stride_ != stride_ / 2) continue;
+    receivers_.push_back(receivers[i]);
+    results_.push_back(results[i]);
+  }
+}
+
+CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const Sky& sky,
+                                 const DirectLight* light, const RayScene* mesh,
+                                 const LightSampling& sampling, const Executor& executor) const {
+  CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
+  if (receivers_.empty()) return report;
+  std::vector<Shading> traced(receivers_.size());
+  {
+    const std::vector<Surfel> surfels = load_surfels(scene, kMostSurfels);
+    const DiscRays discs(surfels, sides, sky_function(sky));
+    report.disc_microseconds = timed(receivers_.size(), executor, [&](std::size_t i) {
+      traced[i] = discs.trace(receivers_[i], request_.rays, i);
+    });
+  }
+  report.discs = errors(results_, traced);
+  if (!light || !mesh) return report;
+  report.mesh_microseconds = timed(receivers_.size(), executor, [&](std::size_t i) {
+    const RayTraced seen = trace_mesh(*mesh, *light, receivers_[i].position, receivers_[i].normal,
+                                      request_.rays, sampling, i);
+    traced[i] = {.occlusion = seen.occlusion, .irradiance = seen.irradiance, .sky = seen.sky};
+  });
+  report.mesh = errors(results_, traced);
+  return report;
+}
+
+}  // namespace ptc

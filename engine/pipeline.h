@@ -1,0 +1,149 @@
+// The calls a user needs: scene to container, container to shaded points, container to picture.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/progress.h"
+#include "engine/build/build.h"
+#include "engine/cache/page_cache.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/lights.h"
+#include "engine/scene/sampler.h"
+#include "engine/shade/shading.h"
+#include "engine/sort/external_sort.h"
+#include "format/codec.h"
+
+namespace ptc {
+
+/// What every long run is given.
+struct RunOptions {
+  std::uint64_t memory_bytes = std::uint64_t{2} << 30;  ///< cap on resident bytes, caches included
+  unsigned threads = 0;                                 ///< 0: as many as cores
+  std::filesystem::path temp_dir;                       ///< empty: the output's directory
+};
+
+/// Seconds of wall time by stage, in the order in which they ran.
+using StageSeconds = std::vector<std::pair<std::string, double>>;
+
+struct BuildRequest {
+  std::vector<std::filesystem::path> inputs;  ///< meshes and clouds
+  std::uint64_t city_points = 0;              ///< the procedural city instead of inputs
+  bool backdrop = false;                      ///< sets the meshes on a ground before a red wall
+  LightRig lights;                            ///< of the meshes; clouds come lit
+  SamplingOptions sampling;
+  BuildOptions tree;
+  std::uint8_t page_shift = 16;
+  Codec codec = Codec::zstd;
+  RunOptions run;
+};
+
+struct BuildReport {
+  Superblock superblock;
+  SortStatistics sort;
+  StageSeconds seconds;
+};
+
+/// Samples and lights meshes, reads clouds, sorts, builds the octree and publishes the container.
+/// The same request gives the same bytes for any number of threads and any cap.
+/// @throws DataError for bad input, std::invalid_argument for a cap that is too small (the text
+///         names the least that works), std::system_error
+BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
+                            Progress& progress);
+
+/// The meshes of a request as they are sampled: one mesh, with the backdrop.
+[[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, bool backdrop,
+                               std::vector<MeshCamera>* cameras = nullptr);
+
+/// A check of some receivers against rays, in the same run. It loads all surfels (and the mesh) into
+/// Embree, outside the memory cap.
+struct CheckRequest {
+  unsigned receivers = 0;  ///< about so many, spread over all; 0: no check
+  unsigned rays = 4096;    ///< cosine-distributed, for each receiver
+};
+
+/// Errors over the receivers of a check: root mean square and mean of (ours - rays).
+struct CheckError {
+  double occlusion_rms = 0;    ///< absolute, occlusion is 0 to 1
+  double occlusion_bias = 0;
+  double occlusion_mean = 0;   ///< of the rays
+  double irradiance_rms = 0;   ///< over the mean of the rays
+  double irradiance_bias = 0;  ///< likewise
+  double irradiance_mean = 0;  ///< of the rays, over receivers and RGB
+};
+
+struct CheckReport {
+  std::size_t receivers = 0;
+  unsigned rays = 0;
+  CheckError discs;                ///< against rays at the same surfels
+  std::optional<CheckError> mesh;  ///< against rays at the mesh, when there is one
+  double disc_microseconds = 0;    ///< CPU time of one receiver's rays at the surfels
+  double mesh_microseconds = 0;
+};
+
+struct ShadeRequest {
+  std::filesystem::path scene;      ///< surfels that occlude and emit
+  std::filesystem::path receivers;  ///< a cloud or container to shade; empty: the scene's own points
+  GatherOptions gather;
+  float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii
+  std::optional<Sky> sky;           ///< empty: the one that the scene was built with
+  ContainerReader::Access access = ContainerReader::Access::pread;
+  CheckRequest check;
+  RunOptions run;
+};
+
+struct ShadeReport {
+  std::uint64_t receivers = 0;
+  double shade_cpu_seconds = 0;  ///< of the gather alone, all threads
+  GatherCounts gather;
+  CacheStatistics cache;
+  std::optional<CheckReport> check;
+  StageSeconds seconds;
+};
+
+/// Shades every receiver and writes them to `target`: .ptcx (the receivers' container with the new
+/// channels occlusion, bent_normal, irradiance, sky, indirect) or .ply (the same as columns);
+/// indirect = albedo / pi * (irradiance + sky).
+ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
+                            Progress& progress);
+
+/// A picture file and what it shows.
+struct PictureTarget {
+  std::filesystem::path path;    ///< .exr: all layers; .png: one
+  std::string layer = "beauty";  ///< of a PNG: beauty, direct, indirect, occlusion (white: open), albedo
+};
+
+struct RenderRequest {
+  std::filesystem::path scene;
+  std::vector<std::filesystem::path> meshes;  ///< what the camera sees; empty: the surfels themselves
+  bool backdrop = false;
+  std::optional<Camera> camera;   ///< empty: the mesh's or the build's, else a view of everything
+  std::optional<std::array<unsigned, 2>> size;  ///< width and height in place of the camera's
+  unsigned samples = 4;           ///< per pixel, a square number
+  std::optional<LightRig> lights; ///< empty: those that the scene was built with
+  LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
+  GatherOptions gather;
+  float lift = 0.15F;             ///< receivers rise by so many radii of a surfel of the scene's spacing
+  float exposure = 0;             ///< stops, for PNGs of light
+  ContainerReader::Access access = ContainerReader::Access::pread;
+  CheckRequest check;
+  RunOptions run;
+};
+
+/// Renders to .exr (beauty as RGB and the layers direct, indirect, occlusion, bent_normal, albedo,
+/// alpha) and .png (one of them).
+///
+/// direct = emission + albedo / pi * (lights + sky), indirect = albedo / pi * irradiance from
+/// surfaces, beauty = both; pixels that meet nothing show the sky.
+/// @param targets  one or more files, all from one rendering
+ShadeReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
+                           Progress& progress);
+
+}  // namespace ptc

@@ -1,0 +1,263 @@
+// Container to picture (engine/pipeline.h).
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+
+#include "engine/base/memory.h"
+#include "engine/check.h"
+#include "engine/io/image.h"
+#include "engine/pipeline.h"
+#include "engine/primary.h"
+#include "engine/shade/shader.h"
+#include "engine/stages.h"
+
+namespace ptc {
+namespace {
+
+constexpr unsigned kTileSamples = 256;            // side of a tile, in samples
+constexpr std::uint64_t kReceiverBytes = 320;     // of one sample of a tile: hit, receiver, result, order
+constexpr std::uint64_t kLeastCache = 16 << 20;
+
+/// Sums over the samples of every pixel.
+struct Film {
+  unsigned width, height;
+  std::vector<glm::vec3> beauty, direct, indirect, bent_normal, albedo;
+  std::vector<float> occlusion, alpha;
+
+  Film(unsigned w, unsigned h) : width(w), height(h) {
+    const std::size_t pixels = std::size_t{w} * h;
+    for (auto* layer : {&beauty, &direct, &indirect, &bent_normal, &albedo}) layer->resize(pixels, glm::vec3(0));
+    for (auto* layer : {&occlusion, &alpha}) layer->resize(pixels, 0);
+  }
+
+  static constexpr std::uint64_t kBytes = 5 * sizeof(glm::vec3) + 2 * sizeof(float);
+
+  void add(std::size_t pixel, const PrimaryHit& hit, const Shading& s, float weight) {
+    const glm::vec3 reflect = hit.albedo * std::numbers::inv_pi_v<float>;
+    const glm::vec3 lit = hit.direct + (hit.sky_included ? glm::vec3(0) : reflect * s.sky);
+    const glm::vec3 bounced = reflect * s.irradiance;
+    direct[pixel] += weight * lit;
+    indirect[pixel] += weight * bounced;
+    beauty[pixel] += weight * (lit + bounced);
+    bent_normal[pixel] += weight * s.bent_normal;
+    albedo[pixel] += weight * hit.albedo;
+    occlusion[pixel] += weight * s.occlusion;
+    alpha[pixel] += weight;
+  }
+};
+
+std::vector<float> flatten(const std::vector<glm::vec3>& values) {
+  std::vector<float> flat;
+  flat.reserve(values.size() * 3);
+  for (const glm::vec3& v : values) flat.insert(flat.end(), {v.x, v.y, v.z});
+  return flat;
+}
+
+void write_layers(const std::filesystem::path& target, const Film& film) {
+  using Kind = ExrLayer::Kind;
+  write_exr(target, film.width, film.height,
+            {{"", Kind::colour, false, flatten(film.beauty)},
+             {"direct", Kind::colour, false, flatten(film.direct)},
+             {"indirect", Kind::colour, false, flatten(film.indirect)},
+             {"albedo", Kind::colour, false, flatten(film.albedo)},
+             {"occlusion", Kind::scalar, false, film.occlusion},
+             {"alpha", Kind::scalar, false, film.alpha},
+             {"bent_normal", Kind::vector, true, flatten(film.bent_normal)}});
+}
+
+void write_layer_png(const PictureTarget& target, const Film& film, float exposure) {
+  Image image{.width = film.width, .height = film.height};
+  if (target.layer == "occlusion") {
+    for (std::size_t i = 0; i < film.occlusion.size(); ++i) image.pixels.emplace_back(1 - film.occlusion[i]);
+  } else {
+    image.pixels = target.layer == "direct"     ? film.direct
+                   : target.layer == "indirect" ? film.indirect
+                   : target.layer == "albedo"   ? film.albedo
+                                                : film.beauty;
+    const float gain = target.layer == "albedo" ? 1 : std::exp2(exposure);
+    for (glm::vec3& pixel : image.pixels) pixel *= gain;
+  }
+  write_png(target.path, image);
+}
+
+/// A view of everything: from the front, the right and above.
+Camera overview(const Superblock& superblock, bool backdrop) {
+  const glm::dvec3 low(superblock.bounds_low[0], superblock.bounds_low[1], superblock.bounds_low[2]);
+  const glm::dvec3 high(superblock.bounds_high[0], superblock.bounds_high[1], superblock.bounds_high[2]);
+  const double size = glm::length(high - low) * (backdrop ? 0.4 : 1.0);
+  Camera camera;
+  camera.look_at = (low + high) * 0.5;
+  camera.position = camera.look_at + glm::normalize(glm::dvec3(0.45, 0.35, 1)) * size * 1.4;
+  return camera;
+}
+
+Camera choose_camera(const RenderRequest& request, const ContainerReader& scene,
+                     const std::vector<MeshCamera>& cameras) {
+  Camera camera;
+  const auto& text = scene.meta().text;
+  const auto recorded = text.find(kCameraKey);
+  if (request.camera) {
+    camera = *request.camera;
+  } else if (recorded != text.end()) {
+    camera = camera_from_json(recorded->second);
+  } else if (cameras.empty()) {
+    camera = overview(scene.superblock(), request.backdrop);
+  } else {
+    const MeshCamera& from = cameras.front();
+    const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
+    camera.position = from.position;
+    camera.look_at = from.position + glm::dvec3(from.forward);
+    camera.up = from.up;
+    camera.vertical_fov = 2 * std::atan(std::tan(from.horizontal_fov * 0.5F) / aspect);
+  }
+  if (request.size) {
+    camera.width = (*request.size)[0];
+    camera.height = (*request.size)[1];
+  }
+  return camera;
+}
+
+/// What the camera sees and what lights it, alive as long as the view.
+struct Subject {
+  Mesh mesh;
+  std::unique_ptr<RayScene> rays;
+  std::unique_ptr<DirectLight> light;
+  std::unique_ptr<PrimaryView> view;
+};
+
+/// Renders one tile of samples into the film.
+class TileRenderer {
+ public:
+  TileRenderer(const PrimaryView& view, Shader& shader, Film& film, const Camera& camera, unsigned side,
+               const Sky& sky, CheckSample& check, const Executor& executor)
+      : view_(view), shader_(shader), film_(film), camera_(camera), side_(side), sky_(sky), check_(check),
+        executor_(executor) {}
+
+  void render(unsigned x0, unsigned y0, unsigned x1, unsigned y1, Progress& progress) {
+    find_hits(x0, y0, x1, y1);
+    receivers_.clear();
+    for (const auto& hit : hits_) {
+      if (hit) receivers_.push_back({hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
+    }
+    results_.resize(receivers_.size());
+    const double before = cpu_seconds();
+    shader_.shade(receivers_, results_, progress);
+    cpu_ += cpu_seconds() - before;
+    check_.add(receivers_, results_);
+    expose(x0, y0, x1);
+    progress.advance(hits_.size() - receivers_.size());
+  }
+
+  [[nodiscard]] double shade_cpu_seconds() const { return cpu_; }
+
+ private:
+  void find_hits(unsigned x0, unsigned y0, unsigned x1, unsigned y1) {
+    const std::size_t columns = x1 - x0;
+    hits_.assign(columns * (y1 - y0), std::nullopt);
+    executor_.for_each(y1 - y0, [&](std::size_t row, unsigned) {
+      for (std::size_t i = 0; i < columns; ++i) {
+        hits_[row * columns + i] = view_.at(x0 + static_cast<unsigned>(i), y0 + static_cast<unsigned>(row));
+      }
+    });
+  }
+
+  void expose(unsigned x0, unsigned y0, unsigned x1) {
+    const float weight = 1.0F / static_cast<float>(side_ * side_);
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < hits_.size(); ++i) {
+      const unsigned x = x0 + static_cast<unsigned>(i % (x1 - x0));
+      const unsigned y = y0 + static_cast<unsigned>(i / (x1 - x0));
+      const std::size_t pixel = std::size_t{y / side_} * film_.width + x / side_;
+      if (hits_[i]) {
+        film_.add(pixel, *hits_[i], results_[next++], weight);
+      } else {
+        const float scale = 1.0F / static_cast<float>(side_);
+        film_.beauty[pixel] += weight * sky_.at(camera_.direction((static_cast<float>(x) + 0.5F) * scale,
+                                                                  (static_cast<float>(y) + 0.5F) * scale));
+      }
+    }
+  }
+
+  const PrimaryView& view_;
+  Shader& shader_;
+  Film& film_;
+  const Camera& camera_;
+  unsigned side_;
+  const Sky& sky_;
+  CheckSample& check_;
+  const Executor& executor_;
+  std::vector<std::optional<PrimaryHit>> hits_;
+  std::vector<Receiver> receivers_;
+  std::vector<Shading> results_;
+  double cpu_ = 0;
+};
+
+}  // namespace
+
+ShadeReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets, Progress& progress) {
+  ShadeReport report;
+  const Executor executor(request.run.threads);
+  const ContainerReader scene(request.scene);
+  const LightRig lights = request.lights ? *request.lights : recorded_lights(scene);
+  const auto side = static_cast<unsigned>(std::lround(std::sqrt(request.samples)));
+  if (side * side != request.samples) throw std::invalid_argument("samples per pixel must be a square number");
+
+  std::vector<MeshCamera> cameras;
+  Subject subject;
+  subject.mesh = load_meshes(request.meshes, request.backdrop, &cameras);
+  const Camera camera = choose_camera(request, scene, cameras);
+  const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
+  const std::uint64_t samples = std::uint64_t{camera.width} * camera.height * request.samples;
+  if (!subject.mesh.triangles.empty()) {
+    subject.rays = std::make_unique<RayScene>(subject.mesh);
+    subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
+    subject.view = view_mesh(*subject.rays, *subject.light, request.light_sampling, camera, side,
+                             request.lift * static_cast<float>(surfel_radius));
+  } else {
+    const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
+    subject.view = view_surfels(scene, camera, side, request.lift, progress);
+  }
+
+  Film film(camera.width, camera.height);
+  ShadeOptions options{.access = request.access, .gather = request.gather, .sky = sky_function(lights.sky)};
+  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSamples} * kTileSamples * kReceiverBytes +
+                              std::uint64_t{camera.width} * camera.height * Film::kBytes +
+                              (subject.rays ? mesh_bytes(subject.mesh) : samples * 24);
+  options.cache_bytes = memory_left(request.run, taken,
+                                    std::max(kLeastCache, PageCache::least_bytes(scene, executor.threads())),
+                                    "this picture");
+  Shader shader(scene, options, executor);
+  CheckSample check(request.check, samples);
+  {
+    const Stage stage(report.seconds, progress, "render", samples, "samples");
+    TileRenderer tiles(*subject.view, shader, film, camera, side, lights.sky, check, executor);
+    const unsigned width = camera.width * side, height = camera.height * side;
+    for (unsigned y = 0; y < height; y += kTileSamples) {
+      for (unsigned x = 0; x < width; x += kTileSamples) {
+        tiles.render(x, y, std::min(width, x + kTileSamples), std::min(height, y + kTileSamples), progress);
+      }
+    }
+    report.shade_cpu_seconds = tiles.shade_cpu_seconds();
+  }
+  for (const PictureTarget& target : targets) {
+    if (target.path.extension() == ".exr") {
+      write_layers(target.path, film);
+    } else {
+      write_layer_png(target, film, request.exposure);
+    }
+  }
+  report.gather = shader.counts();
+  report.receivers = report.gather.receivers;
+  report.cache = shader.cache_statistics();
+  if (request.check.receivers > 0) {
+    const Stage stage(report.seconds, progress, "check", request.check.receivers, "receivers");
+    report.check = check.compare(scene, request.gather.sides, lights.sky, subject.light.get(), subject.rays.get(),
+                                 {.sun_rays = 1, .area_rays = 1, .sky_rays = 1}, executor);
+  }
+  return report;
+}
+
+}  // namespace ptc

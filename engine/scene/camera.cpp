@@ -1,0 +1,85 @@
+// The pinhole's geometry and its JSON record.
+#include "engine/scene/camera.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <glm/geometric.hpp>
+
+#include "engine/scene/json_fields.h"
+
+namespace ptc {
+namespace {
+
+constexpr Range kFinite{-std::numeric_limits<float>::max(), std::numeric_limits<float>::max()};
+constexpr Range kFiniteWide{-std::numeric_limits<double>::max(),
+                            std::numeric_limits<double>::max()};
+constexpr Range kFov{1e-4, 3.1415};
+constexpr Range kPixels{1, 65536};
+
+bool is_finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+double half_height(const Camera& camera) {
+  return std::tan(0.5 * static_cast<double>(camera.vertical_fov));
+}
+
+}  // namespace
+
+CameraAxes axes_of(const Camera& camera) {
+  const glm::dvec3 view = camera.look_at - camera.position;
+  const double distance = glm::length(view);
+  const glm::dvec3 forward = distance > 0 ? view / distance : glm::dvec3(0, 0, -1);
+  glm::dvec3 right = glm::cross(forward, glm::dvec3(camera.up));
+  if (!(glm::length(right) > 1e-6 * glm::length(glm::dvec3(camera.up)))) {
+    right =
+        glm::cross(forward, std::abs(forward.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, -1));
+  }
+  right = glm::normalize(right);
+  return {right, glm::cross(right, forward), forward};
+}
+
+glm::vec3 Camera::direction(float x, float y) const {
+  const CameraAxes axes = axes_of(*this);
+  const double pixel = 2 * half_height(*this) / height;
+  const double across = (static_cast<double>(x) - 0.5 * width) * pixel;
+  const double upward = (0.5 * height - static_cast<double>(y)) * pixel;
+  return glm::vec3(glm::normalize(axes.forward + across * axes.right + upward * axes.up));
+}
+
+float Camera::pixel_angle() const {
+  return static_cast<float>(std::atan(2 * half_height(*this) / height));
+}
+
+std::string to_json(const Camera& camera) {
+  if (!is_finite(camera.position) || !is_finite(camera.look_at) ||
+      !is_finite(glm::dvec3(camera.up)) || !std::isfinite(camera.vertical_fov)) {
+    throw std::invalid_argument("camera: a member is not finite");
+  }
+  return dump_json(Json{{"position", to_json_array(camera.position)},
+                        {"look_at", to_json_array(camera.look_at)},
+                        {"up", to_json_array(camera.up)},
+                        {"vertical_fov", camera.vertical_fov},
+                        {"width", camera.width},
+                        {"height", camera.height}},
+                   "camera");
+}
+
+Camera camera_from_json(const std::string& text) {
+  const Json json = parse_json(text, "camera");
+  JsonFields fields(json, "camera");
+  Camera camera;
+  fields.read("position", camera.position, kFiniteWide);
+  fields.read("look_at", camera.look_at, kFiniteWide);
+  fields.read("up", camera.up, kFinite);
+  fields.read("vertical_fov", camera.vertical_fov, kFov);
+  fields.read("width", camera.width, kPixels);
+  fields.read("height", camera.height, kPixels);
+  fields.finish();
+  if (glm::dot(camera.up, camera.up) == 0) fields.fail("up must not be zero");
+  return camera;
+}
+
+}  // namespace ptc

@@ -1,0 +1,85 @@
+// Sample points that fill the unit square evenly, scrambled by a seed.
+#pragma once
+
+#include <cstdint>
+
+#include <glm/vec2.hpp>
+
+namespace ptc {
+
+/// A 64-bit hash: neighbouring numbers give unrelated ones.
+/// Source: Steele, Lea and Flood 2014, Fast splittable pseudorandom number generators (SplitMix64).
+[[nodiscard]] constexpr std::uint64_t mix_bits(std::uint64_t x) noexcept {
+  x += 0x9E3779B97F4A7C15u;
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+  return x ^ (x >> 31);
+}
+
+/// The top 24 bits as a number in [0, 1).
+[[nodiscard]] constexpr float to_unit(std::uint32_t bits) noexcept {
+  return static_cast<float>(bits >> 8) * 0x1p-24f;
+}
+
+[[nodiscard]] constexpr std::uint32_t reverse_bits(std::uint32_t x) noexcept {
+  x = (x >> 16) | (x << 16);
+  x = ((x & 0x00FF00FFu) << 8) | ((x >> 8) & 0x00FF00FFu);
+  x = ((x & 0x0F0F0F0Fu) << 4) | ((x >> 4) & 0x0F0F0F0Fu);
+  x = ((x & 0x33333333u) << 2) | ((x >> 2) & 0x33333333u);
+  return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
+}
+
+/// Owen's nested uniform scramble of a number whose bits are reversed: each bit is flipped or not
+/// by what lies below it.
+/// Source: Laine and Karras 2011, Stratified sampling for stochastic transparency, section 3.1.
+[[nodiscard]] constexpr std::uint32_t scramble_reversed(std::uint32_t x,
+                                                        std::uint32_t seed) noexcept {
+  x += seed;
+  x ^= x * 0x6C50B47Cu;
+  x ^= x * 0xB82F1E52u;
+  x ^= x * 0xC7AFE638u;
+  x ^= x * 0x8D22F6E6u;
+  return x;
+}
+
+/// Owen-scrambled points of the Sobol sequence: any 2^k points from a multiple of 2^k on fall one
+/// each into the 2^k boxes of every shape 2^-a x 2^-(k-a).
+/// Source: Sobol 1967; Owen 1995; Burley 2020, Practical hash-based Owen scrambling.
+class SquarePoints {
+ public:
+  explicit constexpr SquarePoints(std::uint64_t seed) noexcept : seed_(mix_bits(seed)) {}
+
+  [[nodiscard]] constexpr glm::vec2 square(std::uint32_t index) const noexcept {
+    return {to_unit(reverse_bits(scramble_reversed(index, low(seed_)))),
+            to_unit(reverse_bits(
+                scramble_reversed(reverse_bits(second_dimension(index)), high(seed_))))};
+  }
+
+  /// A further coordinate, evenly spread by itself and independent of square().
+  [[nodiscard]] constexpr float line(std::uint32_t index) const noexcept {
+    const std::uint64_t seed = mix_bits(seed_);
+    // A shuffle that keeps blocks of 2^k together.
+    const std::uint32_t shuffled = reverse_bits(scramble_reversed(reverse_bits(index), low(seed)));
+    return to_unit(reverse_bits(scramble_reversed(shuffled, high(seed))));
+  }
+
+ private:
+  static constexpr std::uint32_t low(std::uint64_t x) noexcept {
+    return static_cast<std::uint32_t>(x);
+  }
+  static constexpr std::uint32_t high(std::uint64_t x) noexcept {
+    return static_cast<std::uint32_t>(x >> 32);
+  }
+  // Direction numbers of the second dimension: Pascal's triangle modulo 2, row by row.
+  static constexpr std::uint32_t second_dimension(std::uint32_t index) noexcept {
+    std::uint32_t result = 0;
+    for (std::uint32_t row = 0x80000000u; index != 0; index >>= 1, row ^= row >> 1) {
+      if ((index & 1u) != 0) result ^= row;
+    }
+    return result;
+  }
+
+  std::uint64_t seed_;
+};
+
+}  // namespace ptc

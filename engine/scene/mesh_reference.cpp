@@ -1,0 +1,63 @@
+// A receiver's hemisphere, ray by ray.
+#include "engine/scene/mesh_reference.h"
+
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+#include "engine/scene/directions.h"
+#include "engine/scene/low_discrepancy.h"
+#include "engine/scene/step_off.h"
+
+namespace ptc {
+namespace {
+
+bool is_double_sided(const Mesh& mesh, std::uint32_t triangle) {
+  return mesh.materials[mesh.material_of[triangle]].double_sided;
+}
+
+// Radiance that leaves a hit towards where the ray came from.
+glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const SurfaceHit& hit,
+                      const LightSampling& sampling, std::uint64_t seed) {
+  if (!hit.front && !is_double_sided(scene.mesh(), hit.triangle)) return glm::vec3(0);
+  const glm::vec3 normal = hit.front ? hit.normal : -hit.normal;
+  const DirectLight::Result direct = light.irradiance(hit.position, normal, sampling, seed);
+  const glm::vec3 reflected = hit.albedo / kPi * (direct.local + direct.sky);
+  return hit.front ? hit.emission + reflected : reflected;
+}
+
+}  // namespace
+
+RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm::dvec3& position,
+                     const glm::vec3& normal, unsigned rays, const LightSampling& sampling,
+                     std::uint64_t seed) {
+  RayTraced result;
+  const glm::vec3 unit = glm::normalize(normal);
+  if (rays == 0 || !std::isfinite(unit.x + unit.y + unit.z)) return result;
+  const std::optional<glm::dvec3> origin = step_off(scene, position, unit);
+  if (!origin) {
+    result.occlusion = 1;
+    return result;
+  }
+  const Basis frame(unit);
+  const SquarePoints points(seed);
+  unsigned hits = 0;
+  for (std::uint32_t i = 0; i < rays; ++i) {
+    const glm::vec3 direction = frame.to_world(cosine_direction(points.square(i)));
+    const auto hit = scene.closest(*origin, direction, 0, std::numeric_limits<double>::infinity());
+    if (hit) {
+      ++hits;
+      result.irradiance += radiance_of(scene, light, *hit, sampling, mix_bits(seed) + i);
+    } else {
+      result.sky += light.rig().sky.at(direction);
+    }
+  }
+  const auto count = static_cast<float>(rays);
+  result.occlusion = static_cast<float>(hits) / count;
+  result.irradiance *= kPi / count;
+  result.sky *= kPi / count;
+  return result;
+}
+
+}  // namespace ptc

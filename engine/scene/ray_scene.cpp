@@ -1,0 +1,293 @@
+// Embree's device and scene behind two queries, and the surface at a hit.
+#include "engine/scene/ray_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include <embree3/rtcore.h>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+#include "engine/scene/texture.h"
+
+namespace ptc {
+namespace {
+
+// Embree's own limit is 1.8e18, and it does not forgive a ray beyond it.
+bool is_sane(const glm::vec3& v) {
+  constexpr float kMost = 1e18f;
+  return std::abs(v.x) <= kMost && std::abs(v.y) <= kMost && std::abs(v.z) <= kMost;
+}
+
+void check_mesh(const Mesh& mesh) {
+  const std::size_t vertices = mesh.positions.size();
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("RayScene: ") + what);
+  };
+  require(mesh.normals.empty() || mesh.normals.size() == vertices,
+          "normals are not one per vertex");
+  require(mesh.uvs.empty() || mesh.uvs.size() == vertices, "uvs are not one per vertex");
+  require(mesh.material_of.size() == mesh.triangles.size(), "materials are not one per triangle");
+  for (const glm::vec3& p : mesh.positions) require(is_sane(p), "a position is beyond 1e18");
+  for (const auto& corners : mesh.triangles) {
+    for (const std::uint32_t corner : corners) require(corner < vertices, "corner out of range");
+  }
+  for (const std::uint16_t material : mesh.material_of) {
+    require(material < mesh.materials.size(), "material out of range");
+  }
+}
+
+void check_device(RTCDevice device) {
+  const RTCError error = rtcGetDeviceError(device);
+  if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+  if (error != RTC_ERROR_NONE) {
+    throw std::runtime_error("Embree: error " + std::to_string(static_cast<int>(error)));
+  }
+}
+
+// Owns what rtcNew... returned.
+template <typename Handle, void (*release)(Handle)>
+class Owned {
+ public:
+  explicit Owned(Handle handle) : handle_(handle) {}
+  ~Owned() {
+    if (handle_ != nullptr) release(handle_);
+  }
+  Owned(const Owned&) = delete;
+  Owned& operator=(const Owned&) = delete;
+  operator Handle() const noexcept { return handle_; }
+
+ private:
+  Handle handle_;
+};
+
+// Unit vector along v, or the fallback when v has no direction.
+glm::dvec3 direction_of(const glm::dvec3& v, const glm::dvec3& fallback) {
+  // Scaled first: the square of a tiny triangle's normal underflows.
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (!(largest > 0) || !std::isfinite(largest)) return fallback;
+  return glm::normalize(v / largest);
+}
+
+// A ray in Embree's frame.
+struct LocalRay {
+  glm::vec3 origin;
+  glm::vec3 direction;
+  float near;
+  float far;
+  double skipped;  // how far the origin was moved along the ray
+};
+
+RTCRay to_embree(const LocalRay& ray) {
+  RTCRay out{};
+  out.org_x = ray.origin.x;
+  out.org_y = ray.origin.y;
+  out.org_z = ray.origin.z;
+  out.dir_x = ray.direction.x;
+  out.dir_y = ray.direction.y;
+  out.dir_z = ray.direction.z;
+  out.tnear = ray.near;
+  out.tfar = ray.far;
+  out.mask = ~0u;
+  return out;
+}
+
+// Piece [begin, end] of the line origin + t direction that lies inside a box; empty: begin > end.
+struct Stretch {
+  double begin = -std::numeric_limits<double>::infinity();
+  double end = std::numeric_limits<double>::infinity();
+};
+
+Stretch inside_box(const glm::dvec3& origin, const glm::dvec3& direction, const glm::dvec3& half) {
+  Stretch s;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0) {
+      if (std::abs(origin[axis]) > half[axis]) return {1, 0};
+      continue;
+    }
+    const double a = (-half[axis] - origin[axis]) / direction[axis];
+    const double b = (half[axis] - origin[axis]) / direction[axis];
+    s.begin = std::max(s.begin, std::min(a, b));
+    s.end = std::min(s.end, std::max(a, b));
+  }
+  return s;
+}
+
+}  // namespace
+
+struct RayScene::Impl {
+  explicit Impl(const Mesh& source);
+
+  void measure();
+  void build();
+  [[nodiscard]] std::optional<LocalRay> localise(const glm::dvec3& origin,
+                                                 const glm::vec3& direction, double near,
+                                                 double far) const;
+  [[nodiscard]] glm::dvec3 shading_normal(const std::array<std::uint32_t, 3>& corners, double u,
+                                          double v, const glm::dvec3& geometric) const;
+  [[nodiscard]] glm::vec3 albedo(const Material& material,
+                                 const std::array<std::uint32_t, 3>& corners, float u,
+                                 float v) const;
+
+  const Mesh& mesh;
+  glm::vec3 middle{0};  // Embree's zero, in the mesh's frame
+  glm::dvec3 half_extent{0};
+  double epsilon = 0;
+  Owned<RTCDevice, rtcReleaseDevice> device;
+  Owned<RTCScene, rtcReleaseScene> scene;
+};
+
+RayScene::Impl::Impl(const Mesh& source)
+    : mesh((check_mesh(source), source)),
+      device(rtcNewDevice("set_affinity=0")),
+      scene(device != nullptr ? rtcNewScene(device) : nullptr) {
+  check_device(device);
+  measure();
+  if (!mesh.triangles.empty()) build();
+}
+
+void RayScene::Impl::measure() {
+  if (mesh.positions.empty()) return;
+  glm::vec3 low = mesh.positions.front();
+  glm::vec3 high = low;
+  for (const glm::vec3& p : mesh.positions) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  middle = 0.5f * low + 0.5f * high;
+  half_extent =
+      glm::max(glm::dvec3(high) - glm::dvec3(middle), glm::dvec3(middle) - glm::dvec3(low));
+  const double largest = std::max({half_extent.x, half_extent.y, half_extent.z});
+  constexpr double kUlps = 16 * static_cast<double>(std::numeric_limits<float>::epsilon());
+  epsilon = std::max(kUlps * largest, static_cast<double>(std::numeric_limits<float>::min()));
+}
+
+void RayScene::Impl::build() {
+  const Owned<RTCGeometry, rtcReleaseGeometry> geometry(
+      rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+  auto* const positions = static_cast<glm::vec3*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                              sizeof(glm::vec3), mesh.positions.size()));
+  check_device(device);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) positions[i] = mesh.positions[i] - middle;
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             mesh.triangles.data(), 0, sizeof(mesh.triangles.front()),
+                             mesh.triangles.size());
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene, geometry);
+  // Robust: watertight at edges, and what a ray hits does not depend on the shape of the tree.
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  rtcCommitScene(scene);
+  check_device(device);
+}
+
+// A ray that begins far outside starts where it enters the box around the mesh, so that its origin
+// keeps the precision of the mesh when it becomes float.
+std::optional<LocalRay> RayScene::Impl::localise(const glm::dvec3& origin,
+                                                 const glm::vec3& direction, double near,
+                                                 double far) const {
+  const glm::dvec3 local = (origin - mesh.origin) - glm::dvec3(middle);
+  const glm::dvec3 along(direction);
+  double skipped = 0;
+  if (glm::any(glm::greaterThan(glm::abs(local), half_extent + epsilon))) {
+    const Stretch inside = inside_box(local, along, half_extent + 2 * epsilon);
+    // Negated, so that a ray with a NaN in it misses.
+    if (!(inside.begin <= inside.end && inside.end >= near && inside.begin <= far)) return {};
+    skipped = std::max(inside.begin, 0.0);
+  }
+  const LocalRay ray{glm::vec3(local + along * skipped), direction,
+                     static_cast<float>(std::max(near - skipped, 0.0)),
+                     static_cast<float>(far - skipped), skipped};
+  if (!is_sane(ray.origin) || !is_sane(direction) || !(ray.near <= ray.far)) return {};
+  return ray;
+}
+
+glm::dvec3 RayScene::Impl::shading_normal(const std::array<std::uint32_t, 3>& corners, double u,
+                                          double v, const glm::dvec3& geometric) const {
+  if (mesh.normals.empty()) return geometric;
+  const glm::dvec3 blended = (1 - u - v) * glm::dvec3(mesh.normals[corners[0]]) +
+                             u * glm::dvec3(mesh.normals[corners[1]]) +
+                             v * glm::dvec3(mesh.normals[corners[2]]);
+  const glm::dvec3 normal = direction_of(blended, geometric);
+  if (!std::isfinite(glm::dot(normal, geometric))) return geometric;
+  const double side = glm::dot(normal, geometric);
+  return side < 0 ? normal - 2 * side * geometric : normal;  // mirrored at the surface
+}
+
+glm::vec3 RayScene::Impl::albedo(const Material& material,
+                                 const std::array<std::uint32_t, 3>& corners, float u,
+                                 float v) const {
+  if (!material.texture || mesh.uvs.empty()) return material.albedo;
+  const glm::vec2 uv =
+      (1 - u - v) * mesh.uvs[corners[0]] + u * mesh.uvs[corners[1]] + v * mesh.uvs[corners[2]];
+  return material.albedo * sample_texture(*material.texture, uv);
+}
+
+RayScene::RayScene(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
+RayScene::~RayScene() = default;
+
+const Mesh& RayScene::mesh() const noexcept {
+  return impl_->mesh;
+}
+
+double RayScene::epsilon() const noexcept {
+  return impl_->epsilon;
+}
+
+std::optional<SurfaceHit> RayScene::closest(const glm::dvec3& origin, const glm::vec3& direction,
+                                            double near, double far) const {
+  const std::optional<LocalRay> local = impl_->localise(origin, direction, near, far);
+  if (!local) return {};
+  RTCRayHit query{};
+  query.ray = to_embree(*local);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(impl_->scene, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  SurfaceHit hit = surface(query.hit.primID, query.hit.u, query.hit.v);
+  hit.distance = local->skipped + static_cast<double>(query.ray.tfar);
+  hit.front = glm::dot(hit.geometric_normal, direction) < 0;
+  return hit;
+}
+
+bool RayScene::occluded(const glm::dvec3& origin, const glm::vec3& direction, double near,
+                        double far) const {
+  const std::optional<LocalRay> local = impl_->localise(origin, direction, near, far);
+  if (!local) return false;
+  RTCRay ray = to_embree(*local);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(impl_->scene, &context, &ray);
+  return ray.tfar < 0;
+}
+
+SurfaceHit RayScene::surface(std::uint32_t triangle, float u, float v) const {
+  const Mesh& mesh = impl_->mesh;
+  if (triangle >= mesh.triangles.size()) throw std::invalid_argument("RayScene: no such triangle");
+  const auto& corners = mesh.triangles[triangle];
+  const glm::dvec3 a(mesh.positions[corners[0]]);
+  const glm::dvec3 ab = glm::dvec3(mesh.positions[corners[1]]) - a;
+  const glm::dvec3 ac = glm::dvec3(mesh.positions[corners[2]]) - a;
+  const glm::dvec3 geometric = direction_of(glm::cross(ab, ac), glm::dvec3(0, 0, 1));
+  const double u_wide = static_cast<double>(u);
+  const double v_wide = static_cast<double>(v);
+  const Material& material = mesh.materials[mesh.material_of[triangle]];
+
+  SurfaceHit hit;
+  hit.triangle = triangle;
+  hit.position = mesh.origin + (a + u_wide * ab + v_wide * ac);
+  hit.geometric_normal = glm::vec3(geometric);
+  hit.normal = glm::vec3(impl_->shading_normal(corners, u_wide, v_wide, geometric));
+  hit.albedo = impl_->albedo(material, corners, u, v);
+  hit.emission = material.emission;
+  return hit;
+}
+
+}  // namespace ptc

@@ -1,0 +1,100 @@
+// A point where two walls meet may lie, once rounded, on the far side of the wall it touches; rays
+// from there would let light in. So it is moved into its own triangle, which ends at the wall, and
+// lifted; then whatever shows its back from there, nearer than the triangle, is a lid over the
+// point.
+//
+//        wall |
+//             |   8 e    o
+//             |<-------->| 2 e
+//   ----------p----------+--------- own triangle
+#include "engine/scene/step_off.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include "engine/scene/directions.h"
+
+namespace ptc {
+namespace {
+
+constexpr double kLift = 2;  // epsilons
+constexpr double kInset = 8;
+constexpr double kLidBelow = 1.75;  // nearer than the own surface, rounding allowed for
+
+// The point of a triangle next to p that keeps `margin` from all edges; the place that is farthest
+// from them when the triangle is too small for that.
+glm::dvec3 inset(const std::array<glm::dvec3, 3>& corner, const glm::dvec3& p, double margin) {
+  const glm::dvec3 normal = glm::cross(corner[1] - corner[0], corner[2] - corner[0]);
+  const double square = glm::dot(normal, normal);
+  if (!(square > 0)) return p;
+  // A barycentric weight is the distance from the opposite edge over the height above it.
+  std::array<double, 3> least{}, excess{};
+  double sum_least = 0;
+  double sum_excess = 0;
+  bool is_inside = true;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec3& from = corner[(i + 1) % 3];
+    const glm::dvec3 edge = corner[(i + 2) % 3] - from;
+    const double weight = glm::dot(glm::cross(edge, p - from), normal) / square;
+    least[i] = margin * glm::length(edge) / std::sqrt(square);
+    excess[i] = std::max(0.0, weight - least[i]);
+    is_inside = is_inside && weight >= least[i];
+    sum_least += least[i];
+    sum_excess += excess[i];
+  }
+  if (is_inside) return p;
+  const double room = std::max(0.0, 1 - sum_least);
+  const double scale = room > 0 ? room / sum_excess : 0;
+  glm::dvec3 result(0);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double weight = room > 0 ? least[i] + scale * excess[i] : least[i] / sum_least;
+    result += weight * corner[i];
+  }
+  return result;
+}
+
+// The triangle at the point. Rounding may have put the point just beside it, and another may lie in
+// the same place and look the other way, so the surroundings are searched for one that fronts the
+// normal's side.
+std::optional<SurfaceHit> own_surface(const RayScene& scene, const glm::dvec3& position,
+                                      const glm::vec3& normal) {
+  const double e = scene.epsilon();
+  const auto below = [&](const glm::vec3& aside) {
+    const glm::dvec3 from =
+        position + e * (kLift * glm::dvec3(normal) + kInset * glm::dvec3(aside));
+    return scene.closest(from, -normal, kLidBelow * e, (2 * kLift - kLidBelow) * e);
+  };
+  std::optional<SurfaceHit> own = below(glm::vec3(0));
+  if (own && own->front) return own;
+  const Basis basis(normal);
+  for (const glm::vec3& aside : {basis.x, -basis.x, basis.y, -basis.y}) {
+    const std::optional<SurfaceHit> other = below(aside);
+    if (other && (!own || other->front)) own = other;
+    if (own && own->front) break;
+  }
+  return own;
+}
+
+}  // namespace
+
+std::optional<glm::dvec3> step_off(const RayScene& scene, const glm::dvec3& position,
+                                   const glm::vec3& normal) {
+  const double e = scene.epsilon();
+  const glm::dvec3 lift = kLift * e * glm::dvec3(normal);
+  const std::optional<SurfaceHit> own = own_surface(scene, position, normal);
+  if (!own) return position + lift;
+  const Mesh& mesh = scene.mesh();
+  std::array<glm::dvec3, 3> corner;
+  for (std::size_t i = 0; i < 3; ++i) {
+    corner[i] = glm::dvec3(mesh.positions[mesh.triangles[own->triangle][i]]);
+  }
+  const glm::dvec3 origin = mesh.origin + inset(corner, position - mesh.origin, kInset * e) + lift;
+  const auto lid = scene.closest(origin, -normal, 0, kLidBelow * e);
+  if (lid && !lid->front) return {};
+  return origin;
+}
+
+}  // namespace ptc

@@ -1,0 +1,61 @@
+// Bilinear lookups. Pixel (i, j) has its centre at (i + 1/2, j + 1/2).
+#include "engine/scene/texture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include <glm/common.hpp>
+
+namespace ptc {
+namespace {
+
+enum class Border { wrap, end };
+
+// Two neighbouring pixels of a row or column and the share of the second.
+struct Pair {
+  unsigned first;
+  unsigned second;
+  float share;
+};
+
+unsigned bring_inside(std::int64_t index, unsigned size, Border border) {
+  const auto count = static_cast<std::int64_t>(size);
+  if (border == Border::end)
+    return static_cast<unsigned>(std::clamp<std::int64_t>(index, 0, count - 1));
+  return static_cast<unsigned>((index % count + count) % count);
+}
+
+Pair neighbours(double at, unsigned size, Border border) {
+  const double low = std::floor(at - 0.5);
+  const auto index = static_cast<std::int64_t>(low);
+  return {bring_inside(index, size, border), bring_inside(index + 1, size, border),
+          static_cast<float>(at - 0.5 - low)};
+}
+
+glm::vec3 blend(const Image& image, const Pair& x, const Pair& y) {
+  const glm::vec3 top = glm::mix(image.at(x.first, y.first), image.at(x.second, y.first), x.share);
+  const glm::vec3 bottom =
+      glm::mix(image.at(x.first, y.second), image.at(x.second, y.second), x.share);
+  return glm::mix(top, bottom, y.share);
+}
+
+double fraction(float coordinate) {
+  if (!std::isfinite(coordinate)) return 0;
+  return static_cast<double>(coordinate) - std::floor(static_cast<double>(coordinate));
+}
+
+}  // namespace
+
+glm::vec3 sample_texture(const Image& image, const glm::vec2& uv) {
+  if (image.pixels.empty()) return glm::vec3(1);
+  return blend(image, neighbours(fraction(uv.x) * image.width, image.width, Border::wrap),
+               neighbours((1 - fraction(uv.y)) * image.height, image.height, Border::wrap));
+}
+
+glm::vec3 sample_panorama(const Image& image, double x, double y) {
+  return blend(image, neighbours(x, image.width, Border::wrap),
+               neighbours(y, image.height, Border::end));
+}
+
+}  // namespace ptc

@@ -1,0 +1,73 @@
+// A cube of direction pixels around a receiver: what covers each of them, and how light adds up.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "engine/shade/direction_kernels.h"
+#include "engine/shade/shading.h"
+
+namespace ptc {
+
+/// The geometry of the pixels, shared by all buffers of a run: directions, exact solid angles, sky.
+///
+/// The cube is turned away from the world's axes, so that walls and floors do not line up with
+/// pixel rows.
+class DirectionGrid {
+ public:
+  /// @param resolution  pixels along a cube edge, a multiple of kPixelLanes
+  /// @param sky  radiance from a direction (unit, away from the receiver), or empty: no sky
+  DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky);
+
+  [[nodiscard]] unsigned resolution() const noexcept { return resolution_; }
+  [[nodiscard]] std::size_t pixels() const noexcept { return std::size_t{6} * resolution_ * resolution_; }
+  /// From world to the cube's axes.
+  [[nodiscard]] const glm::mat3& rotation() const noexcept { return rotation_; }
+
+ private:
+  friend class DirectionBuffer;
+  unsigned resolution_;
+  glm::mat3 rotation_;
+  std::vector<float> centre_;  // resolution: pixel centres in [-1, 1]
+  std::vector<float> length_;  // resolution^2: |(1, u, v)|
+  std::vector<float> weight_;  // resolution^2: solid angle / length
+  std::vector<float> sky_;     // by face: planes of red, green, blue; or empty
+};
+
+/// Nearest coverer of every direction pixel: its depth and its RGBE colour. Of equal depths the
+/// lesser colour stays, so the order of drawing does not matter.
+class DirectionBuffer {
+ public:
+  explicit DirectionBuffer(const DirectionGrid& grid);
+
+  void clear() noexcept;
+  void copy(const DirectionBuffer& other) noexcept;
+
+  /// Draws a small thing as a square of pixels of its solid angle.
+  /// @param to    its middle relative to the buffer's, not zero
+  /// @param area  projected area, squared units of `to`
+  void draw_footprint(const glm::vec3& to, float area, std::uint32_t rgbe) noexcept;
+
+  /// Draws a disc exactly: every pixel whose ray meets it. Coplanar overlapping discs divide at the
+  /// line between their centres.
+  /// @param rgbe  colour of the front; the back is black
+  void draw_disc(const glm::vec3& to, const glm::vec3& normal, float radius, std::uint32_t rgbe,
+                 Sides sides) noexcept;
+
+  /// Sums over the hemisphere of `normal`.
+  [[nodiscard]] Shading resolve(const glm::vec3& normal) noexcept;
+
+ private:
+  [[nodiscard]] FacePixels face(int face) noexcept;
+
+  const DirectionGrid* grid_;
+  std::vector<float> depth_;  // infinity where nothing covers
+  std::vector<std::uint32_t> rgbe_;
+};
+
+}  // namespace ptc

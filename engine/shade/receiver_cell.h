@@ -1,0 +1,38 @@
+// A set of receivers seen as one: what the gather tests clusters against.
+#pragma once
+
+#include <span>
+
+#include <glm/vec3.hpp>
+
+#include "format/morton.h"
+
+namespace ptc {
+
+/// A receiver in lattice units, with its place on the Z-curve.
+struct PlacedReceiver {
+  MortonKey key;
+  glm::dvec3 position{0};  ///< lattice units
+  glm::vec3 normal{0};
+  std::size_t index = 0;   ///< in the caller's order
+};
+
+/// Bounds of some receivers: positions in a sphere, normals in a cone.
+struct ReceiverCell {
+  glm::dvec3 centre{0};     ///< lattice units
+  float radius = 0;         ///< scene units
+  glm::vec3 axis{0};        ///< unit
+  float cone_cos = -1;      ///< every normal n: n . axis >= cone_cos
+  float cone_sin = 0;
+  bool has_horizon = false; ///< the cone is narrow enough to cull below it
+
+  /// @param unit  lattice unit in scene units
+  ReceiverCell(std::span<const PlacedReceiver> receivers, double unit);
+
+  /// True when a sphere is below the horizon of every receiver.
+  /// @param to      its centre relative to `centre`
+  /// @param radius  its radius, scene units
+  [[nodiscard]] bool below_horizon(const glm::vec3& to, float distance_squared, float sphere) const noexcept;
+};
+
+}  // namespace ptc

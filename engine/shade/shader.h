@@ -1,0 +1,46 @@
+// Shading many receivers on many threads under one cap.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "engine/base/executor.h"
+#include "engine/base/progress.h"
+#include "engine/cache/page_cache.h"
+#include "engine/shade/gather.h"
+
+namespace ptc {
+
+struct ShadeOptions {
+  std::uint64_t cache_bytes = std::uint64_t{512} << 20;  ///< page cache, all threads together
+  ContainerReader::Access access = ContainerReader::Access::pread;
+  GatherOptions gather;
+  /// Radiance that arrives from a direction (unit) where nothing covers it; empty: none.
+  std::function<glm::vec3(const glm::vec3&)> sky;
+};
+
+/// Keeps cache and gathers between calls.
+class Shader {
+ public:
+  Shader(const ContainerReader& container, const ShadeOptions& options, const Executor& executor);
+  ~Shader();
+
+  /// Receivers of a block: neighbours on the Z-curve that one thread shades together.
+  static constexpr std::size_t kBlock = 4096;
+
+  /// Sorts the receivers along the Z-curve, shades them block by block. A receiver's result depends
+  /// on the receivers of its block, so callers that stream give multiples of kBlock, in Z order.
+  /// @param results  as many as receivers, in their order
+  void shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress);
+
+  [[nodiscard]] GatherCounts counts() const;
+  /// Complete once no shade() is running.
+  [[nodiscard]] CacheStatistics cache_statistics() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ptc

@@ -1,0 +1,52 @@
+// What shading takes and gives (spec/shading.md).
+#pragma once
+
+#include <cstdint>
+
+#include <glm/vec3.hpp>
+
+#include "format/morton.h"
+
+namespace ptc {
+
+/// A place to be shaded.
+struct Receiver {
+  glm::dvec3 position{0};  ///< scene units, already lifted off its surface
+  glm::vec3 normal{0};     ///< unit
+};
+
+/// Light that arrives at a receiver.
+struct Shading {
+  float occlusion = 0;       ///< cosine-weighted share of the hemisphere that is covered, 0 to 1
+  glm::vec3 bent_normal{0};  ///< unit mean of the uncovered directions; the normal when none is
+  glm::vec3 irradiance{0};   ///< from surfaces, W / m^2
+  glm::vec3 sky{0};          ///< from the environment where it is not covered, W / m^2
+};
+
+/// Which sides of a surfel stop light. Radiance always leaves the front alone.
+enum class Sides {
+  both,   ///< the back is black, and transparent to receivers within two radii of the centre
+  front,  ///< right and faster where no back side is ever seen
+};
+
+struct GatherOptions {
+  float solid_angle = 0.01F;    ///< a cluster is not opened when its bounding sphere is below it, sr
+  float parallax = 0.04F;       ///< a cluster is shared by receivers that see it within this angle, rad
+  float inflation = 1.25F;      ///< footprint of a cluster that is not flat over its projected area
+  unsigned resolution = 32;     ///< direction pixels along a cube edge, 8 to 64, a multiple of 8
+  Sides sides = Sides::both;
+};
+
+/// What a gather did.
+struct GatherCounts {
+  std::uint64_t receivers = 0;
+  std::uint64_t cells = 0;          ///< receiver cells with more than one receiver
+  std::uint64_t groups = 0;         ///< sibling groups tested
+  std::uint64_t surfel_blocks = 0;  ///< runs of up to 8 surfels tested
+  std::uint64_t clusters = 0;       ///< drawn
+  std::uint64_t surfels = 0;        ///< drawn
+
+  void add(const GatherCounts& other) noexcept;
+};
+
+}  // namespace ptc

@@ -1,0 +1,287 @@
+// Container to shaded points (engine/pipeline.h).
+#include <algorithm>
+#include <cstring>
+#include <numbers>
+#include <memory>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include "engine/base/memory.h"
+#include "engine/check.h"
+#include "engine/io/file.h"
+#include "engine/io/record.h"
+#include "engine/pipeline.h"
+#include "engine/shade/shader.h"
+#include "engine/stages.h"
+#include "engine/store/writer.h"
+#include "format/checksum.h"
+#include "format/point_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kBatch = 16 * Shader::kBlock;  // receivers in memory at once
+constexpr std::uint64_t kLeastCache = 16 << 20;
+constexpr std::uint16_t kGroup = 1;  // of the channels that shading adds
+
+/// What shading says of a point, in the order of the channels.
+struct ShadedChannels {
+  static constexpr std::size_t kFloats = 1 + 3 + 3 + 3 + 3;
+  static std::vector<Channel> channels() {
+    return {{"occlusion", ChannelType::half, 1, kGroup},
+            {"bent_normal", ChannelType::half, 3, kGroup},
+            {"irradiance", ChannelType::half, 3, kGroup},
+            {"sky", ChannelType::half, 3, kGroup},
+            {"indirect", ChannelType::half, 3, kGroup}};
+  }
+  static std::vector<PointColumn> columns() {
+    std::vector<PointColumn> columns;
+    for (const Channel& c : channels()) columns.push_back({c.name, c.components});
+    return columns;
+  }
+};
+
+/// Values of a shaded surfel: outgoing radiance is albedo / pi times what arrives.
+std::array<float, ShadedChannels::kFloats> values_of(const Shading& s, const glm::vec3& albedo) {
+  const glm::vec3 out = albedo * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float>;
+  return {s.occlusion,    s.bent_normal.x, s.bent_normal.y, s.bent_normal.z, s.irradiance.r, s.irradiance.g,
+          s.irradiance.b, s.sky.r,         s.sky.g,         s.sky.b,         out.r,          out.g,
+          out.b};
+}
+
+/// All points of a container in order, in blocks.
+class PointCursor {
+ public:
+  explicit PointCursor(const ContainerReader& container)
+      : container_(container), payload_(container.page_payload_limit()) {}
+
+  std::size_t next(std::span<Surfel> out) {
+    std::size_t filled = 0;
+    while (filled < out.size()) {
+      if (at_ == count_) {
+        if (page_ == container_.point_pages().size()) break;
+        count_ = container_.read_page(container_.point_pages()[page_++], payload_, decoder_).record_count;
+        at_ = 0;
+      }
+      const PointPage points(payload_.data(), count_);
+      while (at_ < count_ && filled < out.size()) {
+        out[filled++] = to_surfel(points[at_++], container_.superblock().frame);
+      }
+    }
+    return filled;
+  }
+
+ private:
+  const ContainerReader& container_;
+  std::vector<std::byte> payload_;
+  PageDecoder decoder_;
+  std::size_t page_ = 0;
+  std::uint32_t at_ = 0;
+  std::uint32_t count_ = 0;
+};
+
+/// Takes shaded points in order.
+class ShadedSink {
+ public:
+  virtual ~ShadedSink() = default;
+  virtual void write(std::span<const Surfel> surfels, std::span<const Shading> shading) = 0;
+  virtual void finish() = 0;
+};
+
+class PlySink : public ShadedSink {
+ public:
+  PlySink(const std::filesystem::path& target, std::uint64_t count)
+      : writer_(target, count, ShadedChannels::columns()) {}
+  void write(std::span<const Surfel> surfels, std::span<const Shading> shading) override {
+    std::vector<float> values;
+    values.reserve(surfels.size() * ShadedChannels::kFloats);
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      const auto v = values_of(shading[i], surfels[i].albedo);
+      values.insert(values.end(), v.begin(), v.end());
+    }
+    writer_.write(surfels, values);
+  }
+  void finish() override { writer_.finish(); }
+
+ private:
+  PlyWriter writer_;
+};
+
+/// A copy of the receivers' container with one attribute page behind each point page. Channels of
+/// an earlier shading are left out.
+class ContainerSink : public ShadedSink {
+ public:
+  ContainerSink(const std::filesystem::path& target, const ContainerReader& from, const std::string& settings)
+      : from_(from),
+        meta_(from.meta()),
+        writer_(target, {.page_shift = from.header().page_shift, .uuid = uuid_for(from, settings)}) {
+    std::erase_if(meta_.channels, [](const Channel& c) { return c.group == kGroup; });
+    const std::vector<Channel> added = ShadedChannels::channels();
+    meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());
+    meta_.text["shading"] = settings;
+    copy_pages();
+  }
+
+  void write(std::span<const Surfel> surfels, std::span<const Shading> shading) override {
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      values_.push_back(values_of(shading[i], surfels[i].albedo));
+      if (values_.size() == page_points()) flush();
+    }
+  }
+
+  void finish() override {
+    if (!values_.empty()) flush();
+    writer_.finish(meta_, from_.superblock());
+  }
+
+ private:
+  static Uuid uuid_for(const ContainerReader& from, const std::string& settings) {
+    std::string text(reinterpret_cast<const char*>(from.header().uuid.data()), sizeof(Uuid));
+    text += settings;
+    const std::array<std::uint64_t, 2> hash = xxh3_128(std::as_bytes(std::span(text)));
+    Uuid uuid;
+    std::memcpy(uuid.data(), hash.data(), uuid.size());
+    return uuid;
+  }
+
+  [[nodiscard]] std::size_t page_points() const {
+    const std::uint64_t left = from_.superblock().points - written_;
+    return static_cast<std::size_t>(std::min<std::uint64_t>(from_.superblock().points_per_page, left));
+  }
+
+  /// Point and node pages keep their numbers, so that references hold: they precede all others.
+  void copy_pages() {
+    std::vector<std::byte> stored;
+    for (std::uint32_t page = 0; page < from_.page_count(); ++page) {
+      const DirectoryEntry& entry = from_.entry(page);
+      const bool earlier = entry.type == PageType::attribute && entry.group == kGroup;
+      if (entry.type == PageType::meta || earlier) continue;
+      const PageHeader header = from_.read_stored_page(page, stored);
+      writer_.write_stored_page(writer_.reserve_page(),
+                                {.type = header.type,
+                                 .group = header.group,
+                                 .level = header.level,
+                                 .record_count = header.record_count,
+                                 .first_key = header.first_key,
+                                 .last_key = header.last_key},
+                                header.codec, header.raw_bytes, stored);
+    }
+  }
+
+  void flush() {
+    const std::size_t count = values_.size();
+    std::vector<std::byte> payload(count * ShadedChannels::kFloats * 2);
+    for (std::size_t c = 0; c < ShadedChannels::kFloats; ++c) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::uint16_t half = encode_half(values_[i][c]);
+        std::memcpy(payload.data() + 2 * (c * count + i), &half, 2);
+      }
+    }
+    writer_.write_page(writer_.reserve_page(),
+                       {.type = PageType::attribute, .group = kGroup, .record_count = static_cast<std::uint32_t>(count)},
+                       payload);
+    written_ += count;
+    values_.clear();
+  }
+
+  const ContainerReader& from_;
+  Meta meta_;
+  ContainerWriter writer_;
+  std::vector<std::array<float, ShadedChannels::kFloats>> values_;
+  std::uint64_t written_ = 0;
+};
+
+std::string settings_text(const ShadeRequest& request) {
+  const GatherOptions& g = request.gather;
+  return fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
+                     g.solid_angle, g.parallax, g.inflation, g.resolution,
+                     g.sides == Sides::both ? "both" : "front", request.lift);
+}
+
+/// Builds a foreign cloud into a container beside the target, for the time of one run.
+class TemporaryContainer {
+ public:
+  TemporaryContainer(const ShadeRequest& request, const std::filesystem::path& target, Progress& progress)
+      : file_(target) {
+    BuildRequest build;
+    build.inputs = {request.receivers};
+    build.run = request.run;
+    build.run.temp_dir = temp_dir(request.run, target);
+    build_container(build, path(), progress);
+  }
+  ~TemporaryContainer() {
+    std::error_code ignored;
+    std::filesystem::remove(path(), ignored);
+  }
+  [[nodiscard]] std::filesystem::path path() const { return file_.temporary().string() + ".receivers"; }
+
+ private:
+  OutputFile file_;  // reserves the name
+};
+
+}  // namespace
+
+ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target, Progress& progress) {
+  ShadeReport report;
+  const Executor executor(request.run.threads);
+  const ContainerReader scene(request.scene);
+  std::unique_ptr<TemporaryContainer> built;
+  std::unique_ptr<ContainerReader> other;
+  if (!request.receivers.empty()) {
+    if (request.receivers.extension() != ".ptcx") {
+      built = std::make_unique<TemporaryContainer>(request, target, progress);
+    }
+    other = std::make_unique<ContainerReader>(built ? built->path() : request.receivers);
+  }
+  const ContainerReader& receivers = other ? *other : scene;
+  const std::uint64_t points = receivers.superblock().points;
+
+  ShadeOptions options;
+  options.gather = request.gather;
+  const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
+  options.sky = sky_function(sky);
+  options.access = request.access;
+  options.cache_bytes =
+      memory_left(request.run, kBufferBytes, std::max(kLeastCache, PageCache::least_bytes(scene, executor.threads())),
+                  "shading");
+  Shader shader(scene, options, executor);
+
+  std::unique_ptr<ShadedSink> sink;
+  if (target.extension() == ".ply") {
+    sink = std::make_unique<PlySink>(target, points);
+  } else {
+    sink = std::make_unique<ContainerSink>(target, receivers, settings_text(request));
+  }
+  CheckSample check(request.check, points);
+  {
+    const Stage stage(report.seconds, progress, "shade", points, "points");
+    PointCursor cursor(receivers);
+    std::vector<Surfel> surfels(kBatch);
+    std::vector<Receiver> batch(kBatch);
+    std::vector<Shading> results(kBatch);
+    while (const std::size_t count = cursor.next(surfels)) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const Surfel& s = surfels[i];
+        batch[i] = {s.position + glm::dvec3(s.normal) * static_cast<double>(request.lift * s.radius), s.normal};
+      }
+      const double before = cpu_seconds();
+      shader.shade(std::span(batch).first(count), std::span(results).first(count), progress);
+      report.shade_cpu_seconds += cpu_seconds() - before;
+      check.add(std::span(batch).first(count), std::span(results).first(count));
+      sink->write(std::span(surfels).first(count), std::span(results).first(count));
+    }
+  }
+  sink->finish();
+  report.receivers = points;
+  report.gather = shader.counts();
+  report.cache = shader.cache_statistics();
+  if (request.check.receivers > 0) {
+    const Stage stage(report.seconds, progress, "check", request.check.receivers, "receivers");
+    report.check = check.compare(scene, request.gather.sides, sky, nullptr, nullptr, {}, executor);
+  }
+  return report;
+}
+
+}  // namespace ptc

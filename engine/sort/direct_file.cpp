@@ -1,0 +1,70 @@
+// A nameless temporary file past the page cache.
+#include "engine/sort/direct_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+
+#include "engine/base/error.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{8} << 20;  // of one call
+
+[[noreturn]] void fail(const char* call, const std::filesystem::path& directory) {
+  throw std::system_error(errno, std::generic_category(),
+                          call + (" temporary file in " + directory.string()));
+}
+
+}  // namespace
+
+DirectFile::DirectFile(const std::filesystem::path& directory) : directory_(directory) {
+  do fd_ = ::open(directory.c_str(), O_TMPFILE | O_RDWR | O_DIRECT | O_CLOEXEC, 0600);
+  while (fd_ < 0 && errno == EINTR);
+  if (fd_ < 0) buffered_.emplace(directory);  // no direct transfers here, or an error to report
+}
+
+DirectFile::~DirectFile() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+bool DirectFile::give_up_direct(bool was_direct) const noexcept {
+  if (errno != EINVAL || !was_direct) return false;
+  const int flags = ::fcntl(fd_, F_GETFL);
+  if (flags < 0 || ::fcntl(fd_, F_SETFL, flags & ~O_DIRECT) != 0) return false;
+  direct_ = false;
+  return true;
+}
+
+void DirectFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const {
+  if (buffered_) return buffered_->read_at(offset, bytes);
+  while (!bytes.empty()) {
+    const bool direct = direct_;
+    const ssize_t n =
+        ::pread(fd_, bytes.data(), std::min(bytes.size(), kMostBytes), static_cast<off_t>(offset));
+    if (n < 0 && errno != EINTR && !give_up_direct(direct)) fail("pread", directory_);
+    if (n == 0) throw DataError(directory_.string() + ": a temporary file ends too early");
+    if (n < 0) continue;
+    offset += static_cast<std::uint64_t>(n);
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+}
+
+void DirectFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
+  if (buffered_) return buffered_->write_at(offset, bytes);
+  while (!bytes.empty()) {
+    const bool direct = direct_;
+    const ssize_t n =
+        ::pwrite(fd_, bytes.data(), std::min(bytes.size(), kMostBytes), static_cast<off_t>(offset));
+    if (n < 0 && errno != EINTR && !give_up_direct(direct)) fail("pwrite", directory_);
+    if (n < 0) continue;
+    offset += static_cast<std::uint64_t>(n);
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+}
+
+}  // namespace ptc

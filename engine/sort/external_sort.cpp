@@ -1,0 +1,184 @@
+// External Morton sort: fill memory, spill by range, sort range by range.
+#include "engine/sort/external_sort.h"
+
+#include <algorithm>
+#include <atomic>
+#include <future>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "engine/base/memory.h"
+#include "engine/sort/bucket_stream.h"
+#include "engine/sort/radix_sort.h"
+#include "engine/sort/sort_plan.h"
+#include "engine/sort/spill.h"
+#include "format/checksum.h"
+
+namespace ptc {
+namespace {
+
+using Digest = std::array<std::uint64_t, 2>;
+
+Digest sum(const Digest& a, const Digest& b) noexcept {
+  return {a[0] + b[0], a[1] + b[1]};
+}
+
+Digest digest_of(std::span<const PointRecord> records) noexcept {
+  Digest total{};
+  for (const PointRecord& record : records)
+    total = sum(total, xxh3_128(std::as_bytes(std::span(&record, 1))));
+  return total;
+}
+
+Digest digest_of(std::span<const PointRecord> records, const Executor& executor) {
+  constexpr std::size_t kGrain = 1 << 14;
+  if (records.size() <= kGrain) return digest_of(records);
+  std::vector<Digest> parts(records.size() / kGrain + 1);
+  executor.for_ranges(records.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parts[begin / kGrain] = digest_of(records.subspan(begin, end - begin));
+  });
+  Digest total{};
+  for (const Digest& part : parts) total = sum(total, part);
+  return total;
+}
+
+// All in memory: one block.
+class MemoryStream final : public BlockStream {
+ public:
+  MemoryStream(std::span<const PointRecord> records, std::function<void()> at_end)
+      : records_(records), at_end_(std::move(at_end)) {}
+
+ private:
+  std::span<const PointRecord> next_block() override {
+    if (records_.empty() && at_end_) std::exchange(at_end_, nullptr)();
+    return std::exchange(records_, {});
+  }
+
+  std::span<const PointRecord> records_;
+  std::function<void()> at_end_;
+};
+
+}  // namespace
+
+struct ExternalSorter::Impl {
+  Impl(const SortOptions& sort_options, const Executor& sort_executor,
+       std::span<const MortonKey> given_sample)
+      : options(sort_options),
+        executor(sort_executor),
+        plan(plan_sort(options.memory_bytes, executor.threads())),
+        arena(2 * plan.run_records * sizeof(PointRecord)) {
+    const std::size_t stride = given_sample.size() / plan.sample_keys + 1;
+    for (std::size_t i = 0; i < given_sample.size(); i += stride) sample.push_back(given_sample[i]);
+  }
+
+  [[nodiscard]] std::span<PointRecord> memory() noexcept {
+    return {reinterpret_cast<PointRecord*>(arena.data()), 2 * plan.run_records};
+  }
+  [[nodiscard]] std::span<PointRecord> run() noexcept { return memory().first(plan.run_records); }
+  [[nodiscard]] std::span<PointRecord> scratch() noexcept {
+    return memory().last(plan.run_records);
+  }
+
+  void add(std::span<const PointRecord> records);
+  void begin_partition();
+  void spill();
+  [[nodiscard]] std::unique_ptr<PointStream> stream_memory();
+  [[nodiscard]] std::unique_ptr<PointStream> stream_buckets();
+
+  SortOptions options;
+  const Executor& executor;
+  SortPlan plan;
+  std::vector<MortonKey> sample;
+  Arena arena;             // two runs: one being filled, one being written
+  std::size_t filled = 0;  // records in run()
+  std::uint64_t points = 0;
+  Digest digest{};
+  bool finished = false;
+  std::optional<SpillFile> file;  // these two from the first spill on
+  std::shared_ptr<Partition> partition;
+  std::atomic<std::uint32_t> buckets{0};
+  std::future<void> writing;  // of scratch(); last, so that it is waited for first
+};
+
+void ExternalSorter::Impl::add(std::span<const PointRecord> records) {
+  digest = sum(digest, digest_of(records, executor));
+  points += records.size();
+  while (!records.empty()) {
+    if (filled == plan.run_records) spill();
+    const std::size_t count = std::min(records.size(), plan.run_records - filled);
+    std::ranges::copy(records.first(count), run().begin() + static_cast<std::ptrdiff_t>(filled));
+    filled += count;
+    records = records.subspan(count);
+  }
+}
+
+// Only the first run is known: without a sample it stands for what will come.
+void ExternalSorter::Impl::begin_partition() {
+  constexpr std::size_t kKeysPerRange = 4, kLeastKeys = 64;
+  if (sample.size() < kLeastKeys) {
+    sample.clear();
+    const std::size_t stride = filled / plan.sample_keys + 1;
+    for (std::size_t i = 0; i < filled; i += stride) sample.push_back(run()[i].key);
+  }
+  const std::size_t ranges = std::clamp<std::size_t>(sample.size() / kKeysPerRange, 3, plan.ranges);
+  file.emplace(options.temp_dir);
+  partition = std::make_shared<Partition>(*file, Splitters(std::move(sample), ranges));
+  sample = {};
+}
+
+// Groups the run and writes it while the next one is filled.
+void ExternalSorter::Impl::spill() {
+  if (!partition) begin_partition();
+  if (writing.valid()) writing.get();
+  const std::span<PointRecord> grouped = scratch().first(filled);
+  const std::uint64_t offset = partition->add_run(run().first(filled), grouped, executor);
+  filled = 0;
+  // Direct writes leave the processor free: another thread, even if the executor has only one.
+  writing =
+      std::async(std::launch::async, [this, offset, grouped] { file->write(offset, grouped); });
+}
+
+std::unique_ptr<PointStream> ExternalSorter::Impl::stream_memory() {
+  radix_sort(run().first(filled), scratch(), executor);
+  arena.discard(plan.run_records * sizeof(PointRecord), plan.run_records * sizeof(PointRecord));
+  buckets = 1;
+  return std::make_unique<MemoryStream>(run().first(filled), [this] { arena = Arena(); });
+}
+
+std::unique_ptr<PointStream> ExternalSorter::Impl::stream_buckets() {
+  if (filled > 0) spill();
+  if (writing.valid()) writing.get();
+  const auto policy = executor.threads() == 1 ? std::launch::deferred : std::launch::async;
+  return std::make_unique<BucketStream>(
+      BucketLoader(std::move(partition), *file, plan, executor, buckets), memory(), policy,
+      [this] { arena = Arena(); });
+}
+
+ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& executor,
+                               std::span<const MortonKey> sample)
+    : impl_(std::make_unique<Impl>(options, executor, sample)) {}
+
+ExternalSorter::~ExternalSorter() = default;
+
+void ExternalSorter::add(std::span<const PointRecord> records) {
+  if (impl_->finished) throw std::invalid_argument("ExternalSorter::add after finish");
+  impl_->add(records);
+}
+
+std::array<std::uint64_t, 2> ExternalSorter::digest() const noexcept {
+  return impl_->digest;
+}
+
+std::unique_ptr<PointStream> ExternalSorter::finish() {
+  if (std::exchange(impl_->finished, true))
+    throw std::invalid_argument("ExternalSorter::finish called twice");
+  return impl_->partition ? impl_->stream_buckets() : impl_->stream_memory();
+}
+
+SortStatistics ExternalSorter::statistics() const noexcept {
+  return {impl_->points, impl_->file ? impl_->file->bytes() : 0, impl_->buckets};
+}
+
+}  // namespace ptc

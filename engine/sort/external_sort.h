@@ -1,0 +1,75 @@
+// External Morton sort under a memory cap.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "engine/base/executor.h"
+#include "format/point_record.h"
+
+namespace ptc {
+
+/// Point records by ascending key, one block after another.
+class PointStream {
+ public:
+  virtual ~PointStream() = default;
+  /// Fills the front of `out`. @return how many; 0 at the end
+  virtual std::size_t next(std::span<PointRecord> out) = 0;
+};
+
+struct SortOptions {
+  /// All that this stage holds at once; at least 256 KiB.
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;
+  std::filesystem::path temp_dir = ".";
+};
+
+struct SortStatistics {
+  std::uint64_t points = 0;
+  std::uint64_t spilled_bytes = 0;  ///< written to the temporary file, 0 when all fit in memory
+  std::uint32_t buckets = 0;  ///< sorted one by one and handed out so far, 1 when all fit in memory
+};
+
+/// Sorts records by key; equal keys stay in the order in which they came, so the result depends on
+/// neither cap nor threads.
+///
+/// Records collect in memory until the cap; then they are partitioned on disk by splitters taken
+/// from the sample, and each bucket is radix-sorted in memory, the next one while the one before is
+/// handed out. A bucket that turns out larger than memory is partitioned again. The temporary file
+/// has no name and vanishes with the sorter.
+/// Threads: add() and next() are called from outside the bodies of the executor's loops.
+class ExternalSorter {
+ public:
+  /// @param executor  must outlive the sorter
+  /// @param sample    keys drawn evenly from the input, any order; a few thousand are enough; with
+  ///                  fewer than 64 the first records that fill the memory serve instead
+  /// @throws std::invalid_argument when the cap is too small, std::bad_alloc
+  ExternalSorter(const SortOptions& options, const Executor& executor,
+                 std::span<const MortonKey> sample);
+  ~ExternalSorter();
+
+  /// @throws std::system_error naming the directory when what memory does not hold cannot be
+  /// written, now or a moment ago: the sorter is of no use then
+  void add(std::span<const PointRecord> records);
+  /// Order-independent digest of all records so far: the same set gives the same value.
+  [[nodiscard]] std::array<std::uint64_t, 2> digest() const noexcept;
+  /// The sorted stream; this must outlive it. Nothing may be added afterwards. Its memory is given
+  /// back when it has handed out all. @throws as add(); so does the stream's next()
+  [[nodiscard]] std::unique_ptr<PointStream> finish();
+  [[nodiscard]] SortStatistics statistics() const noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Stable in-memory sort by key: MSD radix, then insertion for small pieces. All 128 bits of a key
+/// count. Time: linear for keys spread evenly, at worst a pass for each bit of a key.
+/// @param scratch  as many records as `records`; what it holds afterwards is of no use
+/// @throws std::invalid_argument when it is smaller, std::bad_alloc
+void radix_sort(std::span<PointRecord> records, std::span<PointRecord> scratch,
+                const Executor& executor);
+
+}  // namespace ptc

@@ -1,0 +1,194 @@
+// The stable partition of records into classes, by many threads and past the cache.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "format/point_record.h"
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+namespace ptc {
+
+/// Eight records are five cache lines: what a WriteCombiner hands to memory at once.
+inline constexpr std::size_t kGroupRecords = 8;
+inline constexpr std::size_t kCacheLineBytes = 64;
+static_assert(kGroupRecords * sizeof(PointRecord) % kCacheLineBytes == 0);
+
+/// Writes records to many places at once, a group at a time. A record stored on its own would fetch
+/// the cache line it goes to and, with more places than the TLB has entries, its page as well.
+///
+///   destination   | ......## | ######## | ####.... |   groups of 8 from a line's start
+///                        ^ begin of the class        a first and a last group may be partial
+class WriteCombiner {
+ public:
+  /// @param begin  for every class the index of `to` where its first record goes
+  WriteCombiner(PointRecord* to, std::vector<std::size_t> begin)
+      : to_(to),
+        begin_(std::move(begin)),
+        next_(begin_),
+        groups_(std::make_unique_for_overwrite<Group[]>(begin_.size())) {
+    const auto address = reinterpret_cast<std::uintptr_t>(to);
+    while ((address + phase_ * sizeof(PointRecord)) % kCacheLineBytes != 0) ++phase_;
+  }
+
+  void put(std::size_t c, const PointRecord& record) noexcept {
+    const std::size_t slot = slot_of(next_[c]);
+    groups_[c].records[slot] = record;
+    ++next_[c];
+    if (slot == kGroupRecords - 1) flush(c);
+  }
+
+  /// Writes what is left in the groups.
+  void finish() noexcept {
+    for (std::size_t c = 0; c < begin_.size(); ++c) {
+      const std::size_t end = next_[c], in_group = slot_of(end);
+      const std::size_t first = std::max(begin_[c], end - std::min(end, in_group));
+      if (in_group != 0 && first < end) copy(c, first, end);
+    }
+#if defined(__SSE2__)
+    _mm_sfence();  // streamed lines are seen by the other threads from here on
+#endif
+  }
+
+ private:
+  struct alignas(kCacheLineBytes) Group {
+    PointRecord records[kGroupRecords];
+  };
+
+  // Index of a record in its group: 0 where `to` + index lies on a cache line.
+  [[nodiscard]] std::size_t slot_of(std::size_t index) const noexcept {
+    return (index - phase_) % kGroupRecords;
+  }
+
+  void flush(std::size_t c) noexcept {
+    const std::size_t end = next_[c];
+    if (end < begin_[c] + kGroupRecords) return copy(c, begin_[c], end);
+    PointRecord* const to = to_ + (end - kGroupRecords);
+#if defined(__SSE2__)
+    const auto* lines = reinterpret_cast<const __m128i*>(groups_[c].records);
+    auto* out = reinterpret_cast<__m128i*>(to);
+    for (std::size_t i = 0; i < sizeof(Group) / sizeof(__m128i); ++i)
+      _mm_stream_si128(out + i, _mm_load_si128(lines + i));
+#else
+    std::memcpy(to, groups_[c].records, sizeof(Group));
+#endif
+  }
+
+  void copy(std::size_t c, std::size_t first, std::size_t end) noexcept {
+    std::memcpy(to_ + first, groups_[c].records + slot_of(first),
+                (end - first) * sizeof(PointRecord));
+  }
+
+  PointRecord* to_;
+  std::size_t phase_ = 0;  // least index of `to` on a cache line
+  std::vector<std::size_t> begin_;
+  std::vector<std::size_t> next_;
+  std::unique_ptr<Group[]> groups_;
+};
+
+/// Bytes that partition_records() allocates for each block.
+[[nodiscard]] constexpr std::size_t partition_bytes(std::size_t classes) noexcept {
+  return classes * (kGroupRecords * sizeof(PointRecord) + 3 * sizeof(std::size_t));
+}
+
+/// Into how many blocks a partition is cut: one for each thread, but no more than keep their groups
+/// below a 32nd of the records, nor smaller than is worth a thread.
+[[nodiscard]] inline std::size_t partition_blocks(std::size_t records, std::size_t classes,
+                                                  unsigned threads) noexcept {
+  constexpr std::size_t kLeastRecords = 1 << 15;
+  const std::size_t affordable = records * sizeof(PointRecord) / 32 / partition_bytes(classes);
+  return std::clamp<std::size_t>(std::min(affordable, records / kLeastRecords), 1, threads);
+}
+
+/// How many records of each block fall into each class, and in which bits their keys differ.
+class ClassCounts {
+ public:
+  /// @param from  at least one record
+  template <class Classify>
+  ClassCounts(std::span<const PointRecord> from, std::size_t classes, std::size_t blocks,
+              const Classify& classify, const Executor& executor)
+      : from_(from),
+        classes_(classes),
+        counts_(blocks, std::vector<std::size_t>(classes, 0)),
+        differences_(blocks) {
+    each_block(executor, [&](std::size_t b) {
+      const std::span<std::size_t> counts = counts_[b];
+      const MortonKey first = from_.front().key;
+      MortonKey differ;
+      for (const PointRecord& record : block(b)) {
+        ++counts[classify(record.key)];
+        differ.high |= record.key.high ^ first.high;
+        differ.low |= record.key.low ^ first.low;
+      }
+      differences_[b] = differ;
+    });
+  }
+
+  /// The bits that are not the same in all keys.
+  [[nodiscard]] MortonKey differences() const noexcept {
+    MortonKey all;
+    for (const MortonKey& d : differences_) all = {all.high | d.high, all.low | d.low};
+    return all;
+  }
+
+  /// Where each class begins, and the end of the last one.
+  [[nodiscard]] std::vector<std::size_t> starts() const {
+    std::vector<std::size_t> starts(classes_ + 1, 0);
+    for (std::size_t c = 0; c < classes_; ++c) {
+      starts[c + 1] = starts[c];
+      for (const auto& counts : counts_) starts[c + 1] += counts[c];
+    }
+    return starts;
+  }
+
+  /// Moves the records to `to`, class by class, each in the order in which they were.
+  template <class Classify>
+  void scatter(PointRecord* to, const Classify& classify, const Executor& executor) const {
+    each_block(executor, [&](std::size_t b) {
+      WriteCombiner out(to, begins(b));
+      for (const PointRecord& record : block(b)) out.put(classify(record.key), record);
+      out.finish();
+    });
+  }
+
+ private:
+  template <class Body>
+  void each_block(const Executor& executor, const Body& body) const {
+    if (counts_.size() == 1) return body(std::size_t{0});
+    executor.for_each(counts_.size(), [&](std::size_t b, unsigned) { body(b); });
+  }
+
+  [[nodiscard]] std::span<const PointRecord> block(std::size_t b) const noexcept {
+    const std::size_t size = from_.size() / counts_.size();
+    return b + 1 < counts_.size() ? from_.subspan(b * size, size) : from_.subspan(b * size);
+  }
+
+  // Where block b's records of each class go: after those of the classes and blocks before.
+  [[nodiscard]] std::vector<std::size_t> begins(std::size_t b) const {
+    std::vector<std::size_t> begin(classes_);
+    std::size_t at = 0;
+    for (std::size_t c = 0; c < classes_; ++c)
+      for (std::size_t other = 0; other < counts_.size(); ++other) {
+        if (other == b) begin[c] = at;
+        at += counts_[other][c];
+      }
+    return begin;
+  }
+
+  std::span<const PointRecord> from_;
+  std::size_t classes_;
+  std::vector<std::vector<std::size_t>> counts_;
+  std::vector<MortonKey> differences_;
+};
+
+}  // namespace ptc

@@ -1,0 +1,27 @@
+// How a sort divides the memory it may hold.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace ptc {
+
+/// Sizes that follow from the cap. Two runs of records are held at once; when buckets are read, the
+/// same memory is three blocks.
+struct SortPlan {
+  std::size_t run_records = 0;  ///< a multiple of 1536: runs and blocks lie on page boundaries
+  std::size_t ranges = 0;       ///< of a partition
+  std::size_t sample_keys = 0;  ///< kept for the splitters, at most
+  std::size_t read_bytes = 0;   ///< read from the disk at once
+};
+
+/// Bytes held at once by a sort that follows the plan: runs, what grouping and sorting them takes,
+/// the sample and what is read at once. The table of runs is beside it, 4 bytes for each run and
+/// range: 1/16000 of what is spilled under a cap of 2 MiB or more.
+[[nodiscard]] std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept;
+
+/// The plan with the largest runs whose plan_bytes() is at most `memory_bytes`.
+/// @throws std::invalid_argument below 256 KiB
+[[nodiscard]] SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads);
+
+}  // namespace ptc

@@ -1,0 +1,41 @@
+// Ranges of keys from the quantiles of a sample.
+#include "engine/sort/splitters.h"
+
+#include <stdexcept>
+
+namespace ptc {
+
+Splitters::Splitters(std::vector<MortonKey> sample, std::size_t ranges) {
+  if (sample.empty() || ranges < 3 || ranges > 0xffff)
+    throw std::invalid_argument("Splitters: nothing to cut");
+  std::ranges::sort(sample);
+  for (std::size_t i = 1; i < ranges; ++i) {
+    const Whole key = whole(sample[i * sample.size() / ranges]);
+    if (keys_.empty() || keys_.back() < key)
+      keys_.push_back(key);
+    else if (keys_.back() == key && key != kGreatest)
+      keys_.push_back(key + 1);  // a second quantile: the key fills a range
+  }
+  index();
+}
+
+void Splitters::index() {
+  constexpr std::size_t kCellsPerRange = 8;
+  const std::size_t most_cells = kCellsPerRange * size();
+  const Whole extent = keys_.back() - keys_.front();
+  while (extent >> shift_ >= most_cells) ++shift_;
+
+  below_cell_.assign(static_cast<std::size_t>(extent >> shift_) + 2, 0);
+  for (const Whole key : keys_)
+    ++below_cell_[static_cast<std::size_t>((key - keys_.front()) >> shift_) + 1];
+  for (std::size_t cell = 1; cell < below_cell_.size(); ++cell)
+    below_cell_[cell] = static_cast<std::uint16_t>(below_cell_[cell] + below_cell_[cell - 1]);
+}
+
+bool Splitters::single_key(std::size_t range) const noexcept {
+  if (range == 0) return false;
+  const Whole first = keys_[range - 1];
+  return first == kGreatest || (range < keys_.size() && keys_[range] == first + 1);
+}
+
+}  // namespace ptc

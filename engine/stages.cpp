@@ -1,0 +1,60 @@
+#include "engine/stages.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <stdexcept>
+
+namespace ptc {
+
+Stage::Stage(StageSeconds& seconds, Progress& progress, std::string name, std::uint64_t total, const char* unit)
+    : seconds_(seconds), progress_(progress), name_(std::move(name)) {
+  progress_.begin(name_, total, unit);
+}
+
+Stage::~Stage() {
+  progress_.end();
+  seconds_.emplace_back(name_, std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
+}
+
+std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least, const char* what_for) {
+  if (run.memory_bytes < taken || run.memory_bytes - taken < least) {
+    const std::uint64_t mebibytes = (taken + least + (1 << 20) - 1) >> 20;
+    throw std::invalid_argument("the memory cap is too small for " + std::string(what_for) +
+                                ": the least that works is " + std::to_string(mebibytes) + "M");
+  }
+  return run.memory_bytes - taken;
+}
+
+std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target) {
+  if (!run.temp_dir.empty()) return run.temp_dir;
+  return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
+}
+
+LightRig recorded_lights(const ContainerReader& container) {
+  const auto& text = container.meta().text;
+  const auto found = text.find(kLightsKey);
+  return found == text.end() ? LightRig{} : light_rig_from_json(found->second);
+}
+
+double surfel_spacing(const ContainerReader& container) {
+  const auto& text = container.meta().text;
+  if (const auto found = text.find(kSpacingKey); found != text.end()) {
+    const double spacing = std::strtod(found->second.c_str(), nullptr);
+    if (std::isfinite(spacing) && spacing > 0) return spacing;
+  }
+  const Superblock& superblock = container.superblock();
+  return superblock.points == 0 ? 0 : std::sqrt(superblock.area / static_cast<double>(superblock.points));
+}
+
+std::uint64_t mesh_bytes(const Mesh& mesh) {
+  constexpr std::uint64_t kBvhBytes = 150;  // a triangle, Embree 3 at medium quality, with its buffers
+  return mesh.triangles.size() * (sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]) + kBvhBytes) +
+         mesh.positions.size() * (2 * sizeof(glm::vec3) + sizeof(glm::vec2) + 16);
+}
+
+std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky) {
+  if (sky.radiance == glm::vec3(0)) return {};
+  return [sky](const glm::vec3& direction) { return sky.at(direction); };
+}
+
+}  // namespace ptc

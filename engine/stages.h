@@ -1,0 +1,54 @@
+// What the calls of pipeline.h share: stage clocks, the memory left, the record in the meta page.
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "engine/pipeline.h"
+#include "engine/store/reader.h"
+
+namespace ptc {
+
+/// Times one stage and tells its progress, from construction to destruction.
+class Stage {
+ public:
+  Stage(StageSeconds& seconds, Progress& progress, std::string name, std::uint64_t total, const char* unit);
+  ~Stage();
+  Stage(const Stage&) = delete;
+  Stage& operator=(const Stage&) = delete;
+
+ private:
+  StageSeconds& seconds_;
+  Progress& progress_;
+  std::string name_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// What is left of a cap for a stage. @throws std::invalid_argument naming the least cap that works
+[[nodiscard]] std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least,
+                                        const char* what_for);
+
+/// Where temporary files go: the given directory, else the target's.
+[[nodiscard]] std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target);
+
+/// The lights that a container was built with; none when it does not say.
+[[nodiscard]] LightRig recorded_lights(const ContainerReader& container);
+/// Spacing of the surfels: recorded, else the square root of area over points.
+[[nodiscard]] double surfel_spacing(const ContainerReader& container);
+
+/// Sky as a gather takes it; empty for a black one.
+[[nodiscard]] std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky);
+
+/// Resident bytes of a mesh and its BVH, from above.
+[[nodiscard]] std::uint64_t mesh_bytes(const Mesh& mesh);
+
+// Keys of the meta page's text.
+inline constexpr const char* kLightsKey = "lights";
+inline constexpr const char* kCameraKey = "camera";
+inline constexpr const char* kSpacingKey = "spacing";
+inline constexpr const char* kInputsKey = "inputs";
+
+/// Part of a cap that buffers outside the large budgets take: open pages, blocks, receivers.
+inline constexpr std::uint64_t kBufferBytes = std::uint64_t{32} << 20;
+
+}  // namespace ptc

@@ -1,0 +1,162 @@
+// The way from the end of a file to its directory, and the diagnosis when there is none.
+#include "engine/store/commit.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "engine/store/structure.h"
+#include "format/checksum.h"
+
+namespace ptc {
+namespace {
+
+constexpr char kMagic[] = "spec/container.md#superblock-magic";
+constexpr char kLength[] = "spec/container.md#superblock-length";
+constexpr char kCopies[] = "spec/container.md#superblock-copies";
+constexpr char kDirectoryPages[] = "spec/container.md#directory-pages";
+
+/// Blocks before the end that are searched for a superblock when it is not where it should be.
+constexpr std::uint64_t kSearchBlocks = 256;
+
+Block read_block(const InputFile& file, std::uint64_t offset) {
+  Block block;
+  file.read_at(offset, block);
+  return block;
+}
+
+bool has_superblock_magic(const Block& block) {
+  static const Block example = encode_superblock({});
+  return std::equal(block.begin(), block.begin() + 8, example.begin());
+}
+
+using Copy = std::variant<Superblock, FormatError>;
+
+Copy decode_copy(const Block& block, const FileHeader& header, std::uint64_t file_bytes) {
+  try {
+    return decode_superblock(block, header, file_bytes);
+  } catch (const FormatError& error) {
+    return error;
+  }
+}
+
+/// Length that a whole superblock near the end of the file gives it, when there is one.
+std::optional<std::uint64_t> committed_length(const InputFile& file, const FileHeader& header) {
+  const std::uint64_t blocks = file.size() / kBlockBytes;
+  for (std::uint64_t back = 1; back <= std::min(kSearchBlocks, blocks); ++back) {
+    const std::uint64_t offset = (blocks - back) * kBlockBytes;
+    const Block block = read_block(file, offset);
+    if (!has_superblock_magic(block)) continue;
+    for (const std::uint64_t length : {offset + kBlockBytes, offset + 2 * kBlockBytes}) {
+      if (std::holds_alternative<Superblock>(decode_copy(block, header, length))) return length;
+    }
+  }
+  return std::nullopt;
+}
+
+[[noreturn]] void refuse_length(std::uint64_t is, std::uint64_t committed) {
+  const std::string by = std::to_string(is > committed ? is - committed : committed - is);
+  throw FormatError(is, kLength,
+                    "the file is " + by + (is > committed ? " bytes longer" : " bytes shorter") +
+                        " than its superblock says");
+}
+
+[[noreturn]] void refuse_damaged(std::uint64_t offset, const FormatError& error) {
+  throw FormatError(offset + error.offset(), error.clause(),
+                    "no superblock is whole: " + error.text());
+}
+
+/// Which of the two copies to trust, when the file has the length for them.
+std::optional<Superblock> trusted_copy(std::uint64_t offset, const std::array<Block, 2>& blocks,
+                                       const std::array<Copy, 2>& copies) {
+  const auto* first = std::get_if<Superblock>(&copies[0]);
+  const auto* second = std::get_if<Superblock>(&copies[1]);
+  if (first != nullptr && second != nullptr && blocks[0] != blocks[1]) {
+    throw FormatError(offset, kCopies, "the two superblocks differ");
+  }
+  if (first != nullptr) return *first;
+  if (second != nullptr) return *second;
+  return std::nullopt;
+}
+
+Superblock choose_superblock(const InputFile& file, const FileHeader& header) {
+  const std::uint64_t size = file.size();
+  std::array<Block, 2> blocks{};
+  std::array<Copy, 2> copies{Superblock{}, Superblock{}};
+  const bool room = size % kBlockBytes == 0 && size >= 3 * kBlockBytes;
+  const std::uint64_t offset = room ? size - 2 * kBlockBytes : 0;
+  if (room) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      blocks[i] = read_block(file, offset + i * kBlockBytes);
+      copies[i] = decode_copy(blocks[i], header, size);
+    }
+    if (auto superblock = trusted_copy(offset, blocks, copies)) return *std::move(superblock);
+  }
+  if (const auto length = committed_length(file, header)) refuse_length(size, *length);
+  for (std::size_t i = 0; room && i < 2; ++i) {
+    if (!has_superblock_magic(blocks[i])) continue;
+    refuse_damaged(offset + i * kBlockBytes, std::get<FormatError>(copies[i]));
+  }
+  throw FormatError(size, kMagic, "no superblock at the end: the file is unfinished or truncated");
+}
+
+/// The entries of directory page `index`, as bytes, into `out`, which has their exact size.
+void read_directory_page(const InputFile& file, const Superblock& superblock, std::uint32_t index,
+                         std::span<std::byte> out) {
+  const std::uint64_t offset = directory_page_offset(superblock, index);
+  std::array<std::byte, kPageHeaderBytes> image;
+  file.read_at(offset, image);
+  file.read_at(offset + kPageHeaderBytes, out);
+  at_offset(file, offset, [&] {
+    const PageHeader page = decode_page_header(image, superblock.header);
+    if (page.type != PageType::directory || page.page_id != superblock.page_count + index ||
+        page.raw_bytes != out.size()) {
+      throw FormatError(0, kDirectoryPages, "not the directory page that belongs here");
+    }
+    if (xxh3_64(out) != page.payload_xxh3) {
+      throw FormatError(kPageHeaderBytes, kDirectoryPages, "payload's checksum is wrong");
+    }
+  });
+}
+
+}  // namespace
+
+FileHeader read_file_header(const InputFile& file) {
+  Block block;
+  const auto bytes = std::span(block).first(std::min<std::uint64_t>(file.size(), block.size()));
+  file.read_at(0, bytes);
+  return at_offset(file, 0, [&] { return decode_file_header(bytes); });
+}
+
+Superblock read_superblock(const InputFile& file, const FileHeader& header) {
+  return at_offset(file, 0, [&] { return choose_superblock(file, header); });
+}
+
+std::vector<DirectoryEntry> read_directory(const InputFile& file, const Superblock& superblock) {
+  const std::size_t whole = superblock.page_count * kDirectoryEntryBytes;
+  const std::size_t full = directory_entries_per_page(superblock.header) * kDirectoryEntryBytes;
+  std::vector<std::byte> all;  // grows with what was verified: a file may be long and empty
+  for (std::uint32_t i = 0; i < superblock.directory_pages; ++i) {
+    const std::size_t at = all.size();
+    all.resize(at + std::min(full, whole - at));
+    read_directory_page(file, superblock, i, std::span(all).subspan(at));
+  }
+  if (xxh3_64(all) != superblock.directory_xxh3) {
+    const FormatError error(superblock.directory_offset, kDirectoryPages,
+                            "entries' checksum is not that of the superblock");
+    throw error.rebased(0, file.path().string());
+  }
+  std::vector<DirectoryEntry> entries;
+  entries.reserve(superblock.page_count);
+  for (std::uint32_t page = 0; page < superblock.page_count; ++page) {
+    const auto bytes = std::span(all).subspan(page * kDirectoryEntryBytes, kDirectoryEntryBytes);
+    entries.push_back(at_offset(file, entry_offset(superblock, page), [&] {
+      return decode_directory_entry(bytes, superblock.header, superblock.file_bytes);
+    }));
+  }
+  return entries;
+}
+
+}  // namespace ptc

@@ -1,0 +1,37 @@
+// What commits a file: header, superblocks and directory, read and checked (spec/container.md).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/io/file.h"
+#include "format/container.h"
+#include "format/error.h"
+
+namespace ptc {
+
+/// Calls `body`; errors of the format leave with the file's path, `base` bytes further on.
+template <class Body>
+decltype(auto) at_offset(const InputFile& file, std::uint64_t base, Body&& body) {
+  try {
+    return body();
+  } catch (const FormatError& error) {
+    throw error.rebased(base, file.path().string());
+  }
+}
+
+/// @throws FormatError with path and offset, as all of these
+[[nodiscard]] FileHeader read_file_header(const InputFile& file);
+
+/// The superblock, from its second copy when the first is damaged. Two whole copies that differ are
+/// refused. Without a whole copy the error says whether the file is longer or shorter than when it
+/// was committed, its superblocks are damaged, or there is none: unfinished or truncated.
+[[nodiscard]] Superblock read_superblock(const InputFile& file, const FileHeader& header);
+
+/// All entries; each alone is checked, not yet against the others.
+/// @pre the superblock has passed its decoder: the file is as long as the directory needs
+/// Memory: at most 96 bytes an entry, of which 32 are returned.
+[[nodiscard]] std::vector<DirectoryEntry> read_directory(const InputFile& file,
+                                                         const Superblock& superblock);
+
+}  // namespace ptc

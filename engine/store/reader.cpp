@@ -1,0 +1,280 @@
+// From the commit record at the end of the file to verified pages (spec/container.md).
+#include "engine/store/reader.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include "engine/io/file.h"
+#include "engine/store/commit.h"
+#include "engine/store/structure.h"
+#include "format/checksum.h"
+#include "format/error.h"
+#include "format/node_page.h"
+#include "format/point_page.h"
+
+namespace ptc {
+namespace {
+
+constexpr char kAgreement[] = "spec/container.md#page-agreement";
+constexpr char kPayload[] = "spec/container.md#page-payload";
+constexpr char kReferences[] = "spec/nodes.md#references";
+
+/// The file mapped whole on first use. A file that shrinks while it is mapped raises SIGBUS in the
+/// thread that touches what is gone, so pread is the default.
+class Mapping {
+ public:
+  explicit Mapping(const InputFile& file) : file_(file) {}
+  ~Mapping() {
+    if (data_ != nullptr) ::munmap(data_, file_.size());
+  }
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+
+  /// Part of the mapping that stops counting as resident when its user, who has copied it, is done.
+  class Lease {
+   public:
+    Lease(std::byte* file, std::uint64_t file_bytes, std::uint64_t offset, std::size_t bytes)
+        : file_(file), file_bytes_(file_bytes), offset_(offset), bytes_(bytes) {}
+    ~Lease() {
+      // The kernel maps up to 64 KiB around a fault. Others who read there only fault once more.
+      constexpr std::uint64_t kAround = 65536;
+      const std::uint64_t begin = offset_ / kAround * kAround;
+      const std::uint64_t end = (offset_ + bytes_ + kAround - 1) / kAround * kAround;
+      ::madvise(file_ + begin, std::min(end, file_bytes_) - begin, MADV_DONTNEED);
+    }
+    Lease(const Lease&) = delete;
+    Lease& operator=(const Lease&) = delete;
+    [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
+      return {file_ + offset_, bytes_};
+    }
+
+   private:
+    std::byte* file_;
+    std::uint64_t file_bytes_;
+    std::uint64_t offset_;
+    std::size_t bytes_;
+  };
+
+  [[nodiscard]] Lease lease(std::uint64_t offset, std::size_t bytes) {
+    return {map(), file_.size(), offset, bytes};
+  }
+
+ private:
+  std::byte* map() {
+    const std::lock_guard lock(mutex_);
+    if (data_ != nullptr) return data_;
+    void* data = ::mmap(nullptr, file_.size(), PROT_READ, MAP_SHARED, file_.descriptor(), 0);
+    if (data == MAP_FAILED) {
+      throw std::system_error(errno, std::generic_category(), "mmap " + file_.path().string());
+    }
+    ::madvise(data, file_.size(), MADV_RANDOM);
+    return data_ = static_cast<std::byte*>(data);
+  }
+
+  const InputFile& file_;
+  std::mutex mutex_;
+  std::byte* data_ = nullptr;
+};
+
+/// Errors inside a decoded payload name the byte of the file only when it is stored as it is.
+FormatError placed(const FormatError& error, const PageHeader& page) {
+  if (page.codec == Codec::raw) {
+    return {kPageHeaderBytes + error.offset(), error.clause(), error.text()};
+  }
+  return {kPageHeaderBytes, error.clause(),
+          "decoded byte " + std::to_string(error.offset()) + ": " + error.text()};
+}
+
+}  // namespace
+
+struct ContainerReader::Impl {
+  explicit Impl(const std::filesystem::path& path)
+      : file(path),
+        mapping(file),
+        header(read_file_header(file)),
+        superblock(read_superblock(file, header)),
+        entries(read_directory(file, superblock)),
+        index(index_pages(entries)) {
+    at_offset(file, 0, [&] { verify_pages(superblock, entries, index); });
+    meta = read_meta();
+    at_offset(file, 0, [&] { verify_attributes(superblock, entries, index, meta); });
+  }
+
+  const DirectoryEntry& entry(std::uint32_t page) const {
+    if (page < entries.size()) return entries[page];
+    throw std::invalid_argument(file.path().string() + ": page " + std::to_string(page) + " of " +
+                                std::to_string(entries.size()));
+  }
+
+  /// The header of the page whose image this is, when directory and checksum agree with it.
+  PageHeader checked_header(std::uint32_t page, std::span<const std::byte> image) const {
+    const PageHeader found = decode_page_header(image.first(kPageHeaderBytes), header);
+    const DirectoryEntry facts{entries[page].offset, found.stored_bytes, found.raw_bytes,
+                               found.payload_xxh3,   found.type,         found.group,
+                               found.record_count};
+    if (found.page_id != page || facts != entries[page]) {
+      throw FormatError(
+          0, kAgreement,
+          "the page header is not what the directory says of page " + std::to_string(page));
+    }
+    if (xxh3_64(image.subspan(kPageHeaderBytes)) != found.payload_xxh3) {
+      throw FormatError(kPageHeaderBytes, kPayload, "payload's checksum is wrong");
+    }
+    return found;
+  }
+
+  /// Every interior child is a group that exists: who follows a reference has only to check that
+  /// levels increase.
+  void verify_references(const NodePage& nodes) const {
+    for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
+      const GroupView group = nodes[slot];
+      for (unsigned rest = group.interior_mask(); rest != 0; rest &= rest - 1) {
+        const ChildRef child = group.child(std::countr_zero(rest));
+        const DirectoryEntry& target = entries[child.page];
+        if (target.type == PageType::node && child.slot < target.record_count) continue;
+        throw FormatError(0, kReferences,
+                          "group " + std::to_string(slot) + " refers to group " +
+                              std::to_string(child.slot) + " of page " +
+                              std::to_string(child.page) + ", which there is not");
+      }
+    }
+  }
+
+  void verify_content(const PageHeader& page, std::span<const std::byte> payload) const {
+    if (page.type == PageType::point) PointPage(payload, page.record_count).verify();
+    if (page.type == PageType::node) {
+      const auto pages = static_cast<std::uint32_t>(entries.size());
+      verify_references(NodePage(payload, page.record_count, pages, superblock.points));
+    }
+  }
+
+  PageHeader decode(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
+                    PageDecoder& decoder) const {
+    const PageHeader found = checked_header(page, image);
+    const std::span<std::byte> payload = out.first(found.raw_bytes);
+    try {
+      decoder.decode(found.codec, image.subspan(kPageHeaderBytes), payload);
+    } catch (const FormatError& error) {
+      throw error.rebased(kPageHeaderBytes, "");
+    }
+    try {
+      verify_content(found, payload);
+    } catch (const FormatError& error) {
+      throw placed(error, found);
+    }
+    return found;
+  }
+
+  PageHeader read(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder,
+                  Access access) const {
+    const DirectoryEntry& where = entry(page);
+    const std::size_t bytes = kPageHeaderBytes + std::size_t{where.stored_bytes};
+    const auto decoded = [&](std::span<const std::byte> image) {
+      return at_offset(file, where.offset, [&] { return decode(page, image, out, decoder); });
+    };
+    if (access == Access::mmap) {
+      const Mapping::Lease lease = mapping.lease(where.offset, bytes);
+      return decoded(lease.bytes());
+    }
+    const auto image = std::make_unique_for_overwrite<std::byte[]>(bytes);
+    file.read_at(where.offset, {image.get(), bytes});
+    return decoded({image.get(), bytes});
+  }
+
+  Meta read_meta() const {
+    const DirectoryEntry& where = entries[superblock.meta_page];
+    std::vector<std::byte> payload(where.raw_bytes);
+    PageDecoder decoder;
+    const PageHeader found = read(superblock.meta_page, payload, decoder, Access::pread);
+    return at_offset(file, where.offset, [&] {
+      try {
+        return decode_meta(payload);
+      } catch (const FormatError& error) {
+        throw placed(error, found);
+      }
+    });
+  }
+
+  InputFile file;
+  mutable Mapping mapping;  ///< made on first use, which does not change what is read
+  FileHeader header;
+  Superblock superblock;
+  std::vector<DirectoryEntry> entries;
+  PageIndex index;
+  Meta meta;
+};
+
+ContainerReader::ContainerReader(const std::filesystem::path& path)
+    : impl_(std::make_unique<Impl>(path)) {}
+
+ContainerReader::~ContainerReader() = default;
+
+const std::filesystem::path& ContainerReader::path() const noexcept {
+  return impl_->file.path();
+}
+
+const FileHeader& ContainerReader::header() const noexcept {
+  return impl_->header;
+}
+
+const Superblock& ContainerReader::superblock() const noexcept {
+  return impl_->superblock;
+}
+
+const Meta& ContainerReader::meta() const noexcept {
+  return impl_->meta;
+}
+
+std::uint32_t ContainerReader::page_count() const noexcept {
+  return impl_->superblock.page_count;
+}
+
+std::size_t ContainerReader::page_payload_limit() const noexcept {
+  return (std::size_t{1} << impl_->header.page_shift) - kPageHeaderBytes;
+}
+
+const DirectoryEntry& ContainerReader::entry(std::uint32_t page) const {
+  return impl_->entry(page);
+}
+
+std::span<const std::uint32_t> ContainerReader::point_pages() const noexcept {
+  return impl_->index.points;
+}
+
+std::span<const std::uint32_t> ContainerReader::node_pages() const noexcept {
+  return impl_->index.nodes;
+}
+
+std::span<const std::uint32_t> ContainerReader::attribute_pages(std::uint16_t group) const {
+  const auto pages = impl_->index.attributes.find(group);
+  if (pages == impl_->index.attributes.end()) return {};
+  return pages->second;
+}
+
+PageHeader ContainerReader::read_page(std::uint32_t page, std::span<std::byte> out,
+                                      PageDecoder& decoder, Access access) const {
+  if (out.size() < page_payload_limit()) {
+    throw std::invalid_argument("read_page: the buffer is smaller than a page's payload may be");
+  }
+  return impl_->read(page, out, decoder, access);
+}
+
+PageHeader ContainerReader::read_stored_page(std::uint32_t page,
+                                             std::vector<std::byte>& stored) const {
+  const DirectoryEntry& where = impl_->entry(page);
+  stored.resize(kPageHeaderBytes + std::size_t{where.stored_bytes});
+  impl_->file.read_at(where.offset, stored);
+  const PageHeader found =
+      at_offset(impl_->file, where.offset, [&] { return impl_->checked_header(page, stored); });
+  stored.erase(stored.begin(), stored.begin() + kPageHeaderBytes);
+  return found;
+}
+
+}  // namespace ptc

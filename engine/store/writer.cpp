@@ -1,0 +1,230 @@
+// Pages, directory and commit record in the order that makes a torn file recognisable
+// (spec/container.md#publishing):
+//
+//   header | pages ... meta page | directory pages | sync | superblock A | B | sync | rename
+#include "engine/store/writer.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/io/file.h"
+#include "engine/store/structure.h"
+#include "format/checksum.h"
+#include "format/error.h"
+#include "format/point_page.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint16_t kNoLevel = 0xffff;
+
+void require(bool holds, const char* text) {
+  if (!holds) throw std::invalid_argument(std::string("container writer: ") + text);
+}
+
+FileHeader make_header(const WriterOptions& options) {
+  require(options.page_shift >= 12 && options.page_shift <= 20, "page_shift is not 12 to 20");
+  FileHeader header;
+  header.uuid = options.uuid;
+  header.page_shift = options.page_shift;
+  return header;
+}
+
+/// Runs a reader's check on what is about to be written: what fails it is the caller's mistake.
+template <class Check>
+void refuse_what_readers_refuse(Check&& check) {
+  try {
+    check();
+  } catch (const FormatError& error) {
+    throw std::invalid_argument(std::string("container writer: ") + error.what());
+  }
+}
+
+}  // namespace
+
+struct ContainerWriter::Impl {
+  Impl(const std::filesystem::path& target, const WriterOptions& options)
+      : header(make_header(options)), encoder(options.codec, options.level), file(target) {
+    file.write_at(0, encode_file_header(header));
+  }
+
+  [[nodiscard]] std::size_t payload_limit() const {
+    return (std::size_t{1} << header.page_shift) - kPageHeaderBytes;
+  }
+
+  std::uint32_t reserve() {
+    require(!finished, "a page after finish()");
+    if (entries.size() >= kMaxPages) {
+      throw DataError(file.target().string() + ": needs more than 2^32 - 2 pages");
+    }
+    entries.emplace_back();
+    return static_cast<std::uint32_t>(entries.size() - 1);
+  }
+
+  PageHeader page_header(std::uint32_t page_id, const PageFacts& facts) const {
+    PageHeader page;
+    page.type = facts.type;
+    page.page_id = page_id;
+    page.group = facts.group;
+    page.level = facts.level;
+    page.record_count = facts.record_count;
+    page.first_key = facts.first_key;
+    page.last_key = facts.last_key;
+    return page;
+  }
+
+  /// Header, payload and zeros up to the next block, at the end of the file, in one write.
+  void append(PageHeader& page, std::span<const std::byte> payload) {
+    page.stored_bytes = static_cast<std::uint32_t>(payload.size());
+    page.payload_xxh3 = xxh3_64(payload);
+    image.assign(extent_bytes(page.stored_bytes), std::byte{0});
+    encode_page_header(page, header.uuid, std::span(image).first<kPageHeaderBytes>());
+    refuse_what_readers_refuse([&] { static_cast<void>(decode_page_header(image, header)); });
+    std::ranges::copy(payload, image.begin() + kPageHeaderBytes);
+    file.write_at(end, image);
+    end += image.size();
+  }
+
+  void append_page(PageHeader page, std::span<const std::byte> payload) {
+    require(!finished, "a page after finish()");
+    require(page.page_id < entries.size(), "a page that was not reserved");
+    require(entries[page.page_id].offset == 0, "a page written twice");
+    require(!payload.empty() && payload.size() <= payload_limit(),
+            "a stored payload that is empty or longer than a page");
+    const std::uint64_t offset = end;
+    append(page, payload);
+    entries[page.page_id] = {offset,    page.stored_bytes, page.raw_bytes,   page.payload_xxh3,
+                             page.type, page.group,        page.record_count};
+  }
+
+  void encode_page(std::uint32_t page_id, const PageFacts& facts,
+                   std::span<const std::byte> payload) {
+    require(!payload.empty() && payload.size() <= payload_limit(),
+            "a payload that is empty or longer than a page");
+    PageHeader page = page_header(page_id, facts);
+    page.raw_bytes = static_cast<std::uint32_t>(payload.size());
+    page.codec = encoder.encode(payload, stored);
+    append_page(page, stored);
+  }
+
+  std::uint32_t write_meta(const Meta& meta) {
+    const std::uint32_t page = reserve();
+    encode_page(page, {PageType::meta, 0, kNoLevel, 1, 0, 0}, encode_meta(meta));
+    return page;
+  }
+
+  std::vector<std::byte> encode_directory() const {
+    std::vector<std::byte> all(entries.size() * kDirectoryEntryBytes);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      encode_directory_entry(
+          entries[i],
+          std::span(all).subspan(i * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
+    }
+    return all;
+  }
+
+  /// Directory pages are numbered on from the last page and not compressed: they can be told apart
+  /// and read without one another.
+  void write_directory(std::span<const std::byte> all) {
+    const std::size_t full = directory_entries_per_page(header) * kDirectoryEntryBytes;
+    auto page_id = static_cast<std::uint32_t>(entries.size());
+    for (std::size_t at = 0; at < all.size(); at += full, ++page_id) {
+      const auto part = all.subspan(at, std::min(full, all.size() - at));
+      const auto count = static_cast<std::uint32_t>(part.size() / kDirectoryEntryBytes);
+      PageHeader page = page_header(page_id, {PageType::directory, 0, kNoLevel, count, 0, 0});
+      page.raw_bytes = static_cast<std::uint32_t>(part.size());
+      append(page, part);
+    }
+  }
+
+  void complete(Superblock& superblock, std::span<const std::byte> directory) const {
+    const auto pages = static_cast<std::uint32_t>(entries.size());
+    superblock.header = header;
+    superblock.page_count = pages;
+    superblock.directory_pages = (pages - 1) / directory_entries_per_page(header) + 1;
+    superblock.directory_offset = end;
+    superblock.directory_xxh3 = xxh3_64(directory);
+    superblock.file_bytes = end + directory_bytes(header, pages) + 2 * kBlockBytes;
+    superblock.points_per_page = points_per_page(header);
+    ContentDigest digest;
+    for (const DirectoryEntry& entry : entries) digest.add(entry);
+    superblock.content_xxh3 = digest.value();
+    if (superblock.writer.empty()) superblock.writer = "ptc " PTC_VERSION;
+  }
+
+  void check(const Block& block, const Superblock& superblock, const Meta& meta) const {
+    refuse_what_readers_refuse([&] {
+      static_cast<void>(decode_superblock(block, header, superblock.file_bytes));
+      const PageIndex index = index_pages(entries);
+      verify_pages(superblock, entries, index);
+      verify_attributes(superblock, entries, index, meta);
+    });
+  }
+
+  Superblock finish(const Meta& meta, Superblock superblock) {
+    require(!finished, "finish() twice");
+    require(std::ranges::none_of(entries, [](const auto& entry) { return entry.offset == 0; }),
+            "a reserved page that was never written");
+    superblock.meta_page = write_meta(meta);
+    finished = true;
+    const std::vector<std::byte> directory = encode_directory();
+    complete(superblock, directory);
+    const Block block = encode_superblock(superblock);
+    check(block, superblock, meta);
+    write_directory(directory);
+    file.sync();  // what is committed reaches the disk before the commit record
+    file.write_at(end, block);
+    file.write_at(end + kBlockBytes, block);
+    file.sync();
+    file.publish();
+    return superblock;
+  }
+
+  FileHeader header;
+  PageEncoder encoder;
+  OutputFile file;
+  std::vector<DirectoryEntry> entries;  ///< offset 0: reserved, not yet written
+  std::uint64_t end = kBlockBytes;      ///< where the next page goes
+  bool finished = false;
+  std::vector<std::byte> stored;  ///< of one page; kept between calls
+  std::vector<std::byte> image;   ///< of one page with header and padding; kept between calls
+};
+
+ContainerWriter::ContainerWriter(const std::filesystem::path& target, const WriterOptions& options)
+    : impl_(std::make_unique<Impl>(target, options)) {}
+
+ContainerWriter::~ContainerWriter() = default;
+
+const FileHeader& ContainerWriter::header() const noexcept {
+  return impl_->header;
+}
+
+std::uint32_t ContainerWriter::reserve_page() {
+  return impl_->reserve();
+}
+
+void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts,
+                                 std::span<const std::byte> payload) {
+  require(facts.type != PageType::directory && facts.type != PageType::meta,
+          "directory and meta page are written by finish()");
+  impl_->encode_page(page_id, facts, payload);
+}
+
+void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& facts, Codec codec,
+                                        std::uint32_t raw_bytes,
+                                        std::span<const std::byte> stored) {
+  require(facts.type != PageType::directory && facts.type != PageType::meta,
+          "directory and meta page are written by finish()");
+  PageHeader page = impl_->page_header(page_id, facts);
+  page.codec = codec;
+  page.raw_bytes = raw_bytes;
+  impl_->append_page(page, stored);
+}
+
+Superblock ContainerWriter::finish(const Meta& meta, Superblock superblock) {
+  return impl_->finish(meta, std::move(superblock));
+}
+
+}  // namespace ptc

@@ -1,0 +1,70 @@
+// Writes a container page by page (spec/container.md).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "format/codec.h"
+#include "format/container.h"
+#include "format/schema.h"
+
+namespace ptc {
+
+struct WriterOptions {
+  std::uint8_t page_shift = 16;
+  Codec codec = Codec::zstd;
+  int level = 1;  ///< of zstd, clamped to its range
+  Uuid uuid{};
+};
+
+/// A container on its way to the disk. Page numbers are given out by reserve_page(), so that a
+/// parent can refer to a page that is written later; pages are written in any order, and lie in the
+/// file in the order of the calls.
+///
+/// Until finish() has returned, the target is what it was before; a writer that ends before leaves
+/// nothing behind. What a reader would refuse is not written but thrown as std::invalid_argument,
+/// after which the writer is of no more use. Every call may throw std::system_error.
+/// Memory: 32 bytes a page, 80 in finish().   Threads: one at a time.
+class ContainerWriter {
+ public:
+  /// @throws std::invalid_argument when page_shift is not 12 to 20
+  ContainerWriter(const std::filesystem::path& target, const WriterOptions& options);
+  ~ContainerWriter();
+
+  [[nodiscard]] const FileHeader& header() const noexcept;
+  /// The next page number, from 0 on. @throws DataError after 2^32 - 2 pages
+  [[nodiscard]] std::uint32_t reserve_page();
+
+  /// What a page header says beyond sizes and hashes.
+  struct PageFacts {
+    PageType type = PageType::point;
+    std::uint16_t group = 0;
+    std::uint16_t level = 0xffff;
+    std::uint32_t record_count = 0;
+    std::uint64_t first_key = 0;
+    std::uint64_t last_key = 0;
+  };
+  /// Compresses, checksums and writes the page. Each reserved page must be written once.
+  /// @param payload  1 to page size - 64 bytes
+  void write_page(std::uint32_t page_id, const PageFacts& facts,
+                  std::span<const std::byte> payload);
+  /// Writes a page whose payload is already in its stored form (copied from another container).
+  void write_stored_page(std::uint32_t page_id, const PageFacts& facts, Codec codec,
+                         std::uint32_t raw_bytes, std::span<const std::byte> stored);
+
+  /// Meta page, directory, superblocks; syncs and publishes under the target's name.
+  /// @param superblock  counts, frame, bounds, totals and root; the rest is filled in here, the
+  /// writer's name when it is empty
+  /// @return  the superblock as it was written
+  Superblock finish(const Meta& meta, Superblock superblock);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ptc

@@ -1,0 +1,39 @@
+// Little-endian numbers in a span of bytes: the one way that format/ reads and fills structures.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <type_traits>
+
+namespace ptc {
+
+static_assert(std::endian::native == std::endian::little,
+              "numbers are copied as they lie in files");
+
+/// The number at `at`, which the caller has checked to lie inside.
+template <class T>
+[[nodiscard]] T load(const std::byte* bytes, std::size_t at) noexcept {
+  static_assert(std::is_arithmetic_v<T>);
+  T value;
+  std::memcpy(&value, bytes + at, sizeof value);
+  return value;
+}
+
+template <class T>
+void store(std::byte* bytes, std::size_t at, T value) noexcept {
+  static_assert(std::is_arithmetic_v<T>);
+  std::memcpy(bytes + at, &value, sizeof value);
+}
+
+/// Position of the first byte that is not zero; bytes.size() when all are.
+[[nodiscard]] inline std::size_t first_nonzero(std::span<const std::byte> bytes) noexcept {
+  const auto found = std::ranges::find_if(bytes, [](std::byte b) { return b != std::byte{0}; });
+  return static_cast<std::size_t>(found - bytes.begin());
+}
+
+}  // namespace ptc

@@ -1,0 +1,24 @@
+// XXH3 through libxxhash (spec/checksums.md).
+#include "format/checksum.h"
+
+#include <xxhash.h>
+#ifdef PTC_XXHASH_DISPATCH
+#include <xxh_x86dispatch.h>  // the same functions for the widest vectors of the processor
+#endif
+
+namespace ptc {
+
+std::uint64_t xxh3_64(std::span<const std::byte> bytes) noexcept {
+  return XXH3_64bits(bytes.data(), bytes.size());
+}
+
+std::uint64_t xxh3_64(std::span<const std::byte> bytes, std::uint64_t seed) noexcept {
+  return XXH3_64bits_withSeed(bytes.data(), bytes.size(), seed);
+}
+
+std::array<std::uint64_t, 2> xxh3_128(std::span<const std::byte> bytes) noexcept {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return {hash.low64, hash.high64};
+}
+
+}  // namespace ptc

@@ -1,0 +1,172 @@
+// Sibling groups: the check that makes later reads safe, and the way back to numbers
+// (spec/nodes.md#node-page).
+#include "format/node_page.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "format/bytes.h"
+#include "format/error.h"
+#include "format/node_layout.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kKeyLimit = std::uint64_t{1} << 63;
+constexpr std::uint16_t kUfloat16Limit = 0xff00;  // from here on infinity and NaN
+
+// Checks one group that lies whole in the payload, `at` bytes from its start.
+class GroupCheck {
+ public:
+  GroupCheck(const std::byte* payload, std::size_t at, std::uint32_t page_count,
+             std::uint64_t points)
+      : group_(payload + at), at_(at), page_count_(page_count), points_(points), view_(group_) {}
+
+  void run() const {
+    check_cell();
+    check_zero();
+    for (int i = 0; i < view_.size(); ++i) {
+      check_ref(i);
+      check_numbers(i);
+    }
+  }
+
+ private:
+  [[noreturn]] void fail(std::size_t offset, const char* clause, const char* text) const {
+    throw FormatError(at_ + offset, clause, text);
+  }
+
+  void check_cell() const {
+    if (view_.level() > kMaxLevel) fail(16, "spec/nodes.md#node-level", "level is above 62");
+    const MortonKey cell = view_.cell();
+    if (cell.high >= kKeyLimit || cell.low >= kKeyLimit ||
+        cell_of(cell, std::min(view_.level(), kLatticeBits)) != cell) {
+      fail(0, "spec/nodes.md#node-cell", "cell has digits below its level");
+    }
+    if (view_.interior_mask() >> view_.size() != 0) {
+      fail(18, "spec/nodes.md#node-mask", "interior mask names a child that is not there");
+    }
+  }
+
+  void check_zero() const {
+    constexpr char kZeroClause[] = "spec/nodes.md#node-zero";
+    const auto n = static_cast<std::size_t>(view_.size());
+    const std::size_t end = group_content_bytes(n);
+    if (load<std::uint8_t>(group_, 19) != 0 || load<std::uint32_t>(group_, 20) != 0) {
+      fail(19, kZeroClause, "reserved field is not zero");
+    }
+    if (first_nonzero({group_ + column_at(n, kZero), 2 * n}) != 2 * n) {
+      fail(column_at(n, kZero), kZeroClause, "reserved column is not zero");
+    }
+    if (first_nonzero({group_ + end, round_to_slot(end) - end}) != round_to_slot(end) - end) {
+      fail(end, kZeroClause, "padding is not zero");
+    }
+  }
+
+  void check_ref(int i) const {
+    const std::size_t offset = kGroupHeadBytes + 8 * static_cast<std::size_t>(i);
+    const ChildRef ref = view_.child(i);
+    if (ref.interior) {
+      if (ref.page >= page_count_) {
+        fail(offset, "spec/nodes.md#node-reference", "child's page does not exist");
+      }
+      if (load<std::uint64_t>(group_, offset) >> kFirstPointBits != 0) {
+        fail(offset + 6, "spec/nodes.md#node-zero", "reserved bits are not zero");
+      }
+    } else if (ref.point_count == 0 || ref.first_point > points_ ||
+               ref.point_count > points_ - ref.first_point) {
+      fail(offset, "spec/nodes.md#node-leaf", "leaf's points do not exist");
+    }
+  }
+
+  void check_numbers(int i) const {
+    for (const std::byte* const column : {view_.radius(), view_.area()}) {
+      if (GroupView::u16_at(column, i) >= kUfloat16Limit) {
+        fail(static_cast<std::size_t>(column - group_) + 2 * static_cast<std::size_t>(i),
+             "spec/nodes.md#node-number", "radius or area is not finite");
+      }
+    }
+  }
+
+  const std::byte* group_;
+  std::size_t at_;
+  std::uint32_t page_count_;
+  std::uint64_t points_;
+  GroupView view_;
+};
+
+double snorm16(std::uint16_t bits) noexcept {
+  return std::max(static_cast<double>(static_cast<std::int16_t>(bits)) / kCosSteps, -1.0);
+}
+
+NodeSummary decode_summary(const GroupView& group, int i) {
+  const auto u16 = [i](const std::byte* column) { return GroupView::u16_at(column, i); };
+  const LatticePoint corner = decode_morton(group.cell());
+  const double step = cell_edge(group.level()) / kMeanSteps;
+  NodeSummary node;
+  const std::array columns{group.mean_x(), group.mean_y(), group.mean_z()};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    node.mean[axis] = static_cast<double>(corner[axis]) + u16(columns[axis]) * step;
+  }
+  node.radius = decode_ufloat16(u16(group.radius()));
+  node.area = decode_ufloat16(u16(group.area()));
+  node.cone_axis = decode_octahedral8(u16(group.cone_axis()));
+  node.cone_cos = static_cast<float>(snorm16(u16(group.cone_cos())));
+  for (std::size_t k = 0; k < 6; ++k) {
+    const auto share = load<std::uint16_t>(group.facing(i), 2 * k);
+    node.facing[k] = share / kFacingSteps * node.area;
+    const std::array<float, 3> radiance =
+        decode_rgbe(load<std::uint32_t>(group.radiance(i), 4 * k));
+    for (std::size_t c = 0; c < 3; ++c) node.flux[k][c] = node.facing[k] * double{radiance[c]};
+  }
+  return node;
+}
+
+}  // namespace
+
+NodePage::NodePage(std::span<const std::byte> payload, std::uint32_t group_count,
+                   std::uint32_t page_count, std::uint64_t points)
+    : payload_(payload.data()), count_(group_count) {
+  constexpr char kSlots[] = "spec/nodes.md#node-slots";
+  const std::size_t table_end = sizeof(std::uint16_t) * std::size_t{group_count};
+  std::size_t at = round_to_slot(table_end);
+  if (group_count == 0 || at > payload.size()) {
+    throw FormatError(0, kSlots, "slot table does not fit the payload");
+  }
+  if (first_nonzero(payload.subspan(table_end, at - table_end)) != at - table_end) {
+    throw FormatError(table_end, "spec/nodes.md#node-zero", "padding is not zero");
+  }
+  // Groups follow each other without a gap, so none overlaps and no byte is left over.
+  for (std::uint32_t slot = 0; slot < group_count; ++slot) {
+    const std::size_t entry = sizeof(std::uint16_t) * std::size_t{slot};
+    if (load<std::uint16_t>(payload_, entry) * kSlotUnit != at) {
+      throw FormatError(entry, kSlots, "group does not start where the one before ends");
+    }
+    const std::size_t room = payload.size() - at;
+    if (room < kGroupHeadBytes) throw FormatError(at, kSlots, "group ends past the payload");
+    const auto n = load<std::uint8_t>(payload_, at + 17);
+    if (n < 1 || n > kMaxChildren) {
+      throw FormatError(at + 17, "spec/nodes.md#node-children", "group has not 1 to 8 children");
+    }
+    const std::size_t bytes = round_to_slot(group_content_bytes(n));
+    if (bytes > room) throw FormatError(at, kSlots, "group ends past the payload");
+    GroupCheck(payload_, at, page_count, points).run();
+    at += bytes;
+  }
+  if (at != payload.size()) throw FormatError(at, kSlots, "bytes follow the last group");
+}
+
+NodeGroup NodePage::decode(std::uint32_t slot) const {
+  const GroupView view = (*this)[slot];
+  NodeGroup group;
+  group.cell = view.cell();
+  group.level = view.level();
+  group.children.resize(static_cast<std::size_t>(view.size()));
+  for (int i = 0; i < view.size(); ++i) {
+    group.children[static_cast<std::size_t>(i)] = {view.child(i), decode_summary(view, i)};
+  }
+  return group;
+}
+
+}  // namespace ptc

@@ -1,0 +1,200 @@
+// Summaries to columns: every bound is rounded outwards (spec/nodes.md#quantisation).
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "format/bytes.h"
+#include "format/node_layout.h"
+#include "format/node_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kGreatestPayload = (0xffff + 1) * kSlotUnit;
+constexpr double kGreatestFloat = std::numeric_limits<float>::max();
+
+// Least float that is not below x, which is not negative.
+float float_above(double x) noexcept {
+  const auto nearest = static_cast<float>(std::min(x, kGreatestFloat));
+  return nearest < x ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
+}
+
+// Nearest whole number to x >= 0, halves up.
+std::uint16_t to_u16(double x) noexcept {
+  const double shifted = x + 0.5;
+  return static_cast<std::uint16_t>(shifted);
+}
+
+float to_float(double x) noexcept {
+  return static_cast<float>(std::min(x, kGreatestFloat));
+}
+
+bool sane(double x) noexcept {
+  return x >= 0 && x <= std::numeric_limits<double>::max();
+}
+
+[[maybe_unused]] bool storable(const NodeSummary& node) noexcept {
+  return std::ranges::all_of(node.mean, [](double x) { return std::isfinite(x); }) &&
+         sane(node.radius) && sane(node.area) && std::ranges::all_of(node.facing, sane) &&
+         std::ranges::all_of(node.flux,
+                             [](const auto& f) { return std::ranges::all_of(f, sane); }) &&
+         std::ranges::all_of(node.cone_axis, [](float x) { return std::isfinite(x); }) &&
+         std::abs(node.cone_cos) <= 1;
+}
+
+std::uint64_t encode_ref(const ChildRef& ref) noexcept {
+  if (ref.interior) return ref.page | std::uint64_t{ref.slot} << 32;
+  assert(ref.point_count >= 1 && ref.point_count <= kMaxLeafPoints);
+  assert(ref.first_point >> kFirstPointBits == 0);
+  return ref.first_point | std::uint64_t{ref.point_count} << kFirstPointBits;
+}
+
+// cos(a + d) rounded down, where a is the cone's half angle and d the angle between its axis and
+// the stored one; -1 when a + d reaches pi. Square roots only: the same bytes on every machine.
+std::int16_t encode_cone_cos(const NodeSummary& node, std::uint16_t stored_axis) noexcept {
+  constexpr double kFloatSlack = 4e-7;  // normals and axes are unit to float precision
+  const std::array<float, 3> b = decode_octahedral8(stored_axis);
+  const auto& a = node.cone_axis;
+  std::array<double, 3> cross;
+  double dot = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    const std::size_t k = (i + 2) % 3;
+    cross[i] = double{a[j]} * b[k] - double{a[k]} * b[j];
+    dot += double{a[i]} * b[i];
+  }
+  const double sine = std::sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
+  const double length = std::sqrt(sine * sine + dot * dot);
+  const double c = node.cone_cos;
+  double widened = -1;
+  if (length > 0 && c + dot / length > 0) {
+    widened = (c * dot - std::sqrt(std::max(0.0, 1 - c * c)) * sine) / length;
+  }
+  const double steps = std::max((widened - kFloatSlack) * kCosSteps, -kCosSteps);
+  return static_cast<std::int16_t>(static_cast<int>(steps + kCosSteps + 1) - 32768);  // floor
+}
+
+// Writes the columns of one child of a group of n.
+class ChildEncoder {
+ public:
+  ChildEncoder(std::byte* group, std::size_t n, std::size_t i, const LatticePoint& corner,
+               double edge)
+      : group_(group), n_(n), i_(i), corner_(corner), edge_(edge) {}
+
+  void encode(const NodeChild& child) {
+    assert(storable(child.node));
+    store(group_, kGroupHeadBytes + 8 * i_, encode_ref(child.ref));
+    encode_sphere(child.node);
+    const std::uint16_t axis = encode_octahedral8(child.node.cone_axis);
+    put(kConeAxis, axis);
+    put(kConeCos, static_cast<std::uint16_t>(encode_cone_cos(child.node, axis)));
+    encode_light(child.node);
+  }
+
+ private:
+  void put(std::size_t column, std::uint16_t value) {
+    store(group_, column_at(n_, column) + 2 * i_, value);
+  }
+
+  void encode_sphere(const NodeSummary& node) {
+    double moved_squared = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto corner = static_cast<double>(corner_[axis]);
+      const double steps = (node.mean[axis] - corner) * (kMeanSteps / edge_);
+      const std::uint16_t stored = to_u16(std::clamp(steps, 0.0, kMeanSteps - 1));
+      put(kMeanX + axis, stored);
+      const double moved = node.mean[axis] - (corner + stored * (edge_ / kMeanSteps));
+      moved_squared += moved * moved;
+    }
+    double radius = node.radius;
+    if (moved_squared > 0) {  // one part in 2^50 covers the roundings of these lines
+      radius = (radius + std::sqrt(moved_squared)) * (1 + 0x1p-50);
+    }
+    put(kRadius, encode_ufloat16_up(float_above(radius)));
+  }
+
+  void encode_light(const NodeSummary& node) {
+    put(kArea, encode_ufloat16(to_float(node.area)));
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double facing = node.facing[k];
+      if (!(facing > 0)) continue;  // share and radiance stay 0
+      const double share = node.area > 0 ? std::min(facing / node.area, 1.0) : 0.0;
+      store(group_, column_at(n_, kFacing) + 12 * i_ + 2 * k, to_u16(share * kFacingSteps));
+      const auto& flux = node.flux[k];
+      store(group_, column_at(n_, kRadiance) + 24 * i_ + 4 * k,
+            encode_rgbe({to_float(flux[0] / facing), to_float(flux[1] / facing),
+                         to_float(flux[2] / facing)}));
+    }
+  }
+
+  std::byte* group_;
+  std::size_t n_;
+  std::size_t i_;
+  const LatticePoint& corner_;
+  double edge_;
+};
+
+}  // namespace
+
+std::size_t node_group_bytes(std::size_t children) noexcept {
+  return round_to_slot(group_content_bytes(children)) + sizeof(std::uint16_t);
+}
+
+NodePageEncoder::NodePageEncoder(std::size_t payload_limit)
+    : limit_(std::min(payload_limit, kGreatestPayload)) {}
+
+bool NodePageEncoder::fits(std::size_t children) const noexcept {
+  const std::size_t table = round_to_slot(sizeof(std::uint16_t) * (slots_.size() + 1));
+  const std::size_t group = round_to_slot(group_content_bytes(children));
+  return table + groups_.size() + group <= limit_;
+}
+
+std::uint16_t NodePageEncoder::add(const NodeGroup& group) {
+  const std::size_t n = group.children.size();
+  if (n < 1 || n > kMaxChildren || !fits(n)) {
+    throw std::invalid_argument("NodePageEncoder: no or too many children, or no room for them");
+  }
+  assert(group.level >= 0 && group.level <= kMaxLevel);
+  assert(cell_of(group.cell, std::min(group.level, kLatticeBits)) == group.cell);
+  const std::size_t at = groups_.size();
+  slots_.push_back(static_cast<std::uint16_t>(at / kSlotUnit));  // take() adds the table's size
+  groups_.resize(at + round_to_slot(group_content_bytes(n)));
+
+  std::byte* const out = groups_.data() + at;
+  store(out, 0, group.cell.high);
+  store(out, 8, group.cell.low);
+  store(out, 16, static_cast<std::uint8_t>(group.level));
+  store(out, 17, static_cast<std::uint8_t>(n));
+  const LatticePoint corner = decode_morton(group.cell);
+  std::uint8_t interior_mask = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const NodeChild& child = group.children[i];
+    interior_mask = static_cast<std::uint8_t>(interior_mask | unsigned{child.ref.interior} << i);
+    ChildEncoder(out, n, i, corner, cell_edge(group.level)).encode(child);
+  }
+  store(out, 18, interior_mask);
+  return static_cast<std::uint16_t>(slots_.size() - 1);
+}
+
+std::uint32_t NodePageEncoder::size() const noexcept {
+  return static_cast<std::uint32_t>(slots_.size());
+}
+
+std::vector<std::byte> NodePageEncoder::take() {
+  const std::size_t table = round_to_slot(sizeof(std::uint16_t) * slots_.size());
+  std::vector<std::byte> payload(table + groups_.size());
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    const std::size_t unit = table / kSlotUnit + slots_[i];
+    store(payload.data(), 2 * i, static_cast<std::uint16_t>(unit));
+  }
+  std::ranges::copy(groups_, payload.begin() + static_cast<std::ptrdiff_t>(table));
+  slots_.clear();
+  groups_.clear();
+  return payload;
+}
+
+}  // namespace ptc

@@ -1,0 +1,242 @@
+// Columns of surfels (spec/points.md#point-page).
+#include "format/point_page.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "format/bytes.h"
+#include "format/error.h"
+#include "format/page_facts.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kPointBytes = 34;
+constexpr int kHighBits = kLatticeBits - 32;  // bits of each coordinate in the column `high`
+constexpr std::uint32_t kHighMask = (1u << kHighBits) - 1;
+constexpr std::uint32_t kHighLimit = 1u << (3 * kHighBits);
+
+// First byte of each column, in bytes a point.
+constexpr std::size_t kPosition = 0;  // x, y, z
+constexpr std::size_t kHigh = 12;
+constexpr std::size_t kRadius = 16;
+constexpr std::size_t kNormal = 20;
+constexpr std::size_t kRadiance = 24;
+constexpr std::size_t kAlbedo = 30;
+constexpr std::size_t kFlags = 33;
+
+// The order of points along the Z-curve is checked in 32-bit lanes: first the upper 31 bits of each
+// coordinate, then, where those are all equal, the lower 11.
+//
+//   bit 41 ....... 11 | 10 ...... 0
+constexpr int kLowerBits = 11;
+constexpr std::size_t kRunPoints = 128;  // a run's lanes stay in the first-level cache
+
+struct Lanes {
+  std::array<std::array<std::int32_t, kRunPoints + 1>, 3> axes;
+};
+
+// Upper or lower parts of the coordinates of points first to first + n - 1.
+void split(const std::byte* payload, std::size_t count, std::size_t first, std::size_t n,
+           bool upper, Lanes& out) noexcept {
+  const std::byte* const high = payload + kHigh * count + 4 * first;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::byte* const low = payload + 4 * axis * count + 4 * first;
+    auto& lanes = out.axes[axis];
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto bits = load<std::uint32_t>(low, 4 * i);
+      const std::uint32_t top = load<std::uint32_t>(high, 4 * i) >> (kHighBits * axis) & kHighMask;
+      const std::uint32_t part =
+          upper ? top << (32 - kLowerBits) | bits >> kLowerBits : bits & ((1u << kLowerBits) - 1);
+      lanes[i] = static_cast<std::int32_t>(part);
+    }
+  }
+}
+
+// Truth is all bits one and falsehood zero, so that compilers make vectors of the loops below.
+using Mask = std::int32_t;
+
+inline Mask below(std::int32_t a, std::int32_t b) noexcept {
+  return a < b ? -1 : 0;
+}
+inline Mask choose(Mask m, Mask yes, Mask no) noexcept {
+  return (m & yes) | (~m & no);
+}
+
+// Most significant bit of a below that of b; neither is negative (Chan 2002, "Closest-point
+// problems simplified"; here as one comparison).
+inline Mask below_msb(std::int32_t a, std::int32_t b) noexcept {
+  return below(a, b & ~a);
+}
+
+// Whether point j comes after point i: the axis whose coordinates differ in the most significant
+// bit decides, z before y before x among equals.
+inline Mask follows(const Lanes& p, std::size_t i, std::size_t j) noexcept {
+  const auto& [x, y, z] = p.axes;
+  const std::int32_t differ_x = x[i] ^ x[j];
+  const std::int32_t differ_y = y[i] ^ y[j];
+  const std::int32_t differ_z = z[i] ^ z[j];
+  const Mask xy = choose(below_msb(differ_y, differ_x), below(x[i], x[j]), below(y[i], y[j]));
+  return choose(below_msb(differ_z, differ_x | differ_y), xy, below(z[i], z[j]));
+}
+
+inline Mask equal(const Lanes& p, std::size_t i, std::size_t j) noexcept {
+  const auto& [x, y, z] = p.axes;
+  return ((x[i] ^ x[j]) | (y[i] ^ y[j]) | (z[i] ^ z[j])) == 0 ? -1 : 0;
+}
+
+// True when each of n points is followed or equalled by the next of the n + 1.
+bool run_ascends(const std::byte* payload, std::size_t count, std::size_t first,
+                 std::size_t n) noexcept {
+  Lanes upper;
+  split(payload, count, first, n + 1, true, upper);
+  Mask ascends = -1;
+  for (std::size_t i = 0; i < n; ++i) ascends &= follows(upper, i, i + 1);
+  if (ascends != 0) return true;  // usual: points of real scenes differ in the upper bits
+
+  Lanes lower;
+  split(payload, count, first, n + 1, false, lower);
+  ascends = -1;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Mask tie = equal(upper, i, i + 1) & ~follows(lower, i + 1, i);
+    ascends &= follows(upper, i, i + 1) | tie;
+  }
+  return ascends != 0;
+}
+
+// Index of the first point whose successor comes before it on the Z-curve; count - 1 when none.
+std::size_t first_descent(const PointPage& page, const std::byte* payload) noexcept {
+  const std::size_t last = page.size() - 1;
+  for (std::size_t first = 0; first < last; first += kRunPoints) {
+    const std::size_t n = std::min(kRunPoints, last - first);
+    if (run_ascends(payload, page.size(), first, n)) continue;
+    auto i = static_cast<std::uint32_t>(first);
+    while (encode_morton(page.position(i)) <= encode_morton(page.position(i + 1))) ++i;
+    return i;
+  }
+  return last;
+}
+
+// True when every value is below the limit, which is at most the type's top bit: adding what the
+// limit lacks to the top bit sets that bit for all others, or it was set before.
+template <class T>
+bool all_below(const std::byte* column, std::size_t count, T limit) noexcept {
+  constexpr T kTop = static_cast<T>(T{1} << (8 * sizeof(T) - 1));
+  const T lack = static_cast<T>(kTop - limit);
+  T seen = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const T value = load<T>(column, i * sizeof(T));
+    seen = static_cast<T>(seen | value | static_cast<T>(value + lack));
+  }
+  return (seen & kTop) == 0;
+}
+
+[[maybe_unused]] bool storable(const PointRecord& point) noexcept {
+  const auto usual = [](std::uint16_t half) { return half < 0x7c00 || half == 0x8000; };
+  return point.radius >= 0 && point.radius <= std::numeric_limits<float>::max() &&
+         point.flags == 0 && std::ranges::all_of(point.radiance, usual);
+}
+
+// Writes columns of `count` numbers.
+class Columns {
+ public:
+  explicit Columns(std::uint32_t count) : count_(count), payload_(point_page_bytes(count)) {}
+
+  template <class T>
+  void put(std::size_t bytes_before, std::size_t i, T value) {
+    store(payload_.data() + bytes_before * count_, i * sizeof(T), value);
+  }
+  std::vector<std::byte> take() { return std::move(payload_); }
+
+ private:
+  std::size_t count_;
+  std::vector<std::byte> payload_;
+};
+
+}  // namespace
+
+std::uint32_t points_per_page(const FileHeader& file) noexcept {
+  return static_cast<std::uint32_t>(payload_limit(file) / kPointBytes) / 8 * 8;
+}
+
+std::uint64_t point_page_bytes(std::uint32_t points) noexcept {
+  return kPointBytes * std::uint64_t{points};
+}
+
+std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
+  if (points.empty()) throw std::invalid_argument("encode_point_page: no points");
+  assert(std::ranges::is_sorted(points, {}, &PointRecord::key));
+  Columns columns(static_cast<std::uint32_t>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const PointRecord& point = points[i];
+    assert(storable(point));
+    const LatticePoint q = decode_morton(point.key);
+    columns.put(kHigh, i,
+                static_cast<std::uint32_t>(q[0] >> 32 | q[1] >> 32 << kHighBits |
+                                           q[2] >> 32 << (2 * kHighBits)));
+    columns.put(kRadius, i, point.radius + 0.0f);  // -0 becomes 0
+    for (std::size_t k = 0; k < 2; ++k) columns.put(kNormal + 2 * k, i, point.normal[k]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint16_t half = point.radiance[k] == 0x8000 ? std::uint16_t{0} : point.radiance[k];
+      columns.put(kPosition + 4 * k, i, static_cast<std::uint32_t>(q[k]));
+      columns.put(kRadiance + 2 * k, i, half);
+      columns.put(kAlbedo + k, i, point.albedo[k]);
+    }
+    columns.put(kFlags, i, point.flags);
+  }
+  return columns.take();
+}
+
+PointPage::PointPage(std::span<const std::byte> payload, std::uint32_t count)
+    : payload_(payload.data()), count_(count) {
+  if (count == 0 || payload.size() != point_page_bytes(count)) {
+    throw FormatError(0, "spec/points.md#point-size", "payload's size does not suit its points");
+  }
+}
+
+PointRecord PointPage::operator[](std::uint32_t i) const noexcept {
+  PointRecord point;
+  point.key = encode_morton(position(i));
+  point.radius = radius(i);
+  point.normal = normal(i);
+  point.radiance = radiance(i);
+  point.albedo = albedo(i);
+  point.flags = value<std::uint8_t>(kFlags, i);
+  return point;
+}
+
+void PointPage::verify() const {
+  verify_column<std::uint32_t>(kHigh, kHighLimit, "spec/points.md#point-lattice",
+                               "bits 30 and 31 of high are not zero");
+  const std::size_t descent = first_descent(*this, payload_);
+  if (descent + 1 < count_) {
+    throw FormatError(4 * (descent + 1), "spec/points.md#point-order",
+                      "point " + std::to_string(descent + 1) + " precedes the one before");
+  }
+  verify_column<std::uint32_t>(kRadius, 0x7f800000, "spec/points.md#point-radius",
+                               "radius is negative or not finite");
+  for (std::size_t k = 0; k < 3; ++k) {
+    verify_column<std::uint16_t>(kRadiance + 2 * k, 0x7c00, "spec/points.md#point-radiance",
+                                 "radiance is negative or not finite");
+  }
+  verify_column<std::uint8_t>(kFlags, 1, "spec/points.md#point-flags", "flags are not zero");
+}
+
+// Bit patterns of numbers that are not negative are ordered like the numbers, and all others are
+// above them: one limit finds negative numbers, infinities and NaN.
+template <class T>
+void PointPage::verify_column(std::size_t bytes_before, T limit, const char* clause,
+                              const char* text) const {
+  const std::byte* const values = payload_ + bytes_before * count_;
+  if (all_below(values, count_, limit)) return;
+  std::size_t i = 0;
+  while (load<T>(values, i * sizeof(T)) < limit) ++i;
+  throw FormatError(bytes_before * count_ + i * sizeof(T), clause,
+                    "point " + std::to_string(i) + ": " + text);
+}
+
+}  // namespace ptc

@@ -1,0 +1,24 @@
+// One surfel on its way from the source to the file: what the sort moves.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+
+#include "format/morton.h"
+
+namespace ptc {
+
+/// A surfel with its place on the Z-curve in front. The key is the position.
+struct PointRecord {
+  MortonKey key;
+  float radius = 0;                         ///< scene units; the disc circumscribes its square cell
+  std::array<std::int16_t, 2> normal{};     ///< octahedral
+  std::array<std::uint16_t, 3> radiance{};  ///< half, outgoing, W / (m^2 sr)
+  std::array<std::uint8_t, 3> albedo{};     ///< diffuse reflectance, v / 255
+  std::uint8_t flags = 0;                   ///< 0; reserved
+  std::array<std::uint8_t, 6> reserved{};   ///< 0
+};
+static_assert(sizeof(PointRecord) == 40 && std::is_trivially_copyable_v<PointRecord>);
+
+}  // namespace ptc

@@ -1,0 +1,134 @@
+// Small number types, rounded the same way on every machine (spec/README.md#types).
+#include "format/scalar.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ptc {
+namespace {
+
+constexpr std::uint16_t kGreatestUfloat16 = 0xfeff;  // exponent 255 is infinity and NaN
+
+// Nearest integer, halves away from zero; exact for the magnitudes used here.
+int nearest(float x) noexcept {
+  return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f);
+}
+
+// The direction on the square [-1, 1]^2: the upper half of the octahedron in the middle, the lower
+// half folded out over the diagonals.
+//
+//      +---^---+
+//      | / | \ |    inside the diamond z >= 0, outside z < 0
+//      |<--+-->|
+//      | \ | / |
+//      +---v---+
+std::array<float, 2> fold(const std::array<float, 3>& n) noexcept {
+  const float norm = std::abs(n[0]) + std::abs(n[1]) + std::abs(n[2]);
+  if (!(norm > 0) || !std::isfinite(norm)) return {0, 0};
+  const float u = n[0] / norm;
+  const float v = n[1] / norm;
+  if (n[2] >= 0) return {u, v};
+  return {std::copysign(1 - std::abs(v), u), std::copysign(1 - std::abs(u), v)};
+}
+
+std::array<float, 3> unfold(float u, float v) noexcept {
+  float x = u;
+  float y = v;
+  const float z = 1 - std::abs(u) - std::abs(v);
+  if (z < 0) {
+    x = std::copysign(1 - std::abs(v), u);
+    y = std::copysign(1 - std::abs(u), v);
+  }
+  const float length = std::sqrt(x * x + y * y + z * z);
+  return {x / length, y / length, z / length};
+}
+
+}  // namespace
+
+std::uint16_t encode_half(float x) noexcept {
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
+  const auto sign = static_cast<std::uint32_t>(bits >> 16 & 0x8000);
+  const std::uint32_t magnitude = bits & 0x7fffffff;
+  if (magnitude > 0x7f800000) return 0;                                           // NaN
+  if (magnitude >= 0x477fe000) return static_cast<std::uint16_t>(sign | 0x7bff);  // 65504 and above
+  std::uint32_t rounded;
+  if (magnitude >= 0x38800000) {  // 2^-14: normal; the carry of rounding runs into the exponent
+    const std::uint32_t rebased = magnitude - (112u << 23);
+    rounded = (rebased + 0xfff + (rebased >> 13 & 1)) >> 13;
+  } else {  // adding 2^-1 leaves x in units of 2^-24 in the low bits, rounded to even
+    const float shifted = std::bit_cast<float>(magnitude) + 0.5f;
+    rounded = std::bit_cast<std::uint32_t>(shifted) - std::bit_cast<std::uint32_t>(0.5f);
+  }
+  return static_cast<std::uint16_t>(sign | rounded);
+}
+
+float decode_half(std::uint16_t bits) noexcept {
+  const std::uint32_t sign = static_cast<std::uint32_t>(bits & 0x8000) << 16;
+  const std::uint32_t magnitude = bits & 0x7fff;
+  if (magnitude >= 0x7c00) {  // infinity and NaN keep their fraction
+    return std::bit_cast<float>(sign | 0x7f800000 | (magnitude & 0x3ff) << 13);
+  }
+  // Shifted into place the exponent is 112 too small; the product is exact, also for subnormals.
+  const float value = std::bit_cast<float>(magnitude << 13) * 0x1p112f;
+  return std::bit_cast<float>(sign | std::bit_cast<std::uint32_t>(value));
+}
+
+std::uint16_t encode_ufloat16_up(float x) noexcept {
+  if (!(x > 0)) return 0;
+  const std::uint32_t rounded = (std::bit_cast<std::uint32_t>(x) + 0x7fff) >> 15;
+  return static_cast<std::uint16_t>(std::min<std::uint32_t>(rounded, kGreatestUfloat16));
+}
+
+std::uint16_t encode_ufloat16(float x) noexcept {
+  if (!(x > 0)) return 0;
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
+  const std::uint32_t rounded = (bits + 0x3fff + (bits >> 15 & 1)) >> 15;
+  return static_cast<std::uint16_t>(std::min<std::uint32_t>(rounded, kGreatestUfloat16));
+}
+
+std::uint32_t encode_rgbe(const std::array<float, 3>& rgb) noexcept {
+  const float greatest = std::max({rgb[0], rgb[1], rgb[2], 0.0f});
+  if (!(greatest > 0)) return 0;
+  // The exponent e with greatest in [2^(e-1), 2^e), kept in [-128, 127].
+  const double wide = greatest;
+  const int biased = static_cast<int>(std::bit_cast<std::uint64_t>(wide) >> 52) - 1022;
+  const int exponent = std::clamp(biased, -128, 127);
+  const double scale = std::bit_cast<double>(static_cast<std::uint64_t>(1023 + 8 - exponent) << 52);
+  std::uint32_t bits = static_cast<std::uint32_t>(exponent + 128) << 24;
+  for (unsigned i = 0; i < 3; ++i) {
+    const double scaled = std::max(0.0, static_cast<double>(rgb[i])) * scale + 0.5;
+    bits |= static_cast<std::uint32_t>(std::min(scaled, 255.0)) << (8 * i);
+  }
+  return bits;
+}
+
+std::array<float, 3> decode_rgbe(std::uint32_t bits) noexcept {
+  const auto exponent = static_cast<std::uint64_t>(bits >> 24);
+  const double scale = std::bit_cast<double>((exponent + 1023 - 136) << 52);
+  return {static_cast<float>((bits & 0xff) * scale), static_cast<float>((bits >> 8 & 0xff) * scale),
+          static_cast<float>((bits >> 16 & 0xff) * scale)};
+}
+
+std::array<std::int16_t, 2> encode_octahedral(const std::array<float, 3>& n) noexcept {
+  const auto [u, v] = fold(n);
+  return {static_cast<std::int16_t>(nearest(u * 32767)),
+          static_cast<std::int16_t>(nearest(v * 32767))};
+}
+
+std::array<float, 3> decode_octahedral(std::int16_t u, std::int16_t v) noexcept {
+  return unfold(static_cast<float>(std::max<int>(u, -32767)) / 32767,
+                static_cast<float>(std::max<int>(v, -32767)) / 32767);
+}
+
+std::uint16_t encode_octahedral8(const std::array<float, 3>& n) noexcept {
+  const auto [u, v] = fold(n);
+  return static_cast<std::uint16_t>((nearest(u * 127) & 0xff) | (nearest(v * 127) & 0xff) << 8);
+}
+
+std::array<float, 3> decode_octahedral8(std::uint16_t bits) noexcept {
+  const int u = std::max<int>(static_cast<std::int8_t>(bits & 0xff), -127);
+  const int v = std::max<int>(static_cast<std::int8_t>(bits >> 8), -127);
+  return unfold(static_cast<float>(u) / 127, static_cast<float>(v) / 127);
+}
+
+}  // namespace ptc

@@ -1,0 +1,424 @@
+"""Which vectors there are: every rule of the format and the smallest file that breaks it.
+
+all_vectors() yields (folder, name, Draft or bytes). A name is document-anchor, with .variant where
+one rule is broken in several ways.
+"""
+
+import struct
+
+import reader as r
+from vectors import UUID, Draft, Page, Surfel, encode_meta, encode_points, scatter
+
+NAN = float("nan")
+CHANNELS = (("irradiance", 3, 3, 1), ("occlusion", 1, 1, 1), ("part", 4, 1, 9))
+
+
+def one_point():
+    return Draft([Surfel((1 << 41, 3, (1 << 42) - 1), (0, 1, 0), 0.25, (1, 0.5, 0.25),
+                         (255, 128, 0))])
+
+
+def zero_point():
+    """A point whose columns are all zero, but that octahedral zero is +z."""
+    return Draft([Surfel((0, 0, 0))])
+
+
+def two_pages():
+    return Draft(scatter(130, 7))
+
+
+def rle_frame(raw_bytes):
+    """A zstd frame of zeros, made by hand: one segment, one block that repeats a byte."""
+    return b"\x28\xb5\x2f\xfd\x20" + bytes([raw_bytes]) + (raw_bytes << 3 | 1 << 1 | 1).to_bytes(
+        3, "little") + b"\0"
+
+
+# good --------------------------------------------------------------------------------------------
+
+def with_rle():
+    draft = zero_point()
+    draft.pages[0].stored, draft.pages[0].codec = rle_frame(34), r.ZSTD
+    return draft
+
+
+def with_zstd():
+    draft = two_pages()
+    for page in draft.pages:
+        draft.compress(page)
+    return draft
+
+
+def with_unknown_bits():
+    draft = one_point()
+    draft.head.update(minor=7, ro_compat=1 << 63, compat=1)
+    return draft
+
+
+def good(has_zstd):
+    top = (1 << 42) - 1
+    corners = [Surfel((x, y, z), radius=1) for x in (0, top) for y in (0, top) for z in (0, top)]
+    coincident = [Surfel((5, 6, 7), radius=0.5, radiance=(1, 1, 1))]
+    yield "empty", Draft()
+    yield "one-point", one_point()
+    yield "three-coincident-points", Draft(coincident * 3, leaf_points=1)
+    yield "coincident-points-on-three-levels", Draft(coincident * 70, leaf_points=1)
+    yield "corners-of-the-lattice", Draft(corners, leaf_points=1)
+    yield "two-pages", two_pages()
+    yield "far-origin", Draft(scatter(20, 3), origin=(1e7, -1e7, 0.0))
+    yield "page-shift-20", Draft(scatter(20, 4), page_shift=20)
+    yield "attributes", Draft(scatter(130, 5), channels=CHANNELS,
+                              text=(("scene", "caf\u00e9"), ("unit", "m")))
+    yield "unknown-compatible-features", with_unknown_bits()
+    yield "zstd-frame-by-hand", with_rle()
+    if has_zstd:
+        yield "zstd", with_zstd()
+
+
+# bad: container.md -------------------------------------------------------------------------------
+
+def changed(draft, change):
+    change(draft)
+    return draft
+
+
+def bad_header():
+    def head(**fields):
+        return changed(Draft(), lambda d: d.head.update(fields))
+
+    def patch(at, new):
+        return changed(Draft(), lambda d: d.patches.append((at, new)))
+    yield "container-header-magic", patch(0, b"\x09")
+    yield "container-header-length", Draft().to_bytes()[:100]
+    yield "container-header-checksum", patch(44, b"\xff")
+    yield "container-header-version", head(major=2)
+    yield "container-header-features", head(incompat=1 << 5)
+    yield "container-header-constants", head(align_shift=13)
+    yield "container-header-constants.byte-order", head(byte_order=0x04030201)
+    yield "container-header-page-shift", Draft(page_shift=11)
+    yield "container-header-page-shift.above", Draft(page_shift=21)
+    yield "container-header-zero", head(reserved=b"\1" + bytes(55))
+    yield "container-header-zero.rest", patch(4095, b"\1")
+
+
+def bad_page():
+    def page(number=0, both=None, **header):
+        draft = one_point()
+        draft.pages[number].header.update(header)
+        draft.pages[number].header.update(both or {})
+        draft.pages[number].entry.update(both or {})
+        return draft
+    other = one_point()
+    other.pages[0].uuid = UUID[::-1]
+    fields = one_point()
+    fields.pages[0].level = 0
+    yield "container-page-magic", changed(
+        one_point(), lambda d: d.patches.append((d.offset(0), b"X")))
+    yield "container-page-checksum", changed(
+        one_point(), lambda d: d.patches.append((d.offset(0) + 32, b"X")))
+    yield "container-page-checksum.other-file", other
+    yield "container-page-type", page(both={"type": 6})
+    yield "container-page-codec", page(codec=2)
+    yield "container-page-length", page(both={"raw_bytes": 33})
+    yield "container-page-length.above", page(both={"raw_bytes": 0xFFFFFFFF})
+    yield "container-page-fields", page(both={"group": 1})
+    yield "container-page-fields.count", page(both={"record_count": 2})
+    yield "container-page-fields.level", fields
+    yield "container-page-keys", page(first_key=1 << 62, last_key=1)
+    yield "container-page-agreement", page(page_id=1)
+    yield "container-page-agreement.group-count", page(1, record_count=2)
+    yield "container-page-payload", changed(
+        one_point(), lambda d: d.patches.append((d.offset(0) + 64 + 30, b"X")))
+
+
+def bad_codec():
+    def stored(frame):
+        draft = zero_point()
+        draft.pages[0].stored, draft.pages[0].codec = frame, r.ZSTD
+        return draft
+    frame = rle_frame(34)
+    yield "container-codec-frame", stored(rle_frame(33))
+    yield "container-codec-frame.trailing", stored(frame + b"\0")
+    yield "container-codec-frame.truncated", stored(frame[:-1])
+    yield "container-codec-frame.window", stored(frame[:4] + b"\0\x58" + frame[6:])
+    yield "container-codec-frame.dictionary", stored(frame[:4] + b"\x21\x01" + frame[5:])
+    yield "container-codec-frame.no-frame", stored(b"\0" * 10)
+
+
+def bad_directory():
+    def entry(**fields):
+        return changed(one_point(), lambda d: d.pages[0].entry.update(fields))
+    extent = "container-directory-extent"
+    yield extent, entry(offset=r.BLOCK + 64)
+    yield extent + ".header", entry(offset=0)
+    yield extent + ".superblock", entry(offset=one_point().offset(3) + r.BLOCK)
+    yield extent + ".wraps", entry(offset=(1 << 64) - r.BLOCK)
+    yield "container-directory-listing", entry(type=r.DIRECTORY, raw_bytes=32, stored_bytes=32)
+    yield "container-directory-overlap", entry(offset=one_point().offset(1))
+    yield "container-directory-overlap.directory", entry(offset=one_point().offset(3))
+    yield "container-directory-pages", changed(one_point(), lambda d: d.directory.update(page_id=9))
+    yield "container-directory-pages.checksum", changed(
+        one_point(), lambda d: d.super.update(directory_xxh3=1))
+
+
+def bad_superblock():
+    def with_(**fields):
+        return changed(one_point(), lambda d: d.super.update(fields))
+    good_identity = one_point().identity()
+    yield "container-superblock-magic", one_point().to_bytes()[:-8192]
+    yield "container-superblock-magic.truncated", one_point().to_bytes()[:8192]
+    yield "container-superblock-checksum", changed(
+        Draft(), lambda d: d.patches.extend([(-8192 + 500, b"X"), (-4096 + 500, b"X")]))
+    yield "container-superblock-header", with_(identity=good_identity[:40] + b"X"
+                                               + good_identity[41:])
+    yield "container-superblock-length", with_(file_bytes=1 << 20)
+    yield "container-superblock-length.appended", one_point().to_bytes() + bytes(4096)
+    yield "container-superblock-copies", changed(
+        one_point(), lambda d: d.super_b.update(area=1.0))
+    pages = "container-superblock-pages"
+    yield pages, with_(meta_page=3)
+    yield pages + ".none", with_(page_count=0, directory_pages=0)
+    yield pages + ".directory", with_(directory_offset=8192)
+    yield pages + ".directory-pages", with_(directory_pages=2)
+    root = "container-superblock-root"
+    yield root, with_(root_page=r.NO_PAGE)
+    yield root + ".point-page", with_(root_page=0)
+    yield root + ".slot", with_(root_slot=1)
+    yield root + ".levels", with_(levels=64)
+    counts = "container-superblock-counts"
+    yield counts, with_(points=2)
+    yield counts + ".groups", with_(node_groups=2, nodes=2)
+    yield counts + ".nodes", with_(nodes=9)
+    yield counts + ".leaf-points", with_(leaf_points=0)
+    yield counts + ".points-per-page", with_(points_per_page=0)
+    frame = "container-superblock-frame"
+    yield frame, with_(edge=3.0)
+    yield frame + ".negative", with_(edge=-4.0)
+    yield frame + ".origin", with_(origin=(2.0 ** -21, 0.0, 0.0))
+    yield frame + ".far", with_(origin=(0.0, 2.0 ** 34, 0.0))
+    totals = "container-superblock-totals"
+    yield totals, with_(area=NAN)
+    yield totals + ".flux", with_(flux=(0.0, -1.0, 0.0))
+    yield totals + ".bounds", with_(bounds_low=(0.0, 1.0, 0.0), bounds_high=(0.0, 0.5, 0.0))
+    yield "container-superblock-digest", with_(content_xxh3=(1, 2))
+    yield "container-superblock-writer", with_(writer=b"\xff")
+    yield "container-superblock-writer.unended", with_(writer=b"x" * 64)
+    yield "container-superblock-zero", with_(rest=b"\1" + bytes(3695))
+    yield "container-superblock-zero.field", with_(reserved=1)
+    yield "container-meta-page", with_(meta_page=0)
+
+
+# bad: points.md ----------------------------------------------------------------------------------
+
+def bad_points():
+    def payload(at, new, draft=None):
+        draft = draft or one_point()
+        draft.pages[0].payload[at:at + len(new)] = new
+        return draft
+    pair = Draft([Surfel((1, 1, 1)), Surfel((2, 1, 1))])
+    pair.pages[0].payload[:8] = pair.pages[0].payload[4:8] + pair.pages[0].payload[:4]
+    yield "points-point-lattice", payload(15, b"\x40")
+    yield "points-point-order", pair
+    yield "points-point-order.high", payload(26, b"\x20", Draft([Surfel((1, 1, 1)),
+                                                                Surfel((2, 1, 1 << 32))]))
+    yield "points-point-radius", payload(16, struct.pack("<f", NAN))
+    yield "points-point-radius.negative", payload(16, struct.pack("<f", -0.0))
+    yield "points-point-radiance", payload(24, b"\x00\x7c")
+    yield "points-point-radiance.negative", payload(28, b"\x00\xbc")
+    yield "points-point-flags", payload(33, b"\1")
+    short = Draft(scatter(130, 7))
+    first, second = short.pages[0], short.pages[1]
+    short.pages[0], short.pages[1] = second, first
+    yield "points-point-pages", short
+    yield "points-point-pages.superblock", changed(
+        one_point(), lambda d: d.super.update(points_per_page=104))
+
+
+def bad_meta():
+    def meta(payload):
+        draft = Draft()
+        draft.pages[-1] = Page(r.META, payload, 1)
+        return draft
+
+    def channel(*fields, text=()):
+        return meta(encode_meta([fields], text))
+    size = "points-meta-size"
+    yield size, meta(encode_meta() + b"\0")
+    yield size + ".short", meta(bytes(4))
+    yield size + ".channels", meta(struct.pack("<II", 0xFFFFFFFF, 0))
+    yield size + ".texts", meta(struct.pack("<II", 0, 0xFFFFFFFF))
+    yield size + ".text", meta(struct.pack("<IIII", 0, 1, 0xFFFFFFFF, 0xFFFFFFFF))
+    yield "points-meta-channel", channel("Upper", 3, 1, 1)
+    yield "points-meta-channel.type", channel("a", 5, 1, 1)
+    yield "points-meta-channel.components", channel("a", 3, 0, 1)
+    yield "points-meta-channel.group", channel("a", 3, 1, 256)
+    yield "points-meta-channel.width", channel("a", 4, 9, 1)
+    yield "points-meta-channel.twice", meta(encode_meta([("a", 3, 1, 1), ("a", 3, 1, 2)]))
+    yield "points-meta-channel.order", meta(encode_meta([("a", 3, 1, 2), ("b", 3, 1, 1)]))
+    text = "points-meta-text"
+    yield text, meta(struct.pack("<IIII", 0, 1, 1, 1) + b"a\xff")
+    yield text + ".key", meta(encode_meta((), [("A", "")]))
+    yield text + ".nul", meta(encode_meta((), [("a", "\0")]))
+    yield text + ".order", meta(encode_meta((), [("b", ""), ("a", "")]))
+    padded = bytearray(encode_meta([("a", 3, 1, 1)]))
+    padded[8 + 31] = 1
+    yield "points-meta-zero", meta(padded)
+
+
+def bad_attributes():
+    clause = "points-attribute-pages"
+    missing = Draft(scatter(10, 5), channels=CHANNELS)
+    del missing.pages[-2]
+    other = Draft(scatter(10, 5), channels=CHANNELS)
+    other.pages[-2].group = 8
+    short = Draft(scatter(10, 5), channels=CHANNELS)
+    del short.pages[-2].payload[-1]
+    count = Draft(scatter(10, 5), channels=CHANNELS)
+    count.pages[-2].count = 9
+    yield clause, missing
+    yield clause + ".unknown-group", other
+    yield clause + ".bytes", short
+    yield clause + ".count", count
+
+
+# bad: nodes.md -----------------------------------------------------------------------------------
+
+def bad_nodes():
+    """The node page of one point: a slot table of 8 bytes, then a group with one child."""
+    def payload(at, new):
+        draft = one_point()
+        draft.pages[1].payload[at:at + len(new)] = new
+        return draft
+
+    def reference(word, mask=b"\0"):
+        return changed(payload(8 + 24, struct.pack("<Q", word)),
+                       lambda d: d.pages[1].payload.__setitem__(slice(26, 27), mask))
+    slots = "nodes-node-slots"
+    yield slots, payload(0, b"\2")
+    yield slots + ".children", payload(8 + 17, b"\2")
+    yield slots + ".left-over", changed(one_point(), lambda d: d.pages[1].payload.extend(bytes(8)))
+    yield slots + ".table", changed(one_point(), lambda d: (
+        setattr(d.pages[1], "payload", d.pages[1].payload[:4])))
+    yield "nodes-node-children", payload(8 + 17, b"\0")
+    yield "nodes-node-children.nine", payload(8 + 17, b"\x09")
+    yield "nodes-node-level", payload(8 + 16, b"\x3f")
+    yield "nodes-node-cell", payload(8, struct.pack("<Q", 1))
+    yield "nodes-node-cell.bit-63", payload(8 + 8, struct.pack("<Q", 1 << 63))
+    yield "nodes-node-mask", payload(8 + 18, b"\2")
+    yield "nodes-node-reference", reference(3, b"\1")
+    yield "nodes-references", reference(0, b"\1")
+    yield "nodes-references.slot", reference(1 | 1 << 32, b"\1")
+    yield "nodes-node-leaf", reference(0)
+    yield "nodes-node-leaf.past-the-end", reference(1 | 1 << 48)
+    yield "nodes-node-leaf.two", reference(2 << 48)
+    yield "nodes-node-number", payload(8 + 32 + 6, b"\x00\xff")
+    yield "nodes-node-number.area", payload(8 + 32 + 12, b"\xff\xff")
+    zero = "nodes-node-zero"
+    yield zero, payload(8 + 19, b"\1")
+    yield zero + ".column", payload(8 + 32 + 14, b"\1")
+    yield zero + ".padding", payload(8 + 84, b"\1")
+    yield zero + ".table", payload(2, b"\1")
+    yield zero + ".reference", reference(1 | 1 << 48, b"\1")
+
+
+# verify: what only a look at the whole file finds ------------------------------------------------
+
+def tree_of(surfels, change, leaf_points=1):
+    """A file whose groups were changed before they were encoded."""
+    draft = Draft(surfels, leaf_points=leaf_points)
+    change(draft.tree.groups)
+    first = draft.point_pages
+    last = len(draft.pages) - 1
+    draft.pages[first:last] = [draft.node_page(draft.tree.groups)]
+    return draft
+
+
+def four_points():
+    """Two pairs of points: a root with two groups of two leaves each."""
+    far = 1 << 41
+    return [Surfel((x + dx, 0, 0), radius=1) for x in (0, far) for dx in (0, 1 << 30)]
+
+
+def verify_container():
+    yield "container-padding", changed(
+        one_point(), lambda d: d.patches.append((d.offset(0) + 64 + 34, b"\1")))
+    yield "container-padding.directory", changed(
+        one_point(), lambda d: d.patches.append((-8192 - 1, b"\1")))
+    yield "container-page-keys", changed(
+        one_point(), lambda d: d.pages[0].header.update(first_key=0))
+    yield "container-page-keys.groups", changed(
+        one_point(), lambda d: d.pages[1].header.update(last_key=1))
+    yield "container-page-level", changed(
+        one_point(), lambda d: d.pages[1].header.update(level=1))
+    yield "container-superblock-checksum", changed(
+        one_point(), lambda d: d.patches.append((-4096 + 500, b"X")))
+    yield "container-superblock-magic", changed(
+        one_point(), lambda d: d.patches.append((-8192, b"X")))
+    yield "container-superblock-totals", changed(
+        one_point(), lambda d: d.super.update(area=0.126))
+    yield "container-superblock-totals.flux", changed(
+        one_point(), lambda d: d.super.update(flux=(0.125, 0.0625, 0.03126)))
+    yield "container-superblock-totals.bounds", changed(
+        one_point(), lambda d: d.super.update(bounds_low=(0.0, 0.0, 0.0)))
+    yield "container-superblock-counts", changed(
+        one_point(), lambda d: d.super.update(nodes=2))
+    yield "container-superblock-root", changed(
+        one_point(), lambda d: d.super.update(levels=2))
+    nan = Draft(scatter(10, 5), channels=CHANNELS)
+    nan.pages[-3].payload[:2] = b"\x00\x7e"
+    yield "points-attribute-pages", nan
+    swapped = Draft(scatter(113, 9), leaf_points=200)
+    surfels = swapped.surfels[:111] + swapped.surfels[112:] + swapped.surfels[111:112]
+    for page, part in zip(swapped.pages, (surfels[:112], surfels[112:])):
+        page.payload, page.keys = encode_points(part), (part[0].key >> 63, part[-1].key >> 63)
+    yield "points-point-order", swapped
+
+
+def verify_tree():
+    four = four_points()
+
+    def level(groups):
+        groups[0][1] = groups[-1][1] = groups[0][1] + 1
+        groups[-1][0] = 0
+        groups[-1][1] = 20
+    yield "nodes-references", tree_of(four, lambda g: g[2][2].__setitem__(1, (True, 0)))
+    yield "nodes-references.lost", changed(
+        tree_of(four + [Surfel((0, 1 << 30, 0), radius=1)],
+                lambda g: g[2][2].__setitem__(1, (False, (3, 2)))),
+        lambda d: d.super.update(leaf_points=2))
+    yield "nodes-node-level", tree_of(four, level)
+    yield "nodes-node-cell", tree_of(four, lambda g: g[1].__setitem__(0, r.interleave(
+        3 << 40, 0, 0)))
+    yield "nodes-node-cell.point", tree_of(four, lambda g: g[0].__setitem__(1, 20))
+    yield "nodes-node-children", tree_of(four, lambda g: (g[0][2].pop(), g[0][3].pop()))
+    yield "nodes-node-children.octants", tree_of(
+        four, lambda g: g[0].__setitem__(1, g[0][1] - 1))
+    yield "nodes-node-leaf", tree_of(
+        four, lambda g: g[0][2].__setitem__(slice(0, 2), [(False, (1, 1)), (False, (0, 1))]))
+    yield "nodes-node-leaf.small-group", changed(
+        tree_of(four, lambda g: None), lambda d: d.super.update(leaf_points=2))
+    yield "nodes-node-leaf.great-leaf", changed(
+        Draft(scatter(20, 4)), lambda d: d.super.update(leaf_points=1))
+
+
+def verify_summaries():
+    """reader.py does not recompute these."""
+    def column(name, value):
+        return tree_of(four_points(), lambda g: g[2][3][0].__setitem__(name, value))
+    yield "nodes-node-mean", column("mean_x", 9)
+    yield "nodes-node-sphere", column("radius", 0x4000)
+    yield "nodes-node-sums", column("area", 0x3F80)
+    yield "nodes-node-sums.facing", column("facing", [9] * 6)
+    yield "nodes-node-sums.radiance", column("radiance", [0, 0, 0, 0, 0x80808080, 0])
+    yield "nodes-node-cone", column("cone_cos", 0)
+
+
+def all_vectors(has_zstd):
+    for name, draft in good(has_zstd):
+        yield "good", name, draft
+    for source in (bad_header, bad_page, bad_codec, bad_directory, bad_superblock, bad_points,
+                   bad_meta, bad_attributes, bad_nodes):
+        for name, draft in source():
+            yield "bad", name, draft
+    for source in (verify_container, verify_tree, verify_summaries):
+        for name, draft in source():
+            yield "verify", name, draft

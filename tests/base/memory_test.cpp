@@ -1,0 +1,126 @@
+// What the system says of this process, and arenas.
+#include "engine/base/memory.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <new>
+#include <utility>
+
+using namespace ptc;
+
+namespace {
+
+constexpr std::uint64_t kMiB = 1 << 20;
+
+// Sanitizers keep shadow memory of what a program touches: resident sizes say less there.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kResidentIsExact = false;
+#else
+constexpr bool kResidentIsExact = true;
+#endif
+
+bool near(std::uint64_t actual, std::uint64_t expected) {
+  return !kResidentIsExact || (actual + 4 * kMiB > expected && actual < expected + 4 * kMiB);
+}
+
+// Whether `holds` is true in a child process, whose peak is its own.
+bool in_child(const std::function<bool()>& holds) {
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    bool ok = false;
+    try {
+      ok = holds();
+    } catch (...) {
+    }
+    _exit(ok ? 0 : 1);
+  }
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+}  // namespace
+
+TEST_CASE("memory: an arena counts as resident once touched and no longer than it lives",
+          "[base][memory]") {
+  CHECK(in_child([] {
+    const std::uint64_t before = resident_bytes();
+    {
+      const Arena arena(64 * kMiB);
+      const bool lazy = near(resident_bytes(), before);
+      std::memset(arena.data(), 1, arena.size());
+      if (!lazy || !near(resident_bytes(), before + 64 * kMiB)) return false;
+    }
+    return near(resident_bytes(), before);
+  }));
+}
+
+TEST_CASE("memory: the peak stays when memory is given back", "[base][memory]") {
+  CHECK(in_child([] {
+    const std::uint64_t before = resident_bytes();
+    {
+      const Arena arena(64 * kMiB);
+      std::memset(arena.data(), 1, arena.size());
+    }
+    return peak_resident_bytes() + 4 * kMiB > before + 64 * kMiB &&
+           near(resident_bytes(), before) && peak_resident_bytes() >= resident_bytes();
+  }));
+}
+
+TEST_CASE("memory: an arena is zero-filled, aligned to pages and writable to its last byte",
+          "[base][memory]") {
+  for (const std::size_t bytes : {std::size_t{1}, std::size_t{4096}, std::size_t{4097},
+                                  std::size_t{2} << 20, (std::size_t{6} << 20) + 5}) {
+    const Arena arena(bytes);
+    CHECK(arena.size() == bytes);
+    CHECK(reinterpret_cast<std::uintptr_t>(arena.data()) % 4096 == 0);
+    std::size_t other = 0;
+    for (std::size_t i = 0; i < bytes; ++i) other += arena.data()[i] != std::byte{0};
+    CHECK(other == 0);
+    std::memset(arena.data(), 0xff, bytes);
+  }
+}
+
+TEST_CASE("memory: an arena moves and leaves nothing behind", "[base][memory]") {
+  Arena empty(0);
+  CHECK(empty.data() == nullptr);
+  CHECK(empty.size() == 0);
+
+  Arena a(8192);
+  std::byte* const data = a.data();
+  Arena b(std::move(a));
+  CHECK(b.data() == data);
+  CHECK(b.size() == 8192);
+  CHECK(a.data() == nullptr);  // NOLINT: a moved-from arena is empty
+  CHECK(a.size() == 0);
+
+  Arena c(4096);
+  c = std::move(b);
+  CHECK(c.data() == data);
+  CHECK(b.data() == nullptr);  // NOLINT: a moved-from arena is empty
+  Arena& same = c;
+  c = std::move(same);
+  CHECK(c.data() == data);
+  CHECK(c.size() == 8192);
+}
+
+TEST_CASE("memory: an arena beyond the address space is bad_alloc", "[base][memory]") {
+  CHECK_THROWS_AS(Arena(std::numeric_limits<std::size_t>::max() / 2), std::bad_alloc);
+}
+
+TEST_CASE("memory: CPU time grows with work and not with waiting", "[base][memory]") {
+  const double start = cpu_seconds();
+  usleep(50000);
+  const double waited = cpu_seconds();
+  CHECK(waited - start < 0.04);
+  volatile std::uint64_t sum = 0;
+  while (cpu_seconds() - waited < 0.02)
+    for (int i = 0; i < 1000; ++i) sum = sum + 1;
+  CHECK(cpu_seconds() > start);
+}

@@ -1,0 +1,112 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "engine/build/radius.h"
+#include "engine/io/record.h"
+#include "engine/store/reader.h"
+#include "format/point_page.h"
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+std::vector<char> bytes_of(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+TEST_CASE("build: a container gives its points back in order", "[build]") {
+  const TemporaryDirectory dir;
+  const std::vector<Surfel> surfels = random_surfels(3000, 7);
+  const SortedScene scene = sort_scene(surfels);
+  for (const Codec codec : {Codec::raw, Codec::zstd}) {
+    write_scene(dir / "a.ptcx", surfels, {}, 12, codec);
+    const ContainerReader reader(dir / "a.ptcx");
+    CHECK(reader.superblock().points == 3000);
+    std::vector<std::byte> payload(reader.page_payload_limit());
+    PageDecoder decoder;
+    std::size_t at = 0;
+    for (const std::uint32_t page : reader.point_pages()) {
+      const PageHeader header = reader.read_page(page, payload, decoder);
+      const PointPage points(payload.data(), header.record_count);
+      for (std::uint32_t i = 0; i < points.size(); ++i, ++at) {
+        const PointRecord got = points[i];
+        const PointRecord& want = scene.records[at];
+        REQUIRE(got.key == want.key);
+        REQUIRE(got.radius == want.radius);
+        REQUIRE(got.normal == want.normal);
+        REQUIRE(got.radiance == want.radiance);
+        REQUIRE(got.albedo == want.albedo);
+      }
+    }
+    CHECK(at == 3000);
+  }
+}
+
+TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
+  const TemporaryDirectory dir;
+  const SortedScene scene = sort_scene(random_surfels(5000, 8));
+  const auto write = [&](const std::string& name, std::size_t block) {
+    ContainerWriter writer(dir / name, {.page_shift = 12});
+    VectorStream stream(scene.records, block);
+    Progress silent;
+    writer.finish({}, build_pages(stream, scene.frame, writer, {}, silent));
+  };
+  write("one.ptcx", 1);
+  write("all.ptcx", 5000);
+  CHECK(bytes_of(dir / "one.ptcx") == bytes_of(dir / "all.ptcx"));
+}
+
+TEST_CASE("build: a container without points has no root", "[build]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "empty.ptcx", {});
+  const ContainerReader reader(dir / "empty.ptcx");
+  CHECK(reader.superblock().points == 0);
+  CHECK(reader.superblock().root_page == kNoPage);
+  CHECK(reader.point_pages().empty());
+}
+
+TEST_CASE("radius: discs of an even grid come to circumscribe its cells", "[build][radius]") {
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {0, 0, 0}, {300, 0, 0}, {0, 300, 0}, 1, glm::vec3(1));
+  for (Surfel& s : surfels) s.radius = 0;
+  SortedScene scene = sort_scene(surfels);
+  VectorStream sorted(scene.records, 777);
+  const auto stream = estimate_radii(sorted, scene.frame.unit());
+  std::vector<PointRecord> block(5000);
+  std::size_t seen = 0;
+  while (const std::size_t count = stream->next(block)) {
+    for (std::size_t i = 0; i < count; ++i, ++seen) {
+      REQUIRE(block[i].key == scene.records[seen].key);
+      // sqrt(2) sqrt(pi / 12) inside, up to 2 sqrt(pi / 12) at the rim and at seams of the curve
+      REQUIRE(block[i].radius >= 0.72F);
+      REQUIRE(block[i].radius <= 1.3F);
+    }
+  }
+  CHECK(seen == surfels.size());
+}
+
+TEST_CASE("radius: given radii stay, coincident points get the median", "[build][radius]") {
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {0, 0, 0}, {50, 0, 0}, {0, 50, 0}, 1, glm::vec3(1));
+  for (Surfel& s : surfels) s.radius = 0;
+  surfels[0].radius = 9;
+  for (int i = 0; i < 20; ++i) surfels.push_back(surfels[100]);
+  SortedScene scene = sort_scene(surfels);
+  VectorStream sorted(scene.records);
+  const auto stream = estimate_radii(sorted, scene.frame.unit());
+  std::vector<PointRecord> out(surfels.size());
+  REQUIRE(stream->next(out) == out.size());
+  std::size_t nines = 0;
+  for (const PointRecord& p : out) {
+    nines += p.radius == 9;
+    REQUIRE(p.radius > 0);
+  }
+  CHECK(nines == 1);
+}

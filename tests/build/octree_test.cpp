@@ -1,0 +1,180 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+#include <map>
+
+#include "engine/build/octree.h"
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// Keeps groups; references count up in page and slot.
+struct KeptGroups : GroupSink {
+  std::vector<NodeGroup> groups;
+  ChildRef add(const NodeGroup& group) override {
+    groups.push_back(group);
+    const std::size_t i = groups.size() - 1;
+    return {.interior = true, .page = static_cast<std::uint32_t>(i / 100), .slot = static_cast<std::uint16_t>(i % 100)};
+  }
+  [[nodiscard]] const NodeGroup& at(const ChildRef& ref) const { return groups.at(ref.page * 100 + ref.slot); }
+};
+
+struct Tree {
+  KeptGroups sink;
+  OctreeBuilder::Result result;
+};
+
+Tree build(const std::vector<PointRecord>& records, std::uint32_t leaf_points, double unit) {
+  Tree tree;
+  OctreeBuilder builder(tree.sink, leaf_points, unit);
+  for (const PointRecord& record : records) builder.add(record);
+  tree.result = builder.finish();
+  return tree;
+}
+
+/// The octree by definition, top down: the leaves as (first, count), in order.
+void expected_leaves(const std::vector<PointRecord>& records, std::uint64_t first, std::uint64_t count,
+                     std::uint32_t leaf_points, std::vector<std::pair<std::uint64_t, std::uint64_t>>& leaves) {
+  if (count <= leaf_points) {
+    leaves.emplace_back(first, count);
+    return;
+  }
+  const int level = common_level(records[first].key, records[first + count - 1].key);
+  REQUIRE(level < kLatticeBits);  // no coincident cell with more than leaf_points in this test
+  for (std::uint64_t begin = first; begin < first + count;) {
+    std::uint64_t end = begin + 1;
+    while (end < first + count && octant(records[end].key, level + 1) == octant(records[begin].key, level + 1)) ++end;
+    expected_leaves(records, begin, end - begin, leaf_points, leaves);
+    begin = end;
+  }
+}
+
+void walk(const Tree& tree, const ChildRef& ref, const std::function<void(const NodeGroup&, const NodeChild&)>& visit) {
+  for (const NodeChild& child : tree.sink.at(ref).children) {
+    visit(tree.sink.at(ref), child);
+    if (child.ref.interior) walk(tree, child.ref, visit);
+  }
+}
+
+std::vector<std::pair<std::uint64_t, std::uint64_t>> leaves_of(const Tree& tree) {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> leaves;
+  walk(tree, tree.result.root, [&](const NodeGroup&, const NodeChild& child) {
+    if (!child.ref.interior) leaves.emplace_back(child.ref.first_point, child.ref.point_count);
+  });
+  return leaves;
+}
+
+}  // namespace
+
+TEST_CASE("octree: leaves are those of the top-down definition", "[build][octree]") {
+  const SortedScene scene = sort_scene(random_surfels(5000, 1));
+  for (const std::uint32_t leaf_points : {1U, 2U, 8U, 100U, 4999U}) {
+    const Tree tree = build(scene.records, leaf_points, scene.frame.unit());
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> expected;
+    expected_leaves(scene.records, 0, scene.records.size(), leaf_points, expected);
+    CHECK(leaves_of(tree) == expected);
+  }
+}
+
+TEST_CASE("octree: a group's cell holds all its points and no deeper cell does", "[build][octree]") {
+  const SortedScene scene = sort_scene(random_surfels(3000, 2));
+  const Tree tree = build(scene.records, 4, scene.frame.unit());
+  const std::function<std::pair<std::uint64_t, std::uint64_t>(const ChildRef&)> check =
+      [&](const ChildRef& ref) -> std::pair<std::uint64_t, std::uint64_t> {
+    if (!ref.interior) return {ref.first_point, ref.first_point + ref.point_count};
+    const NodeGroup& group = tree.sink.at(ref);
+    std::uint64_t first = ~std::uint64_t{0}, last = 0;
+    for (const NodeChild& child : group.children) {
+      const auto [begin, end] = check(child.ref);
+      if (last != 0) CHECK(begin == last);
+      first = std::min(first, begin);
+      last = end;
+      if (child.ref.interior) CHECK(tree.sink.at(child.ref).level > group.level);
+    }
+    CHECK(group.level == common_level(scene.records[first].key, scene.records[last - 1].key));
+    CHECK(group.cell == cell_of(scene.records[first].key, group.level));
+    return {first, last};
+  };
+  const auto [first, last] = check(tree.result.root);
+  CHECK(first == 0);
+  CHECK(last == scene.records.size());
+}
+
+TEST_CASE("octree: spheres hold every disc below them and sums agree with the points", "[build][octree]") {
+  const SortedScene scene = sort_scene(random_surfels(2000, 3));
+  const double unit = scene.frame.unit();
+  const Tree tree = build(scene.records, 8, unit);
+  const std::function<std::vector<const PointRecord*>(const ChildRef&, const NodeSummary&)> check =
+      [&](const ChildRef& ref, const NodeSummary& node) {
+        std::vector<const PointRecord*> points;
+        if (ref.interior) {
+          for (const NodeChild& child : tree.sink.at(ref).children) {
+            const auto below = check(child.ref, child.node);
+            points.insert(points.end(), below.begin(), below.end());
+          }
+        } else {
+          for (std::uint32_t i = 0; i < ref.point_count; ++i) points.push_back(&scene.records[ref.first_point + i]);
+        }
+        double area = 0;
+        for (const PointRecord* p : points) {
+          const LatticePoint q = decode_morton(p->key);
+          const double d = std::hypot(static_cast<double>(q[0]) - node.mean[0], static_cast<double>(q[1]) - node.mean[1],
+                                      static_cast<double>(q[2]) - node.mean[2]);
+          CHECK(d + static_cast<double>(p->radius) / unit <= node.radius * (1 + 1e-12));
+          area += 2.0 * static_cast<double>(p->radius) * static_cast<double>(p->radius);
+        }
+        CHECK(node.area == Approx(area));
+        return points;
+      };
+  CHECK(check(tree.result.root, tree.result.total).size() == 2000);
+}
+
+TEST_CASE("octree: a million coincident points split by rank into full leaves", "[build][octree]") {
+  PointRecord point;
+  point.key = encode_morton({12345, 678, 91011});
+  point.radius = 0.5F;
+  const std::vector<PointRecord> records(1'000'000, point);
+  const Tree tree = build(records, 8, 1.0);
+  const auto leaves = leaves_of(tree);
+  std::uint64_t next = 0;
+  for (const auto& [first, count] : leaves) {
+    REQUIRE(first == next);
+    REQUIRE(count <= 8);
+    next = first + count;
+  }
+  CHECK(next == records.size());
+  CHECK(leaves.size() == 125'000);
+  CHECK(tree.result.levels <= kMaxLevel + 1);
+  CHECK(tree.result.total.area == Approx(0.5e6));
+}
+
+TEST_CASE("octree: up to leaf_points points make a root group with one leaf", "[build][octree]") {
+  const SortedScene scene = sort_scene(random_surfels(8, 4));
+  for (std::size_t count = 1; count <= 8; ++count) {
+    const Tree tree = build({scene.records.begin(), scene.records.begin() + static_cast<std::ptrdiff_t>(count)}, 8, 1);
+    REQUIRE(tree.sink.groups.size() == 1);
+    REQUIRE(tree.sink.groups[0].children.size() == 1);
+    CHECK(tree.sink.groups[0].children[0].ref == ChildRef{.first_point = 0, .point_count = static_cast<std::uint32_t>(count)});
+  }
+  CHECK_FALSE(build({}, 8, 1).result.root.interior);
+}
+
+TEST_CASE("octree: points without area or with opposite normals still have a middle and a cone", "[build][octree]") {
+  std::vector<PointRecord> points(2);
+  points[0].key = encode_morton({0, 0, 0});
+  points[1].key = encode_morton({8, 0, 0});
+  const NodeSummary flat = summarise_points(points, 1);
+  CHECK(flat.mean[0] == 4);
+  CHECK(flat.area == 0);
+  points[0].radius = points[1].radius = 1;
+  points[0].normal = {32767, 0};
+  points[1].normal = {-32767, 0};
+  const NodeSummary opposite = summarise_points(points, 1);
+  CHECK(opposite.cone_cos == -1);
+  CHECK(opposite.facing[0] == Approx(2));
+  CHECK(opposite.facing[1] == Approx(2));
+}

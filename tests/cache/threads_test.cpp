@@ -1,0 +1,183 @@
+// Many threads on one cache: contents, single flight, failure, and no deadlock at the least cap.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <atomic>
+#include <barrier>
+#include <fstream>
+#include <functional>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "engine/cache/page_cache.h"
+#include "format/error.h"
+#include "tests/cache/pages.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// Calls body(thread) on so many threads at once.
+void on_threads(unsigned threads, const std::function<void(unsigned)>& body) {
+  std::barrier start(static_cast<std::ptrdiff_t>(threads));
+  std::vector<std::jthread> running;
+  for (unsigned thread = 0; thread < threads; ++thread) {
+    running.emplace_back([&, thread] {
+      start.arrive_and_wait();
+      body(thread);
+    });
+  }
+}
+
+/// Few pages of a mebibyte, whose reads last long enough for threads to meet in them.
+SampleOptions slow_pages() {
+  SampleOptions options;
+  options.writer.page_shift = 20;
+  options.points = 60000;
+  options.leaf_points = 64;
+  options.attribute_groups = 0;
+  return options;
+}
+
+/// Changes a byte of the page's payload in the file.
+void damage(const Pages& pages, std::uint32_t page) {
+  const std::uint64_t at = pages.container.entry(page).offset + kPageHeaderBytes + 6;
+  std::fstream file(pages.file.path(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(at));
+  const int byte = file.get();
+  file.seekp(static_cast<std::streamoff>(at));
+  file.put(static_cast<char>(byte ^ 1));
+}
+
+void check_sums(const CacheStatistics& s, std::uint64_t lookups) {
+  CHECK(s.lookups == lookups);
+  CHECK(s.local_hits + s.shared_hits + s.misses == lookups);
+  CHECK(s.evictions <= s.misses);
+  CHECK(s.peak_frames <= s.frames);
+}
+
+}  // namespace
+
+TEST_CASE("cache: threads that fight for frames get the right pages", "[cache][threads]") {
+  const Pages pages;
+  constexpr std::uint64_t kGets = 3000;
+  for (const unsigned threads : {2u, 4u, 8u}) {
+    for (const std::uint64_t frames : {2 * threads, 5 * threads, pages.count()}) {
+      for (const auto access : {ContainerReader::Access::pread, ContainerReader::Access::mmap}) {
+        CacheOptions options = pages.options(threads, frames);
+        options.access = access;
+        PageCache cache(pages.container, options);
+        std::atomic<std::size_t> wrong = 0;
+        on_threads(threads, [&](unsigned thread) {
+          PageReader reader(cache);
+          std::mt19937 random(thread);
+          for (std::uint64_t i = 0; i < kGets; ++i) {
+            // Half of the gets go to a few pages that all threads want.
+            const std::uint32_t page = below(i % 2 == 0 ? 8 : pages.count(), random);
+            if (!pages.same(page, reader.get(page))) ++wrong;
+          }
+        });
+        CHECK(wrong == 0);
+        check_sums(cache.statistics(), threads * kGets);
+      }
+    }
+  }
+}
+
+TEST_CASE("cache: a page that all ask for at once is read once", "[cache][threads]") {
+  const Pages pages(slow_pages());
+  constexpr unsigned kThreads = 8;
+  for (int round = 0; round < 20; ++round) {
+    PageCache cache(pages.container, pages.options(kThreads, 2 * kThreads));
+    std::barrier together(kThreads);
+    on_threads(kThreads, [&](unsigned) {
+      PageReader reader(cache);
+      for (std::uint32_t page = 0; page < pages.count(); ++page) {
+        together.arrive_and_wait();
+        static_cast<void>(reader.get(page));
+      }
+    });
+    const CacheStatistics s = cache.statistics();
+    check_sums(s, std::uint64_t{kThreads} * pages.count());
+    REQUIRE(s.misses == pages.count());
+    REQUIRE(s.evictions == 0);
+  }
+}
+
+TEST_CASE("cache: who waits for a read that fails gets its error", "[cache][threads][failure]") {
+  const Pages pages(slow_pages());
+  damage(pages, 0);
+  constexpr unsigned kThreads = 4;
+  PageCache cache(pages.container, pages.options(kThreads, 2 * kThreads));
+  std::atomic<std::uint64_t> errors = 0;
+  std::uint64_t asked = 0;
+  // Whether two threads meet in one read is up to the system: it is tried until they have.
+  while (asked < 4000 && cache.statistics().shared_hits == 0) {
+    asked += kThreads;
+    on_threads(kThreads, [&](unsigned) {
+      PageReader reader(cache);
+      try {
+        static_cast<void>(reader.get(0));
+      } catch (const FormatError&) {
+        ++errors;
+      }
+    });
+  }
+  CHECK(cache.statistics().shared_hits > 0);
+  CHECK(errors == asked);
+  PageReader reader(cache);
+  CHECK(pages.same(1, reader.get(1)));
+}
+
+TEST_CASE("cache: readers that pin all they may do not lock each other out", "[cache][threads]") {
+  const Pages pages;
+  constexpr unsigned kThreads = 4;
+  constexpr std::uint32_t kSlots = 4;
+  // Every frame can be pinned: T * S of them.
+  PageCache cache(pages.container, pages.options(kThreads, kThreads * kSlots, kSlots));
+  REQUIRE(cache.statistics().frames == kThreads * kSlots);
+  std::atomic<std::size_t> wrong = 0;
+  on_threads(kThreads, [&](unsigned thread) {
+    PageReader reader(cache);
+    for (std::uint32_t i = 0; i < 5000; ++i) {
+      const std::uint32_t page = (i + 25 * thread) % pages.count();
+      if (!pages.same(page, reader.get(page))) ++wrong;
+    }
+  });
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("cache: all who ask for a damaged page get its error, the others their pages",
+          "[cache][threads][failure]") {
+  const Pages pages;
+  damage(pages, 0);
+  const std::uint64_t payload_at = pages.container.entry(0).offset + kPageHeaderBytes;
+  constexpr unsigned kThreads = 8;
+  constexpr std::uint64_t kGets = 2000;
+  for (const std::uint64_t frames : {std::uint64_t{2 * kThreads}, std::uint64_t{pages.count()}}) {
+    PageCache cache(pages.container, pages.options(kThreads, frames));
+    std::atomic<std::size_t> wrong = 0;
+    std::atomic<std::size_t> errors = 0;
+    std::atomic<std::size_t> asked = 0;
+    on_threads(kThreads, [&](unsigned thread) {
+      PageReader reader(cache);
+      std::mt19937 random(thread);
+      for (std::uint64_t i = 0; i < kGets; ++i) {
+        const std::uint32_t page = i % 3 == 0 ? 0 : 1 + below(pages.count() - 1, random);
+        if (page == 0) ++asked;
+        try {
+          if (!pages.same(page, reader.get(page))) ++wrong;
+        } catch (const FormatError& error) {
+          const bool right = page == 0 && error.offset() == payload_at;
+          ++(right ? errors : wrong);
+        }
+      }
+    });
+    CHECK(wrong == 0);
+    CHECK(errors == asked);
+    check_sums(cache.statistics(), kThreads * kGets);
+  }
+}

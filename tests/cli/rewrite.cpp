@@ -1,0 +1,74 @@
+#include "tests/cli/rewrite.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "engine/store/reader.h"
+#include "format/checksum.h"
+
+namespace ptc::test {
+
+std::vector<std::byte> read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw std::runtime_error("read " + path.string());
+  std::vector<std::byte> bytes(text.size());
+  std::ranges::transform(text, bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
+  return bytes;
+}
+
+void write_file(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (!file.flush()) throw std::runtime_error("write " + path.string());
+}
+
+OpenContainer::OpenContainer(const std::filesystem::path& path) : bytes_(read_file(path)) {
+  const ContainerReader container(path);
+  superblock_ = container.superblock();
+  if (superblock_.directory_pages != 1) throw std::invalid_argument("more than one directory page");
+  for (std::uint32_t page = 0; page < container.page_count(); ++page) {
+    entries_.push_back(container.entry(page));
+    headers_.push_back(decode_page_header(std::span(bytes_).subspan(entries_.back().offset, kPageHeaderBytes),
+                                          container.header()));
+    if (headers_.back().codec != Codec::raw) throw std::invalid_argument("a page that is not raw");
+  }
+}
+
+std::span<std::byte> OpenContainer::payload(std::size_t page) {
+  return std::span(bytes_).subspan(entries_[page].offset + kPageHeaderBytes, entries_[page].stored_bytes);
+}
+
+void OpenContainer::write(const std::filesystem::path& target) {
+  const Uuid& uuid = superblock_.header.uuid;
+  const auto header_at = [&](std::uint64_t offset) {
+    return std::span(bytes_).subspan(offset).first<kPageHeaderBytes>();
+  };
+  const auto directory = std::span(bytes_).subspan(superblock_.directory_offset + kPageHeaderBytes,
+                                                   entries_.size() * kDirectoryEntryBytes);
+  ContentDigest digest;
+  for (std::size_t page = 0; page < entries_.size(); ++page) {
+    PageHeader& header = headers_[page];
+    DirectoryEntry& entry = entries_[page];
+    header.payload_xxh3 = entry.payload_xxh3 = xxh3_64(payload(page));
+    entry.type = header.type;
+    entry.group = header.group;
+    entry.record_count = header.record_count;
+    encode_page_header(header, uuid, header_at(entry.offset));
+    encode_directory_entry(entry, directory.subspan(page * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
+    digest.add(entry);
+  }
+  PageHeader header = decode_page_header(header_at(superblock_.directory_offset), superblock_.header);
+  header.payload_xxh3 = superblock_.directory_xxh3 = xxh3_64(directory);
+  encode_page_header(header, uuid, header_at(superblock_.directory_offset));
+  superblock_.content_xxh3 = digest.value();
+  const Block block = encode_superblock(superblock_);
+  for (const std::size_t back : {2 * kBlockBytes, kBlockBytes}) {
+    std::ranges::copy(block, bytes_.end() - static_cast<std::ptrdiff_t>(back));
+  }
+  write_file(target, bytes_);
+}
+
+}  // namespace ptc::test

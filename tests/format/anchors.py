@@ -1,0 +1,84 @@
+"""Every clause that the sources cite exists in the spec, and every rule is listed in errors.md.
+
+anchors.py SOURCE_DIR: collects "spec/FILE.md#anchor" and "spec/FILE.md" in sources and documents.
+"""
+
+import os
+import re
+import sys
+
+CITED = re.compile(r"spec/([A-Za-z_]+\.md)(?:#([A-Za-z0-9_-]+))?")
+LINKED = re.compile(r"\]\(([A-Za-z_]*\.md)?(?:#([a-z0-9_-]+))?\)")
+SOURCES = (".h", ".cpp", ".py", ".md", ".txt", ".sh", ".cmake")
+FOLDERS = ("format", "engine", "tools", "tests", "fuzz", "spec")
+
+
+def slug(heading):
+    text = re.sub(r"<[^>]*>|[`*]", "", heading)
+    return re.sub(r"[^a-z0-9 _-]", "", text.strip().lower()).replace(" ", "-")
+
+
+def anchors_of(text):
+    """Headings, explicit anchors, and rules in bold at the start of a list item."""
+    found = {slug(m) for m in re.findall(r"^#+ (.*)$", text, re.M)}
+    found.update(re.findall(r'<a id="([^"]+)">', text))
+    return found
+
+
+def rules_of(text):
+    """Names in bold with which a list item begins."""
+    return set(re.findall(r"^- (?:<a id=\"[^\"]+\"></a>)?\*\*([a-z0-9-]+)\*\*:", text, re.M))
+
+
+def sources(root):
+    for folder in FOLDERS:
+        for directory, _, names in os.walk(os.path.join(root, folder)):
+            for name in names:
+                if name.endswith(SOURCES):
+                    yield os.path.join(directory, name)
+
+
+def main(root):
+    spec = os.path.join(root, "spec")
+    documents = {}
+    for name in os.listdir(spec):
+        if name.endswith(".md"):
+            with open(os.path.join(spec, name), encoding="utf-8") as file:
+                documents[name] = file.read()
+    anchors = {name: anchors_of(text) for name, text in documents.items()}
+    faults = []
+
+    def check(where, document, anchor):
+        if document not in anchors:
+            faults.append(f"{where}: spec/{document} does not exist")
+        elif anchor.endswith("-"):  # a prefix, to compare with
+            if not any(a.startswith(anchor) for a in anchors[document]):
+                faults.append(f"{where}: spec/{document} has no #{anchor}...")
+        elif anchor and anchor not in anchors[document]:
+            faults.append(f"{where}: spec/{document} has no #{anchor}")
+
+    cited = 0
+    for path in sources(root):
+        with open(path, encoding="utf-8") as file:
+            for number, line in enumerate(file, 1):
+                for document, anchor in CITED.findall(line):
+                    if "FILE" not in document:
+                        check(f"{os.path.relpath(path, root)}:{number}", document, anchor)
+                        cited += 1
+    for name, text in documents.items():
+        for document, anchor in LINKED.findall(text):
+            if document or anchor:
+                check("spec/" + name, document or name, anchor)
+        if name in ("container.md", "points.md", "nodes.md"):
+            for rule in rules_of(text):
+                check("spec/" + name, name, rule)
+                if f"[{rule}]({name}#{rule})" not in documents["errors.md"]:
+                    faults.append(f"spec/errors.md does not list {rule} of {name}")
+    if cited < 100:
+        faults.append(f"only {cited} citations found: the search is broken")
+    print("\n".join(faults) if faults else f"{cited} citations exist")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,353 @@
+// File header, page header and directory entry: damage is found by the checksum, and a rule that is
+// broken under a right checksum is named.
+#include "format/container.h"
+
+#include <catch2/catch.hpp>
+
+#include "format/checksum.h"
+#include "format/point_page.h"
+#include "tests/format/support.h"
+
+using namespace ptc;
+using ptc::test::clause_of;
+using ptc::test::get;
+using ptc::test::put;
+using Bytes = std::vector<std::byte>;
+using PageBytes = std::array<std::byte, kPageHeaderBytes>;
+using EntryBytes = std::array<std::byte, kDirectoryEntryBytes>;
+
+namespace {
+
+constexpr std::uint64_t kHeaderSeed = 0x4441454858435450;  // "PTCXHEAD"
+
+FileHeader example_file() {
+  FileHeader header;
+  for (std::size_t i = 0; i < 16; ++i) header.uuid[i] = static_cast<std::byte>(17 * i + 1);
+  header.minor = 3;
+  header.feature_ro_compat = 1ull << 63;
+  header.feature_compat = 0xff00;
+  header.page_shift = 12;
+  return header;
+}
+
+PageHeader example_page() {
+  PageHeader header;
+  header.type = PageType::point;
+  header.codec = Codec::zstd;
+  header.page_id = 0x01020304;
+  header.stored_bytes = 1000;
+  header.raw_bytes = 34 * 40;
+  header.level = 0xffff;
+  header.record_count = 40;
+  header.first_key = 5;
+  header.last_key = 0x7fffffffffffffff;
+  header.payload_xxh3 = 0x1122334455667788;
+  return header;
+}
+
+DirectoryEntry example_entry() {
+  return {8192, 1000, 34 * 40, 0x1122334455667788, PageType::point, 0, 40};
+}
+
+std::string header_clause(const Block& block) {
+  return clause_of([&] { (void)decode_file_header(block); });
+}
+
+// The clause of a header block whose bytes changed and whose checksum is right again.
+template <class T>
+std::string resealed_header(std::size_t at, T value) {
+  Block block = encode_file_header(example_file());
+  put(block, at, value);
+  put(block, 120, xxh3_64(std::span(block).first(120), kHeaderSeed));
+  return header_clause(block);
+}
+
+PageBytes encode_page(const PageHeader& header) {
+  PageBytes bytes;
+  encode_page_header(header, example_file().uuid, bytes);
+  return bytes;
+}
+
+std::string page_clause(const PageHeader& header) {
+  const PageBytes bytes = encode_page(header);
+  return clause_of([&] { (void)decode_page_header(bytes, example_file()); });
+}
+
+template <class Change>
+std::string changed_page(const Change& change) {
+  PageHeader header = example_page();
+  change(header);
+  return page_clause(header);
+}
+
+EntryBytes encode_entry(const DirectoryEntry& entry) {
+  EntryBytes bytes;
+  encode_directory_entry(entry, bytes);
+  return bytes;
+}
+
+template <class Change>
+std::string changed_entry(const Change& change) {
+  DirectoryEntry entry = example_entry();
+  change(entry);
+  const EntryBytes bytes = encode_entry(entry);
+  return clause_of([&] { (void)decode_directory_entry(bytes, example_file(), 65536); });
+}
+
+}  // namespace
+
+TEST_CASE("file header: it comes back", "[format][container]") {
+  const FileHeader header = example_file();
+  const FileHeader back = decode_file_header(encode_file_header(header));
+  CHECK(back.major == 1);
+  CHECK(back.minor == 3);
+  CHECK(back.feature_incompat == 0);
+  CHECK(back.feature_ro_compat == header.feature_ro_compat);
+  CHECK(back.feature_compat == header.feature_compat);
+  CHECK(back.uuid == header.uuid);
+  CHECK(back.page_shift == 12);
+}
+
+TEST_CASE("file header: its bytes lie where the spec says", "[format][container]") {
+  const Block block = encode_file_header(example_file());
+  const unsigned char magic[8] = {0x89, 'P', 'T', 'C', 0x0d, 0x0a, 0x1a, 0x0a};
+  CHECK(std::memcmp(block.data(), magic, 8) == 0);
+  CHECK(get<std::uint16_t>(block, 8) == 1);
+  CHECK(get<std::uint16_t>(block, 10) == 3);
+  CHECK(get<std::uint32_t>(block, 12) == 4096);
+  CHECK(get<std::uint64_t>(block, 24) == 1ull << 63);
+  CHECK(get<std::uint64_t>(block, 32) == 0xff00);
+  CHECK(block[40] == std::byte{1});
+  CHECK(get<std::uint8_t>(block, 56) == 12);
+  CHECK(get<std::uint8_t>(block, 57) == 12);
+  CHECK(get<std::uint16_t>(block, 58) == 1);
+  CHECK(get<std::uint32_t>(block, 60) == 0x01020304);
+}
+
+TEST_CASE("file header: every truncation and every flipped bit is refused", "[format][container]") {
+  const Block block = encode_file_header(example_file());
+  for (std::size_t n = 0; n < block.size(); ++n) {
+    const Bytes prefix(block.begin(), block.begin() + static_cast<std::ptrdiff_t>(n));
+    const std::string clause = clause_of([&] { (void)decode_file_header(prefix); });
+    if (clause != (n < 8 ? "spec/container.md#header-magic" : "spec/container.md#header-length")) {
+      FAIL("prefix of " << n << " bytes: " << clause);
+    }
+  }
+  unsigned accepted = 0;
+  for (std::size_t bit = 0; bit < 8 * block.size(); ++bit) {
+    Block flipped = block;
+    flipped[bit / 8] ^= static_cast<std::byte>(1u << bit % 8);
+    accepted += header_clause(flipped) == "none";
+  }
+  CHECK(accepted == 0);
+}
+
+TEST_CASE("file header: a broken rule is named, checksum right or not", "[format][container]") {
+  Block block = encode_file_header(example_file());
+  block[8] ^= std::byte{1};
+  CHECK(header_clause(block) == "spec/container.md#header-checksum");
+  CHECK(resealed_header(0, 'x') == "spec/container.md#header-magic");
+  CHECK(resealed_header(8, std::uint16_t{2}) == "spec/container.md#header-version");
+  CHECK(resealed_header(8, std::uint16_t{0}) == "spec/container.md#header-version");
+  CHECK(resealed_header(10, std::uint16_t{999}) == "none");
+  CHECK(resealed_header(12, std::uint32_t{8192}) == "spec/container.md#header-constants");
+  for (int bit = 0; bit < 64; ++bit) {
+    CHECK(resealed_header(16, std::uint64_t{1} << bit) == "spec/container.md#header-features");
+    CHECK(resealed_header(24, std::uint64_t{1} << bit) == "none");
+    CHECK(resealed_header(32, std::uint64_t{1} << bit) == "none");
+  }
+  for (unsigned shift = 0; shift < 256; ++shift) {
+    const bool allowed = shift >= 12 && shift <= 20;
+    CHECK(resealed_header(56, static_cast<std::uint8_t>(shift)) ==
+          (allowed ? "none" : "spec/container.md#header-page-shift"));
+  }
+  CHECK(resealed_header(57, std::uint8_t{13}) == "spec/container.md#header-constants");
+  CHECK(resealed_header(58, std::uint16_t{2}) == "spec/container.md#header-constants");
+  CHECK(resealed_header(60, std::uint32_t{0x04030201}) == "spec/container.md#header-constants");
+  CHECK(resealed_header(64, 'x') == "spec/container.md#header-zero");
+  CHECK(resealed_header(119, 'x') == "spec/container.md#header-zero");
+  CHECK(resealed_header(128, 'x') == "spec/container.md#header-zero");
+  CHECK(resealed_header(4095, 'x') == "spec/container.md#header-zero");
+}
+
+TEST_CASE("page header: it comes back", "[format][container]") {
+  const PageHeader header = example_page();
+  const PageHeader back = decode_page_header(encode_page(header), example_file());
+  CHECK(back.type == header.type);
+  CHECK(back.codec == header.codec);
+  CHECK(back.page_id == header.page_id);
+  CHECK(back.stored_bytes == header.stored_bytes);
+  CHECK(back.raw_bytes == header.raw_bytes);
+  CHECK(back.group == header.group);
+  CHECK(back.level == header.level);
+  CHECK(back.record_count == header.record_count);
+  CHECK(back.first_key == header.first_key);
+  CHECK(back.last_key == header.last_key);
+  CHECK(back.payload_xxh3 == header.payload_xxh3);
+}
+
+TEST_CASE("page header: every truncation and every flipped bit is refused", "[format][container]") {
+  const PageBytes bytes = encode_page(example_page());
+  for (std::size_t n = 0; n < bytes.size(); ++n) {
+    CHECK_THROWS_AS((void)decode_page_header(std::span(bytes).first(n), example_file()),
+                    FormatError);
+  }
+  for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+    PageBytes flipped = bytes;
+    flipped[bit / 8] ^= static_cast<std::byte>(1u << bit % 8);
+    CHECK_THROWS_AS((void)decode_page_header(flipped, example_file()), FormatError);
+  }
+}
+
+TEST_CASE("page header: the checksum holds for one file, number and type", "[format][container]") {
+  const PageBytes bytes = encode_page(example_page());
+  FileHeader other = example_file();
+  other.uuid[15] ^= std::byte{1};
+  CHECK(clause_of([&] { (void)decode_page_header(bytes, other); }) ==
+        "spec/container.md#page-checksum");
+  // The hash of bytes 0 to 55 under the seed of the spec: uuid, number, type.
+  const Uuid uuid = example_file().uuid;
+  Bytes salt(uuid.begin(), uuid.end());
+  salt.resize(22);
+  put(salt, 16, std::uint32_t{0x01020304});
+  put(salt, 20, std::uint16_t{2});
+  CHECK(get<std::uint64_t>(bytes, 56) == xxh3_64(std::span(bytes).first(56), xxh3_64(salt)));
+}
+
+TEST_CASE("page header: a broken rule is named", "[format][container]") {
+  constexpr char kLength[] = "spec/container.md#page-length";
+  constexpr char kFields[] = "spec/container.md#page-fields";
+  constexpr char kKeys[] = "spec/container.md#page-keys";
+  const auto page = [](auto change) { return changed_page(change); };
+  CHECK(page([](PageHeader&) {}) == "none");
+  CHECK(page([](PageHeader& h) { h.type = PageType{0}; }) == "spec/container.md#page-type");
+  CHECK(page([](PageHeader& h) { h.type = PageType{6}; }) == "spec/container.md#page-type");
+  CHECK(page([](PageHeader& h) { h.codec = Codec{2}; }) == "spec/container.md#page-codec");
+  CHECK(page([](PageHeader& h) { h.stored_bytes = 0; }) == kLength);
+  CHECK(page([](PageHeader& h) { h.stored_bytes = h.raw_bytes; }) == kLength);
+  CHECK(page([](PageHeader& h) { h.stored_bytes = 0xffffffff; }) == kLength);
+  CHECK(page([](PageHeader& h) { h.codec = Codec::raw; }) == kLength);
+  CHECK(page([](PageHeader& h) { h.raw_bytes = 4096 - 63; }) == kLength);
+  CHECK(page([](PageHeader& h) { h.raw_bytes = 0; }) == kLength);
+  CHECK(page([](PageHeader& h) { h.group = 1; }) == kFields);
+  CHECK(page([](PageHeader& h) { h.level = 0; }) == kFields);
+  CHECK(page([](PageHeader& h) { h.record_count = 41; }) == kFields);
+  CHECK(page([](PageHeader& h) { h.record_count = 0; }) == kFields);
+  CHECK(page([](PageHeader& h) { h.first_key = 1ull << 63; }) == kKeys);
+  CHECK(page([](PageHeader& h) { h.last_key = 1ull << 63; }) == kKeys);
+  CHECK(page([](PageHeader& h) { h.last_key = 4; }) == kKeys);
+}
+
+TEST_CASE("page header: each type has its own fields", "[format][container]") {
+  constexpr char kFields[] = "spec/container.md#page-fields";
+  const auto of_type = [](PageType type, auto change) {
+    return changed_page([&](PageHeader& h) {
+      h.type = type;
+      h.first_key = h.last_key = 0;
+      if (type == PageType::node) h.level = 62;
+      if (type == PageType::directory) {
+        h.codec = Codec::raw;
+        h.stored_bytes = h.raw_bytes = 32 * h.record_count;
+      }
+      if (type == PageType::meta) h.record_count = 1;
+      if (type == PageType::attribute) h.group = 255;
+      change(h);
+    });
+  };
+  const auto same = [](PageHeader&) {};
+  for (const PageType type :
+       {PageType::node, PageType::directory, PageType::meta, PageType::attribute}) {
+    CHECK(of_type(type, same) == "none");
+  }
+  CHECK(of_type(PageType::node, [](PageHeader& h) { h.level = 63; }) == kFields);
+  CHECK(of_type(PageType::node, [](PageHeader& h) { h.record_count = 65536; }) == kFields);
+  CHECK(of_type(PageType::node, [](PageHeader& h) { h.first_key = 1; }) ==
+        "spec/container.md#page-keys");
+  CHECK(of_type(PageType::directory, [](PageHeader& h) { h.record_count = 39; }) == kFields);
+  CHECK(of_type(PageType::directory, [](PageHeader& h) {
+          h.codec = Codec::zstd;
+          h.stored_bytes = 100;
+        }) == "spec/container.md#page-codec");
+  CHECK(of_type(PageType::meta, [](PageHeader& h) { h.record_count = 2; }) == kFields);
+  CHECK(of_type(PageType::meta, [](PageHeader& h) { h.last_key = 1; }) ==
+        "spec/container.md#page-keys");
+  CHECK(of_type(PageType::attribute, [](PageHeader& h) { h.group = 0; }) == kFields);
+  CHECK(of_type(PageType::attribute, [](PageHeader& h) { h.group = 256; }) == kFields);
+}
+
+TEST_CASE("directory: an entry comes back", "[format][directory]") {
+  const DirectoryEntry entry = example_entry();
+  CHECK(decode_directory_entry(encode_entry(entry), example_file(), 65536) == entry);
+}
+
+TEST_CASE("directory: every proper prefix of an entry is truncated", "[format][directory]") {
+  const EntryBytes bytes = encode_entry(example_entry());
+  for (std::size_t n = 0; n < bytes.size(); ++n) {
+    CHECK_THROWS_AS((void)decode_directory_entry(std::span(bytes).first(n), example_file(), 65536),
+                    FormatError);
+  }
+}
+
+TEST_CASE("directory: a page outside the file is refused, however the numbers wrap",
+          "[format][directory]") {
+  constexpr char kExtent[] = "spec/container.md#directory-extent";
+  const auto at = [](std::uint64_t offset) {
+    return changed_entry([=](DirectoryEntry& e) { e.offset = offset; });
+  };
+  CHECK(at(4096) == "none");
+  CHECK(at(65536 - 8192 - 4096) == "none");
+  for (const std::uint64_t offset :
+       {std::uint64_t{0}, std::uint64_t{4095}, std::uint64_t{8193}, std::uint64_t{65536 - 8192},
+        std::uint64_t{65536}, ~std::uint64_t{0}, ~std::uint64_t{4095}, std::uint64_t{1} << 63}) {
+    CHECK(at(offset) == kExtent);
+  }
+  const EntryBytes bytes = encode_entry(example_entry());
+  for (const std::uint64_t file_bytes : {0ull, 4096ull, 8191ull, 8192ull, 16384ull, 20479ull}) {
+    CHECK(clause_of([&] { (void)decode_directory_entry(bytes, example_file(), file_bytes); }) ==
+          kExtent);
+  }
+  CHECK_NOTHROW((void)decode_directory_entry(bytes, example_file(), 20480));
+}
+
+TEST_CASE("directory: an entry keeps the rules of its page's header", "[format][directory]") {
+  const auto entry = [](auto change) { return changed_entry(change); };
+  CHECK(entry([](DirectoryEntry& e) { e.type = PageType{0}; }) == "spec/container.md#page-type");
+  CHECK(entry([](DirectoryEntry& e) { e.type = PageType{0xffff}; }) ==
+        "spec/container.md#page-type");
+  CHECK(entry([](DirectoryEntry& e) { e.raw_bytes = 5000; }) == "spec/container.md#page-length");
+  CHECK(entry([](DirectoryEntry& e) { e.stored_bytes = e.raw_bytes + 1; }) ==
+        "spec/container.md#page-length");
+  CHECK(entry([](DirectoryEntry& e) { e.record_count = 39; }) == "spec/container.md#page-fields");
+  CHECK(entry([](DirectoryEntry& e) { e.group = 3; }) == "spec/container.md#page-fields");
+  CHECK(entry([](DirectoryEntry& e) {
+          e.type = PageType::directory;
+          e.raw_bytes = 32 * e.record_count;
+        }) == "spec/container.md#directory-listing");
+}
+
+TEST_CASE("directory: its size follows from the number of pages", "[format][directory]") {
+  FileHeader file = example_file();
+  CHECK(directory_entries_per_page(file) == 126);
+  CHECK(directory_bytes(file, 1) == 4096);
+  CHECK(directory_bytes(file, 126) == 4096);
+  CHECK(directory_bytes(file, 127) == 8192);
+  file.page_shift = 16;
+  CHECK(directory_entries_per_page(file) == 2046);
+  CHECK(directory_bytes(file, 126) == 4096);
+  CHECK(directory_bytes(file, 127) == 8192);
+  CHECK(directory_bytes(file, 2046) == 65536);
+  CHECK(directory_bytes(file, 2047) == 65536 + 4096);
+  CHECK(directory_bytes(file, 0xfffffffe) == 0xfffffffe / 2046 * 65536ull + 4096);
+}
+
+TEST_CASE("container: points a page are a multiple of 8 that fits", "[format][container]") {
+  FileHeader file = example_file();
+  for (std::uint8_t shift = 12; shift <= 20; ++shift) {
+    file.page_shift = shift;
+    const std::uint32_t points = points_per_page(file);
+    const std::uint64_t limit = (1ull << shift) - kPageHeaderBytes;
+    CHECK(points % 8 == 0);
+    CHECK(point_page_bytes(points) <= limit);
+    CHECK(point_page_bytes(points + 8) > limit);
+  }
+}

@@ -1,0 +1,368 @@
+// Node pages: bounds survive quantisation, and any bytes are refused or safe to read.
+#include "format/node_page.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <stdexcept>
+
+#include "format/scalar.h"
+#include "tests/format/support.h"
+
+using namespace ptc;
+using ptc::test::clause_of;
+using ptc::test::put;
+using ptc::test::Random;
+using Bytes = std::vector<std::byte>;
+
+namespace {
+
+constexpr std::uint32_t kPages = 50;
+constexpr std::uint64_t kPoints = 1000000;
+
+double cell_edge(int level) {
+  return std::exp2(std::max(0, 42 - level));
+}
+
+std::array<float, 3> random_axis(Random& random) {
+  std::array<double, 3> n;
+  double square = 0;
+  for (double& c : n) {
+    c = random.between(-1, 1);
+    square += c * c;
+  }
+  const double length = std::sqrt(square);
+  return {static_cast<float>(n[0] / length), static_cast<float>(n[1] / length),
+          static_cast<float>(n[2] / length)};
+}
+
+NodeSummary random_summary(Random& random, const LatticePoint& corner, int level) {
+  NodeSummary node;
+  const double edge = cell_edge(level);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    node.mean[axis] = static_cast<double>(corner[axis]) + edge * random.between(0, 1 - 0x1p-16);
+  }
+  node.radius = edge * std::exp2(random.between(-20, 2));
+  node.area = std::exp2(random.between(-30, 30));
+  for (std::size_t k = 0; k < 6; ++k) {
+    node.facing[k] = random.below(3) == 0 ? 0 : node.area * random.unit();
+    for (double& f : node.flux[k]) f = node.facing[k] * std::exp2(random.between(-20, 20));
+  }
+  node.cone_axis = random_axis(random);
+  node.cone_cos = static_cast<float>(random.below(4) == 0 ? 1 : random.between(-1, 1));
+  return node;
+}
+
+NodeGroup random_group(Random& random, std::size_t children, int level) {
+  NodeGroup group;
+  group.level = level;
+  const LatticePoint p{random.bits() & kLatticeMax, random.bits() & kLatticeMax,
+                       random.bits() & kLatticeMax};
+  group.cell = cell_of(encode_morton(p), std::min(level, kLatticeBits));
+  for (std::size_t i = 0; i < children; ++i) {
+    NodeChild child;
+    child.ref.interior = random.below(2) == 0;
+    if (child.ref.interior) {
+      child.ref.page = static_cast<std::uint32_t>(random.below(kPages));
+      child.ref.slot = static_cast<std::uint16_t>(random.bits());
+    } else {
+      child.ref.point_count = 1 + static_cast<std::uint32_t>(random.below(0xffff));
+      child.ref.first_point = random.below(kPoints - child.ref.point_count + 1);
+    }
+    child.node = random_summary(random, decode_morton(group.cell), level);
+    group.children.push_back(child);
+  }
+  return group;
+}
+
+Bytes page_of(const std::vector<NodeGroup>& groups) {
+  NodePageEncoder encoder(65472);
+  for (const NodeGroup& group : groups) encoder.add(group);
+  return encoder.take();
+}
+
+std::string clause(const Bytes& payload, std::uint32_t groups) {
+  return clause_of([&] { NodePage(payload, groups, kPages, kPoints); });
+}
+
+template <class T>
+std::string changed(const Bytes& payload, std::uint32_t groups, std::size_t at, T value) {
+  Bytes bytes = payload;
+  put(bytes, at, value);
+  return clause(bytes, groups);
+}
+
+bool finite(const NodeSummary& node) {
+  const auto ok = [](double x) { return std::isfinite(x); };
+  return std::ranges::all_of(node.mean, ok) && ok(node.radius) && ok(node.area) &&
+         std::ranges::all_of(node.facing, ok) && std::ranges::all_of(node.cone_axis, ok) &&
+         ok(node.cone_cos) &&
+         std::ranges::all_of(node.flux, [&](const auto& f) { return std::ranges::all_of(f, ok); });
+}
+
+bool reference_in_bounds(const ChildRef& ref) {
+  if (ref.interior) return ref.page < kPages;
+  return ref.point_count > 0 && ref.first_point + ref.point_count <= kPoints;
+}
+
+}  // namespace
+
+TEST_CASE("node page: structure and references come back", "[format][nodes]") {
+  Random random(1);
+  std::vector<NodeGroup> groups;
+  for (int level = 0; level <= kMaxLevel; ++level) {
+    groups.push_back(random_group(random, 1 + random.below(8), level));
+  }
+  const Bytes payload = page_of(groups);
+  const NodePage page(payload, static_cast<std::uint32_t>(groups.size()), kPages, kPoints);
+  for (std::uint32_t slot = 0; slot < page.size(); ++slot) {
+    const NodeGroup back = page.decode(slot);
+    CHECK(back.cell == groups[slot].cell);
+    CHECK(back.level == groups[slot].level);
+    REQUIRE(back.children.size() == groups[slot].children.size());
+    for (std::size_t i = 0; i < back.children.size(); ++i) {
+      CHECK(back.children[i].ref == groups[slot].children[i].ref);
+      CHECK(finite(back.children[i].node));
+    }
+  }
+}
+
+TEST_CASE("node page: the stored sphere holds the given one", "[format][nodes]") {
+  Random random(2);
+  unsigned wrong = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const int level = static_cast<int>(random.below(63));
+    NodeGroup group = random_group(random, 1, level);
+    NodeSummary& given = group.children[0].node;
+    if (i % 10 == 0) given.radius = 0;
+    if (i % 7 == 0) given.mean[1] += (random.unit() - 0.5) * 3 * cell_edge(level);  // clamped
+    const NodeSummary stored =
+        NodePage(page_of({group}), 1, kPages, kPoints).decode(0).children[0].node;
+    long double square = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const long double d = static_cast<long double>(stored.mean[axis]) - given.mean[axis];
+      square += d * d;
+    }
+    const long double moved = std::sqrt(square);
+    wrong += stored.radius < given.radius + moved;
+    // Not wider than needed: one step of ufloat16.
+    wrong += stored.radius > (given.radius + moved) * (1.0L + 0x1p-8L) * (1 + 1e-6L);
+    if (i % 7 != 0) {
+      wrong +=
+          moved > std::sqrt(3.0) / 2 * 1.001 * cell_edge(level) / 65536;  // half a step an axis
+    }
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("node page: an exact mean keeps its radius", "[format][nodes]") {
+  NodeGroup group;
+  group.children.resize(1);
+  group.children[0].ref.point_count = 1;
+  group.children[0].node.radius = 3;
+  group.children[0].node.mean = {0x1p26, 0x1p41, 0};
+  const NodeSummary stored =
+      NodePage(page_of({group}), 1, kPages, kPoints).decode(0).children[0].node;
+  CHECK(stored.mean == group.children[0].node.mean);
+  CHECK(stored.radius == 3);
+}
+
+TEST_CASE("node page: the stored cone holds the given one", "[format][nodes]") {
+  Random random(3);
+  unsigned wrong = 0;
+  unsigned useful = 0;
+  for (int i = 0; i < 20000; ++i) {
+    NodeGroup group = random_group(random, 1, 5);
+    const NodeSummary& given = group.children[0].node;
+    const NodeSummary stored =
+        NodePage(page_of({group}), 1, kPages, kPoints).decode(0).children[0].node;
+    const double half_angle = std::acos(double{given.cone_cos});
+    // A normal on the given cone's edge, turned any way about the axis.
+    const std::array<float, 3> other = random_axis(random);
+    std::array<double, 3> side;
+    double along = 0;
+    for (std::size_t k = 0; k < 3; ++k) along += double{other[k]} * given.cone_axis[k];
+    double square = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      side[k] = other[k] - along * given.cone_axis[k];
+      square += side[k] * side[k];
+    }
+    double dot = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double n = std::cos(half_angle) * given.cone_axis[k] +
+                       std::sin(half_angle) * side[k] / std::sqrt(square);
+      dot += n * stored.cone_axis[k];
+    }
+    wrong += dot < double{stored.cone_cos};
+    useful += std::acos(double{stored.cone_cos}) < half_angle + 0.05;
+  }
+  CHECK(wrong == 0);
+  CHECK(useful > 19000);
+}
+
+TEST_CASE("node page: area, facing and flux keep their precision", "[format][nodes]") {
+  Random random(4);
+  unsigned wrong = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const NodeGroup group = random_group(random, 1, 3);
+    const NodeSummary& given = group.children[0].node;
+    const Bytes payload = page_of({group});
+    const NodePage page(payload, 1, kPages, kPoints);
+    const NodeSummary stored = page.decode(0).children[0].node;
+    wrong += std::abs(stored.area - given.area) > given.area * 0x1p-9;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double share = stored.facing[k] / stored.area;
+      wrong += std::abs(share - given.facing[k] / given.area) > 0.5001 / 65535;
+      std::array<float, 3> radiance{};
+      for (std::size_t c = 0; c < 3 && given.facing[k] > 0; ++c) {
+        radiance[c] = static_cast<float>(given.flux[k][c] / given.facing[k]);
+      }
+      const auto bits = test::get<std::uint32_t>(std::span(page[0].radiance(0), 24), 4 * k);
+      wrong += bits != encode_rgbe(radiance);
+    }
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("node page: a cluster without area has no light", "[format][nodes]") {
+  NodeGroup group;
+  group.children.resize(1);
+  group.children[0].ref.point_count = 1;
+  const Bytes payload = page_of({group});
+  const NodeSummary node = NodePage(payload, 1, kPages, kPoints).decode(0).children[0].node;
+  CHECK(node.area == 0);
+  CHECK(node.facing == std::array<double, 6>{});
+  CHECK(node.flux == decltype(node.flux){});
+}
+
+TEST_CASE("node page: groups fill a page up to its limit", "[format][nodes]") {
+  CHECK(node_group_bytes(1) == 88 + 2);
+  CHECK(node_group_bytes(8) == 504 + 2);
+  Random random(5);
+  for (const std::size_t limit : {4032u, 65472u}) {
+    NodePageEncoder encoder(limit);
+    std::size_t groups = 0;
+    std::size_t bytes = 0;
+    for (;;) {
+      const std::size_t n = 1 + random.below(8);
+      const std::size_t table = (2 * (groups + 1) + 7) / 8 * 8;
+      const bool fits = table + bytes + node_group_bytes(n) - 2 <= limit;
+      REQUIRE(encoder.fits(n) == fits);
+      if (!fits) {
+        CHECK_THROWS_AS(encoder.add(random_group(random, n, 9)), std::invalid_argument);
+        break;
+      }
+      CHECK(encoder.add(random_group(random, n, 9)) == groups);
+      ++groups;
+      bytes += node_group_bytes(n) - 2;
+      CHECK(encoder.size() == groups);
+    }
+    const Bytes payload = encoder.take();
+    CHECK(payload.size() <= limit);
+    CHECK(clause(payload, static_cast<std::uint32_t>(groups)) == "none");
+    CHECK(encoder.size() == 0);
+    CHECK(encoder.fits(8));
+  }
+}
+
+TEST_CASE("node page: slots reach the end of the greatest page", "[format][nodes]") {
+  Random random(6);
+  const NodeGroup group = random_group(random, 8, 9);
+  NodePageEncoder encoder((1u << 20) - 64);
+  std::uint32_t groups = 0;
+  for (; encoder.fits(8); ++groups) encoder.add(group);
+  const Bytes payload = encoder.take();
+  CHECK(payload.size() <= 65536 * 8);
+  CHECK(payload.size() > 65536 * 8 - 520);
+  CHECK(clause(payload, groups) == "none");
+}
+
+TEST_CASE("node page: too many or no children are refused", "[format][nodes]") {
+  NodePageEncoder encoder(4032);
+  NodeGroup group;
+  CHECK_THROWS_AS(encoder.add(group), std::invalid_argument);
+  group.children.resize(9);
+  CHECK_THROWS_AS(encoder.add(group), std::invalid_argument);
+}
+
+TEST_CASE("node page: every truncation and wrong count is refused", "[format][nodes]") {
+  Random random(7);
+  const Bytes payload = page_of({random_group(random, 3, 2), random_group(random, 8, 41)});
+  CHECK(clause(payload, 2) == "none");
+  for (std::size_t n = 0; n < payload.size(); ++n) {
+    CHECK(clause(Bytes(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(n)), 2) ==
+          "spec/nodes.md#node-slots");
+  }
+  for (const std::uint32_t count : {0u, 1u, 3u, 5u, 60000u, 0xffffffffu}) {
+    CHECK(clause(payload, count) != "none");
+  }
+}
+
+TEST_CASE("node page: any value of any byte is refused or safe to read", "[format][nodes]") {
+  Random random(8);
+  std::vector<NodeGroup> groups;
+  for (const int level : {0, 21, 42, 60}) {
+    groups.push_back(random_group(random, 1 + random.below(4), level));
+  }
+  const Bytes payload = page_of(groups);
+  const auto count = static_cast<std::uint32_t>(groups.size());
+  unsigned wrong = 0;
+  unsigned refused = 0;
+  for (std::size_t at = 0; at < payload.size(); ++at) {
+    for (unsigned value = 0; value < 256; ++value) {
+      Bytes bytes = payload;
+      bytes[at] = static_cast<std::byte>(value);
+      if (clause(bytes, count) != "none") {
+        ++refused;
+        continue;
+      }
+      const NodePage page(bytes.data(), count);
+      for (std::uint32_t slot = 0; slot < count; ++slot) {
+        const NodeGroup group = page.decode(slot);
+        wrong += group.level > kMaxLevel || group.children.empty() || group.children.size() > 8;
+        wrong += cell_of(group.cell, std::min(group.level, kLatticeBits)) != group.cell;
+        for (const NodeChild& child : group.children) {
+          wrong += !finite(child.node);
+          wrong += !reference_in_bounds(child.ref);
+        }
+      }
+    }
+  }
+  CHECK(wrong == 0);
+  CHECK(refused > 5000);
+}
+
+TEST_CASE("node page: a broken rule is named", "[format][nodes]") {
+  NodeGroup group;
+  group.level = 3;
+  group.cell = encode_morton({5ull << 39, 0, 0});
+  group.children.resize(3);  // 24 + 180 bytes, 4 of padding; the group starts at 8
+  for (NodeChild& child : group.children) child.ref.point_count = 2;
+  group.children[1].ref = {true, 7, 1, 0, 0};
+  const Bytes payload = page_of({group});
+  REQUIRE(payload.size() == 8 + 208);
+  const auto with = [&](std::size_t at, auto value) { return changed(payload, 1, at, value); };
+  CHECK(with(0, std::uint16_t{2}) == "spec/nodes.md#node-slots");
+  CHECK(with(2, std::uint16_t{1}) == "spec/nodes.md#node-zero");
+  CHECK(with(8, ~std::uint64_t{0}) == "spec/nodes.md#node-cell");
+  CHECK(with(8, 5ull << 53) == "spec/nodes.md#node-cell");
+  CHECK(with(16, std::uint64_t{1}) == "spec/nodes.md#node-cell");
+  CHECK(with(24, std::uint8_t{63}) == "spec/nodes.md#node-level");
+  CHECK(with(25, std::uint8_t{0}) == "spec/nodes.md#node-children");
+  CHECK(with(25, std::uint8_t{9}) == "spec/nodes.md#node-children");
+  CHECK(with(25, std::uint8_t{4}) == "spec/nodes.md#node-slots");
+  CHECK(with(26, std::uint8_t{8}) == "spec/nodes.md#node-mask");
+  CHECK(with(27, std::uint8_t{1}) == "spec/nodes.md#node-zero");
+  CHECK(with(28, std::uint32_t{1}) == "spec/nodes.md#node-zero");
+  CHECK(with(32, kPoints - 2 + (2ull << 48)) == "none");
+  CHECK(with(32, kPoints - 1 + (2ull << 48)) == "spec/nodes.md#node-leaf");
+  CHECK(with(32, kPoints + 1 + (2ull << 48)) == "spec/nodes.md#node-leaf");
+  CHECK(with(32, std::uint64_t{0}) == "spec/nodes.md#node-leaf");
+  CHECK(with(40, std::uint64_t{kPages}) == "spec/nodes.md#node-reference");
+  CHECK(with(40, 1ull << 48) == "spec/nodes.md#node-zero");
+  CHECK(with(8 + 48 + 6 * 3, std::uint16_t{0xff00}) == "spec/nodes.md#node-number");  // radius
+  CHECK(with(8 + 48 + 6 * 3, std::uint16_t{0xfeff}) == "none");
+  CHECK(with(8 + 48 + 6 * 6 + 4, std::uint16_t{0xffff}) == "spec/nodes.md#node-number");  // area
+  CHECK(with(8 + 48 + 6 * 7, std::uint16_t{1}) == "spec/nodes.md#node-zero");
+  CHECK(with(8 + 204, std::uint16_t{1}) == "spec/nodes.md#node-zero");
+}

@@ -1,0 +1,58 @@
+// What the tests of format/ share: random numbers that are the same everywhere, and which clause an
+// error names.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "format/error.h"
+
+namespace ptc::test {
+
+/// SplitMix64 (Steele, Lea and Flood 2014): the same sequence on every machine.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed) {}
+  std::uint64_t bits() {
+    std::uint64_t z = state_ += 0x9e3779b97f4a7c15;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
+    z = (z ^ z >> 27) * 0x94d049bb133111eb;
+    return z ^ z >> 31;
+  }
+  std::uint64_t below(std::uint64_t limit) { return bits() % limit; }
+  /// In [0, 1).
+  double unit() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+  double between(double low, double high) { return low + (high - low) * unit(); }
+
+ private:
+  std::uint64_t state_;
+};
+
+/// The clause of the FormatError that `action` throws; "none" when it throws nothing.
+template <class Action>
+std::string clause_of(const Action& action) {
+  try {
+    action();
+  } catch (const FormatError& error) {
+    return error.clause();
+  }
+  return "none";
+}
+
+template <class T, class Bytes>
+void put(Bytes& bytes, std::size_t at, T value) {
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+template <class T, class Bytes>
+T get(const Bytes& bytes, std::size_t at) {
+  T value;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+}  // namespace ptc::test

@@ -1,0 +1,160 @@
+// The road end to end: mesh or cloud to container to shaded points and pictures.
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+
+#include "engine/base/error.h"
+#include "engine/build/verify.h"
+#include "engine/io/image.h"
+#include "engine/io/points.h"
+#include "engine/pipeline.h"
+#include "engine/store/reader.h"
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+std::vector<char> bytes_of(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A unit cube as OBJ, faces outwards.
+void write_cube(const std::filesystem::path& path) {
+  std::ofstream(path) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+                         "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
+}
+
+BuildRequest cube_request(const std::filesystem::path& mesh) {
+  BuildRequest request;
+  request.inputs = {mesh};
+  request.backdrop = true;
+  request.sampling.count = 40'000;
+  request.sampling.lights.sky_rays = 4;
+  request.lights.suns.push_back({});
+  request.lights.sky.radiance = glm::vec3(0.5F);
+  request.run.memory_bytes = std::uint64_t{256} << 20;
+  request.run.threads = 1;
+  return request;
+}
+
+}  // namespace
+
+TEST_CASE("pipeline: threads and cap change no byte of a container", "[integration][build]") {
+  const TemporaryDirectory dir;
+  write_cube(dir / "cube.obj");
+  Progress silent;
+  BuildRequest request = cube_request(dir / "cube.obj");
+  build_container(request, dir / "one.ptcx", silent);
+  request.run.threads = 2;
+  request.run.memory_bytes = std::uint64_t{96} << 20;
+  build_container(request, dir / "two.ptcx", silent);
+  CHECK(bytes_of(dir / "one.ptcx") == bytes_of(dir / "two.ptcx"));
+  request.sampling.lights.sky_rays = 5;
+  build_container(request, dir / "other.ptcx", silent);
+  CHECK(bytes_of(dir / "one.ptcx") != bytes_of(dir / "other.ptcx"));
+}
+
+TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integration][build]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  BuildRequest request;
+  request.city_points = 1'200'000;  // 48 MB of records
+  request.run.threads = 2;
+  request.run.memory_bytes = std::uint64_t{1} << 30;
+  const BuildReport roomy = build_container(request, dir / "roomy.ptcx", silent);
+  request.run.memory_bytes = std::uint64_t{84} << 20;
+  const BuildReport tight = build_container(request, dir / "tight.ptcx", silent);
+  CHECK(roomy.sort.spilled_bytes == 0);
+  CHECK(tight.sort.spilled_bytes > 0);
+  CHECK(bytes_of(dir / "roomy.ptcx") == bytes_of(dir / "tight.ptcx"));
+  verify_container(dir / "tight.ptcx", {}, silent);
+}
+
+TEST_CASE("pipeline: shading adds channels, keeps the points and verifies", "[integration][shade]") {
+  const TemporaryDirectory dir;
+  write_cube(dir / "cube.obj");
+  Progress silent;
+  build_container(cube_request(dir / "cube.obj"), dir / "scene.ptcx", silent);
+  ShadeRequest request{.scene = dir / "scene.ptcx"};
+  request.run = {.memory_bytes = std::uint64_t{128} << 20, .threads = 2};
+  const std::vector<char> before = bytes_of(dir / "scene.ptcx");
+  shade_container(request, dir / "shaded.ptcx", silent);
+  CHECK(bytes_of(dir / "scene.ptcx") == before);
+  verify_container(dir / "shaded.ptcx", {}, silent);
+  const ContainerReader scene(dir / "scene.ptcx"), shaded(dir / "shaded.ptcx");
+  CHECK(shaded.superblock().points == scene.superblock().points);
+  REQUIRE(shaded.meta().channels.size() == 5);
+  CHECK(shaded.meta().channels[0].name == "occlusion");
+
+  // Shading a shaded container replaces the channels: the same bytes again.
+  request.scene = dir / "shaded.ptcx";
+  shade_container(request, dir / "again.ptcx", silent);
+  CHECK(ContainerReader(dir / "again.ptcx").superblock().content_xxh3 == shaded.superblock().content_xxh3);
+
+  shade_container(request, dir / "shaded.ply", silent);
+  const PointFile ply = open_points(dir / "shaded.ply");
+  CHECK(ply.info.count == scene.superblock().points);
+}
+
+TEST_CASE("pipeline: another cloud's points can be shaded by a scene", "[integration][shade]") {
+  const TemporaryDirectory dir;
+  write_cube(dir / "cube.obj");
+  Progress silent;
+  build_container(cube_request(dir / "cube.obj"), dir / "scene.ptcx", silent);
+  std::ofstream(dir / "probes.xyz") << "0.5 1.5 0.5 0 -1 0\n-0.02 0.5 0.5 -1 0 0\n";
+  ShadeRequest request{.scene = dir / "scene.ptcx", .receivers = dir / "probes.xyz"};
+  const ShadeReport report = shade_container(request, dir / "probes.ply", silent);
+  CHECK(report.receivers == 2);
+  std::size_t entries = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(dir.path())) ++entries;
+  CHECK(entries == 4);  // cube, scene, probes.xyz, probes.ply: no temporary is left
+}
+
+TEST_CASE("pipeline: a picture has the layers it promises, with and without a mesh", "[integration][render]") {
+  const TemporaryDirectory dir;
+  write_cube(dir / "cube.obj");
+  Progress silent;
+  build_container(cube_request(dir / "cube.obj"), dir / "scene.ptcx", silent);
+  RenderRequest request{.scene = dir / "scene.ptcx", .meshes = {dir / "cube.obj"}, .backdrop = true, .samples = 1};
+  request.size = {{64, 48}};
+  const std::vector<PictureTarget> targets{{dir / "a.exr", ""}, {dir / "a.png", "beauty"}, {dir / "o.png", "occlusion"}};
+  render_picture(request, targets, silent);
+  const Image with_mesh = read_image(dir / "a.exr");
+  CHECK(with_mesh.width == 64);
+  CHECK(with_mesh.height == 48);
+  request.meshes.clear();
+  const std::vector<PictureTarget> splatted{{dir / "b.exr", ""}};
+  render_picture(request, splatted, silent);
+  const Image with_surfels = read_image(dir / "b.exr");
+  // The same view of the same scene: most pixels agree closely.
+  std::size_t close = 0;
+  for (std::size_t i = 0; i < with_mesh.pixels.size(); ++i) {
+    close += std::abs(with_mesh.pixels[i].g - with_surfels.pixels[i].g) < 0.1F;
+  }
+  CHECK(close > with_mesh.pixels.size() * 85 / 100);
+}
+
+TEST_CASE("pipeline: a cap that is too small is refused with the least that works", "[integration]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  BuildRequest request;
+  request.city_points = 10'000;
+  request.run.memory_bytes = std::uint64_t{60} << 20;
+  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent), Catch::Contains("least that works is 80M"));
+  request.run.memory_bytes = std::uint64_t{80} << 20;
+  CHECK_NOTHROW(build_container(request, dir / "a.ptcx", silent));
+}
+
+TEST_CASE("pipeline: clouds without normals and inputs without points are refused by name", "[integration]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  std::ofstream(dir / "bare.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                     "property float z\nend_header\n0 0 0\n";
+  BuildRequest request;
+  request.inputs = {dir / "bare.ply"};
+  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent), Catch::Contains("bare.ply") && Catch::Contains("normals"));
+  CHECK_FALSE(std::filesystem::exists(dir / "a.ptcx"));
+}

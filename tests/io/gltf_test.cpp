@@ -1,0 +1,360 @@
+// Meshes, materials and cameras from glTF and GLB.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include <glm/geometric.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/mesh.h"
+#include "tests/io/files.h"
+
+using namespace ptc;
+using Catch::Matchers::Contains;
+using Json = nlohmann::json;
+
+namespace {
+
+// A triangle in the plane z = 0: 36 bytes of positions, 6 of indices, 24 of texture coordinates.
+std::string buffer_bytes() {
+  std::string bytes;
+  for (const int p : {0, 0, 0, 1, 0, 0, 0, 1, 0}) bytes += raw(static_cast<float>(p));
+  for (const int i : {0, 1, 2}) bytes += raw(static_cast<std::uint16_t>(i));
+  bytes += std::string(2, '\0');
+  for (const float t : {0.0F, 0.25F, 1.0F, 0.0F, 0.0F, 1.0F}) bytes += raw(t);
+  return bytes;
+}
+
+Json document() {
+  return Json::parse(R"({
+    "asset": {"version": "2.0"}, "scene": 0,
+    "scenes": [{"nodes": [0]}],
+    "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    "accessors": [
+      {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+      {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+      {"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC2"}],
+    "bufferViews": [
+      {"buffer": 0, "byteLength": 36},
+      {"buffer": 0, "byteOffset": 36, "byteLength": 6},
+      {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+    "buffers": [{"uri": "a%20b.bin", "byteLength": 68}]})");
+}
+
+std::string glb(const Json& json, const std::string& binary) {
+  std::string text = json.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  const auto u32 = [](std::size_t value) { return raw(static_cast<std::uint32_t>(value)); };
+  return "glTF" + u32(2) + u32(12 + 8 + text.size() + 8 + binary.size()) + u32(text.size()) +
+         "JSON" + text + u32(binary.size()) + std::string("BIN\0", 4) + binary;
+}
+
+std::string base64(const std::string& bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      text += i + k > bytes.size() ? '=' : kDigits[bits >> (18 - 6 * k) & 63];
+    }
+  }
+  return text;
+}
+
+struct Files {
+  Scratch scratch;
+  Files() { scratch.file("a b.bin", buffer_bytes()); }
+
+  MeshFile read(const Json& json) const { return read_mesh(scratch.file("a.gltf", json.dump())); }
+  std::string fault(const Json& json) const {
+    return refusal([&] { static_cast<void>(read(json)); });
+  }
+};
+
+glm::dvec3 corner(const Mesh& mesh, std::size_t triangle, std::size_t k) {
+  return mesh.origin + glm::dvec3(mesh.positions[mesh.triangles[triangle][k]]);
+}
+
+}  // namespace
+
+TEST_CASE("gltf: buffers beside the file, in it and in a GLB give the same triangle",
+          "[io][gltf]") {
+  const Files files;
+  Json inside = document();
+  inside["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64(buffer_bytes());
+  Json chunk = document();
+  chunk["buffers"][0].erase("uri");
+  const auto packed = files.scratch.file("a.glb", glb(chunk, buffer_bytes()));
+  for (const MeshFile& file : {files.read(document()), files.read(inside), read_mesh(packed)}) {
+    CHECK(file.mesh.triangles.size() == 1);
+    CHECK(corner(file.mesh, 0, 1) == glm::dvec3(1, 0, 0));
+    CHECK(corner(file.mesh, 0, 2) == glm::dvec3(0, 1, 0));
+    CHECK(file.mesh.normals.empty());
+    CHECK(file.mesh.uvs.empty());
+    REQUIRE(file.mesh.materials.size() == 1);
+    CHECK(file.mesh.materials[0].albedo == glm::vec3(1));
+    CHECK(file.warnings.empty());
+  }
+}
+
+TEST_CASE("gltf: transforms of nested nodes are applied in double", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  const double half = std::sqrt(0.5);
+  json["nodes"] =
+      Json::array({{{"children", {1}}, {"translation", {10000000.001, 0, 0}}},
+                   {{"children", {2}},
+                    {"rotation", {0, 0, half, half}},  // a quarter turn about z
+                    {"scale", {2, 3, 1}}},
+                   {{"mesh", 0}, {"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, 0, 7, 1}}}});
+  const Mesh mesh = files.read(json).mesh;
+  const auto near = [](const glm::dvec3& a, const glm::dvec3& b) {
+    return glm::length(a - b) < 1e-6;
+  };
+  CHECK(near(corner(mesh, 0, 0), {10000000.001, 1, 7}));
+  CHECK(near(corner(mesh, 0, 1), {10000000.001, 3, 7}));
+  CHECK(near(corner(mesh, 0, 2), {9999997.001, 1, 7}));
+}
+
+TEST_CASE("gltf: a mirroring node keeps the front in front", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["nodes"][0]["scale"] = {-1, 1, 1};
+  const Mesh mesh = files.read(json).mesh;
+  const glm::dvec3 normal =
+      glm::cross(corner(mesh, 0, 1) - corner(mesh, 0, 0), corner(mesh, 0, 2) - corner(mesh, 0, 0));
+  CHECK(normal.z > 0);
+}
+
+TEST_CASE("gltf: only the nodes of the scene are read, each once", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["nodes"].push_back({{"mesh", 0}});
+  CHECK(files.read(json).mesh.triangles.size() == 1);
+  json.erase("scenes");
+  json.erase("scene");
+  CHECK(files.read(json).mesh.triangles.size() == 2);
+  json["nodes"][0]["children"] = {1};
+  CHECK(files.read(json).mesh.triangles.size() == 2);
+  json["nodes"][1]["children"] = {0};  // nobody's children are none
+  CHECK_THAT(files.fault(json), Contains("no triangle"));
+  json["scenes"] = Json::array({{{"nodes", {0}}}});
+  CHECK_THAT(files.fault(json), Contains("node 0 has two parents or is its own"));
+  json["scenes"] = Json::array({{{"nodes", {0, 0}}}});
+  json["nodes"] = Json::array({{{"mesh", 0}}});
+  CHECK_THAT(files.fault(json), Contains("node 0 has two parents"));
+}
+
+TEST_CASE("gltf: strips and fans become triangles of one side, points and lines nothing",
+          "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  std::string bytes;
+  for (const int p : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, -1, 1, 0})
+    bytes += raw(static_cast<float>(p));
+  json["buffers"][0] = {{"uri", "data:;base64," + base64(bytes)}, {"byteLength", 60}};
+  json["bufferViews"][0]["byteLength"] = 60;
+  json["accessors"][0]["count"] = 5;
+  Json& primitive = json["meshes"][0]["primitives"][0];
+  primitive.erase("indices");
+  primitive["mode"] = 6;
+  const Mesh fan = files.read(json).mesh;
+  REQUIRE(fan.triangles.size() == 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(corner(fan, i, 0) == glm::dvec3(0));
+    CHECK(glm::cross(corner(fan, i, 1), corner(fan, i, 2)).z > 0);
+  }
+  primitive["mode"] = 5;
+  CHECK(files.read(json).mesh.triangles.size() == 2);  // the last three are on a line
+  primitive["mode"] = 4;
+  CHECK(files.read(json).mesh.triangles.size() == 1);
+  for (const int mode : {0, 1, 2, 3}) {
+    primitive["mode"] = mode;
+    CHECK_THAT(files.fault(json), Contains("no triangle"));
+  }
+  primitive["mode"] = 7;
+  CHECK_THAT(files.fault(json), Contains("an unknown mode"));
+}
+
+TEST_CASE("gltf: materials have factor, texture, emission and sides", "[io][gltf]") {
+  const Files files;
+  write_png(files.scratch.path() / "t.png", {2, 1, {glm::vec3(1, 0, 0), glm::vec3(0, 0, 0)}});
+  Json json = document();
+  json["materials"] = Json::parse(R"([
+    {"name": "wall", "doubleSided": true, "emissiveFactor": [1, 0.5, 0],
+     "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 2, 1],
+                              "baseColorTexture": {"index": 0}},
+     "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 20}}}])");
+  json["textures"] = Json::parse(R"([{"source": 0}])");
+  json["images"] = Json::parse(R"([{"uri": "t.png"}])");
+  Json& primitive = json["meshes"][0]["primitives"][0];
+  primitive["material"] = 0;
+  primitive["attributes"]["TEXCOORD_0"] = 2;
+  const MeshFile file = files.read(json);
+  REQUIRE(file.mesh.materials.size() == 1);
+  const Material& material = file.mesh.materials[0];
+  CHECK(material.name == "wall");
+  CHECK(material.albedo == glm::vec3(0.5F, 0.25F, 1));
+  CHECK(material.emission == glm::vec3(20, 10, 0));
+  CHECK(material.double_sided);
+  REQUIRE(material.texture);
+  CHECK(material.texture->at(0, 0) == glm::vec3(1, 0, 0));
+  // v grows downwards in the file and upwards in the mesh.
+  CHECK(file.mesh.uvs[file.mesh.triangles[0][0]] == glm::vec2(0, 0.75F));
+  CHECK(file.mesh.uvs[file.mesh.triangles[0][1]] == glm::vec2(1, 1));
+  CHECK(file.warnings.empty());
+
+  // The mean of an emission texture, in a bufferView and by a data URI alike.
+  const std::string png = slurp(files.scratch.path() / "t.png");
+  json["images"] = Json::array({{{"uri", "data:image/png;base64," + base64(png)}}});
+  json["materials"][0]["emissiveTexture"] = {{"index", 0}};
+  const MeshFile lit = files.read(json);
+  CHECK(lit.mesh.materials[0].emission == glm::vec3(10, 0, 0));
+  CHECK(lit.mesh.materials[0].texture->width == 2);
+  CHECK(lit.warnings.size() == 1);
+
+  // A missing texture is a warning.
+  json["images"] = Json::parse(R"([{"uri": "none.png"}])");
+  const MeshFile plain = files.read(json);
+  CHECK_FALSE(plain.mesh.materials[0].texture);
+  REQUIRE(plain.warnings.size() == 1);
+  CHECK_THAT(plain.warnings[0], Contains("none.png"));
+}
+
+TEST_CASE("gltf: a texture transform moves the coordinates", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["materials"] = Json::parse(R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0,
+    "extensions": {"KHR_texture_transform":
+      {"offset": [0.5, 0.25], "scale": [2, 4], "rotation": 1.5707963267948966}}}}}])");
+  json["textures"] = Json::parse(R"([{}])");
+  Json& primitive = json["meshes"][0]["primitives"][0];
+  primitive["material"] = 0;
+  primitive["attributes"]["TEXCOORD_0"] = 2;
+  const MeshFile file = files.read(json);
+  // (0, 0.25) scaled is (0, 1), turned (1, 0), moved (1.5, 0.25); v upwards 0.75.
+  const glm::vec2 uv = file.mesh.uvs[file.mesh.triangles[0][0]];
+  CHECK(uv.x == Approx(1.5F));
+  CHECK(uv.y == Approx(0.75F));
+  CHECK_THAT(file.warnings.at(0), Contains("no source that is supported"));
+}
+
+TEST_CASE("gltf: integers are scaled when they say so", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  const std::string bytes = std::string("\0\0\0\xff\0\0\0\xff\0", 9);
+  json["buffers"][0] = {{"uri", "data:;base64," + base64(bytes)}, {"byteLength", 9}};
+  json["bufferViews"][0]["byteLength"] = 9;
+  json["accessors"][0]["componentType"] = 5121;
+  json["meshes"][0]["primitives"][0].erase("indices");
+  CHECK(corner(files.read(json).mesh, 0, 1) == glm::dvec3(255, 0, 0));
+  json["accessors"][0]["normalized"] = true;
+  CHECK(corner(files.read(json).mesh, 0, 1) == glm::dvec3(1, 0, 0));
+}
+
+TEST_CASE("gltf: cameras look along -z of their node", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["cameras"] = Json::parse(
+      R"([{"type": "perspective", "perspective": {"yfov": 0.8, "aspectRatio": 2}},
+          {"type": "orthographic"}])");
+  json["nodes"][0]["children"] = {1, 2};
+  json["nodes"][0]["translation"] = {0, 0, 5};
+  json["nodes"].push_back({{"camera", 0}, {"rotation", {0, std::sqrt(0.5), 0, std::sqrt(0.5)}}});
+  json["nodes"].push_back({{"camera", 1}});
+  const MeshFile file = files.read(json);
+  REQUIRE(file.cameras.size() == 1);
+  const MeshCamera& camera = file.cameras[0];
+  CHECK(camera.position == glm::dvec3(0, 0, 5));
+  CHECK(glm::length(camera.forward - glm::vec3(-1, 0, 0)) < 1e-6F);
+  CHECK(glm::length(camera.up - glm::vec3(0, 1, 0)) < 1e-6F);
+  CHECK(static_cast<double>(camera.horizontal_fov) == Approx(2 * std::atan(2 * std::tan(0.4))));
+}
+
+TEST_CASE("gltf: ranges that reach past what they are in are refused", "[io][gltf]") {
+  const Files files;
+  const auto with = [&](const char* pointer, const Json& value) {
+    Json json = document();
+    json[Json::json_pointer(pointer)] = value;
+    return files.fault(json);
+  };
+  CHECK_THAT(with("/buffers/0/byteLength", 69), Contains("buffer 0 has 68 bytes of 69"));
+  CHECK_THAT(with("/bufferViews/0/byteOffset", 33),
+             Contains("bufferView 0 reaches past its buffer"));
+  CHECK_THAT(with("/bufferViews/0/byteOffset", UINT64_MAX), Contains("bufferView 0 reaches past"));
+  CHECK_THAT(with("/accessors/0/count", 4), Contains("accessor 0 reaches past its bufferView"));
+  CHECK_THAT(with("/accessors/0/count", UINT64_MAX), Contains("accessor 0 reaches past"));
+  CHECK_THAT(with("/accessors/0/byteOffset", 1), Contains("accessor 0 reaches past"));
+  CHECK_THAT(with("/accessors/0/byteOffset", UINT64_MAX), Contains("accessor 0 reaches past"));
+  CHECK_THAT(with("/bufferViews/0/byteStride", 13), Contains("accessor 0 reaches past"));
+  CHECK_THAT(with("/bufferViews/0/byteStride", 11),
+             Contains("accessor 0 has elements that overlap"));
+  CHECK_THAT(with("/bufferViews/0/byteStride", 0),
+             Contains("accessor 0 has elements that overlap"));
+  CHECK_THAT(with("/accessors/0/type", "VEC2"), Contains("accessor 0 is of the wrong type"));
+  CHECK_THAT(with("/accessors/0/componentType", 5124), Contains("unknown componentType"));
+  CHECK_THAT(with("/accessors/0/sparse", Json::object()), Contains("is sparse"));
+  CHECK_THAT(with("/accessors/1/componentType", 5121), Contains("no triangle"));
+  CHECK_THAT(with("/nodes/0/mesh", 1), Contains("meshes has no entry 1"));
+  CHECK_THAT(with("/nodes/0/mesh", -1), Contains("mesh is no unsigned integer"));
+  CHECK_THAT(with("/nodes/0/scale", {1, 1}), Contains("scale has not 3 numbers"));
+  CHECK_THAT(with("/nodes/0/scale", {1e300, 1, 1}), Contains("2e18 apart"));
+  CHECK_THAT(with("/scenes/0/nodes/0", 7), Contains("nodes has no entry 7"));
+  CHECK_THAT(with("/scene", 1), Contains("scenes has no entry 1"));
+  CHECK_THAT(with("/scene", "0"), Contains("scene is no unsigned integer"));
+  CHECK_THAT(with("/extensionsRequired", {"KHR_draco_mesh_compression"}),
+             Contains("not supported"));
+  CHECK_THAT(with("/buffers/0/uri", "none.bin"), Contains("none.bin"));
+  CHECK_THAT(with("/buffers/0/uri", "data:;base64,!"), Contains("base64"));
+  CHECK_THAT(with("/buffers/0/uri", "data:,x"), Contains("not base64"));
+}
+
+TEST_CASE("gltf: an index past the vertices is refused", "[io][gltf]") {
+  const Files files;
+  std::string bytes = buffer_bytes();
+  bytes.replace(36, 2, raw(std::uint16_t{3}));
+  files.scratch.file("a b.bin", bytes);
+  CHECK_THAT(files.fault(document()), Contains("an index that leads to no vertex"));
+}
+
+TEST_CASE("gltf: few bytes cannot make many vertices by repeating a mesh", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  std::string bytes(12 * 1000, '\0');
+  json["buffers"][0] = {{"uri", "data:;base64," + base64(bytes)}, {"byteLength", bytes.size()}};
+  json["bufferViews"][0]["byteLength"] = bytes.size();
+  json["accessors"][0]["count"] = 1000;
+  Json& primitive = json["meshes"][0]["primitives"][0];
+  primitive.erase("indices");
+  Json& primitives = json["meshes"][0]["primitives"];
+  for (int i = 1; i < 30; ++i) primitives.push_back(primitives[0]);
+  for (unsigned i = 1; i < 300; ++i) {
+    json["nodes"].push_back({{"mesh", 0}});
+    json["scenes"][0]["nodes"].push_back(i);
+  }
+  CHECK_THAT(files.fault(json), Contains("repeat meshes to more vertices"));
+}
+
+TEST_CASE("glb: every truncation and every flipped byte is read or refused", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["buffers"][0].erase("uri");
+  const std::string whole = glb(json, buffer_bytes());
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const auto cut = files.scratch.file("cut.glb", whole.substr(0, size));
+    CHECK_THROWS_AS(static_cast<void>(read_mesh(cut)), DataError);
+  }
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    for (const int flip : {1, 2, 0x10, 0x80}) {
+      std::string damaged = whole;
+      damaged[i] = static_cast<char>(damaged[i] ^ flip);
+      const auto at = files.scratch.file("bad.glb", damaged);
+      static_cast<void>(refusal([&] { static_cast<void>(read_mesh(at)); }));
+    }
+  }
+}

@@ -1,0 +1,194 @@
+// 8-bit pictures: the sRGB curve, the formats, and what damaged files do.
+#include "engine/io/image.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <glm/common.hpp>
+
+#include "engine/base/error.h"
+#include "tests/io/files.h"
+
+using namespace ptc;
+using Catch::Matchers::Contains;
+
+namespace {
+
+// Linear value of an 8-bit one, written down apart from the library's own curve.
+double linear(int stored) {
+  const double s = stored / 255.0;
+  return s < 0.04045 ? s / 12.92 : std::exp(2.4 * std::log((s + 0.055) / 1.055));
+}
+
+Image decode(std::string_view bytes, const std::string& name) {
+  return decode_image(std::as_bytes(std::span(bytes.data(), bytes.size())), name);
+}
+
+// 2 x 2: red, green / blue, white, as the rows of a picture from the top.
+void check_four_colours(const Image& image, double tolerance = 1e-6) {
+  REQUIRE(image.width == 2);
+  REQUIRE(image.height == 2);
+  const auto is = [&](unsigned x, unsigned y, glm::vec3 colour) {
+    for (int i = 0; i < 3; ++i) {
+      CHECK(static_cast<double>(image.at(x, y)[i]) ==
+            Approx(static_cast<double>(colour[i])).margin(tolerance));
+    }
+  };
+  is(0, 0, {1, 0, 0});
+  is(1, 0, {0, 1, 0});
+  is(0, 1, {0, 0, 1});
+  is(1, 1, {1, 1, 1});
+}
+
+std::string tga_header(int type, int width, int height) {
+  std::string bytes(18, '\0');
+  bytes[2] = static_cast<char>(type);
+  bytes[12] = static_cast<char>(width);
+  bytes[14] = static_cast<char>(height);
+  bytes[16] = 24;
+  bytes[17] = 0x20;  // rows from the top
+  return bytes;
+}
+
+const std::string kBgr("\0\0\xff\0\xff\0\xff\0\0\xff\xff\xff", 12);
+
+std::string four_colours_tga() {
+  return tga_header(2, 2, 2) + kBgr;
+}
+
+std::string four_colours_tga_rle() {
+  // One packet of three different pixels, one of a single repeated one.
+  return tga_header(10, 2, 2) + std::string("\x02") + kBgr.substr(0, 9) + std::string("\x80") +
+         kBgr.substr(9);
+}
+
+std::string four_colours_bmp() {
+  std::string rows =
+      kBgr.substr(6, 6) + std::string(2, '\0') + kBgr.substr(0, 6) + std::string(2, '\0');
+  return "BM" + raw<std::uint32_t>(70) + raw<std::uint32_t>(0) + raw<std::uint32_t>(54) +
+         raw<std::uint32_t>(40) + raw<std::int32_t>(2) + raw<std::int32_t>(2) +
+         raw<std::uint16_t>(1) + raw<std::uint16_t>(24) + std::string(24, '\0') + rows;
+}
+
+// Radiance: mantissas and a common exponent; 2^(129 - 136) * 128 = 1.
+std::string four_colours_hdr() {
+  return "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n" +
+         std::string("\x80\0\0\x81\0\x80\0\x81\0\0\x80\x81\x80\x80\x80\x81", 16);
+}
+
+// Eight equal pixels a row, run-length coded.
+std::string coded_hdr() {
+  std::string row("\x02\x02\x00\x08", 4);
+  for (const char* run : {"\x88\x80", "\x88\x80", "\x88\x80", "\x88\x81"}) row.append(run, 2);
+  return "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n" + row + row;
+}
+
+Image gradient() {
+  Image image{16, 16, {}};
+  for (int i = 0; i < 256; ++i) {
+    image.pixels.emplace_back(linear(i), linear(255 - i), linear(i / 2));
+  }
+  return image;
+}
+
+}  // namespace
+
+TEST_CASE("png: all 256 stored values come back as written", "[io][image]") {
+  const Scratch scratch;
+  const Image image = gradient();
+  write_png(scratch.path() / "a.png", image);
+  CHECK(scratch.listing() == "a.png");
+  const Image back = read_image(scratch.path() / "a.png");
+  REQUIRE(back.width == 16);
+  REQUIRE(back.height == 16);
+  for (std::size_t i = 0; i < 256; ++i) {
+    const glm::vec3 difference = glm::abs(back.pixels[i] - image.pixels[i]);
+    CHECK(difference.x < 1e-6F);
+    CHECK(difference.y < 1e-6F);
+    CHECK(difference.z < 1e-6F);
+  }
+}
+
+TEST_CASE("png: values outside [0, 1] are clamped and no number is black", "[io][image]") {
+  const Scratch scratch;
+  write_png(scratch.path() / "a.png", {2, 1, {{-1, 2, NAN}, {INFINITY, -INFINITY, 0.5F}}});
+  const Image back = read_image(scratch.path() / "a.png");
+  CHECK(back.at(0, 0) == glm::vec3(0, 1, 0));
+  CHECK(back.at(1, 0).x == 1);
+  CHECK(back.at(1, 0).y == 0);
+  CHECK(static_cast<double>(back.at(1, 0).z) == Approx(linear(188)));
+}
+
+TEST_CASE("png: sizes that do not fit the pixels are refused", "[io][image]") {
+  const Scratch scratch;
+  CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {2, 2, {glm::vec3(0)}}),
+                  std::invalid_argument);
+  CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {}), std::invalid_argument);
+  CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {65537, 1, std::vector<glm::vec3>(65537)}),
+                  std::invalid_argument);
+  CHECK(scratch.listing().empty());
+}
+
+TEST_CASE("image: TGA, BMP and HDR give the same four pixels", "[io][image]") {
+  check_four_colours(decode(four_colours_tga(), "a.tga"));
+  check_four_colours(decode(four_colours_tga_rle(), "a.TGA"));
+  check_four_colours(decode(four_colours_bmp(), "a"));
+  check_four_colours(decode(four_colours_hdr(), "a"));
+  const Image coded = decode(coded_hdr(), "a");
+  CHECK(coded.width == 8);
+  CHECK(coded.at(7, 1) == glm::vec3(1));
+}
+
+TEST_CASE("image: every truncation of every format is refused", "[io][image]") {
+  const Scratch scratch;
+  write_png(scratch.path() / "a.png", gradient());
+  for (const std::string& whole :
+       {slurp(scratch.path() / "a.png"), four_colours_tga(), four_colours_tga_rle(),
+        four_colours_bmp(), four_colours_hdr(), coded_hdr()}) {
+    CHECK_NOTHROW(decode(whole, "a.tga"));
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      CHECK_THROWS_AS(decode(whole.substr(0, size), "a.tga"), DataError);
+    }
+  }
+}
+
+TEST_CASE("image: no flipped byte does more than change the picture or refuse it", "[io][image]") {
+  const Scratch scratch;
+  write_png(scratch.path() / "a.png", {3, 2, std::vector<glm::vec3>(6, glm::vec3(0.5F))});
+  for (const std::string& whole :
+       {slurp(scratch.path() / "a.png"), four_colours_tga(), four_colours_tga_rle(),
+        four_colours_bmp(), four_colours_hdr(), coded_hdr()}) {
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      for (const int flip : {1, 0x80, 0xff}) {
+        std::string damaged = whole;
+        damaged[i] = static_cast<char>(damaged[i] ^ flip);
+        static_cast<void>(refusal([&] {
+          const Image image = decode(damaged, "a.tga");
+          if (image.pixels.size() != std::size_t{image.width} * image.height) {
+            throw std::logic_error("an image with too few pixels");
+          }
+        }));
+      }
+    }
+  }
+}
+
+TEST_CASE("image: a small file cannot ask for many pixels", "[io][image]") {
+  std::string bmp = four_colours_bmp();
+  bmp.replace(18, 8, raw<std::int32_t>(60000) + raw<std::int32_t>(4000));
+  CHECK_THROWS_WITH(decode(bmp, "a.bmp"), Contains("a.bmp: 60000 x 4000 pixels"));
+  bmp.replace(18, 8, raw<std::int32_t>(70000) + raw<std::int32_t>(1));
+  CHECK_THROWS_WITH(decode(bmp, "a.bmp"), Contains("more than this program takes"));
+}
+
+TEST_CASE("image: what is no picture is refused by name", "[io][image]") {
+  const Scratch scratch;
+  for (const std::string text : {"", "GIF89a......", "hello"}) {
+    const auto path = scratch.file("a.png", text);
+    CHECK_THROWS_WITH(static_cast<void>(read_image(path)),
+                      Contains(path.string() + ": not a PNG, JPEG, BMP, HDR, TGA or EXR"));
+  }
+  CHECK_THROWS_AS(static_cast<void>(read_image(scratch.path())), std::system_error);
+}

@@ -1,0 +1,135 @@
+// Boxes, and joining meshes.
+#include "engine/io/mesh.h"
+
+#include <catch2/catch.hpp>
+#include <stdexcept>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "engine/base/error.h"
+#include "tests/io/files.h"
+
+using namespace ptc;
+using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
+
+namespace {
+
+Mesh triangle(const glm::dvec3& origin) {
+  Mesh mesh;
+  mesh.origin = origin;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.material_of = {0};
+  mesh.materials.resize(1);
+  mesh.materials[0].name.assign("plain");
+  return mesh;
+}
+
+glm::dvec3 world(const Mesh& mesh, std::size_t index) {
+  return mesh.origin + glm::dvec3(mesh.positions[index]);
+}
+
+glm::vec3 geometric_normal(const Mesh& mesh, std::size_t index) {
+  const auto& [a, b, c] = mesh.triangles[index];
+  return glm::normalize(
+      glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]));
+}
+
+}  // namespace
+
+TEST_CASE("bounds: a box holds what was added and nothing before", "[io][bounds]") {
+  Bounds box;
+  CHECK(box.empty());
+  box.add(Bounds{});
+  CHECK(box.empty());
+  box.add(glm::dvec3(5, -5, 5));
+  CHECK_FALSE(box.empty());
+  CHECK(box.low == glm::dvec3(5, -5, 5));
+  CHECK(box.high == box.low);
+  box.add(glm::dvec3(6, -6, 5));
+  CHECK(box.low == glm::dvec3(5, -6, 5));
+  CHECK(box.high == glm::dvec3(6, -5, 5));
+  Bounds other;
+  other.add(box);
+  other.add(Bounds{});
+  CHECK(other.low == box.low);
+  CHECK(other.high == box.high);
+}
+
+TEST_CASE("mesh: the box of an empty mesh is empty", "[io][mesh]") {
+  CHECK(Mesh{}.bounds().empty());
+  CHECK(triangle({1e7, 0, 0}).bounds().high == glm::dvec3(1e7 + 1, 1, 0));
+}
+
+TEST_CASE("append: an empty mesh takes its origin from what is appended", "[io][mesh]") {
+  Mesh mesh;
+  append_mesh(mesh, triangle({1e7, 0, 0}), glm::translate(glm::dmat4(1), {0.25, 0, 5e6}));
+  CHECK(mesh.origin == glm::dvec3(1e7 + 1, 1, 5e6));
+  CHECK(world(mesh, 0) == glm::dvec3(1e7 + 0.25, 0, 5e6));
+  CHECK(mesh.materials.size() == 1);
+}
+
+TEST_CASE("append: indices and materials move behind those that are there", "[io][mesh]") {
+  Mesh mesh = triangle({0, 0, 0});
+  append_mesh(mesh, triangle({3, 0, 0}), glm::dmat4(1));
+  append_mesh(mesh, mesh, glm::translate(glm::dmat4(1), {0, 0, 1}));
+  REQUIRE(mesh.triangles.size() == 4);
+  CHECK(mesh.material_of == std::vector<std::uint16_t>{0, 1, 2, 3});
+  CHECK(world(mesh, mesh.triangles[3][1]) == glm::dvec3(4, 0, 1));
+  CHECK(mesh.normals.empty());
+}
+
+TEST_CASE("append: a mirror turns triangles and normals alike", "[io][mesh]") {
+  Mesh other = triangle({0, 0, 0});
+  other.normals.assign(3, {0, 0.6F, 0.8F});
+  Mesh mesh;
+  append_mesh(mesh, other, glm::scale(glm::dmat4(1), {2, 1, -0.5}));
+  CHECK(geometric_normal(mesh, 0) == glm::vec3(0, 0, -1));
+  // The inverse transpose: y by 1, z by -2.
+  const glm::vec3 expected = glm::normalize(glm::vec3(0, 0.6F, -1.6F));
+  CHECK(glm::length(mesh.normals[0] - expected) < 1e-6F);
+}
+
+TEST_CASE("append: the mesh without normals gets flat ones, without coordinates (0, 0)",
+          "[io][mesh]") {
+  for (const bool first : {false, true}) {
+    Mesh with = triangle({0, 0, 0});
+    with.normals.assign(3, {0, 1, 0});
+    with.uvs.assign(3, {0.5F, 0.5F});
+    Mesh without = triangle({0, 0, 2});
+    without.triangles.push_back({2, 1, 0});
+    without.material_of.push_back(0);
+    Mesh mesh = first ? with : without;
+    append_mesh(mesh, first ? without : with, glm::dmat4(1));
+    REQUIRE(mesh.normals.size() == mesh.positions.size());
+    REQUIRE(mesh.uvs.size() == mesh.positions.size());
+    const std::size_t flat = first ? 1 : 0;
+    CHECK(mesh.normals[mesh.triangles[flat][0]] == glm::vec3(0, 0, 1));
+    CHECK(mesh.normals[mesh.triangles[flat + 1][0]] == glm::vec3(0, 0, -1));
+    CHECK(mesh.uvs[mesh.triangles[flat][0]] == glm::vec2(0));
+    const std::size_t own = first ? 0 : 2;
+    CHECK(mesh.normals[mesh.triangles[own][0]] == glm::vec3(0, 1, 0));
+    CHECK(mesh.uvs[mesh.triangles[own][0]] == glm::vec2(0.5F));
+  }
+}
+
+TEST_CASE("append: transforms without an inverse and too many materials are refused",
+          "[io][mesh]") {
+  Mesh mesh = triangle({0, 0, 0});
+  const Mesh other = mesh;
+  CHECK_THROWS_AS(append_mesh(mesh, other, glm::dmat4(0)), std::invalid_argument);
+  CHECK_THROWS_AS(append_mesh(mesh, other, glm::dmat4(NAN)), std::invalid_argument);
+  mesh.materials.resize(65536);
+  CHECK_THROWS_AS(append_mesh(mesh, other, glm::dmat4(1)), std::invalid_argument);
+  CHECK(mesh.triangles.size() == 1);
+}
+
+TEST_CASE("mesh: names that no reader knows are refused", "[io][mesh]") {
+  const Scratch scratch;
+  for (const char* name : {"a.blend", "a.dae", "a", "a.gltf.gz"}) {
+    CHECK_THAT(refusal([&] { static_cast<void>(read_mesh(scratch.file(name, "x"))); }),
+               Contains(name) && Contains("not a mesh"));
+  }
+}

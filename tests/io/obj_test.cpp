@@ -1,0 +1,146 @@
+// Meshes and materials from OBJ.
+#include <catch2/catch.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/mesh.h"
+#include "tests/io/files.h"
+
+using namespace ptc;
+using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
+
+namespace {
+
+const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+MeshFile read(const Scratch& scratch, const std::string& text) {
+  return read_mesh(scratch.file("a.obj", text));
+}
+
+std::string fault(const Scratch& scratch, const std::string& text) {
+  return refusal([&] { static_cast<void>(read(scratch, text)); });
+}
+
+}  // namespace
+
+TEST_CASE("obj: indices count from one, from the end, and with any of their parts", "[io][mesh]") {
+  const Scratch scratch;
+  const std::string start = kSquare + "vt 0.5\nvt 0 1 7\nvn 0 0 1\n";
+  for (const char* face :
+       {"f 1 2 3", "f -4 -3 -2", "f 1/1 2/1 3/2", "f 1//1 2//1 3//1", "f 1/1/1 2/2/1 3/2/1",
+        "f 1/1/ 2/1/ 3/1/", "f 1/-2/-1 2/-1/-1 3/1/1", "  f\t1 2 \\\n 3 # comment", "f +1 +2 +3"}) {
+    const Mesh mesh = read(scratch, start + face + "\n").mesh;
+    REQUIRE(mesh.triangles.size() == 1);
+    CHECK(mesh.positions[mesh.triangles[0][1]] + glm::vec3(mesh.origin) == glm::vec3(1, 0, 0));
+  }
+}
+
+TEST_CASE("obj: corners that differ in any index are vertices of their own", "[io][mesh]") {
+  const Scratch scratch;
+  const std::string start = kSquare + "vt 0 0\nvt 1 1\nvn 0 0 1\nvn 0 1 0\n";
+  const Mesh shared = read(scratch, start + "f 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/1/1 4/1/1\n").mesh;
+  CHECK(shared.positions.size() == 4);
+  const Mesh split = read(scratch, start + "f 1/1/1 2/1/1 3/1/1\nf 1/2/1 3/1/2 4/1/1\n").mesh;
+  CHECK(split.positions.size() == 6);
+  CHECK(split.uvs[split.triangles[1][0]] == glm::vec2(1, 1));
+  CHECK(split.normals[split.triangles[1][1]] == glm::vec3(0, 1, 0));
+  CHECK(split.normals[split.triangles[0][2]] == glm::vec3(0, 0, 1));
+}
+
+TEST_CASE("obj: faces without normals among others get flat ones", "[io][mesh]") {
+  const Scratch scratch;
+  const Mesh mesh =
+      read(scratch, kSquare + "v 0 0 5\nvn 0 1 1\nf 1//1 2//1 3//1\nf 1 4 3\nf 1 2 5\n").mesh;
+  REQUIRE(mesh.normals.size() == mesh.positions.size());
+  CHECK(mesh.normals[mesh.triangles[1][0]] == glm::vec3(0, 0, -1));
+  CHECK(mesh.normals[mesh.triangles[2][0]] == glm::vec3(0, -1, 0));
+  CHECK(mesh.normals[mesh.triangles[2][2]] == glm::vec3(0, -1, 0));
+}
+
+TEST_CASE("obj: ten million metres from the origin millimetres are kept", "[io][mesh]") {
+  const Scratch scratch;
+  const Mesh mesh =
+      read(scratch, "v 10000000.001 0 0\nv 10000000.003 0 0\nv 10000000.001 0.002 0\nf 1 2 3\n")
+          .mesh;
+  CHECK(mesh.origin == glm::dvec3(1e7, 0, 0));
+  CHECK(static_cast<double>(mesh.positions[1].x) == Approx(0.003).epsilon(1e-6));
+}
+
+TEST_CASE("obj: materials come from the library, textures from files beside it", "[io][mesh]") {
+  const Scratch scratch;
+  write_png(scratch.path() / "my red.png", {1, 1, {glm::vec3(1, 0, 0)}});
+  scratch.file("a b.mtl",
+               "Kd 9 9 9\nnewmtl red wall\nKd 0.5 0.25 2\nmap_Kd -s 1 1 -o 0.5 -bm 2 my red.png\n"
+               "newmtl lamp # a comment\nKd 0.1\nKe 17 12 4\nillum 2\n"
+               "newmtl odd\nKd spectral file.rfl\nmap_Ke a.png\nmap_Kd none.png\n"
+               "newmtl lamp\nKe 0 0 0\n");
+  const MeshFile file = read(scratch, kSquare +
+                                          "mtllib a b.mtl\nf 1 2 3\nusemtl red wall\nf 1 2 3\n"
+                                          "usemtl lamp\nf 1 2 4\nusemtl missing\nf 1 3 4\n"
+                                          "usemtl lamp\nf 2 3 4\nusemtl odd\nf 2 3 4\n");
+  const Mesh& mesh = file.mesh;
+  CHECK(mesh.material_of == std::vector<std::uint16_t>{0, 1, 2, 3, 2, 4});
+  REQUIRE(mesh.materials.size() == 5);
+  CHECK(mesh.materials[0].albedo == glm::vec3(0.5F));
+  CHECK(mesh.materials[1].name == "red wall");
+  CHECK(mesh.materials[1].albedo == glm::vec3(0.5F, 0.25F, 1));
+  REQUIRE(mesh.materials[1].texture);
+  CHECK(mesh.materials[1].texture->at(0, 0) == glm::vec3(1, 0, 0));
+  CHECK(mesh.materials[2].albedo == glm::vec3(0.1F));
+  CHECK(mesh.materials[2].emission == glm::vec3(17, 12, 4));
+  CHECK_FALSE(mesh.materials[4].texture);
+  std::string warnings;
+  for (const std::string& warning : file.warnings) warnings += warning + "\n";
+  CHECK(file.warnings.size() == 4);
+  CHECK_THAT(warnings, Contains("line 10: a colour other than r g b is left out") &&
+                           Contains("line 11: map_Ke is left out") &&
+                           Contains("texture left out: open ") && Contains("none.png") &&
+                           Contains("material 'missing' is not defined"));
+}
+
+TEST_CASE("obj: several libraries on a line, escaped blanks and missing ones", "[io][mesh]") {
+  const Scratch scratch;
+  scratch.file("one.mtl", "newmtl a\nKd 1 0 0\n");
+  scratch.file("two three.mtl", "newmtl b\nKd 0 1 0\n");
+  const MeshFile file = read(scratch, kSquare +
+                                          "mtllib one.mtl two\\ three.mtl none.mtl\n"
+                                          "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n");
+  REQUIRE(file.mesh.materials.size() == 2);
+  CHECK(file.mesh.materials[0].albedo == glm::vec3(1, 0, 0));
+  CHECK(file.mesh.materials[1].albedo == glm::vec3(0, 1, 0));
+  REQUIRE(file.warnings.size() == 1);
+  CHECK_THAT(file.warnings[0], Contains("material library left out: open "));
+}
+
+TEST_CASE("obj: files that break a rule are refused by line", "[io][mesh]") {
+  const Scratch scratch;
+  CHECK_THAT(fault(scratch, kSquare + "f 1 2 0\n"),
+             EndsWith("line 5: an index that leads to no vertex"));
+  CHECK_THAT(fault(scratch, kSquare + "f 1 2 -5\n"),
+             EndsWith("line 5: an index that leads to no vertex"));
+  CHECK_THAT(fault(scratch, kSquare + "f 1 2 x\n"),
+             EndsWith("line 5: an index that leads to no vertex"));
+  CHECK_THAT(fault(scratch, kSquare + "f 1 2 4294967296\n"), EndsWith("leads to no vertex"));
+  CHECK_THAT(fault(scratch, kSquare + "f 1 2 5\n"),
+             EndsWith("polygon 0: an index leads to no vertex"));
+  CHECK_THAT(fault(scratch, kSquare + "f 1/1 2/1 3/1\n"),
+             EndsWith("polygon 0: an index leads to no vertex"));
+  CHECK_THAT(fault(scratch, kSquare + "f 1//1 2//1 3//1\n"),
+             EndsWith("an index leads to no vertex"));
+  CHECK_THAT(fault(scratch, "v 1 2\n"), EndsWith("line 1: a vertex with too few values"));
+  CHECK_THAT(fault(scratch, "v 1 2 3.1+e2\n"), EndsWith("line 1: not a number"));
+  CHECK_THAT(fault(scratch, "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+             EndsWith("vertex 0: a position that is not finite"));
+  CHECK_THAT(fault(scratch, kSquare + "l 1 2\np 1\nf 1 2\n"), EndsWith("a.obj: no triangle"));
+  CHECK_THAT(fault(scratch, ""), EndsWith("a.obj: no triangle"));
+}
+
+TEST_CASE("obj: every truncation gives a mesh or a refusal", "[io][mesh]") {
+  const Scratch scratch;
+  const std::string whole =
+      kSquare + "vt 0 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 \\\n3/1/1 4/1/1\nf -1 -2 -3\n";
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const std::string text = fault(scratch, whole.substr(0, size));
+    CHECK((text.empty() || text.find("a.obj: ") != std::string::npos));
+  }
+}

@@ -1,0 +1,84 @@
+// Meshes from OFF.
+#include <catch2/catch.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/mesh.h"
+#include "tests/io/files.h"
+
+using namespace ptc;
+using Catch::Matchers::EndsWith;
+
+namespace {
+
+const std::string kBody = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
+
+MeshFile read(const Scratch& scratch, const std::string& text) {
+  return read_mesh(scratch.file("a.off", text));
+}
+
+std::string fault(const Scratch& scratch, const std::string& text) {
+  return refusal([&] { static_cast<void>(read(scratch, text)); });
+}
+
+}  // namespace
+
+TEST_CASE("off: headers in all their forms give the same square", "[io][mesh]") {
+  const Scratch scratch;
+  for (const char* header :
+       {"OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\n", "4 1 0\n", "OFF # comment\n\n4 1\n",
+        "# first\nOFF\r\n# second\n4 1 0 # third\n", "COFF\n4 1 4\n"}) {
+    const Mesh mesh = read(scratch, header + kBody).mesh;
+    CHECK(mesh.positions.size() == 4);
+    CHECK(mesh.triangles.size() == 2);
+    CHECK(mesh.normals.empty());
+    CHECK(mesh.uvs.empty());
+  }
+}
+
+TEST_CASE("off: normals and texture coordinates are found around the colours", "[io][mesh]") {
+  const Scratch scratch;
+  const Mesh mesh =
+      read(scratch,
+           "STCNOFF\n3 1 0\n0 0 0 0 0 2 255 0 0 255 0.1 0.2\n"
+           "1 0 0 0 0 2 255 0 0 0.3 0.4\n0 1 0 0 2 0 1 1 1 1 0.5 0.6\n3 0 1 2 255 0 0\n")
+          .mesh;
+  REQUIRE(mesh.normals.size() == 3);
+  CHECK(mesh.normals[0] == glm::vec3(0, 0, 1));
+  CHECK(mesh.normals[2] == glm::vec3(0, 1, 0));
+  REQUIRE(mesh.uvs.size() == 3);
+  CHECK(mesh.uvs[1] == glm::vec2(0.3F, 0.4F));
+}
+
+TEST_CASE("off: files that break a rule are refused by line", "[io][mesh]") {
+  const Scratch scratch;
+  CHECK_THAT(fault(scratch, "OFF BINARY\n"), EndsWith("line 1: binary OFF is not supported"));
+  CHECK_THAT(fault(scratch, "4OFF\n"), EndsWith("line 1: an OFF of a kind that is not supported"));
+  CHECK_THAT(fault(scratch, "OFF\nx\n"),
+             EndsWith("line 2: OFF needs its counts of vertices and faces"));
+  CHECK_THAT(fault(scratch, "OFF\n-4 1 0\n" + kBody),
+             EndsWith("OFF needs its counts of vertices and faces"));
+  CHECK_THAT(fault(scratch, "OFF\n353535235358 6 0\n" + kBody),
+             EndsWith("line 2: more vertices or faces than the file can hold"));
+  CHECK_THAT(fault(scratch, "OFF\n4 9999999999 0\n" + kBody),
+             EndsWith("line 2: more vertices or faces than the file can hold"));
+  CHECK_THAT(fault(scratch, "OFF\n1 0 0\n0 0\n   \n"),
+             EndsWith("line 3: a vertex with too few values"));
+  CHECK_THAT(fault(scratch, "OFF\n1 0 0\n0 0 zero\n"), EndsWith("line 3: not a number"));
+  CHECK_THAT(fault(scratch, "OFF\n4 2 0\n" + kBody), EndsWith("the file ends too early"));
+  CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
+             EndsWith("line 6: an index that leads to no vertex"));
+  CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n"),
+             EndsWith("line 6: a face with fewer corners than it says"));
+  CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n"),
+             EndsWith("line 6: a face begins with its number of corners"));
+  CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 inf 0\n3 0 1 2\n"),
+             EndsWith("vertex 2: a position that is not finite"));
+}
+
+TEST_CASE("off: every truncation but of the last word is refused", "[io][mesh]") {
+  const Scratch scratch;
+  const std::string whole = "OFF\n4 1 0\n" + kBody;
+  for (std::size_t size = 0; size < whole.size() - 1; ++size) {
+    CHECK_FALSE(fault(scratch, whole.substr(0, size)).empty());
+  }
+}

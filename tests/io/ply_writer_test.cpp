@@ -1,0 +1,109 @@
+// Clouds to PLY and back.
+#include <catch2/catch.hpp>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include "engine/io/points.h"
+#include "tests/io/files.h"
+
+using namespace ptc;
+using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
+
+namespace {
+
+std::vector<Surfel> make_surfels(std::size_t count) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> unit(0, 1);
+  std::vector<Surfel> surfels(count);
+  for (Surfel& s : surfels) {
+    s.position = {1e7 + static_cast<double>(unit(random)), unit(random), -1e-9};
+    s.normal = {0, 1, 0};
+    s.radius = unit(random);
+    s.radiance = {unit(random) * 100, unit(random), 0};
+    s.albedo = {unit(random), 1, 0};
+  }
+  return surfels;
+}
+
+}  // namespace
+
+TEST_CASE("ply writer: every value of every surfel comes back bit for bit", "[io][writer]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.ply";
+  for (const std::size_t count : {0U, 1U, 20'000U}) {  // none, one, more than one buffer
+    const std::vector<Surfel> surfels = make_surfels(count);
+    PlyWriter writer(path, count, {});
+    const std::size_t half = count / 2;
+    writer.write(std::span(surfels).first(half), {});
+    writer.write(std::span(surfels).subspan(half), {});
+    writer.finish();
+    PointFile file = open_points(path);
+    CHECK(file.info.count == count);
+    std::vector<Surfel> back(count + 1);
+    REQUIRE(file.source->next(back) == count);
+    bool same = true;
+    for (std::size_t i = 0; i < count; ++i) {
+      same = same && back[i].position == surfels[i].position &&
+             back[i].normal == surfels[i].normal && back[i].radius == surfels[i].radius &&
+             back[i].radiance == surfels[i].radiance && back[i].albedo == surfels[i].albedo;
+    }
+    CHECK(same);
+    CHECK(scratch.listing() == "a.ply");
+  }
+}
+
+TEST_CASE("ply writer: columns follow the surfel under their names", "[io][writer]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.ply";
+  const std::vector<Surfel> surfels = make_surfels(2);
+  PlyWriter writer(path, 2, {{"occlusion", 1}, {"irradiance", 3}, {"bent", 3, true}, {"pair", 2}});
+  const std::vector<float> values = {0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14, 15, 16, 17, 18};
+  writer.write(surfels, values);
+  writer.finish();
+  const std::string bytes = slurp(path);
+  CHECK_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\nelement vertex 2\n"));
+  CHECK_THAT(bytes, Contains("property float blue\nproperty float occlusion\n"
+                             "property float irradiance_r\nproperty float irradiance_g\n"
+                             "property float irradiance_b\nproperty float bent_x\n"
+                             "property float bent_y\nproperty float bent_z\n"
+                             "property float pair_0\nproperty float pair_1\nend_header\n"));
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::size_t record = bytes.size() - (2 - i) * (64 + 36);
+    for (std::size_t k = 0; k < 9; ++k) {
+      CHECK(bytes.substr(record + 64 + 4 * k, 4) == raw(values[9 * i + k]));
+    }
+  }
+  CHECK(open_points(path).info.count == 2);
+}
+
+TEST_CASE("ply writer: wrong numbers of points or values leave no file", "[io][writer]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.ply";
+  const std::vector<Surfel> surfels = make_surfels(3);
+  for (const std::uint64_t announced : {2U, 4U}) {
+    PlyWriter writer(path, announced, {});
+    writer.write(surfels, {});
+    CHECK_THROWS_AS(writer.finish(), std::invalid_argument);
+  }
+  {
+    PlyWriter writer(path, 3, {{"a", 1}});
+    CHECK_THROWS_AS(writer.write(surfels, {}), std::invalid_argument);
+    CHECK_THROWS_AS(writer.write(surfels, std::vector<float>(4)), std::invalid_argument);
+  }
+  CHECK(scratch.listing().empty());
+}
+
+TEST_CASE("ply writer: names that are none or are taken are refused", "[io][writer]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.ply";
+  const auto make = [&](std::vector<PointColumn> columns) { PlyWriter writer(path, 0, columns); };
+  CHECK_THROWS_AS(make({{"", 1}}), std::invalid_argument);
+  CHECK_THROWS_AS(make({{"a b", 1}}), std::invalid_argument);
+  CHECK_THROWS_AS(make({{"a\n", 1}}), std::invalid_argument);
+  CHECK_THROWS_AS(make({{"nx", 1}}), std::invalid_argument);
+  CHECK_THROWS_AS(make({{"radiance", 3}}), std::invalid_argument);
+  CHECK_THROWS_AS(make({{"a", 1}, {"a", 1}}), std::invalid_argument);
+  CHECK(scratch.listing().empty());
+}

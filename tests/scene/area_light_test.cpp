@@ -1,0 +1,173 @@
+// Emissive triangles, against the form factor of a rectangle.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "engine/scene/lights.h"
+#include "tests/scene/meshes.h"
+
+using namespace ptc;
+
+namespace {
+
+const glm::vec3 kUp(0, 1, 0);
+constexpr double kPiWide = 3.14159265358979;
+
+// Form factor from a small patch to a parallel rectangle a x b at distance c, a corner over it.
+// Source: Howell, A catalog of radiation heat transfer configuration factors, B-4.
+double corner_factor(double a, double b, double c) {
+  const double x = a / c;
+  const double y = b / c;
+  const double hx = std::sqrt(1 + x * x);
+  const double hy = std::sqrt(1 + y * y);
+  return (x / hx * std::atan(y / hx) + y / hy * std::atan(x / hy)) / (2 * kPiWide);
+}
+
+// A square lamp of half width h at a height, which looks down, made of n x n quads.
+Mesh lamp(float h, float height, int n, const glm::vec3& radiance) {
+  Mesh mesh = ground(50);
+  mesh.materials.emplace_back();
+  mesh.materials[1].emission = radiance;
+  const float step = 2 * h / static_cast<float>(n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      add_quad(mesh, {-h + step * static_cast<float>(i), height, -h + step * static_cast<float>(j)},
+               {step, 0, 0}, {0, 0, step}, 1);
+    }
+  }
+  return mesh;
+}
+
+struct Spread {
+  double mean = 0;
+  double deviation = 0;
+};
+
+Spread irradiance(const DirectLight& light, const glm::dvec3& at, const glm::vec3& normal,
+                  int runs) {
+  double sum = 0;
+  double squares = 0;
+  for (int i = 0; i < runs; ++i) {
+    const auto x = static_cast<double>(
+        light.irradiance(at, normal, {}, static_cast<std::uint64_t>(i)).local.x);
+    sum += x / runs;
+    squares += x * x / runs;
+  }
+  return {sum, std::sqrt(std::max(0.0, squares - sum * sum))};
+}
+
+}  // namespace
+
+TEST_CASE("area light: a square overhead gives pi times radiance times its form factor",
+          "[scene][lights]") {
+  for (const int n : {1, 3, 12}) {  // 2, 18 and 288 triangles: more than 64 are drawn by power
+    for (const float height : {0.02f, 0.3f, 2.0f, 30.0f}) {
+      const Mesh mesh = lamp(1, height, n, {2, 3, 4});
+      const RayScene scene(mesh);
+      const DirectLight light(scene, {});
+      const double expected = 2 * kPiWide * 4 * corner_factor(1, 1, static_cast<double>(height));
+      const Spread found = irradiance(light, {0, 0, 0}, kUp, 400);
+      // Of many emitters, few are drawn that are near: noise, until all are near or all are far.
+      const bool is_noisy = n == 12 && height < 0.1f;
+      CHECK(found.mean == Approx(expected).epsilon(is_noisy ? 0.15 : 0.02));
+      CHECK(found.deviation < (is_noisy ? 1 : 0.25) * expected);
+    }
+  }
+}
+
+TEST_CASE("area light: beside and beyond the lamp it is exact as well", "[scene][lights]") {
+  const Mesh mesh = lamp(1, 1, 2, glm::vec3(1));
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  for (const double x : {0.5, 1.0, 2.0, 6.0}) {
+    // Rectangles with a corner over the point: to x + 1, less to x - 1 (its sign included).
+    const double near = std::copysign(corner_factor(std::abs(x - 1), 1, 1), x - 1);
+    const double expected = kPiWide * 2 * (corner_factor(x + 1, 1, 1) - (x == 1 ? 0 : near));
+    CHECK(irradiance(light, {x, 0, 0}, kUp, 400).mean == Approx(expected).epsilon(0.02));
+  }
+}
+
+TEST_CASE("area light: a wall that the lamp stands on gets its part above the horizon",
+          "[scene][lights]") {
+  // A lamp that looks along -x, from the floor up, seen from the floor.
+  Mesh mesh = ground(50);
+  mesh.materials.emplace_back();
+  mesh.materials[1].emission = glm::vec3(1);
+  add_quad(mesh, {1, -2, -1}, {0, 0, 2}, {0, 4, 0}, 1);
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  // Patch square to a rectangle of height a and width b from its foot on, at distance c (Howell
+  // B-5): (atan(b / c) - c / sqrt(a^2 + c^2) atan(b / sqrt(a^2 + c^2))) / 2 pi; twice, for both
+  // sides.
+  const double diagonal = std::sqrt(5.0);
+  const double factor = (std::atan(1.0) - std::atan(1 / diagonal) / diagonal) / kPiWide;
+  CHECK(irradiance(light, {0, 0, 0}, kUp, 400).mean == Approx(kPiWide * factor).epsilon(0.02));
+}
+
+TEST_CASE("area light: it shines on its front side only", "[scene][lights]") {
+  Mesh mesh = lamp(1, 1, 1, glm::vec3(1));
+  mesh.materials[1].double_sided = true;
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  CHECK(light.irradiance({0, 2, 0}, -kUp, {}, 1).local == glm::vec3(0));
+  CHECK(light.irradiance({0, 0.5, 0}, kUp, {}, 1).local.x > 1);
+  CHECK(light.irradiance({0.3, 1, 0.2}, -kUp, {}, 1).local == glm::vec3(0));  // on itself
+}
+
+TEST_CASE("area light: what stands between hides it", "[scene][lights]") {
+  Mesh mesh = lamp(1, 2, 1, glm::vec3(1));
+  add_quad(mesh, {-5, 1, -5}, {5, 0, 0}, {0, 0, 10});  // the half x < 0
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  const double whole = kPiWide * 4 * corner_factor(1, 1, 2);
+  CHECK(irradiance(light, {0, 0, 0}, kUp, 400).mean == Approx(whole / 2).epsilon(0.03));
+  CHECK(light.irradiance({-3, 0, 0}, kUp, {}, 1).local == glm::vec3(0));
+}
+
+TEST_CASE("area light: lamps of different power give the sum of each", "[scene][lights]") {
+  Mesh mesh = ground(50);
+  double expected = 0;
+  Random random(1);
+  for (std::uint16_t i = 1; i <= 90; ++i) {
+    mesh.materials.emplace_back();
+    const auto radiance = static_cast<float>(std::exp(random.between(-3, 3)));
+    mesh.materials.back().emission = glm::vec3(radiance);
+    const float x = static_cast<float>(random.between(-4, 4));
+    const float z = static_cast<float>(random.between(-4, 4));
+    const float y = 2 + 0.02f * static_cast<float>(i);
+    add_quad(mesh, {x, y, z}, {0.05f, 0, 0}, {0, 0, 0.05f}, i);
+    const double square = static_cast<double>(x * x + y * y + z * z);
+    expected += 0.0025 * static_cast<double>(radiance * y * y) / (square * square);
+  }
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  CHECK(irradiance(light, {0, 0, 0}, kUp, 2000).mean == Approx(expected).epsilon(0.03));
+}
+
+TEST_CASE("area light: ten million metres away the light is the same", "[scene][lights]") {
+  Mesh mesh = lamp(1, 1, 4, glm::vec3(1));
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  Mesh moved = mesh;
+  moved.origin = {1e7, 2e7, -1e7};
+  const RayScene moved_scene(moved);
+  const DirectLight moved_light(moved_scene, {});
+  for (int i = 0; i < 50; ++i) {
+    const glm::dvec3 at(0.0625 * i, 0, 0.125);
+    const auto seed = static_cast<std::uint64_t>(i);
+    const auto here = light.irradiance(at, kUp, {}, seed);
+    const auto there = moved_light.irradiance(moved.origin + at, kUp, {}, seed);
+    CHECK(there.local.x == Approx(here.local.x).epsilon(1e-5));
+  }
+}
+
+TEST_CASE("area light: degenerate and black emitters give nothing", "[scene][lights]") {
+  Mesh mesh = ground(1);
+  mesh.materials.emplace_back();
+  mesh.materials[1].emission = glm::vec3(1);
+  add_triangle(mesh, {0, 1, 0}, {0, 1, 0}, {1, 1, 0}, 1);
+  add_triangle(mesh, {0, 1, 0}, {0, 1, 1}, {0, 1, 2}, 1);
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  CHECK(light.irradiance({0, 0, 0}, kUp, {}, 1).local == glm::vec3(0));
+}

@@ -1,0 +1,138 @@
+// The light rig's record.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "engine/base/error.h"
+#include "engine/scene/lights.h"
+#include "tests/scene/meshes.h"
+
+using namespace ptc;
+
+namespace {
+
+glm::vec3 random_light(Random& random) {
+  return glm::vec3(random.in_box(0, 1) * std::exp(random.between(-40, 40)));
+}
+
+LightRig random_rig(Random& random) {
+  LightRig rig;
+  for (int i = 0; i < 3; ++i) {
+    rig.suns.push_back(
+        {random.direction(), random_light(random), static_cast<float>(random.between(0, 1.5))});
+    rig.points.push_back({random.in_box(-1e9, 1e9), random_light(random)});
+  }
+  rig.sky.radiance = random_light(random);
+  rig.sky.up = random.direction();
+  rig.sky.map_path =
+      "maps/r\xC3\xBC"
+      "ck \"seite\".exr";
+  return rig;
+}
+
+}  // namespace
+
+TEST_CASE("light rig: its JSON comes back exactly", "[scene][lights]") {
+  Random random(3);
+  for (int i = 0; i < 200; ++i) {
+    const LightRig rig = random_rig(random);
+    const LightRig back = light_rig_from_json(to_json(rig));
+    REQUIRE(back.suns.size() == rig.suns.size());
+    REQUIRE(back.points.size() == rig.points.size());
+    for (std::size_t k = 0; k < rig.suns.size(); ++k) {
+      CHECK(back.suns[k].to_sun == rig.suns[k].to_sun);
+      CHECK(back.suns[k].irradiance == rig.suns[k].irradiance);
+      CHECK(back.suns[k].angular_radius == rig.suns[k].angular_radius);
+      CHECK(back.points[k].position == rig.points[k].position);
+      CHECK(back.points[k].intensity == rig.points[k].intensity);
+    }
+    CHECK(back.sky.radiance == rig.sky.radiance);
+    CHECK(back.sky.up == rig.sky.up);
+    CHECK(back.sky.map_path == rig.sky.map_path);
+    CHECK(!back.sky.map);
+    CHECK(to_json(back) == to_json(rig));
+  }
+}
+
+TEST_CASE("light rig: an empty object is no light", "[scene][lights]") {
+  const LightRig rig = light_rig_from_json("{}");
+  CHECK(rig.suns.empty());
+  CHECK(rig.points.empty());
+  CHECK(rig.sky.radiance == glm::vec3(0));
+}
+
+TEST_CASE("light rig: directions are made unit", "[scene][lights]") {
+  const LightRig rig = light_rig_from_json(
+      "{\"suns\": [{\"to_sun\": [0, 3, 4]}], \"sky\": {\"up\": [0, 0, 1e-30]}}");
+  CHECK(rig.suns[0].to_sun == glm::vec3(0, 0.6f, 0.8f));
+  CHECK(rig.sky.up == glm::vec3(0, 0, 1));
+}
+
+TEST_CASE("light rig: every proper prefix of its JSON is refused", "[scene][lights]") {
+  Random random(4);
+  const std::string whole = to_json(random_rig(random));
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    CHECK_THROWS_AS(light_rig_from_json(whole.substr(0, n)), DataError);
+  }
+}
+
+TEST_CASE("light rig: a damaged byte gives a rig or a DataError", "[scene][lights]") {
+  Random random(5);
+  const std::string whole = to_json(random_rig(random));
+  int refused = 0;
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    for (const int flip : {1, 2, 4, 8, 16, 32, 64, 128}) {
+      std::string damaged = whole;
+      damaged[n] = static_cast<char>(damaged[n] ^ flip);
+      try {
+        (void)light_rig_from_json(damaged);
+      } catch (const DataError&) {
+        ++refused;
+      }
+    }
+  }
+  CHECK(refused > 0);
+}
+
+TEST_CASE("light rig: JSON that makes no lights is refused with the place", "[scene][lights]") {
+  const auto refuses = [](const std::string& text, const std::string& place) {
+    CHECK_THROWS_WITH(light_rig_from_json(text),
+                      Catch::Contains("light rig") && Catch::Contains(place));
+    CHECK_THROWS_AS(light_rig_from_json(text), DataError);
+  };
+  refuses("3", "object");
+  refuses("{\"sun\": []}", "\"sun\"");
+  refuses("{\"suns\": {}}", "suns");
+  refuses("{\"suns\": [{}, 1]}", "suns[1]");
+  refuses("{\"suns\": [{\"to_sun\": [0, 0, 0]}]}", "to_sun");
+  refuses("{\"suns\": [{\"irradiance\": [1, -1, 1]}]}", "irradiance");
+  refuses("{\"suns\": [{\"angular_radius\": 1.6}]}", "angular_radius");
+  refuses("{\"suns\": [{\"angle\": 1}]}", "angle");
+  refuses("{\"points\": [{\"intensity\": [1, 1]}]}", "intensity");
+  refuses("{\"points\": [{\"position\": \"here\"}]}", "position");
+  refuses("{\"sky\": []}", "sky");
+  refuses("{\"sky\": {\"radiance\": [1e39, 0, 0]}}", "radiance");
+  refuses("{\"sky\": {\"map\": 1}}", "map");
+  refuses("{\"sky\": {\"up\": [0, 0, 0]}}", "up");
+  refuses(std::string(5000, '['), "JSON");
+}
+
+TEST_CASE("light rig: what JSON cannot say is not written", "[scene][lights]") {
+  LightRig rig;
+  rig.points.push_back({});
+  rig.points[0].position.x = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_AS(to_json(rig), std::invalid_argument);
+  rig.points.clear();
+  rig.sky.map_path = "\xFF\xFE.exr";
+  CHECK_THROWS_AS(to_json(rig), std::invalid_argument);
+}
+
+TEST_CASE("light rig: a map that is not there is an error, no map is none", "[scene][lights]") {
+  Sky sky;
+  load_sky_map(sky, "/");
+  CHECK(!sky.map);
+  sky.map_path = "no-such-map.exr";
+  CHECK_THROWS(load_sky_map(sky, "/no-such-folder"));
+}

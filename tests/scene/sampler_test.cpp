@@ -1,0 +1,348 @@
+// Mesh to surfels: number, area, evenness, light.
+#include "engine/scene/sampler.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+
+#include "engine/scene/directions.h"
+#include "tests/scene/coverage.h"
+#include "tests/scene/meshes.h"
+
+using namespace ptc;
+
+namespace {
+
+std::vector<Surfel> sample(const Mesh& mesh, const SamplingOptions& options,
+                           const LightRig& rig = {}, unsigned threads = 2,
+                           std::size_t block = 1000) {
+  const RayScene scene(mesh);
+  const DirectLight light(scene, rig);
+  const Executor executor(threads);
+  return drain(*sample_mesh(light, scene, options, executor), block);
+}
+
+std::vector<Surfel> sample(const Mesh& mesh, std::uint64_t count) {
+  SamplingOptions options;
+  options.count = count;
+  return sample(mesh, options);
+}
+
+Mesh cube() {
+  Mesh mesh = empty_mesh();
+  add_box(mesh, glm::vec3(-0.5f), glm::vec3(0.5f), false);
+  return mesh;
+}
+
+// A unit square of n strips.
+Mesh strips(int n) {
+  Mesh mesh = empty_mesh();
+  for (int i = 0; i < n; ++i) {
+    const float y = static_cast<float>(i) / static_cast<float>(n);
+    add_quad(mesh, {0, y, 0}, {1, 0, 0}, {0, 1 / static_cast<float>(n), 0});
+  }
+  return mesh;
+}
+
+// A disc of n needles that meet at its middle.
+Mesh fan(int n) {
+  Mesh mesh = empty_mesh();
+  for (int i = 0; i < n; ++i) {
+    const float a = 2 * kPi * static_cast<float>(i) / static_cast<float>(n);
+    const float b = 2 * kPi * static_cast<float>(i + 1) / static_cast<float>(n);
+    add_triangle(mesh, {0, 0, 0}, {std::cos(a), std::sin(a), 0}, {std::cos(b), std::sin(b), 0});
+  }
+  return mesh;
+}
+
+// Two large triangles beside n x n small quads.
+Mesh huge_and_tiny(int n) {
+  Mesh mesh = empty_mesh();
+  add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  const float step = 1 / static_cast<float>(n);
+  for (int i = 0; i < n * n; ++i) {
+    add_quad(mesh, {1 + step * static_cast<float>(i % n), step * static_cast<float>(i / n), 0},
+             {step, 0, 0}, {0, step, 0});
+  }
+  return mesh;
+}
+
+struct Shape {
+  const char* name;
+  Mesh mesh;
+  double uncovered;  // share that may be
+};
+
+std::vector<Shape> shapes() {
+  return {{"square", strips(1), 0.006},
+          {"cube", cube(), 0.008},
+          {"sphere", sphere(1, 40), 0.008},
+          {"coarse sphere", sphere(1, 6), 0.008},
+          {"strips", strips(40), 0.008},
+          {"fan", fan(300), 0.01},
+          {"huge and tiny", huge_and_tiny(50), 0.008}};
+}
+
+bool equal_bytes(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i].position != b[i].position || a[i].normal != b[i].normal ||
+        a[i].radius != b[i].radius || a[i].radiance != b[i].radiance ||
+        a[i].albedo != b[i].albedo) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+TEST_CASE("sampler: the number is met within 2 %, and the sum of 2 r^2 is the mesh's area",
+          "[scene][sampler]") {
+  for (const Shape& shape : shapes()) {
+    for (const std::uint64_t count : {1u, 2u, 13u, 100u, 2000u}) {
+      const auto surfels = sample(shape.mesh, count);
+      INFO(shape.name << " " << count);
+      CHECK(static_cast<double>(surfels.size()) ==
+            Approx(static_cast<double>(count)).epsilon(0.02));
+      CHECK(covered_area(surfels) == Approx(one_sided_area(shape.mesh)).epsilon(1e-6));
+    }
+  }
+}
+
+TEST_CASE("sampler: surfels are evenly spaced and leave next to nothing uncovered",
+          "[scene][sampler]") {
+  for (const Shape& shape : shapes()) {
+    const std::uint64_t count = 10000;
+    const auto surfels = sample(shape.mesh, count);
+    const Coverage c = measure_coverage(shape.mesh, surfels, spacing_for(shape.mesh, count), 20000);
+    INFO(shape.name << ": nearest " << c.nearest_least << " mean " << c.nearest_mean << " +- "
+                    << c.nearest_deviation << ", hole " << c.largest_hole << ", uncovered "
+                    << c.uncovered);
+    CHECK(static_cast<double>(surfels.size()) == Approx(static_cast<double>(count)).epsilon(0.02));
+    CHECK(c.uncovered < shape.uncovered);
+    CHECK(c.largest_hole < 1.1);
+    CHECK(c.nearest_mean > 0.83);  // random points: 0.5
+    CHECK(c.nearest_deviation < 0.13);
+  }
+}
+
+TEST_CASE("sampler: surfels lie on the mesh and have its normals and colours", "[scene][sampler]") {
+  Mesh mesh = cube();
+  mesh.origin = {3, 4, 5};
+  mesh.materials[0].albedo = {0.25f, 0.5f, 0.75f};
+  for (const Surfel& s : sample(mesh, 3000)) {
+    const glm::dvec3 p = glm::abs(s.position - mesh.origin);
+    const double largest = std::max({p.x, p.y, p.z});
+    CHECK(largest == 0.5);
+    CHECK(glm::dot(glm::dvec3(s.normal), s.position - mesh.origin) == 0.5);
+    CHECK(glm::length(s.normal) == 1);
+    CHECK(s.albedo == mesh.materials[0].albedo);
+    CHECK(s.radiance == glm::vec3(0));
+  }
+}
+
+TEST_CASE("sampler: a given spacing gives area over its square surfels", "[scene][sampler]") {
+  SamplingOptions options;
+  options.spacing = 0.05;
+  options.count = 5;
+  const auto surfels = sample(cube(), options);
+  CHECK(surfels.size() == 2400);
+  for (const Surfel& s : surfels) CHECK(s.radius == Approx(0.05 * std::sqrt(0.5)).epsilon(0.35));
+}
+
+TEST_CASE("sampler: radiance is emission plus albedo over pi times irradiance",
+          "[scene][sampler]") {
+  Mesh mesh = ground(1);
+  mesh.materials[0].albedo = {0.5f, 0.25f, 1};
+  mesh.materials[0].emission = {7, 0, 0};
+  LightRig rig;
+  rig.suns.push_back({glm::normalize(glm::vec3(1, 1, 0)), {2, 2, 2}, 0});
+  rig.sky.radiance = {1, 1, 0};
+  SamplingOptions options;
+  options.count = 500;
+  const float sun = 2 * std::sqrt(0.5f);
+  for (const Surfel& s : sample(mesh, options, rig)) {
+    CHECK(s.radiance.x == Approx(7 + 0.5 / kPi * (sun + kPi)).epsilon(1e-4));
+    CHECK(s.radiance.y == Approx(0.25 / kPi * (sun + kPi)).epsilon(1e-4));
+    CHECK(s.radiance.z == Approx(1 / kPi * sun).epsilon(1e-4));
+  }
+}
+
+TEST_CASE("sampler: emitters keep their power, and what lies beside them stays dark",
+          "[scene][sampler]") {
+  Mesh mesh = ground(1);
+  mesh.materials.emplace_back();
+  mesh.materials[1].emission = glm::vec3(10);
+  mesh.materials[1].albedo = glm::vec3(0);
+  add_quad(mesh, {1, 0, 1}, {0.5f, 0, 0}, {0, 0, -2}, 1);  // in one plane with the ground
+  double power = 0;
+  for (const Surfel& s : sample(mesh, 5000)) {
+    CHECK((s.radiance == glm::vec3(0) || s.radiance == glm::vec3(10)));
+    CHECK((s.radiance.x > 0) == (s.position.x > 1));
+    power += 2 * static_cast<double>(s.radius * s.radius * s.radiance.x);
+  }
+  CHECK(power == Approx(10).epsilon(0.01));
+  // Smaller than a surfel, it is not lost either: a surfel takes its part.
+  power = 0;
+  for (const Surfel& s : sample(mesh, 8)) {
+    power += 2 * static_cast<double>(s.radius * s.radius * s.radiance.x);
+  }
+  CHECK(power == Approx(10).epsilon(0.3));
+}
+
+TEST_CASE("sampler: a fine texture is averaged over what a surfel stands for", "[scene][sampler]") {
+  Mesh mesh = ground(1);
+  Image checks{64, 64, {}};
+  for (int i = 0; i < 64 * 64; ++i)
+    checks.pixels.push_back(glm::vec3((i / 64 + i) % 2 == 0 ? 1.0f : 0));
+  mesh.materials[0].texture = std::make_shared<Image>(checks);
+  mesh.materials[0].albedo = glm::vec3(0.8f);
+  for (const glm::vec3& p : mesh.positions) mesh.uvs.emplace_back(p.x, p.z);
+  double mean = 0;
+  double squares = 0;
+  const auto surfels = sample(mesh, 200);
+  for (const Surfel& s : surfels) {
+    mean += static_cast<double>(s.albedo.x) / static_cast<double>(surfels.size());
+    squares += static_cast<double>(s.albedo.x * s.albedo.x) / static_cast<double>(surfels.size());
+  }
+  CHECK(mean == Approx(0.4).epsilon(0.05));
+  CHECK(std::sqrt(squares - mean * mean) < 0.12);  // 0.3 with one look-up
+}
+
+TEST_CASE("sampler: a double-sided material gives two surfels back to back, each lit for itself",
+          "[scene][sampler]") {
+  Mesh mesh = ground(1);
+  mesh.materials[0].double_sided = true;
+  mesh.materials[0].emission = {5, 5, 5};
+  LightRig rig;
+  rig.suns.push_back({{0, -1, 0}, glm::vec3(kPi), 0});  // from below
+  SamplingOptions options;
+  options.count = 4000;
+  const auto surfels = sample(mesh, options, rig);
+  REQUIRE(surfels.size() == 4000);
+  CHECK(covered_area(surfels) == Approx(2 * one_sided_area(mesh)).epsilon(1e-6));
+  for (std::size_t i = 0; i < surfels.size(); i += 2) {
+    CHECK(surfels[i].position == surfels[i + 1].position);
+    CHECK(surfels[i].normal == -surfels[i + 1].normal);
+    CHECK(surfels[i].radius == surfels[i + 1].radius);
+    CHECK(surfels[i].radiance == glm::vec3(5));       // the front emits
+    CHECK(surfels[i + 1].radiance.x == Approx(0.5));  // the back reflects
+  }
+}
+
+TEST_CASE("sampler: a mixture of one-sided and double-sided faces keeps number and area",
+          "[scene][sampler]") {
+  Mesh mesh = cube();
+  mesh.materials.emplace_back();
+  mesh.materials[1].double_sided = true;
+  for (std::size_t i = 0; i < 4; ++i) mesh.material_of[i] = 1;
+  for (const std::uint64_t count : {5u, 300u, 5000u}) {
+    const auto surfels = sample(mesh, count);
+    CHECK(covered_area(surfels) == Approx(8).epsilon(1e-6));
+    if (count > 5) {
+      CHECK(static_cast<double>(surfels.size()) ==
+            Approx(static_cast<double>(count)).epsilon(0.02));
+    }
+  }
+}
+
+TEST_CASE("sampler: the surfels are the same for any number of threads and any block",
+          "[scene][sampler]") {
+  Mesh mesh = sphere(1, 40);
+  add_box(mesh, {1, 0, 0}, {2, 1, 1}, false);
+  LightRig rig;
+  rig.suns.push_back({glm::normalize(glm::vec3(1, 2, 3)), glm::vec3(1), 0.1f});
+  rig.sky.radiance = glm::vec3(1);
+  SamplingOptions options;
+  options.count = 18000;
+  options.lights = {1, 0, 4};
+  const auto one = sample(mesh, options, rig, 1, 100000);
+  CHECK(equal_bytes(one, sample(mesh, options, rig, 2, 100000)));
+  CHECK(equal_bytes(one, sample(mesh, options, rig, 5, 777)));
+  CHECK(equal_bytes(one, sample(mesh, options, rig, 2, 1)));
+}
+
+TEST_CASE("sampler: in a closed box all surfels are dark, to the last bit", "[scene][sampler]") {
+  Mesh mesh = empty_mesh();
+  add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
+  Random random(1);
+  turn(mesh, random.rotation());
+  LightRig rig;
+  for (int i = 0; i < 10; ++i) rig.suns.push_back({random.direction(), glm::vec3(1), 0.1f});
+  rig.sky.radiance = glm::vec3(1);
+  SamplingOptions options;
+  options.count = 10000;
+  options.lights = {2, 1, 16};
+  int lit = 0;
+  for (const Surfel& s : sample(mesh, options, rig)) lit += s.radiance != glm::vec3(0) ? 1 : 0;
+  CHECK(lit == 0);
+}
+
+TEST_CASE("sampler: ten million metres away the surfels are the same, moved", "[scene][sampler]") {
+  Mesh mesh = sphere(1, 20);
+  const auto here = sample(mesh, 3000);
+  mesh.origin = {1e7, -2e7, 3e7};
+  const auto there = sample(mesh, 3000);
+  REQUIRE(there.size() == here.size());
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    CHECK(glm::distance(there[i].position - mesh.origin, here[i].position) < 1e-8);
+    CHECK(there[i].radius == here[i].radius);
+    CHECK(there[i].normal == here[i].normal);
+  }
+}
+
+TEST_CASE("sampler: a mesh without area gives no surfels", "[scene][sampler]") {
+  Mesh mesh = empty_mesh();
+  CHECK(sample(mesh, 100).empty());
+  add_triangle(mesh, {1, 1, 1}, {1, 1, 1}, {1, 1, 1});
+  add_triangle(mesh, {0, 0, 0}, {1, 0, 0}, {2, 0, 0});
+  CHECK(sample(mesh, 100).empty());
+  CHECK(spacing_for(mesh, 100) == 0);
+  add_triangle(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});  // and with it, just on this
+  const auto surfels = sample(mesh, 100);
+  CHECK(surfels.size() == 100);
+  for (const Surfel& s : surfels) CHECK(s.normal == glm::vec3(0, 0, 1));
+}
+
+TEST_CASE("sampler: the spacing for a number of surfels is the root of area over it",
+          "[scene][sampler]") {
+  Mesh mesh = cube();
+  CHECK(spacing_for(mesh, 600) == Approx(0.1));
+  mesh.materials[0].double_sided = true;
+  CHECK(spacing_for(mesh, 1200) == Approx(0.1));
+  CHECK_THROWS_AS(spacing_for(mesh, 0), std::invalid_argument);
+}
+
+TEST_CASE("sampler: options that make no sense are refused", "[scene][sampler]") {
+  const Mesh mesh = cube();
+  const auto refuses = [&](auto&& spoil) {
+    SamplingOptions options;
+    options.camera.emplace();
+    spoil(options);
+    CHECK_THROWS_AS(sample(mesh, options), std::invalid_argument);
+  };
+  refuses([](SamplingOptions& o) { o.count = 0; });
+  refuses([](SamplingOptions& o) { o.spacing = -1; });
+  refuses([](SamplingOptions& o) { o.spacing = std::numeric_limits<double>::quiet_NaN(); });
+  refuses([](SamplingOptions& o) { o.pixels_per_surfel = 0; });
+  refuses([](SamplingOptions& o) { o.finest = 0; });
+  refuses([](SamplingOptions& o) { o.finest = 1.5f; });
+  refuses([](SamplingOptions& o) { o.camera->height = 0; });
+}
+
+TEST_CASE("sampler: it streams: the first surfels of very many come at once", "[scene][sampler]") {
+  const Mesh mesh = cube();
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  const Executor executor(1);
+  SamplingOptions options;
+  options.count = 4'000'000;
+  const auto source = sample_mesh(light, scene, options, executor);
+  std::vector<Surfel> first(10);
+  CHECK(source->next(first) == 10);
+}

@@ -1,0 +1,62 @@
+// Texture and panorama lookups.
+#include "engine/scene/texture.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+using namespace ptc;
+
+namespace {
+
+// Four columns and two rows; red is the column, green the row.
+Image numbered() {
+  Image image{4, 2, {}};
+  for (unsigned y = 0; y < 2; ++y) {
+    for (unsigned x = 0; x < 4; ++x) {
+      image.pixels.emplace_back(static_cast<float>(x), static_cast<float>(y), 0.25f);
+    }
+  }
+  return image;
+}
+
+}  // namespace
+
+TEST_CASE("texture: at a pixel's centre it is the pixel, and row 0 is at v = 1",
+          "[scene][texture]") {
+  const Image image = numbered();
+  for (unsigned y = 0; y < 2; ++y) {
+    for (unsigned x = 0; x < 4; ++x) {
+      const glm::vec2 uv((static_cast<float>(x) + 0.5f) / 4,
+                         1 - (static_cast<float>(y) + 0.5f) / 2);
+      CHECK(sample_texture(image, uv) == image.at(x, y));
+      CHECK(sample_texture(image, uv + glm::vec2(3, -7)) == image.at(x, y));
+    }
+  }
+}
+
+TEST_CASE("texture: between centres it is their mean, across the border too", "[scene][texture]") {
+  const Image image = numbered();
+  CHECK(sample_texture(image, {0.25f, 0.75f}).x == Approx(0.5f));
+  CHECK(sample_texture(image, {0.0f, 0.75f}).x == Approx(1.5f));  // of columns 3 and 0
+  CHECK(sample_texture(image, {0.125f, 0.5f}).y == Approx(0.5f));
+  CHECK(sample_texture(image, {0.125f, 1.0f}).y == Approx(0.5f));  // of rows 0 and 1
+}
+
+TEST_CASE("texture: odd coordinates and empty pictures give a finite colour", "[scene][texture]") {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  for (const float odd : {nan, inf, -inf, 1e30f, -1e30f, 1e-30f, -1e-30f}) {
+    const glm::vec3 c = sample_texture(numbered(), {odd, odd});
+    CHECK(std::isfinite(c.x + c.y + c.z));
+  }
+  CHECK(sample_texture(Image{}, {0.5f, 0.5f}) == glm::vec3(1));
+}
+
+TEST_CASE("panorama: columns wrap around and rows end", "[scene][texture]") {
+  const Image image = numbered();
+  CHECK(sample_panorama(image, 2.5, 0.5) == image.at(2, 0));
+  CHECK(sample_panorama(image, 0, 0.5).x == Approx(1.5f));
+  CHECK(sample_panorama(image, 2.5, 0).y == 0);
+  CHECK(sample_panorama(image, 2.5, 2).y == 1);
+}

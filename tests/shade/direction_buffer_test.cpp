@@ -1,0 +1,152 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <glm/geometric.hpp>
+
+#include "engine/shade/direction_buffer.h"
+#include "format/scalar.h"
+
+using namespace ptc;
+
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+glm::vec3 random_direction(std::mt19937& bits) {
+  std::normal_distribution<float> normal;
+  return glm::normalize(glm::vec3(normal(bits), normal(bits), normal(bits)));
+}
+
+const DirectionGrid& fine_grid() {
+  static const DirectionGrid grid(64, {});
+  return grid;
+}
+
+}  // namespace
+
+TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole sky", "[shade][buffer]") {
+  const DirectionGrid grid(32, [](const glm::vec3&) { return glm::vec3(1, 2, 3); });
+  DirectionBuffer buffer(grid);
+  std::mt19937 bits(1);
+  for (int i = 0; i < 100; ++i) {
+    const glm::vec3 n = random_direction(bits);
+    const Shading s = buffer.resolve(n);
+    CHECK(s.occlusion == 0);
+    CHECK(s.irradiance == glm::vec3(0));
+    CHECK(s.sky.g == Approx(2 * kPi).epsilon(1e-5));
+    CHECK(glm::dot(s.bent_normal, n) > 0.9999F);
+  }
+}
+
+TEST_CASE("direction buffer: irradiance from a gradient does not depend on the turn of the receiver", "[shade][buffer]") {
+  // Radiance 1 + cos(angle to z): E(n) = pi + 2 pi / 3 n.z, whatever the cube's pixels are.
+  const DirectionGrid grid(32, [](const glm::vec3& d) { return glm::vec3(1 + d.z); });
+  DirectionBuffer buffer(grid);
+  std::mt19937 bits(2);
+  for (int i = 0; i < 300; ++i) {
+    const glm::vec3 n = random_direction(bits);
+    CHECK(buffer.resolve(n).sky.r == Approx(kPi + 2 * kPi / 3 * n.z).margin(0.002 * kPi));
+  }
+}
+
+TEST_CASE("direction buffer: a footprint covers its solid angle in every direction", "[shade][buffer]") {
+  std::mt19937 bits(3);
+  std::uniform_real_distribution<float> uniform;
+  double ratio_sum = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const glm::vec3 direction = random_direction(bits);
+    const float distance = std::exp(6 * uniform(bits) - 3);
+    const float solid_angle = 0.02F;
+    DirectionBuffer buffer(fine_grid());
+    buffer.draw_footprint(direction * distance, solid_angle * distance * distance, 1);
+    const double covered = static_cast<double>(buffer.resolve(direction).occlusion * kPi / solid_angle);
+    CHECK(covered > 0.6);  // one pixel row more or less of about ten
+    CHECK(covered < 1.4);
+    ratio_sum += covered;
+  }
+  CHECK(ratio_sum / 1000 == Approx(1).margin(0.02));
+}
+
+TEST_CASE("direction buffer: a disc over the receiver has the analytic form factor", "[shade][buffer]") {
+  std::mt19937 bits(4);
+  for (const float radius : {0.01F, 0.1F, 0.5F, 1.0F, 3.0F, 30.0F}) {
+    for (int i = 0; i < 20; ++i) {
+      const glm::vec3 n = random_direction(bits);
+      DirectionBuffer buffer(fine_grid());
+      buffer.draw_disc(n, -n, radius, encode_rgbe({1, 0.5F, 0.25F}), Sides::front);
+      const float expected = radius * radius / (1 + radius * radius);
+      const Shading s = buffer.resolve(n);
+      CHECK(s.occlusion == Approx(expected).margin(0.004));
+      CHECK(s.irradiance.r == Approx(kPi * s.occlusion).epsilon(0.01));
+      CHECK(s.irradiance.b == Approx(0.25F * kPi * s.occlusion).epsilon(0.01));
+    }
+  }
+}
+
+TEST_CASE("direction buffer: a disc close to the receiver never covers more than the hemisphere", "[shade][buffer]") {
+  for (const float height : {1.0F, 1e-1F, 1e-3F, 1e-6F, 0.0F}) {
+    DirectionBuffer buffer(fine_grid());
+    buffer.draw_disc({0, 0, height}, {0, 0, -1}, 1, 1, Sides::both);
+    const Shading s = buffer.resolve({0, 0, 1});
+    CHECK(s.occlusion <= 1.00001F);
+    if (height > 0) CHECK(s.occlusion == Approx(1 / (1 + height * height)).margin(0.004));
+    CHECK(std::isfinite(s.bent_normal.x));
+  }
+}
+
+TEST_CASE("direction buffer: the back of a disc is black, and clear within two radii", "[shade][buffer]") {
+  const std::uint32_t white = encode_rgbe({1, 1, 1});
+  const auto shade = [&](float distance, Sides sides) {
+    DirectionBuffer buffer(fine_grid());
+    buffer.draw_disc({0, 0, distance}, {0, 0, 1}, 1, white, sides);
+    return buffer.resolve({0, 0, 1});
+  };
+  CHECK(shade(2.5F, Sides::both).occlusion > 0.1F);
+  CHECK(shade(2.5F, Sides::both).irradiance == glm::vec3(0));
+  CHECK(shade(1.9F, Sides::both).occlusion == 0);
+  CHECK(shade(2.5F, Sides::front).occlusion == 0);
+}
+
+TEST_CASE("direction buffer: the nearer of two walls is seen whatever is drawn first", "[shade][buffer]") {
+  const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0});
+  for (const bool near_first : {true, false}) {
+    DirectionBuffer buffer(fine_grid());
+    for (const bool near : {near_first, !near_first}) {
+      buffer.draw_disc({0, 0, near ? 1.0F : 1.001F}, {0, 0, -1}, 2, near ? red : green, Sides::front);
+    }
+    const Shading s = buffer.resolve({0, 0, 1});
+    CHECK(s.irradiance.r == Approx(kPi * 0.8).margin(0.02));
+    CHECK(s.irradiance.g < 0.02F);
+  }
+}
+
+TEST_CASE("direction buffer: coplanar overlapping discs divide half way between their centres", "[shade][buffer]") {
+  const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0});
+  for (const bool swap : {false, true}) {
+    DirectionBuffer buffer(fine_grid());
+    buffer.draw_disc({swap ? 0.5F : -0.5F, 0, 1}, {0, 0, -1}, 2, swap ? green : red, Sides::front);
+    buffer.draw_disc({swap ? -0.5F : 0.5F, 0, 1}, {0, 0, -1}, 2, swap ? red : green, Sides::front);
+    const Shading s = buffer.resolve({0, 0, 1});
+    CHECK(s.irradiance.r == Approx(s.irradiance.g).epsilon(0.03));
+  }
+}
+
+TEST_CASE("direction buffer: an emitter moving across pixels changes the light smoothly", "[shade][buffer]") {
+  const std::uint32_t white = encode_rgbe({1, 1, 1});
+  const DirectionGrid grid(32, {});
+  float last = -1, largest = 0, least = 1e9F;
+  for (int i = 0; i <= 400; ++i) {
+    const float angle = 0.5F + 0.3F * static_cast<float>(i) / 400;
+    DirectionBuffer buffer(grid);
+    buffer.draw_disc(10.0F * glm::vec3(std::sin(angle), 0, std::cos(angle)),
+                     -glm::vec3(std::sin(angle), 0, std::cos(angle)), 2, white, Sides::front);
+    const float e = buffer.resolve({0, 0, 1}).irradiance.r / std::cos(angle);
+    if (last >= 0) largest = std::max(largest, std::abs(e - last));
+    last = e;
+    least = std::min(least, e);
+  }
+  CHECK(least == Approx(kPi * 0.04 / 1.04).epsilon(0.1));  // about 36 pixels
+  CHECK(largest < 0.08F * least);                        // at most two or three at once
+}

@@ -1,0 +1,403 @@
+// The external sort against std::stable_sort, and what becomes of its memory, file and errors.
+#include "engine/sort/external_sort.h"
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <csignal>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <system_error>
+
+#include "engine/base/memory.h"
+#include "tests/sort/records.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+constexpr std::uint64_t kMiB = 1 << 20;
+constexpr std::uint64_t kLeastCap = kMiB / 4;  // runs of 1536 records
+
+// A directory that is removed with all that should not be in it.
+struct TempDirectory {
+  std::filesystem::path path;
+
+  TempDirectory() {
+    std::string name = (std::filesystem::temp_directory_path() / "ptc_sort_XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path = name;
+  }
+  ~TempDirectory() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path, ignored);
+  }
+};
+
+struct Outcome {
+  std::vector<PointRecord> records;
+  SortStatistics statistics;
+  std::array<std::uint64_t, 2> digest{};
+};
+
+void add_in_blocks(ExternalSorter& sorter, std::span<const PointRecord> input, std::size_t block) {
+  for (std::size_t i = 0; i < input.size(); i += block)
+    sorter.add(input.subspan(i, std::min(block, input.size() - i)));
+}
+
+std::vector<PointRecord> drain(PointStream& stream, std::size_t block) {
+  std::vector<PointRecord> records, out(block);
+  while (const std::size_t count = stream.next(out))
+    records.insert(records.end(), out.begin(), out.begin() + static_cast<std::ptrdiff_t>(count));
+  return records;
+}
+
+Outcome sort(std::span<const PointRecord> input, std::uint64_t cap, unsigned threads,
+             std::span<const MortonKey> sample) {
+  const TempDirectory directory;
+  const Executor executor(threads);
+  ExternalSorter sorter({cap, directory.path}, executor, sample);
+  add_in_blocks(sorter, input, 3001);
+  Outcome outcome;
+  outcome.records = drain(*sorter.finish(), 2222);
+  outcome.statistics = sorter.statistics();
+  outcome.digest = sorter.digest();
+  CHECK(std::filesystem::is_empty(directory.path));
+  return outcome;
+}
+
+std::size_t open_files() {
+  const std::filesystem::directory_iterator files("/proc/self/fd");
+  return static_cast<std::size_t>(std::distance(begin(files), end(files)));
+}
+
+// Exit status of a child process; its limits and its peak of memory are its own.
+int in_child(const std::function<int()>& body) {
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    int status = 99;
+    try {
+      status = body();
+    } catch (...) {
+    }
+    _exit(status);
+  }
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+// Makes files no larger than that: a full disk that needs no disk.
+void limit_file_size(std::uint64_t bytes) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit limit{bytes, bytes};
+  if (setrlimit(RLIMIT_FSIZE, &limit) != 0) throw std::runtime_error("setrlimit");
+}
+
+}  // namespace
+
+TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort][external]") {
+  for (const Keys keys : kAllKeys) {
+    CAPTURE(static_cast<int>(keys));
+    const std::vector<PointRecord> input = make_records(keys, 30000);  // 1.2 MB
+    const std::vector<PointRecord> expected = stable_sorted(input);
+    const std::vector<MortonKey> sample = sample_of(input, 2000);
+    for (const std::uint64_t cap : {kLeastCap, 64 * kMiB}) {
+      CAPTURE(cap);
+      const Outcome one = sort(input, cap, 1, sample), two = sort(input, cap, 2, sample);
+      CHECK(same_bytes(one.records, expected));
+      CHECK(same_bytes(two.records, expected));
+      CHECK(one.digest == two.digest);
+      CHECK(one.statistics.points == input.size());
+      CHECK(one.statistics.spilled_bytes == two.statistics.spilled_bytes);
+      CHECK(one.statistics.buckets == two.statistics.buckets);
+      if (cap == 64 * kMiB) {
+        CHECK(one.statistics.spilled_bytes == 0);
+        CHECK(one.statistics.buckets == 1);
+      } else {
+        CHECK(one.statistics.spilled_bytes >= input.size() * sizeof(PointRecord));
+      }
+    }
+  }
+}
+
+TEST_CASE("external sort: no, few and misleading samples cost passes, not the result",
+          "[sort][external]") {
+  const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
+  const std::vector<PointRecord> expected = stable_sorted(input);
+  const std::uint64_t bytes = input.size() * sizeof(PointRecord);
+  for (const unsigned threads : {1u, 2u}) {
+    const Outcome fair = sort(input, kMiB, threads, sample_of(input, 1000));
+    CHECK(same_bytes(fair.records, expected));
+    CHECK(fair.statistics.spilled_bytes < bytes + bytes / 10);
+
+    const std::vector<MortonKey> one_key(1000, input.front().key);
+    const Outcome misled = sort(input, kMiB, threads, one_key);
+    CHECK(same_bytes(misled.records, expected));
+    CHECK(misled.statistics.spilled_bytes > bytes + bytes / 2);  // buckets were split again
+
+    CHECK(same_bytes(sort(input, kMiB, threads, {}).records, expected));
+    CHECK(same_bytes(sort(input, kMiB, threads, sample_of(input, 63)).records, expected));
+    CHECK(same_bytes(sort(input, kMiB, threads, sample_of(input, 64)).records, expected));
+  }
+}
+
+TEST_CASE("external sort: clusters inside clusters are split until they fit", "[sort][external]") {
+  // Nine of ten lie in a cell 2^-20 as wide as the one before: each partition sees one level.
+  std::mt19937_64 random(5);
+  std::vector<PointRecord> input;
+  for (std::size_t i = 0; i < 60000; ++i) {
+    std::uint64_t r = random();
+    int level = 0;
+    for (; level < 5 && r % 10 != 0; r /= 10) ++level;
+    const int bit = 20 * level;  // from the highest
+    const std::uint64_t noise = random() >> 44;
+    const MortonKey key = bit <= 40
+                              ? MortonKey{noise << (44 - bit), random()}
+                              : MortonKey{0, bit == 60 ? noise << 48 : noise << (128 - bit - 24)};
+    input.push_back(numbered(key, i));
+  }
+  const std::vector<PointRecord> expected = stable_sorted(input);
+  for (const unsigned threads : {1u, 2u}) {
+    const Outcome outcome = sort(input, kLeastCap, threads, sample_of(input, 100));
+    CHECK(same_bytes(outcome.records, expected));
+    CHECK(outcome.statistics.spilled_bytes > 2 * input.size() * sizeof(PointRecord));
+  }
+}
+
+TEST_CASE("external sort: equal keys beyond memory stream in the order of the input",
+          "[sort][external]") {
+  for (const Keys keys : {Keys::equal, Keys::heavy, Keys::few}) {
+    const std::vector<PointRecord> input = make_records(keys, 80000);
+    const Outcome outcome = sort(input, kLeastCap, 2, sample_of(input, 500));
+    CHECK(same_bytes(outcome.records, stable_sorted(input)));
+    // They are not partitioned again and again.
+    CHECK(outcome.statistics.spilled_bytes < 3 * input.size() * sizeof(PointRecord));
+  }
+}
+
+TEST_CASE("external sort: every count around a run's end is sorted", "[sort][external]") {
+  const Executor two(2);
+  const std::vector<PointRecord> input = make_records(Keys::lattice, 5000);
+  for (const std::size_t count : {0u, 1u, 2u, 1535u, 1536u, 1537u, 3071u, 3072u, 3073u, 5000u}) {
+    const std::span<const PointRecord> part(input.data(), count);
+    const Outcome outcome = sort(part, kLeastCap, 2, {});
+    CHECK(same_bytes(outcome.records, stable_sorted({part.begin(), part.end()})));
+    CHECK(outcome.statistics.points == count);
+  }
+}
+
+TEST_CASE("external sort: blocks of any size come out the same", "[sort][external]") {
+  const TempDirectory directory;
+  const Executor two(2);
+  const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
+  const std::vector<PointRecord> expected = stable_sorted(input);
+  for (const std::uint64_t cap : {kLeastCap, 16 * kMiB})
+    for (const std::size_t block : {1u, 13u, 4096u, 100000u}) {
+      ExternalSorter sorter({cap, directory.path}, two, {});
+      add_in_blocks(sorter, input, block);
+      const std::unique_ptr<PointStream> stream = sorter.finish();
+      CHECK(same_bytes(drain(*stream, block), expected));
+      PointRecord more;
+      CHECK(stream->next({&more, 1}) == 0);
+      CHECK(stream->next({&more, 1}) == 0);
+      CHECK(stream->next({}) == 0);
+    }
+}
+
+TEST_CASE("external sort: a block that is offered is filled as long as there are records",
+          "[sort][external]") {
+  const TempDirectory directory;
+  const Executor two(2);
+  const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
+  ExternalSorter sorter({kLeastCap, directory.path}, two, {});
+  sorter.add(input);
+  const std::unique_ptr<PointStream> stream = sorter.finish();
+  std::vector<PointRecord> out(15000);
+  CHECK(stream->next(out) == 15000);
+  CHECK(stream->next(out) == 5000);
+}
+
+TEST_CASE("external sort: the digest is that of the set, however it came", "[sort][digest]") {
+  const TempDirectory directory;
+  const Executor one(1), two(2);
+  const auto digest = [&](std::span<const PointRecord> records, const Executor& executor,
+                          std::size_t block) {
+    ExternalSorter sorter({64 * kMiB, directory.path}, executor, {});
+    add_in_blocks(sorter, records, block);
+    return sorter.digest();
+  };
+  std::vector<PointRecord> records = make_records(Keys::random, 100000);
+  const auto whole = digest(records, one, records.size());
+  CHECK(digest(records, two, records.size()) == whole);
+  CHECK(digest(records, two, 777) == whole);
+  std::ranges::shuffle(records, std::mt19937_64(3));
+  CHECK(digest(records, two, records.size()) == whole);
+  CHECK(whole[0] != whole[1]);
+  CHECK(digest({}, one, 1) == std::array<std::uint64_t, 2>{});
+
+  const std::vector<PointRecord> few(records.begin(), records.begin() + 3);
+  const auto before = digest(few, one, 3);
+  for (std::size_t i = 0; i < few.size() * sizeof(PointRecord); ++i) {  // each byte counts
+    std::vector<PointRecord> changed = few;
+    std::as_writable_bytes(std::span(changed))[i] ^= std::byte{1};
+    const auto after = digest(changed, one, 3);
+    CHECK(after[0] != before[0]);
+    CHECK(after[1] != before[1]);
+  }
+  std::vector<PointRecord> twice = few;  // a sum, not an xor: pairs do not vanish
+  twice.insert(twice.end(), {few[0], few[0]});
+  CHECK(digest(twice, one, 5) != before);
+}
+
+TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops",
+          "[sort][external]") {
+  const TempDirectory directory;
+  const Executor two(2);
+  const std::vector<PointRecord> input = make_records(Keys::surface, 50000);
+  const std::size_t files = open_files();
+  {
+    ExternalSorter sorter({kLeastCap, directory.path}, two, {});
+    sorter.add(input);
+    CHECK(open_files() == files + 1);
+  }
+  CHECK(open_files() == files);
+  for (const std::size_t taken : {0u, 1u, 30000u}) {
+    ExternalSorter sorter({kLeastCap, directory.path}, two, {});
+    sorter.add(input);
+    const std::unique_ptr<PointStream> stream = sorter.finish();
+    std::vector<PointRecord> out(taken);
+    CHECK(stream->next(out) == taken);
+  }
+  CHECK(open_files() == files);
+  CHECK(std::filesystem::is_empty(directory.path));
+}
+
+TEST_CASE("external sort: adding after the end and ending twice are refused", "[sort][external]") {
+  const TempDirectory directory;
+  const Executor one(1);
+  ExternalSorter sorter({kMiB, directory.path}, one, {});
+  const std::unique_ptr<PointStream> stream = sorter.finish();
+  CHECK_THROWS_AS(sorter.add({}), std::invalid_argument);
+  CHECK_THROWS_AS(sorter.finish(), std::invalid_argument);
+  CHECK_THROWS_AS(ExternalSorter({1000, directory.path}, one, {}), std::invalid_argument);
+}
+
+TEST_CASE("external sort: a directory that cannot be written to is named once it is needed",
+          "[sort][external]") {
+  const Executor two(2);
+  const std::vector<PointRecord> input = make_records(Keys::lattice, 50000);
+  ExternalSorter small({64 * kMiB, "/nonexistent/spill"}, two, {});
+  small.add(input);
+  CHECK(drain(*small.finish(), 1000).size() == input.size());
+
+  ExternalSorter large({kLeastCap, "/nonexistent/spill"}, two, {});
+  CHECK_THROWS_AS(large.add(input), std::system_error);
+  ExternalSorter again({kLeastCap, "/nonexistent/spill"}, two, {});
+  CHECK_THROWS_WITH(again.add(input), Catch::Contains("/nonexistent/spill"));
+}
+
+TEST_CASE("external sort: a disk that fills up is reported and leaves nothing behind",
+          "[sort][external]") {
+  const TempDirectory directory;
+  const std::vector<PointRecord> input = make_records(Keys::lattice, 100000);  // 4 MB
+  for (const std::uint64_t room : {std::uint64_t{0}, kMiB / 10, kMiB, 3 * kMiB}) {
+    CAPTURE(room);
+    CHECK(in_child([&] {
+            limit_file_size(room);
+            const Executor two(2);
+            const std::size_t files = open_files();
+            try {
+              ExternalSorter sorter({kMiB, directory.path}, two, {});
+              add_in_blocks(sorter, input, 1000);
+              static_cast<void>(sorter.finish());
+              return 1;
+            } catch (const std::system_error& error) {
+              const std::string text = error.what();
+              if (text.find(directory.path.string()) == std::string::npos) return 2;
+            }
+            if (open_files() != files) return 3;
+            return std::filesystem::is_empty(directory.path) ? 0 : 4;
+          }) == 0);
+  }
+}
+
+TEST_CASE("external sort: a stream that failed does not look as if it ended", "[sort][external]") {
+  const TempDirectory directory;
+  const std::vector<PointRecord> input = make_records(Keys::surface, 50000);  // 2 MB
+  const std::vector<MortonKey> one_key(1000, input.front().key);
+  CHECK(in_child([&] {
+          const Executor two(2);
+          ExternalSorter sorter({kLeastCap, directory.path}, two, one_key);
+          sorter.add(input);
+          // The first spill is whole, the partition of the bucket that does not fit is not.
+          limit_file_size(input.size() * sizeof(PointRecord) + kMiB);
+          const std::unique_ptr<PointStream> stream = sorter.finish();
+          std::vector<PointRecord> out(1000);
+          int errors = 0;
+          for (int i = 0; i < 1000 && errors < 3; ++i) {
+            try {
+              if (stream->next(out) == 0) return 1;
+            } catch (const std::system_error&) {
+              ++errors;
+            }
+          }
+          return errors == 3 ? 0 : 2;
+        }) == 0);
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST_CASE("external sort: resident memory stays below the cap", "[sort][external]") {
+  const TempDirectory directory;
+  for (const unsigned threads : {1u, 2u})
+    for (const bool fair : {true, false})
+      for (const bool spills : {true, false}) {
+        if (!fair && !spills) continue;  // no sample is needed
+        CAPTURE(threads, fair, spills);
+        CHECK(in_child([&] {
+                constexpr std::uint64_t kCap = 16 * kMiB;
+                const std::size_t count = (spills ? 5 * kCap : kCap * 2 / 5) / sizeof(PointRecord);
+                std::mt19937_64 random(1);
+                std::vector<MortonKey> sample(1000, MortonKey{1, 1});
+                for (MortonKey& key : sample)
+                  if (fair) key = key_of(Keys::lattice, 0, 1, random);
+                std::vector<PointRecord> block(4096);
+                const Executor executor(threads);
+                // Threads that never ran and code never called would be counted to the sort.
+                std::vector<PointRecord> warm = make_records(Keys::lattice, 140000), scratch = warm;
+                radix_sort(warm, scratch, executor);
+                warm = scratch = {};
+
+                const std::uint64_t before = resident_bytes();
+                if (peak_resident_bytes() > before + kCap) return 3;  // it would hide the sort's
+                ExternalSorter sorter({kCap, directory.path}, executor, sample);
+                for (std::size_t i = 0; i < count; i += block.size()) {
+                  for (PointRecord& r : block) r.key = key_of(Keys::lattice, 0, 1, random);
+                  sorter.add(block);
+                }
+                std::size_t seen = 0;
+                MortonKey last;
+                const std::unique_ptr<PointStream> stream = sorter.finish();
+                while (const std::size_t n = stream->next(block)) {
+                  for (const PointRecord& r : std::span(block).first(n)) {
+                    if (r.key < last) return 1;
+                    last = r.key;
+                  }
+                  seen += n;
+                }
+                if (seen < count || (sorter.statistics().spilled_bytes > 0) != spills) return 2;
+                // Stacks and the heaps of threads are beside it.
+                if (peak_resident_bytes() > before + kCap + 2 * kMiB) return 4;
+                // It grew as it should have, or this would test nothing.
+                if (peak_resident_bytes() < before + kCap * 3 / 4) return 5;
+                return resident_bytes() < before + 3 * kMiB ? 0 : 6;  // and was given back
+              }) == 0);
+      }
+}
+#endif

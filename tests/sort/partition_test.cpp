@@ -1,0 +1,66 @@
+// The stable partition against one class after another.
+#include "engine/sort/partition.h"
+
+#include <catch2/catch.hpp>
+
+#include "tests/sort/records.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+TEST_CASE("partition: classes ascend and keep their order for any number of blocks",
+          "[sort][partition]") {
+  const Executor three(3);
+  for (const std::size_t count : {1u, 7u, 8u, 9u, 1000u, 4099u})
+    for (const std::size_t classes : {1u, 2u, 3u, 64u})
+      for (const std::size_t blocks : {1u, 2u, 5u}) {
+        const std::vector<PointRecord> input = make_records(Keys::random, count);
+        const auto classify = [=](const MortonKey& key) { return key.low % classes; };
+        std::vector<PointRecord> expected;
+        std::vector<std::size_t> starts;
+        for (std::size_t c = 0; c < classes; ++c) {
+          starts.push_back(expected.size());
+          for (const PointRecord& r : input)
+            if (classify(r.key) == c) expected.push_back(r);
+        }
+        starts.push_back(count);
+
+        const ClassCounts counts(input, classes, blocks, classify, three);
+        CHECK(counts.starts() == starts);
+        for (std::size_t shift = 0; shift < 8; ++shift) {  // places in a cache line
+          std::vector<PointRecord> out(count + 8);
+          counts.scatter(out.data() + shift, classify, three);
+          REQUIRE(same_bytes(std::span(out).subspan(shift, count), expected));
+        }
+      }
+}
+
+TEST_CASE("partition: the differences are the bits that are not the same in all keys",
+          "[sort][partition]") {
+  const Executor two(2);
+  std::vector<PointRecord> input(100, numbered({0xf0, 1}, 0));
+  const auto classify = [](const MortonKey&) { return std::size_t{0}; };
+  const auto differences = [&] { return ClassCounts(input, 1, 3, classify, two).differences(); };
+  CHECK(differences() == MortonKey{0, 0});
+  input.back().key.low = 3;
+  CHECK(differences() == MortonKey{0, 2});
+  input[40].key.high = 0xff;
+  CHECK(differences() == MortonKey{0x0f, 2});
+  input.front().key = {~std::uint64_t{0}, 0};
+  CHECK(differences() == MortonKey{~std::uint64_t{0xf0}, 3});
+}
+
+TEST_CASE("partition: blocks are as many as threads but never cost much memory",
+          "[sort][partition]") {
+  CHECK(partition_blocks(100, 32, 8) == 1);
+  CHECK(partition_blocks(10'000'000, 2048, 2) == 2);
+  for (const std::size_t records : {1u, 10'000u, 1'000'000u, 100'000'000u})
+    for (const std::size_t classes : {32u, 512u, 4096u})
+      for (const unsigned threads : {1u, 8u, 256u}) {
+        const std::size_t blocks = partition_blocks(records, classes, threads);
+        CHECK(blocks >= 1);
+        CHECK(blocks <= threads);
+        if (blocks > 1)
+          CHECK(blocks * partition_bytes(classes) <= records * sizeof(PointRecord) / 32);
+      }
+}

@@ -1,0 +1,151 @@
+// Records on disk, and what a sort makes of its cap.
+#include "engine/sort/spill.h"
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <system_error>
+
+#include "engine/base/error.h"
+#include "engine/base/memory.h"
+#include "engine/sort/direct_file.h"
+#include "engine/sort/sort_plan.h"
+#include "tests/sort/records.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+const std::filesystem::path kDirectory = std::filesystem::temp_directory_path();
+
+std::span<PointRecord> records_in(const Arena& arena) {
+  return {reinterpret_cast<PointRecord*>(arena.data()), arena.size() / sizeof(PointRecord)};
+}
+
+// `count` records in runs of at most `run`, partitioned by splitters of all of them.
+std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord> records,
+                                   std::size_t run, std::size_t ranges) {
+  const Executor two(2);
+  Arena memory(run * sizeof(PointRecord) + kDirectBytes);
+  const auto partition =
+      std::make_shared<Partition>(file, Splitters(sample_of(records, 1000), ranges));
+  while (!records.empty()) {
+    const std::size_t count = std::min(run, records.size());
+    const std::span<PointRecord> grouped = records_in(memory).first(count);
+    const std::uint64_t offset = partition->add_run(records.first(count), grouped, two);
+    file.write(offset, grouped);
+    records = records.subspan(count);
+  }
+  return partition;
+}
+
+}  // namespace
+
+TEST_CASE("direct file: what was written is read, aligned or not", "[sort][spill]") {
+  DirectFile file(kDirectory);
+  const Arena memory(16 * kDirectBytes);
+  for (std::size_t i = 0; i < memory.size(); ++i) memory.data()[i] = std::byte(i * 7 + i / 256);
+  file.write_at(0, {memory.data(), 8 * kDirectBytes});
+  file.write_at(8 * kDirectBytes, {memory.data() + 8 * kDirectBytes, 8 * kDirectBytes});
+
+  const Arena aligned(memory.size());
+  file.read_at(0, {aligned.data(), aligned.size()});
+  CHECK(std::memcmp(aligned.data(), memory.data(), memory.size()) == 0);
+
+  std::vector<std::byte> odd(1001);
+  file.read_at(4097, odd);
+  CHECK(std::memcmp(odd.data(), memory.data() + 4097, odd.size()) == 0);
+  file.write_at(13, odd);
+  std::vector<std::byte> again(1001);
+  file.read_at(13, again);
+  CHECK(again == odd);
+  CHECK_THROWS_AS(file.read_at(16 * kDirectBytes - 5, odd), DataError);
+}
+
+TEST_CASE("direct file: a directory that cannot be used is named", "[sort][spill]") {
+  CHECK_THROWS_AS(DirectFile("/nonexistent/spill"), std::system_error);
+  CHECK_THROWS_WITH(DirectFile("/nonexistent/spill"), Catch::Contains("/nonexistent/spill"));
+}
+
+TEST_CASE("direct file: it has no name", "[sort][spill]") {
+  const std::filesystem::path directory = kDirectory / "ptc_direct_file_test";
+  std::filesystem::create_directory(directory);
+  {
+    DirectFile file(directory);
+    file.write_at(0, std::as_bytes(std::span("hello")));
+    CHECK(std::filesystem::is_empty(directory));
+  }
+  CHECK(std::filesystem::remove(directory));
+}
+
+TEST_CASE("spill: each range gives its records back in the order of the input", "[sort][spill]") {
+  for (const std::size_t run : {512u, 1000u, 5000u}) {
+    const std::vector<PointRecord> input = make_records(Keys::surface, 3210);
+    const Splitters splitters(sample_of(input, 1000), 10);
+    SpillFile file(kDirectory);
+    const auto partition = spilled(file, input, run, 10);
+    SpillReader reader(file, SpillReader::kLeastBytes);
+    REQUIRE(partition->ranges() == splitters.size());
+    for (std::size_t range = 0; range < partition->ranges(); ++range)
+      for (const std::size_t step : {1u, 7u, 5000u}) {
+        std::vector<PointRecord> expected, actual, block(step);
+        for (const PointRecord& r : input)
+          if (splitters(r.key) == range) expected.push_back(r);
+        BucketReader bucket(partition, range);
+        CHECK(bucket.size() == expected.size());
+        while (const std::size_t count = bucket.read(block, reader)) {
+          actual.insert(actual.end(), block.begin(), block.begin() + static_cast<long>(count));
+          CHECK(bucket.left() == expected.size() - actual.size());
+        }
+        CHECK(same_bytes(actual, expected));
+      }
+  }
+}
+
+TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
+  const std::vector<PointRecord> input = make_records(Keys::ascending, 5000);
+  SpillFile file(kDirectory);
+  const auto partition = spilled(file, input, 600, 3);
+  SpillReader reader(file, SpillReader::kLeastBytes);
+  for (std::size_t range = 0; range < partition->ranges(); ++range) {
+    BucketReader bucket(partition, range);
+    std::vector<PointRecord> all(static_cast<std::size_t>(bucket.size()));
+    for (const std::size_t count : {std::size_t{1}, std::size_t{10}, all.size(), 2 * all.size()}) {
+      const std::vector<MortonKey> sample = bucket.sample(count, reader);
+      REQUIRE(sample.size() == std::min(count, all.size()));
+      CHECK(bucket.left() == bucket.size());
+      BucketReader again(partition, range);
+      REQUIRE(again.read(all, reader) == all.size());
+      for (std::size_t i = 0; i < sample.size(); ++i) {  // one from each stride
+        CHECK(sample[i] >= all[i * all.size() / sample.size()].key);
+        CHECK(sample[i] <= all[(i + 1) * all.size() / sample.size() - 1].key);
+      }
+    }
+  }
+}
+
+TEST_CASE("spill: a read buffer below its least is refused", "[sort][spill]") {
+  const SpillFile file(kDirectory);
+  CHECK_THROWS_AS(SpillReader(file, SpillReader::kLeastBytes - 1), std::invalid_argument);
+}
+
+TEST_CASE("sort plan: it uses most of the cap and never more", "[sort][plan]") {
+  for (std::uint64_t cap = 256 << 10; cap < std::uint64_t{1} << 40; cap += cap / 7)
+    for (const unsigned threads : {1u, 2u, 64u}) {
+      CAPTURE(cap, threads);
+      const SortPlan plan = plan_sort(cap, threads);
+      CHECK(plan_bytes(plan, threads) <= cap);
+      CHECK(2 * plan.run_records * sizeof(PointRecord) >=
+            std::min(cap, std::uint64_t{1} << 38) / 3);
+      if (cap > 64 << 20 && threads < 64 && cap < std::uint64_t{1} << 38)
+        CHECK(2 * plan.run_records * sizeof(PointRecord) > cap / 10 * 9);
+      CHECK(plan.run_records * sizeof(PointRecord) % kDirectBytes == 0);
+      CHECK(2 * plan.run_records / 3 * sizeof(PointRecord) % kDirectBytes == 0);
+      CHECK(plan.ranges >= 32);
+      CHECK(plan.read_bytes >= SpillReader::kLeastBytes);
+    }
+  CHECK_THROWS_AS(plan_sort((256 << 10) - 1, 1), std::invalid_argument);
+  CHECK_NOTHROW(plan_sort(~std::uint64_t{0}, 1));
+}

@@ -1,0 +1,210 @@
+// Bytes that changed after the file was written: damage is found, or what is read is what was
+// written.
+#include <catch2/catch.hpp>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "format/error.h"
+#include "tests/store/forge.h"
+#include "tests/store/sample.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// The smallest scene: one page of points, one of nodes, the meta page.
+SampleOptions tiny() {
+  SampleOptions options;
+  options.points = 3;
+  options.attribute_groups = 0;
+  return options;
+}
+
+/// A file that is damaged in place.
+class Patient {
+ public:
+  explicit Patient(const std::filesystem::path& path)
+      : fd_(::open(path.c_str(), O_RDWR)), bytes_(read_file(path)) {
+    REQUIRE(fd_ >= 0);
+  }
+  ~Patient() { ::close(fd_); }
+  Patient(const Patient&) = delete;
+  Patient& operator=(const Patient&) = delete;
+
+  [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
+  void put(std::size_t at, std::byte value) {
+    REQUIRE(::pwrite(fd_, &value, 1, static_cast<off_t>(at)) == 1);
+  }
+  void flip(std::size_t at) { put(at, bytes_[at] ^ std::byte(1u << at % 8)); }
+  void restore(std::size_t at) { put(at, bytes_[at]); }
+  void resize(std::size_t bytes) { REQUIRE(::ftruncate(fd_, static_cast<off_t>(bytes)) == 0); }
+
+ private:
+  int fd_;
+  std::vector<std::byte> bytes_;
+};
+
+/// Text of the error that reading everything ends with; nothing when it does not.
+std::optional<std::string> refusal(const std::filesystem::path& path) {
+  try {
+    static_cast<void>(walk(path));
+    return std::nullopt;
+  } catch (const FormatError& error) {
+    return error.what();
+  }
+}
+
+/// Bytes that a reader may ignore: padding after pages, and the superblocks, of which there are
+/// two.
+std::vector<bool> ignorable(const std::filesystem::path& path) {
+  const Forgery parts(path);
+  std::vector<bool> may(parts.superblock.file_bytes, false);
+  const auto allow = [&](std::uint64_t from, std::uint64_t to) {
+    std::fill(may.begin() + static_cast<std::ptrdiff_t>(from),
+              may.begin() + static_cast<std::ptrdiff_t>(to), true);
+  };
+  const auto allow_padding = [&](std::uint64_t offset, std::uint64_t stored) {
+    const std::uint64_t end = offset + 64 + stored;
+    allow(end, (end + 4095) / 4096 * 4096);
+  };
+  for (const DirectoryEntry& entry : parts.entries) allow_padding(entry.offset, entry.stored_bytes);
+  allow_padding(parts.superblock.directory_offset, parts.directory[0].stored_bytes);
+  allow(may.size() - 2 * kBlockBytes, may.size());
+  return may;
+}
+
+}  // namespace
+
+TEST_CASE("reader: a flipped bit in any byte is refused or changes nothing", "[store][damage]") {
+  const ScratchDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, tiny());
+  const std::vector<std::byte> content = walk(path);
+  const std::vector<bool> may_ignore = ignorable(path);
+  Patient file(path);
+  std::size_t wrongly_taken = 0;
+  std::size_t wrongly_refused = 0;
+  std::size_t changed = 0;
+  for (std::size_t at = 0; at < file.bytes().size(); ++at) {
+    file.flip(at);
+    try {
+      if (walk(path) != content) ++changed;
+      if (!may_ignore[at]) ++wrongly_taken;
+    } catch (const FormatError&) {
+      if (may_ignore[at]) ++wrongly_refused;
+    }
+    file.restore(at);
+  }
+  CHECK(changed == 0);
+  CHECK(wrongly_taken == 0);
+  CHECK(wrongly_refused == 0);
+  CHECK(refusal(path) == std::nullopt);
+}
+
+TEST_CASE("reader: every proper prefix is refused, and why is said", "[store][damage]") {
+  const ScratchDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, tiny());
+  Patient file(path);
+  const std::size_t length = file.bytes().size();
+  std::size_t taken = 0;
+  std::size_t misnamed = 0;
+  for (std::size_t bytes = length; bytes-- > 0;) {
+    file.resize(bytes);
+    const std::optional<std::string> text = refusal(path);
+    if (!text) {
+      ++taken;
+      continue;
+    }
+    const std::string expected =
+        bytes >= length - kBlockBytes  // the first superblock is whole
+            ? std::to_string(length - bytes) + " bytes shorter than its superblock says"
+            : bytes >= kBlockBytes ? "unfinished or truncated"
+              : bytes >= 8         ? "file ends in its header"
+                                   : "not a PTCX file";
+    if (text->find(expected) == std::string::npos) ++misnamed;
+  }
+  CHECK(taken == 0);
+  CHECK(misnamed == 0);
+}
+
+TEST_CASE("reader: a file of many pages cut at any block is refused", "[store][damage]") {
+  const ScratchDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  SampleOptions options;
+  options.points = 20000;
+  options.writer.codec = Codec::raw;
+  write_sample(path, options);
+  Patient file(path);
+  std::size_t taken = 0;
+  for (std::size_t bytes = file.bytes().size(); bytes > 0; bytes -= kBlockBytes) {
+    if (bytes < file.bytes().size()) {
+      file.resize(bytes);
+      if (!refusal(path)) ++taken;
+    }
+  }
+  CHECK(taken == 0);
+}
+
+TEST_CASE("reader: bytes after the end are refused, and how many is said", "[store][damage]") {
+  const ScratchDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, tiny());
+  Patient file(path);
+  for (const std::size_t more : {1u, 512u, 4095u, 4096u, 4097u, 8192u, 100000u}) {
+    file.resize(file.bytes().size() + more);
+    const std::string expected = std::to_string(more) + " bytes longer than its superblock says";
+    CHECK_THAT(refusal(path).value_or(""), Catch::Contains(expected));
+  }
+  file.resize(file.bytes().size());
+  CHECK(refusal(path) == std::nullopt);
+}
+
+TEST_CASE("reader: one whole superblock is enough, none is not", "[store][damage]") {
+  const ScratchDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, tiny());
+  const std::vector<std::byte> content = walk(path);
+  Patient file(path);
+  const std::size_t b = file.bytes().size() - kBlockBytes;
+  const std::size_t a = b - kBlockBytes;
+  file.flip(a + 200);
+  CHECK((walk(path) == content));
+  file.flip(b + 300);
+  CHECK_THAT(refusal(path).value_or(""), Catch::Contains("no superblock is whole"));
+  file.restore(a + 200);
+  CHECK((walk(path) == content));
+  for (std::size_t at = a; at < file.bytes().size(); ++at) file.put(at, std::byte{0});
+  CHECK_THAT(refusal(path).value_or(""), Catch::Contains("unfinished or truncated"));
+}
+
+TEST_CASE("reader: files that are no containers are refused", "[store][damage]") {
+  const ScratchDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_file(path, {});
+  CHECK_THAT(refusal(path).value_or(""), Catch::Contains("not a PTCX file"));
+  write_file(path, std::vector<std::byte>(20000, std::byte{0xff}));
+  CHECK_THAT(refusal(path).value_or(""), Catch::Contains("not a PTCX file"));
+  CHECK_THROWS_AS(ContainerReader(scratch / "absent.ptcx"), std::system_error);
+  CHECK_THROWS_AS(ContainerReader(scratch.path()), std::system_error);
+}
+
+TEST_CASE("reader: a file that shrinks while it is open is an error, not a crash",
+          "[store][damage]") {
+  const ScratchDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, tiny());
+  const ContainerReader reader(path);
+  Patient(path).resize(kBlockBytes);
+  PageDecoder decoder;
+  std::vector<std::byte> buffer(reader.page_payload_limit());
+  CHECK_THROWS_AS(reader.read_page(0, buffer, decoder), DataError);
+}

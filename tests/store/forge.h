@@ -1,0 +1,37 @@
+// Containers with one lie in them and every checksum right, so that only a structural check can
+// find it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "format/container.h"
+
+namespace ptc::test {
+
+/// A container taken apart. What is changed here is sealed again by bytes(): page headers,
+/// directory, content digest and superblocks get the checksums of what they hold.
+struct Forgery {
+  struct Page {
+    std::uint64_t offset = 0;  ///< where bytes() puts it, whatever its entry says
+    PageHeader header;         ///< its payload_xxh3 is that of `stored` unless told otherwise
+    std::vector<std::byte> stored;
+  };
+  FileHeader header;
+  Superblock superblock;
+  std::vector<DirectoryEntry> entries;
+  std::vector<Page> pages;             ///< by number
+  std::vector<PageHeader> directory;   ///< headers of the directory's pages
+  bool rehash_payloads = true;         ///< header and entry take the hash of `stored`
+  bool rehash_directory_pages = true;  ///< their headers take the hash of their entries
+  bool rehash_directory = true;        ///< superblock takes the hash and digest of the entries
+  std::function<void(Superblock& first, Superblock& second)> last_word;  ///< before they are sealed
+
+  explicit Forgery(const std::filesystem::path& path);
+  [[nodiscard]] std::vector<std::byte> bytes() const;
+};
+
+}  // namespace ptc::test

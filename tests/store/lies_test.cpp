@@ -1,0 +1,372 @@
+// Containers whose checksums are right and whose structure is not: each lie is found, and the error
+// names file, place and rule.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "format/error.h"
+#include "format/node_page.h"
+#include "format/point_page.h"
+#include "tests/store/forge.h"
+#include "tests/store/sample.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// The directory numbers the sample's pages: 3 pages for each run of points, then nodes, then meta.
+constexpr std::uint32_t kPoint = 0;
+constexpr std::uint32_t kAttribute = 1;
+constexpr std::uint32_t kSecondGroup = 2;
+
+constexpr std::size_t kRadiusColumn = 16;  // bytes a point in front of it (spec/points.md)
+
+class Liar {
+ public:
+  explicit Liar(SampleOptions options = {}) {
+    options.writer.codec = Codec::raw;
+    write_sample(path(), options);
+  }
+
+  [[nodiscard]] std::filesystem::path path() const { return scratch_ / "a.ptcx"; }
+  [[nodiscard]] Forgery truth() const { return Forgery(path()); }
+
+  /// Expects that opening or reading finds the lie under `clause`, and says `text`.
+  void expect(const std::string& clause, const std::function<void(Forgery&)>& lie,
+              const std::string& text = "") const {
+    Forgery forgery = truth();
+    lie(forgery);
+    const std::filesystem::path lied = scratch_ / "lied.ptcx";
+    write_file(lied, forgery.bytes());
+    for (const auto access : {ContainerReader::Access::pread, ContainerReader::Access::mmap}) {
+      try {
+        static_cast<void>(walk(lied, access));
+        FAIL_CHECK("not found: " << clause);
+      } catch (const FormatError& error) {
+        INFO(error.what());
+        CHECK(error.clause().ends_with("#" + clause));
+        CHECK_THAT(error.text(), Catch::Contains(text));
+        CHECK(std::string(error.what()).starts_with(lied.string() + ": offset "));
+        CHECK(error.offset() <= forgery.superblock.file_bytes);
+      }
+    }
+  }
+
+ private:
+  ScratchDirectory scratch_;
+};
+
+std::uint32_t first_of(const Forgery& f, PageType type) {
+  const auto found = std::ranges::find(f.entries, type, &DirectoryEntry::type);
+  return static_cast<std::uint32_t>(found - f.entries.begin());
+}
+
+std::uint32_t last_point_page(const Forgery& f) {
+  std::uint32_t last = 0;
+  for (std::uint32_t page = 0; page < f.entries.size(); ++page) {
+    if (f.entries[page].type == PageType::point) last = page;
+  }
+  return last;
+}
+
+/// Gives a page another payload, in header and entry alike.
+void replace(Forgery& f, std::uint32_t page, std::vector<std::byte> payload) {
+  const auto bytes = static_cast<std::uint32_t>(payload.size());
+  f.pages[page].stored = std::move(payload);
+  f.pages[page].header.stored_bytes = f.pages[page].header.raw_bytes = bytes;
+  f.entries[page].stored_bytes = f.entries[page].raw_bytes = bytes;
+}
+
+/// Changes the first child reference that `pick` takes, anywhere in the node pages.
+void change_reference(Forgery& f, const std::function<bool(ChildRef&)>& pick) {
+  for (std::uint32_t page = 0; page < f.entries.size(); ++page) {
+    if (f.entries[page].type != PageType::node) continue;
+    const NodePage nodes(f.pages[page].stored.data(), f.entries[page].record_count);
+    NodePageEncoder encoder((std::size_t{1} << f.header.page_shift) - kPageHeaderBytes);
+    bool done = false;
+    for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
+      NodeGroup group = nodes.decode(slot);
+      for (NodeChild& child : group.children) done = done || pick(child.ref);
+      encoder.add(group);
+    }
+    if (done) return replace(f, page, encoder.take());
+  }
+  FAIL("no such reference");
+}
+
+}  // namespace
+
+TEST_CASE("reader: pages that overlap are found", "[store][lies]") {
+  SampleOptions options;
+  options.writer.page_shift = 14;
+  options.points = 2000;
+  const Liar liar(options);
+  REQUIRE(liar.truth().entries[kPoint].raw_bytes > 2 * kBlockBytes);
+  liar.expect("directory-overlap", [](Forgery& f) { f.entries[1].offset = f.entries[0].offset; });
+  liar.expect("directory-overlap",
+              [](Forgery& f) { f.entries[1].offset = f.entries[0].offset + kBlockBytes; });
+  liar.expect("directory-overlap",
+              [](Forgery& f) { f.entries[0].offset = f.entries[1].offset - kBlockBytes; });
+  liar.expect("directory-overlap",
+              [](Forgery& f) { f.entries.back().offset = f.superblock.directory_offset; });
+  liar.expect("directory-overlap", [](Forgery& f) {  // a page of its own, moved into the directory
+    const std::uint64_t blocks = (f.entries[0].stored_bytes + 64 + kBlockBytes - 1) / kBlockBytes;
+    f.entries[0].offset = f.superblock.directory_offset - (blocks - 1) * kBlockBytes;
+    f.entries.back().offset = f.pages[0].offset;
+  });
+  liar.expect("directory-extent", [](Forgery& f) { f.entries[0].offset = 0; });
+  liar.expect("directory-extent", [](Forgery& f) { f.entries[0].offset += 64; });
+  liar.expect("directory-extent",
+              [](Forgery& f) { f.entries[0].offset = f.superblock.file_bytes; });
+  liar.expect("directory-extent", [](Forgery& f) {
+    f.entries[0].offset = std::numeric_limits<std::uint64_t>::max() - kBlockBytes + 1;
+  });
+}
+
+TEST_CASE("reader: counts that the directory belies are found", "[store][lies]") {
+  const Liar liar;
+  for (const int by : {-1, 1}) {
+    const auto step = static_cast<std::uint64_t>(by);  // wraps around, as the addition does
+    liar.expect("superblock-counts", [&](Forgery& f) { f.superblock.points += step; });
+    liar.expect("superblock-counts", [&](Forgery& f) { f.superblock.node_groups += step; });
+  }
+  liar.expect("superblock-counts",
+              [](Forgery& f) { f.superblock.nodes = 8 * f.superblock.node_groups + 1; });
+  liar.expect("superblock-counts",
+              [](Forgery& f) { f.superblock.points = std::uint64_t{1} << 47; });
+  liar.expect("superblock-pages", [](Forgery& f) { --f.superblock.page_count; });
+  liar.expect("directory-pages", [](Forgery& f) {
+    f.entries.pop_back();
+    f.directory.back().record_count -= 1;
+    f.directory.back().stored_bytes -= 32;
+    f.directory.back().raw_bytes -= 32;
+  });
+}
+
+TEST_CASE("reader: point pages that do not give a point its place are found", "[store][lies]") {
+  const Liar liar;
+  liar.expect("point-pages", [](Forgery& f) { f.superblock.points_per_page -= 8; });
+  liar.expect("point-pages", [](Forgery& f) {  // the short page is not the last
+    const std::uint32_t last = last_point_page(f);
+    REQUIRE(f.entries[last].record_count < f.entries[kPoint].record_count);
+    std::swap(f.entries[kPoint], f.entries[last]);
+    std::swap(f.pages[kPoint], f.pages[last]);
+    std::swap(f.pages[kPoint].header.page_id, f.pages[last].header.page_id);
+  });
+}
+
+TEST_CASE("reader: root and meta page of another kind are found", "[store][lies]") {
+  const Liar liar;
+  liar.expect("superblock-root", [](Forgery& f) { f.superblock.root_page = kPoint; });
+  liar.expect("superblock-root", [](Forgery& f) { f.superblock.root_page = kNoPage; });
+  liar.expect("superblock-root", [](Forgery& f) {
+    f.superblock.root_slot =
+        static_cast<std::uint16_t>(f.entries[f.superblock.root_page].record_count);
+  });
+  liar.expect("meta-page", [](Forgery& f) { f.superblock.meta_page = kPoint; });
+  liar.expect("meta-page", [](Forgery& f) {
+    PageHeader& header = f.pages[kAttribute].header;
+    DirectoryEntry& entry = f.entries[kAttribute];
+    header.type = entry.type = PageType::meta;
+    header.group = entry.group = 0;
+    header.record_count = entry.record_count = 1;
+    header.first_key = header.last_key = 0;
+  });
+}
+
+TEST_CASE("reader: attribute pages that do not match the point pages are found", "[store][lies]") {
+  const Liar liar;
+  const auto set_group = [](Forgery& f, std::uint16_t group) {
+    f.entries[kAttribute].group = f.pages[kAttribute].header.group = group;
+  };
+  liar.expect("attribute-pages", [&](Forgery& f) { set_group(f, 9); });
+  const auto rename_second = [](Forgery& f) {
+    for (std::uint32_t page = 0; page < f.entries.size(); ++page) {
+      if (f.entries[page].group != 2) continue;
+      f.entries[page].group = f.pages[page].header.group = 9;
+    }
+  };
+  liar.expect("attribute-pages", rename_second, "group 9, which the meta page does not name");
+  liar.expect("attribute-pages", [&](Forgery& f) { set_group(f, 2); });
+  liar.expect("attribute-pages", [](Forgery& f) {
+    f.entries[kAttribute].record_count -= 1;
+    f.pages[kAttribute].header.record_count -= 1;
+  });
+  liar.expect("attribute-pages", [](Forgery& f) {
+    std::vector<std::byte> payload = f.pages[kAttribute].stored;
+    payload.pop_back();
+    replace(f, kAttribute, payload);
+  });
+  liar.expect("attribute-pages", [](Forgery& f) {  // the last one, with another group's length
+    const std::uint32_t last = last_point_page(f);
+    f.entries[last + kSecondGroup].group = f.pages[last + kSecondGroup].header.group = 1;
+  });
+}
+
+TEST_CASE("reader: a page that lies where another should is found", "[store][lies]") {
+  const Liar liar;
+  liar.expect("page-agreement", [](Forgery& f) {
+    REQUIRE(f.entries[1].stored_bytes == f.entries[4].stored_bytes);
+    std::swap(f.pages[1].offset, f.pages[4].offset);
+  });
+  liar.expect("page-agreement", [](Forgery& f) {
+    std::swap(f.entries[1].payload_xxh3, f.entries[4].payload_xxh3);
+    f.rehash_payloads = false;
+  });
+  liar.expect("page-agreement", [](Forgery& f) { f.pages[kPoint].header.page_id = 5; });
+  liar.expect("page-agreement", [](Forgery& f) { f.pages[kAttribute].header.group = 2; });
+  liar.expect("page-payload", [](Forgery& f) {
+    f.pages[kPoint].stored[100] ^= std::byte{1};
+    f.rehash_payloads = false;
+  });
+}
+
+TEST_CASE("reader: a page of another file is found", "[store][lies]") {
+  const Liar liar;
+  const ScratchDirectory scratch;
+  SampleOptions options;
+  options.writer.codec = Codec::raw;
+  options.writer.uuid[0] = std::byte{8};
+  write_sample(scratch / "other.ptcx", options);
+  const Forgery other(scratch / "other.ptcx");
+  const Forgery mine = liar.truth();
+  REQUIRE((other.entries == mine.entries));
+  for (std::uint32_t page = 0; page < mine.entries.size(); ++page) {
+    std::vector<std::byte> file = read_file(liar.path());
+    const std::vector<std::byte> from = read_file(scratch / "other.ptcx");
+    const std::size_t at = mine.entries[page].offset;
+    std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(at), kBlockBytes,
+                file.begin() + static_cast<std::ptrdiff_t>(at));
+    write_file(scratch / "mixed.ptcx", file);
+    CHECK_THROWS_WITH(
+        walk(scratch / "mixed.ptcx"),
+        Catch::Contains("#page-checksum") && Catch::Contains("offset " + std::to_string(at + 56)));
+  }
+}
+
+TEST_CASE("reader: a directory that is not the superblock's is found", "[store][lies]") {
+  const Liar liar;
+  liar.expect("superblock-digest", [](Forgery& f) {
+    f.last_word = [](Superblock& a, Superblock& b) { a.content_xxh3[1] = b.content_xxh3[1] ^= 1; };
+  });
+  liar.expect("directory-pages", [](Forgery& f) {
+    f.last_word = [](Superblock& a, Superblock& b) { a.directory_xxh3 = b.directory_xxh3 ^= 1; };
+  });
+  liar.expect("directory-pages", [](Forgery& f) { ++f.directory[0].page_id; });
+  liar.expect("directory-pages", [](Forgery& f) {
+    f.directory[0].type = PageType::attribute;
+    f.directory[0].group = 1;
+  });
+  liar.expect("directory-pages", [](Forgery& f) {  // one entry fewer than lie there
+    f.directory.back().record_count -= 1;
+    f.directory.back().stored_bytes -= 32;
+    f.directory.back().raw_bytes -= 32;
+  });
+  liar.expect("directory-pages", [](Forgery& f) {
+    f.rehash_directory_pages = false;
+    f.directory[0].payload_xxh3 ^= 1;
+  });
+  liar.expect("superblock-copies",
+              [](Forgery& f) { f.last_word = [](Superblock& a, Superblock&) { a.area += 1; }; });
+}
+
+TEST_CASE("reader: the entry at fault is named by its place in the file", "[store][lies]") {
+  SampleOptions options;
+  options.points = 40000;
+  options.attribute_groups = 0;
+  const Liar liar(options);
+  Forgery f = liar.truth();
+  REQUIRE(f.directory.size() > 2);
+  const std::uint32_t page = directory_entries_per_page(f.header) + 5;
+  f.entries[page].offset += 64;
+  const ScratchDirectory scratch;
+  write_file(scratch / "lied.ptcx", f.bytes());
+  const std::uint64_t at = f.superblock.directory_offset + 4096 + 64 + 5 * 32;
+  CHECK_THROWS_WITH(walk(scratch / "lied.ptcx"), Catch::Contains("offset " + std::to_string(at)));
+}
+
+TEST_CASE("reader: references to groups that there are not are found", "[store][lies]") {
+  const Liar liar;
+  const Forgery truth = liar.truth();
+  const auto interior = [&](const std::function<void(ChildRef&)>& change) {
+    return [change](ChildRef& ref) {
+      if (ref.interior) change(ref);
+      return ref.interior;
+    };
+  };
+  liar.expect("references", [&](Forgery& f) {
+    change_reference(f, interior([](ChildRef& ref) { ref.page = kPoint; }));
+  });
+  liar.expect("references", [&](Forgery& f) {
+    change_reference(f, interior([&](ChildRef& ref) { ref.page = truth.superblock.meta_page; }));
+  });
+  liar.expect("references", [&](Forgery& f) {
+    change_reference(f, interior([&](ChildRef& ref) {
+                       ref.slot = static_cast<std::uint16_t>(truth.entries[ref.page].record_count);
+                     }));
+  });
+  liar.expect("node-reference", [&](Forgery& f) {
+    change_reference(f, interior([&](ChildRef& ref) { ref.page = truth.superblock.page_count; }));
+  });
+  liar.expect("node-leaf", [&](Forgery& f) {
+    change_reference(f, [&](ChildRef& ref) {
+      if (ref.interior) return false;
+      ref.first_point = truth.superblock.points - ref.point_count + 1;
+      return true;
+    });
+  });
+}
+
+TEST_CASE("reader: payloads that decode to nonsense are found", "[store][lies]") {
+  const Liar liar;
+  liar.expect("point-radius", [](Forgery& f) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const std::size_t at = kRadiusColumn * f.entries[kPoint].record_count;
+    std::memcpy(&f.pages[kPoint].stored[at], &nan, sizeof nan);
+  });
+  liar.expect("codec-frame", [](Forgery& f) {
+    f.pages[kPoint].header.codec = Codec::zstd;
+    f.pages[kPoint].stored.pop_back();
+    --f.pages[kPoint].header.stored_bytes;
+    --f.entries[kPoint].stored_bytes;
+  });
+  liar.expect("meta-size", [](Forgery& f) {
+    const std::uint32_t meta = f.superblock.meta_page;
+    std::vector<std::byte> payload = f.pages[meta].stored;
+    payload.push_back(std::byte{0});
+    replace(f, meta, payload);
+  });
+  liar.expect("node-slots", [](Forgery& f) {
+    const std::uint32_t page = first_of(f, PageType::node);
+    ++f.entries[page].record_count;
+    ++f.pages[page].header.record_count;
+    ++f.superblock.node_groups;
+  });
+}
+
+TEST_CASE("reader: an error in a compressed page names the decoded byte", "[store][lies]") {
+  const ScratchDirectory scratch;
+  write_sample(scratch / "a.ptcx", {});
+  Forgery f(scratch / "a.ptcx");
+  REQUIRE(f.pages[kPoint].header.codec == Codec::zstd);
+  std::vector<std::byte> payload(f.entries[kPoint].raw_bytes);
+  PageDecoder().decode(Codec::zstd, f.pages[kPoint].stored, payload);
+  const std::size_t at = kRadiusColumn * f.entries[kPoint].record_count;
+  const float negative = -1;
+  std::memcpy(&payload[at], &negative, sizeof negative);
+  std::vector<std::byte> stored;
+  REQUIRE(PageEncoder(Codec::zstd).encode(payload, stored) == Codec::zstd);
+  f.pages[kPoint].stored = stored;
+  f.pages[kPoint].header.stored_bytes = static_cast<std::uint32_t>(stored.size());
+  f.entries[kPoint].stored_bytes = static_cast<std::uint32_t>(stored.size());
+  write_file(scratch / "lied.ptcx", f.bytes());
+  CHECK_THROWS_WITH(walk(scratch / "lied.ptcx"),
+                    Catch::Contains("decoded byte " + std::to_string(at)) &&
+                        Catch::Contains("offset " + std::to_string(f.entries[kPoint].offset + 64)));
+}

@@ -1,0 +1,157 @@
+// What was written comes back, for every codec and page size.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <string>
+
+#include "format/error.h"
+#include "tests/store/forge.h"
+#include "tests/store/sample.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// Every page as it was given to the writer.
+void check_pages(const ContainerReader& reader, const Sample& sample,
+                 ContainerReader::Access access) {
+  PageDecoder decoder;
+  std::vector<std::byte> buffer(reader.page_payload_limit());
+  std::vector<std::byte> stored;
+  for (std::uint32_t page = 0; page < sample.pages.size(); ++page) {
+    const auto& [facts, payload] = sample.pages[page];
+    const PageHeader header = reader.read_page(page, buffer, decoder, access);
+    REQUIRE(header.page_id == page);
+    REQUIRE(header.type == facts.type);
+    REQUIRE(header.group == facts.group);
+    REQUIRE(header.level == facts.level);
+    REQUIRE(header.record_count == facts.record_count);
+    REQUIRE(header.first_key == facts.first_key);
+    REQUIRE(header.last_key == facts.last_key);
+    REQUIRE(header.raw_bytes == payload.size());
+    REQUIRE(std::equal(payload.begin(), payload.end(), buffer.begin()));
+    REQUIRE(reader.read_stored_page(page, stored).codec == header.codec);
+    std::vector<std::byte> decoded(header.raw_bytes);
+    decoder.decode(header.codec, stored, decoded);
+    REQUIRE((decoded == payload));
+  }
+}
+
+void check_index(const ContainerReader& reader, const Sample& sample) {
+  std::vector<std::uint32_t> points, nodes, second;
+  for (std::uint32_t page = 0; page < sample.pages.size(); ++page) {
+    const ContainerWriter::PageFacts& facts = sample.pages[page].facts;
+    if (facts.type == PageType::point) points.push_back(page);
+    if (facts.type == PageType::node) nodes.push_back(page);
+    if (facts.group == 2) second.push_back(page);
+  }
+  REQUIRE(std::ranges::equal(reader.point_pages(), points));
+  REQUIRE(std::ranges::equal(reader.node_pages(), nodes));
+  REQUIRE(std::ranges::equal(reader.attribute_pages(2), second));
+  REQUIRE(reader.attribute_pages(77).empty());
+}
+
+}  // namespace
+
+TEST_CASE("container: pages come back from every codec and page size", "[store][reader]") {
+  const ScratchDirectory scratch;
+  for (const Codec codec : {Codec::raw, Codec::zstd}) {
+    for (std::uint8_t shift = 12; shift <= 20; ++shift) {
+      SampleOptions options;
+      options.writer.codec = codec;
+      options.writer.page_shift = shift;
+      options.points = shift < 16 ? 5000 : 20000;
+      const Sample sample = write_sample(scratch / "a.ptcx", options);
+      const ContainerReader reader(scratch / "a.ptcx");
+      INFO("codec " << static_cast<int>(codec) << ", page shift " << int{shift});
+      CHECK(reader.header().page_shift == shift);
+      CHECK(reader.page_payload_limit() == (std::size_t{1} << shift) - 64);
+      CHECK(reader.page_count() == sample.pages.size() + 1);
+      CHECK(reader.meta().channels == sample.meta.channels);
+      CHECK(reader.meta().text == sample.meta.text);
+      check_index(reader, sample);
+      check_pages(reader, sample, ContainerReader::Access::pread);
+      check_pages(reader, sample, ContainerReader::Access::mmap);
+    }
+  }
+}
+
+TEST_CASE("container: compression is used where it saves space", "[store][reader]") {
+  const ScratchDirectory scratch;
+  SampleOptions options;
+  write_sample(scratch / "zstd.ptcx", options);
+  options.writer.codec = Codec::raw;
+  write_sample(scratch / "raw.ptcx", options);
+  const ContainerReader zstd(scratch / "zstd.ptcx");
+  const ContainerReader raw(scratch / "raw.ptcx");
+  std::uint64_t zstd_bytes = 0;
+  for (std::uint32_t page = 0; page < raw.page_count(); ++page) {
+    CHECK(raw.entry(page).stored_bytes == raw.entry(page).raw_bytes);
+    CHECK(zstd.entry(page).raw_bytes == raw.entry(page).raw_bytes);
+    zstd_bytes += zstd.entry(page).stored_bytes;
+  }
+  std::uint64_t raw_bytes = 0;
+  for (std::uint32_t page = 0; page < raw.page_count(); ++page) {
+    raw_bytes += raw.entry(page).stored_bytes;
+  }
+  CHECK(zstd_bytes < raw_bytes * 3 / 4);
+}
+
+TEST_CASE("container: a scene without points is a container", "[store][reader]") {
+  const ScratchDirectory scratch;
+  SampleOptions options;
+  options.points = 0;
+  write_sample(scratch / "empty.ptcx", options);
+  const ContainerReader reader(scratch / "empty.ptcx");
+  CHECK(reader.page_count() == 1);
+  CHECK(reader.superblock().root_page == kNoPage);
+  CHECK(reader.point_pages().empty());
+  CHECK(reader.node_pages().empty());
+  CHECK_FALSE(walk(scratch / "empty.ptcx").empty());
+}
+
+TEST_CASE("container: a directory of several pages comes back", "[store][reader]") {
+  const ScratchDirectory scratch;
+  SampleOptions options;
+  options.points = 40000;
+  options.attribute_groups = 0;
+  const Sample sample = write_sample(scratch / "a.ptcx", options);
+  REQUIRE(sample.superblock.directory_pages > 3);
+  const ContainerReader reader(scratch / "a.ptcx");
+  check_index(reader, sample);
+  check_pages(reader, sample, ContainerReader::Access::pread);
+}
+
+TEST_CASE("container: the superblock comes back as finish() returned it", "[store][reader]") {
+  const ScratchDirectory scratch;
+  const Sample sample = write_sample(scratch / "a.ptcx", {});
+  const ContainerReader reader(scratch / "a.ptcx");
+  CHECK((encode_superblock(reader.superblock()) == encode_superblock(sample.superblock)));
+  CHECK(reader.superblock().writer.starts_with("ptc "));
+  CHECK(reader.path() == scratch / "a.ptcx");
+}
+
+TEST_CASE("reader: a page that there is not is refused, as is a small buffer", "[store][reader]") {
+  const ScratchDirectory scratch;
+  write_sample(scratch / "a.ptcx", {});
+  const ContainerReader reader(scratch / "a.ptcx");
+  PageDecoder decoder;
+  std::vector<std::byte> buffer(reader.page_payload_limit());
+  CHECK_THROWS_AS(reader.entry(reader.page_count()), std::invalid_argument);
+  CHECK_THROWS_AS(reader.entry(kNoPage), std::invalid_argument);
+  CHECK_THROWS_AS(reader.read_page(reader.page_count(), buffer, decoder), std::invalid_argument);
+  CHECK_THROWS_AS(reader.read_stored_page(reader.page_count(), buffer), std::invalid_argument);
+  const auto small = std::span(buffer).first(buffer.size() - 1);
+  CHECK_THROWS_AS(reader.read_page(0, small, decoder), std::invalid_argument);
+}
+
+TEST_CASE("forgery: a container taken apart and put together is the same", "[store][support]") {
+  const ScratchDirectory scratch;
+  for (const std::uint32_t points : {0u, 1u, 500u, 20000u}) {
+    SampleOptions options;
+    options.points = points;
+    write_sample(scratch / "a.ptcx", options);
+    CHECK((Forgery(scratch / "a.ptcx").bytes() == read_file(scratch / "a.ptcx")));
+  }
+}

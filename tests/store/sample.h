@@ -1,0 +1,67 @@
+// Small containers for tests, and a directory to keep them in.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "engine/store/reader.h"
+#include "engine/store/writer.h"
+#include "format/point_record.h"
+
+namespace ptc::test {
+
+/// A new directory that is removed with everything in it.
+class ScratchDirectory {
+ public:
+  ScratchDirectory();
+  ~ScratchDirectory();
+  ScratchDirectory(const ScratchDirectory&) = delete;
+  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
+  [[nodiscard]] std::size_t files() const;  ///< how many entries it has, hidden ones included
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct SampleOptions {
+  WriterOptions writer{12, Codec::zstd, 1, Uuid{std::byte{7}}};
+  std::uint32_t points = 500;
+  std::uint32_t leaf_points = 2;
+  unsigned attribute_groups = 2;  ///< group g has a half and g components of u8
+};
+
+/// What went into a sample, page by page in the order of their numbers.
+struct Sample {
+  struct Page {
+    ContainerWriter::PageFacts facts;
+    std::vector<std::byte> payload;
+  };
+  std::vector<Page> pages;  ///< the meta page is not among them
+  Meta meta;
+  Superblock superblock;  ///< as finish() returned it
+};
+
+/// Surfels by ascending key, the same for the same count.
+[[nodiscard]] std::vector<PointRecord> sample_points(std::uint32_t count);
+
+/// Writes a container: random surfels under a tree of eight children a group that is cut by rank,
+/// not by place. The reader does not look at places.
+Sample write_sample(const std::filesystem::path& target, const SampleOptions& options);
+
+/// The same, up to but without finish().
+void write_unfinished(ContainerWriter& writer, const SampleOptions& options, Sample& sample);
+
+[[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path);
+void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
+
+/// Opens a container and reads every page. @return the payloads, one after another
+[[nodiscard]] std::vector<std::byte> walk(
+    const std::filesystem::path& path,
+    ContainerReader::Access access = ContainerReader::Access::pread);
+
+}  // namespace ptc::test

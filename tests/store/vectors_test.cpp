@@ -1,0 +1,68 @@
+// The conformance vectors of the specification: every good one is read whole, every bad one refused
+// by the rule that it is named after.
+#include <catch2/catch.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "format/error.h"
+#include "tests/store/sample.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+std::vector<std::filesystem::path> vectors(const char* kind) {
+  const std::filesystem::path directory =
+      std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors" / kind;
+  std::vector<std::filesystem::path> found;
+  for (const auto& entry : std::filesystem::directory_iterator(directory)) {
+    if (entry.path().extension() == ".ptcx") found.push_back(entry.path());
+  }
+  REQUIRE_FALSE(found.empty());
+  return found;
+}
+
+/// "container-page-magic.variant.ptcx" shows spec/container.md#page-magic.
+std::string rule_of(const std::filesystem::path& path) {
+  const std::string name = path.filename().string();
+  const std::size_t dash = name.find('-');
+  return "spec/" + name.substr(0, dash) + ".md#" + name.substr(dash + 1, name.find('.') - dash - 1);
+}
+
+}  // namespace
+
+TEST_CASE("vectors: every good one is read whole", "[store][vectors]") {
+  for (const auto& path : vectors("good")) {
+    INFO(path.filename());
+    CHECK_NOTHROW(walk(path));
+    CHECK((walk(path) == walk(path, ContainerReader::Access::mmap)));
+  }
+}
+
+TEST_CASE("vectors: every bad one is refused by its rule", "[store][vectors]") {
+  for (const auto& path : vectors("bad")) {
+    INFO(path.filename());
+    try {
+      static_cast<void>(walk(path));
+      FAIL_CHECK("not refused");
+    } catch (const FormatError& error) {
+      INFO(error.what());
+      CHECK(error.clause() == rule_of(path));
+    }
+  }
+}
+
+TEST_CASE("vectors: what only a verifier must find is read whole or refused by its rule",
+          "[store][vectors]") {
+  for (const auto& path : vectors("verify")) {
+    INFO(path.filename());
+    try {
+      CHECK_FALSE(walk(path).empty());
+    } catch (const FormatError& error) {
+      CHECK(error.clause() == rule_of(path));
+    }
+  }
+}

@@ -1,0 +1,246 @@
+// The file as it lies on the disk, what the writer refuses, and that it is whole or not there.
+#include <catch2/catch.hpp>
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <csignal>
+#include <string>
+#include <system_error>
+
+#include "tests/store/forge.h"
+#include "tests/store/sample.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+using Facts = ContainerWriter::PageFacts;
+
+/// A limit on the length of files that this process writes, as a full disk would be.
+class FileLimit {
+ public:
+  explicit FileLimit(rlim_t bytes) : ignored_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit now{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &now);
+  }
+  ~FileLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, ignored_);
+  }
+  FileLimit(const FileLimit&) = delete;
+  FileLimit& operator=(const FileLimit&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*ignored_)(int);
+};
+
+}  // namespace
+
+TEST_CASE("writer: pages lie in the order of the calls, aligned, padded with zeros",
+          "[store][writer]") {
+  const ScratchDirectory scratch;
+  const Sample sample = write_sample(scratch / "a.ptcx", {});
+  const std::vector<std::byte> file = read_file(scratch / "a.ptcx");
+  const Forgery parts(scratch / "a.ptcx");
+  std::uint64_t expected = kBlockBytes;
+  const auto expect_zeros = [&](std::uint64_t from, std::uint64_t to) {
+    CHECK(std::all_of(file.begin() + static_cast<std::ptrdiff_t>(from),
+                      file.begin() + static_cast<std::ptrdiff_t>(to),
+                      [](std::byte b) { return b == std::byte{0}; }));
+  };
+  const auto expect_page = [&](std::uint64_t offset, std::uint64_t stored) {
+    CHECK(offset == expected);
+    expected = (offset + 64 + stored + 4095) / 4096 * 4096;
+    expect_zeros(offset + 64 + stored, expected);
+  };
+  // The sample is written from its last page to its first; the meta page comes after all.
+  for (std::size_t page = sample.pages.size(); page-- > 0;) {
+    expect_page(parts.entries[page].offset, parts.entries[page].stored_bytes);
+  }
+  expect_page(parts.entries.back().offset, parts.entries.back().stored_bytes);
+  CHECK(parts.entries.back().type == PageType::meta);
+  for (std::size_t i = 0; i < parts.directory.size(); ++i) {
+    CHECK(parts.directory[i].page_id == parts.entries.size() + i);
+    expect_page(parts.superblock.directory_offset + i * 4096, parts.directory[i].stored_bytes);
+  }
+  CHECK(file.size() == expected + 2 * kBlockBytes);
+  const std::span tail = std::span(file).last(2 * kBlockBytes);
+  CHECK(std::ranges::equal(tail.first(kBlockBytes), tail.last(kBlockBytes)));
+}
+
+TEST_CASE("writer: the same calls give the same bytes", "[store][writer]") {
+  const ScratchDirectory scratch;
+  write_sample(scratch / "a.ptcx", {});
+  write_sample(scratch / "b.ptcx", {});
+  CHECK((read_file(scratch / "a.ptcx") == read_file(scratch / "b.ptcx")));
+}
+
+TEST_CASE("writer: another uuid changes the bytes, not the content digest", "[store][writer]") {
+  const ScratchDirectory scratch;
+  SampleOptions options;
+  const Sample a = write_sample(scratch / "a.ptcx", options);
+  options.writer.uuid[3] = std::byte{99};
+  const Sample b = write_sample(scratch / "b.ptcx", options);
+  CHECK(a.superblock.content_xxh3 == b.superblock.content_xxh3);
+  CHECK((read_file(scratch / "a.ptcx") != read_file(scratch / "b.ptcx")));
+}
+
+TEST_CASE("writer: pages copied in their stored form give the same container", "[store][writer]") {
+  const ScratchDirectory scratch;
+  write_sample(scratch / "a.ptcx", {});
+  const ContainerReader from(scratch / "a.ptcx");
+  ContainerWriter to(scratch / "b.ptcx", {12, Codec::zstd, 1, from.header().uuid});
+  const std::uint32_t copied = from.page_count() - 1;  // the meta page is written anew
+  for (std::uint32_t page = 0; page < copied; ++page) CHECK(to.reserve_page() == page);
+  std::vector<std::byte> stored;
+  for (std::uint32_t page = copied; page-- > 0;) {
+    const PageHeader h = from.read_stored_page(page, stored);
+    const Facts facts{h.type, h.group, h.level, h.record_count, h.first_key, h.last_key};
+    to.write_stored_page(page, facts, h.codec, h.raw_bytes, stored);
+  }
+  to.finish(from.meta(), from.superblock());
+  CHECK((read_file(scratch / "a.ptcx") == read_file(scratch / "b.ptcx")));
+}
+
+TEST_CASE("writer: each reserved page must be written exactly once", "[store][writer]") {
+  const ScratchDirectory scratch;
+  Sample sample;
+  ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
+  write_unfinished(writer, {}, sample);
+  const auto& [facts, payload] = sample.pages[0];
+  CHECK_THROWS_AS(writer.write_page(0, facts, payload), std::invalid_argument);
+  const auto next = static_cast<std::uint32_t>(sample.pages.size());
+  CHECK_THROWS_AS(writer.write_page(next, facts, payload), std::invalid_argument);
+  CHECK(writer.reserve_page() == next);
+  CHECK_THROWS_AS(writer.finish(sample.meta, sample.superblock), std::invalid_argument);
+}
+
+TEST_CASE("writer: nothing follows finish()", "[store][writer]") {
+  const ScratchDirectory scratch;
+  Sample sample;
+  ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
+  write_unfinished(writer, {}, sample);
+  const std::uint32_t spare = 0;
+  sample.superblock = writer.finish(sample.meta, sample.superblock);
+  CHECK_THROWS_AS(writer.reserve_page(), std::invalid_argument);
+  CHECK_THROWS_AS(writer.write_page(spare, sample.pages[0].facts, sample.pages[0].payload),
+                  std::invalid_argument);
+  CHECK_THROWS_AS(writer.finish(sample.meta, sample.superblock), std::invalid_argument);
+}
+
+TEST_CASE("writer: a page that no reader would take is refused", "[store][writer]") {
+  const ScratchDirectory scratch;
+  Sample sample;
+  write_sample(scratch / "good.ptcx", {});
+  {
+    ContainerWriter good(scratch / "b.ptcx", {12, Codec::zstd, 1, {}});
+    write_unfinished(good, {}, sample);
+  }
+  ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
+  const std::uint32_t page = writer.reserve_page();
+  const Facts good = sample.pages[0].facts;
+  const std::vector<std::byte>& payload = sample.pages[0].payload;
+  const auto refused = [&](const Facts& facts, std::span<const std::byte> bytes) {
+    CHECK_THROWS_AS(writer.write_page(page, facts, bytes), std::invalid_argument);
+  };
+  Facts facts = good;
+  facts.type = PageType::meta;
+  refused(facts, payload);
+  facts.type = PageType::directory;
+  refused(facts, payload);
+  facts = good;
+  facts.record_count = 0;
+  refused(facts, payload);
+  facts = good;
+  facts.group = 1;
+  refused(facts, payload);
+  facts = good;
+  facts.level = 0;
+  refused(facts, payload);
+  facts = good;
+  std::swap(facts.first_key, facts.last_key);
+  refused(facts, payload);
+  refused(good, {});
+  refused(good, std::vector<std::byte>(4096 - 63));
+  const auto stored = [&](Codec codec, std::uint32_t raw_bytes, std::span<const std::byte> bytes) {
+    CHECK_THROWS_AS(writer.write_stored_page(page, good, codec, raw_bytes, bytes),
+                    std::invalid_argument);
+  };
+  const auto size = static_cast<std::uint32_t>(payload.size());
+  stored(Codec::raw, size + 1, payload);
+  stored(Codec::zstd, size, payload);
+  stored(Codec::raw, 0, payload);
+  stored(Codec::raw, size, {});
+  CHECK_NOTHROW(writer.write_page(page, good, payload));
+}
+
+TEST_CASE("writer: a superblock that the pages belie is refused", "[store][writer]") {
+  const ScratchDirectory scratch;
+  const auto refused = [&](const auto& lie) {
+    Sample sample;
+    ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
+    write_unfinished(writer, {}, sample);
+    lie(sample.superblock, sample.meta);
+    CHECK_THROWS_AS(writer.finish(sample.meta, sample.superblock), std::invalid_argument);
+  };
+  refused([](Superblock& s, Meta&) { ++s.points; });
+  refused([](Superblock& s, Meta&) { ++s.node_groups; });
+  refused([](Superblock& s, Meta&) { s.nodes = s.node_groups * 8 + 1; });
+  refused([](Superblock& s, Meta&) { s.root_page = 0; });
+  refused([](Superblock& s, Meta&) { s.root_slot = 1; });
+  refused([](Superblock& s, Meta&) { s.frame.edge = 3; });
+  refused([](Superblock&, Meta& m) { m.channels.pop_back(); });
+  refused([](Superblock&, Meta& m) { m.channels.push_back({"more", ChannelType::f32, 1, 9}); });
+  refused([](Superblock&, Meta& m) { m.text["long"] = std::string(5000, 'x'); });
+  refused([](Superblock& s, Meta&) { s.writer = std::string(64, 'x'); });
+  CHECK(scratch.files() == 0);
+}
+
+TEST_CASE("writer: a page size that there is not is refused before a file is made",
+          "[store][writer]") {
+  const ScratchDirectory scratch;
+  for (const std::uint8_t shift : {std::uint8_t{0}, std::uint8_t{11}, std::uint8_t{21}}) {
+    CHECK_THROWS_AS(ContainerWriter(scratch / "a.ptcx", {shift, Codec::zstd, 1, {}}),
+                    std::invalid_argument);
+  }
+  CHECK(scratch.files() == 0);
+}
+
+TEST_CASE("writer: without finish() neither target nor temporary is left", "[store][writer]") {
+  const ScratchDirectory scratch;
+  try {
+    Sample sample;
+    ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
+    write_unfinished(writer, {}, sample);
+    CHECK(scratch.files() == 1);
+    throw std::runtime_error("the build failed");
+  } catch (const std::runtime_error&) {
+  }
+  CHECK(scratch.files() == 0);
+}
+
+TEST_CASE("writer: a write that fails, at every block, leaves the old file as it was",
+          "[store][writer]") {
+  const ScratchDirectory scratch;
+  SampleOptions options;
+  options.points = 200;
+  write_sample(scratch / "whole.ptcx", options);
+  const std::size_t length = read_file(scratch / "whole.ptcx").size();
+  const std::vector<std::byte> old(100, std::byte{42});
+  write_file(scratch / "a.ptcx", old);
+  for (std::size_t limit = 0; limit < length; limit += kBlockBytes) {
+    {
+      const FileLimit full(limit);
+      CHECK_THROWS_AS(write_sample(scratch / "a.ptcx", options), std::system_error);
+    }
+    CHECK(scratch.files() == 2);
+    CHECK((read_file(scratch / "a.ptcx") == old));
+  }
+  const FileLimit enough(length);
+  write_sample(scratch / "a.ptcx", options);
+  CHECK((read_file(scratch / "a.ptcx") == read_file(scratch / "whole.ptcx")));
+}

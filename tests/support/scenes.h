@@ -1,0 +1,64 @@
+// Small scenes and containers for tests.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "engine/base/surfel.h"
+#include "engine/build/build.h"
+#include "engine/sort/external_sort.h"
+
+namespace ptc::test {
+
+/// A directory that is removed with all it holds.
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory();
+  ~TemporaryDirectory();
+  TemporaryDirectory(const TemporaryDirectory&) = delete;
+  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Records one block after another from a vector, at most `block` at once.
+class VectorStream : public PointStream {
+ public:
+  explicit VectorStream(std::vector<PointRecord> records, std::size_t block = 1000)
+      : records_(std::move(records)), block_(block) {}
+  std::size_t next(std::span<PointRecord> out) override;
+
+ private:
+  std::vector<PointRecord> records_;
+  std::size_t block_;
+  std::size_t at_ = 0;
+};
+
+/// Surfels as sorted records in the smallest frame around them.
+struct SortedScene {
+  Frame frame;
+  std::vector<PointRecord> records;
+};
+[[nodiscard]] SortedScene sort_scene(const std::vector<Surfel>& surfels);
+
+/// Writes the surfels to a container.
+void write_scene(const std::filesystem::path& target, const std::vector<Surfel>& surfels,
+                 const BuildOptions& options = {}, std::uint8_t page_shift = 12, Codec codec = Codec::zstd);
+
+/// A rectangle of n x m surfels: low corner, two edges; the normal is edge_u x edge_v.
+void add_rectangle(std::vector<Surfel>& surfels, const glm::dvec3& corner, const glm::dvec3& edge_u,
+                   const glm::dvec3& edge_v, double spacing, const glm::vec3& radiance);
+
+/// A sphere of about 4 pi r^2 / spacing^2 surfels, normals outwards.
+void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double radius, double spacing,
+                const glm::vec3& radiance);
+
+/// `count` surfels in the unit cube from a fixed stream, normals and radii at random.
+[[nodiscard]] std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed);
+
+}  // namespace ptc::test

@@ -1,0 +1,49 @@
+# Who may include whom, said once: ptc_add_layer() links a layer from this table, and
+# tests/layers.py reads every #include "..." of the tree against it.
+set(PTC_LAYERS_format "")
+set(PTC_LAYERS_engine/base "")
+set(PTC_LAYERS_engine/io "format;engine/base")
+set(PTC_LAYERS_engine/scene "format;engine/base;engine/io")
+set(PTC_LAYERS_engine/sort "format;engine/base;engine/io")
+set(PTC_LAYERS_engine/store "format;engine/base;engine/io")
+set(PTC_LAYERS_engine/build "format;engine/base;engine/io;engine/sort;engine/store")
+set(PTC_LAYERS_engine/cache "format;engine/base;engine/io;engine/store")
+set(PTC_LAYERS_engine/shade "format;engine/base;engine/io;engine/cache")
+set(PTC_LAYERS_engine "format;engine/base;engine/io;engine/scene;engine/sort;engine/store;engine/build;engine/cache;engine/shade")
+set(PTC_LAYERS_tools "${PTC_LAYERS_engine};engine;tools")
+
+add_library(ptc_options INTERFACE)
+target_compile_features(ptc_options INTERFACE cxx_std_20)
+# No contraction: a fused multiply-add in one build and not in another would change the bytes.
+target_compile_options(ptc_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+  -Wsign-conversion -Wno-missing-field-initializers -ffp-contract=off $<$<BOOL:${PTC_WERROR}>:-Werror>)
+if(PTC_SANITIZE)
+  target_compile_options(ptc_options INTERFACE -fsanitize=${PTC_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(ptc_options INTERFACE -fsanitize=${PTC_SANITIZE})
+endif()
+
+# ptc_add_layer(<path> SOURCES <files> HEADERS <files> [PUBLIC <libs>] [PRIVATE <libs>])
+# makes the static library ptc_<name>, alias ptc::<name>; its headers are included as "<path>/x.h".
+function(ptc_add_layer path)
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
+  get_filename_component(name ${path} NAME)
+  add_library(ptc_${name} STATIC ${ARG_SOURCES})
+  add_library(ptc::${name} ALIAS ptc_${name})
+  target_sources(ptc_${name} PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR}
+    FILES ${ARG_HEADERS})
+  set_target_properties(ptc_${name} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
+  target_link_libraries(ptc_${name} PUBLIC ptc_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  foreach(layer IN LISTS PTC_LAYERS_${path})
+    get_filename_component(dependency ${layer} NAME)
+    target_link_libraries(ptc_${name} PUBLIC ptc::${dependency})
+  endforeach()
+endfunction()
+
+# ptc_add_tests(<name> SOURCES <files> LINK <libs>) makes test_<name> and registers every TEST_CASE.
+function(ptc_add_tests name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(test_${name} ${ARG_SOURCES})
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(test_${name} PRIVATE ptc_options Catch2::Catch2WithMain ${ARG_LINK})
+  catch_discover_tests(test_${name} TEST_PREFIX "${name}: " PROPERTIES TIMEOUT 300)
+endfunction()

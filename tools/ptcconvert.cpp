@@ -1,0 +1,87 @@
+// ptcconvert: containers to clouds, clouds and meshes to containers, containers to containers.
+#include <fmt/format.h>
+
+#include "engine/convert.h"
+#include "tools/common.h"
+#include "tools/options.h"
+#include "tools/report.h"
+
+namespace {
+
+constexpr char kPurpose[] =
+    "Converts by the names' endings: a container to .ply (with all channels) or .xyz, a cloud or a\n"
+    "mesh to .ptcx, a container to .ptcx in another codec or page size.";
+constexpr char kExamples[] =
+    "  ptcconvert lit.ptcx lit.ply\n"
+    "  ptcconvert scan.xyz scan.ptcx --temp /scratch\n"
+    "  ptcconvert scene.ptcx fast.ptcx --codec raw --page-size 16K\n";
+
+struct Arguments {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  ptc::Codec codec = ptc::Codec::zstd;
+  std::uint8_t page_shift = 16;
+  bool page_size_given = false;
+  ptc::SamplingOptions sampling;
+};
+
+ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
+                         ptc::Progress& progress) {
+  ptc::BuildRequest request;
+  request.inputs = {arguments.input};
+  request.sampling = arguments.sampling;
+  request.codec = arguments.codec;
+  request.page_shift = arguments.page_shift;
+  request.run = run;
+  if (ptc::meshes_are_dark(request)) request.lights = ptc::LightArguments::default_rig();
+  ptc::BuildReport built = ptc::build_container(request, arguments.output, progress);
+  return {.points = built.superblock.points,
+          .superblock = built.superblock,
+          .seconds = std::move(built.seconds)};
+}
+
+ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& run,
+                           ptc::Progress& progress) {
+  const bool to_container = ptc::has_ending(arguments.output, ".ptcx");
+  if (!ptc::is_container(arguments.input)) {
+    if (to_container) return build(arguments, run, progress);
+    throw CLI::ValidationError("output", "clouds and meshes are converted to .ptcx only; '" +
+                                             arguments.output.string() + "' is no such name");
+  }
+  const ptc::ContainerReader container(arguments.input);
+  if (ptc::has_ending(arguments.output, ".ply")) {
+    return ptc::container_to_ply(container, arguments.output, progress);
+  }
+  if (ptc::has_ending(arguments.output, ".xyz")) {
+    return ptc::container_to_xyz(container, arguments.output, progress);
+  }
+  ptc::RecodeOptions options{.codec = arguments.codec};
+  if (arguments.page_size_given) options.page_shift = arguments.page_shift;
+  return ptc::recode_container(container, arguments.output, options, progress);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ptc::Command command("ptcconvert", kPurpose, kExamples);
+  Arguments arguments;
+  command.add_input("input", arguments.input, "Container, cloud or mesh")->required();
+  command.add_output("output", arguments.output, {".ptcx", ".ply", ".xyz"},
+                     "What to write: .ptcx, .ply or .xyz");
+  ptc::add_points(command.app(), arguments.sampling.count);
+  ptc::add_codec(command.app(), arguments.codec)->group("Container");
+  const CLI::Option* page_size =
+      ptc::add_page_size(command.app(), arguments.page_shift)->group("Container");
+  return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
+    arguments.page_size_given = page_size->count() > 0;
+    const ptc::ConvertReport report = convert(arguments, command.run_options(), progress);
+    const std::uint64_t bytes = std::filesystem::file_size(arguments.output);
+    nlohmann::ordered_json facts{{"output", arguments.output.string()}, {"points", report.points}};
+    if (report.superblock) facts.update(ptc::container_facts(*report.superblock));
+    facts["bytes"]["file"] = bytes;
+    facts["seconds"] = ptc::facts_of(report.seconds);
+    return {facts, fmt::format("{}: {} points, {}, {:.2f} s\n", arguments.output.string(),
+                               report.points, ptc::bytes_text(bytes),
+                               ptc::total_seconds(report.seconds))};
+  });
+}

@@ -1,0 +1,119 @@
+#include "tools/report.h"
+
+#include <fmt/format.h>
+
+#include <numeric>
+
+#include "engine/base/progress_text.h"
+
+namespace ptc {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+ordered_json facts_of(const CheckError& error) {
+  return {{"occlusion_rms", error.occlusion_rms},     {"occlusion_bias", error.occlusion_bias},
+          {"occlusion_mean", error.occlusion_mean},   {"irradiance_rms", error.irradiance_rms},
+          {"irradiance_bias", error.irradiance_bias}, {"irradiance_mean", error.irradiance_mean}};
+}
+
+std::string check_line(const char* against, const CheckError& error) {
+  return fmt::format("  against rays at the {}: occlusion rms {:.4f} bias {:+.4f}, irradiance rms "
+                     "{:.2f} % bias {:+.2f} %\n",
+                     against, error.occlusion_rms, error.occlusion_bias, 100 * error.irradiance_rms,
+                     100 * error.irradiance_bias);
+}
+
+}  // namespace
+
+ordered_json container_facts(const Superblock& superblock) {
+  const FileHeader& header = superblock.header;
+  return {{"format_version", fmt::format("{}.{}", header.major, header.minor)},
+          {"points", superblock.points},
+          {"nodes", superblock.nodes},
+          {"node_groups", superblock.node_groups},
+          {"levels", superblock.levels},
+          {"bounds", {{"low", superblock.bounds_low}, {"high", superblock.bounds_high}}},
+          {"pages", superblock.page_count},
+          {"page_size", std::uint64_t{1} << header.page_shift},
+          {"bytes", {{"file", superblock.file_bytes}}}};
+}
+
+ordered_json facts_of(const SortStatistics& sort) {
+  return {{"points", sort.points}, {"spilled_bytes", sort.spilled_bytes}, {"buckets", sort.buckets}};
+}
+
+ordered_json facts_of(const CacheStatistics& cache) {
+  return {{"lookups", cache.lookups},         {"local_hits", cache.local_hits},
+          {"shared_hits", cache.shared_hits}, {"misses", cache.misses},
+          {"hit_rate", cache.hit_rate()},     {"evictions", cache.evictions},
+          {"bytes_read", cache.bytes_read},   {"frames", cache.frames},
+          {"peak_frames", cache.peak_frames}};
+}
+
+ordered_json facts_of(const GatherCounts& counts) {
+  return {{"receivers", counts.receivers},         {"cells", counts.cells},
+          {"groups", counts.groups},               {"surfel_blocks", counts.surfel_blocks},
+          {"clusters", counts.clusters},           {"surfels", counts.surfels}};
+}
+
+ordered_json facts_of(const StageSeconds& seconds) {
+  ordered_json json = ordered_json::object();
+  for (const auto& [stage, time] : seconds) json[stage] = time;
+  json["total"] = total_seconds(seconds);
+  return json;
+}
+
+ordered_json facts_of(const CheckReport& check) {
+  ordered_json facts{{"receivers", check.receivers},
+                     {"rays", check.rays},
+                     {"discs", facts_of(check.discs)},
+                     {"disc_microseconds", check.disc_microseconds}};
+  if (check.mesh) {
+    facts["mesh"] = facts_of(*check.mesh);
+    facts["mesh_microseconds"] = check.mesh_microseconds;
+  }
+  return facts;
+}
+
+ordered_json facts_of(const ShadeReport& report) {
+  ordered_json facts{{"receivers", report.receivers},
+                     {"shade_cpu_seconds", report.shade_cpu_seconds},
+                     {"gather", facts_of(report.gather)},
+                     {"cache", facts_of(report.cache)}};
+  if (report.check) facts["check"] = facts_of(*report.check);
+  facts["seconds"] = facts_of(report.seconds);
+  return facts;
+}
+
+std::string shade_text(const std::string& output, const ShadeReport& report) {
+  std::string text =
+      fmt::format("{}: {} receivers, {:.2f} s, {:.2f} % cache hits\n{}", output, report.receivers,
+                  total_seconds(report.seconds), 100 * report.cache.hit_rate(),
+                  stages_text(report.seconds));
+  if (!report.check) return text;
+  text += check_line("surfels", report.check->discs);
+  if (report.check->mesh) text += check_line("mesh", *report.check->mesh);
+  return text;
+}
+
+double total_seconds(const StageSeconds& seconds) {
+  return std::accumulate(seconds.begin(), seconds.end(), 0.0,
+                         [](double sum, const auto& stage) { return sum + stage.second; });
+}
+
+std::string bytes_text(std::uint64_t bytes) {
+  const std::string count = format_count(static_cast<double>(bytes));
+  return count.find(' ') == std::string::npos ? count + " B" : count + "B";
+}
+
+std::string stages_text(const StageSeconds& seconds) {
+  std::string text;
+  for (const auto& [stage, time] : seconds) {
+    text += fmt::format("{}{} {:.2f} s", text.empty() ? "  " : ", ", stage, time);
+  }
+  return text.empty() ? text : text + "\n";
+}
+
+}  // namespace ptc
