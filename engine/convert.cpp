@@ -102,7 +102,8 @@ class PageCursor {
     float* place = values.data();
     while (!rest.empty()) {  // channels are by group
       const std::uint16_t group = rest.front().group;
-      const auto last = std::ranges::find_if(rest, [&](const Channel& c) { return c.group != group; });
+      const auto last =
+          std::ranges::find_if(rest, [&](const Channel& c) { return c.group != group; });
       const auto channels = rest.first(static_cast<std::size_t>(last - rest.begin()));
       read(container_.attribute_pages(group)[page_]);
       spread_columns(channels, payload_.data(), count, place, floats_);
@@ -120,7 +121,7 @@ class PageCursor {
 
 /// A channel as PLY columns: dots become '_', as do ends of names that PlyWriter uses itself.
 std::vector<PointColumn> columns_of(const Meta& meta) {
-  static const std::set<std::string> kTaken{"x",  "y",     "z",  "nx",       "ny", "nz",
+  static const std::set<std::string> kTaken{"x",      "y",   "z",     "nx",   "ny",      "nz",
                                             "radius", "red", "green", "blue", "radiance"};
   std::set<std::string> seen = kTaken;
   std::vector<PointColumn> columns;
@@ -185,7 +186,8 @@ class GroupPager {
         payload_(container.page_payload_limit()),
         point_bytes_(group_point_bytes(container.meta().channels, group)) {
     for (const Channel& channel : container.meta().channels) {
-      if (channel.group == group) widths_.insert(widths_.end(), channel.components, channel_bytes(channel.type));
+      if (channel.group == group)
+        widths_.insert(widths_.end(), channel.components, channel_bytes(channel.type));
     }
   }
 

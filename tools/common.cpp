@@ -113,8 +113,7 @@ void Command::add_common_options() {
       ->type_name("DIR")
       ->check(CLI::Validator(CLI::ExistingDirectory).description(""))
       ->group(kGroup);
-  app_.add_flag("--progress", progress_,
-                "Show stages on stderr: on a terminal a bar, else lines")
+  app_.add_flag("--progress", progress_, "Show stages on stderr: on a terminal a bar, else lines")
       ->group(kGroup);
   app_.add_flag("--quiet", quiet_, "No progress and no summary")->group(kGroup);
   app_.add_flag("--json", json_, "Print facts and statistics as JSON, not a summary")

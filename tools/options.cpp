@@ -57,7 +57,8 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
 glm::vec3 parse_colour(const std::string& option, const std::string& text) {
   constexpr char kExpected[] = "R,G,B or one number for grey, none negative";
   const std::vector<double> n = parse_numbers(option, text, {1, 3}, kExpected);
-  const glm::vec3 colour = n.size() == 1 ? glm::vec3(glm::dvec3(n[0])) : glm::vec3(n[0], n[1], n[2]);
+  const glm::vec3 colour =
+      n.size() == 1 ? glm::vec3(glm::dvec3(n[0])) : glm::vec3(n[0], n[1], n[2]);
   for (int c = 0; c < 3; ++c) {
     if (!(colour[c] >= 0 && colour[c] <= 1e30F)) refuse(option, text, kExpected);
   }
@@ -129,10 +130,16 @@ std::uint64_t parse_count(const std::string& option, const std::string& text) {
 
 std::uint64_t parse_size(const std::string& option, const std::string& text) {
   constexpr double kGreatest = 0x1p62;
-  const double bytes =
-      parse_scaled(text, {{"K", 0x1p10}, {"M", 0x1p20}, {"G", 0x1p30}, {"T", 0x1p40},
-                          {"KiB", 0x1p10}, {"MiB", 0x1p20}, {"GiB", 0x1p30}, {"TiB", 0x1p40}});
-  if (!(bytes >= 1 && bytes <= kGreatest)) refuse(option, text, "a size as 800000000, 256M or 1.5G");
+  const double bytes = parse_scaled(text, {{"K", 0x1p10},
+                                           {"M", 0x1p20},
+                                           {"G", 0x1p30},
+                                           {"T", 0x1p40},
+                                           {"KiB", 0x1p10},
+                                           {"MiB", 0x1p20},
+                                           {"GiB", 0x1p30},
+                                           {"TiB", 0x1p40}});
+  if (!(bytes >= 1 && bytes <= kGreatest))
+    refuse(option, text, "a size as 800000000, 256M or 1.5G");
   return static_cast<std::uint64_t>(bytes);
 }
 
@@ -173,7 +180,8 @@ CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& byt
           name, [&bytes, name](const std::string& text) { bytes = parse_size(name, text); },
           description)
       ->type_name("SIZE")
-      ->default_str(whole ? std::to_string(mebibytes / 1024) + "G" : std::to_string(mebibytes) + "M");
+      ->default_str(whole ? std::to_string(mebibytes / 1024) + "G"
+                          : std::to_string(mebibytes) + "M");
 }
 
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count) {
@@ -216,7 +224,8 @@ void LightArguments::declare(CLI::App& app) {
       ->type_name("AZIMUTH,ELEVATION[,STRENGTH]")
       ->group(kGroup);
   app.add_option_function<std::string>(
-         "--sun-colour", [this](const std::string& t) { sun_colour_ = parse_colour("--sun-colour", t); },
+         "--sun-colour",
+         [this](const std::string& t) { sun_colour_ = parse_colour("--sun-colour", t); },
          "Multiplies the strength of all suns")
       ->type_name("R,G,B")
       ->default_str("1,1,1")
@@ -248,12 +257,14 @@ void LightArguments::declare_sky(CLI::App& app) {
 }
 
 void LightArguments::set_suns(const std::vector<std::string>& values) {
-  constexpr char kExpected[] = "AZIMUTH,ELEVATION[,STRENGTH], elevation -90 to 90, strength not negative";
+  constexpr char kExpected[] =
+      "AZIMUTH,ELEVATION[,STRENGTH], elevation -90 to 90, strength not negative";
   suns_.clear();
   for (const std::string& text : values) {
     const std::vector<double> n = parse_numbers("--sun", text, {2, 3}, kExpected);
     const double strength = n.size() == 3 ? n[2] : 3;
-    if (std::abs(n[1]) > 90 || !(strength >= 0 && strength <= 1e30)) refuse("--sun", text, kExpected);
+    if (std::abs(n[1]) > 90 || !(strength >= 0 && strength <= 1e30))
+      refuse("--sun", text, kExpected);
     suns_.push_back({.to_sun = sun_direction(n[0], n[1]),
                      .irradiance = glm::vec3(static_cast<float>(strength))});
   }
@@ -365,11 +376,8 @@ void CameraArguments::declare(CLI::App& app, const std::string& purpose) {
       ->check(detail::in_range(0.01, 179))
       ->needs("--camera")
       ->group("Camera");
-}
-
-void CameraArguments::declare_size(CLI::App& app) {
   app.add_option_function<std::string>(
-         "--size", [this](const std::string& text) { set_size(text); }, "Pixels of the picture")
+         "--size", [this](const std::string& text) { set_size(text); }, "Pixels of its picture")
       ->type_name("WIDTHxHEIGHT")
       ->default_str(std::to_string(camera_.width) + "x" + std::to_string(camera_.height))
       ->group("Camera");
@@ -394,9 +402,9 @@ void CameraArguments::set_size(const std::string& text) {
     }
     return *pixels;
   };
-  const std::string_view height = cross == std::string::npos ? "" : std::string_view(text).substr(cross + 1);
-  size_ = {side(std::string_view(text).substr(0, cross)), side(height)};
-  size_ = {{camera_.width, camera_.height}};
+  if (cross == std::string::npos) refuse("--size", text, "WIDTHxHEIGHT, as 960x540");
+  const std::string_view whole = text;
+  size_ = {side(whole.substr(0, cross)), side(whole.substr(cross + 1))};
 }
 
 std::optional<Camera> CameraArguments::camera() const {

@@ -29,11 +29,13 @@ struct Arguments {
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   CLI::App& app = command.app();
   ptc::BuildRequest& request = arguments.request;
-  CLI::Option* inputs = command.add_inputs(
-      "inputs", request.inputs, "Meshes (OBJ, PLY, OFF, glTF, GLB) and clouds (PLY, XYZ), also .gz");
+  CLI::Option* inputs =
+      command.add_inputs("inputs", request.inputs,
+                         "Meshes (OBJ, PLY, OFF, glTF, GLB) and clouds (PLY, XYZ), also .gz");
   command.add_output("-o,--output", arguments.output, {".ptcx"}, "The container to write");
   app.add_option_function<std::string>(
-         "--city", [&](const std::string& t) { request.city_points = ptc::parse_count("--city", t); },
+         "--city",
+         [&](const std::string& t) { request.city_points = ptc::parse_count("--city", t); },
          "A procedural city of about so many points, no inputs")
       ->type_name("COUNT")
       ->excludes(inputs);
@@ -53,7 +55,8 @@ void declare_sampling(CLI::App& app, Arguments& arguments) {
   ptc::add_number(app, "--pixels-per-surfel", sampling.pixels_per_surfel, 0.01, 1000,
                   "At most so many pixels between neighbours in its view")
       ->group("Camera");
-  ptc::add_number(app, "--finest", sampling.finest, 0.001, 1, "But never below this share of the spacing")
+  ptc::add_number(app, "--finest", sampling.finest, 0.001, 1,
+                  "But never below this share of the spacing")
       ->group("Camera");
 }
 
@@ -95,11 +98,10 @@ ptc::Outcome build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progre
   facts.update(ptc::container_facts(made));
   facts["sort"] = ptc::facts_of(report.sort);
   facts["seconds"] = ptc::facts_of(report.seconds);
-  return {facts,
-          fmt::format("{}: {} points, {} nodes on {} levels, {} pages, {}, {:.2f} s\n{}",
-                      arguments.output.string(), made.points, made.nodes, made.levels,
-                      made.page_count, ptc::bytes_text(made.file_bytes),
-                      ptc::total_seconds(report.seconds), ptc::stages_text(report.seconds))};
+  return {facts, fmt::format("{}: {} points, {} nodes on {} levels, {} pages, {}, {:.2f} s\n{}",
+                             arguments.output.string(), made.points, made.nodes, made.levels,
+                             made.page_count, ptc::bytes_text(made.file_bytes),
+                             ptc::total_seconds(report.seconds), ptc::stages_text(report.seconds))};
 }
 
 }  // namespace

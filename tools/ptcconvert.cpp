@@ -9,7 +9,8 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Converts by the names' endings: a container to .ply (with all channels) or .xyz, a cloud or a\n"
+    "Converts by the names' endings: a container to .ply (with all channels) or .xyz, a cloud or "
+    "a\n"
     "mesh to .ptcx, a container to .ptcx in another codec or page size.";
 constexpr char kExamples[] =
     "  ptcconvert lit.ptcx lit.ply\n"
@@ -80,8 +81,8 @@ int main(int argc, char** argv) {
     if (report.superblock) facts.update(ptc::container_facts(*report.superblock));
     facts["bytes"]["file"] = bytes;
     facts["seconds"] = ptc::facts_of(report.seconds);
-    return {facts, fmt::format("{}: {} points, {}, {:.2f} s\n", arguments.output.string(),
-                               report.points, ptc::bytes_text(bytes),
-                               ptc::total_seconds(report.seconds))};
+    return {facts,
+            fmt::format("{}: {} points, {}, {:.2f} s\n", arguments.output.string(), report.points,
+                        ptc::bytes_text(bytes), ptc::total_seconds(report.seconds))};
   });
 }

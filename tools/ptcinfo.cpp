@@ -14,7 +14,8 @@ using nlohmann::ordered_json;
 constexpr char kPurpose[] = "Prints what a container holds; reads none of its points and nodes.";
 constexpr char kExamples[] =
     "  ptcinfo scene.ptcx\n"
-    "  ptcinfo scene.ptcx --json | python3 -c 'import json,sys; print(json.load(sys.stdin)[\"points\"])'\n";
+    "  ptcinfo scene.ptcx --json | python3 -c 'import json,sys; "
+    "print(json.load(sys.stdin)[\"points\"])'\n";
 
 std::string type_name(ptc::ChannelType type) {
   switch (type) {
@@ -120,10 +121,10 @@ std::string summary_of(const ordered_json& facts) {
       "  bounds    {} {} {} to {} {} {}\n"
       "  bytes     {}: points {}, nodes {}, channels {}; codec {}\n",
       facts["file"].get<std::string>(), facts["format_version"].get<std::string>(),
-      facts["writer"].dump(), facts["points"].dump(),
-      facts["page_counts"]["point"].dump(), ptc::bytes_text(facts["page_size"].get<std::uint64_t>()),
-      facts["nodes"].dump(), facts["node_groups"].dump(), facts["levels"].dump(), low[0].dump(),
-      low[1].dump(), low[2].dump(), high[0].dump(), high[1].dump(), high[2].dump(), bytes("file"),
+      facts["writer"].dump(), facts["points"].dump(), facts["page_counts"]["point"].dump(),
+      ptc::bytes_text(facts["page_size"].get<std::uint64_t>()), facts["nodes"].dump(),
+      facts["node_groups"].dump(), facts["levels"].dump(), low[0].dump(), low[1].dump(),
+      low[2].dump(), high[0].dump(), high[1].dump(), high[2].dump(), bytes("file"),
       bytes("point_pages"), bytes("node_pages"), bytes("attribute_pages"),
       facts["codec"].get<std::string>());
   for (const auto& channel : facts["channels"]) {

@@ -100,7 +100,6 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   request.run = run;
   request.camera = arguments.camera.camera();
   request.size = arguments.camera.size();
-  request.size = arguments.camera.size();
   if (arguments.lights.given()) request.lights = arguments.lights.rig();
   std::vector<ptc::PictureTarget> targets = arguments.layers;
   for (const auto& output : arguments.outputs) targets.push_back({.path = output});

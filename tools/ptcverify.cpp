@@ -10,7 +10,8 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Walks every page of a container: checksums, order, references, node sums. Names the offset and\n"
+    "Walks every page of a container: checksums, order, references, node sums. Names the offset "
+    "and\n"
     "the rule of the first thing that is wrong, and exits with 1.";
 constexpr char kExamples[] =
     "  ptcverify scene.ptcx\n"
@@ -25,8 +26,8 @@ int main(int argc, char** argv) {
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     const ptc::RunOptions& run = command.run_options();
     const auto start = std::chrono::steady_clock::now();
-    const ptc::VerifyReport report =
-        ptc::verify_container(file, {.memory_bytes = run.memory_bytes, .threads = run.threads}, progress);
+    const ptc::VerifyReport report = ptc::verify_container(
+        file, {.memory_bytes = run.memory_bytes, .threads = run.threads}, progress);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     return {{{"file", file.string()},
              {"valid", true},

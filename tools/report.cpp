@@ -19,10 +19,11 @@ ordered_json facts_of(const CheckError& error) {
 }
 
 std::string check_line(const char* against, const CheckError& error) {
-  return fmt::format("  against rays at the {}: occlusion rms {:.4f} bias {:+.4f}, irradiance rms "
-                     "{:.2f} % bias {:+.2f} %\n",
-                     against, error.occlusion_rms, error.occlusion_bias, 100 * error.irradiance_rms,
-                     100 * error.irradiance_bias);
+  return fmt::format(
+      "  against rays at the {}: occlusion rms {:.4f} bias {:+.4f}, irradiance rms "
+      "{:.2f} % bias {:+.2f} %\n",
+      against, error.occlusion_rms, error.occlusion_bias, 100 * error.irradiance_rms,
+      100 * error.irradiance_bias);
 }
 
 }  // namespace
@@ -41,7 +42,8 @@ ordered_json container_facts(const Superblock& superblock) {
 }
 
 ordered_json facts_of(const SortStatistics& sort) {
-  return {{"points", sort.points}, {"spilled_bytes", sort.spilled_bytes}, {"buckets", sort.buckets}};
+  return {
+      {"points", sort.points}, {"spilled_bytes", sort.spilled_bytes}, {"buckets", sort.buckets}};
 }
 
 ordered_json facts_of(const CacheStatistics& cache) {
@@ -53,9 +55,9 @@ ordered_json facts_of(const CacheStatistics& cache) {
 }
 
 ordered_json facts_of(const GatherCounts& counts) {
-  return {{"receivers", counts.receivers},         {"cells", counts.cells},
-          {"groups", counts.groups},               {"surfel_blocks", counts.surfel_blocks},
-          {"clusters", counts.clusters},           {"surfels", counts.surfels}};
+  return {{"receivers", counts.receivers}, {"cells", counts.cells},
+          {"groups", counts.groups},       {"surfel_blocks", counts.surfel_blocks},
+          {"clusters", counts.clusters},   {"surfels", counts.surfels}};
 }
 
 ordered_json facts_of(const StageSeconds& seconds) {
@@ -88,10 +90,9 @@ ordered_json facts_of(const ShadeReport& report) {
 }
 
 std::string shade_text(const std::string& output, const ShadeReport& report) {
-  std::string text =
-      fmt::format("{}: {} receivers, {:.2f} s, {:.2f} % cache hits\n{}", output, report.receivers,
-                  total_seconds(report.seconds), 100 * report.cache.hit_rate(),
-                  stages_text(report.seconds));
+  std::string text = fmt::format("{}: {} receivers, {:.2f} s, {:.2f} % cache hits\n{}", output,
+                                 report.receivers, total_seconds(report.seconds),
+                                 100 * report.cache.hit_rate(), stages_text(report.seconds));
   if (!report.check) return text;
   text += check_line("surfels", report.check->discs);
   if (report.check->mesh) text += check_line("mesh", *report.check->mesh);

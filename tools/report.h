@@ -18,7 +18,8 @@ namespace ptc {
 [[nodiscard]] nlohmann::ordered_json facts_of(const CheckReport& check);
 [[nodiscard]] nlohmann::ordered_json facts_of(const ShadeReport& report);
 
-/// "lit.ply: 1000 receivers, 1.20 s, 99.1 % cache hits", the stages, and the check if there was one.
+/// "lit.ply: 1000 receivers, 1.20 s, 99.1 % cache hits", the stages, and the check if there was
+/// one.
 [[nodiscard]] std::string shade_text(const std::string& output, const ShadeReport& report);
 /// Sum over all stages.
 [[nodiscard]] double total_seconds(const StageSeconds& seconds);

@@ -30,6 +30,18 @@ bool set_cone_axis(NodeSummary& node) {
   return true;
 }
 
+/// Cosine of the angle between a direction and the cone's axis, neither quite of unit length.
+double cosine_to_axis(const NodeSummary& node, const std::array<float, 3>& n) {
+  const Vec3 a{node.cone_axis[0], node.cone_axis[1], node.cone_axis[2]}, b{n[0], n[1], n[2]};
+  return std::clamp(dot(a, b) / std::sqrt(dot(a, a) * dot(b, b)), -1.0, 1.0);
+}
+
+/// The greatest float not above x, so that a cone never loses a normal to rounding.
+float round_down(double x) {
+  const auto nearest = static_cast<float>(x);
+  return static_cast<double>(nearest) <= x ? nearest : std::nextafter(nearest, -2.0F);
+}
+
 /// One colour for all directions where the surfels face nearly the same way: there the split by
 /// axis only adds quantisation (measured in spec/nodes.md#summary).
 void flatten(NodeSummary& node) {
@@ -82,8 +94,7 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
     node.radius = std::max(node.radius, distance(position(p), node.mean) + static_cast<double>(p.radius) / unit);
     if (!has_axis) continue;
     const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
-    const float cosine = n[0] * node.cone_axis[0] + n[1] * node.cone_axis[1] + n[2] * node.cone_axis[2];
-    node.cone_cos = std::clamp(cosine, -1.0F, node.cone_cos);
+    node.cone_cos = std::min(node.cone_cos, round_down(cosine_to_axis(node, n)));
   }
   flatten(node);
   return node;
@@ -107,13 +118,10 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
   double angle = set_cone_axis(sum) ? 0 : M_PI;
   for (const NodeSummary* node : nodes) {
     sum.radius = std::max(sum.radius, distance(node->mean, sum.mean) + node->radius);
-    const double cosine = static_cast<double>(sum.cone_axis[0] * node->cone_axis[0] +
-                                              sum.cone_axis[1] * node->cone_axis[1] +
-                                              sum.cone_axis[2] * node->cone_axis[2]);
-    angle = std::max(angle, std::acos(std::clamp(cosine, -1.0, 1.0)) +
-                                std::acos(std::clamp(static_cast<double>(node->cone_cos), -1.0, 1.0)));
+    const double half = std::acos(std::clamp(static_cast<double>(node->cone_cos), -1.0, 1.0));
+    angle = std::max(angle, std::acos(cosine_to_axis(sum, node->cone_axis)) + half);
   }
-  sum.cone_cos = angle >= M_PI ? -1.0F : static_cast<float>(std::cos(angle));
+  sum.cone_cos = angle >= M_PI ? -1.0F : round_down(std::cos(angle));
   flatten(sum);
   return sum;
 }

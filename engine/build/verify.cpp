@@ -48,8 +48,9 @@ class FileCheck {
                                 3 * page * executor_.threads() + 100 * superblock.leaf_points;
     const std::uint64_t least = fixed + kLeastCachedPages * page;
     if (options.memory_bytes < least) {
-      throw std::invalid_argument(fmt::format(
-          "the memory cap is too small for this file: the least that works is {}M", (least >> 20) + 1));
+      throw std::invalid_argument(
+          fmt::format("the memory cap is too small for this file: the least that works is {}M",
+                      (least >> 20) + 1));
     }
     cached_pages_ = static_cast<std::size_t>(
         std::min<std::uint64_t>(kMostCachedPages, (options.memory_bytes - fixed) / page));
@@ -110,9 +111,8 @@ class FileCheck {
       if (!buffers[thread]) buffers[thread] = std::make_unique<PageBuffer>(container_);
       try {
         check_page(order[i], *buffers[thread]);
-        const std::uint64_t next =
-            i + 1 < order.size() ? container_.entry(order[i + 1]).offset
-                                 : container_.superblock().directory_offset;
+        const std::uint64_t next = i + 1 < order.size() ? container_.entry(order[i + 1]).offset
+                                                        : container_.superblock().directory_offset;
         check_zero({extent(order[i]).end, next});
         progress.advance(1);
       } catch (...) {
@@ -128,7 +128,8 @@ class FileCheck {
   }
 
   struct PageBuffer {
-    explicit PageBuffer(const ContainerReader& container) : payload(container.page_payload_limit()) {}
+    explicit PageBuffer(const ContainerReader& container)
+        : payload(container.page_payload_limit()) {}
     PageDecoder decoder;
     std::vector<std::byte> payload;
   };
@@ -142,9 +143,11 @@ class FileCheck {
   void check_directory_padding() const {
     const Superblock& superblock = container_.superblock();
     const std::uint32_t full = directory_entries_per_page(superblock.header);
-    const std::uint64_t entries = superblock.page_count - (superblock.directory_pages - 1) * std::uint64_t{full};
-    const std::uint64_t last = superblock.directory_offset +
-                               (std::uint64_t{superblock.directory_pages - 1} << superblock.header.page_shift);
+    const std::uint64_t entries =
+        superblock.page_count - (superblock.directory_pages - 1) * std::uint64_t{full};
+    const std::uint64_t last =
+        superblock.directory_offset +
+        (std::uint64_t{superblock.directory_pages - 1} << superblock.header.page_shift);
     check_zero({last + kPageHeaderBytes + entries * kDirectoryEntryBytes,
                 superblock.file_bytes - 2 * kBlockBytes});
   }
@@ -152,7 +155,8 @@ class FileCheck {
   void check_zero(Extent gap) const {
     std::array<std::byte, 2 * kBlockBytes> block;
     while (gap.begin < gap.end) {
-      const auto part = std::span(block).first(std::min<std::uint64_t>(block.size(), gap.end - gap.begin));
+      const auto part =
+          std::span(block).first(std::min<std::uint64_t>(block.size(), gap.end - gap.begin));
       file_.read_at(gap.begin, part);
       const auto found = std::ranges::find_if(part, [](std::byte b) { return b != std::byte{0}; });
       if (found != part.end()) {
@@ -170,15 +174,18 @@ class FileCheck {
       const PointPage points(buffer.payload.data(), header.record_count);
       if (points[0].key.high != header.first_key ||
           points[points.size() - 1].key.high != header.last_key) {
-        fail(offset + 32, kPageKeys, fmt::format("page {}: keys are not those of its points", page));
+        fail(offset + 32, kPageKeys,
+             fmt::format("page {}: keys are not those of its points", page));
       }
     }
     if (header.type == PageType::node) {
       const NodePage nodes(buffer.payload.data(), header.record_count);
       int least = kMaxLevel;
-      for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) least = std::min(least, nodes[slot].level());
+      for (std::uint32_t slot = 0; slot < nodes.size(); ++slot)
+        least = std::min(least, nodes[slot].level());
       if (least != header.level) {
-        fail(offset + 22, kPageLevel, fmt::format("page {}: level is not the least of its groups", page));
+        fail(offset + 22, kPageLevel,
+             fmt::format("page {}: level is not the least of its groups", page));
       }
     }
   }

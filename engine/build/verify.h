@@ -16,7 +16,7 @@ struct VerifyOptions {
 /// What a check went over.
 struct VerifyReport {
   std::uint64_t file_bytes = 0;
-  std::uint64_t pages = 0;   ///< those in the directory
+  std::uint64_t pages = 0;  ///< those in the directory
   std::uint64_t points = 0;
   std::uint64_t nodes = 0;
   std::uint64_t groups = 0;

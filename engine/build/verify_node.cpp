@@ -17,9 +17,9 @@ constexpr char kSphere[] = "spec/nodes.md#node-sphere";
 constexpr char kSums[] = "spec/nodes.md#node-sums";
 constexpr char kCone[] = "spec/nodes.md#node-cone";
 
-constexpr double kRelative = 1e-6;      // sums in another order
+constexpr double kRelative = 1e-6;        // sums in another order
 constexpr double kLatticeSlack = 0x1p-8;  // the same for positions up to 2^42 in double
-constexpr double kAngleSlack = 1e-6;    // normals and axes are unit to float precision
+constexpr double kAngleSlack = 1e-6;      // normals and axes are unit to float precision
 
 constexpr double kGreatestUfloat16 = 0x1.ffp127;
 constexpr double kLeastUfloat16 = 0x1p-134;
@@ -55,8 +55,9 @@ std::optional<Fault> compare_mean(const NodeSummary& stored, const NodeSummary& 
     const double off = exact.mean[k] - stored.mean[k];
     const bool at_end = off > 0 && std::fmod(stored.mean[k], edge) == edge - step;
     if (std::abs(off) > (at_end ? 1.0 : 0.5) * step + kLatticeSlack) {
-      return Fault{kMean, fmt::format("mean position {} along {} is that of no such points, theirs is {}",
-                                      stored.mean[k], "xyz"[k], exact.mean[k])};
+      return Fault{kMean,
+                   fmt::format("mean position {} along {} is that of no such points, theirs is {}",
+                               stored.mean[k], "xyz"[k], exact.mean[k])};
     }
   }
   return {};
@@ -75,7 +76,8 @@ std::optional<Fault> compare_sphere(const NodeSummary& stored, const NodeSummary
 std::optional<Fault> compare_area(const NodeSummary& stored, const NodeSummary& exact) {
   const double area = std::min(exact.area, kGreatestUfloat16);
   if (std::abs(stored.area - area) <= area * (0x1p-9 + kRelative) + kLeastUfloat16) return {};
-  return Fault{kSums, fmt::format("area {} is not the sum {} of its points", stored.area, exact.area)};
+  return Fault{kSums,
+               fmt::format("area {} is not the sum {} of its points", stored.area, exact.area)};
 }
 
 std::optional<Fault> compare_radiance(const NodeSummary& stored, const NodeSummary& exact,
@@ -99,8 +101,9 @@ std::optional<Fault> compare_light(const NodeSummary& stored, const NodeSummary&
     const double found = stored.facing[k] / stored.area;
     const double share = std::min(exact.facing[k] / exact.area, 1.0);
     if (std::abs(found - share) > 0.5 / 65535 + kRelative) {
-      return Fault{kSums, fmt::format("share {} of the area that faces {} is not the {} of its points",
-                                      found, axis_name(k), share)};
+      return Fault{kSums,
+                   fmt::format("share {} of the area that faces {} is not the {} of its points",
+                               found, axis_name(k), share)};
     }
     if (!(stored.facing[k] > 0) || !(exact.facing[k] > 0)) continue;
     if (auto fault = compare_radiance(stored, exact, k)) return fault;
@@ -113,7 +116,8 @@ std::optional<Fault> compare_cone(const NodeSummary& stored, const NodeSummary& 
   constexpr double kCosSlack = 1e-5;
   const double turned = angle_between(widen(stored.cone_axis), widen(exact.cone_axis));
   if (turned > kAxisAngle) {
-    return Fault{kCone, fmt::format("cone's axis is {} rad off the mean normal of its points", turned)};
+    return Fault{kCone,
+                 fmt::format("cone's axis is {} rad off the mean normal of its points", turned)};
   }
   const double half = std::acos(std::clamp(static_cast<double>(exact.cone_cos), -1.0, 1.0));
   const double needed = half + turned >= M_PI ? -1.0 : std::cos(half + turned);
@@ -139,12 +143,15 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
   const double radius = stored.radius * (1 + kRelative) + kLatticeSlack;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const LatticePoint at = decode_morton(points[i].key);
-    const Vec3 position{static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
-    const double reach = distance(position, stored.mean) + static_cast<double>(points[i].radius) / unit;
+    const Vec3 position{static_cast<double>(at[0]), static_cast<double>(at[1]),
+                        static_cast<double>(at[2])};
+    const double reach =
+        distance(position, stored.mean) + static_cast<double>(points[i].radius) / unit;
     if (reach > radius && stored.radius < kGreatestUfloat16) {
-      return Fault{kSphere, fmt::format("disc {} of the leaf reaches {} lattice units from the mean "
-                                        "position, beyond the sphere's {}",
-                                        i, reach, stored.radius)};
+      return Fault{kSphere,
+                   fmt::format("disc {} of the leaf reaches {} lattice units from the mean "
+                               "position, beyond the sphere's {}",
+                               i, reach, stored.radius)};
     }
     const Vec3 normal = widen(decode_octahedral(points[i].normal[0], points[i].normal[1]));
     if (dot(normal, axis) < static_cast<double>(stored.cone_cos) - kAngleSlack) {

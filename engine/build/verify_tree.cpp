@@ -61,8 +61,8 @@ class NodePages {
   [[nodiscard]] OpenGroup open(std::uint32_t page, std::uint16_t slot) {
     const Page& found = get(page);
     const NodePage nodes(found.payload.data(), found.header.record_count);
-    const auto at = static_cast<std::size_t>(nodes[slot].mean_x() - found.payload.data()) -
-                    24 - 8 * static_cast<std::size_t>(nodes[slot].size());
+    const auto at = static_cast<std::size_t>(nodes[slot].mean_x() - found.payload.data()) - 24 -
+                    8 * static_cast<std::size_t>(nodes[slot].size());
     const bool raw = found.header.codec == Codec::raw;
     OpenGroup opened;
     opened.group = nodes.decode(slot);
@@ -89,8 +89,8 @@ class NodePages {
   std::unordered_map<std::uint32_t, Page>::iterator load(std::uint32_t page) {
     Page fresh;
     if (pages_.size() >= capacity_) {
-      const auto oldest = std::ranges::min_element(
-          pages_, {}, [](const auto& entry) { return entry.second.used; });
+      const auto oldest =
+          std::ranges::min_element(pages_, {}, [](const auto& entry) { return entry.second.used; });
       fresh.payload = std::move(oldest->second.payload);
       pages_.erase(oldest);
     }
@@ -172,8 +172,8 @@ class PointTotals {
     for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
     if (taken_ > 0 && (s.bounds_low != low_ || s.bounds_high != high_)) {
       fail_superblock(container_, kTotals,
-                      fmt::format("bounds are not those of the points, {} {} {} to {} {} {}", low_[0],
-                                  low_[1], low_[2], high_[0], high_[1], high_[2]));
+                      fmt::format("bounds are not those of the points, {} {} {} to {} {} {}",
+                                  low_[0], low_[1], low_[2], high_[0], high_[1], high_[2]));
     }
   }
 
@@ -185,7 +185,8 @@ class PointTotals {
            fmt::format("key of point {} is below the one before", taken_));
     }
     last_ = point.key;
-    const std::array<double, 3> at = container_.superblock().frame.to_position(decode_morton(point.key));
+    const std::array<double, 3> at =
+        container_.superblock().frame.to_position(decode_morton(point.key));
     const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
     area_ += area;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -238,13 +239,15 @@ class TreeWalk {
   }
 
  private:
-  void require_equal(const char* clause, const char* what, std::uint64_t said, std::uint64_t found) const {
+  void require_equal(const char* clause, const char* what, std::uint64_t said,
+                     std::uint64_t found) const {
     if (said == found) return;
     fail_superblock(container_, clause,
                     fmt::format("superblock says {} {}, the tree has {}", said, what, found));
   }
 
-  [[noreturn]] void fail_at(const OpenGroup& open, const char* clause, const std::string& text) const {
+  [[noreturn]] void fail_at(const OpenGroup& open, const char* clause,
+                            const std::string& text) const {
     fail(container_, open.offset, clause, open.place + text);
   }
 
@@ -291,7 +294,8 @@ class TreeWalk {
     const NodeGroup& around = parent.group;
     if (group.children.size() < 2) fail_at(open, kChildren, "has one child and is not the root");
     if (group.level <= around.level) {
-      fail_at(open, kLevel, fmt::format("level {} is not below its parent's {}", group.level, around.level));
+      fail_at(open, kLevel,
+              fmt::format("level {} is not below its parent's {}", group.level, around.level));
     }
     if (!contains(around, group.cell)) fail_at(open, kCell, "cell lies outside its parent's");
     require_next_octant(parent, group.cell);
@@ -307,7 +311,8 @@ class TreeWalk {
     if (open.group.level >= kLatticeBits || open.group.children.size() == 1) return;
     const int digit = octant(key, open.group.level + 1);
     if (digit <= open.last_octant) {
-      fail_at(open, kChildren, fmt::format("child {} is not in an octant behind the one before", open.next));
+      fail_at(open, kChildren,
+              fmt::format("child {} is not in an octant behind the one before", open.next));
     }
     open.last_octant = digit;
   }
@@ -315,16 +320,19 @@ class TreeWalk {
   void visit_leaf(OpenGroup& open, const ChildRef& ref) {
     const auto child = [&] { return fmt::format("child {}: ", open.next); };
     if (ref.first_point != points_.taken()) {
-      fail_at(open, kLeaf, child() + fmt::format("its points begin with {}, the next is {}",
-                                                 ref.first_point, points_.taken()));
+      fail_at(open, kLeaf,
+              child() + fmt::format("its points begin with {}, the next is {}", ref.first_point,
+                                    points_.taken()));
     }
     if (ref.point_count > superblock_.leaf_points) {
-      fail_at(open, kLeaf, child() + fmt::format("has {} points, a leaf has at most {}", ref.point_count,
-                                                 superblock_.leaf_points));
+      fail_at(open, kLeaf,
+              child() + fmt::format("has {} points, a leaf has at most {}", ref.point_count,
+                                    superblock_.leaf_points));
     }
     const std::span<const PointRecord> points = points_.take(ref.point_count);
     for (const PointRecord& point : points) {
-      if (!contains(open.group, point.key)) fail_at(open, kCell, child() + "points lie outside the cell");
+      if (!contains(open.group, point.key))
+        fail_at(open, kCell, child() + "points lie outside the cell");
     }
     require_one_octant(open, points);
     const NodeSummary& stored = open.group.children[open.next].node;

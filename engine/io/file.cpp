@@ -124,7 +124,8 @@ void unlink_and_reraise(int signal) {
   while (registry_lock.test_and_set(std::memory_order_acquire)) {
   }
   for (const std::string& name : live_temporaries()) ::unlink(name.c_str());
-  ::raise(signal);  // SA_RESETHAND: the default action follows when this handler returns
+  // SA_RESETHAND: the default action follows when this handler returns.
+  static_cast<void>(::raise(signal));
 }
 
 // ".NAME.tmp-PID-N"; a long NAME is cut so that the whole stays below 255 bytes.

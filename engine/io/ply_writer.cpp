@@ -53,9 +53,11 @@ std::string make_header(std::uint64_t count, const std::vector<PointColumn>& col
 }  // namespace
 
 struct PlyWriter::Impl {
-  Impl(const std::filesystem::path& target, std::uint64_t count,
-       const std::vector<PointColumn>& columns)
-      : header(make_header(count, columns)), announced(count), out(target) {
+  Impl(const std::filesystem::path& target, std::uint64_t count, std::vector<PointColumn> extra)
+      : columns(std::move(extra)),
+        header(make_header(count, columns)),
+        announced(count),
+        out(target) {
     for (const PointColumn& column : columns) values_a_point += column.components;
     out.put(header.data(), header.size());
   }
@@ -68,7 +70,8 @@ struct PlyWriter::Impl {
     out.put(&surfel.albedo, sizeof surfel.albedo);
   }
 
-  std::string header;  // made first: a bad column leaves no file
+  std::vector<PointColumn> columns;
+  std::string header;  // made before the file: a bad column leaves none
   std::uint64_t announced;
   std::uint64_t came = 0;
   std::size_t values_a_point = 0;
@@ -77,7 +80,7 @@ struct PlyWriter::Impl {
 
 PlyWriter::PlyWriter(const std::filesystem::path& target, std::uint64_t count,
                      std::vector<PointColumn> columns)
-    : impl_(std::make_unique<Impl>(target, count, columns)) {}
+    : impl_(std::make_unique<Impl>(target, count, std::move(columns))) {}
 
 PlyWriter::~PlyWriter() = default;
 

@@ -163,8 +163,8 @@ AreaLights::AreaLights(const Mesh& mesh) {
   }
 }
 
-std::uint32_t AreaLights::draw(float unit) const {
-  const double scaled = static_cast<double>(unit) * static_cast<double>(table_.size());
+std::uint32_t AreaLights::draw(double unit) const {
+  const double scaled = unit * static_cast<double>(table_.size());
   const auto column =
       static_cast<std::uint32_t>(std::min(static_cast<std::size_t>(scaled), table_.size() - 1));
   const double rest = scaled - static_cast<double>(column);
@@ -209,7 +209,7 @@ void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsi
   const SquarePoints points(seed);
   const double total = choices.back().sum;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const double wanted = static_cast<double>(points.line(i)) * total;
+    const double wanted = points.line(i) * total;
     const auto chosen = std::min(
         std::upper_bound(choices.begin(), choices.end(), wanted,
                          [](double value, const Choice& choice) { return value < choice.sum; }),

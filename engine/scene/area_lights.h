@@ -48,7 +48,7 @@ class AreaLights {
                   std::vector<Choice>& out) const;
   void choose_by_power(const glm::vec3& position, const glm::vec3& normal, std::uint64_t seed,
                        std::vector<Choice>& out) const;
-  [[nodiscard]] std::uint32_t draw(float unit) const;
+  [[nodiscard]] std::uint32_t draw(double unit) const;
 
   std::vector<Emitter> emitters_;
   // Walker's alias table: a column keeps its own emitter up to `keep`, and gives the rest to

@@ -86,7 +86,7 @@ Json parse_json(const std::string& text, const std::string& where) {
 
 std::string dump_json(const Json& json, const std::string& where) {
   try {
-    return json.dump(1);
+    return json.dump();
   } catch (const Json::exception& error) {
     throw std::invalid_argument(where + ": " + error.what());
   }

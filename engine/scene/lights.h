@@ -77,7 +77,7 @@ struct LightSampling {
 
 /// Direct irradiance by shadow rays. Deterministic: the seed fixes the sample points.
 /// Threads: may be called concurrently.
-/// Memory: 48 bytes an emissive triangle, 4 bytes a pixel of the sky map.
+/// Memory: 60 bytes an emissive triangle, 4 bytes a pixel of the sky map.
 class DirectLight {
  public:
   /// @param scene  must outlive this

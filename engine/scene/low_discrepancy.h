@@ -55,12 +55,15 @@ class SquarePoints {
                 scramble_reversed(reverse_bits(second_dimension(index)), high(seed_))))};
   }
 
-  /// A further coordinate, evenly spread by itself and independent of square().
-  [[nodiscard]] constexpr float line(std::uint32_t index) const noexcept {
+  /// A further coordinate, evenly spread by itself and independent of square(); of 53 bits, to
+  /// choose from very many.
+  [[nodiscard]] constexpr double line(std::uint32_t index) const noexcept {
     const std::uint64_t seed = mix_bits(seed_);
     // A shuffle that keeps blocks of 2^k together.
     const std::uint32_t shuffled = reverse_bits(scramble_reversed(reverse_bits(index), low(seed)));
-    return to_unit(reverse_bits(scramble_reversed(shuffled, high(seed))));
+    const std::uint64_t upper = reverse_bits(scramble_reversed(shuffled, high(seed)));
+    const std::uint64_t bits = upper << 32 | high(mix_bits(seed + index));
+    return static_cast<double>(bits >> 11) * 0x1p-53;
   }
 
  private:

@@ -18,6 +18,8 @@ class SpacingField {
 
   /// Spacing that suits all of a ball: the finest that any of its points asks for.
   [[nodiscard]] double at(const glm::dvec3& centre, double radius) const;
+  /// False when it is the same everywhere.
+  [[nodiscard]] bool varies() const noexcept { return angle_ != 0; }
 
  private:
   [[nodiscard]] bool is_in_view(const glm::dvec3& centre, double radius) const;

@@ -83,16 +83,18 @@ std::optional<SurfaceHit> own_surface(const RayScene& scene, const glm::dvec3& p
 std::optional<glm::dvec3> step_off(const RayScene& scene, const glm::dvec3& position,
                                    const glm::vec3& normal) {
   const double e = scene.epsilon();
-  const glm::dvec3 lift = kLift * e * glm::dvec3(normal);
   const std::optional<SurfaceHit> own = own_surface(scene, position, normal);
-  if (!own) return position + lift;
+  if (!own) return position + kLift * e * glm::dvec3(normal);
   const Mesh& mesh = scene.mesh();
   std::array<glm::dvec3, 3> corner;
   for (std::size_t i = 0; i < 3; ++i) {
     corner[i] = glm::dvec3(mesh.positions[mesh.triangles[own->triangle][i]]);
   }
-  const glm::dvec3 origin = mesh.origin + inset(corner, position - mesh.origin, kInset * e) + lift;
-  const auto lid = scene.closest(origin, -normal, 0, kLidBelow * e);
+  // Along the geometric normal: an interpolated one may lie nearly in the surface.
+  const glm::vec3 up = own->front ? own->geometric_normal : -own->geometric_normal;
+  const glm::dvec3 inside = mesh.origin + inset(corner, position - mesh.origin, kInset * e);
+  const glm::dvec3 origin = inside + kLift * e * glm::dvec3(up);
+  const auto lid = scene.closest(origin, -up, 0, kLidBelow * e);
   if (lid && !lid->front) return {};
   return origin;
 }

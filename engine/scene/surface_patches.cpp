@@ -17,9 +17,10 @@
 namespace ptc {
 namespace {
 
-constexpr double kPieceSpacings = 32;  // a piece is at most so wide,
-constexpr double kPieceWeight = 0.1;   // or wants at most so many surfels
-constexpr double kPartSpacings = 1;    // the same of a part of it
+constexpr double kPieceSpacings = 32;        // a piece is at most so wide,
+constexpr double kVaryingPieceSpacings = 8;  // so that it has one spacing nearly,
+constexpr double kPieceWeight = 0.1;         // or wants at most so many surfels
+constexpr double kPartSpacings = 1;          // the same of a part of it
 constexpr double kPartWeight = 0.0156;
 constexpr std::uint32_t kDeepest = 1u << 30;  // so that a path fits 32 bits
 
@@ -227,8 +228,9 @@ void SurfacePatches::cut(std::uint32_t triangle, const SubTriangle& shape, std::
   const double area = shape.area();
   if (!(area > 0)) return;
   const double spacing = spacing_of(shape);
-  if (shape.longest_edge() <= kPieceSpacings * spacing ||
-      area <= kPieceWeight * spacing * spacing || path >= kDeepest) {
+  const double widest = field_.varies() ? kVaryingPieceSpacings : kPieceSpacings;
+  if (shape.longest_edge() <= widest * spacing || area <= kPieceWeight * spacing * spacing ||
+      path >= kDeepest) {
     pieces_.push_back({triangle, path});
     return;
   }

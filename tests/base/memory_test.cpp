@@ -61,6 +61,34 @@ TEST_CASE("memory: an arena counts as resident once touched and no longer than i
   }));
 }
 
+TEST_CASE("memory: what an arena discards is given back, zero when touched again",
+          "[base][memory]") {
+  CHECK(in_child([] {
+    const std::uint64_t before = resident_bytes();
+    Arena arena(64 * kMiB);
+    std::memset(arena.data(), 1, arena.size());
+    arena.discard(16 * kMiB, 32 * kMiB);
+    return near(resident_bytes(), before + 32 * kMiB);
+  }));
+  const std::size_t page = 4096;
+  for (const auto& [offset, bytes] : {std::pair<std::size_t, std::size_t>{0, 0},
+                                      {0, 8 * page},
+                                      {1, 8 * page - 2},
+                                      {page, 3 * page},
+                                      {page - 1, page + 1},
+                                      {page, page - 1},
+                                      {5, 7}}) {
+    Arena arena(8 * page);
+    std::memset(arena.data(), 1, arena.size());
+    arena.discard(offset, bytes);
+    for (std::size_t i = 0; i < arena.size(); ++i) {  // whole pages only
+      const std::size_t first = i / page * page;
+      const bool gone = first >= offset && first + page <= offset + bytes;
+      REQUIRE(arena.data()[i] == (gone ? std::byte{0} : std::byte{1}));
+    }
+  }
+}
+
 TEST_CASE("memory: the peak stays when memory is given back", "[base][memory]") {
   CHECK(in_child([] {
     const std::uint64_t before = resident_bytes();

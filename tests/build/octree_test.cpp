@@ -5,6 +5,7 @@
 #include <map>
 
 #include "engine/build/octree.h"
+#include "format/scalar.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -177,4 +178,25 @@ TEST_CASE("octree: points without area or with opposite normals still have a mid
   CHECK(opposite.cone_cos == -1);
   CHECK(opposite.facing[0] == Approx(2));
   CHECK(opposite.facing[1] == Approx(2));
+}
+
+TEST_CASE("octree: cones hold every normal to the last bit", "[build][octree]") {
+  const SortedScene scene = sort_scene(random_surfels(20'000, 5));
+  const auto holds = [](const NodeSummary& node, const PointRecord& p) {
+    const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
+    double dot = 0, nn = 0, aa = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      dot += static_cast<double>(n[k]) * static_cast<double>(node.cone_axis[k]);
+      nn += static_cast<double>(n[k]) * static_cast<double>(n[k]);
+      aa += static_cast<double>(node.cone_axis[k]) * static_cast<double>(node.cone_axis[k]);
+    }
+    return dot / std::sqrt(nn * aa) >= static_cast<double>(node.cone_cos);
+  };
+  for (std::size_t i = 0; i + 3 <= scene.records.size(); i += 3) {
+    for (const std::size_t count : {1U, 2U, 3U}) {
+      const std::span<const PointRecord> run(scene.records.data() + i, count);
+      const NodeSummary node = summarise_points(run, 1);
+      for (const PointRecord& p : run) REQUIRE(holds(node, p));
+    }
+  }
 }

@@ -21,7 +21,8 @@ std::vector<std::byte> read_file(const std::filesystem::path& path) {
 
 void write_file(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
   std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
   if (!file.flush()) throw std::runtime_error("write " + path.string());
 }
 
@@ -31,14 +32,15 @@ OpenContainer::OpenContainer(const std::filesystem::path& path) : bytes_(read_fi
   if (superblock_.directory_pages != 1) throw std::invalid_argument("more than one directory page");
   for (std::uint32_t page = 0; page < container.page_count(); ++page) {
     entries_.push_back(container.entry(page));
-    headers_.push_back(decode_page_header(std::span(bytes_).subspan(entries_.back().offset, kPageHeaderBytes),
-                                          container.header()));
+    headers_.push_back(decode_page_header(
+        std::span(bytes_).subspan(entries_.back().offset, kPageHeaderBytes), container.header()));
     if (headers_.back().codec != Codec::raw) throw std::invalid_argument("a page that is not raw");
   }
 }
 
 std::span<std::byte> OpenContainer::payload(std::size_t page) {
-  return std::span(bytes_).subspan(entries_[page].offset + kPageHeaderBytes, entries_[page].stored_bytes);
+  return std::span(bytes_).subspan(entries_[page].offset + kPageHeaderBytes,
+                                   entries_[page].stored_bytes);
 }
 
 void OpenContainer::write(const std::filesystem::path& target) {
@@ -57,10 +59,12 @@ void OpenContainer::write(const std::filesystem::path& target) {
     entry.group = header.group;
     entry.record_count = header.record_count;
     encode_page_header(header, uuid, header_at(entry.offset));
-    encode_directory_entry(entry, directory.subspan(page * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
+    encode_directory_entry(
+        entry, directory.subspan(page * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
     digest.add(entry);
   }
-  PageHeader header = decode_page_header(header_at(superblock_.directory_offset), superblock_.header);
+  PageHeader header =
+      decode_page_header(header_at(superblock_.directory_offset), superblock_.header);
   header.payload_xxh3 = superblock_.directory_xxh3 = xxh3_64(directory);
   encode_page_header(header, uuid, header_at(superblock_.directory_offset));
   superblock_.content_xxh3 = digest.value();

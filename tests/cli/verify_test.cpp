@@ -116,7 +116,8 @@ TEST_CASE("verify: the report does not depend on threads or memory", "[cli][veri
     CHECK(report.nodes == whole.nodes);
     CHECK(report.groups == whole.groups);
   }
-  CHECK_THROWS_WITH(verify(path, {.memory_bytes = 1 << 20}), Catch::Contains("the least that works is"));
+  CHECK_THROWS_WITH(verify(path, {.memory_bytes = 1 << 20}),
+                    Catch::Contains("the least that works is"));
 }
 
 TEST_CASE("verify: every flipped byte of a file is found", "[cli][verify]") {
@@ -158,7 +159,8 @@ TEST_CASE("verify: the error names where the flipped byte lies", "[cli][verify]"
   std::vector<std::uint64_t> starts{0};
   {
     const ContainerReader container(path);
-    for (std::uint32_t page = 0; page < container.page_count(); ++page) starts.push_back(container.entry(page).offset);
+    for (std::uint32_t page = 0; page < container.page_count(); ++page)
+      starts.push_back(container.entry(page).offset);
     starts.push_back(container.superblock().directory_offset);
     starts.push_back(whole.size() - 2 * kBlockBytes);
     starts.push_back(whole.size() - kBlockBytes);
@@ -185,7 +187,8 @@ TEST_CASE("verify: of several damaged pages the first in the file is named", "[c
   const auto path = directory / "scene.ptcx";
   write_scene(path, random_surfels(5000, 9), {}, 12, Codec::raw);
   std::vector<std::byte> bytes = read_file(path);
-  for (std::size_t block = 40; block < 90; block += 3) bytes[block * kBlockBytes + 100] ^= std::byte{1};
+  for (std::size_t block = 40; block < 90; block += 3)
+    bytes[block * kBlockBytes + 100] ^= std::byte{1};
   write_file(path, bytes);
   for (int run = 0; run < 20; ++run) {
     Progress silent;
@@ -203,7 +206,7 @@ namespace {
 /// A number of a group's child: where it lies and by how much it is moved.
 struct Edit {
   const char* what;
-  std::size_t bytes;   ///< 1 or 2
+  std::size_t bytes;  ///< 1 or 2
   int by;
   std::function<std::size_t(const GroupView&, int)> at;  ///< from the group's first byte
 };
@@ -215,7 +218,8 @@ std::size_t column(const GroupView& group, int child, std::size_t k) {
 
 std::vector<Edit> edits() {
   std::vector<Edit> all;
-  const std::array<const char*, 7> names{"mean x", "mean y", "mean z", "radius", "cone axis", "cone cos", "area"};
+  const std::array<const char*, 7> names{"mean x",    "mean y",   "mean z", "radius",
+                                         "cone axis", "cone cos", "area"};
   for (std::size_t k = 0; k < names.size(); ++k) {
     for (const int by : {-4, 4}) {
       all.push_back({names[k], 2, by, [k](const GroupView& g, int i) { return column(g, i, k); }});
@@ -272,7 +276,8 @@ bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at
 
 }  // namespace
 
-TEST_CASE("verify: a wrong number in any node is found though checksums are right", "[cli][verify]") {
+TEST_CASE("verify: a wrong number in any node is found though checksums are right",
+          "[cli][verify]") {
   const TemporaryDirectory directory;
   const auto source = directory / "scene.ptcx";
   const auto target = directory / "wrong.ptcx";
@@ -305,7 +310,8 @@ TEST_CASE("verify: a wrong number in any node is found though checksums are righ
   CHECK(tried > 500);
 }
 
-TEST_CASE("verify: a reference that leads elsewhere is found though checksums are right", "[cli][verify]") {
+TEST_CASE("verify: a reference that leads elsewhere is found though checksums are right",
+          "[cli][verify]") {
   const TemporaryDirectory directory;
   const auto source = directory / "scene.ptcx";
   const auto target = directory / "wrong.ptcx";
@@ -318,7 +324,8 @@ TEST_CASE("verify: a reference that leads elsewhere is found though checksums ar
     std::uint64_t before = 0;
     std::memcpy(&before, place, 8);
     for (std::uint64_t by = 1; by < 6; ++by) {  // to other groups, other first points, other counts
-      for (const std::uint64_t after : {before + (by << (interior ? 32 : 0)), before + (by << (interior ? 0 : 48))}) {
+      for (const std::uint64_t after :
+           {before + (by << (interior ? 32 : 0)), before + (by << (interior ? 0 : 48))}) {
         std::memcpy(place, &after, 8);
         container.write(target);
         CHECK(fault_of(target) != "");
@@ -330,7 +337,8 @@ TEST_CASE("verify: a reference that leads elsewhere is found though checksums ar
   CHECK(tried > 300);
 }
 
-TEST_CASE("verify: a group with a wrong level or cell is found though checksums are right", "[cli][verify]") {
+TEST_CASE("verify: a group with a wrong level or cell is found though checksums are right",
+          "[cli][verify]") {
   const TemporaryDirectory directory;
   const auto source = directory / "scene.ptcx";
   const auto target = directory / "wrong.ptcx";
@@ -359,7 +367,8 @@ TEST_CASE("verify: a group with a wrong level or cell is found though checksums 
   });
 }
 
-TEST_CASE("verify: a page header that says otherwise is found though checksums are right", "[cli][verify]") {
+TEST_CASE("verify: a page header that says otherwise is found though checksums are right",
+          "[cli][verify]") {
   const TemporaryDirectory directory;
   const auto source = directory / "scene.ptcx";
   const auto target = directory / "wrong.ptcx";
@@ -384,7 +393,8 @@ TEST_CASE("verify: a page header that says otherwise is found though checksums a
   }
 }
 
-TEST_CASE("verify: wrong totals in the superblock are found though checksums are right", "[cli][verify]") {
+TEST_CASE("verify: wrong totals in the superblock are found though checksums are right",
+          "[cli][verify]") {
   const TemporaryDirectory directory;
   const auto source = directory / "scene.ptcx";
   const auto target = directory / "wrong.ptcx";
@@ -428,7 +438,8 @@ TEST_CASE("verify: a point that moved is found though checksums are right", "[cl
     const std::size_t count = container.header(page).record_count;
     for (std::size_t i = 0; i < count; ++i) {
       // x by a thousandth, normal by 0.01, radiance by 4 per cent, radius by 6 per cent
-      for (const PointEdit& edit : {PointEdit{0, 4, 1U << 31}, {20, 2, 400}, {24, 2, 40}, {16, 4, 1U << 19}}) {
+      for (const PointEdit& edit :
+           {PointEdit{0, 4, 1U << 31}, {20, 2, 400}, {24, 2, 40}, {16, 4, 1U << 19}}) {
         std::byte* place = container.payload(page).data() + edit.column * count + edit.bytes * i;
         std::uint32_t value = 0;
         std::memcpy(&value, place, edit.bytes);
@@ -453,7 +464,8 @@ TEST_CASE("verify: bytes that belong to no page must be zero", "[cli][verify]") 
   REQUIRE(end % kBlockBytes != 0);
   bytes[end] = std::byte{1};
   write_file(path, bytes);
-  CHECK_THAT(fault_of(path), Catch::Contains("offset " + std::to_string(end)) && Catch::Contains("padding"));
+  CHECK_THAT(fault_of(path),
+             Catch::Contains("offset " + std::to_string(end)) && Catch::Contains("padding"));
 }
 
 }  // namespace ptc::test

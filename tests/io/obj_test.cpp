@@ -26,9 +26,9 @@ std::string fault(const Scratch& scratch, const std::string& text) {
 TEST_CASE("obj: indices count from one, from the end, and with any of their parts", "[io][mesh]") {
   const Scratch scratch;
   const std::string start = kSquare + "vt 0.5\nvt 0 1 7\nvn 0 0 1\n";
-  for (const char* face :
-       {"f 1 2 3", "f -4 -3 -2", "f 1/1 2/1 3/2", "f 1//1 2//1 3//1", "f 1/1/1 2/2/1 3/2/1",
-        "f 1/1/ 2/1/ 3/1/", "f 1/-2/-1 2/-1/-1 3/1/1", "  f\t1 2 \\\n 3 # comment", "f +1 +2 +3"}) {
+  for (const char* face : {"f 1 2 3", "f -4 -3 -2", "f 1/1 2/1 3/2", "f 1//1 2//1 3//1",
+                           "f 1/1/1 2/2/1 3/2/1", "f 1/1/ 2/1/ 3/1/", "f 1/-2/-1 2/-1/-1 3/1/1",
+                           "  f\t1 2 \\\n 3 # comment", "f 1 2 \\\r\n3\r", "f +1 +2 +3"}) {
     const Mesh mesh = read(scratch, start + face + "\n").mesh;
     REQUIRE(mesh.triangles.size() == 1);
     CHECK(mesh.positions[mesh.triangles[0][1]] + glm::vec3(mesh.origin) == glm::vec3(1, 0, 0));

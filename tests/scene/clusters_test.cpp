@@ -16,7 +16,7 @@ SurfacePoint point(const glm::vec3& position, const glm::vec3& normal, std::uint
   SurfacePoint p;
   p.position = position;
   p.normal = normal;
-  p.area = 0.01f;
+  p.area = 0.01;
   p.kind = kind;
   return p;
 }
@@ -30,7 +30,7 @@ std::vector<SurfacePoint> square(int n, const glm::vec3& normal, float height,
     points.push_back(
         point({static_cast<float>(i % n) / step, height, static_cast<float>(i / n) / step}, normal,
               kind));
-    points.back().area = 1 / (step * step);
+    points.back().area = 1.0 / (n * n);
   }
   return points;
 }

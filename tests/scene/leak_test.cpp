@@ -163,3 +163,25 @@ TEST_CASE("leak: a point under a contact is dark, and beside it is lit", "[scene
         Approx(kPi / 2).epsilon(0.1));
   CHECK(light.irradiance({1.0, 0.5, 0.2}, {1, 0, 0}, {}, 1).sky.x > 1);
 }
+
+TEST_CASE("leak: a normal that leans far over does not put the point under its own surface",
+          "[scene][leak]") {
+  Random random(7);
+  for (int i = 0; i < 20; ++i) {
+    Mesh mesh = ground(10);
+    const glm::mat3 rotation = random.rotation();
+    turn(mesh, rotation);
+    const RayScene scene(mesh);
+    int below = 0;
+    for (int k = 0; k < 200; ++k) {
+      const float lean = static_cast<float>(random.between(0.02, 1));
+      const glm::vec3 normal = rotation * glm::normalize(glm::vec3(1, lean, 0));
+      const SurfaceHit at = scene.surface(0, 0.3f, static_cast<float>(random.between(0, 0.7)));
+      const auto origin = step_off(scene, at.position, normal);
+      REQUIRE(origin);
+      const double height = glm::dot(*origin - at.position, glm::dvec3(at.geometric_normal));
+      if (height < 1.9 * scene.epsilon()) ++below;
+    }
+    CHECK(below == 0);
+  }
+}

@@ -40,14 +40,14 @@ TEST_CASE("square points: the further coordinate is stratified and follows neith
     }
     CHECK(boxes.size() == std::size_t{1} << k);
   }
-  float with_x = 0;
-  float with_y = 0;
+  double with_x = 0;
+  double with_y = 0;
   for (unsigned i = 0; i < 1024; ++i) {
-    with_x += (points.line(i) - 0.5f) * (points.square(i).x - 0.5f) / 1024;
-    with_y += (points.line(i) - 0.5f) * (points.square(i).y - 0.5f) / 1024;
+    with_x += (points.line(i) - 0.5) * (static_cast<double>(points.square(i).x) - 0.5) / 1024;
+    with_y += (points.line(i) - 0.5) * (static_cast<double>(points.square(i).y) - 0.5) / 1024;
   }
-  CHECK(std::abs(with_x) < 0.01f);  // 1/12 if they were equal
-  CHECK(std::abs(with_y) < 0.01f);
+  CHECK(std::abs(with_x) < 0.01);  // 1/12 if they were equal
+  CHECK(std::abs(with_y) < 0.01);
 }
 
 TEST_CASE("square points: seeds that are neighbours give unrelated points", "[scene][sampling]") {

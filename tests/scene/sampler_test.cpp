@@ -296,6 +296,23 @@ TEST_CASE("sampler: ten million metres away the surfels are the same, moved", "[
   }
 }
 
+TEST_CASE("sampler: a mesh of another size gives the same surfels at that size",
+          "[scene][sampler]") {
+  const Mesh mesh = sphere(1, 20);
+  const auto surfels = sample(mesh, 3000);
+  for (const int exponent : {-40, -8, 8, 40}) {
+    const float scale = std::ldexp(1.0f, exponent);
+    Mesh scaled = mesh;
+    for (glm::vec3& p : scaled.positions) p *= scale;
+    const auto others = sample(scaled, 3000);
+    REQUIRE(others.size() == surfels.size());
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      CHECK(others[i].position == surfels[i].position * static_cast<double>(scale));
+      CHECK(others[i].radius == surfels[i].radius * scale);
+    }
+  }
+}
+
 TEST_CASE("sampler: a mesh without area gives no surfels", "[scene][sampler]") {
   Mesh mesh = empty_mesh();
   CHECK(sample(mesh, 100).empty());
@@ -328,11 +345,24 @@ TEST_CASE("sampler: options that make no sense are refused", "[scene][sampler]")
   };
   refuses([](SamplingOptions& o) { o.count = 0; });
   refuses([](SamplingOptions& o) { o.spacing = -1; });
+  refuses([](SamplingOptions& o) { o.spacing = 1e-6; });
+  refuses([](SamplingOptions& o) { o.spacing = 1e-300; });
+  refuses([](SamplingOptions& o) { o.count = 1'000'000'000'000; });
   refuses([](SamplingOptions& o) { o.spacing = std::numeric_limits<double>::quiet_NaN(); });
   refuses([](SamplingOptions& o) { o.pixels_per_surfel = 0; });
   refuses([](SamplingOptions& o) { o.finest = 0; });
   refuses([](SamplingOptions& o) { o.finest = 1.5f; });
   refuses([](SamplingOptions& o) { o.camera->height = 0; });
+}
+
+TEST_CASE("sampler: a spacing beyond all bounds gives one surfel, or none", "[scene][sampler]") {
+  SamplingOptions options;
+  for (const double spacing : {1e3, 1e30, 1e300}) {
+    options.spacing = spacing;
+    const auto surfels = sample(cube(), options);
+    CHECK(surfels.size() <= 1);
+    for (const Surfel& s : surfels) CHECK(s.radius == Approx(std::sqrt(3)));
+  }
 }
 
 TEST_CASE("sampler: it streams: the first surfels of very many come at once", "[scene][sampler]") {

@@ -56,7 +56,7 @@ TEST_CASE("patches: points lie on their triangle and add up to the area", "[scen
   CHECK(points.size() == 8 * patches.surfels());
   double area = 0;
   for (const SurfacePoint& p : points) {
-    area += static_cast<double>(p.area);
+    area += p.area;
     const auto& t = mesh.triangles[p.triangle];
     CHECK((p.uv.x >= 0 && p.uv.y >= 0 && p.uv.x + p.uv.y <= 1));
     const glm::vec3 expected = (1 - p.uv.x - p.uv.y) * mesh.positions[t[0]] +
@@ -151,7 +151,7 @@ TEST_CASE("patches: a needle of any length is cut no deeper than a path can say"
   CHECK(patches.surfels() == 50);
   const auto points = all_points(patches, 8);
   double area = 0;
-  for (const SurfacePoint& p : points) area += static_cast<double>(p.area);
+  for (const SurfacePoint& p : points) area += p.area;
   CHECK(area == Approx(0.5).epsilon(1e-5));
 }
 

@@ -1,0 +1,107 @@
+"""What the programs tell, and that it does not depend on threads or memory."""
+
+import json
+import struct
+import unittest
+
+from programs import SMALL_PICTURE, ProgramTest
+
+
+class Facts(ProgramTest):
+    def test_ptcinfo_names_what_a_container_holds(self):
+        facts = json.loads(self.succeed("ptcinfo", self.scene, "--json").stdout)
+        for key in ("format_version", "points", "nodes", "levels", "bounds", "channels", "bytes", "codec",
+                    "page_size", "peak_resident_bytes"):
+            self.assertIn(key, facts)
+        self.assertEqual(facts["format_version"], "1.0")
+        self.assertEqual(facts["points"], 600)
+        self.assertEqual(facts["page_size"], 65536)
+        self.assertEqual(facts["codec"], "zstd")
+        self.assertEqual(facts["bytes"]["file"], self.scene.stat().st_size)
+        for key in ("point_pages", "node_pages"):
+            self.assertGreater(facts["bytes"][key], 0)
+        for low, high in zip(facts["bounds"]["low"], facts["bounds"]["high"]):
+            self.assertAlmostEqual(low, -1, places=2)
+            self.assertAlmostEqual(high, 1, places=2)
+
+    def test_every_program_tells_machines(self):
+        picture = ["-o", self.here / "o.png", *SMALL_PICTURE]
+        common = {"seconds", "peak_resident_bytes"}
+        for command, keys in (
+                (["ptcbuild", self.mesh, "--points", "1k", "-o", self.here / "o.ptcx"],
+                 {"points", "nodes", "bytes", "pages", "sort"}),
+                (["ptcshade", self.scene, "-o", self.here / "o.ply"], {"receivers", "gather", "cache"}),
+                (["ptcrender", self.scene, *picture], {"receivers", "gather", "cache"}),
+                (["ptcconvert", self.scene, self.here / "p.ptcx"], {"points", "nodes", "bytes", "pages"}),
+                (["ptcverify", self.scene], {"points", "nodes", "bytes", "pages"})):
+            facts = json.loads(self.succeed(*command, "--json").stdout)
+            self.assertLessEqual(keys | common, set(facts), command[0])
+            self.assertGreater(facts["peak_resident_bytes"], 1 << 20)
+        shade = json.loads(self.succeed("ptcshade", self.scene, "-o", self.here / "o.ply", "--json").stdout)
+        cache = shade["cache"]
+        self.assertEqual(cache["lookups"], cache["local_hits"] + cache["shared_hits"] + cache["misses"])
+
+    def test_quiet_programs_say_nothing(self):
+        for command in (["ptcinfo", self.scene], ["ptcverify", self.scene],
+                        ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx"],
+                        ["ptcconvert", self.scene, self.here / "o.ply"]):
+            result = self.succeed(*command, "--quiet", "--progress")
+            self.assertEqual((result.stdout, result.stderr), ("", ""))
+
+    def test_progress_without_a_terminal_is_plain_lines(self):
+        for command in (["ptcverify", self.scene], ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx"],
+                        ["ptcshade", self.scene, "-o", self.here / "o.ply"]):
+            text = self.succeed(*command, "--progress").stderr
+            self.assertGreaterEqual(len(text.splitlines()), 2)
+            self.assertNotIn("\r", text)
+            self.assertEqual(self.succeed(*command).stderr, "")
+
+    def test_a_check_against_rays_is_reported(self):
+        facts = json.loads(self.succeed("ptcshade", self.scene, "-o", self.here / "o.ply", "--check", "20",
+                                        "--check-rays", "64", "--json").stdout)
+        self.assertGreaterEqual(facts["check"]["receivers"], 20)
+        self.assertIn("occlusion_rms", facts["check"]["discs"])
+
+    def test_pictures_are_written_in_every_layer(self):
+        layers = [f"--layer={name}={self.here}/{name}.png" for name in ("direct", "indirect", "occlusion", "albedo")]
+        self.succeed("ptcrender", self.box, "--mesh", self.mesh, "-o", self.here / "o.exr",
+                     "-o", self.here / "o.png", *layers, *SMALL_PICTURE)
+        self.assertEqual((self.here / "o.exr").read_bytes()[:4], b"\x76\x2f\x31\x01")
+        for name in ("o", "direct", "indirect", "occlusion", "albedo"):
+            png = (self.here / (name + ".png")).read_bytes()
+            self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+            self.assertEqual(struct.unpack(">II", png[16:24]), (24, 16))
+
+
+class Verify(ProgramTest):
+    def test_whole_containers_are_valid(self):
+        self.assertIn("valid", self.succeed("ptcverify", self.scene).stdout)
+        self.assertIn("valid", self.succeed("ptcverify", self.box, "--threads", "1").stdout)
+
+    def test_a_flipped_byte_is_named_by_offset_and_rule(self):
+        whole = self.scene.read_bytes()
+        path = self.here / "flipped.ptcx"
+        for offset in range(50, len(whole), 1777):
+            flipped = bytearray(whole)
+            flipped[offset] ^= 0x40
+            path.write_bytes(flipped)
+            message = self.fail_with(1, "ptcverify", path)
+            self.assertRegex(message, rf"{path}: offset \d+: .+ \(spec/[a-z]+\.md#[a-z0-9-]+\)")
+
+
+class Determinism(ProgramTest):
+    def test_threads_and_caps_do_not_change_what_is_written(self):
+        for program, operands, name in (("ptcbuild", [self.mesh, "--points", "4k"], "o.ptcx"),
+                                        ("ptcshade", [self.scene], "o.ptcx"),
+                                        ("ptcshade", [self.scene], "o.ply")):
+            first = None
+            for options in (["--threads", "1"], ["--threads", "2"], ["--threads", "5"],
+                            ["--memory", "128M"], ["--temp", str(self.here)]):
+                self.succeed(program, *operands, *options, "-o", self.here / name)
+                data = (self.here / name).read_bytes()
+                first = first or data
+                self.assertEqual(data, first, options)
+
+
+if __name__ == "__main__":
+    unittest.main()

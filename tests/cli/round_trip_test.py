@@ -1,0 +1,97 @@
+"""What went into a container comes out of it."""
+
+import json
+import unittest
+
+from programs import CORE, ProgramTest, read_ply
+
+
+class RoundTrip(ProgramTest):
+    def columns(self, path):
+        names, points = read_ply(path)
+        order = sorted(points)
+        return {name: [p[i] for p in order] for i, name in enumerate(names)}
+
+    def test_ply_to_container_to_ply_keeps_every_point(self):
+        back = self.here / "back.ply"
+        self.succeed("ptcconvert", self.scene, back)
+        was, now = self.columns(self.cloud), self.columns(back)
+        self.assertEqual(list(now), CORE)
+        for name in CORE:
+            for a, b in zip(was[name], now[name], strict=True):
+                if name in ("x", "y", "z"):
+                    self.assertLessEqual(abs(a - b), 2 ** -40)  # half a unit of a lattice of 4
+                elif name == "radius":
+                    self.assertEqual(a, b)
+                elif name.startswith("n"):
+                    self.assertLessEqual(abs(a - b), 1.1e-4)
+                elif name.startswith("radiance"):
+                    self.assertLessEqual(abs(a - b), 2 ** -11 * a)
+                else:
+                    self.assertLessEqual(abs(a - b), 0.5 / 255 + 1e-7)
+
+    def test_a_second_round_changes_nothing(self):
+        first, second = self.here / "1.ply", self.here / "2.ply"
+        self.succeed("ptcconvert", self.scene, first)
+        self.succeed("ptcconvert", first, self.here / "2.ptcx")
+        self.succeed("ptcconvert", self.here / "2.ptcx", second)
+        for name, values in self.columns(first).items():
+            for a, b in zip(values, self.columns(second)[name], strict=True):
+                self.assertLessEqual(abs(a - b), 6.2e-5 if name.startswith("n") else 0, name)
+
+    def test_container_to_xyz_to_container(self):
+        self.succeed("ptcconvert", self.scene, self.here / "a.xyz")
+        self.succeed("ptcconvert", self.here / "a.xyz", self.here / "b.ptcx")
+        self.succeed("ptcconvert", self.scene, self.here / "a.ply")
+        self.succeed("ptcconvert", self.here / "b.ptcx", self.here / "b.ply")
+        a, b = self.columns(self.here / "a.ply"), self.columns(self.here / "b.ply")
+        for name in ("x", "y", "z", "radius", "radiance_r", "radiance_g", "radiance_b"):
+            self.assertEqual(a[name], b[name], name)
+
+    def test_other_codecs_and_page_sizes_hold_the_same(self):
+        lit = self.here / "lit.ptcx"
+        self.succeed("ptcshade", self.scene, "-o", lit)
+        reference = self.here / "lit.ply"
+        self.succeed("ptcconvert", lit, reference)
+        names, _ = read_ply(reference)
+        for name in ("occlusion", "bent_normal_x", "irradiance_r", "sky_b", "indirect_g"):
+            self.assertIn(name, names)
+        for page_size in ("4K", "8K", "64K", "1M"):
+            for codec in ("raw", "zstd"):
+                other, back = self.here / "other.ptcx", self.here / "other.ply"
+                self.succeed("ptcconvert", lit, other, "--codec", codec, "--page-size", page_size)
+                self.succeed("ptcverify", other)
+                facts = json.loads(self.succeed("ptcinfo", other, "--json").stdout)
+                self.assertEqual(facts["codec"], codec)
+                self.assertEqual(facts["page_size"], int(page_size[:-1]) * (1 << (20 if "M" in page_size else 10)))
+                self.succeed("ptcconvert", other, back)
+                self.assertEqual(back.read_bytes(), reference.read_bytes())
+
+    def test_recoding_twice_gives_the_same_bytes(self):
+        for name in ("a.ptcx", "b.ptcx"):
+            self.succeed("ptcconvert", self.scene, self.here / name, "--codec", "raw")
+        self.assertEqual((self.here / "a.ptcx").read_bytes(), (self.here / "b.ptcx").read_bytes())
+
+    def test_a_container_may_be_recoded_over_itself(self):
+        copy = self.here / "copy.ptcx"
+        copy.write_bytes(self.scene.read_bytes())
+        self.succeed("ptcconvert", copy, copy, "--codec", "raw", "--page-size", "8K")
+        self.succeed("ptcverify", copy)
+
+    def test_a_container_under_another_name_is_still_one(self):
+        path = self.here / "scene.bin"
+        path.write_bytes(self.scene.read_bytes())
+        self.succeed("ptcconvert", path, self.here / "a.ply")
+        self.succeed("ptcverify", path)
+
+    def test_a_mesh_becomes_a_lit_container(self):
+        self.succeed("ptcconvert", self.mesh, self.here / "a.ptcx", "--points", "1k")
+        facts = json.loads(self.succeed("ptcinfo", self.here / "a.ptcx", "--json").stdout)
+        self.assertGreater(min(facts["flux"]), 0)
+
+    def test_a_cloud_becomes_no_cloud(self):
+        self.fail_with(2, "ptcconvert", self.cloud, self.here / "a.xyz")
+
+
+if __name__ == "__main__":
+    unittest.main()

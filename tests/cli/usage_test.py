@@ -1,0 +1,98 @@
+"""The command line: help, version, usage errors."""
+
+import unittest
+
+from programs import PROGRAMS, SMALL_PICTURE, ProgramTest
+
+
+class Usage(ProgramTest):
+    def test_help_shows_examples_and_every_common_option(self):
+        for program in PROGRAMS:
+            text = self.succeed(program, "--help").stdout
+            self.assertIn("Examples:\n  " + program, text)
+            for option in ("--memory", "--threads", "--temp", "--progress", "--quiet", "--json",
+                           "--version", "--help", "Exit codes"):
+                self.assertIn(option, text, program)
+
+    def test_examples_in_the_help_parse(self):
+        # Their files are not there: they must fail for that and for nothing else.
+        for program in PROGRAMS:
+            for line in self.succeed(program, "--help").stdout.split("Examples:\n")[1].splitlines():
+                if not line.startswith("  " + program) or "--city" in line:
+                    continue
+                words = line.split("|")[0].replace("/scratch", str(self.here)).split()
+                message = self.fail_with(1, program, *words[1:], cwd=self.here)
+                self.assertIn("No such file or directory", message, line)
+
+    def test_version_names_program_and_format(self):
+        for program in PROGRAMS:
+            self.assertRegex(self.succeed(program, "--version").stdout,
+                             rf"^{program} \d+\.\d+\.\d+ \(PTCX format \d+\.\d+\)\n$")
+
+    def test_unknown_options_and_missing_arguments_are_usage_errors(self):
+        for program in PROGRAMS:
+            self.assertIn("--help", self.fail_with(2, program))
+            self.assertIn("--help", self.fail_with(2, program, "--no-such-option", "file"))
+
+    def test_wrong_values_of_common_options_are_usage_errors(self):
+        for program in PROGRAMS:
+            operands = {"ptcinfo": [self.scene], "ptcverify": [self.scene],
+                        "ptcconvert": [self.scene, self.here / "o.ply"],
+                        "ptcrender": [self.scene, "-o", self.here / "o.png"],
+                        "ptcshade": [self.scene, "-o", self.here / "o.ply"],
+                        "ptcbuild": [self.cloud, "-o", self.here / "o.ptcx"]}[program]
+            for option, value in (("--memory", "much"), ("--memory", "0"), ("--memory", "-1"),
+                                  ("--memory", "9999999T"), ("--memory", "nan"), ("--memory", ""),
+                                  ("--threads", "-1"), ("--threads", "1.5"), ("--threads", "99999"),
+                                  ("--temp", self.here / "none"), ("--temp", self.mesh)):
+                self.assertIn(option, self.fail_with(2, program, *operands, f"{option}={value}"))
+
+    def test_wrong_values_of_other_options_are_usage_errors(self):
+        cases = {
+            "ptcbuild": ["--points=0", "--points=-5", "--points=1.5", "--points=1e99", "--points=x",
+                         "--spacing=0", "--spacing=nan", "--spacing=inf", "--sun=1", "--sun=1,91",
+                         "--sun=1,2,-3", "--sun=a,b", "--sun-size=-1", "--sun-colour=1,2",
+                         "--point=1,2,3", "--point=0,0,0,1,1,-1", "--sky=1,2", "--sky=-1",
+                         "--sky-scale=-1", "--camera=1,2,3", "--camera=1,2,3,1,2,3", "--fov=40",
+                         "--leaf=0", "--leaf=65536", "--levels-per-stream=0", "--codec=lzma",
+                         "--page-size=3K", "--page-size=2M", "--sun-rays=0", "--finest=0",
+                         "--city=5", "--output="],
+            "ptcshade": ["--solid-angle=0", "--parallax=-1", "--inflation=nan",
+                         "--inflation=0", "--resolution=7", "--resolution=65", "--sides=back",
+                         "--lift=-1", "--io=mail", "--check=-1", "--check-rays=0"],
+            "ptcrender": ["--size=10", "--size=0x10", "--size=10x", "--size=-1x5", "--size=10x70000",
+                          "--samples=0", "--samples=3", "--exposure=inf", "--layer=depth=a.png",
+                          "--layer=direct=a.exr", "--layer=direct", "--camera=0,0,0,0,0,0"],
+            "ptcconvert": ["--codec=", "--page-size=64"],
+        }
+        operands = {"ptcbuild": [self.mesh, "-o", self.here / "o.ptcx"],
+                    "ptcshade": [self.scene, "-o", self.here / "o.ply"],
+                    "ptcrender": [self.scene, "-o", self.here / "o.png"],
+                    "ptcconvert": [self.scene, self.here / "o.ptcx"]}
+        for program, options in cases.items():
+            for option in options:
+                self.fail_with(2, program, *operands[program], option)
+
+    def test_names_of_outputs_must_tell_their_kind(self):
+        for program, operands in (("ptcbuild", [self.mesh, "-o"]), ("ptcshade", [self.scene, "-o"]),
+                                  ("ptcrender", [self.scene, "-o"]), ("ptcconvert", [self.scene])):
+            for name in ("out", "out.txt", ".png", "out.ptcx.bak"):
+                self.assertIn("must end in", self.fail_with(2, program, *operands, self.here / name))
+
+    def test_inputs_and_city_exclude_each_other_and_one_is_needed(self):
+        self.fail_with(2, "ptcbuild", self.mesh, "--city", "1k", "-o", self.here / "o.ptcx")
+        self.fail_with(2, "ptcbuild", "-o", self.here / "o.ptcx")
+
+    def test_a_cap_that_is_too_small_names_the_least_that_works(self):
+        for program, operands in (("ptcbuild", [self.mesh, "--points", "1k", "-o", self.here / "o.ptcx"]),
+                                  ("ptcshade", [self.scene, "-o", self.here / "o.ply"]),
+                                  ("ptcrender", [self.scene, "-o", self.here / "o.png"]),
+                                  ("ptcverify", [self.scene])):
+            message = self.fail_with(2, program, *operands, "--memory", "1M")
+            least = message.split("the least that works is ")[1].split()[0]
+            self.succeed(program, *operands, "--memory", least,
+                         *(SMALL_PICTURE if program == "ptcrender" else []))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,98 @@
+"""Reads every #include "..." of the sources against the table in tools/cmake/PtcLayers.cmake.
+
+A file may include its own layer and those that the table names, always by the path from the root of
+the tree. Needs the standard library only.
+"""
+
+import re
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDERS = ["format", "engine", "tools"]
+
+
+def read_table(text):
+    """Layers that each layer may include, from set(PTC_LAYERS_x "a;b") lines."""
+    table = {}
+    for layer, value in re.findall(r'^set\(PTC_LAYERS_(\S+) "([^"]*)"\)', text, re.MULTILINE):
+        value = re.sub(r"\$\{PTC_LAYERS_([^}]+)\}", lambda m: ";".join(table[m[1]]), value)
+        table[layer] = [name for name in value.split(";") if name]
+    return table
+
+
+def layer_of(path, table):
+    """The layer whose folder holds a path from the root; None for what is in no layer."""
+    folder = Path(path).parent
+    while str(folder) != "." and str(folder) not in table:
+        folder = folder.parent
+    return str(folder) if str(folder) in table else None
+
+
+def faults_of(path, text, table, exists):
+    """What is wrong with the includes of one file, "PATH:LINE: ..." each."""
+    own = layer_of(path, table)
+    faults = []
+    for number, line in enumerate(text.splitlines(), 1):
+        found = re.match(r'\s*#\s*include\s*(["<])([^">]+)[">]', line)
+        if not found:
+            continue
+        quote, target = found.groups()
+        place = f"{path}:{number}: "
+        layer = layer_of(target, table)
+        if ".." in Path(target).parts:
+            faults.append(place + f"{target} leads out of its folder")
+        elif quote == "<":
+            if layer:
+                faults.append(place + f"<{target}> is ours and belongs in quotes")
+        elif not exists(target):
+            faults.append(place + f"{target} is no path from the root of the tree")
+        elif layer != own and layer not in table[own]:
+            faults.append(place + f"{own} may not include {layer} ({target})")
+    return faults
+
+
+class Layers(unittest.TestCase):
+    def setUp(self):
+        self.table = read_table((ROOT / "tools/cmake/PtcLayers.cmake").read_text())
+
+    def test_every_include_keeps_to_the_table(self):
+        faults, files = [], 0
+        for folder in FOLDERS:
+            for path in sorted((ROOT / folder).rglob("*")):
+                if path.suffix not in (".h", ".cpp"):
+                    continue
+                files += 1
+                name = path.relative_to(ROOT).as_posix()
+                self.assertIsNotNone(layer_of(name, self.table), f"{name} is in no layer")
+                faults += faults_of(name, path.read_text(), self.table, lambda p: (ROOT / p).is_file())
+        self.assertEqual(faults, [])
+        self.assertGreater(files, 50)
+
+    def test_the_table_has_no_circles(self):
+        for layer, allowed in self.table.items():
+            for other in allowed:
+                if other != layer:
+                    self.assertNotIn(layer, self.table[other], f"{layer} and {other}")
+
+    def test_what_the_table_forbids_is_found(self):
+        def faults(path, line):
+            return faults_of(path, "#pragma once\n" + line, self.table, lambda p: "missing" not in p)
+
+        self.assertEqual(faults("engine/build/a.cpp", '#include "engine/sort/b.h"'), [])
+        self.assertEqual(faults("engine/build/a.cpp", '#include "engine/build/b.h"'), [])
+        self.assertEqual(faults("engine/build/a.cpp", "#include <vector>"), [])
+        self.assertEqual(faults("tools/a.cpp", '#include "engine/shade/b.h"'), [])
+        for path, line in (("engine/build/a.cpp", '#include "engine/shade/b.h"'),
+                           ("engine/shade/a.cpp", '#  include "engine/build/b.h"'),
+                           ("format/a.h", '#include "engine/base/b.h"'),
+                           ("engine/io/a.h", '#include "engine/pipeline.h"'),
+                           ("engine/a.h", '#include "tools/b.h"'),
+                           ("engine/io/a.h", '#include "../base/b.h"'),
+                           ("engine/io/a.h", '#include "missing.h"'),
+                           ("engine/io/a.h", "#include <format/b.h>")):
+            self.assertEqual(len(faults(path, line)), 1, (path, line))
+
+
+if __name__ == "__main__":
+    unittest.main()

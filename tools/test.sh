@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds everything and runs all tests. Ends with ctest's summary; what a
+# failed test printed stands above it. A second run builds only what changed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+tools/install.sh
+mkdir -p build
+exec 9>build/.lock
+flock 9 # two runs in one tree would build over each other
+
+cmake --preset release
+cmake --build --preset release --parallel "$(nproc)" --target all all_verify_interface_header_sets
+ctest --preset release --parallel "$(nproc)" --no-tests=error "$@"
