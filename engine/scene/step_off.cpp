@@ -62,16 +62,23 @@ glm::dvec3 inset(const std::array<glm::dvec3, 3>& corner, const glm::dvec3& p, d
 std::optional<SurfaceHit> own_surface(const RayScene& scene, const glm::dvec3& position,
                                       const glm::vec3& normal) {
   const double e = scene.epsilon();
-  const auto below = [&](const glm::vec3& aside) {
-    const glm::dvec3 from =
-        position + e * (kLift * glm::dvec3(normal) + kInset * glm::dvec3(aside));
-    return scene.closest(from, -normal, kLidBelow * e, (2 * kLift - kLidBelow) * e);
+  // What lies up to `slack` above or below the point, seen from `height`.
+  const auto around = [&](const glm::vec3& aside, double height, double slack) {
+    const glm::dvec3 from = position + e * (height * glm::dvec3(normal) + glm::dvec3(aside));
+    return scene.closest(from, -normal, (height - slack) * e, (height + slack) * e);
   };
-  std::optional<SurfaceHit> own = below(glm::vec3(0));
+  std::optional<SurfaceHit> own = around(glm::vec3(0), kLift, kLift - kLidBelow);
   if (own && own->front) return own;
+  const auto is_at_point = [&](const SurfaceHit& hit) {
+    const double off = glm::dot(glm::dvec3(hit.geometric_normal), position - hit.position);
+    return std::abs(off) < (kLift - kLidBelow) * e;
+  };
+  if (const auto leaning = around(glm::vec3(0), kInset, kInset); leaning && is_at_point(*leaning)) {
+    if (leaning->front) return leaning;
+  }
   const Basis basis(normal);
   for (const glm::vec3& aside : {basis.x, -basis.x, basis.y, -basis.y}) {
-    const std::optional<SurfaceHit> other = below(aside);
+    const auto other = around(static_cast<float>(kInset) * aside, kLift, kLift - kLidBelow);
     if (other && (!own || other->front)) own = other;
     if (own && own->front) break;
   }

@@ -10,7 +10,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/surfel.h"
 #include "engine/shade/direction_buffer.h"
-#include "engine/store/reader.h"
+#include "engine/cache/page_cache.h"
 
 namespace ptc {
 
