@@ -17,7 +17,7 @@
 #include "engine/io/file.h"
 #include "format/error.h"
 #include "format/text.h"
-#include "tools/options.h"
+#include "tools/values.h"
 
 namespace ptc {
 namespace {

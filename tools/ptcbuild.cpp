@@ -5,6 +5,8 @@
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"
+#include "tools/scene_options.h"
+#include "tools/values.h"
 
 namespace {
 

@@ -2,6 +2,7 @@
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"
+#include "tools/scene_options.h"
 
 namespace {
 

@@ -1,3 +1,4 @@
+// What runs counted, as JSON and as lines.
 #include "tools/report.h"
 
 #include <fmt/format.h>

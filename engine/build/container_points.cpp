@@ -1,3 +1,4 @@
+// Point pages one after another.
 #include "engine/build/container_points.h"
 
 #include "format/point_page.h"

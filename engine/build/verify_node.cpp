@@ -1,3 +1,4 @@
+// The bounds of quantisation, one function a quantity.
 #include "engine/build/verify_node.h"
 
 #include <fmt/format.h>

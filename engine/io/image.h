@@ -47,9 +47,8 @@ struct ExrLayer {
 };
 
 /// Scan lines, ZIP-compressed. Published whole or not at all.
-/// @throws std::system_error; std::invalid_argument when a layer has not width x height x
-/// components
-///         values, two layers have one name, or a side is 0 or above 2^16
+/// @throws std::system_error; std::invalid_argument when a layer has another number of values, two
+///         layers have one name, a side is 0 or above 2^16, or there are more than 2^28 pixels
 void write_exr(const std::filesystem::path& target, unsigned width, unsigned height,
                const std::vector<ExrLayer>& layers);
 

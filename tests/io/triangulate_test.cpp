@@ -76,7 +76,7 @@ TEST_CASE(
       Polygon p = turned(polygon, how);
       for (std::size_t first = 0; first < p.size(); ++first) {
         check_cover(p);
-        std::ranges::rotate(p, p.begin() + 1);
+        std::rotate(p.begin(), p.begin() + 1, p.end());
       }
     }
   }

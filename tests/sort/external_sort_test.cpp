@@ -95,13 +95,6 @@ class FileSizeLimit {
   void (*handler_)(int);
 };
 
-// Lets the peak of resident memory start again from what is resident now.
-bool reset_peak() {
-  malloc_trim(0);
-  std::ofstream("/proc/self/clear_refs") << "5";
-  return peak_resident_bytes() < resident_bytes() + kMiB;
-}
-
 }  // namespace
 
 TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort][external]") {
@@ -349,6 +342,13 @@ TEST_CASE("external sort: a stream that failed does not look as if it ended", "[
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 namespace {
 
+// Lets the peak of resident memory start again from what is resident now.
+bool reset_peak() {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";
+  return peak_resident_bytes() < resident_bytes() + kMiB;
+}
+
 // Sorts so many random records under a cap without holding them itself. @return whether it spilled
 bool sort_random(std::size_t count, std::uint64_t cap, const Executor& executor, bool fair_sample) {
   const TempDirectory directory;
@@ -382,7 +382,7 @@ bool sort_random(std::size_t count, std::uint64_t cap, const Executor& executor,
 
 TEST_CASE("external sort: resident memory stays below the cap and is given back",
           "[sort][external]") {
-  constexpr std::uint64_t kCap = 16 * kMiB;
+  constexpr std::uint64_t kCap = 8 * kMiB;
   if (!reset_peak()) {
     WARN("skipped: the system does not reset the peak of resident memory");
     return;

@@ -1,15 +1,23 @@
-// Containers with faults whose checksums are right.
+// Small containers, faults in them whose checksums are right, and what the check says of them.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "engine/base/surfel.h"
 #include "format/container.h"
 
 namespace ptc::test {
+
+/// A room with a ball in it, lit unevenly: flat cells, round cells, colours.
+[[nodiscard]] std::vector<Surfel> small_scene();
+
+/// What verify_container() says of a file; empty when nothing is wrong.
+[[nodiscard]] std::string fault_of(const std::filesystem::path& path);
 
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path);
 void write_file(const std::filesystem::path& path, const std::vector<std::byte>& bytes);

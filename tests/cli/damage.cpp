@@ -1,14 +1,39 @@
-#include "tests/cli/rewrite.h"
+// Where checksums lie and what they cover (spec/checksums.md).
+#include "tests/cli/damage.h"
 
 #include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
+#include "engine/build/verify.h"
 #include "engine/store/reader.h"
 #include "format/checksum.h"
+#include "format/error.h"
+#include "tests/support/scenes.h"
 
 namespace ptc::test {
+
+std::vector<Surfel> small_scene() {
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {0, 0, 0}, {0, 0, 1}, {1, 0, 0}, 0.2, {1, 0.5F, 0.25F});
+  add_rectangle(surfels, {0, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0.25, {0.1F, 0.9F, 0.3F});
+  add_sphere(surfels, {0.5, 0.4, 0.5}, 0.2, 0.12, {2, 3, 4});
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    surfels[i].radiance *= static_cast<float>(1 + i % 7) * 0.5F;
+  }
+  return surfels;
+}
+
+std::string fault_of(const std::filesystem::path& path) {
+  Progress silent;
+  try {
+    verify_container(path, {.threads = 1}, silent);
+  } catch (const FormatError& error) {
+    return error.what();
+  }
+  return "";
+}
 
 std::vector<std::byte> read_file(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -1,0 +1,217 @@
+// Suns, skies and cameras from the command line.
+#include "tools/scene_options.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <glm/trigonometric.hpp>
+
+#include "engine/io/image.h"
+#include "tools/common.h"
+#include "tools/values.h"
+
+namespace ptc {
+namespace {
+
+glm::vec3 parse_colour(const std::string& option, const std::string& text) {
+  constexpr char kExpected[] = "R,G,B or one number for grey, none negative";
+  const std::vector<double> n = parse_numbers(option, text, {1, 3}, kExpected);
+  const glm::vec3 colour =
+      n.size() == 1 ? glm::vec3(glm::dvec3(n[0])) : glm::vec3(n[0], n[1], n[2]);
+  for (int c = 0; c < 3; ++c) {
+    if (!(colour[c] >= 0 && colour[c] <= 1e30F)) refuse(option, text, kExpected);
+  }
+  return colour;
+}
+
+/// Towards the sun: azimuth 0 is +z, 90 is +x; elevation 90 is +y.
+glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees) {
+  const double azimuth = glm::radians(azimuth_degrees);
+  const double elevation = glm::radians(elevation_degrees);
+  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+          std::cos(azimuth) * std::cos(elevation)};
+}
+
+CLI::Option* add_repeated(CLI::App& app, const std::string& name,
+                          const std::function<void(const std::vector<std::string>&)>& set,
+                          const std::string& description) {
+  return app.add_option_function<std::vector<std::string>>(name, set, description)
+      ->allow_extra_args(false);
+}
+
+}  // namespace
+
+void LightArguments::declare(CLI::App& app) {
+  constexpr char kGroup[] = "Lights";
+  add_repeated(
+      app, "--sun", [this](const std::vector<std::string>& v) { set_suns(v); },
+      "A sun: azimuth from +z to +x and elevation, degrees; irradiance [3]; repeatable")
+      ->type_name("AZIMUTH,ELEVATION[,STRENGTH]")
+      ->group(kGroup);
+  app.add_option_function<std::string>(
+         "--sun-colour",
+         [this](const std::string& t) { sun_colour_ = parse_colour("--sun-colour", t); },
+         "Multiplies the strength of all suns")
+      ->type_name("R,G,B")
+      ->default_str("1,1,1")
+      ->group(kGroup);
+  add_number(app, "--sun-size", sun_degrees_, 0, 90, "Angular diameter of the suns, degrees")
+      ->group(kGroup);
+  add_repeated(
+      app, "--point", [this](const std::vector<std::string>& v) { set_points(v); },
+      "A point light and its intensity, W / sr; repeatable")
+      ->type_name("X,Y,Z,R,G,B")
+      ->group(kGroup);
+  declare_sky(app);
+}
+
+void LightArguments::declare_sky(CLI::App& app) {
+  const auto set = [this](const std::string& text) {
+    sky_ = text;
+    sky_radiance_.reset();
+    // What begins like a number is one: a picture of that name can be given as ./1.exr.
+    if (text.find_first_not_of("0123456789.,+-eE") == std::string::npos) {
+      sky_radiance_ = parse_colour("--sky", text);
+    }
+  };
+  app.add_option_function<std::string>(
+         "--sky", set, "Radiance from everywhere, or a latitude-longitude picture of it")
+      ->type_name("R,G,B|L|FILE")
+      ->group("Lights");
+  add_number(app, "--sky-scale", sky_scale_, 0, 1e6, "Multiplies the sky")->group("Lights");
+}
+
+void LightArguments::set_suns(const std::vector<std::string>& values) {
+  constexpr char kExpected[] =
+      "AZIMUTH,ELEVATION[,STRENGTH], elevation -90 to 90, strength not negative";
+  suns_.clear();
+  for (const std::string& text : values) {
+    const std::vector<double> n = parse_numbers("--sun", text, {2, 3}, kExpected);
+    const double strength = n.size() == 3 ? n[2] : 3;
+    if (std::abs(n[1]) > 90 || !(strength >= 0 && strength <= 1e30))
+      refuse("--sun", text, kExpected);
+    suns_.push_back({.to_sun = sun_direction(n[0], n[1]),
+                     .irradiance = glm::vec3(static_cast<float>(strength))});
+  }
+}
+
+void LightArguments::set_points(const std::vector<std::string>& values) {
+  constexpr char kExpected[] = "X,Y,Z,R,G,B, no colour negative";
+  points_.clear();
+  for (const std::string& text : values) {
+    const std::vector<double> n = parse_numbers("--point", text, {6}, kExpected);
+    for (std::size_t c = 3; c < 6; ++c) {
+      if (!(n[c] >= 0 && n[c] <= 1e30)) refuse("--point", text, kExpected);
+    }
+    points_.push_back({.position = {n[0], n[1], n[2]}, .intensity = {n[3], n[4], n[5]}});
+  }
+}
+
+bool LightArguments::given() const noexcept {
+  return !suns_.empty() || !points_.empty() || sky_given();
+}
+
+LightRig LightArguments::rig() const {
+  LightRig rig{.suns = suns_, .points = points_, .sky = sky()};
+  for (Sun& sun : rig.suns) {
+    sun.irradiance *= sun_colour_;
+    sun.angular_radius = static_cast<float>(glm::radians(sun_degrees_ / 2));
+  }
+  return rig;
+}
+
+Sky LightArguments::sky() const {
+  Sky sky;
+  if (sky_.empty()) return sky;
+  sky.radiance = sky_radiance_.value_or(glm::vec3(1)) * sky_scale_;
+  if (sky_radiance_) return sky;
+  check_input(sky_);
+  sky.map_path = sky_;
+  sky.map = std::make_shared<const Image>(read_image(sky_));
+  return sky;
+}
+
+LightRig LightArguments::default_rig() {
+  LightRig rig;
+  rig.suns.push_back({.to_sun = sun_direction(40, 50), .irradiance = glm::vec3(3)});
+  rig.sky.radiance = 0.8F * glm::vec3(0.85F, 0.93F, 1.0F);
+  return rig;
+}
+
+bool meshes_are_dark(const BuildRequest& request) {
+  const Mesh mesh = load_meshes(request.inputs, false);
+  const auto emits = [](const Material& material) { return material.emission != glm::vec3(0); };
+  return !mesh.triangles.empty() && std::ranges::none_of(mesh.materials, emits);
+}
+
+void add_light_sampling(CLI::App& app, LightSampling& sampling) {
+  constexpr char kGroup[] = "Expert";
+  constexpr std::uint64_t kMost = 1 << 16;
+  add_integer(app, "--sun-rays", sampling.sun_rays, 1, kMost, "Shadow rays of a point to each sun")
+      ->group(kGroup);
+  add_integer(app, "--sky-rays", sampling.sky_rays, 0, kMost, "Shadow rays of a point to the sky")
+      ->group(kGroup);
+  add_integer(app, "--area-rays", sampling.area_rays, 0, kMost,
+              "Shadow rays of a point to emissive triangles")
+      ->group(kGroup);
+}
+
+void CameraArguments::declare(CLI::App& app, const std::string& purpose) {
+  app.add_option_function<std::string>(
+         "--camera", [this](const std::string& text) { set_place(text); }, purpose)
+      ->type_name("PX,PY,PZ,TX,TY,TZ")
+      ->group("Camera");
+  app.add_option_function<double>(
+         "--fov",
+         [this](const double& degrees) {
+           camera_.vertical_fov = static_cast<float>(glm::radians(degrees));
+         },
+         "Vertical field of view of --camera, degrees")
+      ->type_name("NUMBER")
+      ->default_str("40.1")
+      ->check(in_range(0.01, 179))
+      ->needs("--camera")
+      ->group("Camera");
+  app.add_option_function<std::string>(
+         "--size", [this](const std::string& text) { set_size(text); }, "Pixels of its picture")
+      ->type_name("WIDTHxHEIGHT")
+      ->default_str(std::to_string(camera_.width) + "x" + std::to_string(camera_.height))
+      ->group("Camera");
+}
+
+void CameraArguments::set_place(const std::string& text) {
+  constexpr char kExpected[] = "PX,PY,PZ,TX,TY,TZ: two different places";
+  const std::vector<double> n = parse_numbers("--camera", text, {6}, kExpected);
+  camera_.position = {n[0], n[1], n[2]};
+  camera_.look_at = {n[3], n[4], n[5]};
+  if (camera_.position == camera_.look_at) refuse("--camera", text, kExpected);
+  given_ = true;
+}
+
+void CameraArguments::set_size(const std::string& text) {
+  constexpr unsigned kMost = 1 << 16;  // of an EXR
+  const std::size_t cross = text.find('x');
+  const auto side = [&](std::string_view digits) {
+    const auto pixels = parse_number<unsigned>(digits);
+    if (!pixels || *pixels < 1 || *pixels > kMost) {
+      refuse("--size", text, "WIDTHxHEIGHT, 1 to 65536 each");
+    }
+    return *pixels;
+  };
+  if (cross == std::string::npos) refuse("--size", text, "WIDTHxHEIGHT, as 960x540");
+  const std::string_view whole = text;
+  size_ = {side(whole.substr(0, cross)), side(whole.substr(cross + 1))};
+}
+
+std::optional<Camera> CameraArguments::camera() const {
+  if (!given_) return {};
+  Camera camera = camera_;
+  if (size_) {
+    camera.width = (*size_)[0];
+    camera.height = (*size_)[1];
+  }
+  return camera;
+}
+
+}  // namespace ptc

@@ -1,0 +1,113 @@
+// Numbers from words, and what is said when they are none.
+#include "tools/values.h"
+
+#include <map>
+
+namespace ptc {
+namespace {
+
+/// A number before one of some suffixes, or without; NaN when it is none.
+double parse_scaled(std::string_view text, const std::map<std::string_view, double>& suffixes) {
+  const std::size_t end = text.find_last_of("0123456789.") + 1;
+  const auto number = parse_number<double>(text.substr(0, end));
+  const auto factor = suffixes.find(text.substr(end));
+  const bool known = end == text.size() || factor != suffixes.end();
+  if (!number || !known) return std::nan("");
+  return end == text.size() ? *number : *number * factor->second;
+}
+
+std::string range_text(const std::string& least, const std::string& most) {
+  return "expects a number from " + least + " to " + most;
+}
+
+}  // namespace
+
+void refuse(const std::string& option, const std::string& text, const std::string& expected) {
+  throw CLI::ValidationError(option, "expects " + expected + ", not '" + text + "'");
+}
+
+std::vector<double> parse_numbers(const std::string& option, const std::string& text,
+                                  std::initializer_list<std::size_t> counts,
+                                  const std::string& expected) {
+  std::vector<double> numbers;
+  std::string_view rest = text;
+  while (true) {
+    const std::size_t comma = rest.find(',');
+    const auto number = parse_number<double>(rest.substr(0, comma));
+    if (!number) refuse(option, text, expected);
+    numbers.push_back(*number);
+    if (comma == std::string_view::npos) break;
+    rest.remove_prefix(comma + 1);
+  }
+  for (const std::size_t count : counts) {
+    if (numbers.size() == count) return numbers;
+  }
+  refuse(option, text, expected);
+}
+
+std::uint64_t parse_count(const std::string& option, const std::string& text) {
+  constexpr double kGreatest = 0x1p48;  // points of a file
+  const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
+  if (!(count >= 1 && count <= kGreatest) || std::rint(count) != count) {
+    refuse(option, text, "a whole number from 1 to 2^48, as 250000, 250k or 1.5M");
+  }
+  return static_cast<std::uint64_t>(count);
+}
+
+std::uint64_t parse_size(const std::string& option, const std::string& text) {
+  constexpr double kGreatest = 0x1p62;
+  const double bytes = parse_scaled(text, {{"K", 0x1p10},
+                                           {"M", 0x1p20},
+                                           {"G", 0x1p30},
+                                           {"T", 0x1p40},
+                                           {"KiB", 0x1p10},
+                                           {"MiB", 0x1p20},
+                                           {"GiB", 0x1p30},
+                                           {"TiB", 0x1p40}});
+  if (!(bytes >= 1 && bytes <= kGreatest))
+    refuse(option, text, "a size as 800000000, 256M or 1.5G");
+  return static_cast<std::uint64_t>(bytes);
+}
+
+CLI::Validator in_range(double least, double most) {
+  const auto text = [](double x) {
+    std::string digits(32, '\0');
+    digits.resize(static_cast<std::size_t>(
+        std::to_chars(digits.data(), digits.data() + digits.size(), x).ptr - digits.data()));
+    return digits;
+  };
+  const std::string expects = range_text(text(least), text(most));
+  return CLI::Validator(
+      [=](std::string& input) {
+        const auto value = parse_number<double>(input);
+        return value && *value >= least && *value <= most ? std::string()
+                                                          : expects + ", not '" + input + "'";
+      },
+      "");
+}
+
+CLI::Validator whole_in_range(std::uint64_t least, std::uint64_t most) {
+  const std::string expects = range_text(std::to_string(least), std::to_string(most));
+  return CLI::Validator(
+      [=](std::string& input) {
+        const auto value = parse_number<std::uint64_t>(input);
+        return value && *value >= least && *value <= most ? std::string()
+                                                          : expects + ", not '" + input + "'";
+      },
+      "");
+}
+
+CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& bytes,
+                      const std::string& description) {
+  const std::uint64_t mebibytes = bytes >> 20;
+  const bool whole = mebibytes % 1024 == 0;
+  return app
+      .add_option_function<std::string>(
+          name, [&bytes, name](const std::string& text) { bytes = parse_size(name, text); },
+          description)
+      ->type_name("SIZE")
+      ->default_str(whole ? std::to_string(mebibytes / 1024) + "G"
+                          : std::to_string(mebibytes) + "M");
+}
+
+}  // namespace ptc
