@@ -14,9 +14,9 @@ inline constexpr std::size_t kSlotUnit = 8;
 inline constexpr int kFirstPointBits = 48;
 
 // Columns of u16 after the children, in the order of GroupView's picture.
-enum Column : std::size_t { kMeanX, kMeanY, kMeanZ, kRadius, kConeAxis, kConeCos, kArea, kZero };
-inline constexpr std::size_t kFacing = 8;     // 6 u16 of each child
-inline constexpr std::size_t kRadiance = 14;  // 6 u32 of each child
+enum Column : std::size_t { kMeanX, kMeanY, kMeanZ, kRadius, kConeAxis, kConeCos, kArea, kThickness };
+inline constexpr std::size_t kFacing = 8;     // 6 columns, one an axis
+inline constexpr std::size_t kRadiance = 14;  // 6 columns of u32, one an axis
 
 [[nodiscard]] constexpr std::size_t round_to_slot(std::size_t bytes) noexcept {
   return (bytes + kSlotUnit - 1) / kSlotUnit * kSlotUnit;

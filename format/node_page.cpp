@@ -56,9 +56,6 @@ class GroupCheck {
     if (load<std::uint8_t>(group_, 19) != 0 || load<std::uint32_t>(group_, 20) != 0) {
       fail(19, kZeroClause, "reserved field is not zero");
     }
-    if (first_nonzero({group_ + column_at(n, kZero), 2 * n}) != 2 * n) {
-      fail(column_at(n, kZero), kZeroClause, "reserved column is not zero");
-    }
     if (first_nonzero({group_ + end, round_to_slot(end) - end}) != round_to_slot(end) - end) {
       fail(end, kZeroClause, "padding is not zero");
     }
@@ -81,10 +78,10 @@ class GroupCheck {
   }
 
   void check_numbers(int i) const {
-    for (const std::byte* const column : {view_.radius(), view_.area()}) {
+    for (const std::byte* const column : {view_.radius(), view_.area(), view_.thickness()}) {
       if (GroupView::u16_at(column, i) >= kUfloat16Limit) {
         fail(static_cast<std::size_t>(column - group_) + 2 * static_cast<std::size_t>(i),
-             "spec/nodes.md#node-number", "radius or area is not finite");
+             "spec/nodes.md#node-number", "radius, area or thickness is not finite");
       }
     }
   }
@@ -111,13 +108,14 @@ NodeSummary decode_summary(const GroupView& group, int i) {
   }
   node.radius = decode_ufloat16(u16(group.radius()));
   node.area = decode_ufloat16(u16(group.area()));
+  node.thickness = decode_ufloat16(u16(group.thickness()));
   node.cone_axis = decode_octahedral8(u16(group.cone_axis()));
   node.cone_cos = static_cast<float>(snorm16(u16(group.cone_cos())));
   for (std::size_t k = 0; k < 6; ++k) {
-    const auto share = load<std::uint16_t>(group.facing(i), 2 * k);
-    node.facing[k] = share / kFacingSteps * node.area;
+    const int axis = static_cast<int>(k);
+    node.facing[k] = u16(group.facing(axis)) / kFacingSteps * node.area;
     const std::array<float, 3> radiance =
-        decode_rgbe(load<std::uint32_t>(group.radiance(i), 4 * k));
+        decode_rgbe(load<std::uint32_t>(group.radiance(axis), 4 * static_cast<std::size_t>(i)));
     for (std::size_t c = 0; c < 3; ++c) node.flux[k][c] = node.facing[k] * double{radiance[c]};
   }
   return node;

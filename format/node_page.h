@@ -32,6 +32,9 @@ struct NodeSummary {
   std::array<double, 3> mean{};  ///< area-weighted mean position, in lattice units
   double radius = 0;             ///< of a sphere about the mean that holds all discs, lattice units
   double area = 0;               ///< sum of 2 r^2, in scene units squared
+  /// All discs lie so near the plane through the mean across the sum of area times normal, lattice
+  /// units; the radius where the normals cancel out.
+  double thickness = 0;
   std::array<double, 6> facing{};  ///< sum of area * max(0, n . axis), axes +x -x +y -y +z -z
   std::array<std::array<double, 3>, 6> flux{};  ///< the same times radiance
   std::array<float, 3> cone_axis{};             ///< unit
@@ -87,9 +90,9 @@ class NodePageEncoder {
 ///      u16 cone_axis[n]                     octahedral8
 ///      u16 cone_cos[n]                      snorm16 rounded down
 ///      u16 area[n]                          ufloat16, scene units squared
-///      u16 zero[n]                          0
-///      u16 facing[n][6]                     unorm16 of facing / area
-///      u32 radiance[n][6]                   rgbe of flux / facing
+///      u16 thickness[n]                     ufloat16 rounded up, lattice units
+///      u16 facing[6][n]                     unorm16 of facing / area
+///      u32 radiance[6][n]                   rgbe of flux / facing
 class GroupView {
  public:
   explicit GroupView(const std::byte* group) noexcept : p_(group) {}
@@ -122,14 +125,11 @@ class GroupView {
   [[nodiscard]] const std::byte* cone_axis() const noexcept { return column(4); }
   [[nodiscard]] const std::byte* cone_cos() const noexcept { return column(5); }
   [[nodiscard]] const std::byte* area() const noexcept { return column(6); }
-  /// 6 unorm16 of child i.
-  [[nodiscard]] const std::byte* facing(int i) const noexcept {
-    return column(8) + 12 * std::ptrdiff_t{i};
-  }
-  /// 6 rgbe of child i.
-  [[nodiscard]] const std::byte* radiance(int i) const noexcept {
-    return column(14) + 24 * std::ptrdiff_t{i};
-  }
+  [[nodiscard]] const std::byte* thickness() const noexcept { return column(7); }
+  /// unorm16 of axis k.
+  [[nodiscard]] const std::byte* facing(int k) const noexcept { return column(8 + k); }
+  /// rgbe of axis k.
+  [[nodiscard]] const std::byte* radiance(int k) const noexcept { return column(14 + 2 * k); }
 
   /// The i-th value of a u16 column.
   [[nodiscard]] static std::uint16_t u16_at(const std::byte* column, int i) noexcept {

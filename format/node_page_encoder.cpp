@@ -39,7 +39,7 @@ bool sane(double x) noexcept {
 
 [[maybe_unused]] bool storable(const NodeSummary& node) noexcept {
   return std::ranges::all_of(node.mean, [](double x) { return std::isfinite(x); }) &&
-         sane(node.radius) && sane(node.area) && std::ranges::all_of(node.facing, sane) &&
+         sane(node.radius) && sane(node.area) && sane(node.thickness) && std::ranges::all_of(node.facing, sane) &&
          std::ranges::all_of(node.flux,
                              [](const auto& f) { return std::ranges::all_of(f, sane); }) &&
          std::ranges::all_of(node.cone_axis, [](float x) { return std::isfinite(x); }) &&
@@ -88,11 +88,11 @@ class ChildEncoder {
   void encode(const NodeChild& child) {
     assert(storable(child.node));
     store(group_, kGroupHeadBytes + 8 * i_, encode_ref(child.ref));
-    encode_sphere(child.node);
+    encode_light(child.node);
+    encode_bounds(child.node);
     const std::uint16_t axis = encode_octahedral8(child.node.cone_axis);
     put(kConeAxis, axis);
     put(kConeCos, static_cast<std::uint16_t>(encode_cone_cos(child.node, axis)));
-    encode_light(child.node);
   }
 
  private:
@@ -100,7 +100,8 @@ class ChildEncoder {
     store(group_, column_at(n_, column) + 2 * i_, value);
   }
 
-  void encode_sphere(const NodeSummary& node) {
+  // Sphere and slab, widened by what rounding moves the mean and turns the normal of the slab.
+  void encode_bounds(const NodeSummary& node) {
     double moved_squared = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto corner = static_cast<double>(corner_[axis]);
@@ -111,21 +112,51 @@ class ChildEncoder {
       moved_squared += moved * moved;
     }
     double radius = node.radius;
+    double thickness = node.thickness + node.radius * turn_of_slab(node);
     if (moved_squared > 0) {  // one part in 2^50 covers the roundings of these lines
       radius = (radius + std::sqrt(moved_squared)) * (1 + 0x1p-50);
+      thickness = (thickness + std::sqrt(moved_squared)) * (1 + 0x1p-50);
     }
     put(kRadius, encode_ufloat16_up(float_above(radius)));
+    put(kThickness, encode_ufloat16_up(float_above(std::min(thickness, radius))));
+  }
+
+  // Distance between the unit normals of the slab as it is and as the stored shares give it; 1 where
+  // there is none, so that the slab is as thick as the sphere.
+  [[nodiscard]] double turn_of_slab(const NodeSummary& node) const noexcept {
+    std::array<double, 3> exact;
+    std::array<double, 3> stored;
+    double exact_squared = 0;
+    double stored_squared = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto share = [&](std::size_t k) {
+        return static_cast<double>(load<std::uint16_t>(group_, column_at(n_, kFacing + k) + 2 * i_));
+      };
+      exact[axis] = node.facing[2 * axis] - node.facing[2 * axis + 1];
+      stored[axis] = share(2 * axis) - share(2 * axis + 1);
+      exact_squared += exact[axis] * exact[axis];
+      stored_squared += stored[axis] * stored[axis];
+    }
+    if (!(exact_squared > 0 && stored_squared > 0)) return 1;
+    double apart = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double d = exact[axis] / std::sqrt(exact_squared) - stored[axis] / std::sqrt(stored_squared);
+      apart += d * d;
+    }
+    return std::sqrt(apart);
   }
 
   void encode_light(const NodeSummary& node) {
-    put(kArea, encode_ufloat16(to_float(node.area)));
+    const std::uint16_t area = encode_ufloat16(to_float(node.area));
+    put(kArea, area);
+    if (area == 0) return;  // shares and radiance stay 0
     for (std::size_t k = 0; k < 6; ++k) {
       const double facing = node.facing[k];
       if (!(facing > 0)) continue;  // share and radiance stay 0
-      const double share = node.area > 0 ? std::min(facing / node.area, 1.0) : 0.0;
-      store(group_, column_at(n_, kFacing) + 12 * i_ + 2 * k, to_u16(share * kFacingSteps));
+      const double share = std::min(facing / node.area, 1.0);
+      put(kFacing + k, to_u16(share * kFacingSteps));
       const auto& flux = node.flux[k];
-      store(group_, column_at(n_, kRadiance) + 24 * i_ + 4 * k,
+      store(group_, column_at(n_, kRadiance + 2 * k) + 4 * i_,
             encode_rgbe({to_float(flux[0] / facing), to_float(flux[1] / facing),
                          to_float(flux[2] / facing)}));
     }

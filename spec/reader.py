@@ -406,7 +406,7 @@ def decode_meta(payload, base):
 
 Child = namedtuple("Child", "interior page slot first count")
 Group = namedtuple("Group", "cell level children at")
-COLUMNS = ("mean_x", "mean_y", "mean_z", "radius", "cone_axis", "cone_cos", "area")
+COLUMNS = ("mean_x", "mean_y", "mean_z", "radius", "cone_axis", "cone_cos", "area", "thickness")
 
 
 def cell_of(key, level):
@@ -441,13 +441,12 @@ def decode_group(payload, at, base, pages, points):
             "spec/nodes.md#node-cell", "cell has digits after its level's")
     require(mask >> n == 0, here + 18, "spec/nodes.md#node-mask", "interior names no child")
     column = at + 24 + 8 * n
-    require(zero == zeros == 0 and not any(payload[end:at + size])
-            and not any(payload[column + 14 * n:column + 16 * n]), here + 19,
+    require(zero == zeros == 0 and not any(payload[end:at + size]), here + 19,
             "spec/nodes.md#node-zero", "a reserved field is not zero")
     words = struct.unpack_from(f"<{n}Q", payload, at + 24)
     children = [decode_ref(word, mask >> i & 1, pages, points, here + 24 + 8 * i)
                 for i, word in enumerate(words)]
-    for name, before in (("radius", 6 * n), ("area", 12 * n)):
+    for name, before in (("radius", 6 * n), ("area", 12 * n), ("thickness", 14 * n)):
         require(max(struct.unpack_from(f"<{n}H", payload, column + before)) < 0xFF00,
                 base + column + before, "spec/nodes.md#node-number", f"{name} is not finite")
     return Group(cell, level, children, at), size
@@ -480,8 +479,8 @@ def summary(payload, group, i):
     at = group.at + 24 + 8 * n
     out = {name: struct.unpack_from("<H", payload, at + 2 * n * k + 2 * i)[0]
            for k, name in enumerate(COLUMNS)}
-    out["facing"] = struct.unpack_from("<6H", payload, at + 16 * n + 12 * i)
-    out["radiance"] = struct.unpack_from("<6I", payload, at + 28 * n + 24 * i)
+    out["facing"] = struct.unpack_from(f"<{6 * n}H", payload, at + 16 * n)[i::n]
+    out["radiance"] = struct.unpack_from(f"<{6 * n}I", payload, at + 28 * n)[i::n]
     return out
 
 

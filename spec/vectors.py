@@ -104,6 +104,11 @@ def distance(a, b):
     return math.sqrt(sum((x - y) ** 2 for x, y in zip(a, b)))
 
 
+def across(a, b):
+    """Sine of the angle between unit vectors."""
+    return math.sin(angle(a, b)) if any(a) and any(b) else 1.0
+
+
 def angle(a, b):
     cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
     return math.atan2(math.sqrt(sum(c * c for c in cross)), sum(x * y for x, y in zip(a, b)))
@@ -124,11 +129,20 @@ class Summary:
         if area - length <= 0.3 * length and sum(facing) > 0:
             light = [sum(f[c] for f in flux) / sum(facing) for c in range(3)]
             self.flux = [[facing[k] * light[c] for c in range(3)] for k in range(6)]
-        self.radius = self.half_angle = 0.0
+        self.slab = self.axis if self.has_axis else (0.0, 0.0, 0.0)
+        self.radius = self.half_angle = self.thick = 0.0
 
-    def hold(self, reach, turn):
+    def hold(self, reach, turn, height):
         self.radius = max(self.radius, reach)
         self.half_angle = max(self.half_angle, turn) if self.has_axis else math.pi
+        self.thick = max(self.thick, height)
+
+    @property
+    def thickness(self):
+        return min(self.thick, self.radius) if self.has_axis else self.radius
+
+    def height(self, position):
+        return abs(sum(n * (a - b) for n, a, b in zip(self.slab, position, self.mean)))
 
 
 def summarise_points(surfels, unit):
@@ -142,7 +156,8 @@ def summarise_points(surfels, unit):
     area = sum(s.area for s in surfels)
     out = Summary(area, [(s.area if area else 1, s.q) for s in surfels], facing, flux)
     for s in surfels:
-        out.hold(distance(s.q, out.mean) + s.radius / unit, angle(s.normal, out.axis))
+        out.hold(distance(s.q, out.mean) + s.radius / unit, angle(s.normal, out.axis),
+                 out.height(s.q) + s.radius / unit * across(s.normal, out.slab))
     return out
 
 
@@ -152,11 +167,20 @@ def summarise_nodes(nodes):
                   [sum(n.facing[k] for n in nodes) for k in range(6)],
                   [[sum(n.flux[k][c] for n in nodes) for c in range(3)] for k in range(6)])
     for n in nodes:
-        out.hold(distance(n.mean, out.mean) + n.radius, angle(n.axis, out.axis) + n.half_angle)
+        cosine = abs(sum(a * b for a, b in zip(n.slab, out.slab)))
+        height = n.thickness * cosine + n.radius * across(n.slab, out.slab)
+        out.hold(distance(n.mean, out.mean) + n.radius, angle(n.axis, out.axis) + n.half_angle,
+                 out.height(n.mean) + min(height, n.radius))
     return out
 
 
 # Groups (nodes.md#node-group, #quantisation) -----------------------------------------------------
+
+def slab_normal(facing):
+    sums = [facing[2 * k] - facing[2 * k + 1] for k in range(3)]
+    length = math.sqrt(sum(s * s for s in sums))
+    return [s / length for s in sums] if length else sums
+
 
 def encode_summary(node, corner, edge):
     """The columns of one child."""
@@ -166,16 +190,23 @@ def encode_summary(node, corner, edge):
         step = math.floor((node.mean[k] - corner[k]) * (65536 / edge) + 0.5)
         out[name] = min(max(step, 0), 65535)
         stored.append(corner[k] + out[name] * (edge / 65536))
-    out["radius"] = ufloat16_up((node.radius + distance(stored, node.mean)) * (1 + 2 ** -50))
+    moved = distance(stored, node.mean)
+    radius = (node.radius + moved) * (1 + 2 ** -50)
+    out["radius"] = ufloat16_up(radius)
     u, v = octahedral(node.axis, 127)
     out["cone_axis"] = u & 0xFF | (v & 0xFF) << 8
     turned = node.half_angle + angle(node.axis, unfold(u, v, 127))
     cosine = -1.0 if turned >= math.pi else math.cos(turned)
     out["cone_cos"] = max(math.floor((cosine - 4e-7) * 32767), -32767) & 0xFFFF
     out["area"] = ufloat16(node.area)
-    out["facing"] = [math.floor(min(f / node.area, 1) * 65535 + 0.5) if node.area else 0
+    out["facing"] = [math.floor(min(f / node.area, 1) * 65535 + 0.5) if out["area"] else 0
                      for f in node.facing]
-    out["radiance"] = [rgbe([x / f for x in light]) if f else 0
+    turned = distance(slab_normal(out["facing"]), slab_normal(node.facing))
+    if not node.has_axis or not any(slab_normal(out["facing"])):
+        turned = 1.0
+    thickness = (node.thickness + node.radius * turned + moved) * (1 + 2 ** -50)
+    out["thickness"] = ufloat16_up(min(thickness, radius))
+    out["radiance"] = [rgbe([x / f for x in light]) if f and out["area"] else 0
                        for f, light in zip(node.facing, node.flux)]
     return out
 
@@ -188,11 +219,10 @@ def encode_group(cell, level, refs, columns):
     out += struct.pack(f"<{n}Q", *(word for _, word in refs))
     for name in r.COLUMNS:
         out += struct.pack(f"<{n}H", *(c[name] for c in columns))
-    out += bytes(2 * n)
-    for c in columns:
-        out += struct.pack("<6H", *c["facing"])
-    for c in columns:
-        out += struct.pack("<6I", *c["radiance"])
+    for k in range(6):
+        out += struct.pack(f"<{n}H", *(c["facing"][k] for c in columns))
+    for k in range(6):
+        out += struct.pack(f"<{n}I", *(c["radiance"][k] for c in columns))
     return out + bytes(-len(out) % 8)
 
 

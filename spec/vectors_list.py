@@ -312,9 +312,9 @@ def bad_nodes():
     yield "nodes-node-leaf.two", reference(2 << 48)
     yield "nodes-node-number", payload(8 + 32 + 6, b"\x00\xff")
     yield "nodes-node-number.area", payload(8 + 32 + 12, b"\xff\xff")
+    yield "nodes-node-number.thickness", payload(8 + 32 + 14, b"\0\xff")
     zero = "nodes-node-zero"
     yield zero, payload(8 + 19, b"\1")
-    yield zero + ".column", payload(8 + 32 + 14, b"\1")
     yield zero + ".padding", payload(8 + 84, b"\1")
     yield zero + ".table", payload(2, b"\1")
     yield zero + ".reference", reference(1 | 1 << 48, b"\1")
@@ -406,6 +406,7 @@ def verify_summaries():
         return tree_of(four_points(), lambda g: g[2][3][0].__setitem__(name, value))
     yield "nodes-node-mean", column("mean_x", 9)
     yield "nodes-node-sphere", column("radius", 0x4000)
+    yield "nodes-node-slab", column("thickness", 0x5000)
     yield "nodes-node-sums", column("area", 0x3F80)
     yield "nodes-node-sums.facing", column("facing", [9] * 6)
     yield "nodes-node-sums.radiance", column("radiance", [0, 0, 0, 0, 0x80808080, 0])

@@ -30,6 +30,29 @@ bool set_cone_axis(NodeSummary& node) {
   return true;
 }
 
+/// Unit normal of the slab that holds a cluster; zero where the normals cancel out.
+Vec3 slab_normal(const NodeSummary& node) {
+  const Vec3 sum = mean_normal(node);
+  const double length = std::sqrt(dot(sum, sum));
+  if (!(length > 1e-6 * node.area)) return {};
+  return {sum[0] / length, sum[1] / length, sum[2] / length};
+}
+
+/// Half the extent along a unit direction of a thing `thick` along its normal and `wide` across it;
+/// all of `wide` when the normal is zero.
+double extent_along(const Vec3& direction, const Vec3& normal, double thick, double wide) {
+  const double length = std::sqrt(dot(normal, normal));
+  if (!(length > 0)) return wide;
+  const Vec3 cross{direction[1] * normal[2] - direction[2] * normal[1],
+                   direction[2] * normal[0] - direction[0] * normal[2],
+                   direction[0] * normal[1] - direction[1] * normal[0]};
+  return (thick * std::abs(dot(direction, normal)) + wide * std::sqrt(dot(cross, cross))) / length;
+}
+
+double offset_along(const Vec3& direction, const Vec3& a, const Vec3& b) {
+  return std::abs(dot(direction, {a[0] - b[0], a[1] - b[1], a[2] - b[2]}));
+}
+
 /// Cosine of the angle between a direction and the cone's axis, neither quite of unit length.
 double cosine_to_axis(const NodeSummary& node, const std::array<float, 3>& n) {
   const Vec3 a{node.cone_axis[0], node.cone_axis[1], node.cone_axis[2]}, b{n[0], n[1], n[2]};
@@ -89,13 +112,17 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
   }
   for (double& m : node.mean) m /= weight;
   const bool has_axis = set_cone_axis(node);
+  const Vec3 slab = slab_normal(node);
   node.cone_cos = has_axis ? 1.0F : -1.0F;
   for (const PointRecord& p : points) {
     node.radius = std::max(node.radius, distance(position(p), node.mean) + static_cast<double>(p.radius) / unit);
     if (!has_axis) continue;
     const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
     node.cone_cos = std::min(node.cone_cos, round_down(cosine_to_axis(node, n)));
+    const double reach = extent_along(slab, {n[0], n[1], n[2]}, 0, static_cast<double>(p.radius) / unit);
+    node.thickness = std::max(node.thickness, offset_along(slab, position(p), node.mean) + reach);
   }
+  node.thickness = has_axis ? std::min(node.thickness, node.radius) : node.radius;
   flatten(node);
   return node;
 }
@@ -115,12 +142,17 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
     }
   }
   for (double& m : sum.mean) m /= weight;
-  double angle = set_cone_axis(sum) ? 0 : M_PI;
+  const bool has_axis = set_cone_axis(sum);
+  const Vec3 slab = slab_normal(sum);
+  double angle = has_axis ? 0 : M_PI;
   for (const NodeSummary* node : nodes) {
     sum.radius = std::max(sum.radius, distance(node->mean, sum.mean) + node->radius);
     const double half = std::acos(std::clamp(static_cast<double>(node->cone_cos), -1.0, 1.0));
     angle = std::max(angle, std::acos(cosine_to_axis(sum, node->cone_axis)) + half);
+    const double reach = extent_along(slab, slab_normal(*node), node->thickness, node->radius);
+    sum.thickness = std::max(sum.thickness, offset_along(slab, node->mean, sum.mean) + std::min(reach, node->radius));
   }
+  sum.thickness = has_axis ? std::min(sum.thickness, sum.radius) : sum.radius;
   sum.cone_cos = angle >= M_PI ? -1.0F : round_down(std::cos(angle));
   flatten(sum);
   return sum;

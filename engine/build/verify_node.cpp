@@ -15,6 +15,7 @@ using Vec3 = std::array<double, 3>;
 
 constexpr char kMean[] = "spec/nodes.md#node-mean";
 constexpr char kSphere[] = "spec/nodes.md#node-sphere";
+constexpr char kSlab[] = "spec/nodes.md#node-slab";
 constexpr char kSums[] = "spec/nodes.md#node-sums";
 constexpr char kCone[] = "spec/nodes.md#node-cone";
 
@@ -72,6 +73,30 @@ std::optional<Fault> compare_sphere(const NodeSummary& stored, const NodeSummary
   return Fault{kSphere, fmt::format("sphere of radius {} lattice units about the mean position, "
                                     "its points take {}",
                                     stored.radius, needed)};
+}
+
+/// Unit normal of the slab that a summary's shares give, zero where there is none.
+Vec3 slab_normal(const NodeSummary& node) {
+  Vec3 sum{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3],
+           node.facing[4] - node.facing[5]};
+  const double length = std::sqrt(dot(sum, sum));
+  if (!(length > 0)) return {};
+  for (double& s : sum) s /= length;
+  return sum;
+}
+
+std::optional<Fault> compare_slab(const NodeSummary& stored, const NodeSummary& exact) {
+  const double moved = distance(stored.mean, exact.mean);
+  const double turned = distance(slab_normal(stored), slab_normal(exact));
+  const double widest = exact.radius + moved;
+  const double needed = std::min(exact.thickness + exact.radius * turned + moved, widest);
+  const double slack = kLatticeSlack + kRelative * widest;
+  const double least = std::min(needed, kGreatestUfloat16) - slack;
+  const double most = (needed + slack) * (1 + 0x1p-8) * (1 + kRelative) + kLeastUfloat16;
+  if (stored.thickness >= least && stored.thickness <= most) return {};
+  return Fault{kSlab, fmt::format("slab of thickness {} lattice units about the mean position, "
+                                  "its points take {}",
+                                  stored.thickness, needed)};
 }
 
 std::optional<Fault> compare_area(const NodeSummary& stored, const NodeSummary& exact) {
@@ -133,6 +158,7 @@ std::optional<Fault> compare_summary(const NodeSummary& stored, const NodeSummar
                                      int cell_level) {
   if (auto fault = compare_mean(stored, exact, cell_level)) return fault;
   if (auto fault = compare_sphere(stored, exact)) return fault;
+  if (auto fault = compare_slab(stored, exact)) return fault;
   if (auto fault = compare_area(stored, exact)) return fault;
   if (auto fault = compare_light(stored, exact)) return fault;
   return compare_cone(stored, exact);
@@ -142,6 +168,8 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
                                   double unit) {
   const Vec3 axis = widen(stored.cone_axis);
   const double radius = stored.radius * (1 + kRelative) + kLatticeSlack;
+  const Vec3 slab = slab_normal(stored);
+  const double thickness = stored.thickness + kRelative * stored.radius + kLatticeSlack;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const LatticePoint at = decode_morton(points[i].key);
     const Vec3 position{static_cast<double>(at[0]), static_cast<double>(at[1]),
@@ -155,6 +183,14 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
                                i, reach, stored.radius)};
     }
     const Vec3 normal = widen(decode_octahedral(points[i].normal[0], points[i].normal[1]));
+    const double tilt = std::sin(angle_between(slab, normal));
+    const double height = std::abs(dot(slab, position) - dot(slab, stored.mean)) +
+                          static_cast<double>(points[i].radius) / unit * tilt;
+    if (height > thickness && stored.thickness < kGreatestUfloat16) {
+      return Fault{kSlab, fmt::format("disc {} of the leaf reaches {} lattice units from the middle "
+                                      "plane, beyond the slab's {}",
+                                      i, height, stored.thickness)};
+    }
     if (dot(normal, axis) < static_cast<double>(stored.cone_cos) - kAngleSlack) {
       return Fault{kCone, fmt::format("normal {} of the leaf is outside the cone", i)};
     }

@@ -21,6 +21,8 @@ struct Fault {
 ///
 ///   mean      half a step of cell edge / 65536; a whole one at the upper end of the cell
 ///   radius    at least exact radius + |stored mean - exact mean|, at most 1 + 2^-8 times that
+///   slab      at least exact thickness + radius |stored normal - exact normal| + |stored mean - exact
+///             mean| or else the sphere's radius, at most 1 + 2^-8 times that
 ///   area      2^-9 of itself
 ///   facing    half a step of 1 / 65535 of the area, along each axis
 ///   radiance  1 / 256 of its greatest component, along each axis that faces at all
@@ -32,7 +34,7 @@ struct Fault {
 [[nodiscard]] std::optional<Fault> compare_summary(const NodeSummary& stored,
                                                    const NodeSummary& exact, int cell_level);
 
-/// Checks that the stored sphere holds every disc and the stored cone every normal.
+/// Checks that the stored sphere and slab hold every disc and the stored cone every normal.
 /// @param unit  lattice unit in scene units
 [[nodiscard]] std::optional<Fault> check_bounds(const NodeSummary& stored,
                                                 std::span<const PointRecord> points, double unit);

@@ -35,11 +35,16 @@ void shade_brute_force(std::span<const Surfel> surfels, std::span<const Receiver
                        const Executor& executor) {
   executor.for_each(receivers.size(), [&](std::size_t i, unsigned) {
     DirectionBuffer buffer(grid);
+    DiscQueue queue;
     for (const Surfel& s : surfels) {
       const glm::vec3 to(s.position - receivers[i].position);
       if (glm::dot(to, receivers[i].normal) + s.radius <= 0 || !(s.radius > 0)) continue;
-      buffer.draw_disc(to, s.normal, s.radius, encode_rgbe({s.radiance.r, s.radiance.g, s.radiance.b}), sides);
+      queue.push(to, s.normal, s.radius, encode_rgbe({s.radiance.r, s.radiance.g, s.radiance.b}));
+      if (!queue.full()) continue;
+      buffer.draw(queue, sides);
+      queue.size = 0;
     }
+    buffer.draw(queue, sides);
     results[i] = buffer.resolve(receivers[i].normal);
   });
 }

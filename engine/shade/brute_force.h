@@ -26,7 +26,7 @@ void shade_brute_force(std::span<const Surfel> surfels, std::span<const Receiver
 
 /// Embree rays at the same discs: the reference for the gather's own error.
 ///
-/// The discs divide where they overlap as in DirectionBuffer::draw_disc(), and their back sides
+/// The discs divide where they overlap as in DirectionBuffer::draw(), and their back sides
 /// follow the same rule. Threads: trace() may be called concurrently. Memory: about 100 bytes a surfel.
 class DiscRays {
  public:

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include <glm/geometric.hpp>
 
 namespace ptc {
 namespace {
 
-constexpr float kEmpty = std::numeric_limits<float>::infinity();
 constexpr float kPi = 3.14159265F;
 
 /// Solid angle of the part of a cube face below and left of (u, v), up to a constant.
@@ -24,13 +22,6 @@ struct Axes {
 };
 constexpr Axes axes_of(int face) {
   return {face / 2, (face / 2 + 1) % 3, (face / 2 + 2) % 3, face % 2 == 0 ? 1.0F : -1.0F};
-}
-
-/// The face that a direction goes through.
-int face_of(const glm::vec3& d) {
-  const glm::vec3 size = glm::abs(d);
-  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  return 2 * axis + (d[axis] < 0 ? 1 : 0);
 }
 
 /// A rotation far from every symmetry of the axes.
@@ -56,6 +47,14 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
       weight_.push_back(static_cast<float>(solid_angle) / length);
     }
   }
+  geometry_ = {.centre = centre_.data(),
+               .length = length_.data(),
+               .weight = weight_.data(),
+               .resolution = static_cast<int>(resolution),
+               .rotation = {}};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) geometry_.rotation[row][column] = rotation_[column][row];
+  }
   if (!sky) return;
   const glm::mat3 to_world = glm::transpose(rotation_);
   const std::size_t plane = std::size_t{resolution} * resolution;
@@ -79,112 +78,20 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
 }
 
 DirectionBuffer::DirectionBuffer(const DirectionGrid& grid)
-    : grid_(&grid), depth_(grid.pixels(), kEmpty), rgbe_(grid.pixels(), 0) {}
+    : grid_(&grid), nearness_(grid.pixels(), 0), rgbe_(grid.pixels(), 0) {}
 
 void DirectionBuffer::clear() noexcept {
-  std::ranges::fill(depth_, kEmpty);
+  std::ranges::fill(nearness_, 0.0F);
   std::ranges::fill(rgbe_, 0);
 }
 
 void DirectionBuffer::copy(const DirectionBuffer& other) noexcept {
-  std::memcpy(depth_.data(), other.depth_.data(), depth_.size() * sizeof(float));
+  std::memcpy(nearness_.data(), other.nearness_.data(), nearness_.size() * sizeof(float));
   std::memcpy(rgbe_.data(), other.rgbe_.data(), rgbe_.size() * sizeof(std::uint32_t));
 }
 
-FacePixels DirectionBuffer::face(int face) noexcept {
-  const std::size_t first = static_cast<std::size_t>(face) * grid_->resolution_ * grid_->resolution_;
-  return {depth_.data() + first,    rgbe_.data() + first,     grid_->centre_.data(),
-          grid_->length_.data(), grid_->weight_.data(), static_cast<int>(grid_->resolution_)};
-}
-
-void DirectionBuffer::draw_footprint(const glm::vec3& to, float area, std::uint32_t rgbe) noexcept {
-  const glm::vec3 d = grid_->rotation_ * to;
-  const int face = face_of(d);
-  const Axes a = axes_of(face);
-  const float resolution = static_cast<float>(grid_->resolution_);
-  const float half = resolution * 0.5F;
-  const float inverse = 1 / std::abs(d[a.w]);
-  const float depth = std::sqrt(glm::dot(d, d));
-  // A patch of solid angle O covers O l^3 on the face plane, l = depth / |w|; side 2 s pixels.
-  const float s = std::sqrt(area * depth * inverse) * inverse * resolution * 0.25F;
-  const float x = std::clamp(d[a.u] * inverse * half + half, std::min(s, half), std::max(resolution - s, half));
-  const float y = std::clamp(d[a.v] * inverse * half + half, std::min(s, half), std::max(resolution - s, half));
-  const auto first = [&](float t) { return static_cast<int>(std::max(0.0F, t - s + 0.5F)); };
-  const auto last = [&](float t) { return static_cast<int>(std::min(resolution, t + s + 0.5F)); };
-  const int x0 = first(x), x1 = last(x), y0 = first(y), y1 = last(y);
-  const FacePixels pixels = this->face(face);
-  for (int j = y0; j < y1; ++j) {
-    for (int i = j * pixels.resolution + x0; i < j * pixels.resolution + x1; ++i) {
-      const bool nearer = depth < pixels.depth[i] || (depth == pixels.depth[i] && rgbe < pixels.rgbe[i]);
-      if (!nearer) continue;
-      pixels.depth[i] = depth;
-      pixels.rgbe[i] = rgbe;
-    }
-  }
-}
-
-namespace {
-
-/// Pixels [first, last) along one axis of a face that a disc can touch.
-/// @param low, high  extent of the disc along the axis
-/// @param near, far  extent along the face's axis, near above zero
-void pixel_span(float low, float high, float near, float far, int resolution, int& first, int& last) {
-  const float least = low < 0 ? low / near : low / far;
-  const float most = high < 0 ? high / far : high / near;
-  const float r = static_cast<float>(resolution);
-  first = static_cast<int>(std::clamp((least + 1) * 0.5F * r - 0.5F, 0.0F, r));
-  last = static_cast<int>(std::clamp((most + 1) * 0.5F * r + 1.5F, 0.0F, r));
-}
-
-/// The disc in the axes of a face; empty pixel range when it does not reach the face.
-/// @param inside  set when it reaches no other face
-FaceDisc disc_on_face(int face, const glm::vec3& to, const glm::vec3& normal, float radius, int resolution,
-                      bool& inside) {
-  const Axes a = axes_of(face);
-  FaceDisc disc{.cw = to[a.w] * a.sign,
-                .cu = to[a.u],
-                .cv = to[a.v],
-                .nw = normal[a.w] * a.sign,
-                .nu = normal[a.u],
-                .nv = normal[a.v],
-                .radius = radius,
-                .x1 = resolution,
-                .y1 = resolution};
-  const auto extent = [&](float n) { return radius * std::sqrt(std::max(0.0F, 1 - n * n)); };
-  const float eu = extent(disc.nu), ev = extent(disc.nv), ew = extent(disc.nw);
-  const float near = disc.cw - ew, far = disc.cw + ew;
-  const bool misses = far <= 0 || disc.cu - eu > far || -(disc.cu + eu) > far || disc.cv - ev > far ||
-                      -(disc.cv + ev) > far;
-  inside = near > 0 && disc.cu + eu < near && disc.cu - eu > -near && disc.cv + ev < near && disc.cv - ev > -near;
-  if (misses) {
-    disc.x1 = disc.y1 = 0;
-  } else if (near > 1e-3F * far) {
-    pixel_span(disc.cu - eu, disc.cu + eu, near, far, resolution, disc.x0, disc.x1);
-    pixel_span(disc.cv - ev, disc.cv + ev, near, far, resolution, disc.y0, disc.y1);
-  }
-  return disc;
-}
-
-}  // namespace
-
-void DirectionBuffer::draw_disc(const glm::vec3& to, const glm::vec3& normal, float radius,
-                                std::uint32_t rgbe, Sides sides) noexcept {
-  const float height = glm::dot(to, normal);  // above zero: the back faces the receiver
-  if (height >= 0) {
-    if (sides == Sides::front || glm::dot(to, to) < 4 * radius * radius) return;
-    rgbe = 0;
-  }
-  const glm::vec3 centre = grid_->rotation_ * to;
-  const glm::vec3 n = grid_->rotation_ * normal;
-  // The face that holds the centre first: most discs reach no other.
-  const int middle = face_of(centre);
-  bool inside = false;
-  for (int i = 0; i < 6 && !inside; ++i) {
-    const int face = (middle + i) % 6;
-    FaceDisc disc = disc_on_face(face, centre, n, radius, static_cast<int>(grid_->resolution_), inside);
-    disc.rgbe = rgbe;
-    if (disc.x0 < disc.x1 && disc.y0 < disc.y1) draw_face_disc(this->face(face), disc);
-  }
+void DirectionBuffer::draw(const DiscQueue& discs, Sides sides) noexcept {
+  draw_discs(grid_->geometry_, {nearness_.data(), rgbe_.data()}, discs, sides);
 }
 
 Shading DirectionBuffer::resolve(const glm::vec3& normal) noexcept {
@@ -198,7 +105,8 @@ Shading DirectionBuffer::resolve(const glm::vec3& normal) noexcept {
     if (nw + std::abs(nu) + std::abs(nv) <= 0) continue;
     sums.open = {};
     const float* sky = grid_->sky_.empty() ? nullptr : grid_->sky_.data() + static_cast<std::size_t>(3 * face) * plane;
-    sum_face(this->face(face), sky, nw, nu, nv, sums);
+    const std::size_t first = static_cast<std::size_t>(face) * plane;
+    sum_face(grid_->geometry_, {nearness_.data() + first, rgbe_.data() + first}, sky, nw, nu, nv, sums);
     open[a.w] += a.sign * sums.open[0];
     open[a.u] += sums.open[1];
     open[a.v] += sums.open[2];

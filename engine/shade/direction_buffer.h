@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <vector>
 
 #include <glm/mat3x3.hpp>
@@ -23,6 +22,8 @@ class DirectionGrid {
   /// @param resolution  pixels along a cube edge, a multiple of kPixelLanes
   /// @param sky  radiance from a direction (unit, away from the receiver), or empty: no sky
   DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky);
+  DirectionGrid(const DirectionGrid&) = delete;
+  DirectionGrid& operator=(const DirectionGrid&) = delete;
 
   [[nodiscard]] unsigned resolution() const noexcept { return resolution_; }
   [[nodiscard]] std::size_t pixels() const noexcept { return std::size_t{6} * resolution_ * resolution_; }
@@ -37,10 +38,10 @@ class DirectionGrid {
   std::vector<float> length_;  // resolution^2: |(1, u, v)|
   std::vector<float> weight_;  // resolution^2: solid angle / length
   std::vector<float> sky_;     // by face: planes of red, green, blue; or empty
+  CubeGeometry geometry_;      // of the above
 };
 
-/// Nearest coverer of every direction pixel: its depth and its RGBE colour. Of equal depths the
-/// lesser colour stays, so the order of drawing does not matter.
+/// Nearest coverer of every direction pixel and its RGBE colour.
 class DirectionBuffer {
  public:
   explicit DirectionBuffer(const DirectionGrid& grid);
@@ -48,25 +49,16 @@ class DirectionBuffer {
   void clear() noexcept;
   void copy(const DirectionBuffer& other) noexcept;
 
-  /// Draws a small thing as a square of pixels of its solid angle.
-  /// @param to    its middle relative to the buffer's, not zero
-  /// @param area  projected area, squared units of `to`
-  void draw_footprint(const glm::vec3& to, float area, std::uint32_t rgbe) noexcept;
-
-  /// Draws a disc exactly: every pixel whose ray meets it. Coplanar overlapping discs divide at the
-  /// line between their centres.
-  /// @param rgbe  colour of the front; the back is black
-  void draw_disc(const glm::vec3& to, const glm::vec3& normal, float radius, std::uint32_t rgbe,
-                 Sides sides) noexcept;
+  /// Draws discs exactly: every pixel whose ray meets one. Coplanar overlapping discs divide at the
+  /// line between their centres. The order of drawing does not matter.
+  void draw(const DiscQueue& discs, Sides sides) noexcept;
 
   /// Sums over the hemisphere of `normal`.
   [[nodiscard]] Shading resolve(const glm::vec3& normal) noexcept;
 
  private:
-  [[nodiscard]] FacePixels face(int face) noexcept;
-
   const DirectionGrid* grid_;
-  std::vector<float> depth_;  // infinity where nothing covers
+  std::vector<float> nearness_;  // CubePixels
   std::vector<std::uint32_t> rgbe_;
 };
 

@@ -1,11 +1,10 @@
 #include "engine/shade/direction_kernels.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 
-// This file is compiled once per instruction set. The loops are plain C++ for the compiler to
-// vectorise; sums keep kPixelLanes partial sums in every version, so all versions agree to the bit.
+// This file is compiled once per instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/shade/direction_kernels.cpp"
 #include <hwy/foreach_target.h>
@@ -13,94 +12,300 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
+namespace {
 
-void draw_face_disc(const FacePixels& pixels, const FaceDisc& disc) {
-  // Along the ray t (1, u, v) the plane is at t = height / slope. A shallow paraboloid in place of
-  // the flat disc makes the nearest centre win where coplanar discs overlap.
-  const float height = disc.cw * disc.nw + disc.cu * disc.nu + disc.cv * disc.nv;
-  const float square = disc.radius * disc.radius;
-  const float bump = 0.01F / disc.radius;
-  const int x0 = disc.x0 / kPixelLanes * kPixelLanes;
-  for (int y = disc.y0; y < disc.y1; ++y) {
-    const float v = pixels.centre[y];
-    const float row_slope = disc.nw + disc.nv * v;
-    float* depth = pixels.depth + y * pixels.resolution;
-    std::uint32_t* rgbe = pixels.rgbe + y * pixels.resolution;
-    const float* length = pixels.length + y * pixels.resolution;
-    for (int x = x0; x < disc.x1; x += kPixelLanes) {
-      for (int i = x; i < x + kPixelLanes; ++i) {
-        const float u = pixels.centre[i];
-        const float t = height / (row_slope + disc.nu * u);  // infinite, negative or NaN: a miss
-        const float du = u * t - disc.cu, dv = v * t - disc.cv, dw = t - disc.cw;
-        const float off = du * du + dv * dv + dw * dw;
-        const float z = t * length[i] + bump * off;
-        const bool nearer = (z < depth[i]) | ((z == depth[i]) & (disc.rgbe < rgbe[i]));
-        const bool take = (t > 0) & (off < square) & nearer;
-        depth[i] = take ? z : depth[i];
-        rgbe[i] = take ? disc.rgbe : rgbe[i];
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F = hn::CappedTag<float, kPixelLanes>;
+using I = hn::RebindToSigned<F>;
+using U = hn::RebindToUnsigned<F>;
+
+/// Height of the shallow paraboloid that stands for a disc, over its radius (spec/shading.md#surfels).
+constexpr float kBump = 0.01F;
+constexpr float kSlack = 1e-3F;  // pixels: rounding of a disc's bounds
+
+/// Discs on one face of the cube, set up for their pixels. A pixel at (du, dv) from the projected
+/// centre sees the disc's plane at t = cw / w, w = 1 + alpha du + beta dv, and the disc itself where
+///   aa du^2 + 2 ab du dv + bb dv^2 < (radius / cw)^2 w^2.
+struct FaceDiscs {
+  alignas(64) float u0[kPixelLanes], v0[kPixelLanes];
+  float aa[kPixelLanes], ab2[kPixelLanes], bb[kPixelLanes];
+  float alpha[kPixelLanes], beta[kPixelLanes];
+  float square[kPixelLanes];    // (radius / cw)^2
+  float inverse[kPixelLanes];   // 1 / cw
+  float bump[kPixelLanes];      // nearness lost per unit of the quadratic form
+  std::int32_t x0[kPixelLanes], x1[kPixelLanes], y0[kPixelLanes], y1[kPixelLanes];
+  std::int32_t first[kPixelLanes];  // pixel of the face
+};
+
+/// Covers pixels x .. x + lanes of a row.
+HWY_INLINE void cover(float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT rgbe, hn::VFromD<F> near,
+                      hn::Mask<F> inside, hn::VFromD<U> colour) {
+  const F f;
+  const U u;
+  const auto old_near = hn::LoadU(f, nearness);
+  const auto old_colour = hn::LoadU(u, rgbe);
+  const auto tie = hn::And(hn::Eq(near, old_near), hn::RebindMask(f, hn::Lt(colour, old_colour)));
+  const auto take = hn::And(inside, hn::Or(hn::Gt(near, old_near), tie));
+  hn::StoreU(hn::IfThenElse(take, near, old_near), f, nearness);
+  hn::StoreU(hn::IfThenElse(hn::RebindMask(u, take), colour, old_colour), u, rgbe);
+}
+
+HWY_INLINE void draw_on_face(const CubeGeometry& cube, const CubePixels& pixels, const FaceDiscs& discs, std::size_t i,
+                             std::uint32_t rgbe) {
+  const F f;
+  const auto aa = hn::Set(f, discs.aa[i]);
+  const auto alpha = hn::Set(f, discs.alpha[i]);
+  const auto square = hn::Set(f, discs.square[i]);
+  const auto inverse = hn::Set(f, discs.inverse[i]);
+  const auto bump = hn::Set(f, discs.bump[i]);
+  const auto u0 = hn::Set(f, discs.u0[i]);
+  const auto colour = hn::Set(U(), rgbe);
+  const int lanes = static_cast<int>(hn::Lanes(f));
+  const int last = cube.resolution - lanes;
+  for (int y = discs.y0[i]; y < discs.y1[i]; ++y) {
+    const float dv = cube.centre[y] - discs.v0[i];
+    const auto b = hn::Set(f, discs.ab2[i] * dv);
+    const auto c = hn::Set(f, discs.bb[i] * dv * dv);
+    const auto w0 = hn::Set(f, 1 + discs.beta[i] * dv);
+    const int row = discs.first[i] + y * cube.resolution;
+    for (int begin = discs.x0[i]; begin < discs.x1[i]; begin += lanes) {
+      const int x = std::min(begin, last);  // drawing a pixel again changes nothing
+      const auto du = hn::Sub(hn::LoadU(f, cube.centre + x), u0);
+      const auto form = hn::MulAdd(hn::MulAdd(aa, du, b), du, c);
+      const auto w = hn::MulAdd(alpha, du, w0);
+      const auto near = hn::NegMulAdd(form, bump, hn::Mul(w, inverse));  // below 0 behind the receiver
+      const auto inside = hn::Lt(form, hn::Mul(square, hn::Mul(w, w)));
+      cover(pixels.nearness + row + x, pixels.rgbe + row + x, near, inside, colour);
+    }
+  }
+}
+
+/// A disc within two radii of the receiver may fill the view: every face, every pixel, one division
+/// each.
+void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const float (&c)[3], const float (&n)[3],
+                    float radius, std::uint32_t rgbe) {
+  const F f;
+  const float height = c[0] * n[0] + c[1] * n[1] + c[2] * n[2];
+  const auto colour = hn::Set(U(), rgbe);
+  const auto square = hn::Set(f, radius * radius);
+  const auto bump = hn::Set(f, kBump / radius);
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  for (int face = 0; face < 6; ++face) {
+    const int a = face / 2, ua = (a + 1) % 3, va = (a + 2) % 3;
+    const float sign = face % 2 == 0 ? 1.0F : -1.0F;
+    const float reach = c[a] * sign + radius * std::sqrt(std::max(0.0F, 1 - n[a] * n[a]));
+    if (reach <= 0) continue;
+    const int first = face * cube.resolution * cube.resolution;
+    for (int y = 0; y < cube.resolution; ++y) {
+      const float v = cube.centre[y];
+      const auto row_slope = hn::Set(f, n[a] * sign + n[va] * v);
+      const int row = y * cube.resolution;
+      for (int x = 0; x < cube.resolution; x += lanes) {
+        const auto u = hn::LoadU(f, cube.centre + x);
+        const auto slope = hn::MulAdd(hn::Set(f, n[ua]), u, row_slope);
+        const auto t = hn::Div(hn::Set(f, height), slope);  // infinite, negative or NaN: a miss
+        const auto du = hn::MulSub(u, t, hn::Set(f, c[ua]));
+        const auto dv = hn::MulSub(hn::Set(f, v), t, hn::Set(f, c[va]));
+        const auto dw = hn::Sub(t, hn::Set(f, c[a] * sign));
+        const auto off = hn::MulAdd(du, du, hn::MulAdd(dv, dv, hn::Mul(dw, dw)));
+        const auto inside = hn::And(hn::Gt(t, hn::Zero(f)), hn::Lt(off, square));
+        const auto length = hn::LoadU(f, cube.length + row + x);
+        const auto near = hn::Div(hn::Set(f, 1.0F), hn::Add(t, hn::Div(hn::Mul(bump, off), length)));
+        cover(pixels.nearness + first + row + x, pixels.rgbe + first + row + x, near, inside, colour);
       }
     }
   }
 }
 
-void sum_face(const FacePixels& pixels, const float* sky, float nw, float nu, float nv, FaceSums& sums) {
-  constexpr int L = kPixelLanes;
-  const int resolution = pixels.resolution;
-  float total[L] = {}, covered[L] = {}, red[L] = {}, green[L] = {}, blue[L] = {};
-  float open_w[L] = {}, open_u[L] = {}, open_v[L] = {}, sky_r[L] = {}, sky_g[L] = {}, sky_b[L] = {};
-  const int plane = resolution * resolution;
-  for (int y = 0; y < resolution; ++y) {
-    const float v = pixels.centre[y];
-    const float row_cosine = nw + nv * v;
-    if (row_cosine + std::abs(nu) <= 0) continue;
-    const int row = y * resolution;
-    for (int x = 0; x < resolution; x += L) {
-      for (int i = 0; i < L; ++i) {
-        const int at = row + x + i;
-        const float u = pixels.centre[x + i];
-        const float cosine = row_cosine + nu * u;
-        const float weight = (cosine > 0 ? cosine : 0.0F) * pixels.weight[at];
-        const bool empty = pixels.depth[at] == std::numeric_limits<float>::infinity();
-        const float shut = empty ? 0.0F : weight;
-        const float clear = empty ? weight : 0.0F;
-        total[i] += weight;
-        covered[i] += shut;
-        const std::uint32_t c = pixels.rgbe[at];
-        const std::int32_t exponent = static_cast<std::int32_t>(c >> 24) - 9;  // value = m 2^(e - 136)
-        const float scale = std::bit_cast<float>((exponent > 0 ? exponent : 0) << 23) * shut;
-        red[i] += static_cast<float>(static_cast<std::int32_t>(c & 255)) * scale;
-        green[i] += static_cast<float>(static_cast<std::int32_t>(c >> 8 & 255)) * scale;
-        blue[i] += static_cast<float>(static_cast<std::int32_t>(c >> 16 & 255)) * scale;
-        const float direction = clear / pixels.length[at];
-        open_w[i] += direction;
-        open_u[i] += direction * u;
-        open_v[i] += direction * v;
+/// The span of pixels whose centres lie within [middle - half, middle + half] on a face's axis.
+HWY_INLINE void store_span(hn::VFromD<F> middle, hn::VFromD<F> half, float resolution, std::int32_t* first,
+                           std::int32_t* last) {
+  const F f;
+  const I i;
+  const auto scale = hn::Set(f, resolution * 0.5F);
+  const auto low = hn::MulAdd(hn::Sub(middle, half), scale, hn::Set(f, resolution * 0.5F - 0.5F - kSlack));
+  const auto high = hn::MulAdd(hn::Add(middle, half), scale, hn::Set(f, resolution * 0.5F + 0.5F + kSlack));
+  const auto clamp = [&](auto v) { return hn::Min(hn::Max(v, hn::Zero(f)), hn::Set(f, resolution)); };
+  hn::StoreU(hn::ConvertTo(i, hn::Ceil(clamp(low))), i, first);
+  hn::StoreU(hn::ConvertTo(i, hn::Floor(clamp(high))), i, last);
+}
+
+}  // namespace
+
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides) {
+  const F f;
+  const U u;
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  const auto resolution = static_cast<float>(cube.resolution);
+  const int face_pixels = cube.resolution * cube.resolution;
+  const auto zero = hn::Zero(f);
+  const auto one = hn::Set(f, 1.0F);
+  FaceDiscs set;
+  alignas(64) std::uint32_t colours[kPixelLanes];
+  for (int begin = 0; begin < discs.size; begin += lanes) {
+    const auto x = hn::LoadU(f, discs.x + begin), y = hn::LoadU(f, discs.y + begin), z = hn::LoadU(f, discs.z + begin);
+    const auto nx = hn::LoadU(f, discs.nx + begin), ny = hn::LoadU(f, discs.ny + begin),
+               nz = hn::LoadU(f, discs.nz + begin);
+    const auto r = hn::LoadU(f, discs.radius + begin);
+    const auto turn = [&](int row, auto a, auto b, auto c) {
+      const float* m = cube.rotation[row];
+      return hn::MulAdd(hn::Set(f, m[0]), a, hn::MulAdd(hn::Set(f, m[1]), b, hn::Mul(hn::Set(f, m[2]), c)));
+    };
+    const decltype(r) c[3] = {turn(0, x, y, z), turn(1, x, y, z), turn(2, x, y, z)};
+    const decltype(r) n[3] = {turn(0, nx, ny, nz), turn(1, nx, ny, nz), turn(2, nx, ny, nz)};
+    const auto height = hn::MulAdd(c[0], n[0], hn::MulAdd(c[1], n[1], hn::Mul(c[2], n[2])));
+    const auto distance2 = hn::MulAdd(c[0], c[0], hn::MulAdd(c[1], c[1], hn::Mul(c[2], c[2])));
+    const auto r2 = hn::Mul(r, r);
+    const auto back = hn::Ge(height, zero);
+    const auto wide = hn::Lt(distance2, hn::Mul(hn::Set(f, 4.0F), r2));
+    auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(r, zero));
+    // Backs are clear to receivers within two radii.
+    drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, wide), drawn);
+    if (hn::AllFalse(f, drawn)) continue;
+    hn::StoreU(hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin)), u, colours);
+
+    if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) {
+      alignas(64) float lane_c[3][kPixelLanes], lane_n[3][kPixelLanes];
+      for (int k = 0; k < 3; ++k) {
+        hn::StoreU(c[k], f, lane_c[k]);
+        hn::StoreU(n[k], f, lane_n[k]);
       }
-      if (!sky) continue;
-      for (int i = 0; i < L; ++i) {
-        const int at = row + x + i;
-        const float cosine = row_cosine + nu * pixels.centre[x + i];
-        const bool empty = pixels.depth[at] == std::numeric_limits<float>::infinity();
-        const float clear = (empty & (cosine > 0)) ? cosine * pixels.weight[at] : 0.0F;
-        sky_r[i] += clear * sky[at];
-        sky_g[i] += clear * sky[plane + at];
-        sky_b[i] += clear * sky[2 * plane + at];
+      std::uint8_t bits[8] = {};
+      hn::StoreMaskBits(f, near, bits);
+      for (unsigned rest = bits[0]; rest != 0; rest &= rest - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+        draw_wide_disc(cube, pixels, {lane_c[0][i], lane_c[1][i], lane_c[2][i]},
+                       {lane_n[0][i], lane_n[1][i], lane_n[2][i]}, discs.radius[static_cast<std::size_t>(begin) + i],
+                       colours[i]);
+      }
+      drawn = hn::AndNot(wide, drawn);
+    }
+
+    // A disc seen under less than 30 degrees reaches no face whose side its centre is not on.
+    const auto per_height = hn::Div(one, height);
+    for (int a = 0; a < 3; ++a) {
+      const int ua = (a + 1) % 3, va = (a + 2) % 3;
+      const auto cw = hn::Abs(c[a]), cu = c[ua], cv = c[va];
+      const auto extent2 = [&](auto m) { return hn::Mul(r2, hn::Max(zero, hn::NegMulAdd(m, m, one))); };
+      const auto ew2 = extent2(n[a]);
+      const auto far = hn::Add(cw, r);  // beyond it no sphere around the disc reaches
+      auto mask = hn::And(drawn, hn::And(hn::Lt(hn::Sub(hn::Abs(cu), r), far), hn::Lt(hn::Sub(hn::Abs(cv), r), far)));
+      if (hn::AllFalse(f, mask)) continue;
+      const auto negative = hn::Lt(c[a], zero);
+      const auto nw = hn::IfThenElse(negative, hn::Neg(n[a]), n[a]);
+      const auto nu = n[ua], nv = n[va];
+
+      // Bounds along u: (cu - u cw)^2 = r^2 |k|^2 - r^2 (n.k)^2 with k = (-u, 1, 0) in (w, u, v).
+      const auto p = hn::NegMulAdd(cw, cw, ew2);  // ew^2 - cw^2, below 0 where the disc is in front
+      const auto whole = hn::Ge(p, hn::Mul(hn::Set(f, -1e-4F), r2));
+      const auto per_p = hn::Div(hn::Set(f, -1.0F), p);
+      const auto span = [&](auto cx, auto nx_, auto ny_, std::int32_t* first, std::int32_t* last) {
+        const auto q = hn::MulAdd(cx, cw, hn::Mul(r2, hn::Mul(nx_, nw)));
+        const auto cross = hn::MulSub(cw, nx_, hn::Mul(cx, nw));
+        auto s = hn::MulAdd(cw, cw, hn::Mul(cx, cx));
+        s = hn::NegMulAdd(cross, cross, s);
+        s = hn::NegMulAdd(r2, hn::Mul(ny_, ny_), s);
+        const auto half = hn::Mul(r, hn::Sqrt(hn::Max(s, zero)));
+        store_span(hn::IfThenZeroElse(whole, hn::Mul(q, per_p)), hn::IfThenElse(whole, one, hn::Mul(half, per_p)),
+                   resolution, first, last);
+      };
+      span(cu, nu, nv, set.x0, set.x1);
+      span(cv, nv, nu, set.y0, set.y1);
+      const I i32;
+      const auto some = hn::And(hn::Lt(hn::LoadU(i32, set.x0), hn::LoadU(i32, set.x1)),
+                                hn::Lt(hn::LoadU(i32, set.y0), hn::LoadU(i32, set.y1)));
+      mask = hn::And(mask, hn::RebindMask(f, some));
+      if (hn::AllFalse(f, mask)) continue;
+
+      const auto inverse = hn::Div(one, cw);
+      const auto u0 = hn::Mul(cu, inverse), v0 = hn::Mul(cv, inverse);
+      const auto length2 = hn::MulAdd(u0, u0, hn::MulAdd(v0, v0, one));
+      const auto scale = hn::Mul(cw, per_height);
+      const auto alpha = hn::Mul(nu, scale), beta = hn::Mul(nv, scale);
+      const auto al = hn::Mul(alpha, length2), bl = hn::Mul(beta, length2);
+      const auto two = hn::Set(f, 2.0F);
+      hn::StoreU(u0, f, set.u0);
+      hn::StoreU(v0, f, set.v0);
+      hn::StoreU(hn::MulAdd(alpha, hn::NegMulAdd(two, u0, al), one), f, set.aa);
+      hn::StoreU(hn::MulAdd(beta, hn::NegMulAdd(two, v0, bl), one), f, set.bb);
+      hn::StoreU(hn::Mul(two, hn::MulSub(alpha, hn::Sub(bl, v0), hn::Mul(beta, u0))), f, set.ab2);
+      hn::StoreU(alpha, f, set.alpha);
+      hn::StoreU(beta, f, set.beta);
+      const auto size = hn::Mul(r, inverse);
+      hn::StoreU(hn::Mul(size, size), f, set.square);
+      hn::StoreU(inverse, f, set.inverse);
+      hn::StoreU(hn::Div(hn::Set(f, kBump), hn::Mul(r, hn::Sqrt(length2))), f, set.bump);
+      const auto plus = hn::Set(i32, 2 * a * face_pixels), minus = hn::Set(i32, (2 * a + 1) * face_pixels);
+      hn::StoreU(hn::IfThenElse(hn::RebindMask(i32, negative), minus, plus), i32, set.first);
+      std::uint8_t bits[8] = {};
+      hn::StoreMaskBits(f, mask, bits);
+      for (unsigned rest = bits[0]; rest != 0; rest &= rest - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+        draw_on_face(cube, pixels, set, i, colours[i]);
       }
     }
   }
-  for (int i = 0; i < L; ++i) {
-    sums.total += total[i];
-    sums.covered += covered[i];
-    sums.light[0] += red[i];
-    sums.light[1] += green[i];
-    sums.light[2] += blue[i];
-    sums.sky[0] += sky_r[i];
-    sums.sky[1] += sky_g[i];
-    sums.sky[2] += sky_b[i];
-    sums.open[0] += open_w[i];
-    sums.open[1] += open_u[i];
-    sums.open[2] += open_v[i];
+}
+
+void sum_face(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu, float nv,
+              FaceSums& sums) {
+  const F f;
+  const U u;
+  const I s;
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  const int plane = cube.resolution * cube.resolution;
+  const auto zero = hn::Zero(f);
+  auto total = zero, covered = zero, red = zero, green = zero, blue = zero;
+  auto open_w = zero, open_u = zero, open_v = zero, sky_r = zero, sky_g = zero, sky_b = zero;
+  for (int y = 0; y < cube.resolution; ++y) {
+    const float v = cube.centre[y];
+    const float row_cosine = nw + nv * v;
+    if (row_cosine + std::abs(nu) <= 0) continue;
+    const int row = y * cube.resolution;
+    auto row_open = zero;
+    for (int x = 0; x < cube.resolution; x += lanes) {
+      const auto at = static_cast<std::size_t>(row + x);
+      const auto pu = hn::LoadU(f, cube.centre + x);
+      const auto cosine = hn::Max(zero, hn::MulAdd(hn::Set(f, nu), pu, hn::Set(f, row_cosine)));
+      const auto weight = hn::Mul(cosine, hn::LoadU(f, cube.weight + at));
+      const auto empty = hn::Eq(hn::LoadU(f, pixels.nearness + at), zero);
+      const auto shut = hn::IfThenZeroElse(empty, weight);
+      const auto clear = hn::IfThenElseZero(empty, weight);
+      total = hn::Add(total, weight);
+      covered = hn::Add(covered, shut);
+      const auto c = hn::LoadU(u, pixels.rgbe + at);
+      // rgbe: m 2^(e - 136); exponents below 9 are black here.
+      const auto exponent = hn::Max(hn::Sub(hn::BitCast(s, hn::ShiftRight<24>(c)), hn::Set(s, 9)), hn::Zero(s));
+      const auto scale = hn::Mul(hn::BitCast(f, hn::ShiftLeft<23>(exponent)), shut);
+      const auto byte = hn::Set(u, 255U);
+      const auto value = [&](auto bits) { return hn::ConvertTo(f, hn::BitCast(s, hn::And(bits, byte))); };
+      red = hn::MulAdd(value(c), scale, red);
+      green = hn::MulAdd(value(hn::ShiftRight<8>(c)), scale, green);
+      blue = hn::MulAdd(value(hn::ShiftRight<16>(c)), scale, blue);
+      const auto direction = hn::Div(clear, hn::LoadU(f, cube.length + at));
+      open_w = hn::Add(open_w, direction);
+      row_open = hn::Add(row_open, direction);
+      open_u = hn::MulAdd(direction, pu, open_u);
+      if (!sky) continue;
+      sky_r = hn::MulAdd(clear, hn::LoadU(f, sky + at), sky_r);
+      sky_g = hn::MulAdd(clear, hn::LoadU(f, sky + plane + at), sky_g);
+      sky_b = hn::MulAdd(clear, hn::LoadU(f, sky + 2 * plane + at), sky_b);
+    }
+    open_v = hn::MulAdd(row_open, hn::Set(f, v), open_v);
   }
+  const auto add = [&](float& sum, auto lanes_sum) { sum += hn::GetLane(hn::SumOfLanes(f, lanes_sum)); };
+  add(sums.total, total);
+  add(sums.covered, covered);
+  add(sums.light[0], red);
+  add(sums.light[1], green);
+  add(sums.light[2], blue);
+  add(sums.sky[0], sky_r);
+  add(sums.sky[1], sky_g);
+  add(sums.sky[2], sky_b);
+  add(sums.open[0], open_w);
+  add(sums.open[1], open_u);
+  add(sums.open[2], open_v);
 }
 
 }  // namespace ptc::HWY_NAMESPACE
@@ -109,15 +314,16 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ptc {
 
-HWY_EXPORT(draw_face_disc);
+HWY_EXPORT(draw_discs);
 HWY_EXPORT(sum_face);
 
-void draw_face_disc(const FacePixels& pixels, const FaceDisc& disc) {
-  HWY_DYNAMIC_DISPATCH(draw_face_disc)(pixels, disc);
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides) {
+  HWY_DYNAMIC_DISPATCH(draw_discs)(cube, pixels, discs, sides);
 }
 
-void sum_face(const FacePixels& pixels, const float* sky, float nw, float nu, float nv, FaceSums& sums) {
-  HWY_DYNAMIC_DISPATCH(sum_face)(pixels, sky, nw, nu, nv, sums);
+void sum_face(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu, float nv,
+              FaceSums& sums) {
+  HWY_DYNAMIC_DISPATCH(sum_face)(cube, pixels, sky, nw, nu, nv, sums);
 }
 
 }  // namespace ptc

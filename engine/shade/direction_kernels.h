@@ -4,32 +4,32 @@
 #include <array>
 #include <cstdint>
 
-namespace ptc {
+#include "engine/shade/disc_queue.h"
+#include "engine/shade/shading.h"
 
-/// Pixels of one cube face; resolution is a multiple of kPixelLanes.
-struct FacePixels {
-  float* depth;            ///< infinity where nothing covers
-  std::uint32_t* rgbe;
-  const float* centre;     ///< resolution: pixel centres in [-1, 1]
-  const float* length;     ///< resolution^2: |(1, u, v)|
-  const float* weight;     ///< resolution^2: solid angle over length
-  int resolution;
-};
+namespace ptc {
 
 inline constexpr int kPixelLanes = 8;
 
-/// A disc in the axes of a face: w through the face, u along rows, v along columns.
-struct FaceDisc {
-  float cw, cu, cv;  ///< centre
-  float nw, nu, nv;  ///< unit normal
-  float radius;
-  std::uint32_t rgbe;
-  int x0, x1, y0, y1;  ///< pixels that it may touch
+/// The geometry of a cube of direction pixels. Faces: 0 +x  1 -x  2 +y  3 -y  4 +z  5 -z; w points
+/// through a face, u runs along its rows and v along its columns, the axes that follow w cyclically.
+struct CubeGeometry {
+  const float* centre;    ///< resolution: pixel centres in [-1, 1]
+  const float* length;    ///< resolution^2: |(1, u, v)|
+  const float* weight;    ///< resolution^2: solid angle over length
+  int resolution;         ///< a multiple of kPixelLanes
+  float rotation[3][3];   ///< rows: the cube's axes in the world
 };
 
-/// Covers the pixels whose ray (1, u, v) meets the disc before what is there; at equal depth the
-/// lesser colour wins, so the order of drawing does not matter.
-void draw_face_disc(const FacePixels& pixels, const FaceDisc& disc);
+/// What covers each pixel, by face, row and column.
+struct CubePixels {
+  float* nearness;        ///< 1 / t, t along the ray (1, u, v) of the pixel; 0 where nothing covers
+  std::uint32_t* rgbe;
+};
+
+/// Covers the pixels whose ray meets a disc before what is there; of equally near ones the lesser
+/// colour stays, so the order of drawing does not matter.
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides);
 
 /// Sums over the pixels of a face above the horizon.
 struct FaceSums {
@@ -40,8 +40,10 @@ struct FaceSums {
   std::array<float, 3> open{};      ///< of weight times direction (w, u, v) where uncovered
 };
 
+/// @param pixels  of one face
 /// @param sky     3 planes of resolution^2, or null
 /// @param nw, nu, nv  the receiver's normal in the axes of the face
-void sum_face(const FacePixels& pixels, const float* sky, float nw, float nu, float nv, FaceSums& sums);
+void sum_face(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu, float nv,
+              FaceSums& sums);
 
 }  // namespace ptc

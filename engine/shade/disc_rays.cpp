@@ -14,7 +14,7 @@ namespace ptc {
 namespace {
 
 constexpr float kPi = 3.14159265F;
-constexpr float kBump = 0.01F;  // height of the paraboloid over the disc's radius, as draw_disc()
+constexpr float kBump = 0.01F;  // height of the paraboloid over the disc's radius, as draw_discs()
 
 /// SplitMix64 (Steele, Lea and Flood 2014): a stream of uniform numbers in [0, 1).
 class Uniform {

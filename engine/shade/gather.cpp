@@ -2,14 +2,9 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
-#include <cstring>
 #include <vector>
 
-#include <glm/geometric.hpp>
-
-#include "engine/shade/receiver_cell.h"
-#include "format/scalar.h"
+#include "engine/shade/gather_kernels.h"
 
 namespace ptc {
 namespace {
@@ -32,50 +27,6 @@ struct Entry {
 
 constexpr std::uint8_t kAll = 0xff;  // a group may have fewer than 8: its size limits the mask
 
-/// True when the surfels of a cluster face one way so nearly that one large surfel stands for them.
-/// @param normal  mean over area
-bool is_flat(const glm::vec3& normal) { return glm::dot(normal, normal) > 0.81F; }
-
-/// A cluster as one receiver sees it.
-struct SeenCluster {
-  float area = 0;          // of its surfels, scene units squared
-  glm::vec3 normal{0};     // mean over area, not unit: 1 where all face one way
-  float projected = 0;     // area seen, over area
-  std::uint32_t rgbe = 0;  // of the front
-};
-
-/// @param toward  unit, from the cluster to the receiver
-SeenCluster look_at(const GroupView& group, int child, const glm::vec3& toward, Sides sides) {
-  float weight[6];
-  const std::byte* facing = group.facing(child);
-  for (int k = 0; k < 6; ++k) weight[k] = static_cast<float>(GroupView::u16_at(facing, k)) * (1.0F / 65535);
-  SeenCluster seen{.area = decode_ufloat16(GroupView::u16_at(group.area(), child)),
-                   .normal = {weight[0] - weight[1], weight[2] - weight[3], weight[4] - weight[5]}};
-  // Vector area: the part that faces one way; what is left faces every way alike.
-  const float along = glm::dot(seen.normal, toward);
-  const float scattered = std::max(0.0F, 1 - std::sqrt(glm::dot(seen.normal, seen.normal))) * 0.25F;
-  const float front = std::max(0.0F, along) + scattered;
-  seen.projected = sides == Sides::both ? std::abs(along) + scattered : front;
-  if (!(seen.projected > 0)) return seen;
-
-  glm::vec3 light(0);
-  float sum = 0;
-  const std::byte* radiance = group.radiance(child);
-  for (int axis = 0; axis < 3; ++axis) {
-    const int k = 2 * axis + (toward[axis] < 0 ? 1 : 0);
-    const float w = std::abs(toward[axis]) * weight[k];
-    std::uint32_t rgbe;
-    std::memcpy(&rgbe, radiance + 4 * k, 4);
-    const std::array<float, 3> c = decode_rgbe(rgbe);
-    light += w * glm::vec3(c[0], c[1], c[2]);
-    sum += w;
-  }
-  if (sum > 0) light /= sum;
-  if (!is_flat(seen.normal)) light *= front / seen.projected;  // the rest is black backs
-  seen.rgbe = encode_rgbe({light.r, light.g, light.b});
-  return seen;
-}
-
 }  // namespace
 
 struct Gather::Impl {
@@ -89,6 +40,7 @@ struct Gather::Impl {
   std::vector<std::vector<Entry>> lists;                  // likewise
   std::vector<Entry> stack;
   DirectionBuffer leaf;
+  DiscQueue queue;
 
   Impl(const SceneView& view, PageCache& cache, const DirectionGrid& g, const GatherOptions& o)
       : scene(view, cache), grid(g), options(o), leaf(g) {}
@@ -165,66 +117,43 @@ struct Gather::Impl {
   /// children. Without `left` (one receiver) everything is settled.
   void collect(const std::vector<Entry>& list, const ReceiverCell& cell, DirectionBuffer& buffer,
                std::vector<Entry>* left) {
+    const float shared_from = left ? cell.radius / options.parallax : 0;
+    const CellTest test{.cell = cell,
+                        .unit = scene.view().frame().unit(),
+                        .limit = options.solid_angle / kPi,
+                        .shared_from = shared_from,
+                        .shared_band = left ? shared_from + kSeam * cell.radius : 0,
+                        .inflation = options.inflation,
+                        .sides = options.sides,
+                        .last = left == nullptr};
     stack.assign(list.begin(), list.end());
     while (!stack.empty()) {
       const Entry entry = stack.back();
       stack.pop_back();
       if (entry.surfels) {
-        collect_surfels(entry, cell, buffer, left);
+        collect_surfels(entry, test, left);
       } else {
-        collect_group(entry, cell, buffer, left);
+        collect_group(entry, test, left);
       }
+      if (queue.full()) flush(buffer);
     }
+    flush(buffer);
   }
 
-  void collect_group(const Entry& entry, const ReceiverCell& cell, DirectionBuffer& buffer,
-                     std::vector<Entry>* left) {
+  void flush(DirectionBuffer& buffer) {
+    buffer.draw(queue, options.sides);
+    queue.size = 0;
+  }
+
+  void collect_group(const Entry& entry, const CellTest& test, std::vector<Entry>* left) {
     ++counts.groups;
     const GroupView group = scene.group(entry.page, entry.slot);
-    GroupLanes lanes;
-    scene.widen(group, cell.centre, lanes);
-    const float limit = options.solid_angle / kPi;  // of r^2 / d^2
-    const float shared_from = left ? cell.radius / options.parallax : 0;
-    const float seam = kSeam * cell.radius;
-    unsigned keep = 0;
-    const unsigned all = (1U << group.size()) - 1;
-    for (unsigned rest = entry.mask & all; rest != 0; rest &= rest - 1) {
-      const int i = std::countr_zero(rest);
-      const auto k = static_cast<std::size_t>(i);
-      const glm::vec3 to(lanes.x[k], lanes.y[k], lanes.z[k]);
-      const float r = lanes.radius[k];
-      const float d2 = glm::dot(to, to);
-      if (cell.has_horizon && cell.below_horizon(to, d2, r)) continue;
-      if (options.sides == Sides::front && faces_away(group, i, to, d2, r + cell.radius)) continue;
-      const float d = std::sqrt(d2);
-      const float nearest = std::max(0.0F, d - cell.radius);
-      if (r * r < limit * nearest * nearest) {  // small enough for every receiver
-        if (d >= shared_from) draw_cluster(group, i, to, d, buffer);
-        if (d < shared_from + seam) keep |= 1U << i;
-        continue;
-      }
-      // Open now what the children would open anyway, or what opens into shared parts.
-      const float farthest = d + cell.radius;
-      if (!left || d - r >= shared_from || r * r >= limit * farthest * farthest) {
-        open(group.child(i));
-      } else {
-        keep |= 1U << i;
-      }
+    const GroupVerdict verdict = gather_group(group, entry.mask, test, queue);
+    counts.clusters += verdict.drawn;
+    for (unsigned rest = verdict.open; rest != 0; rest &= rest - 1) open(group.child(std::countr_zero(rest)));
+    if (verdict.keep != 0) {
+      left->push_back({.page = entry.page, .slot = entry.slot, .mask = static_cast<std::uint8_t>(verdict.keep)});
     }
-    if (keep != 0) {
-      left->push_back({.page = entry.page, .slot = entry.slot, .mask = static_cast<std::uint8_t>(keep)});
-    }
-  }
-
-  /// True when every surfel of a cluster shows its back to every receiver.
-  static bool faces_away(const GroupView& group, int i, const glm::vec3& to, float d2, float reach) {
-    const float cosine = static_cast<float>(static_cast<std::int16_t>(GroupView::u16_at(group.cone_cos(), i))) *
-                         (1.0F / 32767);
-    if (cosine <= 0.05F || d2 <= reach * reach) return false;
-    const std::array<float, 3> n = decode_octahedral8(GroupView::u16_at(group.cone_axis(), i));
-    const float along = n[0] * to.x + n[1] * to.y + n[2] * to.z;
-    const float sine = std::sqrt(std::max(0.0F, 1 - cosine * cosine)) + 0.02F;  // axis is rounded
-    return along > sine * std::sqrt(d2 - reach * reach) + reach;
   }
 
   void open(const ChildRef& child) {
@@ -232,52 +161,26 @@ struct Gather::Impl {
       stack.push_back({.page = child.page, .slot = child.slot, .mask = kAll});
       return;
     }
-    for (std::uint32_t begin = 0; begin < child.point_count; begin += 8) {
-      const std::uint32_t size = std::min<std::uint32_t>(8, child.point_count - begin);
-      stack.push_back({.first = child.first_point + begin,
-                       .mask = static_cast<std::uint8_t>((1U << size) - 1),
-                       .surfels = true});
+    // Runs of 8 that do not cross a page.
+    const std::uint32_t per_page = scene.view().points_per_page();
+    std::uint64_t first = child.first_point;
+    for (const std::uint64_t end = first + child.point_count; first < end;) {
+      const std::uint64_t page_left = per_page - first % per_page;
+      const auto size = static_cast<unsigned>(std::min<std::uint64_t>({8, end - first, page_left}));
+      stack.push_back({.first = first, .mask = static_cast<std::uint8_t>((1U << size) - 1), .surfels = true});
+      first += size;
     }
   }
 
-  /// A flat cluster is drawn as a disc of its area and normal, which keeps surfaces tight at grazing
-  /// angles; any other as a square of its projected area.
-  void draw_cluster(const GroupView& group, int i, const glm::vec3& to, float d, DirectionBuffer& buffer) {
-    const SeenCluster seen = look_at(group, i, to * (-1 / d), options.sides);
-    if (!(seen.area > 0 && seen.projected > 0)) return;
-    if (is_flat(seen.normal)) {
-      buffer.draw_disc(to, glm::normalize(seen.normal), std::sqrt(seen.area * 0.5F), seen.rgbe, options.sides);
-    } else {
-      buffer.draw_footprint(to, seen.area * seen.projected * options.inflation, seen.rgbe);
-    }
-    ++counts.clusters;
-  }
-
-  void collect_surfels(const Entry& entry, const ReceiverCell& cell, DirectionBuffer& buffer,
-                       std::vector<Entry>* left) {
+  void collect_surfels(const Entry& entry, const CellTest& test, std::vector<Entry>* left) {
     ++counts.surfel_blocks;
-    SurfelLanes lanes;
-    scene.surfels(entry.first, static_cast<int>(std::bit_width(unsigned{entry.mask})), cell.centre, lanes);
-    const float shared_from = left ? cell.radius / options.parallax : 0;
-    const float seam = kSeam * cell.radius;
+    const PageReader::Page page = scene.points(entry.first);
+    const auto slot = static_cast<std::uint32_t>(entry.first % scene.view().points_per_page());
+    const int before = queue.size;
     unsigned keep = 0;
-    for (unsigned rest = entry.mask; rest != 0; rest &= rest - 1) {
-      const auto k = static_cast<std::size_t>(std::countr_zero(rest));
-      const glm::vec3 to(lanes.x[k], lanes.y[k], lanes.z[k]);
-      const float r = lanes.radius[k];
-      const float d2 = glm::dot(to, to);
-      if (cell.has_horizon && cell.below_horizon(to, d2, r)) continue;
-      const glm::vec3 normal(lanes.nx[k], lanes.ny[k], lanes.nz[k]);
-      if (options.sides == Sides::front && glm::dot(to, normal) >= cell.radius) continue;
-      const float d = std::sqrt(d2);
-      if (d < shared_from + seam) keep |= 1U << k;
-      if (d < shared_from) continue;
-      if (r > 0) buffer.draw_disc(to, normal, r, lanes.rgbe[k], options.sides);
-      ++counts.surfels;
-    }
-    if (keep != 0) {
-      left->push_back({.first = entry.first, .mask = static_cast<std::uint8_t>(keep), .surfels = true});
-    }
+    gather_surfels(page.payload, page.record_count, slot, entry.mask, test, queue, keep);
+    counts.surfels += static_cast<unsigned>(queue.size - before);
+    if (keep != 0) left->push_back({.first = entry.first, .mask = static_cast<std::uint8_t>(keep), .surfels = true});
   }
 };
 

@@ -28,24 +28,18 @@ ReceiverCell::ReceiverCell(std::span<const PlacedReceiver> receivers, double uni
   axis = length > 0 ? normals / length : glm::vec3(0, 0, 1);
   cone_cos = length > 0 ? 1.0F : -1.0F;
   double farthest = 0;
+  double lowest = 0;
   for (const PlacedReceiver& r : receivers) {
     const glm::dvec3 d = r.position - centre;
     farthest = std::max(farthest, glm::dot(d, d));
     cone_cos = std::min(cone_cos, glm::dot(axis, r.normal));
+    lowest = std::min(lowest, glm::dot(d, glm::dvec3(r.normal)));
   }
   radius = static_cast<float>(std::sqrt(farthest) * unit);
+  depth = static_cast<float>(-lowest * unit);
   cone_cos = std::max(cone_cos, -1.0F);
   cone_sin = std::sqrt(std::max(0.0F, 1 - cone_cos * cone_cos));
   has_horizon = cone_cos > 0.1F;
-}
-
-bool ReceiverCell::below_horizon(const glm::vec3& to, float distance_squared, float sphere) const noexcept {
-  const float reach = sphere + radius;
-  const float clear = distance_squared - reach * reach;
-  if (clear <= 0) return false;
-  // The sphere, seen under the angle asin(reach / distance), must stay below the union of the
-  // hemispheres, which reaches the cone's half angle below the plane of the axis.
-  return glm::dot(to, axis) + cone_sin * std::sqrt(clear) + cone_cos * reach < 0;
 }
 
 }  // namespace ptc

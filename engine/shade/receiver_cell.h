@@ -21,6 +21,7 @@ struct PlacedReceiver {
 struct ReceiverCell {
   glm::dvec3 centre{0};     ///< lattice units
   float radius = 0;         ///< scene units
+  float depth = 0;          ///< farthest that a receiver lies below the centre along its normal, scene units
   glm::vec3 axis{0};        ///< unit
   float cone_cos = -1;      ///< every normal n: n . axis >= cone_cos
   float cone_sin = 0;
@@ -28,11 +29,6 @@ struct ReceiverCell {
 
   /// @param unit  lattice unit in scene units
   ReceiverCell(std::span<const PlacedReceiver> receivers, double unit);
-
-  /// True when a sphere is below the horizon of every receiver.
-  /// @param to      its centre relative to `centre`
-  /// @param radius  its radius, scene units
-  [[nodiscard]] bool below_horizon(const glm::vec3& to, float distance_squared, float sphere) const noexcept;
 };
 
 }  // namespace ptc

@@ -1,10 +1,7 @@
-// The octree of a container as a gather walks it: groups and surfels relative to a point in space.
+// The octree of a container as a gather walks it.
 #pragma once
 
-#include <array>
 #include <cstdint>
-
-#include <glm/vec3.hpp>
 
 #include "engine/cache/page_cache.h"
 #include "format/node_page.h"
@@ -34,21 +31,6 @@ class SceneView {
   ChildRef root_;
 };
 
-/// The children of a group in float, relative to an origin, in scene units.
-struct alignas(32) GroupLanes {
-  std::array<float, kMaxChildren> x, y, z;  ///< mean - origin
-  std::array<float, kMaxChildren> radius;
-  int size = 0;
-};
-
-/// Up to 8 surfels in float, relative to an origin, in scene units.
-struct alignas(32) SurfelLanes {
-  std::array<float, 8> x, y, z, radius;
-  std::array<float, 8> nx, ny, nz;
-  std::array<std::uint32_t, 8> rgbe;
-  int size = 0;
-};
-
 /// One thread's way into the octree.
 class SceneReader {
  public:
@@ -57,10 +39,8 @@ class SceneReader {
   [[nodiscard]] const SceneView& view() const noexcept { return view_; }
   /// A group; valid until the next call. @throws FormatError when the reference leads nowhere
   [[nodiscard]] GroupView group(std::uint32_t page, std::uint16_t slot);
-  /// @param origin  in lattice units
-  void widen(const GroupView& group, const glm::dvec3& origin, GroupLanes& lanes) const noexcept;
-  /// The surfels [first, first + count), count at most 8.
-  void surfels(std::uint64_t first, int count, const glm::dvec3& origin, SurfelLanes& lanes);
+  /// The page that holds a point; valid until the next call.
+  [[nodiscard]] PageReader::Page points(std::uint64_t point) { return pages_.get(view_.point_page(point)); }
 
  private:
   const SceneView& view_;

@@ -180,6 +180,36 @@ TEST_CASE("octree: points without area or with opposite normals still have a mid
   CHECK(opposite.facing[1] == Approx(2));
 }
 
+TEST_CASE("octree: the slab of a plane is thin, of opposite normals as thick as the sphere", "[build][octree]") {
+  std::vector<PointRecord> points(64);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].key = encode_morton({1000 + i % 8, 2000 + i / 8, 500});
+    points[i].radius = 3;
+    points[i].normal = encode_octahedral({0, 0, 1});
+  }
+  const NodeSummary plane = summarise_points(points, 1);
+  CHECK(plane.thickness == 0);
+  points[0].normal = encode_octahedral({0, 0.6F, 0.8F});  // a disc on a slant
+  CHECK(summarise_points(points, 1).thickness == Approx(3 * 0.6).epsilon(0.02));
+  points[0].normal = encode_octahedral({0, 0, 1});
+  points[0].key = encode_morton({1000, 2000, 507});  // a disc above
+  CHECK(summarise_points(points, 1).thickness == Approx(7.0 * 63 / 64).epsilon(0.01));
+
+  NodeSummary above = plane;
+  above.mean[2] += 10;
+  const std::array<const NodeSummary*, 2> sheets{&plane, &above};
+  CHECK(summarise_nodes(sheets).thickness == Approx(5));
+  NodeSummary turned = plane;  // a wall beside the floor
+  std::swap(turned.facing[0], turned.facing[4]);
+  const std::array<const NodeSummary*, 2> corner{&plane, &turned};
+  const NodeSummary crease = summarise_nodes(corner);
+  CHECK(crease.thickness == Approx(plane.radius * std::sqrt(0.5)));
+  turned = plane;
+  std::swap(turned.facing[4], turned.facing[5]);  // face to face
+  const std::array<const NodeSummary*, 2> pair{&plane, &turned};
+  CHECK(summarise_nodes(pair).thickness == summarise_nodes(pair).radius);
+}
+
 TEST_CASE("octree: cones hold every normal to the last bit", "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(20'000, 5));
   const auto holds = [](const NodeSummary& node, const PointRecord& p) {

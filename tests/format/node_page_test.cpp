@@ -43,6 +43,7 @@ NodeSummary random_summary(Random& random, const LatticePoint& corner, int level
     node.mean[axis] = static_cast<double>(corner[axis]) + edge * random.between(0, 1 - 0x1p-16);
   }
   node.radius = edge * std::exp2(random.between(-20, 2));
+  node.thickness = node.radius * random.unit();
   node.area = std::exp2(random.between(-30, 30));
   for (std::size_t k = 0; k < 6; ++k) {
     node.facing[k] = random.below(3) == 0 ? 0 : node.area * random.unit();
@@ -94,7 +95,7 @@ std::string changed(const Bytes& payload, std::uint32_t groups, std::size_t at, 
 
 bool finite(const NodeSummary& node) {
   const auto ok = [](double x) { return std::isfinite(x); };
-  return std::ranges::all_of(node.mean, ok) && ok(node.radius) && ok(node.area) &&
+  return std::ranges::all_of(node.mean, ok) && ok(node.radius) && ok(node.area) && ok(node.thickness) &&
          std::ranges::all_of(node.facing, ok) && std::ranges::all_of(node.cone_axis, ok) &&
          ok(node.cone_cos) &&
          std::ranges::all_of(node.flux, [&](const auto& f) { return std::ranges::all_of(f, ok); });
@@ -153,6 +154,44 @@ TEST_CASE("node page: the stored sphere holds the given one", "[format][nodes]")
     }
   }
   CHECK(wrong == 0);
+}
+
+TEST_CASE("node page: the stored slab holds the given one", "[format][nodes]") {
+  using Vec = std::array<double, 3>;
+  const auto normal = [](const NodeSummary& node) {
+    Vec v{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3], node.facing[4] - node.facing[5]};
+    const double length = std::hypot(v[0], v[1], v[2]);
+    for (double& x : v) x /= length;
+    return v;
+  };
+  Random random(6);
+  unsigned wrong = 0;
+  unsigned useful = 0;
+  for (int i = 0; i < 20000; ++i) {
+    NodeGroup group = random_group(random, 1, 5);
+    NodeSummary& given = group.children[0].node;
+    for (double& f : given.facing) f = given.area * random.unit();
+    given.thickness = given.radius * std::exp2(random.between(-20, 0));
+    const NodeSummary stored =
+        NodePage(page_of({group}), 1, kPages, kPoints).decode(0).children[0].node;
+    // The highest point over the plane, at the rim of the slab, turned any way.
+    const Vec n = normal(given), s = normal(stored);
+    const std::array<float, 3> other = random_axis(random);
+    double along = 0;
+    for (std::size_t k = 0; k < 3; ++k) along += double{other[k]} * n[k];
+    Vec side{};
+    for (std::size_t k = 0; k < 3; ++k) side[k] = double{other[k]} - along * n[k];
+    const double length = std::hypot(side[0], side[1], side[2]);
+    const double wide = std::sqrt(std::max(0.0, given.radius * given.radius - given.thickness * given.thickness));
+    double height = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      height += s[k] * (given.mean[k] - stored.mean[k] + given.thickness * n[k] + wide * side[k] / length);
+    }
+    wrong += std::abs(height) > stored.thickness;
+    useful += stored.thickness < 1.1 * given.thickness + 1e-3 * given.radius + cell_edge(5) / 32768;
+  }
+  CHECK(wrong == 0);
+  CHECK(useful > 19000);
 }
 
 TEST_CASE("node page: an exact mean keeps its radius", "[format][nodes]") {
@@ -363,6 +402,6 @@ TEST_CASE("node page: a broken rule is named", "[format][nodes]") {
   CHECK(with(8 + 48 + 6 * 3, std::uint16_t{0xff00}) == "spec/nodes.md#node-number");  // radius
   CHECK(with(8 + 48 + 6 * 3, std::uint16_t{0xfeff}) == "none");
   CHECK(with(8 + 48 + 6 * 6 + 4, std::uint16_t{0xffff}) == "spec/nodes.md#node-number");  // area
-  CHECK(with(8 + 48 + 6 * 7, std::uint16_t{1}) == "spec/nodes.md#node-zero");
+  CHECK(with(8 + 48 + 6 * 7 + 2, std::uint16_t{0xff00}) == "spec/nodes.md#node-number");  // thickness
   CHECK(with(8 + 204, std::uint16_t{1}) == "spec/nodes.md#node-zero");
 }
