@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <optional>
 
 #include <glm/geometric.hpp>
 
@@ -229,11 +230,11 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   options.cache_bytes = memory_left(request.run, taken,
                                     std::max(kLeastCache, PageCache::least_bytes(scene, executor.threads())),
                                     "this picture");
-  Shader shader(scene, options, executor);
+  std::optional<Shader> shader(std::in_place, scene, options, executor);
   CheckSample check(request.check, samples);
   {
     const Stage stage(report.seconds, progress, "render", samples, "samples");
-    TileRenderer tiles(*subject.view, shader, film, camera, side, lights.sky, check, executor);
+    TileRenderer tiles(*subject.view, *shader, film, camera, side, lights.sky, check, executor);
     const unsigned width = camera.width * side, height = camera.height * side;
     for (unsigned y = 0; y < height; y += kTileSamples) {
       for (unsigned x = 0; x < width; x += kTileSamples) {
@@ -242,6 +243,10 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
     }
     report.shade_cpu_seconds = tiles.shade_cpu_seconds();
   }
+  report.gather = shader->counts();
+  report.receivers = report.gather.receivers;
+  report.cache = shader->cache_statistics();
+  shader.reset();  // its pages make room for what the writers copy
   for (const PictureTarget& target : targets) {
     if (target.path.extension() == ".exr") {
       write_layers(target.path, film);
@@ -249,9 +254,6 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
       write_layer_png(target, film, request.exposure);
     }
   }
-  report.gather = shader.counts();
-  report.receivers = report.gather.receivers;
-  report.cache = shader.cache_statistics();
   if (request.check.receivers > 0) {
     const Stage stage(report.seconds, progress, "check", request.check.receivers, "receivers");
     report.check = check.compare(scene, request.gather.sides, lights.sky, subject.light.get(), subject.rays.get(),
