@@ -202,7 +202,7 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
   for (const glm::dvec3& p : sample) keys.push_back(encode_morton(frame.to_lattice(to_array(p))));
 
   const std::uint64_t sort_bytes =
-      memory_left(request.run, kBufferBytes + mesh_bytes(lit->mesh), kLeastSort, "this scene's build");
+      memory_left(request.run, kBufferBytes + mesh_bytes(lit->mesh, lit->rays.get()), kLeastSort, "this scene's build");
   ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target)}, executor, keys);
   double spacing = 0;
   {

@@ -47,22 +47,24 @@ double timed(std::size_t count, const Executor& executor, const Body& body) {
 
 }  // namespace
 
-CheckSample::CheckSample(const CheckRequest& request, std::uint64_t expected)
-    : request_(request),
-      stride_(request.receivers == 0 ? 0 : std::max<std::uint64_t>(1, expected / request.receivers)) {}
-
 void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shading> results) {
-  if (stride_ == 0) return;
+  if (request_.receivers == 0) return;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
-    if (seen_++ % stride_ != stride_ / 2) continue;
-    receivers_.push_back(receivers[i]);
-    results_.push_back(results[i]);
+    ++seen_;
+    if (receivers_.size() < request_.receivers) {
+      receivers_.push_back(receivers[i]);
+      results_.push_back(results[i]);
+    } else if (const std::uint64_t slot = bits_() % seen_; slot < request_.receivers) {
+      receivers_[slot] = receivers[i];
+      results_[slot] = results[i];
+    }
   }
 }
 
 CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const Sky& sky,
                                  const DirectLight* light, const RayScene* mesh,
-                                 const LightSampling& sampling, const Executor& executor) const {
+                                 const LightSampling& sampling, const Executor& executor,
+                                 Progress& progress) const {
   CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
   if (receivers_.empty()) return report;
   std::vector<Shading> traced(receivers_.size());
@@ -71,6 +73,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
     const DiscRays discs(surfels, sides, sky_function(sky));
     report.disc_microseconds = timed(receivers_.size(), executor, [&](std::size_t i) {
       traced[i] = discs.trace(receivers_[i], request_.rays, i);
+      progress.advance(1);
     });
   }
   report.discs = errors(results_, traced);
@@ -79,6 +82,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
     const RayTraced seen = trace_mesh(*mesh, *light, receivers_[i].position, receivers_[i].normal,
                                       request_.rays, sampling, i);
     traced[i] = {.occlusion = seen.occlusion, .irradiance = seen.irradiance, .sky = seen.sky};
+    progress.advance(1);
   });
   report.mesh = errors(results_, traced);
   return report;

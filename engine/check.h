@@ -1,6 +1,7 @@
 // Receivers of a run that are checked against rays afterwards.
 #pragma once
 
+#include <random>
 #include <span>
 #include <vector>
 
@@ -10,22 +11,24 @@
 
 namespace ptc {
 
-/// Keeps every n-th receiver of a run with its shading.
+/// Keeps an even sample of a run's receivers with their shading, the same each time (reservoir
+/// sampling, Vitter 1985, algorithm R).
 class CheckSample {
  public:
-  /// @param expected  receivers that will come, for the stride
-  CheckSample(const CheckRequest& request, std::uint64_t expected);
+  explicit CheckSample(const CheckRequest& request) : request_(request) {}
   void add(std::span<const Receiver> receivers, std::span<const Shading> results);
 
   /// @param light  with the mesh under it, or null
+  /// @param progress  advances by one a receiver, once for each reference
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides, const Sky& sky,
                                     const DirectLight* light, const RayScene* mesh,
-                                    const LightSampling& sampling, const Executor& executor) const;
+                                    const LightSampling& sampling, const Executor& executor,
+                                    Progress& progress) const;
 
  private:
   CheckRequest request_;
-  std::uint64_t stride_;
   std::uint64_t seen_ = 0;
+  std::mt19937_64 bits_;  // its default seed
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
 };

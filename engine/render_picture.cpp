@@ -1,5 +1,6 @@
 // Container to picture (engine/pipeline.h).
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -18,9 +19,10 @@
 namespace ptc {
 namespace {
 
-constexpr unsigned kTileSamples = 256;            // side of a tile, in samples
-constexpr std::uint64_t kReceiverBytes = 320;     // of one sample of a tile: hit, receiver, result, order
+constexpr unsigned kTileSide = 256;               // pixels
+constexpr std::uint64_t kReceiverBytes = 320;     // of one pixel of a tile: hit, receiver, result, order
 constexpr std::uint64_t kLeastCache = 16 << 20;
+constexpr unsigned kMostVariants = 16;
 
 /// Sums over the samples of every pixel.
 struct Film {
@@ -129,7 +131,8 @@ struct Subject {
   std::unique_ptr<PrimaryView> view;
 };
 
-/// Renders one tile of samples into the film.
+/// Renders one sample of every pixel of a tile into the film. Each of a pixel's samples is shaded with
+/// a variant of its own, so that what one of them resolves too coarsely the others average out.
 class TileRenderer {
  public:
   TileRenderer(const PrimaryView& view, Shader& shader, Film& film, const Camera& camera, unsigned side,
@@ -137,47 +140,56 @@ class TileRenderer {
       : view_(view), shader_(shader), film_(film), camera_(camera), side_(side), sky_(sky), check_(check),
         executor_(executor) {}
 
-  void render(unsigned x0, unsigned y0, unsigned x1, unsigned y1, Progress& progress) {
-    find_hits(x0, y0, x1, y1);
+  /// @param x0, y0, x1, y1  pixels
+  /// @param sample  0 to side^2 - 1
+  void render(unsigned x0, unsigned y0, unsigned x1, unsigned y1, unsigned sample, Progress& progress) {
+    find_hits(x0, y0, x1, y1, sample);
     receivers_.clear();
     for (const auto& hit : hits_) {
       if (hit) receivers_.push_back({hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
     }
     results_.resize(receivers_.size());
     const double before = cpu_seconds();
-    shader_.shade(receivers_, results_, progress);
+    shader_.shade(receivers_, results_, progress, sample);
     cpu_ += cpu_seconds() - before;
     check_.add(receivers_, results_);
-    expose(x0, y0, x1);
+    expose(x0, y0, x1, sample);
     progress.advance(hits_.size() - receivers_.size());
   }
 
   [[nodiscard]] double shade_cpu_seconds() const { return cpu_; }
 
  private:
-  void find_hits(unsigned x0, unsigned y0, unsigned x1, unsigned y1) {
+  void find_hits(unsigned x0, unsigned y0, unsigned x1, unsigned y1, unsigned sample) {
     const std::size_t columns = x1 - x0;
     hits_.assign(columns * (y1 - y0), std::nullopt);
     executor_.for_each(y1 - y0, [&](std::size_t row, unsigned) {
       for (std::size_t i = 0; i < columns; ++i) {
-        hits_[row * columns + i] = view_.at(x0 + static_cast<unsigned>(i), y0 + static_cast<unsigned>(row));
+        const auto [x, y] = sample_at(x0 + static_cast<unsigned>(i), y0 + static_cast<unsigned>(row), sample);
+        hits_[row * columns + i] = view_.at(x, y);
       }
     });
   }
 
-  void expose(unsigned x0, unsigned y0, unsigned x1) {
+  /// A sample of a pixel on the grid of all samples.
+  [[nodiscard]] std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample) const {
+    return {x * side_ + sample % side_, y * side_ + sample / side_};
+  }
+
+  void expose(unsigned x0, unsigned y0, unsigned x1, unsigned sample) {
     const float weight = 1.0F / static_cast<float>(side_ * side_);
     std::size_t next = 0;
     for (std::size_t i = 0; i < hits_.size(); ++i) {
       const unsigned x = x0 + static_cast<unsigned>(i % (x1 - x0));
       const unsigned y = y0 + static_cast<unsigned>(i / (x1 - x0));
-      const std::size_t pixel = std::size_t{y / side_} * film_.width + x / side_;
+      const std::size_t pixel = std::size_t{y} * film_.width + x;
       if (hits_[i]) {
         film_.add(pixel, *hits_[i], results_[next++], weight);
       } else {
         const float scale = 1.0F / static_cast<float>(side_);
-        film_.beauty[pixel] += weight * sky_.at(camera_.direction((static_cast<float>(x) + 0.5F) * scale,
-                                                                  (static_cast<float>(y) + 0.5F) * scale));
+        const auto [sx, sy] = sample_at(x, y, sample);
+        film_.beauty[pixel] += weight * sky_.at(camera_.direction((static_cast<float>(sx) + 0.5F) * scale,
+                                                                  (static_cast<float>(sy) + 0.5F) * scale));
       }
     }
   }
@@ -223,22 +235,25 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   }
 
   Film film(camera.width, camera.height);
-  ShadeOptions options{.access = request.access, .gather = request.gather, .sky = sky_function(lights.sky)};
-  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSamples} * kTileSamples * kReceiverBytes +
+  ShadeOptions options{.access = request.access,
+                       .gather = request.gather,
+                       .sky = sky_function(lights.sky),
+                       .variants = std::min(request.samples, kMostVariants)};
+  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * kReceiverBytes +
                               std::uint64_t{camera.width} * camera.height * Film::kBytes +
-                              (subject.rays ? mesh_bytes(subject.mesh) : samples * 24);
+                              (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24);
   options.cache_bytes = memory_left(request.run, taken,
                                     std::max(kLeastCache, PageCache::least_bytes(scene, executor.threads())),
                                     "this picture");
   std::optional<Shader> shader(std::in_place, scene, options, executor);
-  CheckSample check(request.check, samples);
+  CheckSample check(request.check);
   {
     const Stage stage(report.seconds, progress, "render", samples, "samples");
     TileRenderer tiles(*subject.view, *shader, film, camera, side, lights.sky, check, executor);
-    const unsigned width = camera.width * side, height = camera.height * side;
-    for (unsigned y = 0; y < height; y += kTileSamples) {
-      for (unsigned x = 0; x < width; x += kTileSamples) {
-        tiles.render(x, y, std::min(width, x + kTileSamples), std::min(height, y + kTileSamples), progress);
+    for (unsigned y = 0; y < camera.height; y += kTileSide) {
+      for (unsigned x = 0; x < camera.width; x += kTileSide) {
+        const unsigned x1 = std::min(camera.width, x + kTileSide), y1 = std::min(camera.height, y + kTileSide);
+        for (unsigned sample = 0; sample < request.samples; ++sample) tiles.render(x, y, x1, y1, sample, progress);
       }
     }
     report.shade_cpu_seconds = tiles.shade_cpu_seconds();
@@ -255,9 +270,10 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
     }
   }
   if (request.check.receivers > 0) {
-    const Stage stage(report.seconds, progress, "check", request.check.receivers, "receivers");
+    const unsigned references = subject.rays ? 2 : 1;
+    const Stage stage(report.seconds, progress, "check", references * request.check.receivers, "references");
     report.check = check.compare(scene, request.gather.sides, lights.sky, subject.light.get(), subject.rays.get(),
-                                 {.sun_rays = 1, .area_rays = 1, .sky_rays = 1}, executor);
+                                 {.sun_rays = 1, .area_rays = 1, .sky_rays = 1}, executor, progress);
   }
   return report;
 }

@@ -254,7 +254,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   } else {
     sink = std::make_unique<ContainerSink>(target, receivers, settings_text(request));
   }
-  CheckSample check(request.check, points);
+  CheckSample check(request.check);
   {
     const Stage stage(report.seconds, progress, "shade", points, "points");
     PointCursor cursor(receivers);
@@ -279,7 +279,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   report.cache = shader.cache_statistics();
   if (request.check.receivers > 0) {
     const Stage stage(report.seconds, progress, "check", request.check.receivers, "receivers");
-    report.check = check.compare(scene, request.gather.sides, sky, nullptr, nullptr, {}, executor);
+    report.check = check.compare(scene, request.gather.sides, sky, nullptr, nullptr, {}, executor, progress);
   }
   return report;
 }

@@ -46,10 +46,9 @@ double surfel_spacing(const ContainerReader& container) {
   return superblock.points == 0 ? 0 : std::sqrt(superblock.area / static_cast<double>(superblock.points));
 }
 
-std::uint64_t mesh_bytes(const Mesh& mesh) {
-  constexpr std::uint64_t kBvhBytes = 110;  // a triangle: Embree 3 takes 80 when built, more while it builds
-  return mesh.triangles.size() * (sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]) + kBvhBytes) +
-         mesh.positions.size() * (2 * sizeof(glm::vec3) + sizeof(glm::vec2) + 16);
+std::uint64_t mesh_bytes(const Mesh& mesh, const RayScene* rays) {
+  return mesh.triangles.size() * (sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0])) +
+         mesh.positions.size() * (2 * sizeof(glm::vec3) + sizeof(glm::vec2)) + (rays ? rays->bytes() : 0);
 }
 
 std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky) {

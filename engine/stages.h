@@ -39,8 +39,9 @@ class Stage {
 /// Sky as a gather takes it; empty for a black one.
 [[nodiscard]] std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky);
 
-/// Resident bytes of a mesh and its BVH, from above.
-[[nodiscard]] std::uint64_t mesh_bytes(const Mesh& mesh);
+/// Bytes of a mesh and of what Embree keeps of it.
+/// @param rays  of the mesh, or null
+[[nodiscard]] std::uint64_t mesh_bytes(const Mesh& mesh, const RayScene* rays);
 
 // Keys of the meta page's text.
 inline constexpr const char* kLightsKey = "lights";

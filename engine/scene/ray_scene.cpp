@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -136,6 +137,7 @@ struct RayScene::Impl {
                                  float v) const;
 
   const Mesh& mesh;
+  std::atomic<std::int64_t> bytes = 0;  // what Embree holds
   glm::vec3 middle{0};  // Embree's zero, in the mesh's frame
   glm::dvec3 half_extent{0};
   double epsilon = 0;
@@ -148,6 +150,13 @@ RayScene::Impl::Impl(const Mesh& source)
       device(rtcNewDevice("set_affinity=0")),
       scene(device != nullptr ? rtcNewScene(device) : nullptr) {
   check_device(device);
+  rtcSetDeviceMemoryMonitorFunction(
+      device,
+      [](void* self, ssize_t change, bool) {
+        static_cast<Impl*>(self)->bytes += change;
+        return true;
+      },
+      this);
   measure();
   if (!mesh.triangles.empty()) build();
 }
@@ -231,6 +240,8 @@ glm::vec3 RayScene::Impl::albedo(const Material& material,
 
 RayScene::RayScene(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
 RayScene::~RayScene() = default;
+
+std::uint64_t RayScene::bytes() const noexcept { return static_cast<std::uint64_t>(impl_->bytes.load()); }
 
 const Mesh& RayScene::mesh() const noexcept {
   return impl_->mesh;

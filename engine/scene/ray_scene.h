@@ -27,7 +27,7 @@ struct SurfaceHit {
 /// Rays are moved into a frame at the middle of the mesh, in double, before they become float, so
 /// that the precision is that of the mesh's extent wherever the mesh lies and wherever the ray
 /// begins. A ray through a shared edge or vertex never slips through; it hits either triangle.
-/// Memory: Embree's BVH, about 100 bytes a triangle, and a copy of the positions.
+/// Memory: bytes(), about 80 a triangle.
 class RayScene {
  public:
   /// @param mesh  must outlive this and not change
@@ -37,6 +37,8 @@ class RayScene {
   ~RayScene();
 
   [[nodiscard]] const Mesh& mesh() const noexcept;
+  /// What Embree holds: its tree and a copy of the positions.
+  [[nodiscard]] std::uint64_t bytes() const noexcept;
   /// @param origin     scene units; the hit is beyond `near`
   /// @param direction  unit; a ray with a NaN in it, or beyond 1e18, misses
   [[nodiscard]] std::optional<SurfaceHit> closest(const glm::dvec3& origin,

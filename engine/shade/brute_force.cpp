@@ -34,18 +34,18 @@ void shade_brute_force(std::span<const Surfel> surfels, std::span<const Receiver
                        std::span<Shading> results, const DirectionGrid& grid, Sides sides,
                        const Executor& executor) {
   executor.for_each(receivers.size(), [&](std::size_t i, unsigned) {
-    DirectionBuffer buffer(grid);
+    DirectionBuffer buffer(grid.resolution());
     DiscQueue queue;
     for (const Surfel& s : surfels) {
       const glm::vec3 to(s.position - receivers[i].position);
       if (glm::dot(to, receivers[i].normal) + s.radius <= 0 || !(s.radius > 0)) continue;
       queue.push(to, s.normal, s.radius, encode_rgbe({s.radiance.r, s.radiance.g, s.radiance.b}));
       if (!queue.full()) continue;
-      buffer.draw(queue, sides);
+      buffer.draw(grid, queue, sides);
       queue.size = 0;
     }
-    buffer.draw(queue, sides);
-    results[i] = buffer.resolve(receivers[i].normal);
+    buffer.draw(grid, queue, sides);
+    results[i] = buffer.resolve(grid, receivers[i].normal);
   });
 }
 

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 
 namespace ptc {
 namespace {
@@ -24,17 +25,21 @@ constexpr Axes axes_of(int face) {
   return {face / 2, (face / 2 + 1) % 3, (face / 2 + 2) % 3, face % 2 == 0 ? 1.0F : -1.0F};
 }
 
-/// A rotation far from every symmetry of the axes.
-glm::mat3 tilted_frame() {
+/// A rotation far from every symmetry of the axes; other variants turn on about a fixed axis by the
+/// golden angle, which comes near no multiple of a quarter soon.
+glm::mat3 tilted_frame(unsigned variant) {
   const glm::vec3 z = glm::normalize(glm::vec3(0.36F, 0.48F, 0.8F));
   const glm::vec3 x = glm::normalize(glm::cross(glm::vec3(0.2F, 1.0F, 0.1F), z));
-  return glm::transpose(glm::mat3(x, glm::cross(z, x), z));
+  const glm::mat3 tilt = glm::transpose(glm::mat3(x, glm::cross(z, x), z));
+  const float angle = 2.3999632F * static_cast<float>(variant);
+  return tilt * glm::mat3_cast(glm::angleAxis(angle, glm::normalize(glm::vec3(0.5F, -0.7F, 0.4F))));
 }
 
 }  // namespace
 
-DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky)
-    : resolution_(resolution), rotation_(tilted_frame()) {
+DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
+                             unsigned variant)
+    : resolution_(resolution), variant_(variant), rotation_(tilted_frame(variant)) {
   const double step = 2.0 / resolution;
   for (unsigned i = 0; i < resolution; ++i) centre_.push_back(static_cast<float>((i + 0.5) * step - 1));
   for (unsigned y = 0; y < resolution; ++y) {
@@ -77,8 +82,8 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
   }
 }
 
-DirectionBuffer::DirectionBuffer(const DirectionGrid& grid)
-    : grid_(&grid), nearness_(grid.pixels(), 0), rgbe_(grid.pixels(), 0) {}
+DirectionBuffer::DirectionBuffer(unsigned resolution)
+    : nearness_(std::size_t{6} * resolution * resolution, 0), rgbe_(nearness_.size(), 0) {}
 
 void DirectionBuffer::clear() noexcept {
   std::ranges::fill(nearness_, 0.0F);
@@ -90,13 +95,13 @@ void DirectionBuffer::copy(const DirectionBuffer& other) noexcept {
   std::memcpy(rgbe_.data(), other.rgbe_.data(), rgbe_.size() * sizeof(std::uint32_t));
 }
 
-void DirectionBuffer::draw(const DiscQueue& discs, Sides sides) noexcept {
-  draw_discs(grid_->geometry_, {nearness_.data(), rgbe_.data()}, discs, sides);
+void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides) noexcept {
+  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, discs, sides);
 }
 
-Shading DirectionBuffer::resolve(const glm::vec3& normal) noexcept {
-  const glm::vec3 n = grid_->rotation_ * normal;
-  const std::size_t plane = std::size_t{grid_->resolution_} * grid_->resolution_;
+Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal) noexcept {
+  const glm::vec3 n = grid.rotation_ * normal;
+  const std::size_t plane = std::size_t{grid.resolution_} * grid.resolution_;
   FaceSums sums;
   glm::vec3 open(0);
   for (int face = 0; face < 6; ++face) {
@@ -104,9 +109,9 @@ Shading DirectionBuffer::resolve(const glm::vec3& normal) noexcept {
     const float nw = n[a.w] * a.sign, nu = n[a.u], nv = n[a.v];
     if (nw + std::abs(nu) + std::abs(nv) <= 0) continue;
     sums.open = {};
-    const float* sky = grid_->sky_.empty() ? nullptr : grid_->sky_.data() + static_cast<std::size_t>(3 * face) * plane;
+    const float* sky = grid.sky_.empty() ? nullptr : grid.sky_.data() + static_cast<std::size_t>(3 * face) * plane;
     const std::size_t first = static_cast<std::size_t>(face) * plane;
-    sum_face(grid_->geometry_, {nearness_.data() + first, rgbe_.data() + first}, sky, nw, nu, nv, sums);
+    sum_face(grid.geometry_, {nearness_.data() + first, rgbe_.data() + first}, sky, nw, nu, nv, sums);
     open[a.w] += a.sign * sums.open[0];
     open[a.u] += sums.open[1];
     open[a.v] += sums.open[2];
@@ -116,7 +121,7 @@ Shading DirectionBuffer::resolve(const glm::vec3& normal) noexcept {
   shading.irradiance = glm::vec3(sums.light[0], sums.light[1], sums.light[2]) * (kPi / sums.total);
   shading.sky = glm::vec3(sums.sky[0], sums.sky[1], sums.sky[2]) * (kPi / sums.total);
   const float length = std::sqrt(glm::dot(open, open));
-  shading.bent_normal = length > 0 ? glm::transpose(grid_->rotation_) * (open / length) : normal;
+  shading.bent_normal = length > 0 ? glm::transpose(grid.rotation_) * (open / length) : normal;
   return shading;
 }
 

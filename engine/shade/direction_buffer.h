@@ -16,23 +16,24 @@ namespace ptc {
 /// The geometry of the pixels, shared by all buffers of a run: directions, exact solid angles, sky.
 ///
 /// The cube is turned away from the world's axes, so that walls and floors do not line up with
-/// pixel rows.
+/// pixel rows; each variant another way.
 class DirectionGrid {
  public:
   /// @param resolution  pixels along a cube edge, a multiple of kPixelLanes
   /// @param sky  radiance from a direction (unit, away from the receiver), or empty: no sky
-  DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky);
+  DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky, unsigned variant = 0);
   DirectionGrid(const DirectionGrid&) = delete;
   DirectionGrid& operator=(const DirectionGrid&) = delete;
 
   [[nodiscard]] unsigned resolution() const noexcept { return resolution_; }
-  [[nodiscard]] std::size_t pixels() const noexcept { return std::size_t{6} * resolution_ * resolution_; }
+  [[nodiscard]] unsigned variant() const noexcept { return variant_; }
   /// From world to the cube's axes.
   [[nodiscard]] const glm::mat3& rotation() const noexcept { return rotation_; }
 
  private:
   friend class DirectionBuffer;
   unsigned resolution_;
+  unsigned variant_;
   glm::mat3 rotation_;
   std::vector<float> centre_;  // resolution: pixel centres in [-1, 1]
   std::vector<float> length_;  // resolution^2: |(1, u, v)|
@@ -44,20 +45,20 @@ class DirectionGrid {
 /// Nearest coverer of every direction pixel and its RGBE colour.
 class DirectionBuffer {
  public:
-  explicit DirectionBuffer(const DirectionGrid& grid);
+  /// @param resolution  of the grids that it will be used with
+  explicit DirectionBuffer(unsigned resolution);
 
   void clear() noexcept;
   void copy(const DirectionBuffer& other) noexcept;
 
   /// Draws discs exactly: every pixel whose ray meets one. Coplanar overlapping discs divide at the
   /// line between their centres. The order of drawing does not matter.
-  void draw(const DiscQueue& discs, Sides sides) noexcept;
+  void draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides) noexcept;
 
   /// Sums over the hemisphere of `normal`.
-  [[nodiscard]] Shading resolve(const glm::vec3& normal) noexcept;
+  [[nodiscard]] Shading resolve(const DirectionGrid& grid, const glm::vec3& normal) noexcept;
 
  private:
-  const DirectionGrid* grid_;
   std::vector<float> nearness_;  // CubePixels
   std::vector<std::uint32_t> rgbe_;
 };

@@ -31,8 +31,8 @@ constexpr std::uint8_t kAll = 0xff;  // a group may have fewer than 8: its size 
 
 struct Gather::Impl {
   SceneReader scene;
-  const DirectionGrid& grid;
   GatherOptions options;
+  const DirectionGrid* grid = nullptr;  // of the call
   GatherCounts counts;
   std::vector<PlacedReceiver> receivers;
   std::span<Shading> results;
@@ -42,8 +42,8 @@ struct Gather::Impl {
   DirectionBuffer leaf;
   DiscQueue queue;
 
-  Impl(const SceneView& view, PageCache& cache, const DirectionGrid& g, const GatherOptions& o)
-      : scene(view, cache), grid(g), options(o), leaf(g) {}
+  Impl(const SceneView& view, PageCache& cache, const GatherOptions& o)
+      : scene(view, cache), options(o), leaf(o.resolution) {}
 
   void place(std::span<const Receiver> from) {
     const Frame& frame = scene.view().frame();
@@ -52,7 +52,7 @@ struct Gather::Impl {
     receivers.clear();
     for (std::size_t i = 0; i < from.size(); ++i) {
       const glm::dvec3& p = from[i].position;
-      receivers.push_back({.key = encode_morton(frame.to_lattice({p.x, p.y, p.z})),
+      receivers.push_back({.key = receiver_key(frame, p, grid->variant()),
                            .position = (p - origin) * scale,
                            .normal = from[i].normal,
                            .index = i});
@@ -79,13 +79,13 @@ struct Gather::Impl {
     if (cell.size() == 1) {
       if (&inherited != &leaf) leaf.copy(inherited);
       collect(list, bounds, leaf, nullptr);
-      results[cell[0].index] = leaf.resolve(cell[0].normal);
+      results[cell[0].index] = leaf.resolve(*grid, cell[0].normal);
       ++counts.receivers;
       return;
     }
     ++counts.cells;
     if (depth == buffers.size()) {
-      buffers.push_back(std::make_unique<DirectionBuffer>(grid));
+      buffers.push_back(std::make_unique<DirectionBuffer>(options.resolution));
       lists.emplace_back();
     }
     DirectionBuffer& buffer = *buffers[depth];
@@ -141,7 +141,7 @@ struct Gather::Impl {
   }
 
   void flush(DirectionBuffer& buffer) {
-    buffer.draw(queue, options.sides);
+    buffer.draw(*grid, queue, options.sides);
     queue.size = 0;
   }
 
@@ -184,12 +184,13 @@ struct Gather::Impl {
   }
 };
 
-Gather::Gather(const SceneView& view, PageCache& cache, const DirectionGrid& grid, const GatherOptions& options)
-    : impl_(std::make_unique<Impl>(view, cache, grid, options)) {}
+Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& options)
+    : impl_(std::make_unique<Impl>(view, cache, options)) {}
 Gather::~Gather() = default;
 
-void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> results) {
+void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> results, const DirectionGrid& grid) {
   if (receivers.empty()) return;
+  impl_->grid = &grid;
   impl_->place(receivers);
   impl_->results = results;
   impl_->run();

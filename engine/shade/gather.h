@@ -18,12 +18,13 @@ namespace ptc {
 /// Memory: a direction buffer (48 KiB at resolution 32) per level of receiver cells, and lists.
 class Gather {
  public:
-  Gather(const SceneView& view, PageCache& cache, const DirectionGrid& grid, const GatherOptions& options);
+  Gather(const SceneView& view, PageCache& cache, const GatherOptions& options);
   ~Gather();
 
   /// @param receivers  neighbours, in any order; a few thousand share best
   /// @param results    as many
-  void shade(std::span<const Receiver> receivers, std::span<Shading> results);
+  /// @param grid       of the options' resolution; its variant shifts the cells too
+  void shade(std::span<const Receiver> receivers, std::span<Shading> results, const DirectionGrid& grid);
   [[nodiscard]] const GatherCounts& counts() const noexcept;
 
  private:

@@ -17,6 +17,9 @@ struct PlacedReceiver {
   std::size_t index = 0;   ///< in the caller's order
 };
 
+/// A receiver's place on the Z-curve. The cells of other variants have their borders elsewhere.
+[[nodiscard]] MortonKey receiver_key(const Frame& frame, const glm::dvec3& position, unsigned variant);
+
 /// Bounds of some receivers: positions in a sphere, normals in a cone.
 struct ReceiverCell {
   glm::dvec3 centre{0};     ///< lattice units

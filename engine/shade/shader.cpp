@@ -4,12 +4,14 @@
 #include <optional>
 #include <vector>
 
+#include "engine/shade/receiver_cell.h"
+
 namespace ptc {
 
 struct Shader::Impl {
   const Executor& executor;
   SceneView view;
-  DirectionGrid grid;
+  std::vector<std::unique_ptr<DirectionGrid>> grids;  // one a variant
   GatherOptions gather_options;
   PageCache cache;
   std::vector<std::unique_ptr<Gather>> gathers;  // one per thread, made when first needed
@@ -18,18 +20,21 @@ struct Shader::Impl {
   Impl(const ContainerReader& container, const ShadeOptions& options, const Executor& e)
       : executor(e),
         view(container),
-        grid(options.gather.resolution, options.sky),
         gather_options(options.gather),
         cache(container, {.memory_bytes = options.cache_bytes, .threads = e.threads(), .access = options.access}),
-        gathers(e.threads()) {}
+        gathers(e.threads()) {
+    for (unsigned i = 0; i < std::max(1U, options.variants); ++i) {
+      grids.push_back(std::make_unique<DirectionGrid>(options.gather.resolution, options.sky, i));
+    }
+  }
 
   Gather& gather(unsigned thread) {
-    if (!gathers[thread]) gathers[thread] = std::make_unique<Gather>(view, cache, grid, gather_options);
+    if (!gathers[thread]) gathers[thread] = std::make_unique<Gather>(view, cache, gather_options);
     return *gathers[thread];
   }
 
   /// Indices of the receivers along the Z-curve.
-  [[nodiscard]] std::vector<std::size_t> z_order(std::span<const Receiver> receivers) const {
+  [[nodiscard]] std::vector<std::size_t> z_order(std::span<const Receiver> receivers, unsigned variant) const {
     struct Placed {
       MortonKey key;
       std::size_t index;
@@ -37,8 +42,7 @@ struct Shader::Impl {
     std::vector<Placed> placed(receivers.size());
     executor.for_ranges(receivers.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const glm::dvec3& p = receivers[i].position;
-        placed[i] = {encode_morton(view.frame().to_lattice({p.x, p.y, p.z})), i};
+        placed[i] = {receiver_key(view.frame(), receivers[i].position, variant), i};
       }
     });
     std::ranges::sort(placed, [](const Placed& a, const Placed& b) {
@@ -54,15 +58,17 @@ Shader::Shader(const ContainerReader& container, const ShadeOptions& options, co
     : impl_(std::make_unique<Impl>(container, options, executor)) {}
 Shader::~Shader() = default;
 
-void Shader::shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress) {
-  const std::vector<std::size_t> order = impl_->z_order(receivers);
+void Shader::shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress,
+                   unsigned variant) {
+  variant %= static_cast<unsigned>(impl_->grids.size());
+  const std::vector<std::size_t> order = impl_->z_order(receivers, variant);
   const std::size_t blocks = (order.size() + kBlock - 1) / kBlock;
   impl_->executor.for_each(blocks, [&](std::size_t block, unsigned thread) {
     const auto indices = std::span(order).subspan(block * kBlock, std::min(kBlock, order.size() - block * kBlock));
     std::vector<Receiver> in(indices.size());
     std::vector<Shading> out(indices.size());
     std::ranges::transform(indices, in.begin(), [&](std::size_t i) { return receivers[i]; });
-    impl_->gather(thread).shade(in, out);
+    impl_->gather(thread).shade(in, out, *impl_->grids[variant]);
     for (std::size_t i = 0; i < indices.size(); ++i) results[indices[i]] = out[i];
     progress.advance(indices.size());
   });

@@ -18,6 +18,7 @@ struct ShadeOptions {
   GatherOptions gather;
   /// Radiance that arrives from a direction (unit) where nothing covers it; empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;
+  unsigned variants = 1;  ///< turns of the direction cube and shifts of the receiver cells to choose from
 };
 
 /// Keeps cache and gathers between calls.
@@ -32,7 +33,10 @@ class Shader {
   /// Sorts the receivers along the Z-curve, shades them block by block. A receiver's result depends
   /// on the receivers of its block, so callers that stream give multiples of kBlock, in Z order.
   /// @param results  as many as receivers, in their order
-  void shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress);
+  /// @param variant  modulo the variants there are. The errors of two variants are not alike: their
+  ///                 mean has fewer
+  void shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress,
+             unsigned variant = 0);
 
   [[nodiscard]] GatherCounts counts() const;
   /// Complete once no shade() is running.

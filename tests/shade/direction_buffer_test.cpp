@@ -19,11 +19,11 @@ glm::vec3 random_direction(std::mt19937& bits) {
   return glm::normalize(glm::vec3(normal(bits), normal(bits), normal(bits)));
 }
 
-void draw_disc(DirectionBuffer& buffer, const glm::vec3& to, const glm::vec3& normal, float radius, std::uint32_t rgbe,
+void draw_disc(const DirectionGrid& grid, DirectionBuffer& buffer, const glm::vec3& to, const glm::vec3& normal, float radius, std::uint32_t rgbe,
                Sides sides) {
   DiscQueue queue;
   queue.push(to, normal, radius, rgbe);
-  buffer.draw(queue, sides);
+  buffer.draw(grid, queue, sides);
 }
 
 const DirectionGrid& fine_grid() {
@@ -35,11 +35,11 @@ const DirectionGrid& fine_grid() {
 
 TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole sky", "[shade][buffer]") {
   const DirectionGrid grid(32, [](const glm::vec3&) { return glm::vec3(1, 2, 3); });
-  DirectionBuffer buffer(grid);
+  DirectionBuffer buffer(32);
   std::mt19937 bits(1);
   for (int i = 0; i < 100; ++i) {
     const glm::vec3 n = random_direction(bits);
-    const Shading s = buffer.resolve(n);
+    const Shading s = buffer.resolve(grid, n);
     CHECK(s.occlusion == 0);
     CHECK(s.irradiance == glm::vec3(0));
     CHECK(s.sky.g == Approx(2 * kPi).epsilon(1e-5));
@@ -50,11 +50,11 @@ TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole 
 TEST_CASE("direction buffer: irradiance from a gradient does not depend on the turn of the receiver", "[shade][buffer]") {
   // Radiance 1 + cos(angle to z): E(n) = pi + 2 pi / 3 n.z, whatever the cube's pixels are.
   const DirectionGrid grid(32, [](const glm::vec3& d) { return glm::vec3(1 + d.z); });
-  DirectionBuffer buffer(grid);
+  DirectionBuffer buffer(32);
   std::mt19937 bits(2);
   for (int i = 0; i < 300; ++i) {
     const glm::vec3 n = random_direction(bits);
-    CHECK(buffer.resolve(n).sky.r == Approx(kPi + 2 * kPi / 3 * n.z).margin(0.002 * kPi));
+    CHECK(buffer.resolve(grid, n).sky.r == Approx(kPi + 2 * kPi / 3 * n.z).margin(0.002 * kPi));
   }
 }
 
@@ -66,9 +66,9 @@ TEST_CASE("direction buffer: small discs cover their solid angle in every direct
     const glm::vec3 direction = random_direction(bits);
     const float distance = std::exp(6 * uniform(bits) - 3);
     const float solid_angle = 0.02F;
-    DirectionBuffer buffer(fine_grid());
-    draw_disc(buffer, direction * distance, -direction, std::sqrt(solid_angle / kPi) * distance, 1, Sides::front);
-    const double covered = static_cast<double>(buffer.resolve(direction).occlusion * kPi / solid_angle);
+    DirectionBuffer buffer(64);
+    draw_disc(fine_grid(), buffer, direction * distance, -direction, std::sqrt(solid_angle / kPi) * distance, 1, Sides::front);
+    const double covered = static_cast<double>(buffer.resolve(fine_grid(), direction).occlusion * kPi / solid_angle);
     CHECK(covered > 0.6);  // one pixel row more or less of about ten
     CHECK(covered < 1.4);
     ratio_sum += covered;
@@ -81,10 +81,10 @@ TEST_CASE("direction buffer: a disc over the receiver has the analytic form fact
   for (const float radius : {0.01F, 0.1F, 0.5F, 1.0F, 3.0F, 30.0F}) {
     for (int i = 0; i < 20; ++i) {
       const glm::vec3 n = random_direction(bits);
-      DirectionBuffer buffer(fine_grid());
-      draw_disc(buffer, n, -n, radius, encode_rgbe({1, 0.5F, 0.25F}), Sides::front);
+      DirectionBuffer buffer(64);
+      draw_disc(fine_grid(), buffer, n, -n, radius, encode_rgbe({1, 0.5F, 0.25F}), Sides::front);
       const float expected = radius * radius / (1 + radius * radius);
-      const Shading s = buffer.resolve(n);
+      const Shading s = buffer.resolve(fine_grid(), n);
       CHECK(s.occlusion == Approx(expected).margin(0.004));
       CHECK(s.irradiance.r == Approx(kPi * s.occlusion).epsilon(0.01));
       CHECK(s.irradiance.b == Approx(0.25F * kPi * s.occlusion).epsilon(0.01));
@@ -94,9 +94,9 @@ TEST_CASE("direction buffer: a disc over the receiver has the analytic form fact
 
 TEST_CASE("direction buffer: a disc close to the receiver never covers more than the hemisphere", "[shade][buffer]") {
   for (const float height : {1.0F, 1e-1F, 1e-3F, 1e-6F, 0.0F}) {
-    DirectionBuffer buffer(fine_grid());
-    draw_disc(buffer, {0, 0, height}, {0, 0, -1}, 1, 1, Sides::both);
-    const Shading s = buffer.resolve({0, 0, 1});
+    DirectionBuffer buffer(64);
+    draw_disc(fine_grid(), buffer, {0, 0, height}, {0, 0, -1}, 1, 1, Sides::both);
+    const Shading s = buffer.resolve(fine_grid(), {0, 0, 1});
     CHECK(s.occlusion <= 1.00001F);
     if (height > 0) CHECK(s.occlusion == Approx(1 / (1 + height * height)).margin(0.004));
     CHECK(std::isfinite(s.bent_normal.x));
@@ -106,9 +106,9 @@ TEST_CASE("direction buffer: a disc close to the receiver never covers more than
 TEST_CASE("direction buffer: the back of a disc is black, and clear within two radii", "[shade][buffer]") {
   const std::uint32_t white = encode_rgbe({1, 1, 1});
   const auto shade = [&](float distance, Sides sides) {
-    DirectionBuffer buffer(fine_grid());
-    draw_disc(buffer, {0, 0, distance}, {0, 0, 1}, 1, white, sides);
-    return buffer.resolve({0, 0, 1});
+    DirectionBuffer buffer(64);
+    draw_disc(fine_grid(), buffer, {0, 0, distance}, {0, 0, 1}, 1, white, sides);
+    return buffer.resolve(fine_grid(), {0, 0, 1});
   };
   CHECK(shade(2.5F, Sides::both).occlusion > 0.1F);
   CHECK(shade(2.5F, Sides::both).irradiance == glm::vec3(0));
@@ -119,11 +119,11 @@ TEST_CASE("direction buffer: the back of a disc is black, and clear within two r
 TEST_CASE("direction buffer: the nearer of two walls is seen whatever is drawn first", "[shade][buffer]") {
   const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0});
   for (const bool near_first : {true, false}) {
-    DirectionBuffer buffer(fine_grid());
+    DirectionBuffer buffer(64);
     for (const bool near : {near_first, !near_first}) {
-      draw_disc(buffer, {0, 0, near ? 1.0F : 1.001F}, {0, 0, -1}, 2, near ? red : green, Sides::front);
+      draw_disc(fine_grid(), buffer, {0, 0, near ? 1.0F : 1.001F}, {0, 0, -1}, 2, near ? red : green, Sides::front);
     }
-    const Shading s = buffer.resolve({0, 0, 1});
+    const Shading s = buffer.resolve(fine_grid(), {0, 0, 1});
     CHECK(s.irradiance.r == Approx(kPi * 0.8).margin(0.02));
     CHECK(s.irradiance.g < 0.02F);
   }
@@ -132,10 +132,10 @@ TEST_CASE("direction buffer: the nearer of two walls is seen whatever is drawn f
 TEST_CASE("direction buffer: coplanar overlapping discs divide half way between their centres", "[shade][buffer]") {
   const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0});
   for (const bool swap : {false, true}) {
-    DirectionBuffer buffer(fine_grid());
-    draw_disc(buffer, {swap ? 0.5F : -0.5F, 0, 1}, {0, 0, -1}, 2, swap ? green : red, Sides::front);
-    draw_disc(buffer, {swap ? -0.5F : 0.5F, 0, 1}, {0, 0, -1}, 2, swap ? red : green, Sides::front);
-    const Shading s = buffer.resolve({0, 0, 1});
+    DirectionBuffer buffer(64);
+    draw_disc(fine_grid(), buffer, {swap ? 0.5F : -0.5F, 0, 1}, {0, 0, -1}, 2, swap ? green : red, Sides::front);
+    draw_disc(fine_grid(), buffer, {swap ? -0.5F : 0.5F, 0, 1}, {0, 0, -1}, 2, swap ? red : green, Sides::front);
+    const Shading s = buffer.resolve(fine_grid(), {0, 0, 1});
     CHECK(s.irradiance.r == Approx(s.irradiance.g).epsilon(0.03));
   }
 }
@@ -146,10 +146,10 @@ TEST_CASE("direction buffer: an emitter moving across pixels changes the light s
   float last = -1, largest = 0, least = 1e9F;
   for (int i = 0; i <= 400; ++i) {
     const float angle = 0.5F + 0.3F * static_cast<float>(i) / 400;
-    DirectionBuffer buffer(grid);
-    draw_disc(buffer, 10.0F * glm::vec3(std::sin(angle), 0, std::cos(angle)),
+    DirectionBuffer buffer(32);
+    draw_disc(grid, buffer, 10.0F * glm::vec3(std::sin(angle), 0, std::cos(angle)),
                      -glm::vec3(std::sin(angle), 0, std::cos(angle)), 2, white, Sides::front);
-    const float e = buffer.resolve({0, 0, 1}).irradiance.r / std::cos(angle);
+    const float e = buffer.resolve(grid, {0, 0, 1}).irradiance.r / std::cos(angle);
     if (last >= 0) largest = std::max(largest, std::abs(e - last));
     last = e;
     least = std::min(least, e);

@@ -27,13 +27,13 @@ struct Scene {
     container = std::make_unique<ContainerReader>(dir / "scene.ptcx");
   }
 
-  [[nodiscard]] std::vector<Shading> shade(ShadeOptions options = {}, unsigned threads = 1) const {
+  [[nodiscard]] std::vector<Shading> shade(ShadeOptions options = {}, unsigned threads = 1, unsigned variant = 0) const {
     const Executor executor(threads);
     if (options.cache_bytes > (64U << 20)) options.cache_bytes = 64U << 20;
     Shader shader(*container, options, executor);
     std::vector<Shading> results(receivers.size());
     Progress silent;
-    shader.shade(receivers, results, silent);
+    shader.shade(receivers, results, silent, variant);
     return results;
   }
 };
@@ -298,6 +298,25 @@ TEST_CASE("gather: turning the scene changes little", "[shade][gather]") {
   const Errors e = compare(turned.shade(), straight.shade());
   CHECK(e.occlusion_rms < 0.025);
   CHECK(e.irradiance_rms < 0.07);
+}
+
+TEST_CASE("gather: the mean of four variants has less than 0.7 of the error of one", "[shade][gather]") {
+  Scene scene(small_scene(0.03));
+  add_floor_receivers(scene.receivers, 0.03);
+  const std::vector<Surfel> surfels = load_surfels(*scene.container, 1'000'000);
+  std::vector<Shading> exact(scene.receivers.size());
+  shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both, Executor(2));
+  ShadeOptions options;
+  options.variants = 4;
+  std::vector<Shading> mean(exact.size());
+  double single = 0;
+  for (unsigned variant = 0; variant < 4; ++variant) {
+    const std::vector<Shading> one = scene.shade(options, 1, variant);
+    single += compare(one, exact).occlusion_rms / 4;
+    for (std::size_t i = 0; i < mean.size(); ++i) mean[i].occlusion += one[i].occlusion / 4;
+  }
+  CAPTURE(single);
+  CHECK(compare(mean, exact).occlusion_rms < 0.7 * single);
 }
 
 TEST_CASE("gather: coincident surfels and receivers, and empty scenes, are no trouble", "[shade][gather]") {
