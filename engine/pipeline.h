@@ -91,6 +91,7 @@ struct CheckReport {
 struct ShadeRequest {
   std::filesystem::path scene;      ///< surfels that occlude and emit
   std::filesystem::path receivers;  ///< a cloud or container to shade; empty: the scene's own points
+  std::uint64_t count = 0;          ///< shade so many of the points, evenly spread in order; 0: all
   GatherOptions gather;
   float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii
   std::optional<Sky> sky;           ///< empty: the one that the scene was built with

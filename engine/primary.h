@@ -43,6 +43,7 @@ class PrimaryView {
 /// is their baked radiance.   Memory: 24 bytes a sample.
 /// @param lift  in radii of a surfel
 [[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
-                                                        unsigned side, float lift, Progress& progress);
+                                                        unsigned side, float lift, const Executor& executor,
+                                                        Progress& progress);
 
 }  // namespace ptc

@@ -86,14 +86,30 @@ void write_layer_png(const PictureTarget& target, const Film& film, float exposu
   write_png(target.path, image);
 }
 
-/// A view of everything: from the front, the right and above.
-Camera overview(const Superblock& superblock, bool backdrop) {
+/// A view of everything from the front, the right and above: as near as all corners of the bounds allow.
+/// A backdrop is larger than what stands on it and may leave the picture.
+Camera overview(const Superblock& superblock, bool backdrop, const std::optional<std::array<unsigned, 2>>& size) {
   const glm::dvec3 low(superblock.bounds_low[0], superblock.bounds_low[1], superblock.bounds_low[2]);
   const glm::dvec3 high(superblock.bounds_high[0], superblock.bounds_high[1], superblock.bounds_high[2]);
-  const double size = glm::length(high - low) * (backdrop ? 0.4 : 1.0);
   Camera camera;
+  if (size) {
+    camera.width = (*size)[0];
+    camera.height = (*size)[1];
+  }
   camera.look_at = (low + high) * 0.5;
-  camera.position = camera.look_at + glm::normalize(glm::dvec3(0.45, 0.35, 1)) * size * 1.4;
+  const glm::dvec3 away = glm::normalize(glm::dvec3(0.45, 0.35, 1));
+  camera.position = camera.look_at + away;
+  const CameraAxes axes = axes_of(camera);
+  const double tall = std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * 0.95;
+  const double wide = tall * camera.width / camera.height;
+  double distance = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    glm::dvec3 p;
+    for (int axis = 0; axis < 3; ++axis) p[axis] = ((corner >> axis & 1) != 0 ? high : low)[axis] - camera.look_at[axis];
+    const double aside = std::max(std::abs(glm::dot(p, axes.right)) / wide, std::abs(glm::dot(p, axes.up)) / tall);
+    distance = std::max(distance, aside - glm::dot(p, axes.forward));
+  }
+  camera.position = camera.look_at + away * (distance > 0 ? distance * (backdrop ? 0.5 : 1.0) : 1.0);
   return camera;
 }
 
@@ -107,7 +123,7 @@ Camera choose_camera(const RenderRequest& request, const ContainerReader& scene,
   } else if (recorded != text.end()) {
     camera = camera_from_json(recorded->second);
   } else if (cameras.empty()) {
-    camera = overview(scene.superblock(), request.backdrop);
+    camera = overview(scene.superblock(), request.backdrop, request.size);
   } else {
     const MeshCamera& from = cameras.front();
     const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
@@ -231,7 +247,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
                              request.lift * static_cast<float>(surfel_radius));
   } else {
     const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
-    subject.view = view_surfels(scene, camera, side, request.lift, progress);
+    subject.view = view_surfels(scene, camera, side, request.lift, executor, progress);
   }
 
   Film film(camera.width, camera.height);

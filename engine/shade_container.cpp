@@ -51,11 +51,12 @@ std::array<float, ShadedChannels::kFloats> values_of(const Shading& s, const glm
           out.b};
 }
 
-/// All points of a container in order, in blocks.
+/// Some of a container's points in order, in blocks.
 class PointCursor {
  public:
-  explicit PointCursor(const ContainerReader& container)
-      : container_(container), payload_(container.page_payload_limit()) {}
+  /// @param wanted  how many, evenly spread; at most as many as there are
+  PointCursor(const ContainerReader& container, std::uint64_t wanted)
+      : container_(container), wanted_(wanted), payload_(container.page_payload_limit()) {}
 
   std::size_t next(std::span<Surfel> out) {
     std::size_t filled = 0;
@@ -66,8 +67,11 @@ class PointCursor {
         at_ = 0;
       }
       const PointPage points(payload_.data(), count_);
-      while (at_ < count_ && filled < out.size()) {
-        out[filled++] = to_surfel(points[at_++], container_.superblock().frame);
+      for (; at_ < count_ && filled < out.size(); ++at_) {
+        share_ += wanted_;
+        if (share_ < container_.superblock().points) continue;
+        share_ -= container_.superblock().points;
+        out[filled++] = to_surfel(points[at_], container_.superblock().frame);
       }
     }
     return filled;
@@ -75,6 +79,8 @@ class PointCursor {
 
  private:
   const ContainerReader& container_;
+  std::uint64_t wanted_;
+  std::uint64_t share_ = 0;  // wanted_ for each point passed, less the points for each one taken
   std::vector<std::byte> payload_;
   PageDecoder decoder_;
   std::size_t page_ = 0;
@@ -236,7 +242,11 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
     other = std::make_unique<ContainerReader>(built ? built->path() : request.receivers);
   }
   const ContainerReader& receivers = other ? *other : scene;
-  const std::uint64_t points = receivers.superblock().points;
+  const std::uint64_t all = receivers.superblock().points;
+  const std::uint64_t points = request.count == 0 ? all : std::min(request.count, all);
+  if (points < all && target.extension() != ".ply") {
+    throw std::invalid_argument("a container of some of the points cannot be written: name a .ply, or shade them all");
+  }
 
   ShadeOptions options;
   options.gather = request.gather;
@@ -257,7 +267,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   CheckSample check(request.check);
   {
     const Stage stage(report.seconds, progress, "shade", points, "points");
-    PointCursor cursor(receivers);
+    PointCursor cursor(receivers, points);
     std::vector<Surfel> surfels(kBatch);
     std::vector<Receiver> batch(kBatch);
     std::vector<Shading> results(kBatch);

@@ -97,6 +97,12 @@ TEST_CASE("pipeline: shading adds channels, keeps the points and verifies", "[in
   shade_container(request, dir / "shaded.ply", silent);
   const PointFile ply = open_points(dir / "shaded.ply");
   CHECK(ply.info.count == scene.superblock().points);
+
+  request.count = 37;
+  CHECK(shade_container(request, dir / "some.ply", silent).receivers == 37);
+  CHECK(open_points(dir / "some.ply").info.count == 37);
+  CHECK_THROWS_WITH(shade_container(request, dir / "some.ptcx", silent), Catch::Contains(".ply"));
+  CHECK_FALSE(std::filesystem::exists(dir / "some.ptcx"));
 }
 
 TEST_CASE("pipeline: another cloud's points can be shaded by a scene", "[integration][shade]") {
