@@ -146,7 +146,7 @@ Meta make_meta(const BuildRequest& request, double spacing) {
   }
   if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
   meta.text[kInputsKey] = names;
-  meta.text[kLightsKey] = to_json(request.lights);
+  meta.text[kLightsKey] = to_json(request.city_points > 0 ? city_lights() : request.lights);
   if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;

@@ -89,6 +89,7 @@ ptc::Outcome build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progre
   request.run = run;
   request.sampling.camera = arguments.camera.camera();
   request.lights = arguments.lights.rig();
+  if (request.city_points > 0 && arguments.lights.given()) throw CLI::ExcludesError("--city", "lights: it has its own");
   if (!arguments.lights.given() && !arguments.no_default_lights && request.city_points == 0 &&
       ptc::meshes_are_dark(request)) {
     request.lights = ptc::LightArguments::default_rig();

@@ -113,11 +113,15 @@ Layout lay_out(std::uint64_t count) {
   return layout;
 }
 
+constexpr glm::vec3 kToSun(0.45f, 0.84f, 0.3f);
+constexpr glm::vec3 kSunIrradiance(3.0f, 2.8f, 2.4f);
+constexpr glm::vec3 kSkyIrradiance(0.7f, 0.85f, 1.1f);  // of a facet that looks up
+
 // Sun and sky without shadows: what the sky shows of a facet depends on its tilt alone.
 glm::vec3 radiance_of(const glm::vec3& albedo, const glm::vec3& normal) {
-  const glm::vec3 to_sun = glm::normalize(glm::vec3(0.45f, 0.84f, 0.3f));
-  const glm::vec3 sun = glm::vec3(3.0f, 2.8f, 2.4f) * std::max(0.0f, glm::dot(normal, to_sun));
-  const glm::vec3 sky = glm::vec3(0.7f, 0.85f, 1.1f) * (0.5f + 0.5f * normal.y);
+  const glm::vec3 to_sun = glm::normalize(kToSun);
+  const glm::vec3 sun = kSunIrradiance * std::max(0.0f, glm::dot(normal, to_sun));
+  const glm::vec3 sky = kSkyIrradiance * (0.5f + 0.5f * normal.y);
   return albedo / kPi * (sun + sky);
 }
 
@@ -204,6 +208,13 @@ void add_facet(const Facet& facet, const glm::dvec3& block, Mesh& mesh) {
 
 std::unique_ptr<PointSource> make_city(std::uint64_t count) {
   return std::make_unique<CitySource>(count);
+}
+
+LightRig city_lights() {
+  LightRig rig;
+  rig.suns = {{.to_sun = glm::normalize(kToSun), .irradiance = kSunIrradiance}};
+  rig.sky.radiance = kSkyIrradiance / kPi;
+  return rig;
 }
 
 Bounds city_bounds(std::uint64_t count) {

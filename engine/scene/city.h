@@ -7,6 +7,7 @@
 #include "engine/base/surfel.h"
 #include "engine/io/mesh.h"
 #include "engine/io/points.h"
+#include "engine/scene/lights.h"
 
 namespace ptc {
 
@@ -17,6 +18,8 @@ namespace ptc {
 /// @param count  wanted points; what comes is within 5 % from a thousand on
 /// Memory: one block's points, about 4 MB.
 [[nodiscard]] std::unique_ptr<PointSource> make_city(std::uint64_t count);
+/// The sun and sky of that formula.
+[[nodiscard]] LightRig city_lights();
 /// A box that holds every point of make_city(count) and every vertex of city_mesh(count).
 [[nodiscard]] Bounds city_bounds(std::uint64_t count);
 /// The same city as a mesh, for ray-traced references and pictures: every point lies on a triangle
