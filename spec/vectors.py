@@ -126,9 +126,6 @@ class Summary:
         length = math.sqrt(sum(s * s for s in sums))
         self.has_axis = length > 1e-6 * area
         self.axis = tuple(s / length for s in sums) if self.has_axis else (0.0, 0.0, 1.0)
-        if area - length <= 0.3 * length and sum(facing) > 0:
-            light = [sum(f[c] for f in flux) / sum(facing) for c in range(3)]
-            self.flux = [[facing[k] * light[c] for c in range(3)] for k in range(6)]
         self.slab = self.axis if self.has_axis else (0.0, 0.0, 0.0)
         self.radius = self.half_angle = self.thick = 0.0
 

@@ -65,25 +65,6 @@ float round_down(double x) {
   return static_cast<double>(nearest) <= x ? nearest : std::nextafter(nearest, -2.0F);
 }
 
-/// One colour for all directions where the surfels face nearly the same way: there the split by
-/// axis only adds quantisation (measured in spec/nodes.md#summary).
-void flatten(NodeSummary& node) {
-  constexpr double kFlat = 0.3;  // largest (area - |vector area|) / |vector area|
-  const Vec3 sum = mean_normal(node);
-  const double vector_area = std::sqrt(dot(sum, sum));
-  if (node.area - vector_area > kFlat * vector_area) return;
-  double weight = 0;
-  Vec3 flux{};
-  for (std::size_t k = 0; k < 6; ++k) {
-    weight += node.facing[k];
-    for (std::size_t c = 0; c < 3; ++c) flux[c] += node.flux[k][c];
-  }
-  if (!(weight > 0)) return;
-  for (std::size_t k = 0; k < 6; ++k) {
-    for (std::size_t c = 0; c < 3; ++c) node.flux[k][c] = node.facing[k] * flux[c] / weight;
-  }
-}
-
 }  // namespace
 
 NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
@@ -123,7 +104,6 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
     node.thickness = std::max(node.thickness, offset_along(slab, position(p), node.mean) + reach);
   }
   node.thickness = has_axis ? std::min(node.thickness, node.radius) : node.radius;
-  flatten(node);
   return node;
 }
 
@@ -154,7 +134,6 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
   }
   sum.thickness = has_axis ? std::min(sum.thickness, sum.radius) : sum.radius;
   sum.cone_cos = angle >= M_PI ? -1.0F : round_down(std::cos(angle));
-  flatten(sum);
   return sum;
 }
 
