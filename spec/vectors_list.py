@@ -406,7 +406,7 @@ def verify_summaries():
         return tree_of(four_points(), lambda g: g[2][3][0].__setitem__(name, value))
     yield "nodes-node-mean", column("mean_x", 9)
     yield "nodes-node-sphere", column("radius", 0x4000)
-    yield "nodes-node-slab", column("thickness", 0x5000)
+    yield "nodes-node-slab", column("thickness", 0x9300)
     yield "nodes-node-sums", column("area", 0x3F80)
     yield "nodes-node-sums.facing", column("facing", [9] * 6)
     yield "nodes-node-sums.radiance", column("radiance", [0, 0, 0, 0, 0x80808080, 0])

@@ -15,6 +15,7 @@
 #include "engine/build/verify_tree.h"
 #include "engine/io/file.h"
 #include "engine/store/reader.h"
+#include "format/bytes.h"
 #include "format/error.h"
 #include "format/node_page.h"
 #include "format/point_page.h"
@@ -25,6 +26,7 @@ namespace {
 constexpr char kPadding[] = "spec/container.md#padding";
 constexpr char kPageKeys[] = "spec/container.md#page-keys";
 constexpr char kPageLevel[] = "spec/container.md#page-level";
+constexpr char kValues[] = "spec/points.md#attribute-pages";
 constexpr char kCopies[] = "spec/container.md#superblock-copies";
 
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
@@ -181,12 +183,38 @@ class FileCheck {
     if (header.type == PageType::node) {
       const NodePage nodes(buffer.payload.data(), header.record_count);
       int least = kMaxLevel;
-      for (std::uint32_t slot = 0; slot < nodes.size(); ++slot)
+      std::uint64_t first_key = ~std::uint64_t{0}, last_key = 0;
+      for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
         least = std::min(least, nodes[slot].level());
+        first_key = std::min(first_key, nodes[slot].cell().high);
+        last_key = std::max(last_key, nodes[slot].cell().high);
+      }
       if (least != header.level) {
         fail(offset + 22, kPageLevel,
              fmt::format("page {}: level is not the least of its groups", page));
       }
+      if (first_key != header.first_key || last_key != header.last_key) {
+        fail(offset + 32, kPageKeys, fmt::format("page {}: keys are not those of its groups", page));
+      }
+    }
+    if (header.type == PageType::attribute) check_values(page, header, buffer.payload.data());
+  }
+
+  /// Halves and floats are finite: exponents below the greatest.
+  void check_values(std::uint32_t page, const PageHeader& header, const std::byte* column) const {
+    const auto check = [&]<class T>(T infinity, std::size_t count, const std::string& name) {
+      for (std::size_t i = 0; i < count; ++i) {
+        if ((load<T>(column, i * sizeof(T)) & infinity) != infinity) continue;
+        fail(container_.entry(page).offset, kValues,
+             fmt::format("page {}: {} of point {} is not finite", page, name, i % header.record_count));
+      }
+    };
+    for (const Channel& channel : container_.meta().channels) {
+      if (channel.group != header.group) continue;
+      const std::size_t count = std::size_t{channel.components} * header.record_count;
+      if (channel.type == ChannelType::half) check(std::uint16_t{0x7c00}, count, channel.name);
+      if (channel.type == ChannelType::f32) check(std::uint32_t{0x7f800000}, count, channel.name);
+      column += count * channel_bytes(channel.type);
     }
   }
 

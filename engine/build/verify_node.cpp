@@ -158,9 +158,9 @@ std::optional<Fault> compare_summary(const NodeSummary& stored, const NodeSummar
                                      int cell_level) {
   if (auto fault = compare_mean(stored, exact, cell_level)) return fault;
   if (auto fault = compare_sphere(stored, exact)) return fault;
-  if (auto fault = compare_slab(stored, exact)) return fault;
   if (auto fault = compare_area(stored, exact)) return fault;
   if (auto fault = compare_light(stored, exact)) return fault;
+  if (auto fault = compare_slab(stored, exact)) return fault;
   return compare_cone(stored, exact);
 }
 
