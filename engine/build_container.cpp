@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/base/memory.h"
 #include "engine/build/radius.h"
 #include "engine/io/record.h"
 #include "engine/pipeline.h"
@@ -192,6 +193,7 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
       sample.insert(sample.end(), on_mesh.begin(), on_mesh.end());
       lit->rays = std::make_unique<RayScene>(lit->mesh);
       lit->light = std::make_unique<DirectLight>(*lit->rays, request.lights);
+      return_freed_memory();  // what reading the file and building the tree took
     }
   }
   if (bounds.empty()) throw DataError("the input has no points and no triangles");
@@ -201,8 +203,12 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
   keys.reserve(sample.size());
   for (const glm::dvec3& p : sample) keys.push_back(encode_morton(frame.to_lattice(to_array(p))));
 
-  const std::uint64_t sort_bytes =
-      memory_left(request.run, kBufferBytes + mesh_bytes(lit->mesh, lit->rays.get()), kLeastSort, "this scene's build");
+  std::uint64_t taken = kBufferBytes;
+  if (lit->rays) {
+    taken += mesh_bytes(lit->mesh, lit->rays.get()) +
+             sampling_bytes(lit->mesh.triangles.size(), request.sampling.count, executor.threads());
+  }
+  const std::uint64_t sort_bytes = memory_left(request.run, taken, kLeastSort, "this scene's build");
   ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target)}, executor, keys);
   double spacing = 0;
   {

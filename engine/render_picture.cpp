@@ -243,6 +243,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   if (!subject.mesh.triangles.empty()) {
     subject.rays = std::make_unique<RayScene>(subject.mesh);
     subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
+    return_freed_memory();  // what reading the file and building the tree took
     subject.view = view_mesh(*subject.rays, *subject.light, request.light_sampling, camera, side,
                              request.lift * static_cast<float>(surfel_radius));
   } else {

@@ -234,6 +234,10 @@ double spacing_for(const Mesh& mesh, std::uint64_t count) {
   return std::sqrt(area / static_cast<double>(count));
 }
 
+std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels, unsigned threads) noexcept {
+  return 24 * std::max(triangles, surfels / 1000) + (std::uint64_t{20} << 20) * threads;
+}
+
 std::unique_ptr<PointSource> sample_mesh(const DirectLight& light, const RayScene& scene,
                                          const SamplingOptions& options, const Executor& executor) {
   return std::make_unique<MeshSource>(light, scene, options, executor);

@@ -33,7 +33,7 @@ struct SamplingOptions {
 /// normal are those of the mesh at the patch's middle, albedo and emission the patch's mean. Sum of
 /// 2 r^2 equals the mesh's area. Double-sided materials give two surfels back to back.
 /// Deterministic for any thread count. The order is that of the Z-curve, roughly.
-/// Memory: 24 bytes a triangle or a thousandth of the surfels, and about 20 MB a thread.
+/// Memory: sampling_bytes().
 /// @param light, scene, executor  must outlive the source
 /// @throws std::invalid_argument when count, spacing or a camera's number makes no sense, or there
 ///         would be more than 9 * 10^10 surfels
@@ -41,5 +41,8 @@ struct SamplingOptions {
                                                        const RayScene& scene,
                                                        const SamplingOptions& options,
                                                        const Executor& executor);
+/// What sampling takes besides the mesh: 24 bytes a triangle or a thousandth of the surfels, and 20 MB
+/// a thread.
+[[nodiscard]] std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels, unsigned threads) noexcept;
 
 }  // namespace ptc

@@ -49,7 +49,7 @@ TEST_CASE("pipeline: threads and cap change no byte of a container", "[integrati
   BuildRequest request = cube_request(dir / "cube.obj");
   build_container(request, dir / "one.ptcx", silent);
   request.run.threads = 2;
-  request.run.memory_bytes = std::uint64_t{96} << 20;
+  request.run.memory_bytes = std::uint64_t{128} << 20;
   build_container(request, dir / "two.ptcx", silent);
   CHECK(bytes_of(dir / "one.ptcx") == bytes_of(dir / "two.ptcx"));
   request.sampling.lights.sky_rays = 5;

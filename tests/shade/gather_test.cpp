@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <hwy/targets.h>
 
 #include "engine/shade/brute_force.h"
 #include "engine/shade/shader.h"
@@ -241,6 +242,30 @@ TEST_CASE("gather: default settings stay within 0.02 of occlusion and 5 % of irr
   CHECK(e.occlusion_rms <= 0.02);
   CHECK(e.irradiance_rms <= 0.05);
   CHECK(e.occlusion_mean > 0.1);  // the scene does occlude
+}
+
+TEST_CASE("gather: every instruction set that the machine has gives the same shading", "[shade][gather]") {
+  Scene scene(small_scene(0.05));
+  add_floor_receivers(scene.receivers, 0.05);
+  ShadeOptions options;
+  options.sky = [](const glm::vec3& d) { return glm::vec3(1 + d.z); };
+  const auto with_target = [&](std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().DeInit();
+    std::vector<Shading> results = scene.shade(options);
+    hwy::SetSupportedTargetsForTest(0);
+    hwy::GetChosenTarget().DeInit();
+    return results;
+  };
+  const std::vector<Shading> best = scene.shade(options);
+  const std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
+  CHECK(targets.size() > 1);
+  for (const std::int64_t target : targets) {
+    INFO(hwy::TargetName(target));
+    const Errors e = compare(with_target(target), best);
+    CHECK(e.occlusion_rms < 1e-3);  // without fused multiply-add, pixels at the rims of discs change sides
+    CHECK(e.irradiance_rms < 1e-2);
+  }
 }
 
 TEST_CASE("gather: threads, cap, page order and mmap change no bit", "[shade][gather]") {
