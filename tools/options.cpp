@@ -53,7 +53,7 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
   add_number(app, "--inflation", gather.inflation, 0.01, 100,
              "Footprint of a cluster that is not flat over its projected area")
       ->group(kGroup);
-  add_integer(app, "--resolution", gather.resolution, 8, 64, "Direction pixels along a cube edge")
+  add_integer(app, "--resolution", gather.resolution, 16, 64, "Direction pixels along a cube edge, a multiple of 16")
       ->group(kGroup);
   add_choice<Sides>(app, "--sides", gather.sides, {{"both", Sides::both}, {"front", Sides::front}},
                     "Which sides of a surfel stop light")

@@ -1,6 +1,7 @@
 #include "engine/shade/direction_buffer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -52,9 +53,17 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
       weight_.push_back(static_cast<float>(solid_angle) / length);
     }
   }
+  edge_u_.resize(weight_.size());
+  edge_v_.resize(weight_.size());
+  for (std::size_t at = 0; at < weight_.size(); ++at) {
+    if ((at + 1) % resolution != 0) edge_u_[at] = 0.5F * (weight_[at] + weight_[at + 1]);
+    if (at + resolution < weight_.size()) edge_v_[at] = 0.5F * (weight_[at] + weight_[at + resolution]);
+  }
   geometry_ = {.centre = centre_.data(),
                .length = length_.data(),
                .weight = weight_.data(),
+               .edge_u = edge_u_.data(),
+               .edge_v = edge_v_.data(),
                .resolution = static_cast<int>(resolution),
                .rotation = {}};
   for (int row = 0; row < 3; ++row) {
@@ -95,13 +104,18 @@ void DirectionBuffer::copy(const DirectionBuffer& other) noexcept {
   std::memcpy(rgbe_.data(), other.rgbe_.data(), rgbe_.size() * sizeof(std::uint32_t));
 }
 
-void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides) noexcept {
-  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, discs, sides);
+void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides,
+                           unsigned viewpoint) noexcept {
+  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, discs, sides, viewpoint);
 }
 
-Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal) noexcept {
+Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
+                                 std::span<const glm::vec3> offsets) noexcept {
   const glm::vec3 n = grid.rotation_ * normal;
   const std::size_t plane = std::size_t{grid.resolution_} * grid.resolution_;
+  std::array<glm::vec3, kViewpoints> turned{};
+  for (std::size_t i = 0; i < offsets.size(); ++i) turned[i] = grid.rotation_ * offsets[i];
+  FaceOffsets moves;
   FaceSums sums;
   glm::vec3 open(0);
   for (int face = 0; face < 6; ++face) {
@@ -111,7 +125,13 @@ Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& nor
     sums.open = {};
     const float* sky = grid.sky_.empty() ? nullptr : grid.sky_.data() + static_cast<std::size_t>(3 * face) * plane;
     const std::size_t first = static_cast<std::size_t>(face) * plane;
-    sum_face(grid.geometry_, {nearness_.data() + first, rgbe_.data() + first}, sky, nw, nu, nv, sums);
+    for (std::size_t i = 0; i < kViewpoints; ++i) {
+      moves.w[i] = turned[i][a.w] * a.sign;
+      moves.u[i] = turned[i][a.u];
+      moves.v[i] = turned[i][a.v];
+    }
+    sum_face(grid.geometry_, {nearness_.data() + first, rgbe_.data() + first}, sky, nw, nu, nv,
+             offsets.empty() ? nullptr : &moves, sums);
     open[a.w] += a.sign * sums.open[0];
     open[a.u] += sums.open[1];
     open[a.v] += sums.open[2];

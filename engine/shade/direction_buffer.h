@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include <glm/mat3x3.hpp>
@@ -19,7 +20,7 @@ namespace ptc {
 /// pixel rows; each variant another way.
 class DirectionGrid {
  public:
-  /// @param resolution  pixels along a cube edge, a multiple of kPixelLanes
+  /// @param resolution  pixels along a cube edge, a multiple of 16, at most 64
   /// @param sky  radiance from a direction (unit, away from the receiver), or empty: no sky
   DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky, unsigned variant = 0);
   DirectionGrid(const DirectionGrid&) = delete;
@@ -38,6 +39,8 @@ class DirectionGrid {
   std::vector<float> centre_;  // resolution: pixel centres in [-1, 1]
   std::vector<float> length_;  // resolution^2: |(1, u, v)|
   std::vector<float> weight_;  // resolution^2: solid angle / length
+  std::vector<float> edge_u_;  // as CubeGeometry has them
+  std::vector<float> edge_v_;
   std::vector<float> sky_;     // by face: planes of red, green, blue; or empty
   CubeGeometry geometry_;      // of the above
 };
@@ -53,10 +56,13 @@ class DirectionBuffer {
 
   /// Draws discs exactly: every pixel whose ray meets one. Coplanar overlapping discs divide at the
   /// line between their centres. The order of drawing does not matter.
-  void draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides) noexcept;
+  /// @param viewpoint  what the discs are relative to, below kViewpoints
+  void draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides, unsigned viewpoint = 0) noexcept;
 
   /// Sums over the hemisphere of `normal`.
-  [[nodiscard]] Shading resolve(const DirectionGrid& grid, const glm::vec3& normal) noexcept;
+  /// @param offsets  of the receiver from each viewpoint; those that follow are 0. Empty: from none
+  [[nodiscard]] Shading resolve(const DirectionGrid& grid, const glm::vec3& normal,
+                                std::span<const glm::vec3> offsets = {}) noexcept;
 
  private:
   std::vector<float> nearness_;  // CubePixels

@@ -17,19 +17,35 @@ struct CubeGeometry {
   const float* centre;    ///< resolution: pixel centres in [-1, 1]
   const float* length;    ///< resolution^2: |(1, u, v)|
   const float* weight;    ///< resolution^2: solid angle over length
-  int resolution;         ///< a multiple of kPixelLanes
+  const float* edge_u;    ///< resolution^2: mean weight of a pixel and the next in its row, 0 for the last
+  const float* edge_v;    ///< resolution^2: mean weight of a pixel and the one in the next row
+  int resolution;         ///< a multiple of 16, at most 64
   float rotation[3][3];   ///< rows: the cube's axes in the world
 };
 
 /// What covers each pixel, by face, row and column.
 struct CubePixels {
-  float* nearness;        ///< 1 / t, t along the ray (1, u, v) of the pixel; 0 where nothing covers
+  /// 1 / t, t along the ray (1, u, v) of the pixel; 0 where nothing covers. The lowest 4 bits say
+  /// which viewpoint it was drawn from.
+  float* nearness;
   std::uint32_t* rgbe;
+};
+
+/// Viewpoints whose pixels one cube may hold.
+inline constexpr int kViewpoints = 16;
+
+/// Where the receiver lies relative to each viewpoint, in the axes of a face; 0 where they are the same.
+struct FaceOffsets {
+  alignas(64) float w[kViewpoints];
+  float u[kViewpoints];
+  float v[kViewpoints];
 };
 
 /// Covers the pixels whose ray meets a disc before what is there; of equally near ones the lesser
 /// colour stays, so the order of drawing does not matter.
-void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides);
+/// @param viewpoint  what the discs are relative to, below kViewpoints
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides,
+                unsigned viewpoint);
 
 /// Sums over the pixels of a face above the horizon.
 struct FaceSums {
@@ -43,7 +59,9 @@ struct FaceSums {
 /// @param pixels  of one face
 /// @param sky     3 planes of resolution^2, or null
 /// @param nw, nu, nv  the receiver's normal in the axes of the face
+/// @param offsets  moves what was drawn from other viewpoints, to first order: where the nearer of two
+///                 neighbouring pixels grows over the other, light follows. Null: nothing moves
 void sum_face(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu, float nv,
-              FaceSums& sums);
+              const FaceOffsets* offsets, FaceSums& sums);
 
 }  // namespace ptc

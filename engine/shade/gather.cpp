@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <array>
 #include <vector>
 
 #include "engine/shade/gather_kernels.h"
@@ -10,11 +11,6 @@ namespace ptc {
 namespace {
 
 constexpr float kPi = 3.14159265F;
-
-/// What a cell shares is drawn as its centre sees it, what it leaves to its children as they do. The
-/// two pictures of one surface part by up to the cell's radius, so a seam this many radii wide
-/// belongs to both; without it light leaks between them (spec/shading.md#seams).
-constexpr float kSeam = 3;
 
 /// Work left for the children of a receiver cell: some children of a group, or some surfels.
 struct Entry {
@@ -41,6 +37,7 @@ struct Gather::Impl {
   std::vector<Entry> stack;
   DirectionBuffer leaf;
   DiscQueue queue;
+  std::array<glm::dvec3, kViewpoints> centres;  // of the cells around the current one, lattice units
 
   Impl(const SceneView& view, PageCache& cache, const GatherOptions& o)
       : scene(view, cache), options(o), leaf(o.resolution) {}
@@ -78,11 +75,20 @@ struct Gather::Impl {
     const ReceiverCell bounds(cell, scene.view().frame().unit());
     if (cell.size() == 1) {
       if (&inherited != &leaf) leaf.copy(inherited);
-      collect(list, bounds, leaf, nullptr);
-      results[cell[0].index] = leaf.resolve(*grid, cell[0].normal);
+      collect(list, bounds, leaf, nullptr, depth);
+      std::array<glm::vec3, kViewpoints> offsets{};
+      for (std::size_t i = 0; i < depth; ++i) {
+        offsets[i] = glm::vec3((bounds.centre - centres[i]) * scene.view().frame().unit());
+      }
+      results[cell[0].index] = leaf.resolve(*grid, cell[0].normal, std::span(offsets).first(depth));
       ++counts.receivers;
       return;
     }
+    if (depth + 1 == kViewpoints) {  // cells within cells beyond what a pixel can name: one by one
+      for (std::size_t i = 0; i < cell.size(); ++i) shade_cell(cell.subspan(i, 1), list, inherited, depth);
+      return;
+    }
+    centres[depth] = bounds.centre;
     ++counts.cells;
     if (depth == buffers.size()) {
       buffers.push_back(std::make_unique<DirectionBuffer>(options.resolution));
@@ -92,7 +98,7 @@ struct Gather::Impl {
     buffer.copy(inherited);
     std::vector<Entry> left = std::move(lists[depth]);  // `lists` may grow below
     left.clear();
-    collect(list, bounds, buffer, &left);
+    collect(list, bounds, buffer, &left, depth);
     split(cell, [&](std::span<const PlacedReceiver> child) { shade_cell(child, left, buffer, depth + 1); });
     lists[depth] = std::move(left);
   }
@@ -116,13 +122,13 @@ struct Gather::Impl {
   /// Draws what is settled for all receivers of the cell; the rest goes to `left`, for its
   /// children. Without `left` (one receiver) everything is settled.
   void collect(const std::vector<Entry>& list, const ReceiverCell& cell, DirectionBuffer& buffer,
-               std::vector<Entry>* left) {
+               std::vector<Entry>* left, std::size_t depth) {
+    const auto viewpoint = static_cast<unsigned>(depth);
     const float shared_from = left ? cell.radius / options.parallax : 0;
     const CellTest test{.cell = cell,
                         .unit = scene.view().frame().unit(),
                         .limit = options.solid_angle / kPi,
                         .shared_from = shared_from,
-                        .shared_band = left ? shared_from + kSeam * cell.radius : 0,
                         .inflation = options.inflation,
                         .sides = options.sides,
                         .last = left == nullptr};
@@ -135,13 +141,13 @@ struct Gather::Impl {
       } else {
         collect_group(entry, test, left);
       }
-      if (queue.full()) flush(buffer);
+      if (queue.full()) flush(buffer, viewpoint);
     }
-    flush(buffer);
+    flush(buffer, viewpoint);
   }
 
-  void flush(DirectionBuffer& buffer) {
-    buffer.draw(*grid, queue, options.sides);
+  void flush(DirectionBuffer& buffer, unsigned viewpoint) {
+    buffer.draw(*grid, queue, options.sides, viewpoint);
     queue.size = 0;
   }
 

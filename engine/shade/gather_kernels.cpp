@@ -26,6 +26,7 @@ using VU = hn::VFromD<U>;
 using MF = hn::Mask<F>;
 
 constexpr float kPi = 3.14159265F;
+constexpr float kWidestSeam = 1;  // over the distance where it begins
 
 HWY_INLINE VU load_u16(const std::byte* at) {
   return hn::PromoteTo(U(), hn::LoadU(U16(), reinterpret_cast<const std::uint16_t*>(at)));
@@ -164,6 +165,14 @@ HWY_INLINE Facing load_facing(const GroupView& group, int first) {
   return facing;
 }
 
+/// Distance up to which the children of a cell draw what the cell draws too (spec/shading.md#seams).
+/// @param height  of the cell's centre over the plane of the thing, not negative
+HWY_INLINE VF seam_end(const CellTest& test, VF height) {
+  const F f;
+  const auto share = hn::Min(hn::Div(hn::Set(f, test.cell.radius), height), hn::Set(f, kWidestSeam));
+  return hn::MulAdd(share, hn::Set(f, test.shared_from), hn::Set(f, test.shared_from));
+}
+
 /// Clusters as discs (spec/shading.md#gather), appended to the queue.
 HWY_INLINE int draw_clusters(const GroupView& group, int first, const CellTest& test, MF mask, const Vec& to, VF distance,
                              const Facing& facing, DiscQueue& queue) {
@@ -267,7 +276,9 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
     const auto farthest = hn::Add(d, rho);
     const auto opens = hn::Or(hn::Ge(hn::Sub(d, r), shared_from),
                               hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
-    const auto band = hn::Lt(d, hn::Set(f, test.shared_band));
+    // Of what faces many ways, some part is always seen from the front.
+    const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), facing.length), hn::Zero(f)));
+    const auto band = hn::Lt(d, seam_end(test, hn::Max(hn::Abs(dot(to, facing.mean)), scattered)));
     verdict.open |= bits_of(hn::And(large, opens)) << first;
     verdict.keep |= bits_of(hn::Or(hn::AndNot(opens, large), hn::And(wanted, hn::And(small, band)))) << first;
   }
@@ -323,7 +334,7 @@ void gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t
     if (test.sides == Sides::front) wanted = hn::And(wanted, hn::Lt(dot(to, normal), hn::Set(f, cell.radius)));
     if (hn::AllFalse(f, wanted)) continue;
     const auto d = hn::Sqrt(d2);
-    keep |= bits_of(hn::And(wanted, hn::Lt(d, hn::Set(f, test.shared_band)))) << from;
+    keep |= bits_of(hn::And(wanted, hn::Lt(d, test.last ? hn::Zero(f) : seam_end(test, hn::Abs(dot(to, normal)))))) << from;
     const auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
     if (hn::AllFalse(f, drawn)) continue;
     const auto half = [&](std::size_t bytes_before) {

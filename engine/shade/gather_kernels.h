@@ -19,7 +19,6 @@ struct CellTest {
   double unit = 1;         ///< lattice unit in scene units
   float limit = 0;         ///< a cluster is small when r^2 < limit d^2
   float shared_from = 0;   ///< distance from which the cell settles things for all its receivers
-  float shared_band = 0;   ///< up to this distance its children draw them too
   float inflation = 1;
   Sides sides = Sides::both;
   bool last = false;       ///< one receiver: everything is settled, the bands are zero

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <span>
 
 #include <glm/geometric.hpp>
 
@@ -156,4 +157,31 @@ TEST_CASE("direction buffer: an emitter moving across pixels changes the light s
   }
   CHECK(least == Approx(kPi * 0.04 / 1.04).epsilon(0.1));  // about 36 pixels
   CHECK(largest < 0.08F * least);                        // at most two or three at once
+}
+
+TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiver, to first order", "[shade][buffer]") {
+  std::mt19937 bits(7);
+  std::uniform_real_distribution<float> uniform;
+  const DirectionGrid& grid = fine_grid();
+  double unmoved = 0, moved = 0;
+  for (int i = 0; i < 400; ++i) {
+    const glm::vec3 n = random_direction(bits);
+    const glm::vec3 to = glm::normalize(n + 0.9F * random_direction(bits));
+    const glm::vec3 normal = glm::normalize(-to + 0.8F * random_direction(bits));
+    const float radius = 0.1F + 0.3F * uniform(bits);
+    const glm::vec3 offset = 0.03F * random_direction(bits);
+    const auto occlusion = [&](const glm::vec3& from, std::span<const glm::vec3> offsets) {
+      DirectionBuffer buffer(64);
+      DiscQueue queue;
+      queue.push(to - from, normal, radius, encode_rgbe({1, 1, 1}));
+      buffer.draw(grid, queue, Sides::both, 0);
+      return buffer.resolve(grid, n, offsets).occlusion;
+    };
+    const float there = occlusion(offset, {});
+    unmoved += std::pow(occlusion({}, {}) - there, 2);
+    moved += std::pow(occlusion({}, std::span(&offset, 1)) - there, 2);
+    INFO(i << " " << occlusion({}, {}) << " " << occlusion({}, std::span(&offset, 1)) << " " << there);
+    CHECK(std::abs(occlusion({}, std::span(&offset, 1)) - there) < 0.004F);
+  }
+  CHECK(moved < 0.1 * unmoved);
 }

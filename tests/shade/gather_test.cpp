@@ -184,8 +184,8 @@ TEST_CASE("gather: a closed box keeps the sky out, whichever way its walls face"
   const double mean = sum / static_cast<double>(scene.receivers.size());
   CAPTURE(worst, mean);
   // Discs of clusters on a slant leave pinholes (spec/shading.md#weaknesses).
-  CHECK(worst <= 0.015);
-  CHECK(mean <= 0.002);
+  CHECK(worst <= 0.005);
+  CHECK(mean <= 0.0005);
 }
 
 TEST_CASE("gather: nothing shines through a wall, from either side", "[shade][gather]") {
@@ -325,7 +325,7 @@ TEST_CASE("gather: turning the scene changes little", "[shade][gather]") {
   CHECK(e.irradiance_rms < 0.07);
 }
 
-TEST_CASE("gather: the mean of four variants has less than 0.7 of the error of one", "[shade][gather]") {
+TEST_CASE("gather: the mean of four variants has less error than one", "[shade][gather]") {
   Scene scene(small_scene(0.03));
   add_floor_receivers(scene.receivers, 0.03);
   const std::vector<Surfel> surfels = load_surfels(*scene.container, 1'000'000);
@@ -341,7 +341,7 @@ TEST_CASE("gather: the mean of four variants has less than 0.7 of the error of o
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i].occlusion += one[i].occlusion / 4;
   }
   CAPTURE(single);
-  CHECK(compare(mean, exact).occlusion_rms < 0.7 * single);
+  CHECK(compare(mean, exact).occlusion_rms < 0.85 * single);
 }
 
 TEST_CASE("gather: coincident surfels and receivers, and empty scenes, are no trouble", "[shade][gather]") {
