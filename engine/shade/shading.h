@@ -32,7 +32,7 @@ enum class Sides {
 struct GatherOptions {
   float solid_angle = 0.01F;    ///< a cluster is not opened when its bounding sphere is below it, sr
   float parallax = 0.1F;       ///< a cluster is shared by receivers that see it within this angle, rad
-  float inflation = 1.25F;      ///< footprint of a cluster that is not flat over its projected area
+  float inflation = 1.57F;      ///< footprint of a cluster that is not flat over its projected area
   unsigned resolution = 32;     ///< direction pixels along a cube edge, 16 to 64, a multiple of 16
   Sides sides = Sides::both;
 };
