@@ -54,6 +54,10 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
              "Footprint of a cluster that is not flat over its projected area")
       ->group(kGroup);
   add_integer(app, "--resolution", gather.resolution, 16, 64, "Direction pixels along a cube edge, a multiple of 16")
+      ->check([](const std::string& text) {
+        const auto value = parse_number<unsigned>(text);
+        return value && *value % 16 == 0 ? std::string() : "must be a multiple of 16, is " + text;
+      })
       ->group(kGroup);
   add_choice<Sides>(app, "--sides", gather.sides, {{"both", Sides::both}, {"front", Sides::front}},
                     "Which sides of a surfel stop light")

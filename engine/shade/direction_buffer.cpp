@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -41,6 +42,9 @@ glm::mat3 tilted_frame(unsigned variant) {
 DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
                              unsigned variant)
     : resolution_(resolution), variant_(variant), rotation_(tilted_frame(variant)) {
+  if (resolution == 0 || resolution > 64 || resolution % 16 != 0) {
+    throw std::invalid_argument("DirectionGrid: the resolution is 16, 32, 48 or 64");
+  }
   const double step = 2.0 / resolution;
   for (unsigned i = 0; i < resolution; ++i) centre_.push_back(static_cast<float>((i + 0.5) * step - 1));
   for (unsigned y = 0; y < resolution; ++y) {

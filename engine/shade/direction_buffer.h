@@ -21,6 +21,7 @@ namespace ptc {
 class DirectionGrid {
  public:
   /// @param resolution  pixels along a cube edge, a multiple of 16, at most 64
+  /// @throws std::invalid_argument at another resolution
   /// @param sky  radiance from a direction (unit, away from the receiver), or empty: no sky
   DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky, unsigned variant = 0);
   DirectionGrid(const DirectionGrid&) = delete;

@@ -185,3 +185,8 @@ TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiv
   }
   CHECK(moved < 0.1 * unmoved);
 }
+
+TEST_CASE("direction buffer: a resolution that the pixel loops cannot take is refused", "[shade][buffer]") {
+  for (const unsigned resolution : {0U, 8U, 24U, 80U}) CHECK_THROWS_AS(DirectionGrid(resolution, {}), std::invalid_argument);
+  for (const unsigned resolution : {16U, 48U, 64U}) CHECK_NOTHROW(DirectionGrid(resolution, {}));
+}
