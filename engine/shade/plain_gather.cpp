@@ -1,0 +1,153 @@
+#include "engine/shade/plain_gather.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include <glm/geometric.hpp>
+
+#include "engine/io/record.h"
+#include "format/node_layout.h"
+#include "format/point_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr float kPi = 3.14159265F;
+constexpr float kFlat = 0.9F;  // length of the mean normal above which a cluster is one surfel
+
+/// A child of a group, relative to a receiver, in scene units.
+struct Cluster {
+  glm::vec3 to{0};
+  float radius = 0;
+  float area = 0;
+  float thickness = 0;
+  std::array<float, 6> facing{};  // shares of the area
+  glm::vec3 mean{0};              // normal over area, not unit
+  float flatness = 0;             // its length
+};
+
+float share_at(const GroupView& group, int axis, int child) {
+  return static_cast<float>(GroupView::u16_at(group.facing(axis), child)) / static_cast<float>(kFacingSteps);
+}
+
+Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const glm::dvec3& from) {
+  const LatticePoint corner = decode_morton(group.cell());
+  const double step = cell_edge(group.level()) / kMeanSteps;
+  const std::array<const std::byte*, 3> columns{group.mean_x(), group.mean_y(), group.mean_z()};
+  Cluster c;
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    const double at = static_cast<double>(corner[axis]) + step * GroupView::u16_at(columns[axis], i);
+    c.to[k] = static_cast<float>(frame.origin[axis] + at * frame.unit() - from[k]);
+  }
+  const auto unit = static_cast<float>(frame.unit());
+  c.radius = unit * decode_ufloat16(GroupView::u16_at(group.radius(), i));
+  c.thickness = unit * decode_ufloat16(GroupView::u16_at(group.thickness(), i));
+  c.area = decode_ufloat16(GroupView::u16_at(group.area(), i));
+  for (int k = 0; k < 6; ++k) c.facing[static_cast<std::size_t>(k)] = share_at(group, k, i);
+  c.mean = {c.facing[0] - c.facing[1], c.facing[2] - c.facing[3], c.facing[4] - c.facing[5]};
+  c.flatness = glm::length(c.mean);
+  return c;
+}
+
+/// Height of the top of a thing over the receiver's horizon: a ball, or a slab where that is less.
+float top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm::vec3& slab_normal, float thickness) {
+  const float height = glm::dot(to, normal);
+  const float cosine = glm::dot(slab_normal, normal);
+  const float tilt = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
+  return height + std::min(radius, thickness + radius * tilt);
+}
+
+/// Mean radiance towards the receiver: the three faces of the ambient cube that look at it.
+glm::vec3 radiance_towards(const GroupView& group, int i, const Cluster& c, const glm::vec3& toward) {
+  glm::vec3 light(0);
+  float sum = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int face = 2 * axis + (toward[axis] < 0 ? 1 : 0);
+    std::uint32_t rgbe = 0;
+    std::memcpy(&rgbe, group.radiance(face) + 4 * std::ptrdiff_t{i}, sizeof rgbe);
+    const std::array<float, 3> colour = decode_rgbe(rgbe);
+    const float weight = std::abs(toward[axis]) * c.facing[static_cast<std::size_t>(face)];
+    light += weight * glm::vec3(colour[0], colour[1], colour[2]);
+    sum += weight;
+  }
+  return sum > 0 ? light / sum : glm::vec3(0);
+}
+
+std::uint32_t pack(const glm::vec3& colour) { return encode_rgbe({colour.r, colour.g, colour.b}); }
+
+void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options, DiscQueue& queue) {
+  const glm::vec3 toward = -glm::normalize(c.to);
+  const float along = glm::dot(c.mean, toward);
+  const float scattered = std::max(0.0F, 1 - c.flatness) / 4;
+  const float front = std::max(0.0F, along) + scattered;
+  const float projected = options.sides == Sides::both ? std::abs(along) + scattered : front;
+  if (!(c.area * projected > 0)) return;
+  const glm::vec3 colour = radiance_towards(group, i, c, toward);
+  if (c.flatness > kFlat) {
+    queue.push(c.to, c.mean / c.flatness, std::sqrt(c.area / 2), pack(colour));
+  } else {
+    queue.push(c.to, toward, std::sqrt(c.area * projected * options.inflation / kPi), pack(colour * (front / projected)));
+  }
+}
+
+}  // namespace
+
+Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) {
+  grid_ = &grid;
+  buffer_.clear();
+  queue_.size = 0;
+  stack_.assign(1, scene_.view().root());
+  while (!stack_.empty()) {
+    const ChildRef next = stack_.back();
+    stack_.pop_back();
+    if (next.interior) {
+      visit_group(next, receiver);
+    } else {
+      visit_points(next, receiver);
+    }
+  }
+  buffer_.draw(grid, queue_, options_.sides);
+  ++counts_.receivers;
+  return buffer_.resolve(grid, receiver.normal);
+}
+
+void PlainGather::visit_group(const ChildRef& reference, const Receiver& receiver) {
+  ++counts_.groups;
+  const GroupView group = scene_.group(reference.page, reference.slot);
+  for (int i = 0; i < group.size(); ++i) {
+    const Cluster c = read_cluster(group, i, scene_.view().frame(), receiver.position);
+    const glm::vec3 slab = c.flatness > 0 ? c.mean / c.flatness : glm::vec3(0);
+    if (top(c.to, receiver.normal, c.radius, slab, c.thickness) <= 0) continue;
+    if (kPi * c.radius * c.radius >= options_.solid_angle * glm::dot(c.to, c.to)) {
+      stack_.push_back(group.child(i));
+      continue;
+    }
+    ++counts_.clusters;
+    draw_cluster(group, i, c, options_, queue_);
+    if (!queue_.full()) continue;
+    buffer_.draw(*grid_, queue_, options_.sides);
+    queue_.size = 0;
+  }
+}
+
+void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
+  const std::uint32_t per_page = scene_.view().points_per_page();
+  for (std::uint64_t k = run.first_point; k < run.first_point + run.point_count; ++k) {
+    const PageReader::Page page = scene_.points(k);
+    const PointPage points(page.payload, page.record_count);
+    const Surfel surfel = to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
+    const glm::vec3 to(surfel.position - receiver.position);
+    if (!(surfel.radius > 0) || top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0) continue;
+    ++counts_.surfels;
+    queue_.push(to, surfel.normal, surfel.radius, pack(surfel.radiance));
+    if (!queue_.full()) continue;
+    buffer_.draw(*grid_, queue_, options_.sides);
+    queue_.size = 0;
+  }
+}
+
+}  // namespace ptc

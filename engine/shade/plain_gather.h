@@ -1,0 +1,37 @@
+// The gather of one receiver by itself: a cut through the octree, nothing shared, no vectors.
+#pragma once
+
+#include <cstdint>
+
+#include "engine/shade/direction_buffer.h"
+#include "engine/shade/scene_view.h"
+#include "engine/shade/shading.h"
+
+namespace ptc {
+
+/// Shades receivers one at a time by the rules of spec/shading.md#gather, written a second time: what
+/// the hierarchical gather is tested and timed against. One per thread.
+/// Source: Kontkanen, Tabellion and Overbeck 2011, section 3, with exact discs for their splats.
+class PlainGather {
+ public:
+  PlainGather(const SceneView& view, PageCache& cache, const GatherOptions& options)
+      : scene_(view, cache), options_(options), buffer_(options.resolution) {}
+
+  /// @param grid  of the options' resolution
+  [[nodiscard]] Shading shade(const Receiver& receiver, const DirectionGrid& grid);
+  [[nodiscard]] const GatherCounts& counts() const noexcept { return counts_; }
+
+ private:
+  void visit_group(const ChildRef& reference, const Receiver& receiver);
+  void visit_points(const ChildRef& run, const Receiver& receiver);
+
+  SceneReader scene_;
+  GatherOptions options_;
+  const DirectionGrid* grid_ = nullptr;  // of the call
+  GatherCounts counts_;
+  DirectionBuffer buffer_;
+  DiscQueue queue_;
+  std::vector<ChildRef> stack_;
+};
+
+}  // namespace ptc

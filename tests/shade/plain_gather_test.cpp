@@ -1,0 +1,66 @@
+// Two gathers written apart: one receiver at a time they must agree.
+#include <catch2/catch.hpp>
+
+#include "engine/shade/plain_gather.h"
+#include "tests/shade/gather_scene.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// Shades every receiver alone, by both.
+struct Pair {
+  std::vector<Shading> shared, plain;
+  GatherCounts shared_counts, plain_counts;
+};
+
+Pair shade_alone(const Scene& scene, const GatherOptions& options) {
+  const SceneView view(*scene.container);
+  PageCache cache(*scene.container, {.memory_bytes = 64U << 20, .threads = 2});
+  Gather gather(view, cache, options);
+  PlainGather plain(view, cache, options);
+  const DirectionGrid grid(options.resolution, [](const glm::vec3& d) { return glm::vec3(1 + d.z); });
+  Pair pair;
+  for (const Receiver& receiver : scene.receivers) {
+    pair.shared.emplace_back();
+    gather.shade({&receiver, 1}, {&pair.shared.back(), 1}, grid);
+    pair.plain.push_back(plain.shade(receiver, grid));
+  }
+  pair.shared_counts = gather.counts();
+  pair.plain_counts = plain.counts();
+  return pair;
+}
+
+}  // namespace
+
+TEST_CASE("plain gather: a receiver alone gets what the hierarchical gather gives it", "[shade][gather]") {
+  // Surfaces, whose clusters are flat, and a cloud of normals at random, whose clusters are not.
+  std::vector<Surfel> surfels = small_scene(0.04);
+  const std::vector<Surfel> cloud = random_surfels(3000, 7);
+  surfels.insert(surfels.end(), cloud.begin(), cloud.end());
+  Scene scene(surfels);
+  add_floor_receivers(scene.receivers, 0.04);
+  for (const Sides sides : {Sides::both, Sides::front}) {
+    for (const float solid_angle : {0.1F, 0.01F}) {
+      const Pair pair = shade_alone(scene, {.solid_angle = solid_angle, .sides = sides});
+      const Errors e = compare(pair.shared, pair.plain);
+      CAPTURE(solid_angle, sides == Sides::both, e.occlusion_rms, e.irradiance_rms);
+      CHECK(e.occlusion_rms < 2e-4);  // a pixel on a disc's rim is one of 3,072 over the horizon
+      CHECK(e.irradiance_rms < 1e-3);
+      for (std::size_t i = 0; i < pair.plain.size(); ++i) {
+        CHECK(glm::dot(pair.shared[i].bent_normal, pair.plain[i].bent_normal) > 0.999F);
+        CHECK(pair.shared[i].sky.g == Approx(pair.plain[i].sky.g).margin(0.01));
+      }
+      // The cone of normals, which only one of them asks, saves clusters that show their backs.
+      CHECK(pair.plain_counts.clusters >= pair.shared_counts.clusters);
+      if (sides == Sides::both) CHECK(pair.plain_counts.surfels == Approx(pair.shared_counts.surfels).epsilon(0.001));
+    }
+  }
+}
+
+TEST_CASE("plain gather: nothing is seen in an empty scene", "[shade][gather]") {
+  Scene scene({});
+  scene.receivers.push_back({{0, 0, 0}, {0, 0, 1}});
+  CHECK(shade_alone(scene, {}).plain[0].occlusion == 0);
+}
