@@ -9,8 +9,6 @@
 
 namespace ptc {
 
-inline constexpr int kPixelLanes = 8;
-
 /// The geometry of a cube of direction pixels. Faces: 0 +x  1 -x  2 +y  3 -y  4 +z  5 -z; w points
 /// through a face, u runs along its rows and v along its columns, the axes that follow w cyclically.
 struct CubeGeometry {

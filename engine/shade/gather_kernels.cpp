@@ -9,11 +9,11 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "engine/shade/lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
 
 using F = hn::CappedTag<float, DiscQueue::kLanes>;
 using I = hn::RebindToSigned<F>;
@@ -70,12 +70,6 @@ HWY_INLINE VU pack_rgbe(VF r, VF g, VF b) {
                              hn::Or(hn::ShiftLeft<16>(byte(b)), hn::ShiftLeft<24>(hn::BitCast(u, exponent))));
   // Below 2^-100 nothing is bright enough to see, and the scale would overflow.
   return hn::IfThenElseZero(hn::RebindMask(u, hn::Gt(greatest, hn::Set(f, 0x1p-100F))), packed);
-}
-
-HWY_INLINE unsigned bits_of(MF mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(F(), mask, bits);
-  return bits[0];
 }
 
 HWY_INLINE MF mask_of(unsigned bits) {
@@ -177,7 +171,6 @@ HWY_INLINE VF seam_end(const CellTest& test, VF height) {
 HWY_INLINE int draw_clusters(const GroupView& group, int first, const CellTest& test, MF mask, const Vec& to, VF distance,
                              const Facing& facing, DiscQueue& queue) {
   const F f;
-  const I i;
   const U u;
   const auto zero = hn::Zero(f);
   const auto one = hn::Set(f, 1.0F);
@@ -189,15 +182,12 @@ HWY_INLINE int draw_clusters(const GroupView& group, int first, const CellTest& 
     const auto load = [&](int k) {
       return hn::LoadU(u, reinterpret_cast<const std::uint32_t*>(group.radiance(k) + 4 * first));
     };
-    const auto rgbe = hn::IfThenElse(hn::RebindMask(u, negative), load(2 * axis + 1), load(2 * axis));
+    const UnpackedRgbe<F> rgbe =
+        unpack_rgbe(f, hn::IfThenElse(hn::RebindMask(u, negative), load(2 * axis + 1), load(2 * axis)));
     const auto weight = hn::Mul(hn::Abs(along_axis[axis]),
                                 hn::IfThenElse(negative, facing.share[2 * axis + 1], facing.share[2 * axis]));
-    const auto exponent = hn::Max(hn::Sub(hn::BitCast(i, hn::ShiftRight<24>(rgbe)), hn::Set(i, 9)), hn::Zero(i));
-    const auto scale = hn::Mul(hn::BitCast(f, hn::ShiftLeft<23>(exponent)), weight);
-    const auto byte = hn::Set(u, 255U);
-    light[0] = hn::MulAdd(to_float(hn::And(rgbe, byte)), scale, light[0]);
-    light[1] = hn::MulAdd(to_float(hn::And(hn::ShiftRight<8>(rgbe), byte)), scale, light[1]);
-    light[2] = hn::MulAdd(to_float(hn::And(hn::ShiftRight<16>(rgbe), byte)), scale, light[2]);
+    const auto scale = hn::Mul(rgbe.scale, weight);
+    for (int k = 0; k < 3; ++k) light[k] = hn::MulAdd(rgbe.byte[k], scale, light[k]);
     sum = hn::Add(sum, weight);
   }
   const auto area = load_ufloat16(group.area() + 2 * first);
@@ -269,7 +259,7 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
     if (!hn::AllFalse(f, drawn)) verdict.drawn += static_cast<unsigned>(draw_clusters(group, first, test, drawn, to, d, facing, queue));
     const auto large = hn::AndNot(small, wanted);
     if (test.last) {
-      verdict.open |= bits_of(large) << first;
+      verdict.open |= bits_of(f, large) << first;
       continue;
     }
     // Open now what the children would open anyway, or what opens into shared parts.
@@ -279,8 +269,8 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
     // Of what faces many ways, some part is always seen from the front.
     const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), facing.length), hn::Zero(f)));
     const auto band = hn::Lt(d, seam_end(test, hn::Max(hn::Abs(dot(to, facing.mean)), scattered)));
-    verdict.open |= bits_of(hn::And(large, opens)) << first;
-    verdict.keep |= bits_of(hn::Or(hn::AndNot(opens, large), hn::And(wanted, hn::And(small, band)))) << first;
+    verdict.open |= bits_of(f, hn::And(large, opens)) << first;
+    verdict.keep |= bits_of(f, hn::Or(hn::AndNot(opens, large), hn::And(wanted, hn::And(small, band)))) << first;
   }
   return verdict;
 }
@@ -334,7 +324,7 @@ void gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t
     if (test.sides == Sides::front) wanted = hn::And(wanted, hn::Lt(dot(to, normal), hn::Set(f, cell.radius)));
     if (hn::AllFalse(f, wanted)) continue;
     const auto d = hn::Sqrt(d2);
-    keep |= bits_of(hn::And(wanted, hn::Lt(d, test.last ? hn::Zero(f) : seam_end(test, hn::Abs(dot(to, normal)))))) << from;
+    keep |= bits_of(f, hn::And(wanted, hn::Lt(d, test.last ? hn::Zero(f) : seam_end(test, hn::Abs(dot(to, normal)))))) << from;
     const auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
     if (hn::AllFalse(f, drawn)) continue;
     const auto half = [&](std::size_t bytes_before) {

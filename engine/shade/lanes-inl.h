@@ -1,0 +1,49 @@
+// Steps that several kernels share, a lane each. Included by files that are compiled once per
+// instruction set, so it is guarded once per instruction set.
+#if defined(PTC_SHADE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef PTC_SHADE_LANES_INL_H
+#undef PTC_SHADE_LANES_INL_H
+#else
+#define PTC_SHADE_LANES_INL_H
+#endif
+
+#include <cstdint>
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace ptc::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// The lanes of a mask, the first in bit 0.
+template <class D>
+HWY_INLINE unsigned bits_of(D d, hn::Mask<D> mask) {
+  static_assert(hn::MaxLanes(D()) <= 8);
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(d, mask, bits);
+  return bits[0];
+}
+
+/// Colours of RGBE: bytes, as floats, and what they are multiplied by.
+template <class D>
+struct UnpackedRgbe {
+  hn::VFromD<D> byte[3];
+  hn::VFromD<D> scale;
+};
+
+/// m 2^(e - 136) for each byte m; exponents up to 9 are black here.
+template <class D>
+HWY_INLINE UnpackedRgbe<D> unpack_rgbe(D f, hn::VFromD<hn::RebindToUnsigned<D>> rgbe) {
+  const hn::RebindToUnsigned<D> u;
+  const hn::RebindToSigned<D> i;
+  const auto byte = [&](auto bits) { return hn::ConvertTo(f, hn::BitCast(i, hn::And(bits, hn::Set(u, 255U)))); };
+  const auto exponent = hn::Max(hn::Sub(hn::BitCast(i, hn::ShiftRight<24>(rgbe)), hn::Set(i, 9)), hn::Zero(i));
+  return {{byte(rgbe), byte(hn::ShiftRight<8>(rgbe)), byte(hn::ShiftRight<16>(rgbe))},
+          hn::BitCast(f, hn::ShiftLeft<23>(exponent))};
+}
+
+}  // namespace ptc::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
