@@ -21,6 +21,9 @@ constexpr int kLanes = DiscQueue::kLanes;
 using F = hn::CappedTag<float, kLanes>;
 using I = hn::RebindToSigned<F>;
 using U = hn::RebindToUnsigned<F>;
+using VF = hn::VFromD<F>;
+using VU = hn::VFromD<U>;
+using MF = hn::Mask<F>;
 
 /// Height of the shallow paraboloid that stands for a disc, over its radius (spec/shading.md#surfels).
 constexpr float kBump = 0.01F;
@@ -41,8 +44,8 @@ struct FaceDiscs {
 };
 
 /// Covers pixels x .. x + lanes of a row.
-HWY_INLINE void cover(float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT rgbe, hn::VFromD<F> near,
-                      hn::Mask<F> inside, hn::VFromD<U> colour, hn::VFromD<U> viewpoint) {
+HWY_INLINE void cover(float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT rgbe, VF near,
+                      MF inside, VU colour, VU viewpoint) {
   const F f;
   const U u;
   near = hn::BitCast(f, hn::Or(hn::AndNot(hn::Set(u, kViewpoints - 1U), hn::BitCast(u, near)), viewpoint));
@@ -55,7 +58,7 @@ HWY_INLINE void cover(float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT 
 }
 
 HWY_INLINE void draw_on_face(const CubeGeometry& cube, const CubePixels& pixels, const FaceDiscs& discs, std::size_t i,
-                             std::uint32_t rgbe, hn::VFromD<U> viewpoint) {
+                             std::uint32_t rgbe, VU viewpoint) {
   const F f;
   const auto aa = hn::Set(f, discs.aa[i]);
   const auto alpha = hn::Set(f, discs.alpha[i]);
@@ -87,7 +90,7 @@ HWY_INLINE void draw_on_face(const CubeGeometry& cube, const CubePixels& pixels,
 /// A disc within two radii of the receiver may fill the view: every face, every pixel, one division
 /// each.
 void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const float (&c)[3], const float (&n)[3],
-                    float radius, std::uint32_t rgbe, hn::VFromD<U> viewpoint) {
+                    float radius, std::uint32_t rgbe, VU viewpoint) {
   const F f;
   const float height = c[0] * n[0] + c[1] * n[1] + c[2] * n[2];
   const auto colour = hn::Set(U(), rgbe);
@@ -122,7 +125,7 @@ void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const fl
 }
 
 /// The span of pixels whose centres lie within [middle - half, middle + half] on a face's axis.
-HWY_INLINE void store_span(hn::VFromD<F> middle, hn::VFromD<F> half, float resolution, std::int32_t* first,
+HWY_INLINE void store_span(VF middle, VF half, float resolution, std::int32_t* first,
                            std::int32_t* last) {
   const F f;
   const I i;
@@ -134,6 +137,138 @@ HWY_INLINE void store_span(hn::VFromD<F> middle, hn::VFromD<F> half, float resol
   hn::StoreU(hn::ConvertTo(i, hn::Floor(clamp(high))), i, last);
 }
 
+/// Discs in the axes of the cube, a lane each.
+struct CubeLanes {
+  VF c[3], n[3];   // centre, normal
+  VF radius, radius2;
+  VF height;       // c . n
+};
+
+/// Discs in the axes of the faces that their centres lie before, a lane each.
+struct FaceLanes {
+  VF cw, cu, cv, nw, nu, nv;
+  VF radius, radius2;
+};
+
+HWY_INLINE VF dot(const VF (&a)[3], const VF (&b)[3]) {
+  return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], hn::Mul(a[2], b[2])));
+}
+
+HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs, int begin) {
+  const F f;
+  const VF c[3] = {hn::LoadU(f, discs.x + begin), hn::LoadU(f, discs.y + begin), hn::LoadU(f, discs.z + begin)};
+  const VF n[3] = {hn::LoadU(f, discs.nx + begin), hn::LoadU(f, discs.ny + begin), hn::LoadU(f, discs.nz + begin)};
+  CubeLanes turned;
+  for (int k = 0; k < 3; ++k) {
+    const float* m = cube.rotation[k];
+    const VF row[3] = {hn::Set(f, m[0]), hn::Set(f, m[1]), hn::Set(f, m[2])};
+    turned.c[k] = dot(row, c);
+    turned.n[k] = dot(row, n);
+  }
+  turned.radius = hn::LoadU(f, discs.radius + begin);
+  turned.radius2 = hn::Mul(turned.radius, turned.radius);
+  turned.height = dot(turned.c, turned.n);
+  return turned;
+}
+
+HWY_INLINE void draw_wide_discs(const CubeGeometry& cube, const CubePixels& pixels, const CubeLanes& discs, MF mask,
+                                const std::uint32_t* colours, VU viewpoint) {
+  const F f;
+  alignas(64) float c[3][kLanes], n[3][kLanes], radius[kLanes];
+  for (int k = 0; k < 3; ++k) {
+    hn::StoreU(discs.c[k], f, c[k]);
+    hn::StoreU(discs.n[k], f, n[k]);
+  }
+  hn::StoreU(discs.radius, f, radius);
+  for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+    draw_wide_disc(cube, pixels, {c[0][i], c[1][i], c[2][i]}, {n[0][i], n[1][i], n[2][i]}, radius[i], colours[i],
+                   viewpoint);
+  }
+}
+
+/// Stores which pixels discs may cover. @return the discs that cover some
+HWY_INLINE MF store_bounds(const FaceLanes& d, float resolution, FaceDiscs& out) {
+  const F f;
+  const I i;
+  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  // Bounds along u: (cu - u cw)^2 = r^2 |k|^2 - r^2 (n.k)^2 with k = (-u, 1, 0) in (w, u, v).
+  const auto ew2 = hn::Mul(d.radius2, hn::Max(zero, hn::NegMulAdd(d.nw, d.nw, one)));
+  const auto p = hn::NegMulAdd(d.cw, d.cw, ew2);  // ew^2 - cw^2, below 0 where the disc is in front
+  const auto whole = hn::Ge(p, hn::Mul(hn::Set(f, -1e-4F), d.radius2));
+  const auto per_p = hn::Div(hn::Set(f, -1.0F), p);
+  const auto span = [&](VF cx, VF nx, VF ny, std::int32_t* first, std::int32_t* last) {
+    const auto q = hn::MulAdd(cx, d.cw, hn::Mul(d.radius2, hn::Mul(nx, d.nw)));
+    const auto cross = hn::MulSub(d.cw, nx, hn::Mul(cx, d.nw));
+    auto s = hn::MulAdd(d.cw, d.cw, hn::Mul(cx, cx));
+    s = hn::NegMulAdd(cross, cross, s);
+    s = hn::NegMulAdd(d.radius2, hn::Mul(ny, ny), s);
+    const auto half = hn::Mul(d.radius, hn::Sqrt(hn::Max(s, zero)));
+    store_span(hn::IfThenZeroElse(whole, hn::Mul(q, per_p)), hn::IfThenElse(whole, one, hn::Mul(half, per_p)),
+               resolution, first, last);
+  };
+  span(d.cu, d.nu, d.nv, out.x0, out.x1);
+  span(d.cv, d.nv, d.nu, out.y0, out.y1);
+  return hn::RebindMask(f, hn::And(hn::Lt(hn::LoadU(i, out.x0), hn::LoadU(i, out.x1)),
+                                   hn::Lt(hn::LoadU(i, out.y0), hn::LoadU(i, out.y1))));
+}
+
+/// Stores what says which pixels discs cover, and how near.
+HWY_INLINE void store_forms(const FaceLanes& d, VF per_height, FaceDiscs& out) {
+  const F f;
+  const auto one = hn::Set(f, 1.0F), two = hn::Set(f, 2.0F);
+  const auto inverse = hn::Div(one, d.cw);
+  const auto u0 = hn::Mul(d.cu, inverse), v0 = hn::Mul(d.cv, inverse);
+  const auto length2 = hn::MulAdd(u0, u0, hn::MulAdd(v0, v0, one));
+  const auto scale = hn::Mul(d.cw, per_height);
+  const auto alpha = hn::Mul(d.nu, scale), beta = hn::Mul(d.nv, scale);
+  const auto al = hn::Mul(alpha, length2), bl = hn::Mul(beta, length2);
+  const auto size = hn::Mul(d.radius, inverse);
+  hn::StoreU(u0, f, out.u0);
+  hn::StoreU(v0, f, out.v0);
+  hn::StoreU(hn::MulAdd(alpha, hn::NegMulAdd(two, u0, al), one), f, out.aa);
+  hn::StoreU(hn::MulAdd(beta, hn::NegMulAdd(two, v0, bl), one), f, out.bb);
+  hn::StoreU(hn::Mul(two, hn::MulSub(alpha, hn::Sub(bl, v0), hn::Mul(beta, u0))), f, out.ab2);
+  hn::StoreU(alpha, f, out.alpha);
+  hn::StoreU(beta, f, out.beta);
+  hn::StoreU(hn::Mul(size, size), f, out.square);
+  hn::StoreU(inverse, f, out.inverse);
+  hn::StoreU(hn::Div(hn::Set(f, kBump), hn::Mul(d.radius, hn::Sqrt(length2))), f, out.bump);
+}
+
+/// Draws discs on the faces across an axis: each on the one that its centre lies before. A disc seen
+/// under less than 30 degrees reaches no face whose side its centre is not on.
+HWY_INLINE void draw_across(const CubeGeometry& cube, const CubePixels& pixels, const CubeLanes& discs, VF per_height,
+                            MF mask, int axis, const std::uint32_t* colours, VU viewpoint) {
+  const F f;
+  const I i;
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  const auto negative = hn::Lt(discs.c[axis], hn::Zero(f));
+  const FaceLanes d{hn::Abs(discs.c[axis]),
+                    discs.c[u],
+                    discs.c[v],
+                    hn::IfThenElse(negative, hn::Neg(discs.n[axis]), discs.n[axis]),
+                    discs.n[u],
+                    discs.n[v],
+                    discs.radius,
+                    discs.radius2};
+  const auto far = hn::Add(d.cw, d.radius);  // beyond it no sphere around the disc reaches
+  const auto reaches = [&](VF c) { return hn::Lt(hn::Sub(hn::Abs(c), d.radius), far); };
+  mask = hn::And(mask, hn::And(reaches(d.cu), reaches(d.cv)));
+  if (hn::AllFalse(f, mask)) return;
+  FaceDiscs set;
+  mask = hn::And(mask, store_bounds(d, static_cast<float>(cube.resolution), set));
+  if (hn::AllFalse(f, mask)) return;
+  store_forms(d, per_height, set);
+  const int face_pixels = cube.resolution * cube.resolution;
+  const auto plus = hn::Set(i, 2 * axis * face_pixels), minus = hn::Set(i, (2 * axis + 1) * face_pixels);
+  hn::StoreU(hn::IfThenElse(hn::RebindMask(i, negative), minus, plus), i, set.first);
+  for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
+    const auto k = static_cast<std::size_t>(std::countr_zero(rest));
+    draw_on_face(cube, pixels, set, k, colours[k], viewpoint);
+  }
+}
+
 }  // namespace
 
 void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides,
@@ -142,110 +277,22 @@ void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQu
   const U u;
   const auto from = hn::Set(u, viewpoint);
   const auto lanes = static_cast<int>(hn::Lanes(f));
-  const auto resolution = static_cast<float>(cube.resolution);
-  const int face_pixels = cube.resolution * cube.resolution;
-  const auto zero = hn::Zero(f);
-  const auto one = hn::Set(f, 1.0F);
-  FaceDiscs set;
   alignas(64) std::uint32_t colours[kLanes];
   for (int begin = 0; begin < discs.size; begin += lanes) {
-    const auto x = hn::LoadU(f, discs.x + begin), y = hn::LoadU(f, discs.y + begin), z = hn::LoadU(f, discs.z + begin);
-    const auto nx = hn::LoadU(f, discs.nx + begin), ny = hn::LoadU(f, discs.ny + begin),
-               nz = hn::LoadU(f, discs.nz + begin);
-    const auto r = hn::LoadU(f, discs.radius + begin);
-    const auto turn = [&](int row, auto a, auto b, auto c) {
-      const float* m = cube.rotation[row];
-      return hn::MulAdd(hn::Set(f, m[0]), a, hn::MulAdd(hn::Set(f, m[1]), b, hn::Mul(hn::Set(f, m[2]), c)));
-    };
-    const decltype(r) c[3] = {turn(0, x, y, z), turn(1, x, y, z), turn(2, x, y, z)};
-    const decltype(r) n[3] = {turn(0, nx, ny, nz), turn(1, nx, ny, nz), turn(2, nx, ny, nz)};
-    const auto height = hn::MulAdd(c[0], n[0], hn::MulAdd(c[1], n[1], hn::Mul(c[2], n[2])));
-    const auto distance2 = hn::MulAdd(c[0], c[0], hn::MulAdd(c[1], c[1], hn::Mul(c[2], c[2])));
-    const auto r2 = hn::Mul(r, r);
-    const auto back = hn::Ge(height, zero);
-    const auto wide = hn::Lt(distance2, hn::Mul(hn::Set(f, 4.0F), r2));
-    auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(r, zero));
+    const CubeLanes d = load_discs(cube, discs, begin);
+    const auto back = hn::Ge(d.height, hn::Zero(f));
+    const auto wide = hn::Lt(dot(d.c, d.c), hn::Mul(hn::Set(f, 4.0F), d.radius2));
+    auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(d.radius, hn::Zero(f)));
     // Backs are clear to receivers within two radii.
     drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, wide), drawn);
     if (hn::AllFalse(f, drawn)) continue;
     hn::StoreU(hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin)), u, colours);
-
     if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) {
-      alignas(64) float lane_c[3][kLanes], lane_n[3][kLanes];
-      for (int k = 0; k < 3; ++k) {
-        hn::StoreU(c[k], f, lane_c[k]);
-        hn::StoreU(n[k], f, lane_n[k]);
-      }
-      for (unsigned rest = bits_of(f, near); rest != 0; rest &= rest - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(rest));
-        draw_wide_disc(cube, pixels, {lane_c[0][i], lane_c[1][i], lane_c[2][i]},
-                       {lane_n[0][i], lane_n[1][i], lane_n[2][i]}, discs.radius[static_cast<std::size_t>(begin) + i],
-                       colours[i], from);
-      }
+      draw_wide_discs(cube, pixels, d, near, colours, from);
       drawn = hn::AndNot(wide, drawn);
     }
-
-    // A disc seen under less than 30 degrees reaches no face whose side its centre is not on.
-    const auto per_height = hn::Div(one, height);
-    for (int a = 0; a < 3; ++a) {
-      const int ua = (a + 1) % 3, va = (a + 2) % 3;
-      const auto cw = hn::Abs(c[a]), cu = c[ua], cv = c[va];
-      const auto extent2 = [&](auto m) { return hn::Mul(r2, hn::Max(zero, hn::NegMulAdd(m, m, one))); };
-      const auto ew2 = extent2(n[a]);
-      const auto far = hn::Add(cw, r);  // beyond it no sphere around the disc reaches
-      auto mask = hn::And(drawn, hn::And(hn::Lt(hn::Sub(hn::Abs(cu), r), far), hn::Lt(hn::Sub(hn::Abs(cv), r), far)));
-      if (hn::AllFalse(f, mask)) continue;
-      const auto negative = hn::Lt(c[a], zero);
-      const auto nw = hn::IfThenElse(negative, hn::Neg(n[a]), n[a]);
-      const auto nu = n[ua], nv = n[va];
-
-      // Bounds along u: (cu - u cw)^2 = r^2 |k|^2 - r^2 (n.k)^2 with k = (-u, 1, 0) in (w, u, v).
-      const auto p = hn::NegMulAdd(cw, cw, ew2);  // ew^2 - cw^2, below 0 where the disc is in front
-      const auto whole = hn::Ge(p, hn::Mul(hn::Set(f, -1e-4F), r2));
-      const auto per_p = hn::Div(hn::Set(f, -1.0F), p);
-      const auto span = [&](auto cx, auto nx_, auto ny_, std::int32_t* first, std::int32_t* last) {
-        const auto q = hn::MulAdd(cx, cw, hn::Mul(r2, hn::Mul(nx_, nw)));
-        const auto cross = hn::MulSub(cw, nx_, hn::Mul(cx, nw));
-        auto s = hn::MulAdd(cw, cw, hn::Mul(cx, cx));
-        s = hn::NegMulAdd(cross, cross, s);
-        s = hn::NegMulAdd(r2, hn::Mul(ny_, ny_), s);
-        const auto half = hn::Mul(r, hn::Sqrt(hn::Max(s, zero)));
-        store_span(hn::IfThenZeroElse(whole, hn::Mul(q, per_p)), hn::IfThenElse(whole, one, hn::Mul(half, per_p)),
-                   resolution, first, last);
-      };
-      span(cu, nu, nv, set.x0, set.x1);
-      span(cv, nv, nu, set.y0, set.y1);
-      const I i32;
-      const auto some = hn::And(hn::Lt(hn::LoadU(i32, set.x0), hn::LoadU(i32, set.x1)),
-                                hn::Lt(hn::LoadU(i32, set.y0), hn::LoadU(i32, set.y1)));
-      mask = hn::And(mask, hn::RebindMask(f, some));
-      if (hn::AllFalse(f, mask)) continue;
-
-      const auto inverse = hn::Div(one, cw);
-      const auto u0 = hn::Mul(cu, inverse), v0 = hn::Mul(cv, inverse);
-      const auto length2 = hn::MulAdd(u0, u0, hn::MulAdd(v0, v0, one));
-      const auto scale = hn::Mul(cw, per_height);
-      const auto alpha = hn::Mul(nu, scale), beta = hn::Mul(nv, scale);
-      const auto al = hn::Mul(alpha, length2), bl = hn::Mul(beta, length2);
-      const auto two = hn::Set(f, 2.0F);
-      hn::StoreU(u0, f, set.u0);
-      hn::StoreU(v0, f, set.v0);
-      hn::StoreU(hn::MulAdd(alpha, hn::NegMulAdd(two, u0, al), one), f, set.aa);
-      hn::StoreU(hn::MulAdd(beta, hn::NegMulAdd(two, v0, bl), one), f, set.bb);
-      hn::StoreU(hn::Mul(two, hn::MulSub(alpha, hn::Sub(bl, v0), hn::Mul(beta, u0))), f, set.ab2);
-      hn::StoreU(alpha, f, set.alpha);
-      hn::StoreU(beta, f, set.beta);
-      const auto size = hn::Mul(r, inverse);
-      hn::StoreU(hn::Mul(size, size), f, set.square);
-      hn::StoreU(inverse, f, set.inverse);
-      hn::StoreU(hn::Div(hn::Set(f, kBump), hn::Mul(r, hn::Sqrt(length2))), f, set.bump);
-      const auto plus = hn::Set(i32, 2 * a * face_pixels), minus = hn::Set(i32, (2 * a + 1) * face_pixels);
-      hn::StoreU(hn::IfThenElse(hn::RebindMask(i32, negative), minus, plus), i32, set.first);
-      for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(rest));
-        draw_on_face(cube, pixels, set, i, colours[i], from);
-      }
-    }
+    const auto per_height = hn::Div(hn::Set(f, 1.0F), d.height);
+    for (int axis = 0; axis < 3; ++axis) draw_across(cube, pixels, d, per_height, drawn, axis, colours, from);
   }
 }
 
