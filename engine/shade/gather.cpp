@@ -154,8 +154,9 @@ struct Gather::Impl {
   void collect_group(const Entry& entry, const CellTest& test, std::vector<Entry>* left) {
     ++counts.groups;
     const GroupView group = scene.group(entry.page, entry.slot);
+    const int before = queue.size;
     const GroupVerdict verdict = gather_group(group, entry.mask, test, queue);
-    counts.clusters += verdict.drawn;
+    counts.clusters += static_cast<unsigned>(queue.size - before);
     for (unsigned rest = verdict.open; rest != 0; rest &= rest - 1) open(group.child(std::countr_zero(rest)));
     if (verdict.keep != 0) {
       left->push_back({.page = entry.page, .slot = entry.slot, .mask = static_cast<std::uint8_t>(verdict.keep)});
@@ -183,8 +184,7 @@ struct Gather::Impl {
     const PageReader::Page page = scene.points(entry.first);
     const auto slot = static_cast<std::uint32_t>(entry.first % scene.view().points_per_page());
     const int before = queue.size;
-    unsigned keep = 0;
-    gather_surfels(page.payload, page.record_count, slot, entry.mask, test, queue, keep);
+    const unsigned keep = gather_surfels(page.payload, page.record_count, slot, entry.mask, test, queue);
     counts.surfels += static_cast<unsigned>(queue.size - before);
     if (keep != 0) left->push_back({.first = entry.first, .mask = static_cast<std::uint8_t>(keep), .surfels = true});
   }

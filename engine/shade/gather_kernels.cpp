@@ -79,7 +79,7 @@ HWY_INLINE MF mask_of(unsigned bits) {
 }
 
 /// Appends the lanes of a mask.
-HWY_INLINE int push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal, VF radius, VU rgbe) {
+HWY_INLINE void push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal, VF radius, VU rgbe) {
   const F f;
   const U u;
   const auto at = static_cast<std::size_t>(queue.size);
@@ -90,9 +90,7 @@ HWY_INLINE int push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal,
   hn::CompressBlendedStore(normal.y, mask, f, queue.ny + at);
   hn::CompressBlendedStore(normal.z, mask, f, queue.nz + at);
   hn::CompressBlendedStore(radius, mask, f, queue.radius + at);
-  const std::size_t count = hn::CompressBlendedStore(rgbe, hn::RebindMask(u, mask), u, queue.rgbe + at);
-  queue.size += static_cast<int>(count);
-  return static_cast<int>(count);
+  queue.size += static_cast<int>(hn::CompressBlendedStore(rgbe, hn::RebindMask(u, mask), u, queue.rgbe + at));
 }
 
 /// How high the direction to a thing reaches over the horizon of any receiver of the cell, as a length:
@@ -168,8 +166,8 @@ HWY_INLINE VF seam_end(const CellTest& test, VF height) {
 }
 
 /// Clusters as discs (spec/shading.md#gather), appended to the queue.
-HWY_INLINE int draw_clusters(const GroupView& group, int first, const CellTest& test, MF mask, const Vec& to, VF distance,
-                             const Facing& facing, DiscQueue& queue) {
+HWY_INLINE void draw_clusters(const GroupView& group, int first, const CellTest& test, MF mask, const Vec& to,
+                              VF distance, const Facing& facing, DiscQueue& queue) {
   const F f;
   const U u;
   const auto zero = hn::Zero(f);
@@ -206,8 +204,8 @@ HWY_INLINE int draw_clusters(const GroupView& group, int first, const CellTest& 
   const Vec disc_normal{hn::IfThenElse(flat, facing.normal.x, toward.x), hn::IfThenElse(flat, facing.normal.y, toward.y),
                         hn::IfThenElse(flat, facing.normal.z, toward.z)};
   mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
-  return push(queue, mask, to, disc_normal, radius,
-              pack_rgbe(hn::Mul(light[0], mix), hn::Mul(light[1], mix), hn::Mul(light[2], mix)));
+  push(queue, mask, to, disc_normal, radius,
+       pack_rgbe(hn::Mul(light[0], mix), hn::Mul(light[1], mix), hn::Mul(light[2], mix)));
 }
 
 }  // namespace
@@ -256,7 +254,7 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
     const auto small = hn::Lt(r2, hn::Mul(limit, hn::Mul(nearest, nearest)));  // for every receiver
     const auto settled = hn::Ge(d, shared_from);
     const auto drawn = hn::And(wanted, hn::And(small, settled));
-    if (!hn::AllFalse(f, drawn)) verdict.drawn += static_cast<unsigned>(draw_clusters(group, first, test, drawn, to, d, facing, queue));
+    if (!hn::AllFalse(f, drawn)) draw_clusters(group, first, test, drawn, to, d, facing, queue);
     const auto large = hn::AndNot(small, wanted);
     if (test.last) {
       verdict.open |= bits_of(f, large) << first;
@@ -275,8 +273,8 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
   return verdict;
 }
 
-void gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned mask,
-                    const CellTest& test, DiscQueue& queue, unsigned& keep) {
+unsigned gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned mask,
+                        const CellTest& test, DiscQueue& queue) {
   const F f;
   const I i;
   const U u;
@@ -284,7 +282,7 @@ void gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t
   const ReceiverCell& cell = test.cell;
   const std::size_t n = count;
   const Vec axis = spread(cell.axis);
-  keep = 0;
+  unsigned keep = 0;
   // Lattice coordinates have 42 bits: 26 high and 16 low ones are exact in 32-bit arithmetic.
   const auto low16 = hn::Set(u, 0xffffU);
   const auto relative = [&](VU low, VU high10, double centre) {
@@ -332,6 +330,7 @@ void gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t
     };
     push(queue, drawn, to, normal, r, pack_rgbe(half(24), half(26), half(28)));
   }
+  return keep;
 }
 
 }  // namespace ptc::HWY_NAMESPACE
@@ -347,9 +346,9 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
   return HWY_DYNAMIC_DISPATCH(gather_group)(group, mask, test, queue);
 }
 
-void gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned mask,
-                    const CellTest& test, DiscQueue& queue, unsigned& keep) {
-  HWY_DYNAMIC_DISPATCH(gather_surfels)(payload, count, first, mask, test, queue, keep);
+unsigned gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned mask,
+                        const CellTest& test, DiscQueue& queue) {
+  return HWY_DYNAMIC_DISPATCH(gather_surfels)(payload, count, first, mask, test, queue);
 }
 
 }  // namespace ptc

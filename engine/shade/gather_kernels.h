@@ -28,7 +28,6 @@ struct CellTest {
 struct GroupVerdict {
   unsigned keep = 0;  ///< left to the children of the cell
   unsigned open = 0;  ///< replaced by their own children
-  unsigned drawn = 0;
 };
 
 /// @param mask   children to look at
@@ -38,8 +37,9 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
 /// @param payload, count  of a point page; up to 64 bytes past it may be read
 /// @param first   index of the first surfel in the page
 /// @param mask    which of the 8 surfels from `first` to look at
-/// @param[out] keep  those left to the children of the cell
-void gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned mask,
-                    const CellTest& test, DiscQueue& queue, unsigned& keep);
+/// @param queue   as above
+/// @return those left to the children of the cell
+unsigned gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned mask,
+                        const CellTest& test, DiscQueue& queue);
 
 }  // namespace ptc
