@@ -41,7 +41,7 @@ glm::mat3 tilted_frame(unsigned variant) {
 
 DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
                              unsigned variant)
-    : resolution_(resolution), variant_(variant), rotation_(tilted_frame(variant)) {
+    : variant_(variant) {
   if (resolution == 0 || resolution > 64 || resolution % 16 != 0) {
     throw std::invalid_argument("DirectionGrid: the resolution is 16, 32, 48 or 64");
   }
@@ -69,12 +69,9 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
                .edge_u = edge_u_.data(),
                .edge_v = edge_v_.data(),
                .resolution = static_cast<int>(resolution),
-               .rotation = {}};
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) geometry_.rotation[row][column] = rotation_[column][row];
-  }
+               .rotation = tilted_frame(variant)};
   if (!sky) return;
-  const glm::mat3 to_world = glm::transpose(rotation_);
+  const glm::mat3 to_world = glm::transpose(geometry_.rotation);
   const std::size_t plane = std::size_t{resolution} * resolution;
   sky_.resize(6 * 3 * plane);
   for (int face = 0; face < 6; ++face) {
@@ -115,10 +112,11 @@ void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Si
 
 Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
                                  std::span<const glm::vec3> offsets) noexcept {
-  const glm::vec3 n = grid.rotation_ * normal;
-  const std::size_t plane = std::size_t{grid.resolution_} * grid.resolution_;
+  const glm::mat3& rotation = grid.geometry_.rotation;
+  const glm::vec3 n = rotation * normal;
+  const std::size_t plane = std::size_t{grid.resolution()} * grid.resolution();
   std::array<glm::vec3, kViewpoints> turned{};
-  for (std::size_t i = 0; i < offsets.size(); ++i) turned[i] = grid.rotation_ * offsets[i];
+  for (std::size_t i = 0; i < offsets.size(); ++i) turned[i] = rotation * offsets[i];
   FaceOffsets moves;
   FaceSums sums;
   glm::vec3 open(0);
@@ -145,7 +143,7 @@ Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& nor
   shading.irradiance = glm::vec3(sums.light[0], sums.light[1], sums.light[2]) * (kPi / sums.total);
   shading.sky = glm::vec3(sums.sky[0], sums.sky[1], sums.sky[2]) * (kPi / sums.total);
   const float length = std::sqrt(glm::dot(open, open));
-  shading.bent_normal = length > 0 ? glm::transpose(grid.rotation_) * (open / length) : normal;
+  shading.bent_normal = length > 0 ? glm::transpose(rotation) * (open / length) : normal;
   return shading;
 }
 

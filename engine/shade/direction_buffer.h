@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include "engine/shade/direction_kernels.h"
@@ -27,23 +26,19 @@ class DirectionGrid {
   DirectionGrid(const DirectionGrid&) = delete;
   DirectionGrid& operator=(const DirectionGrid&) = delete;
 
-  [[nodiscard]] unsigned resolution() const noexcept { return resolution_; }
+  [[nodiscard]] unsigned resolution() const noexcept { return static_cast<unsigned>(geometry_.resolution); }
   [[nodiscard]] unsigned variant() const noexcept { return variant_; }
-  /// From world to the cube's axes.
-  [[nodiscard]] const glm::mat3& rotation() const noexcept { return rotation_; }
 
  private:
   friend class DirectionBuffer;
-  unsigned resolution_;
   unsigned variant_;
-  glm::mat3 rotation_;
   std::vector<float> centre_;  // resolution: pixel centres in [-1, 1]
   std::vector<float> length_;  // resolution^2: |(1, u, v)|
   std::vector<float> weight_;  // resolution^2: solid angle / length
   std::vector<float> edge_u_;  // as CubeGeometry has them
   std::vector<float> edge_v_;
   std::vector<float> sky_;     // by face: planes of red, green, blue; or empty
-  CubeGeometry geometry_;      // of the above
+  CubeGeometry geometry_;      // of the above, and the rotation
 };
 
 /// Nearest coverer of every direction pixel and its RGBE colour.

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 
+#include <glm/mat3x3.hpp>
+
 #include "engine/shade/disc_queue.h"
 #include "engine/shade/shading.h"
 
@@ -18,7 +20,7 @@ struct CubeGeometry {
   const float* edge_u;    ///< resolution^2: mean weight of a pixel and the next in its row, 0 for the last
   const float* edge_v;    ///< resolution^2: mean weight of a pixel and the one in the next row
   int resolution;         ///< a multiple of 16, at most 64
-  float rotation[3][3];   ///< rows: the cube's axes in the world
+  glm::mat3 rotation;     ///< from the world to the cube's axes
 };
 
 /// What covers each pixel, by face, row and column.

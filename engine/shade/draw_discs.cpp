@@ -160,8 +160,8 @@ HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs
   const VF n[3] = {hn::LoadU(f, discs.nx + begin), hn::LoadU(f, discs.ny + begin), hn::LoadU(f, discs.nz + begin)};
   CubeLanes turned;
   for (int k = 0; k < 3; ++k) {
-    const float* m = cube.rotation[k];
-    const VF row[3] = {hn::Set(f, m[0]), hn::Set(f, m[1]), hn::Set(f, m[2])};
+    const glm::mat3& m = cube.rotation;
+    const VF row[3] = {hn::Set(f, m[0][k]), hn::Set(f, m[1][k]), hn::Set(f, m[2][k])};
     turned.c[k] = dot(row, c);
     turned.n[k] = dot(row, n);
   }
