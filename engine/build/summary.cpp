@@ -15,27 +15,21 @@ double distance(const Vec3& a, const Vec3& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-Vec3 mean_normal(const NodeSummary& node) {
-  return {node.facing[0] - node.facing[1], node.facing[2] - node.facing[3],
-          node.facing[4] - node.facing[5]};
-}
-
-/// Axis of the normal cone; +z with a full cone when the normals cancel out.
-bool set_cone_axis(NodeSummary& node) {
-  const Vec3 sum = mean_normal(node);
-  const double length = std::sqrt(dot(sum, sum));
-  node.cone_axis = {0, 0, 1};
-  if (!(length > 1e-6 * node.area)) return false;
-  for (std::size_t k = 0; k < 3; ++k) node.cone_axis[k] = static_cast<float>(sum[k] / length);
-  return true;
-}
-
-/// Unit normal of the slab that holds a cluster; zero where the normals cancel out.
+/// Unit normal of the slab that holds a cluster, the mean of its normals; zero where they cancel out.
 Vec3 slab_normal(const NodeSummary& node) {
-  const Vec3 sum = mean_normal(node);
+  const Vec3 sum{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3], node.facing[4] - node.facing[5]};
   const double length = std::sqrt(dot(sum, sum));
   if (!(length > 1e-6 * node.area)) return {};
   return {sum[0] / length, sum[1] / length, sum[2] / length};
+}
+
+/// Axis of the normal cone: the slab's normal; +z, with a full cone, where that is zero.
+/// @return false where it is zero
+bool set_cone_axis(NodeSummary& node, const Vec3& slab) {
+  node.cone_axis = {0, 0, 1};
+  if (slab == Vec3{}) return false;
+  for (std::size_t k = 0; k < 3; ++k) node.cone_axis[k] = static_cast<float>(slab[k]);
+  return true;
 }
 
 /// Half the extent along a unit direction of a thing `thick` along its normal and `wide` across it;
@@ -92,8 +86,8 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
     }
   }
   for (double& m : node.mean) m /= weight;
-  const bool has_axis = set_cone_axis(node);
   const Vec3 slab = slab_normal(node);
+  const bool has_axis = set_cone_axis(node, slab);
   node.cone_cos = has_axis ? 1.0F : -1.0F;
   for (const PointRecord& p : points) {
     node.radius = std::max(node.radius, distance(position(p), node.mean) + static_cast<double>(p.radius) / unit);
@@ -122,8 +116,8 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
     }
   }
   for (double& m : sum.mean) m /= weight;
-  const bool has_axis = set_cone_axis(sum);
   const Vec3 slab = slab_normal(sum);
+  const bool has_axis = set_cone_axis(sum, slab);
   double angle = has_axis ? 0 : M_PI;
   for (const NodeSummary* node : nodes) {
     sum.radius = std::max(sum.radius, distance(node->mean, sum.mean) + node->radius);
