@@ -10,11 +10,7 @@
 namespace ptc {
 
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count) {
-  return app
-      .add_option_function<std::string>(
-          "--points", [&count](const std::string& text) { count = parse_count("--points", text); },
-          "Surfels wanted on the meshes; k, M, G count by 1000")
-      ->type_name("COUNT")
+  return add_count(app, "--points", count, "Surfels wanted on the meshes; k, M, G count by 1000")
       ->default_str(std::to_string(count / 1'000'000) + "M")
       ->group("Sampling");
 }

@@ -35,11 +35,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
       command.add_inputs("inputs", request.inputs,
                          "Meshes (OBJ, PLY, OFF, glTF, GLB) and clouds (PLY, XYZ), also .gz");
   command.add_output("-o,--output", arguments.output, {".ptcx"}, "The container to write");
-  app.add_option_function<std::string>(
-         "--city",
-         [&](const std::string& t) { request.city_points = ptc::parse_count("--city", t); },
-         "A procedural city of about so many points, no inputs")
-      ->type_name("COUNT")
+  ptc::add_count(app, "--city", request.city_points, "A procedural city of about so many points, no inputs")
       ->excludes(inputs);
   app.add_flag("--backdrop", request.backdrop, "Set the meshes on a ground before a red wall");
 }

@@ -27,10 +27,8 @@ int main(int argc, char** argv) {
   command.add_output("-o,--output", output, {".ptcx", ".ply"}, "What to write: .ptcx or .ply");
   command.add_input("--receivers", request.receivers,
                     "Cloud or container to shade [default: the scene's own points]");
-  app.add_option_function<std::string>(
-         "--count", [&](const std::string& t) { request.count = ptc::parse_count("--count", t); },
-         "Shade only so many of the points, evenly spread, into a .ply; k, M, G count by 1000 [default: all]")
-      ->type_name("COUNT");
+  ptc::add_count(app, "--count", request.count,
+                 "Shade only so many of the points, evenly spread, into a .ply; k, M, G count by 1000 [default: all]");
   lights.declare_sky(app);
   app.get_option("--sky")->description(
       "Radiance from everywhere, or a latitude-longitude picture of it [default: as built]");

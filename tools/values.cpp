@@ -20,6 +20,30 @@ std::string range_text(const std::string& least, const std::string& most) {
   return "expects a number from " + least + " to " + most;
 }
 
+std::uint64_t parse_count(const std::string& option, const std::string& text) {
+  constexpr double kGreatest = 0x1p48;  // points of a file
+  const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
+  if (!(count >= 1 && count <= kGreatest) || std::rint(count) != count) {
+    refuse(option, text, "a whole number from 1 to 2^48, as 250000, 250k or 1.5M");
+  }
+  return static_cast<std::uint64_t>(count);
+}
+
+std::uint64_t parse_size(const std::string& option, const std::string& text) {
+  constexpr double kGreatest = 0x1p62;
+  const double bytes = parse_scaled(text, {{"K", 0x1p10},
+                                           {"M", 0x1p20},
+                                           {"G", 0x1p30},
+                                           {"T", 0x1p40},
+                                           {"KiB", 0x1p10},
+                                           {"MiB", 0x1p20},
+                                           {"GiB", 0x1p30},
+                                           {"TiB", 0x1p40}});
+  if (!(bytes >= 1 && bytes <= kGreatest))
+    refuse(option, text, "a size as 800000000, 256M or 1.5G");
+  return static_cast<std::uint64_t>(bytes);
+}
+
 }  // namespace
 
 void refuse(const std::string& option, const std::string& text, const std::string& expected) {
@@ -43,30 +67,6 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
     if (numbers.size() == count) return numbers;
   }
   refuse(option, text, expected);
-}
-
-std::uint64_t parse_count(const std::string& option, const std::string& text) {
-  constexpr double kGreatest = 0x1p48;  // points of a file
-  const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
-  if (!(count >= 1 && count <= kGreatest) || std::rint(count) != count) {
-    refuse(option, text, "a whole number from 1 to 2^48, as 250000, 250k or 1.5M");
-  }
-  return static_cast<std::uint64_t>(count);
-}
-
-std::uint64_t parse_size(const std::string& option, const std::string& text) {
-  constexpr double kGreatest = 0x1p62;
-  const double bytes = parse_scaled(text, {{"K", 0x1p10},
-                                           {"M", 0x1p20},
-                                           {"G", 0x1p30},
-                                           {"T", 0x1p40},
-                                           {"KiB", 0x1p10},
-                                           {"MiB", 0x1p20},
-                                           {"GiB", 0x1p30},
-                                           {"TiB", 0x1p40}});
-  if (!(bytes >= 1 && bytes <= kGreatest))
-    refuse(option, text, "a size as 800000000, 256M or 1.5G");
-  return static_cast<std::uint64_t>(bytes);
 }
 
 CLI::Validator in_range(double least, double most) {
@@ -95,6 +95,15 @@ CLI::Validator whole_in_range(std::uint64_t least, std::uint64_t most) {
                                                           : expects + ", not '" + input + "'";
       },
       "");
+}
+
+CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& count,
+                       const std::string& description) {
+  return app
+      .add_option_function<std::string>(
+          name, [&count, name](const std::string& text) { count = parse_count(name, text); },
+          description)
+      ->type_name("COUNT");
 }
 
 CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& bytes,

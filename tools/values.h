@@ -37,12 +37,6 @@ template <class T>
                                                 std::initializer_list<std::size_t> counts,
                                                 const std::string& expected);
 
-/// A whole number, also with k, M or G for powers of 1000: "250k", "1.5M".
-[[nodiscard]] std::uint64_t parse_count(const std::string& option, const std::string& text);
-
-/// Bytes, also with K, M, G or T for powers of 1024: "256M", "1.5G".
-[[nodiscard]] std::uint64_t parse_size(const std::string& option, const std::string& text);
-
 /// Refuses what is no number from `least` to `most`.
 [[nodiscard]] CLI::Validator in_range(double least, double most);
 [[nodiscard]] CLI::Validator whole_in_range(std::uint64_t least, std::uint64_t most);
@@ -93,7 +87,11 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
       ->default_str(current);
 }
 
-/// An option that takes what parse_size() does.
+/// A whole number from 1, also with k, M or G for powers of 1000: "250k", "1.5M".
+CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& count,
+                       const std::string& description);
+
+/// Bytes, also with K, M, G or T for powers of 1024: "256M", "1.5G"; the default is shown in the help.
 CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& bytes,
                       const std::string& description);
 
