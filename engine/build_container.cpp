@@ -131,14 +131,63 @@ std::unique_ptr<PointSource> open_lit(const std::filesystem::path& path) {
   return std::make_unique<Photographed>(std::move(file.source));
 }
 
-/// The mesh of a request under rays and light; gone before the sort needs its memory.
+/// The meshes of a request under rays and light; gone before the sort needs its memory.
 struct LitMesh {
+  LitMesh(Mesh m, const LightRig& lights) : mesh(std::move(m)), rays(mesh), light(rays, lights) {}
+
   Mesh mesh;
-  std::unique_ptr<RayScene> rays;
-  std::unique_ptr<DirectLight> light;
+  RayScene rays;
+  DirectLight light;
 };
 
-Meta make_meta(const BuildRequest& request, double spacing) {
+/// What a build is made from, and what the sort must know of it beforehand.
+struct Inputs {
+  Bounds bounds;
+  std::vector<glm::dvec3> sample;  // places, for splitters
+  Clouds clouds;
+  LightRig lights;
+  std::unique_ptr<LitMesh> lit;  // null without triangles
+};
+
+Inputs lay_city(std::uint64_t points) {
+  const Bounds bounds = city_bounds(points);
+  return {.bounds = bounds, .sample = sample_ground(bounds), .lights = city_lights()};
+}
+
+/// The lights of a request for its meshes, which may bring their own.
+LightRig choose_lights(const BuildRequest& request, const Mesh& mesh) {
+  if (request.lights) return *request.lights;
+  const auto emits = [](const Material& material) { return material.emission != glm::vec3(0); };
+  const bool dark = !mesh.triangles.empty() && std::ranges::none_of(mesh.materials, emits);
+  return dark ? default_rig() : LightRig{};
+}
+
+Inputs read_inputs(const BuildRequest& request, Progress& progress) {
+  Inputs inputs;
+  for (const auto& input : request.inputs) {
+    if (is_point_file(input)) inputs.clouds.measure(input, progress);
+  }
+  inputs.bounds.add(inputs.clouds.bounds);
+  inputs.sample = std::move(inputs.clouds.sample);
+  Mesh mesh = load_meshes(request.inputs, request.backdrop);
+  inputs.lights = choose_lights(request, mesh);
+  if (mesh.triangles.empty()) return inputs;
+  inputs.bounds.add(mesh.bounds());
+  const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
+  inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
+  inputs.lit = std::make_unique<LitMesh>(std::move(mesh), inputs.lights);
+  return_freed_memory();  // what reading the file and building the tree took
+  return inputs;
+}
+
+std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Frame& frame) {
+  std::vector<MortonKey> keys;
+  keys.reserve(places.size());
+  for (const glm::dvec3& p : places) keys.push_back(encode_morton(frame.to_lattice(to_array(p))));
+  return keys;
+}
+
+Meta make_meta(const BuildRequest& request, const LightRig& lights, double spacing) {
   Meta meta;
   std::string names;
   for (const auto& input : request.inputs) {
@@ -147,7 +196,7 @@ Meta make_meta(const BuildRequest& request, double spacing) {
   }
   if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
   meta.text[kInputsKey] = names;
-  meta.text[kLightsKey] = to_json(request.city_points > 0 ? city_lights() : request.lights);
+  meta.text[kLightsKey] = to_json(lights);
   if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;
@@ -171,67 +220,46 @@ Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildR
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target, Progress& progress) {
   BuildReport report;
   const Executor executor(request.run.threads);
-  Bounds bounds;
-  std::vector<glm::dvec3> sample;
-  Clouds clouds;
-  auto lit = std::make_unique<LitMesh>();
-
+  Inputs inputs;
   if (request.city_points > 0) {
-    bounds = city_bounds(request.city_points);
-    sample = sample_ground(bounds);
+    inputs = lay_city(request.city_points);
   } else {
     const Stage stage(report.seconds, progress, "read", 0, "points");
-    for (const auto& input : request.inputs) {
-      if (is_point_file(input)) clouds.measure(input, progress);
-    }
-    bounds.add(clouds.bounds);
-    sample = std::move(clouds.sample);
-    lit->mesh = load_meshes(request.inputs, request.backdrop);
-    if (!lit->mesh.triangles.empty()) {
-      bounds.add(lit->mesh.bounds());
-      const std::vector<glm::dvec3> on_mesh = sample_triangles(lit->mesh);
-      sample.insert(sample.end(), on_mesh.begin(), on_mesh.end());
-      lit->rays = std::make_unique<RayScene>(lit->mesh);
-      lit->light = std::make_unique<DirectLight>(*lit->rays, request.lights);
-      return_freed_memory();  // what reading the file and building the tree took
-    }
+    inputs = read_inputs(request, progress);
   }
-  if (bounds.empty()) throw DataError("the input has no points and no triangles");
-
-  const Frame frame = frame_around(to_array(bounds.low), to_array(bounds.high));
-  std::vector<MortonKey> keys;
-  keys.reserve(sample.size());
-  for (const glm::dvec3& p : sample) keys.push_back(encode_morton(frame.to_lattice(to_array(p))));
+  if (inputs.bounds.empty()) throw DataError("the input has no points and no triangles");
+  const Frame frame = frame_around(to_array(inputs.bounds.low), to_array(inputs.bounds.high));
 
   std::uint64_t taken = kBufferBytes;
-  if (lit->rays) {
-    taken += mesh_bytes(lit->mesh, lit->rays.get()) +
+  if (const LitMesh* lit = inputs.lit.get()) {
+    taken += mesh_bytes(lit->mesh, &lit->rays) +
              sampling_bytes(lit->mesh.triangles.size(), request.sampling.count, executor.threads());
   }
   const std::uint64_t sort_bytes = memory_left(request.run, taken, kLeastSort, "this scene's build");
-  ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target)}, executor, keys);
+  ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target)}, executor,
+                        keys_of(inputs.sample, frame));
   double spacing = 0;
   {
-    const std::uint64_t wanted = request.city_points > 0 ? request.city_points : clouds.points;
-    const Stage stage(report.seconds, progress, lit->rays ? "sample and light" : "partition", wanted, "points");
+    const std::uint64_t wanted = request.city_points > 0 ? request.city_points : inputs.clouds.points;
+    const Stage stage(report.seconds, progress, inputs.lit ? "sample and light" : "partition", wanted, "points");
     if (request.city_points > 0) feed(*make_city(request.city_points), frame, sorter, executor, progress);
-    for (const auto& path : clouds.paths) feed(*open_lit(path), frame, sorter, executor, progress);
-    if (lit->rays) {
+    for (const auto& path : inputs.clouds.paths) feed(*open_lit(path), frame, sorter, executor, progress);
+    if (const LitMesh* lit = inputs.lit.get()) {
       spacing = request.sampling.spacing > 0 ? request.sampling.spacing
                                              : spacing_for(lit->mesh, request.sampling.count);
-      feed(*sample_mesh(*lit->light, *lit->rays, request.sampling, executor), frame, sorter, executor, progress);
+      feed(*sample_mesh(lit->light, lit->rays, request.sampling, executor), frame, sorter, executor, progress);
     }
-    lit.reset();
+    inputs.lit.reset();
   }
 
   const Stage stage(report.seconds, progress, "sort and build", sorter.statistics().points, "points");
-  const Meta meta = make_meta(request, spacing);
+  const Meta meta = make_meta(request, inputs.lights, spacing);
   ContainerWriter writer(target, {.page_shift = request.page_shift,
                                   .codec = request.codec,
                                   .uuid = content_uuid(sorter, frame, request, meta)});
   std::unique_ptr<PointStream> sorted = sorter.finish();
   std::unique_ptr<PointStream> with_radii;
-  if (clouds.estimate_radii) with_radii = estimate_radii(*sorted, frame.unit());
+  if (inputs.clouds.estimate_radii) with_radii = estimate_radii(*sorted, frame.unit());
   const Superblock superblock =
       build_pages(with_radii ? *with_radii : *sorted, frame, writer, request.tree, progress);
   report.superblock = writer.finish(meta, superblock);

@@ -37,7 +37,8 @@ struct BuildRequest {
   std::vector<std::filesystem::path> inputs;  ///< meshes and clouds
   std::uint64_t city_points = 0;              ///< the procedural city instead of inputs
   bool backdrop = false;                      ///< sets the meshes on a ground before a red wall
-  LightRig lights;                            ///< of the meshes; clouds come lit
+  std::optional<LightRig> lights;             ///< of the meshes (clouds come lit); empty: a default_rig()
+                                              ///< unless a mesh emits light
   SamplingOptions sampling;
   BuildOptions tree;
   std::uint8_t page_shift = 16;

@@ -213,6 +213,7 @@ class TemporaryContainer {
       : file_(target) {
     BuildRequest build;
     build.inputs = {request.receivers};
+    build.lights = LightRig{};  // receivers need none
     build.run = request.run;
     build.run.temp_dir = temp_dir(request.run, target);
     build_container(build, path(), progress);

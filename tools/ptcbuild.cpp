@@ -84,12 +84,8 @@ ptc::Outcome build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progre
   }
   request.run = run;
   request.sampling.camera = arguments.camera.camera();
-  request.lights = arguments.lights.rig();
+  if (arguments.lights.given() || arguments.no_default_lights) request.lights = arguments.lights.rig();
   if (request.city_points > 0 && arguments.lights.given()) throw CLI::ExcludesError("--city", "lights: it has its own");
-  if (!arguments.lights.given() && !arguments.no_default_lights && request.city_points == 0 &&
-      ptc::meshes_are_dark(request)) {
-    request.lights = ptc::LightArguments::default_rig();
-  }
   const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
 
   const ptc::Superblock& made = report.superblock;

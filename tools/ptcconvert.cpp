@@ -5,7 +5,6 @@
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"
-#include "tools/scene_options.h"
 
 namespace {
 
@@ -35,7 +34,6 @@ ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
   request.codec = arguments.codec;
   request.page_shift = arguments.page_shift;
   request.run = run;
-  if (ptc::meshes_are_dark(request)) request.lights = ptc::LightArguments::default_rig();
   ptc::BuildReport built = ptc::build_container(request, arguments.output, progress);
   return {.points = built.superblock.points,
           .superblock = built.superblock,

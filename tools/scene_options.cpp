@@ -1,7 +1,6 @@
 // Suns, skies and cameras from the command line.
 #include "tools/scene_options.h"
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -23,14 +22,6 @@ glm::vec3 parse_colour(const std::string& option, const std::string& text) {
     if (!(colour[c] >= 0 && colour[c] <= 1e30F)) refuse(option, text, kExpected);
   }
   return colour;
-}
-
-/// Towards the sun: azimuth 0 is +z, 90 is +x; elevation 90 is +y.
-glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees) {
-  const double azimuth = glm::radians(azimuth_degrees);
-  const double elevation = glm::radians(elevation_degrees);
-  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
-          std::cos(azimuth) * std::cos(elevation)};
 }
 
 CLI::Option* add_repeated(CLI::App& app, const std::string& name,
@@ -130,19 +121,6 @@ Sky LightArguments::sky() const {
   sky.map_path = sky_;
   sky.map = std::make_shared<const Image>(read_image(sky_));
   return sky;
-}
-
-LightRig LightArguments::default_rig() {
-  LightRig rig;
-  rig.suns.push_back({.to_sun = sun_direction(40, 50), .irradiance = glm::vec3(3)});
-  rig.sky.radiance = 0.8F * glm::vec3(0.85F, 0.93F, 1.0F);
-  return rig;
-}
-
-bool meshes_are_dark(const BuildRequest& request) {
-  const Mesh mesh = load_meshes(request.inputs, false);
-  const auto emits = [](const Material& material) { return material.emission != glm::vec3(0); };
-  return !mesh.triangles.empty() && std::ranges::none_of(mesh.materials, emits);
 }
 
 void add_light_sampling(CLI::App& app, LightSampling& sampling) {

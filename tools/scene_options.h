@@ -8,7 +8,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "engine/pipeline.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/lights.h"
 
@@ -27,8 +26,6 @@ class LightArguments {
   /// The lights; reads the sky's map. @throws DataError when the map is no picture
   [[nodiscard]] LightRig rig() const;
   [[nodiscard]] Sky sky() const;
-  /// What lights a scene that brings no light of its own: a sun and a bluish sky.
-  [[nodiscard]] static LightRig default_rig();
 
  private:
   void set_suns(const std::vector<std::string>& values);
@@ -42,10 +39,6 @@ class LightArguments {
   std::optional<glm::vec3> sky_radiance_;  ///< empty: `sky_` is a picture
   float sky_scale_ = 1;
 };
-
-/// True when there are meshes among the inputs and none of their materials emits light.
-/// @throws DataError, std::system_error
-[[nodiscard]] bool meshes_are_dark(const BuildRequest& request);
 
 /// --sun-rays, --sky-rays, --area-rays
 void add_light_sampling(CLI::App& app, LightSampling& sampling);

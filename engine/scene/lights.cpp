@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "engine/scene/area_lights.h"
 #include "engine/scene/directions.h"
@@ -78,6 +79,20 @@ bool is_lit(const glm::vec3& light) {
 }
 
 }  // namespace
+
+glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees) {
+  const double azimuth = glm::radians(azimuth_degrees);
+  const double elevation = glm::radians(elevation_degrees);
+  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+          std::cos(azimuth) * std::cos(elevation)};
+}
+
+LightRig default_rig() {
+  LightRig rig;
+  rig.suns.push_back({.to_sun = sun_direction(40, 50), .irradiance = glm::vec3(3)});
+  rig.sky.radiance = 0.8F * glm::vec3(0.85F, 0.93F, 1.0F);
+  return rig;
+}
 
 struct DirectLight::Impl {
   Impl(const RayScene& s, LightRig r) : scene(s), rig(checked(std::move(r))), area(s.mesh()) {

@@ -21,6 +21,9 @@ struct Sun {
   float angular_radius = 0.00465f;  ///< radians, at most pi / 2; 0: a sharp shadow
 };
 
+/// Towards a sun: azimuth 0 is +z, 90 is +x; elevation 90 is +y.
+[[nodiscard]] glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees);
+
 struct PointLight {
   glm::dvec3 position{0};
   glm::vec3 intensity{1};  ///< W / sr
@@ -53,6 +56,9 @@ struct LightRig {
   std::vector<PointLight> points;
   Sky sky;
 };
+
+/// What lights a scene that brings no light of its own: a sun and a bluish sky.
+[[nodiscard]] LightRig default_rig();
 
 /// JSON text of a rig (the map by its path), for the container's record:
 /// {"suns": [{"to_sun": [x, y, z], "irradiance": [r, g, b], "angular_radius": a}, ...],

@@ -8,6 +8,7 @@
 #include "engine/io/image.h"
 #include "engine/io/points.h"
 #include "engine/pipeline.h"
+#include "engine/stages.h"
 #include "engine/store/reader.h"
 #include "tests/support/scenes.h"
 
@@ -33,8 +34,7 @@ BuildRequest cube_request(const std::filesystem::path& mesh) {
   request.backdrop = true;
   request.sampling.count = 6'000;
   request.sampling.lights.sky_rays = 4;
-  request.lights.suns.push_back({});
-  request.lights.sky.radiance = glm::vec3(0.5F);
+  request.lights = LightRig{.suns = {{}}, .sky = {.radiance = glm::vec3(0.5F)}};
   request.run.memory_bytes = std::uint64_t{256} << 20;
   request.run.threads = 1;
   return request;
@@ -55,6 +55,25 @@ TEST_CASE("pipeline: threads and cap change no byte of a container", "[integrati
   request.sampling.lights.sky_rays = 5;
   build_container(request, dir / "other.ptcx", silent);
   CHECK(bytes_of(dir / "one.ptcx") != bytes_of(dir / "other.ptcx"));
+}
+
+TEST_CASE("pipeline: only meshes without any light get a sun and a sky", "[integration][build]") {
+  const TemporaryDirectory dir;
+  const auto lights_of = [&](const std::filesystem::path& input, const std::optional<LightRig>& lights) {
+    Progress silent;
+    BuildRequest request = cube_request(input);
+    request.lights = lights;
+    build_container(request, dir / "a.ptcx", silent);
+    return ContainerReader(dir / "a.ptcx").meta().text.at(kLightsKey);
+  };
+  write_cube(dir / "cube.obj");
+  CHECK(lights_of(dir / "cube.obj", {}) == to_json(default_rig()));
+  CHECK(lights_of(dir / "cube.obj", LightRig{}) == to_json(LightRig{}));
+  std::ofstream(dir / "lamp.mtl") << "newmtl lamp\nKe 1 1 1\n";
+  std::ofstream(dir / "lamp.obj") << "mtllib lamp.mtl\nusemtl lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  CHECK(lights_of(dir / "lamp.obj", {}) == to_json(LightRig{}));
+  std::ofstream(dir / "cloud.xyz") << "0 0 0 0 1 0\n1 0 0 0 1 0\n";
+  CHECK(lights_of(dir / "cloud.xyz", {}) == to_json(LightRig{}));
 }
 
 TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integration][build]") {
