@@ -48,6 +48,27 @@ std::vector<Edit> edits() {
   return all;
 }
 
+std::filesystem::path write_raw(const std::filesystem::path& path, const std::vector<Surfel>& surfels,
+                                const BuildOptions& tree) {
+  write_scene(path, surfels, tree, 12, Codec::raw);
+  return path;
+}
+
+/// A container of raw pages, to be changed and judged.
+struct Specimen {
+  TemporaryDirectory directory;
+  OpenContainer container;
+
+  explicit Specimen(const std::vector<Surfel>& surfels, const BuildOptions& tree = {})
+      : container(write_raw(directory / "scene.ptcx", surfels, tree)) {}
+
+  /// What verify_container() says of the container as it is now.
+  [[nodiscard]] std::string fault() {
+    container.write(directory / "wrong.ptcx");
+    return fault_of(directory / "wrong.ptcx");
+  }
+};
+
 /// Calls edit(first byte of the group, the group, child) for every child of every group.
 template <class Body>
 void for_each_child(OpenContainer& container, Body&& body) {
@@ -88,13 +109,9 @@ bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at
 
 TEST_CASE("verify: a wrong number in any node is found though checksums are right",
           "[cli][verify]") {
-  const TemporaryDirectory directory;
-  const auto source = directory / "scene.ptcx";
-  const auto target = directory / "wrong.ptcx";
-  write_scene(source, small_scene(), {.leaf_points = 12}, 12, Codec::raw);
-  OpenContainer container(source);
-  container.write(target);
-  REQUIRE(fault_of(target) == "");
+  Specimen specimen(small_scene(), {.leaf_points = 12});
+  OpenContainer& container = specimen.container;
+  REQUIRE(specimen.fault() == "");
 
   std::size_t tried = 0;
   for (const Edit& edit : edits()) {
@@ -106,8 +123,7 @@ TEST_CASE("verify: a wrong number in any node is found though checksums are righ
       if (is_moot(edit, group, child, at, before)) return;
       const auto after = static_cast<std::uint16_t>(before + edit.by);
       std::memcpy(start + at, &after, edit.bytes);
-      container.write(target);
-      const std::string fault = fault_of(target);
+      const std::string fault = specimen.fault();
       if (fault.find("spec/nodes.md#node-") == std::string::npos) {
         missed.push_back(std::to_string(before) + ": " + fault);
       }
@@ -122,11 +138,8 @@ TEST_CASE("verify: a wrong number in any node is found though checksums are righ
 
 TEST_CASE("verify: a reference that leads elsewhere is found though checksums are right",
           "[cli][verify]") {
-  const TemporaryDirectory directory;
-  const auto source = directory / "scene.ptcx";
-  const auto target = directory / "wrong.ptcx";
-  write_scene(source, small_scene(), {.leaf_points = 4}, 12, Codec::raw);
-  OpenContainer container(source);
+  Specimen specimen(small_scene(), {.leaf_points = 4});
+  OpenContainer& container = specimen.container;
   std::size_t tried = 0;
   for_each_child(container, [&](std::byte* start, const GroupView& group, int child) {
     const bool interior = group.child(child).interior;
@@ -137,8 +150,7 @@ TEST_CASE("verify: a reference that leads elsewhere is found though checksums ar
       for (const std::uint64_t after :
            {before + (by << (interior ? 32 : 0)), before + (by << (interior ? 0 : 48))}) {
         std::memcpy(place, &after, 8);
-        container.write(target);
-        CHECK(fault_of(target) != "");
+        CHECK(specimen.fault() != "");
         ++tried;
       }
     }
@@ -149,19 +161,15 @@ TEST_CASE("verify: a reference that leads elsewhere is found though checksums ar
 
 TEST_CASE("verify: a group with a wrong level or cell is found though checksums are right",
           "[cli][verify]") {
-  const TemporaryDirectory directory;
-  const auto source = directory / "scene.ptcx";
-  const auto target = directory / "wrong.ptcx";
-  write_scene(source, small_scene(), {.leaf_points = 4}, 12, Codec::raw);
-  OpenContainer container(source);
+  Specimen specimen(small_scene(), {.leaf_points = 4});
+  OpenContainer& container = specimen.container;
   for_each_child(container, [&](std::byte* start, const GroupView& group, int child) {
     if (child != 0) return;
     for (const int by : {-2, -1, 1, 2}) {
       const std::byte before = start[16];
       if (static_cast<int>(before) + by < 0) continue;
       start[16] = static_cast<std::byte>(static_cast<int>(before) + by);
-      container.write(target);
-      CHECK(fault_of(target) != "");
+      CHECK(specimen.fault() != "");
       start[16] = before;
     }
     if (group.level() == 0) return;
@@ -170,8 +178,7 @@ TEST_CASE("verify: a group with a wrong level or cell is found though checksums 
     for (int digit = 0; digit < group.level(); ++digit) {
       const std::uint64_t moved = cell ^ std::uint64_t{1} << (60 - 3 * digit);
       std::memcpy(start, &moved, 8);
-      container.write(target);
-      CHECK(fault_of(target) != "");
+      CHECK(specimen.fault() != "");
     }
     std::memcpy(start, &cell, 8);
   });
@@ -179,17 +186,14 @@ TEST_CASE("verify: a group with a wrong level or cell is found though checksums 
 
 TEST_CASE("verify: a page header that says otherwise is found though checksums are right",
           "[cli][verify]") {
-  const TemporaryDirectory directory;
-  const auto source = directory / "scene.ptcx";
-  const auto target = directory / "wrong.ptcx";
-  write_scene(source, random_surfels(500, 4), {}, 12, Codec::raw);
-  OpenContainer container(source);
+  Specimen specimen(random_surfels(500, 4));
+  OpenContainer& container = specimen.container;
   const auto fault = [&](std::size_t page, const std::function<void(PageHeader&)>& edit) {
     const PageHeader before = container.header(page);
     edit(container.header(page));
-    container.write(target);
+    const std::string found = specimen.fault();
     container.header(page) = before;
-    return fault_of(target);
+    return found;
   };
   for (std::size_t page = 0; page + 1 < container.pages(); ++page) {
     const bool points = container.header(page).type == PageType::point;
@@ -205,15 +209,13 @@ TEST_CASE("verify: a page header that says otherwise is found though checksums a
 
 TEST_CASE("verify: wrong totals in the superblock are found though checksums are right",
           "[cli][verify]") {
-  const TemporaryDirectory directory;
-  const auto source = directory / "scene.ptcx";
-  const auto target = directory / "wrong.ptcx";
-  write_scene(source, small_scene(), {}, 12, Codec::raw);
+  Specimen specimen(small_scene());
   const auto fault = [&](const std::function<void(Superblock&)>& edit) {
-    OpenContainer container(source);
-    edit(container.superblock());
-    container.write(target);
-    return fault_of(target);
+    const Superblock before = specimen.container.superblock();
+    edit(specimen.container.superblock());
+    const std::string found = specimen.fault();
+    specimen.container.superblock() = before;
+    return found;
   };
   CHECK(fault([](Superblock&) {}) == "");
   using Catch::Matchers::Contains;
@@ -233,11 +235,8 @@ TEST_CASE("verify: wrong totals in the superblock are found though checksums are
 }
 
 TEST_CASE("verify: a point that moved is found though checksums are right", "[cli][verify]") {
-  const TemporaryDirectory directory;
-  const auto source = directory / "scene.ptcx";
-  const auto target = directory / "wrong.ptcx";
-  write_scene(source, small_scene(), {}, 12, Codec::raw);
-  OpenContainer container(source);
+  Specimen specimen(small_scene());
+  OpenContainer& container = specimen.container;
   struct PointEdit {
     std::size_t column;  ///< bytes of a point before it
     std::size_t bytes;
@@ -255,8 +254,7 @@ TEST_CASE("verify: a point that moved is found though checksums are right", "[cl
         std::memcpy(&value, place, edit.bytes);
         const std::uint32_t after = value + edit.by;
         std::memcpy(place, &after, edit.bytes);
-        container.write(target);
-        CHECK(fault_of(target) != "");
+        CHECK(specimen.fault() != "");
         std::memcpy(place, &value, edit.bytes);
       }
     }
