@@ -1,5 +1,6 @@
 // A stage for a mesh: ground below it, a red wall beside it.
 #include <algorithm>
+#include <utility>
 
 #include "engine/pipeline.h"
 #include "engine/io/points.h"
@@ -41,17 +42,25 @@ void add_backdrop(Mesh& mesh) {
 
 }  // namespace
 
-Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, bool backdrop, std::vector<MeshCamera>* cameras) {
+Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
+                 std::vector<MeshCamera>* cameras) {
   Mesh mesh;
+  const auto join = [&mesh]<class M>(M&& other) {
+    if (mesh.triangles.empty()) {
+      mesh = std::forward<M>(other);
+    } else {
+      append_mesh(mesh, other, glm::dmat4(1));
+    }
+  };
   for (const std::filesystem::path& input : inputs) {
     if (is_point_file(input)) continue;
     MeshFile file = read_mesh(input);
     if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
-    if (mesh.triangles.empty()) {
-      mesh = std::move(file.mesh);
-    } else {
-      append_mesh(mesh, file.mesh, glm::dmat4(1));
-    }
+    join(std::move(file.mesh));
+  }
+  if (also) {
+    check_mesh(*also);
+    join(*also);
   }
   if (backdrop && !mesh.triangles.empty()) add_backdrop(mesh);
   return mesh;

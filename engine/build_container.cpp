@@ -169,7 +169,7 @@ Inputs read_inputs(const BuildRequest& request, Progress& progress) {
   }
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
-  Mesh mesh = load_meshes(request.inputs, request.backdrop);
+  Mesh mesh = load_meshes(request.inputs, request.mesh.get(), request.backdrop);
   inputs.lights = choose_lights(request, mesh);
   if (mesh.triangles.empty()) return inputs;
   inputs.bounds.add(mesh.bounds());
@@ -231,6 +231,7 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
   const Frame frame = frame_around(to_array(inputs.bounds.low), to_array(inputs.bounds.high));
 
   std::uint64_t taken = kBufferBytes;
+  if (request.mesh) taken += mesh_bytes(*request.mesh, nullptr);
   if (const LitMesh* lit = inputs.lit.get()) {
     taken += mesh_bytes(lit->mesh, &lit->rays) +
              sampling_bytes(lit->mesh.triangles.size(), request.sampling.count, executor.threads());

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +15,7 @@
 #include "engine/base/progress.h"
 #include "engine/build/build.h"
 #include "engine/cache/page_cache.h"
+#include "engine/io/mesh.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/lights.h"
 #include "engine/scene/sampler.h"
@@ -35,6 +37,7 @@ using StageSeconds = std::vector<std::pair<std::string, double>>;
 
 struct BuildRequest {
   std::vector<std::filesystem::path> inputs;  ///< meshes and clouds
+  std::shared_ptr<const Mesh> mesh;           ///< a mesh in memory, beside those of the inputs
   std::uint64_t city_points = 0;              ///< the procedural city instead of inputs
   bool backdrop = false;                      ///< sets the meshes on a ground before a red wall
   std::optional<LightRig> lights;             ///< of the meshes (clouds come lit); empty: a default_rig()
@@ -54,13 +57,15 @@ struct BuildReport {
 
 /// Samples and lights meshes, reads clouds, sorts, builds the octree and publishes the container.
 /// The same request gives the same bytes for any number of threads and any cap.
-/// @throws DataError for bad input, std::invalid_argument for a cap that is too small (the text
-///         names the least that works), std::system_error
+/// @throws DataError for bad input, std::invalid_argument as check_mesh() for the mesh in memory and for
+///         a cap that is too small (the text names the least that works), std::system_error
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
                             Progress& progress);
 
 /// The meshes of a request as they are sampled: one mesh, with the backdrop.
-[[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, bool backdrop,
+/// @param also  a mesh in memory that comes after those of the inputs, or null
+/// @throws DataError, std::system_error; std::invalid_argument as check_mesh() of `also`
+[[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
                                std::vector<MeshCamera>* cameras = nullptr);
 
 /// A check of some receivers against rays, in the same run. It loads all surfels (and the mesh) into

@@ -236,7 +236,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
 
   std::vector<MeshCamera> cameras;
   Subject subject;
-  subject.mesh = load_meshes(request.meshes, request.backdrop, &cameras);
+  subject.mesh = load_meshes(request.meshes, nullptr, request.backdrop, &cameras);
   const Camera camera = choose_camera(request, scene, cameras);
   const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
   const std::uint64_t samples = std::uint64_t{camera.width} * camera.height * request.samples;

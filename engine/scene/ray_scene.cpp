@@ -26,24 +26,6 @@ bool is_sane(const glm::vec3& v) {
   return std::abs(v.x) <= kMost && std::abs(v.y) <= kMost && std::abs(v.z) <= kMost;
 }
 
-void check_mesh(const Mesh& mesh) {
-  const std::size_t vertices = mesh.positions.size();
-  const auto require = [](bool holds, const char* what) {
-    if (!holds) throw std::invalid_argument(std::string("RayScene: ") + what);
-  };
-  require(mesh.normals.empty() || mesh.normals.size() == vertices,
-          "normals are not one per vertex");
-  require(mesh.uvs.empty() || mesh.uvs.size() == vertices, "uvs are not one per vertex");
-  require(mesh.material_of.size() == mesh.triangles.size(), "materials are not one per triangle");
-  for (const glm::vec3& p : mesh.positions) require(is_sane(p), "a position is beyond 1e18");
-  for (const auto& corners : mesh.triangles) {
-    for (const std::uint32_t corner : corners) require(corner < vertices, "corner out of range");
-  }
-  for (const std::uint16_t material : mesh.material_of) {
-    require(material < mesh.materials.size(), "material out of range");
-  }
-}
-
 void check_device(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
@@ -121,6 +103,24 @@ Stretch inside_box(const glm::dvec3& origin, const glm::dvec3& direction, const 
 }
 
 }  // namespace
+
+void check_mesh(const Mesh& mesh) {
+  const std::size_t vertices = mesh.positions.size();
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("mesh: ") + what);
+  };
+  require(mesh.normals.empty() || mesh.normals.size() == vertices,
+          "normals are not one per vertex");
+  require(mesh.uvs.empty() || mesh.uvs.size() == vertices, "uvs are not one per vertex");
+  require(mesh.material_of.size() == mesh.triangles.size(), "materials are not one per triangle");
+  for (const glm::vec3& p : mesh.positions) require(is_sane(p), "a position is beyond 1e18");
+  for (const auto& corners : mesh.triangles) {
+    for (const std::uint32_t corner : corners) require(corner < vertices, "corner out of range");
+  }
+  for (const std::uint16_t material : mesh.material_of) {
+    require(material < mesh.materials.size(), "material out of range");
+  }
+}
 
 struct RayScene::Impl {
   explicit Impl(const Mesh& source);

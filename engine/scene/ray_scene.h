@@ -11,6 +11,10 @@
 
 namespace ptc {
 
+/// @throws std::invalid_argument when an index is out of range, an array has the wrong length or a
+///         position is beyond 1e18
+void check_mesh(const Mesh& mesh);
+
 struct SurfaceHit {
   double distance = 0;
   std::uint32_t triangle = 0;
@@ -31,8 +35,7 @@ struct SurfaceHit {
 class RayScene {
  public:
   /// @param mesh  must outlive this and not change
-  /// @throws std::invalid_argument when an index is out of range, an array has the wrong length or
-  ///         a position is beyond 1e18
+  /// @throws std::invalid_argument as check_mesh()
   explicit RayScene(const Mesh& mesh);
   ~RayScene();
 

@@ -22,6 +22,16 @@ std::vector<char> bytes_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+/// Checksums of all pages but the one with the record, which names the inputs.
+std::vector<std::uint64_t> pages_of(const std::filesystem::path& path) {
+  const ContainerReader container(path);
+  std::vector<std::uint64_t> pages;
+  for (std::uint32_t page = 0; page < container.page_count(); ++page) {
+    if (page != container.superblock().meta_page) pages.push_back(container.entry(page).payload_xxh3);
+  }
+  return pages;
+}
+
 /// A unit cube as OBJ, faces outwards.
 void write_cube(const std::filesystem::path& path) {
   std::ofstream(path) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
@@ -74,6 +84,38 @@ TEST_CASE("pipeline: only meshes without any light get a sun and a sky", "[integ
   CHECK(lights_of(dir / "lamp.obj", {}) == to_json(LightRig{}));
   std::ofstream(dir / "cloud.xyz") << "0 0 0 0 1 0\n1 0 0 0 1 0\n";
   CHECK(lights_of(dir / "cloud.xyz", {}) == to_json(LightRig{}));
+}
+
+TEST_CASE("pipeline: a mesh in memory is built as its file is", "[integration][build]") {
+  const TemporaryDirectory dir;
+  write_cube(dir / "cube.obj");
+  std::ofstream(dir / "tile.obj") << "v 2 0 0\nv 2 0 1\nv 3 0 0\nf 1 2 3\n";
+  Progress silent;
+  BuildRequest from_files = cube_request(dir / "cube.obj");
+  BuildRequest from_memory = from_files;
+  from_memory.inputs.clear();
+  from_memory.mesh = std::make_shared<const Mesh>(read_mesh(dir / "cube.obj").mesh);
+  for (const bool backdrop : {false, true}) {
+    from_files.backdrop = from_memory.backdrop = backdrop;
+    const BuildReport file = build_container(from_files, dir / "file.ptcx", silent);
+    const BuildReport memory = build_container(from_memory, dir / "memory.ptcx", silent);
+    CHECK(memory.superblock.points == file.superblock.points);
+    CHECK(pages_of(dir / "memory.ptcx") == pages_of(dir / "file.ptcx"));
+  }
+
+  from_files.inputs.push_back(dir / "tile.obj");
+  from_memory.inputs = {dir / "cube.obj"};
+  from_memory.mesh = std::make_shared<const Mesh>(read_mesh(dir / "tile.obj").mesh);
+  build_container(from_files, dir / "file.ptcx", silent);
+  build_container(from_memory, dir / "memory.ptcx", silent);
+  CHECK(pages_of(dir / "memory.ptcx") == pages_of(dir / "file.ptcx"));
+
+  Mesh broken = *from_memory.mesh;
+  broken.triangles[0][2] = 3;
+  from_memory.inputs.clear();
+  from_memory.mesh = std::make_shared<const Mesh>(broken);
+  CHECK_THROWS_AS(build_container(from_memory, dir / "broken.ptcx", silent), std::invalid_argument);
+  CHECK_FALSE(std::filesystem::exists(dir / "broken.ptcx"));
 }
 
 TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integration][build]") {
