@@ -1,8 +1,10 @@
 // What a camera sees: the surface behind every sample of a picture.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include <glm/vec3.hpp>
 
@@ -45,5 +47,12 @@ class PrimaryView {
 [[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
                                                         unsigned side, float lift, const Executor& executor,
                                                         Progress& progress);
+
+/// The camera where none is given: the container's, else the mesh's first, else one that sees everything
+/// from the front, the right and above.
+/// @param backdrop  the scene has one, which is larger than what stands on it and may leave the picture
+/// @param size      of the picture that it is for, if not the camera's own
+[[nodiscard]] Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> cameras, bool backdrop,
+                                    const std::optional<std::array<unsigned, 2>>& size);
 
 }  // namespace ptc

@@ -86,59 +86,6 @@ void write_layer_png(const PictureTarget& target, const Film& film, float exposu
   write_png(target.path, image);
 }
 
-/// A view of everything from the front, the right and above: as near as all corners of the bounds allow.
-/// A backdrop is larger than what stands on it and may leave the picture.
-Camera overview(const Superblock& superblock, bool backdrop, const std::optional<std::array<unsigned, 2>>& size) {
-  const glm::dvec3 low(superblock.bounds_low[0], superblock.bounds_low[1], superblock.bounds_low[2]);
-  const glm::dvec3 high(superblock.bounds_high[0], superblock.bounds_high[1], superblock.bounds_high[2]);
-  Camera camera;
-  if (size) {
-    camera.width = (*size)[0];
-    camera.height = (*size)[1];
-  }
-  camera.look_at = (low + high) * 0.5;
-  const glm::dvec3 away = glm::normalize(glm::dvec3(0.45, 0.35, 1));
-  camera.position = camera.look_at + away;
-  const CameraAxes axes = axes_of(camera);
-  const double tall = std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * 0.95;
-  const double wide = tall * camera.width / camera.height;
-  double distance = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    glm::dvec3 p;
-    for (int axis = 0; axis < 3; ++axis) p[axis] = ((corner >> axis & 1) != 0 ? high : low)[axis] - camera.look_at[axis];
-    const double aside = std::max(std::abs(glm::dot(p, axes.right)) / wide, std::abs(glm::dot(p, axes.up)) / tall);
-    distance = std::max(distance, aside - glm::dot(p, axes.forward));
-  }
-  camera.position = camera.look_at + away * (distance > 0 ? distance * (backdrop ? 0.5 : 1.0) : 1.0);
-  return camera;
-}
-
-Camera choose_camera(const RenderRequest& request, const ContainerReader& scene,
-                     const std::vector<MeshCamera>& cameras) {
-  Camera camera;
-  const auto& text = scene.meta().text;
-  const auto recorded = text.find(kCameraKey);
-  if (request.camera) {
-    camera = *request.camera;
-  } else if (recorded != text.end()) {
-    camera = camera_from_json(recorded->second);
-  } else if (cameras.empty()) {
-    camera = overview(scene.superblock(), request.backdrop, request.size);
-  } else {
-    const MeshCamera& from = cameras.front();
-    const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
-    camera.position = from.position;
-    camera.look_at = from.position + glm::dvec3(from.forward);
-    camera.up = from.up;
-    camera.vertical_fov = 2 * std::atan(std::tan(from.horizontal_fov * 0.5F) / aspect);
-  }
-  if (request.size) {
-    camera.width = (*request.size)[0];
-    camera.height = (*request.size)[1];
-  }
-  return camera;
-}
-
 /// What the camera sees and what lights it, alive as long as the view.
 struct Subject {
   Mesh mesh;
@@ -237,7 +184,11 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   std::vector<MeshCamera> cameras;
   Subject subject;
   subject.mesh = load_meshes(request.meshes, nullptr, request.backdrop, &cameras);
-  const Camera camera = choose_camera(request, scene, cameras);
+  Camera camera = request.camera ? *request.camera : default_camera(scene, cameras, request.backdrop, request.size);
+  if (request.size) {
+    camera.width = (*request.size)[0];
+    camera.height = (*request.size)[1];
+  }
   const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
   const std::uint64_t samples = std::uint64_t{camera.width} * camera.height * request.samples;
   if (!subject.mesh.triangles.empty()) {
