@@ -13,7 +13,8 @@ struct Shader::Impl {
   SceneView view;
   std::vector<std::unique_ptr<DirectionGrid>> grids;  // one a variant
   GatherOptions gather_options;
-  PageCache cache;
+  std::unique_ptr<PageCache> own_cache;
+  PageCache& cache;
   std::vector<std::unique_ptr<Gather>> gathers;  // one per thread, made when first needed
   GatherCounts counts;
 
@@ -21,11 +22,19 @@ struct Shader::Impl {
       : executor(e),
         view(container),
         gather_options(options.gather),
-        cache(container, {.memory_bytes = options.cache_bytes, .threads = e.threads(), .access = options.access}),
+        own_cache(options.cache ? nullptr : make_cache(container, options, e)),
+        cache(options.cache ? *options.cache : *own_cache),
         gathers(e.threads()) {
     for (unsigned i = 0; i < std::max(1U, options.variants); ++i) {
       grids.push_back(std::make_unique<DirectionGrid>(options.gather.resolution, options.sky, i));
     }
+  }
+
+  static std::unique_ptr<PageCache> make_cache(const ContainerReader& container, const ShadeOptions& options,
+                                               const Executor& e) {
+    return std::make_unique<PageCache>(
+        container,
+        CacheOptions{.memory_bytes = options.cache_bytes, .threads = e.threads(), .access = options.access});
   }
 
   Gather& gather(unsigned thread) {

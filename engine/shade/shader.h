@@ -18,6 +18,8 @@ struct ShadeOptions {
   GatherOptions gather;
   /// Radiance that arrives from a direction (unit) where nothing covers it; empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;
+  /// Pages to read through in place of a cache of its own, for as many threads; it outlives the Shader.
+  PageCache* cache = nullptr;
   unsigned variants = 1;  ///< turns of the direction cube and shifts of the receiver cells to choose from
 };
 
@@ -39,7 +41,7 @@ class Shader {
              unsigned variant = 0);
 
   [[nodiscard]] GatherCounts counts() const;
-  /// Complete once no shade() is running.
+  /// Complete once no shade() is running; gives back the readers that the cache allows.
   [[nodiscard]] CacheStatistics cache_statistics() const;
 
  private:
