@@ -26,7 +26,7 @@ using VU = hn::VFromD<U>;
 using MF = hn::Mask<F>;
 
 constexpr float kPi = 3.14159265F;
-constexpr float kWidestSeam = 1;  // over the distance where it begins
+constexpr float kSeam = 0.5F;  // width of a seam in units of rho / h
 
 HWY_INLINE VU load_u16(const std::byte* at) {
   return hn::PromoteTo(U(), hn::LoadU(U16(), reinterpret_cast<const std::uint16_t*>(at)));
@@ -159,9 +159,12 @@ HWY_INLINE Facing load_facing(const GroupView& group, int first) {
 
 /// Distance up to which the children of a cell draw what the cell draws too (spec/shading.md#seams).
 /// @param height  of the cell's centre over the plane of the thing, not negative
-HWY_INLINE VF seam_end(const CellTest& test, VF height) {
+/// @param above   how far the thing's top stands over the horizon of the centre; d its distance
+HWY_INLINE VF seam_end(const CellTest& test, VF height, VF above, VF d) {
   const F f;
-  const auto share = hn::Min(hn::Div(hn::Set(f, test.cell.radius), height), hn::Set(f, kWidestSeam));
+  const auto one = hn::Set(f, 1.0F);
+  auto share = hn::Min(hn::Div(hn::Set(f, kSeam * test.cell.radius), height), one);
+  if (test.cell.has_horizon) share = hn::Mul(share, hn::Max(hn::Zero(f), hn::Min(hn::Div(above, d), one)));
   return hn::MulAdd(share, hn::Set(f, test.shared_from), hn::Set(f, test.shared_from));
 }
 
@@ -266,7 +269,8 @@ GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest&
                               hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
     // Of what faces many ways, some part is always seen from the front.
     const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), facing.length), hn::Zero(f)));
-    const auto band = hn::Lt(d, seam_end(test, hn::Max(hn::Abs(dot(to, facing.mean)), scattered)));
+    const auto above = hn::Add(dot(to, axis), hn::Add(r, rho));
+    const auto band = hn::Lt(d, seam_end(test, hn::Max(hn::Abs(dot(to, facing.mean)), scattered), above, d));
     verdict.open |= bits_of(f, hn::And(large, opens)) << first;
     verdict.keep |= bits_of(f, hn::Or(hn::AndNot(opens, large), hn::And(wanted, hn::And(small, band)))) << first;
   }
@@ -322,7 +326,10 @@ unsigned gather_surfels(const std::byte* payload, std::uint32_t count, std::uint
     if (test.sides == Sides::front) wanted = hn::And(wanted, hn::Lt(dot(to, normal), hn::Set(f, cell.radius)));
     if (hn::AllFalse(f, wanted)) continue;
     const auto d = hn::Sqrt(d2);
-    keep |= bits_of(f, hn::And(wanted, hn::Lt(d, test.last ? hn::Zero(f) : seam_end(test, hn::Abs(dot(to, normal)))))) << from;
+    if (!test.last) {
+      const auto above = hn::Add(dot(to, axis), hn::Add(r, hn::Set(f, cell.radius)));
+      keep |= bits_of(f, hn::And(wanted, hn::Lt(d, seam_end(test, hn::Abs(dot(to, normal)), above, d)))) << from;
+    }
     const auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
     if (hn::AllFalse(f, drawn)) continue;
     const auto half = [&](std::size_t bytes_before) {
