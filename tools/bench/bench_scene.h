@@ -1,0 +1,86 @@
+// A scene that is measured: its container, what rays need of it, and who receives light.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/io/mesh.h"
+#include "engine/pipeline.h"
+#include "engine/shade/shading.h"
+#include "engine/store/reader.h"
+#include "tools/bench/procedural.h"
+
+namespace ptc::bench {
+
+/// Which scene: "fractal", "window", "city", or a mesh's or cloud's file.
+struct SceneChoice {
+  std::string name;             ///< in charts: the word, or the file's name without ending
+  std::filesystem::path file;   ///< empty for the words
+  bool backdrop = false;        ///< the mesh stands on a ground before a wall
+};
+/// @param text  a word or a path, "+backdrop" appended where wanted
+[[nodiscard]] SceneChoice parse_scene(const std::string& text);
+
+/// What a pixel of the camera's picture shows besides the light that is gathered.
+struct Pixel {
+  std::size_t receiver = 0;
+  glm::vec3 albedo{0};
+  glm::vec3 direct{0};
+};
+
+/// Receivers of one kind.
+struct ReceiverSet {
+  std::string name;                  ///< "camera" or "points"
+  std::vector<Receiver> receivers;
+  /// Of the camera: a window in the middle of its picture, row by row; receiver is kNone where
+  /// nothing is seen.
+  static constexpr std::size_t kNone = ~std::size_t{0};
+  std::vector<Pixel> window;
+  unsigned window_width = 0, window_height = 0;
+};
+
+struct SceneOptions {
+  std::uint64_t points = 2'000'000;           ///< surfels wanted; clouds have as many as they have
+  unsigned width = 640, height = 360;         ///< of the camera
+  unsigned window_width = 128, window_height = 72;
+  std::uint64_t own_points = 100'000;         ///< of the scene's points as receivers, in runs
+  float lift = 0.15F;                         ///< as ShadeRequest::lift
+};
+
+/// Builds the container, loads what rays need, finds the receivers.
+class BenchScene {
+ public:
+  /// @param work  a directory; the container stays there until the scene ends
+  BenchScene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
+             const RunOptions& run, Progress& progress);
+  ~BenchScene();
+  BenchScene(const BenchScene&) = delete;
+  BenchScene& operator=(const BenchScene&) = delete;
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] const ContainerReader& container() const noexcept { return *container_; }
+  [[nodiscard]] const std::vector<Surfel>& surfels() const noexcept { return surfels_; }
+  /// Empty for a cloud.
+  [[nodiscard]] const Mesh& mesh() const noexcept { return lit_.mesh; }
+  [[nodiscard]] const LightRig& lights() const noexcept { return lit_.lights; }
+  [[nodiscard]] double spacing() const;
+  [[nodiscard]] const std::vector<ReceiverSet>& sets() const noexcept { return sets_; }
+
+ private:
+  void load(const SceneChoice& choice, const SceneOptions& options, const RunOptions& run, Progress& progress);
+  void add_camera(const SceneOptions& options, const Executor& executor, Progress& progress);
+  void add_points(const SceneOptions& options);
+
+  std::string name_;
+  std::filesystem::path path_;
+  LitScene lit_;
+  std::unique_ptr<ContainerReader> container_;
+  std::vector<Surfel> surfels_;
+  std::vector<ReceiverSet> sets_;
+};
+
+}  // namespace ptc::bench
