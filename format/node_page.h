@@ -27,6 +27,20 @@ struct ChildRef {
   friend bool operator==(const ChildRef&, const ChildRef&) = default;
 };
 
+/// A child reference as it lies in a group: interior page | slot << 32, leaf first point | count << 48.
+[[nodiscard]] constexpr ChildRef decode_reference(std::uint64_t word, bool interior) noexcept {
+  ChildRef ref;
+  ref.interior = interior;
+  if (interior) {
+    ref.page = static_cast<std::uint32_t>(word);
+    ref.slot = static_cast<std::uint16_t>(word >> 32);
+  } else {
+    ref.first_point = word & ((std::uint64_t{1} << 48) - 1);
+    ref.point_count = static_cast<std::uint32_t>(word >> 48);
+  }
+  return ref;
+}
+
 /// What shading knows of a cluster of surfels, before it is quantised.
 struct NodeSummary {
   std::array<double, 3> mean{};  ///< area-weighted mean position, in lattice units
@@ -103,19 +117,12 @@ class GroupView {
   [[nodiscard]] int level() const noexcept { return static_cast<int>(p_[16]); }
   [[nodiscard]] int size() const noexcept { return static_cast<int>(p_[17]); }
   [[nodiscard]] unsigned interior_mask() const noexcept { return static_cast<unsigned>(p_[18]); }
+  /// The stored reference of a child, see decode_reference().
+  [[nodiscard]] std::uint64_t reference(int i) const noexcept {
+    return load<std::uint64_t>(24 + 8 * static_cast<std::size_t>(i));
+  }
   [[nodiscard]] ChildRef child(int i) const noexcept {
-    constexpr std::uint64_t kFirstPointMask = (std::uint64_t{1} << 48) - 1;
-    const auto word = load<std::uint64_t>(24 + 8 * static_cast<std::size_t>(i));
-    ChildRef ref;
-    ref.interior = (interior_mask() >> i & 1) != 0;
-    if (ref.interior) {
-      ref.page = static_cast<std::uint32_t>(word);
-      ref.slot = static_cast<std::uint16_t>(word >> 32);
-    } else {
-      ref.first_point = word & kFirstPointMask;
-      ref.point_count = static_cast<std::uint32_t>(word >> 48);
-    }
-    return ref;
+    return decode_reference(reference(i), (interior_mask() >> i & 1) != 0);
   }
 
   [[nodiscard]] const std::byte* mean_x() const noexcept { return column(0); }

@@ -58,7 +58,7 @@ ordered_json facts_of(const CacheStatistics& cache) {
 ordered_json facts_of(const GatherCounts& counts) {
   return {{"receivers", counts.receivers}, {"cells", counts.cells},
           {"groups", counts.groups},       {"surfel_blocks", counts.surfel_blocks},
-          {"clusters", counts.clusters},   {"surfels", counts.surfels}};
+          {"clusters", counts.clusters},   {"surfels", counts.surfels},   {"retests", counts.retests}};
 }
 
 ordered_json facts_of(const StageSeconds& seconds) {

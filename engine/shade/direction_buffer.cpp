@@ -111,7 +111,7 @@ void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Si
 }
 
 Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
-                                 std::span<const glm::vec3> offsets) noexcept {
+                                 std::span<const glm::vec3> offsets) const noexcept {
   const glm::mat3& rotation = grid.geometry_.rotation;
   const glm::vec3 n = rotation * normal;
   const std::size_t plane = std::size_t{grid.resolution()} * grid.resolution();

@@ -58,7 +58,7 @@ class DirectionBuffer {
   /// Sums over the hemisphere of `normal`.
   /// @param offsets  of the receiver from each viewpoint; those that follow are 0. Empty: from none
   [[nodiscard]] Shading resolve(const DirectionGrid& grid, const glm::vec3& normal,
-                                std::span<const glm::vec3> offsets = {}) noexcept;
+                                std::span<const glm::vec3> offsets = {}) const noexcept;
 
  private:
   std::vector<float> nearness_;  // CubePixels

@@ -31,6 +31,12 @@ struct CubePixels {
   std::uint32_t* rgbe;
 };
 
+/// The same of one face, to be read.
+struct FacePixels {
+  const float* nearness;
+  const std::uint32_t* rgbe;
+};
+
 /// Viewpoints whose pixels one cube may hold.
 inline constexpr int kViewpoints = 16;
 
@@ -56,12 +62,11 @@ struct FaceSums {
   std::array<float, 3> open{};      ///< of weight times direction (w, u, v) where uncovered
 };
 
-/// @param pixels  of one face
 /// @param sky     3 planes of resolution^2, or null
 /// @param nw, nu, nv  the receiver's normal in the axes of the face
 /// @param offsets  moves what was drawn from other viewpoints, to first order: where the nearer of two
 ///                 neighbouring pixels grows over the other, light follows. Null: nothing moves
-void sum_face(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu, float nv,
+void sum_face(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, float nw, float nu, float nv,
               const FaceOffsets* offsets, FaceSums& sums);
 
 }  // namespace ptc

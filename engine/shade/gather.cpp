@@ -1,8 +1,8 @@
 #include "engine/shade/gather.h"
 
 #include <algorithm>
-#include <bit>
 #include <array>
+#include <bit>
 #include <vector>
 
 #include "engine/shade/gather_kernels.h"
@@ -12,16 +12,14 @@ namespace {
 
 constexpr float kPi = 3.14159265F;
 
-/// Work left for the children of a receiver cell: some children of a group, or some surfels.
-struct Entry {
-  std::uint64_t first = 0;  // surfels: index of the first
-  std::uint32_t page = 0;   // group
-  std::uint16_t slot = 0;
-  std::uint8_t mask = 0;    // which of up to 8
-  bool surfels = false;
-};
+/// One depth of receiver cells: what the current cell there draws and leaves.
+struct Level {
+  explicit Level(unsigned resolution) : buffer(resolution) {}
 
-constexpr std::uint8_t kAll = 0xff;  // a group may have fewer than 8: its size limits the mask
+  glm::dvec3 centre{0};  // lattice units
+  DirectionBuffer buffer;
+  NearLists left;
+};
 
 }  // namespace
 
@@ -32,15 +30,17 @@ struct Gather::Impl {
   GatherCounts counts;
   std::vector<PlacedReceiver> receivers;
   std::span<Shading> results;
-  std::vector<std::unique_ptr<DirectionBuffer>> buffers;  // one per depth of receiver cells
-  std::vector<std::vector<Entry>> lists;                  // likewise
-  std::vector<Entry> stack;
-  DirectionBuffer leaf;
+  std::vector<std::unique_ptr<Level>> levels;  // by depth, made when first needed
+  std::vector<ClusterPayload> payloads;        // of the clusters that the current cells left, outer cells first
+  std::vector<ChildRef> stack;
+  std::vector<std::uint32_t> opened;
+  DirectionBuffer empty, leaf;
   DiscQueue queue;
-  std::array<glm::dvec3, kViewpoints> centres;  // of the cells around the current one, lattice units
 
   Impl(const SceneView& view, PageCache& cache, const GatherOptions& o)
-      : scene(view, cache), options(o), leaf(o.resolution) {}
+      : scene(view, cache), options(o), empty(o.resolution), leaf(o.resolution) {
+    empty.clear();
+  }
 
   void place(std::span<const Receiver> from) {
     const Frame& frame = scene.view().frame();
@@ -60,47 +60,49 @@ struct Gather::Impl {
   }
 
   void run() {
-    const ChildRef& root = scene.view().root();
-    std::vector<Entry> all;
-    if (root.interior) {
-      all.push_back({.page = root.page, .slot = root.slot, .mask = kAll});
-    }
-    leaf.clear();
-    shade_cell(receivers, all, leaf, 0);
+    payloads.clear();
+    stack.assign(1, scene.view().root());
+    shade_cell(receivers, empty, 0);
   }
 
-  /// @param inherited  what the cells around this one have drawn; may be the leaf buffer at depth 0
-  void shade_cell(std::span<const PlacedReceiver> cell, const std::vector<Entry>& list,
-                  const DirectionBuffer& inherited, std::size_t depth) {
+  /// What waits on the stack is looked at for this cell too.
+  /// @param inherited  what the cells around this one have drawn
+  void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited, std::size_t depth) {
     const ReceiverCell bounds(cell, scene.view().frame().unit());
     if (cell.size() == 1) {
-      if (&inherited != &leaf) leaf.copy(inherited);
-      collect(list, bounds, leaf, nullptr, depth);
-      std::array<glm::vec3, kViewpoints> offsets{};
-      for (std::size_t i = 0; i < depth; ++i) {
-        offsets[i] = glm::vec3((bounds.centre - centres[i]) * scene.view().frame().unit());
-      }
-      results[cell[0].index] = leaf.resolve(*grid, cell[0].normal, std::span(offsets).first(depth));
-      ++counts.receivers;
+      resolve(cell, collect(bounds, inherited, leaf, nullptr, depth), depth);
       return;
     }
     if (depth + 1 == kViewpoints) {  // cells within cells beyond what a pixel can name: one by one
-      for (std::size_t i = 0; i < cell.size(); ++i) shade_cell(cell.subspan(i, 1), list, inherited, depth);
+      for (std::size_t i = 0; i < cell.size(); ++i) shade_cell(cell.subspan(i, 1), inherited, depth);
       return;
     }
-    centres[depth] = bounds.centre;
     ++counts.cells;
-    if (depth == buffers.size()) {
-      buffers.push_back(std::make_unique<DirectionBuffer>(options.resolution));
-      lists.emplace_back();
+    if (depth == levels.size()) levels.push_back(std::make_unique<Level>(options.resolution));
+    Level& level = *levels[depth];
+    level.centre = bounds.centre;
+    level.left.clear();
+    const std::size_t before = payloads.size();
+    const DirectionBuffer& drawn = collect(bounds, inherited, level.buffer, &level.left, depth);
+    if (level.left.empty()) {
+      resolve(cell, drawn, depth + 1);
+    } else {
+      split(cell, [&](std::span<const PlacedReceiver> child) { shade_cell(child, drawn, depth + 1); });
     }
-    DirectionBuffer& buffer = *buffers[depth];
-    buffer.copy(inherited);
-    std::vector<Entry> left = std::move(lists[depth]);  // `lists` may grow below
-    left.clear();
-    collect(list, bounds, buffer, &left, depth);
-    split(cell, [&](std::span<const PlacedReceiver> child) { shade_cell(child, left, buffer, depth + 1); });
-    lists[depth] = std::move(left);
+    payloads.resize(before);
+  }
+
+  /// Sums for receivers that see the same pixels.
+  /// @param depth  of the cells around them: those whose pixels move as they see them
+  void resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn, std::size_t depth) {
+    std::array<glm::vec3, kViewpoints> offsets{};
+    for (const PlacedReceiver& receiver : cell) {
+      for (std::size_t i = 0; i < depth; ++i) {
+        offsets[i] = glm::vec3((receiver.position - levels[i]->centre) * scene.view().frame().unit());
+      }
+      results[receiver.index] = drawn.resolve(*grid, receiver.normal, std::span(offsets).first(depth));
+    }
+    counts.receivers += cell.size();
   }
 
   /// The occupied children of the smallest octree cell that holds the receivers; coincident
@@ -119,74 +121,96 @@ struct Gather::Impl {
     }
   }
 
-  /// Draws what is settled for all receivers of the cell; the rest goes to `left`, for its
-  /// children. Without `left` (one receiver) everything is settled.
-  void collect(const std::vector<Entry>& list, const ReceiverCell& cell, DirectionBuffer& buffer,
-               std::vector<Entry>* left, std::size_t depth) {
-    const auto viewpoint = static_cast<unsigned>(depth);
-    const float shared_from = left ? cell.radius / options.parallax : 0;
+  /// Looks at the stack and at what the cell around left. Draws what is settled for all receivers of
+  /// the cell; the rest goes to `left`, for its children. Without `left` everything is settled.
+  /// @return  `own`, a copy of `inherited` that was drawn into; `inherited` when nothing was
+  const DirectionBuffer& collect(const ReceiverCell& cell, const DirectionBuffer& inherited, DirectionBuffer& own,
+                                 NearLists* left, std::size_t depth) {
+    const double unit = scene.view().frame().unit();
     const CellTest test{.cell = cell,
-                        .unit = scene.view().frame().unit(),
+                        .unit = unit,
                         .limit = options.solid_angle / kPi,
-                        .shared_from = shared_from,
+                        .shared_from = left ? cell.radius / options.parallax : 0,
                         .inflation = options.inflation,
                         .sides = options.sides,
                         .last = left == nullptr};
-    stack.assign(list.begin(), list.end());
+    CellOutput out{queue, left, payloads};
+    bool touched = false;
+    const auto flush = [&] {
+      if (queue.size == 0) return;
+      if (!touched) own.copy(inherited);
+      touched = true;
+      own.draw(*grid, queue, options.sides, static_cast<unsigned>(depth));
+      queue.size = 0;
+    };
+    if (depth > 0) {
+      const Level& around = *levels[depth - 1];
+      const glm::vec3 move((around.centre - cell.centre) * unit);
+      opened.clear();
+      for (std::size_t i = 0; i < around.left.clusters.size; flush()) i = look_at_clusters(around, i, move, test, out);
+      for (std::size_t i = 0; i < around.left.surfels.size; flush()) i = look_at_surfels(around, i, move, test, out);
+      for (const std::uint32_t i : opened) push(payloads[i]);
+    }
     while (!stack.empty()) {
-      const Entry entry = stack.back();
+      const ChildRef next = stack.back();
       stack.pop_back();
-      if (entry.surfels) {
-        collect_surfels(entry, test, left);
+      if (next.interior) {
+        look_at_group(next, test, out);
       } else {
-        collect_group(entry, test, left);
+        look_at_run(next, test, out, flush);
       }
-      if (queue.full()) flush(buffer, viewpoint);
+      if (queue.full()) flush();
     }
-    flush(buffer, viewpoint);
+    flush();
+    return touched ? own : inherited;
   }
 
-  void flush(DirectionBuffer& buffer, unsigned viewpoint) {
-    buffer.draw(*grid, queue, options.sides, viewpoint);
-    queue.size = 0;
-  }
-
-  void collect_group(const Entry& entry, const CellTest& test, std::vector<Entry>* left) {
-    ++counts.groups;
-    const GroupView group = scene.group(entry.page, entry.slot);
+  std::size_t look_at_clusters(const Level& around, std::size_t from, const glm::vec3& move, const CellTest& test, CellOutput& out) {
     const int before = queue.size;
-    const GroupVerdict verdict = gather_group(group, entry.mask, test, queue);
+    const std::size_t next = gather_clusters(around.left.clusters, from, move, test, out, opened);
     counts.clusters += static_cast<unsigned>(queue.size - before);
-    for (unsigned rest = verdict.open; rest != 0; rest &= rest - 1) open(group.child(std::countr_zero(rest)));
-    if (verdict.keep != 0) {
-      left->push_back({.page = entry.page, .slot = entry.slot, .mask = static_cast<std::uint8_t>(verdict.keep)});
-    }
+    counts.retests += next - from;
+    return next;
   }
 
-  void open(const ChildRef& child) {
-    if (child.interior) {
-      stack.push_back({.page = child.page, .slot = child.slot, .mask = kAll});
-      return;
-    }
-    // Runs of 8 that do not cross a page.
-    const std::uint32_t per_page = scene.view().points_per_page();
-    std::uint64_t first = child.first_point;
-    for (const std::uint64_t end = first + child.point_count; first < end;) {
-      const std::uint64_t page_left = per_page - first % per_page;
-      const auto size = static_cast<unsigned>(std::min<std::uint64_t>({8, end - first, page_left}));
-      stack.push_back({.first = first, .mask = static_cast<std::uint8_t>((1U << size) - 1), .surfels = true});
-      first += size;
-    }
-  }
-
-  void collect_surfels(const Entry& entry, const CellTest& test, std::vector<Entry>* left) {
-    ++counts.surfel_blocks;
-    const PageReader::Page page = scene.points(entry.first);
-    const auto slot = static_cast<std::uint32_t>(entry.first % scene.view().points_per_page());
+  std::size_t look_at_surfels(const Level& around, std::size_t from, const glm::vec3& move, const CellTest& test, CellOutput& out) {
     const int before = queue.size;
-    const unsigned keep = gather_surfels(page.payload, page.record_count, slot, entry.mask, test, queue);
+    const std::size_t next = gather_surfels(around.left.surfels, from, move, test, out);
     counts.surfels += static_cast<unsigned>(queue.size - before);
-    if (keep != 0) left->push_back({.first = entry.first, .mask = static_cast<std::uint8_t>(keep), .surfels = true});
+    counts.retests += next - from;
+    return next;
+  }
+
+  void push(const ClusterPayload& payload) {
+    const std::uint64_t word = std::uint64_t{payload.reference[1]} << 32 | payload.reference[0];
+    stack.push_back(decode_reference(word, payload.interior != 0));
+  }
+
+  void look_at_group(const ChildRef& reference, const CellTest& test, CellOutput& out) {
+    ++counts.groups;
+    const GroupView group = scene.group(reference.page, reference.slot);
+    const int before = queue.size;
+    const unsigned open = gather_group(group, test, out);
+    counts.clusters += static_cast<unsigned>(queue.size - before);
+    for (unsigned rest = open; rest != 0; rest &= rest - 1) stack.push_back(group.child(std::countr_zero(rest)));
+  }
+
+  /// The points of a leaf, in runs of 8 that do not cross a page.
+  template <class Flush>
+  void look_at_run(const ChildRef& leaf_node, const CellTest& test, CellOutput& out, const Flush& flush) {
+    const std::uint32_t per_page = scene.view().points_per_page();
+    std::uint64_t first = leaf_node.first_point;
+    for (const std::uint64_t end = first + leaf_node.point_count; first < end;) {
+      const auto slot = static_cast<std::uint32_t>(first % per_page);
+      const auto number = static_cast<unsigned>(std::min<std::uint64_t>({8, end - first, per_page - slot}));
+      ++counts.surfel_blocks;
+      const PageReader::Page page = scene.points(first);
+      if (queue.full()) flush();
+      const int before = queue.size;
+      gather_page_surfels(page.payload, page.record_count, slot, number, test, out);
+      counts.surfels += static_cast<unsigned>(queue.size - before);
+      first += number;
+    }
   }
 };
 
@@ -211,6 +235,7 @@ void GatherCounts::add(const GatherCounts& other) noexcept {
   surfel_blocks += other.surfel_blocks;
   clusters += other.clusters;
   surfels += other.surfels;
+  retests += other.retests;
 }
 
 }  // namespace ptc

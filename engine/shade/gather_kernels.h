@@ -1,12 +1,14 @@
-// What a gather asks of eight siblings or surfels at once, compiled for every instruction set.
+// What a gather asks of eight clusters or surfels at once, compiled for every instruction set.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include <glm/vec3.hpp>
 
 #include "engine/shade/disc_queue.h"
+#include "engine/shade/near_lists.h"
 #include "engine/shade/receiver_cell.h"
 #include "engine/shade/shading.h"
 #include "format/node_page.h"
@@ -21,25 +23,37 @@ struct CellTest {
   float shared_from = 0;   ///< distance from which the cell settles things for all its receivers
   float inflation = 1;
   Sides sides = Sides::both;
-  bool last = false;       ///< one receiver: everything is settled, the bands are zero
+  bool last = false;       ///< nothing is left to children: everything is settled
 };
 
-/// Children of a group: what becomes of them. Those drawn are in the queue.
-struct GroupVerdict {
-  unsigned keep = 0;  ///< left to the children of the cell
-  unsigned open = 0;  ///< replaced by their own children
+/// What a cell draws, and what it leaves; all relative to its centre.
+struct CellOutput {
+  DiscQueue& queue;
+  NearLists* left;                          ///< null when `last`
+  std::vector<ClusterPayload>& payloads;    ///< of the clusters left, appended
 };
 
-/// @param mask   children to look at
-/// @param queue  with room for 8; discs relative to the cell's centre
-GroupVerdict gather_group(const GroupView& group, unsigned mask, const CellTest& test, DiscQueue& queue);
+/// Looks at the children of a group.
+/// @param out  its queue has room for 8
+/// @return  bit i: child i is replaced by its own children
+unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& out);
 
+/// Looks at clusters that the cell around left, from index `from` on, until the queue is full.
+/// @param move    of positions, from that cell's centre to this one's
+/// @param opened  indices of payloads of clusters that are replaced by their children, appended
+/// @return  the first index that it has not looked at
+std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move, const CellTest& test,
+                            CellOutput& out, std::vector<std::uint32_t>& opened);
+
+/// Looks at surfels of a page.
 /// @param payload, count  of a point page; up to 64 bytes past it may be read
-/// @param first   index of the first surfel in the page
-/// @param mask    which of the 8 surfels from `first` to look at
-/// @param queue   as above
-/// @return those left to the children of the cell
-unsigned gather_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned mask,
-                        const CellTest& test, DiscQueue& queue);
+/// @param first, number   of them, at most 8
+/// @param out  its queue has room for 8
+void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first, unsigned number,
+                         const CellTest& test, CellOutput& out);
+
+/// Looks at surfels that the cell around left, as gather_clusters().
+std::size_t gather_surfels(const NearSurfels& near, std::size_t from, const glm::vec3& move, const CellTest& test,
+                           CellOutput& out);
 
 }  // namespace ptc

@@ -41,10 +41,11 @@ struct GatherOptions {
 struct GatherCounts {
   std::uint64_t receivers = 0;
   std::uint64_t cells = 0;          ///< receiver cells with more than one receiver
-  std::uint64_t groups = 0;         ///< sibling groups tested
-  std::uint64_t surfel_blocks = 0;  ///< runs of up to 8 surfels tested
+  std::uint64_t groups = 0;         ///< sibling groups read and tested
+  std::uint64_t surfel_blocks = 0;  ///< runs of up to 8 surfels read and tested
   std::uint64_t clusters = 0;       ///< drawn
   std::uint64_t surfels = 0;        ///< drawn
+  std::uint64_t retests = 0;        ///< clusters and surfels that one cell left and a cell in it tested
 
   void add(const GatherCounts& other) noexcept;
 };

@@ -67,7 +67,7 @@ struct LaneSums {
 
 /// Decodes a row and adds it up.
 template <int kValues>
-HWY_INLINE void add_row(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, int y, float cosine_row,
+HWY_INLINE void add_row(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, int y, float cosine_row,
                         float nu, Row& out, LaneSums& sums) {
   const W f;
   const auto zero = hn::Zero(f);
@@ -116,7 +116,7 @@ HWY_INLINE void add_edges(const Row& a, const Row& b, std::size_t at_a, std::siz
 }
 
 template <int kValues>
-HWY_INLINE void sum_rows(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu,
+HWY_INLINE void sum_rows(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, float nw, float nu,
                          float nv, const FaceOffsets* offsets, FaceSums& sums) {
   const W f;
   const auto zero = hn::Zero(f);
@@ -177,7 +177,7 @@ HWY_INLINE void sum_rows(const CubeGeometry& cube, const CubePixels& pixels, con
 
 }  // namespace
 
-void sum_face(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu, float nv,
+void sum_face(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, float nw, float nu, float nv,
               const FaceOffsets* offsets, FaceSums& sums) {
   if (sky) {
     sum_rows<7>(cube, pixels, sky, nw, nu, nv, offsets, sums);
@@ -194,7 +194,7 @@ namespace ptc {
 
 HWY_EXPORT(sum_face);
 
-void sum_face(const CubeGeometry& cube, const CubePixels& pixels, const float* sky, float nw, float nu, float nv,
+void sum_face(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, float nw, float nu, float nv,
               const FaceOffsets* offsets, FaceSums& sums) {
   HWY_DYNAMIC_DISPATCH(sum_face)(cube, pixels, sky, nw, nu, nv, offsets, sums);
 }

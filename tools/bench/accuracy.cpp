@@ -236,7 +236,8 @@ class SetRun {
     const GatherCounts counts = entry.run->counts();
     if (counts.receivers > 0) {
       const auto mean = [&](std::uint64_t count) { return count * 1000 / counts.receivers; };
-      row.counts = {1000, mean(counts.cells), mean(counts.groups), mean(counts.surfel_blocks), mean(counts.clusters), mean(counts.surfels)};
+      row.counts = {1000, mean(counts.cells), mean(counts.groups), mean(counts.surfel_blocks), mean(counts.clusters), mean(counts.surfels),
+                    mean(counts.retests)};
     }
     const Values occlusion = occlusion_of(result.checked);
     row.occlusion = over_mean(error_statistics(occlusion, occlusion_of(entry.reference->mean)));

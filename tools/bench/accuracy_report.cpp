@@ -41,6 +41,7 @@ Json facts_of(const AccuracyRow& row) {
   facts["surfel_blocks"] = each(row.counts.surfel_blocks);
   facts["clusters"] = each(row.counts.clusters);
   facts["surfels"] = each(row.counts.surfels);
+  facts["retests"] = each(row.counts.retests);
   return facts;
 }
 

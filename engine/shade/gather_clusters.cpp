@@ -1,0 +1,315 @@
+#include "engine/shade/gather_kernels.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+// This file is compiled once per instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/shade/gather_clusters.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "engine/shade/gather-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ptc::HWY_NAMESPACE {
+namespace {
+
+constexpr float kPi = 3.14159265F;
+constexpr float kFlat = 0.9F;        // length of the mean normal above which a cluster is one surfel
+constexpr float kRounding = 4e-7F;   // of a position relative to a cell, over its distance
+
+/// Clusters relative to a cell's centre.
+struct Clusters {
+  Vec to;
+  VF radius, thickness;
+  Vec mean;    // normal over area, not unit
+  VF length;   // of the mean: 1 where all surfels face one way
+  Vec normal;  // unit; NaN where the mean is zero
+  VF distance2;
+};
+
+HWY_INLINE void set_derived(Clusters& c) {
+  c.length = hn::Sqrt(dot(c.mean, c.mean));
+  c.normal = scaled(c.mean, hn::Div(hn::Set(F(), 1.0F), c.length));
+  c.distance2 = dot(c.to, c.to);
+}
+
+/// Those of which a part may stand over the horizon of some receiver.
+HWY_INLINE MF over_horizon(const CellTest& test, const Clusters& c) {
+  const F f;
+  const Vec axis = spread(test.cell.axis);
+  // What lies in the sphere and in the slab; of a mean normal of zero, NaN, the sphere alone.
+  auto rise = greatest_rise(test.cell, dot(c.normal, axis), c.thickness, c.radius);
+  rise = hn::IfThenElse(hn::Lt(rise, c.radius), rise, c.radius);
+  return hn::Gt(hn::Add(highest(test.cell, c.distance2, dot(c.to, axis)), rise), hn::Zero(f));
+}
+
+struct Verdict {
+  MF drawn, open, keep;
+};
+
+/// What becomes of clusters over the horizon.
+HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wanted) {
+  const F f;
+  const auto limit = hn::Set(f, test.limit), rho = hn::Set(f, test.cell.radius), shared_from = hn::Set(f, test.shared_from);
+  const auto nearest = hn::Max(hn::Zero(f), hn::Sub(d, rho));
+  const auto r2 = hn::Mul(c.radius, c.radius);
+  const auto small = hn::And(wanted, hn::Lt(r2, hn::Mul(limit, hn::Mul(nearest, nearest))));  // for every receiver
+  const auto large = hn::AndNot(small, wanted);
+  const auto drawn = hn::And(small, hn::Ge(d, shared_from));
+  if (test.last) return {drawn, large, hn::FirstN(f, 0)};
+  // Open now what the children would open anyway, or what opens into shared parts.
+  const auto farthest = hn::Add(d, rho);
+  const auto opens = hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from), hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
+  // Of what faces many ways, some part is always seen from the front.
+  const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), c.length), hn::Zero(f)));
+  const auto height = hn::Max(hn::Abs(dot(c.to, c.mean)), scattered);
+  const auto above = hn::Add(dot(c.to, spread(test.cell.axis)), hn::Add(c.radius, rho));
+  const auto band = hn::Lt(d, seam_end(test, height, above, d));
+  return {drawn, hn::And(large, opens), hn::Or(hn::AndNot(opens, large), hn::And(small, band))};
+}
+
+/// Clusters all of whose surfels show their backs to every receiver.
+HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test, const Vec& to, VF distance2, VF radius) {
+  const F f;
+  const I i;
+  const auto cosine = hn::Mul(hn::ConvertTo(f, hn::PromoteTo(i, hn::LoadU(I16(), reinterpret_cast<const std::int16_t*>(
+                                                                         group.cone_cos() + 2 * first)))),
+                              hn::Set(f, 1.0F / 32767));
+  const auto packed = hn::BitCast(i, load_u16(group.cone_axis() + 2 * first));
+  const auto coordinate = [&](auto bits) {
+    return hn::Max(hn::Mul(hn::ConvertTo(f, hn::ShiftRight<24>(bits)), hn::Set(f, 1.0F / 127)), hn::Set(f, -1.0F));
+  };
+  const Vec axis = unfold(coordinate(hn::ShiftLeft<24>(packed)), coordinate(hn::ShiftLeft<16>(packed)));
+  const auto reach = hn::Add(radius, hn::Set(f, test.cell.radius));
+  const auto clear = hn::NegMulAdd(reach, reach, distance2);
+  auto sine = hn::Sqrt(hn::Max(hn::NegMulAdd(cosine, cosine, hn::Set(f, 1.0F)), hn::Zero(f)));
+  sine = hn::Add(sine, hn::Set(f, 0.02F));  // the axis is rounded
+  const auto least = hn::MulAdd(sine, hn::Sqrt(hn::Max(clear, hn::Zero(f))), reach);
+  return hn::And(hn::And(hn::Gt(cosine, hn::Set(f, 0.05F)), hn::Gt(clear, hn::Zero(f))), hn::Gt(dot(axis, to), least));
+}
+
+/// Appends clusters as discs (spec/shading.md#gather).
+/// @param pick  rgbe and share of the face across an axis, of the negative one where the mask says so
+template <class Pick>
+HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, VF distance, VF area, const Pick& pick,
+                              DiscQueue& queue) {
+  const F f;
+  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
+  VF light[3] = {zero, zero, zero}, sum = zero;
+  const VF along_axis[3] = {toward.x, toward.y, toward.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    VU rgbe;
+    VF share;
+    pick(axis, hn::Lt(along_axis[axis], zero), rgbe, share);
+    const auto weight = hn::Mul(hn::Abs(along_axis[axis]), share);
+    const UnpackedRgbe<F> colour = unpack_rgbe(f, rgbe);
+    const auto scale = hn::Mul(colour.scale, weight);
+    for (int k = 0; k < 3; ++k) light[k] = hn::MulAdd(colour.byte[k], scale, light[k]);
+    sum = hn::Add(sum, weight);
+  }
+  // Vector area: the part that faces one way; what is left faces every way alike.
+  const auto along = dot(c.mean, toward);
+  const auto scattered = hn::Mul(hn::Max(zero, hn::Sub(one, c.length)), hn::Set(f, 0.25F));
+  const auto front = hn::Add(hn::Max(zero, along), scattered);
+  const auto projected = test.sides == Sides::both ? hn::Add(hn::Abs(along), scattered) : front;
+
+  // A flat cluster is one surfel of its area and normal, which keeps surfaces tight at grazing
+  // angles; any other a disc of its projected area that faces the receiver, dimmed by the backs.
+  const auto flat = hn::Gt(c.length, hn::Set(f, kFlat));
+  const auto mix = hn::IfThenElse(hn::Gt(sum, zero), hn::Div(hn::IfThenElse(flat, one, hn::Div(front, projected)), sum), zero);
+  const auto seen = hn::Mul(area, hn::Mul(projected, hn::Set(f, test.inflation / kPi)));
+  const auto radius = hn::Sqrt(hn::IfThenElse(flat, hn::Mul(area, hn::Set(f, 0.5F)), seen));
+  const Vec disc_normal{hn::IfThenElse(flat, c.normal.x, toward.x), hn::IfThenElse(flat, c.normal.y, toward.y),
+                        hn::IfThenElse(flat, c.normal.z, toward.z)};
+  mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
+  push(queue, mask, c.to, disc_normal, radius,
+       pack_rgbe(hn::Mul(light[0], mix), hn::Mul(light[1], mix), hn::Mul(light[2], mix)));
+}
+
+/// Appends clusters to those left to the children. Positions are rounded to their distance, so the
+/// bounds grow by that.
+HWY_INLINE void leave(NearClusters& left, MF mask, const Clusters& c, VF distance, VU payload) {
+  const F f;
+  const U u;
+  const std::size_t at = left.size;
+  const auto rounding = hn::Mul(distance, hn::Set(f, kRounding));
+  hn::CompressBlendedStore(c.to.x, mask, f, left.x.data() + at);
+  hn::CompressBlendedStore(c.to.y, mask, f, left.y.data() + at);
+  hn::CompressBlendedStore(c.to.z, mask, f, left.z.data() + at);
+  hn::CompressBlendedStore(hn::Add(c.radius, rounding), mask, f, left.radius.data() + at);
+  hn::CompressBlendedStore(hn::Add(c.thickness, rounding), mask, f, left.thickness.data() + at);
+  hn::CompressBlendedStore(c.mean.x, mask, f, left.mean_x.data() + at);
+  hn::CompressBlendedStore(c.mean.y, mask, f, left.mean_y.data() + at);
+  hn::CompressBlendedStore(c.mean.z, mask, f, left.mean_z.data() + at);
+  left.size += hn::CompressBlendedStore(payload, hn::RebindMask(u, mask), u, left.payload.data() + at);
+}
+
+/// Eight children of a group from `first` on, in columns of the page.
+class GroupLanes {
+ public:
+  GroupLanes(const GroupView& group, const CellTest& test)
+      : group_(group), corner_(decode_morton(group.cell())), test_(test) {
+    const int level = group.level();
+    const double edge = level < kLatticeBits ? static_cast<double>(std::uint64_t{1} << (kLatticeBits - level)) : 1.0;
+    step_ = static_cast<float>(edge * test.unit / 65536);
+  }
+
+  HWY_INLINE Clusters load(int first) {
+    const F f;
+    const int at = 2 * first;
+    const auto step = hn::Set(f, step_), unit = hn::Set(f, static_cast<float>(test_.unit));
+    const auto offset = [&](std::size_t k, double centre) {
+      return hn::Set(f, static_cast<float>((static_cast<double>(corner_[k]) - centre) * test_.unit));
+    };
+    const glm::dvec3& centre = test_.cell.centre;
+    for (int k = 0; k < 6; ++k) {
+      share_[k] = hn::Mul(to_float(load_u16(group_.facing(k) + at)), hn::Set(f, 1.0F / 65535));
+    }
+    Clusters c{.to = {hn::MulAdd(step, to_float(load_u16(group_.mean_x() + at)), offset(0, centre.x)),
+                      hn::MulAdd(step, to_float(load_u16(group_.mean_y() + at)), offset(1, centre.y)),
+                      hn::MulAdd(step, to_float(load_u16(group_.mean_z() + at)), offset(2, centre.z))},
+               .radius = hn::Mul(unit, load_ufloat16(group_.radius() + at)),
+               .thickness = hn::Mul(unit, load_ufloat16(group_.thickness() + at)),
+               .mean = {hn::Sub(share_[0], share_[1]), hn::Sub(share_[2], share_[3]), hn::Sub(share_[4], share_[5])}};
+    set_derived(c);
+    return c;
+  }
+
+  HWY_INLINE void draw(int first, MF mask, const Clusters& c, VF distance, DiscQueue& queue) const {
+    const U u;
+    draw_clusters(test_, mask, c, distance, load_ufloat16(group_.area() + 2 * first),
+                  [&](int axis, MF negative, VU& rgbe, VF& share) {
+                    const auto load = [&](int k) {
+                      return hn::LoadU(u, reinterpret_cast<const std::uint32_t*>(group_.radiance(k) + 4 * first));
+                    };
+                    rgbe = hn::IfThenElse(hn::RebindMask(u, negative), load(2 * axis + 1), load(2 * axis));
+                    share = hn::IfThenElse(negative, share_[2 * axis + 1], share_[2 * axis]);
+                  },
+                  queue);
+  }
+
+ private:
+  const GroupView& group_;
+  LatticePoint corner_;
+  const CellTest& test_;
+  float step_;
+  VF share_[6];
+};
+
+/// The payload of a child.
+ClusterPayload payload_of(const GroupView& group, int i) {
+  ClusterPayload payload;
+  for (int k = 0; k < 6; ++k) {
+    std::memcpy(&payload.rgbe[k], group.radiance(k) + 4 * std::ptrdiff_t{i}, sizeof payload.rgbe[k]);
+    payload.share[k] = static_cast<float>(GroupView::u16_at(group.facing(k), i)) * (1.0F / 65535);
+  }
+  payload.area = std::bit_cast<float>(std::uint32_t{GroupView::u16_at(group.area(), i)} << 15);
+  const std::uint64_t reference = group.reference(i);
+  payload.reference[0] = static_cast<std::uint32_t>(reference);
+  payload.reference[1] = static_cast<std::uint32_t>(reference >> 32);
+  payload.interior = group.interior_mask() >> i & 1;
+  return payload;
+}
+
+}  // namespace
+
+unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& out) {
+  const F f;
+  const U u;
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  GroupLanes loader(group, test);
+  unsigned opened = 0;
+  for (int first = 0; first < group.size(); first += lanes) {
+    auto wanted = hn::FirstN(f, static_cast<std::size_t>(group.size() - first));
+    const Clusters c = loader.load(first);
+    if (test.cell.has_horizon) wanted = hn::And(wanted, over_horizon(test, c));
+    if (test.sides == Sides::front) wanted = hn::AndNot(faces_away(group, first, test, c.to, c.distance2, c.radius), wanted);
+    if (hn::AllFalse(f, wanted)) continue;
+    const auto d = hn::Sqrt(c.distance2);
+    const Verdict verdict = judge(test, c, d, wanted);
+    if (!hn::AllFalse(f, verdict.drawn)) loader.draw(first, verdict.drawn, c, d, out.queue);
+    opened |= bits_of(f, verdict.open) << first;
+    if (hn::AllFalse(f, verdict.keep)) continue;
+    const auto next = static_cast<std::uint32_t>(out.payloads.size());
+    unsigned rest = bits_of(f, verdict.keep);
+    alignas(64) std::uint32_t index[kListLanes] = {};
+    for (std::uint32_t count = 0; rest != 0; rest &= rest - 1) {
+      const int lane = std::countr_zero(rest);
+      index[lane] = next + count++;
+      out.payloads.push_back(payload_of(group, first + lane));
+    }
+    out.left->clusters.make_room(kListLanes);
+    leave(out.left->clusters, verdict.keep, c, d, hn::LoadU(u, index));
+  }
+  return opened;
+}
+
+std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move, const CellTest& test,
+                            CellOutput& out, std::vector<std::uint32_t>& opened) {
+  const F f;
+  const U u;
+  const I i;
+  const std::size_t lanes = hn::Lanes(f);
+  const Vec moved = spread(move);
+  for (; from < near.size && !out.queue.full(); from += lanes) {
+    const auto load = [&](const std::vector<float>& column) { return hn::LoadU(f, column.data() + from); };
+    Clusters c{.to = {hn::Add(load(near.x), moved.x), hn::Add(load(near.y), moved.y), hn::Add(load(near.z), moved.z)},
+               .radius = load(near.radius),
+               .thickness = load(near.thickness),
+               .mean = {load(near.mean_x), load(near.mean_y), load(near.mean_z)}};
+    set_derived(c);
+    auto wanted = hn::FirstN(f, near.size - from);
+    if (test.cell.has_horizon) wanted = hn::And(wanted, over_horizon(test, c));
+    if (hn::AllFalse(f, wanted)) continue;
+    const auto d = hn::Sqrt(c.distance2);
+    const Verdict verdict = judge(test, c, d, wanted);
+    const auto payload = hn::LoadU(u, near.payload.data() + from);
+    if (!hn::AllFalse(f, verdict.drawn)) {
+      const auto word = hn::IfThenElseZero(hn::RebindMask(i, verdict.drawn), hn::ShiftLeft<4>(hn::BitCast(i, payload)));
+      const auto* base = reinterpret_cast<const float*>(out.payloads.data());
+      const auto gather = [&](int k, hn::VFromD<I> at) { return hn::GatherIndex(f, base + k, at); };
+      draw_clusters(test, verdict.drawn, c, d, gather(12, word),
+                    [&](int axis, MF negative, VU& rgbe, VF& share) {
+                      const auto one = hn::IfThenElseZero(hn::RebindMask(i, negative), hn::Set(i, 1));
+                      const auto at = hn::Add(word, one);
+                      rgbe = hn::BitCast(u, gather(2 * axis, at));
+                      share = gather(6 + 2 * axis, at);
+                    },
+                    out.queue);
+    }
+    if (!hn::AllFalse(f, verdict.open)) {
+      opened.resize(opened.size() + lanes);
+      const std::size_t count = hn::CompressBlendedStore(payload, hn::RebindMask(u, verdict.open), u, opened.data() + opened.size() - lanes);
+      opened.resize(opened.size() - lanes + count);
+    }
+    if (!hn::AllFalse(f, verdict.keep)) leave(out.left->clusters, verdict.keep, c, d, payload);
+  }
+  return std::min(from, near.size);
+}
+
+}  // namespace ptc::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ptc {
+
+HWY_EXPORT(gather_group);
+HWY_EXPORT(gather_clusters);
+
+unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& out) {
+  return HWY_DYNAMIC_DISPATCH(gather_group)(group, test, out);
+}
+
+std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move, const CellTest& test,
+                            CellOutput& out, std::vector<std::uint32_t>& opened) {
+  if (out.left) out.left->clusters.make_room(near.size - from);
+  return HWY_DYNAMIC_DISPATCH(gather_clusters)(near, from, move, test, out, opened);
+}
+
+}  // namespace ptc
+#endif
