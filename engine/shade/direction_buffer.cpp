@@ -37,6 +37,23 @@ glm::mat3 tilted_frame(unsigned variant) {
   return tilt * glm::mat3_cast(glm::angleAxis(angle, glm::normalize(glm::vec3(0.5F, -0.7F, 0.4F))));
 }
 
+/// Rows of each face with a pixel (1, u, v) of which axis . (1, u, v) + cone_sin |(1, u, v)| > 0.
+FaceRows rows_over(const CubeGeometry& cube, const Horizon& horizon) {
+  const glm::vec3 n = cube.rotation * horizon.axis;
+  const float slack = horizon.cone_sin * 1.7320509F;  // the longest (1, u, v)
+  FaceRows rows{};
+  for (int face = 0; face < 6; ++face) {
+    const Axes a = axes_of(face);
+    const float best = n[a.w] * a.sign + std::abs(n[a.u]) + slack;
+    int first = 0, end = cube.resolution;
+    while (first < end && best + n[a.v] * cube.centre[first] <= 0) ++first;
+    while (first < end && best + n[a.v] * cube.centre[end - 1] <= 0) --end;
+    rows.first[face] = first;
+    rows.end[face] = end;
+  }
+  return rows;
+}
+
 }  // namespace
 
 DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
@@ -105,9 +122,10 @@ void DirectionBuffer::copy(const DirectionBuffer& other) noexcept {
   std::memcpy(rgbe_.data(), other.rgbe_.data(), rgbe_.size() * sizeof(std::uint32_t));
 }
 
-void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides,
-                           unsigned viewpoint) noexcept {
-  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, discs, sides, viewpoint);
+void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides, unsigned viewpoint,
+                           const Horizon& horizon) noexcept {
+  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, rows_over(grid.geometry_, horizon), discs, sides,
+             viewpoint);
 }
 
 Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,

@@ -41,6 +41,12 @@ class DirectionGrid {
   CubeGeometry geometry_;      // of the above, and the rotation
 };
 
+/// Directions over the horizon of some normal of a cone.
+struct Horizon {
+  glm::vec3 axis{0};  ///< unit
+  float cone_sin = 2; ///< sine of the cone's half angle, which is below a right one; above 1: every direction
+};
+
 /// Nearest coverer of every direction pixel and its RGBE colour.
 class DirectionBuffer {
  public:
@@ -53,7 +59,9 @@ class DirectionBuffer {
   /// Draws discs exactly: every pixel whose ray meets one. Coplanar overlapping discs divide at the
   /// line between their centres. The order of drawing does not matter.
   /// @param viewpoint  what the discs are relative to, below kViewpoints
-  void draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides, unsigned viewpoint = 0) noexcept;
+  /// @param horizon    pixels below it may be left as they are
+  void draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides, unsigned viewpoint = 0,
+            const Horizon& horizon = {}) noexcept;
 
   /// Sums over the hemisphere of `normal`.
   /// @param offsets  of the receiver from each viewpoint; those that follow are 0. Empty: from none

@@ -47,11 +47,18 @@ struct FaceOffsets {
   float v[kViewpoints];
 };
 
+/// Rows of each face whose pixels matter: from `first` up to `end`.
+struct FaceRows {
+  int first[6];
+  int end[6];
+};
+
 /// Covers the pixels whose ray meets a disc before what is there; of equally near ones the lesser
 /// colour stays, so the order of drawing does not matter.
+/// @param rows       others may be left as they are
 /// @param viewpoint  what the discs are relative to, below kViewpoints
-void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides,
-                unsigned viewpoint);
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const DiscQueue& discs,
+                Sides sides, unsigned viewpoint);
 
 /// Sums over the pixels of a face above the horizon.
 struct FaceSums {

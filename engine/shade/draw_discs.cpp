@@ -27,7 +27,9 @@ using MF = hn::Mask<F>;
 
 /// Height of the shallow paraboloid that stands for a disc, over its radius (spec/shading.md#surfels).
 constexpr float kBump = 0.01F;
-constexpr float kSlack = 1e-3F;  // pixels: rounding of a disc's bounds
+constexpr float kSlack = 1e-3F;      // pixels: rounding of a disc's bounds
+constexpr float kWideSlack = 0.05F;  // likewise, where squares cancel
+constexpr int kChunk = 64;           // discs that are sorted by face at once
 
 /// Discs on one face of the cube, set up for their pixels. A pixel at (du, dv) from the projected
 /// centre sees the disc's plane at t = cw / w, w = 1 + alpha du + beta dv, and the disc itself where
@@ -57,8 +59,9 @@ HWY_INLINE void cover(float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT 
   hn::StoreU(hn::IfThenElse(hn::RebindMask(u, take), colour, old_colour), u, rgbe);
 }
 
-HWY_INLINE void draw_on_face(const CubeGeometry& cube, const CubePixels& pixels, const FaceDiscs& discs, std::size_t i,
-                             std::uint32_t rgbe, VU viewpoint) {
+/// @param centre  as CubeGeometry has it
+HWY_INLINE void draw_on_face(const float* HWY_RESTRICT centre, int resolution, const CubePixels& pixels,
+                             const FaceDiscs& discs, std::size_t i, std::uint32_t rgbe, VU viewpoint) {
   const F f;
   const auto aa = hn::Set(f, discs.aa[i]);
   const auto alpha = hn::Set(f, discs.alpha[i]);
@@ -67,59 +70,90 @@ HWY_INLINE void draw_on_face(const CubeGeometry& cube, const CubePixels& pixels,
   const auto bump = hn::Set(f, discs.bump[i]);
   const auto u0 = hn::Set(f, discs.u0[i]);
   const auto colour = hn::Set(U(), rgbe);
-  const int lanes = static_cast<int>(hn::Lanes(f));
-  const int last = cube.resolution - lanes;
-  for (int y = discs.y0[i]; y < discs.y1[i]; ++y) {
-    const float dv = cube.centre[y] - discs.v0[i];
-    const auto b = hn::Set(f, discs.ab2[i] * dv);
-    const auto c = hn::Set(f, discs.bb[i] * dv * dv);
-    const auto w0 = hn::Set(f, 1 + discs.beta[i] * dv);
-    const int row = discs.first[i] + y * cube.resolution;
-    for (int begin = discs.x0[i]; begin < discs.x1[i]; begin += lanes) {
-      const int x = std::min(begin, last);  // drawing a pixel again changes nothing
-      const auto du = hn::Sub(hn::LoadU(f, cube.centre + x), u0);
+  const float v0 = discs.v0[i], ab2 = discs.ab2[i], bb = discs.bb[i], beta = discs.beta[i];
+  const int lanes = static_cast<int>(hn::Lanes(f)), x0 = discs.x0[i] & -lanes, x1 = discs.x1[i], y1 = discs.y1[i];
+  const std::ptrdiff_t first = discs.first[i] + discs.y0[i] * resolution;
+  float* HWY_RESTRICT nearness = pixels.nearness + first;
+  std::uint32_t* HWY_RESTRICT colours = pixels.rgbe + first;
+  for (int y = discs.y0[i]; y < y1; ++y, nearness += resolution, colours += resolution) {
+    const float dv = centre[y] - v0;
+    const auto b = hn::Set(f, ab2 * dv), c = hn::Set(f, bb * dv * dv), w0 = hn::Set(f, 1 + beta * dv);
+    for (int x = x0; x < x1; x += lanes) {
+      const auto du = hn::Sub(hn::LoadU(f, centre + x), u0);
       const auto form = hn::MulAdd(hn::MulAdd(aa, du, b), du, c);
       const auto w = hn::MulAdd(alpha, du, w0);
       const auto near = hn::NegMulAdd(form, bump, hn::Mul(w, inverse));  // below 0 behind the receiver
       const auto inside = hn::Lt(form, hn::Mul(square, hn::Mul(w, w)));
-      cover(pixels.nearness + row + x, pixels.rgbe + row + x, near, inside, colour, viewpoint);
+      cover(nearness + x, colours + x, near, inside, colour, viewpoint);
     }
   }
 }
 
-/// A disc within two radii of the receiver may fill the view: every face, every pixel, one division
-/// each.
-void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const float (&c)[3], const float (&n)[3],
-                    float radius, std::uint32_t rgbe, VU viewpoint) {
+/// Columns of a row that a disc may cover.
+struct Span {
+  int first = 0, end = 0;
+};
+
+/// A disc in the axes of a face. The pixel (1, u, v) meets its plane at t = height / slope,
+/// slope = n . (1, u, v), and the disc where |t (1, u, v) - c|^2 < r^2; times slope^2, a quadratic in u
+/// for a given v.
+struct WideDisc {
+  float cw, cu, cv, nw, nu, nv;
+  float radius, height;
+
+  [[nodiscard]] Span columns(float v, int resolution) const {
+    const float d = cw * cw + cu * cu + cv * cv - radius * radius;
+    const float slope = nw + nv * v, ahead = cw + cv * v;
+    const float a = height * height - 2 * height * nu * cu + nu * nu * d;
+    const float b = nu * slope * d - height * (slope * cu + nu * ahead);  // half of the linear term
+    const float c = height * height * (1 + v * v) - 2 * height * slope * ahead + slope * slope * d;
+    const float square = b * b - a * c;
+    if (!(a > 1e-6F * radius * radius)) return {0, resolution};
+    if (square <= 0) return {};
+    const float root = std::sqrt(square), scale = 0.5F * static_cast<float>(resolution);
+    const auto pixel = [&](float u) { return std::clamp((u + 1) * scale, 0.0F, 2 * scale); };
+    const float low = pixel((-b - root) / a) - 0.5F - kWideSlack, high = pixel((-b + root) / a) + 0.5F + kWideSlack;
+    return {static_cast<int>(std::max(0.0F, low)), std::min(resolution, static_cast<int>(high))};
+  }
+};
+
+/// Covers what a row of pixels sees of a disc, one division a pixel.
+HWY_INLINE void draw_wide_row(const CubeGeometry& cube, const CubePixels& pixels, const WideDisc& disc, int y, int row,
+                              const Span& span, VU colour, VU viewpoint) {
   const F f;
-  const float height = c[0] * n[0] + c[1] * n[1] + c[2] * n[2];
-  const auto colour = hn::Set(U(), rgbe);
-  const auto square = hn::Set(f, radius * radius);
-  const auto bump = hn::Set(f, kBump / radius);
   const auto lanes = static_cast<int>(hn::Lanes(f));
+  const float v = cube.centre[y];
+  const auto row_slope = hn::Set(f, disc.nw + disc.nv * v);
+  const auto square = hn::Set(f, disc.radius * disc.radius), bump = hn::Set(f, kBump / disc.radius);
+  for (int x = span.first & -lanes; x < span.end; x += lanes) {
+    const auto u = hn::LoadU(f, cube.centre + x);
+    const auto slope = hn::MulAdd(hn::Set(f, disc.nu), u, row_slope);
+    const auto t = hn::Div(hn::Set(f, disc.height), slope);  // infinite, negative or NaN: a miss
+    const auto du = hn::MulSub(u, t, hn::Set(f, disc.cu));
+    const auto dv = hn::MulSub(hn::Set(f, v), t, hn::Set(f, disc.cv));
+    const auto dw = hn::Sub(t, hn::Set(f, disc.cw));
+    const auto off = hn::MulAdd(du, du, hn::MulAdd(dv, dv, hn::Mul(dw, dw)));
+    const auto inside = hn::And(hn::Gt(t, hn::Zero(f)), hn::Lt(off, square));
+    const auto length = hn::LoadU(f, cube.length + y * cube.resolution + x);
+    const auto near = hn::Div(hn::Set(f, 1.0F), hn::Add(t, hn::Div(hn::Mul(bump, off), length)));
+    cover(pixels.nearness + row + x, pixels.rgbe + row + x, near, inside, colour, viewpoint);
+  }
+}
+
+/// A disc within two radii of the receiver may fill the view, so every face is looked at.
+void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const float (&c)[3],
+                    const float (&n)[3], float radius, std::uint32_t rgbe, VU viewpoint) {
+  const auto colour = hn::Set(U(), rgbe);
   for (int face = 0; face < 6; ++face) {
-    const int a = face / 2, ua = (a + 1) % 3, va = (a + 2) % 3;
+    const int a = face / 2, u = (a + 1) % 3, v = (a + 2) % 3;
     const float sign = face % 2 == 0 ? 1.0F : -1.0F;
     const float reach = c[a] * sign + radius * std::sqrt(std::max(0.0F, 1 - n[a] * n[a]));
     if (reach <= 0) continue;
-    const int first = face * cube.resolution * cube.resolution;
-    for (int y = 0; y < cube.resolution; ++y) {
-      const float v = cube.centre[y];
-      const auto row_slope = hn::Set(f, n[a] * sign + n[va] * v);
-      const int row = y * cube.resolution;
-      for (int x = 0; x < cube.resolution; x += lanes) {
-        const auto u = hn::LoadU(f, cube.centre + x);
-        const auto slope = hn::MulAdd(hn::Set(f, n[ua]), u, row_slope);
-        const auto t = hn::Div(hn::Set(f, height), slope);  // infinite, negative or NaN: a miss
-        const auto du = hn::MulSub(u, t, hn::Set(f, c[ua]));
-        const auto dv = hn::MulSub(hn::Set(f, v), t, hn::Set(f, c[va]));
-        const auto dw = hn::Sub(t, hn::Set(f, c[a] * sign));
-        const auto off = hn::MulAdd(du, du, hn::MulAdd(dv, dv, hn::Mul(dw, dw)));
-        const auto inside = hn::And(hn::Gt(t, hn::Zero(f)), hn::Lt(off, square));
-        const auto length = hn::LoadU(f, cube.length + row + x);
-        const auto near = hn::Div(hn::Set(f, 1.0F), hn::Add(t, hn::Div(hn::Mul(bump, off), length)));
-        cover(pixels.nearness + first + row + x, pixels.rgbe + first + row + x, near, inside, colour, viewpoint);
-      }
+    const WideDisc disc{.cw = c[a] * sign, .cu = c[u], .cv = c[v], .nw = n[a] * sign, .nu = n[u], .nv = n[v],
+                        .radius = radius, .height = c[0] * n[0] + c[1] * n[1] + c[2] * n[2]};
+    for (int y = rows.first[face]; y < rows.end[face]; ++y) {
+      const Span span = disc.columns(cube.centre[y], cube.resolution);
+      draw_wide_row(cube, pixels, disc, y, (face * cube.resolution + y) * cube.resolution, span, colour, viewpoint);
     }
   }
 }
@@ -150,6 +184,15 @@ struct FaceLanes {
   VF radius, radius2;
 };
 
+/// Discs that faces across one axis see, in columns.
+struct AxisDiscs {
+  alignas(64) float cw[kChunk + kLanes];  ///< negative: before the face of the negative side
+  float cu[kChunk + kLanes], cv[kChunk + kLanes], nw[kChunk + kLanes], nu[kChunk + kLanes], nv[kChunk + kLanes];
+  float radius[kChunk + kLanes];
+  std::uint32_t rgbe[kChunk + kLanes];
+  std::size_t size;
+};
+
 HWY_INLINE VF dot(const VF (&a)[3], const VF (&b)[3]) {
   return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], hn::Mul(a[2], b[2])));
 }
@@ -171,10 +214,12 @@ HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs
   return turned;
 }
 
-HWY_INLINE void draw_wide_discs(const CubeGeometry& cube, const CubePixels& pixels, const CubeLanes& discs, MF mask,
-                                const std::uint32_t* colours, VU viewpoint) {
+HWY_INLINE void draw_wide_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
+                                const CubeLanes& discs, MF mask, VU colour, VU viewpoint) {
   const F f;
   alignas(64) float c[3][kLanes], n[3][kLanes], radius[kLanes];
+  alignas(64) std::uint32_t colours[kLanes];
+  hn::StoreU(colour, U(), colours);
   for (int k = 0; k < 3; ++k) {
     hn::StoreU(discs.c[k], f, c[k]);
     hn::StoreU(discs.n[k], f, n[k]);
@@ -182,13 +227,15 @@ HWY_INLINE void draw_wide_discs(const CubeGeometry& cube, const CubePixels& pixe
   hn::StoreU(discs.radius, f, radius);
   for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(rest));
-    draw_wide_disc(cube, pixels, {c[0][i], c[1][i], c[2][i]}, {n[0][i], n[1][i], n[2][i]}, radius[i], colours[i],
+    draw_wide_disc(cube, pixels, rows, {c[0][i], c[1][i], c[2][i]}, {n[0][i], n[1][i], n[2][i]}, radius[i], colours[i],
                    viewpoint);
   }
 }
 
 /// Stores which pixels discs may cover. @return the discs that cover some
-HWY_INLINE MF store_bounds(const FaceLanes& d, float resolution, FaceDiscs& out) {
+/// @param first_row, end_row  of the pixels that matter
+HWY_INLINE MF store_bounds(const FaceLanes& d, float resolution, hn::VFromD<I> first_row, hn::VFromD<I> end_row,
+                           FaceDiscs& out) {
   const F f;
   const I i;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
@@ -209,8 +256,10 @@ HWY_INLINE MF store_bounds(const FaceLanes& d, float resolution, FaceDiscs& out)
   };
   span(d.cu, d.nu, d.nv, out.x0, out.x1);
   span(d.cv, d.nv, d.nu, out.y0, out.y1);
-  return hn::RebindMask(f, hn::And(hn::Lt(hn::LoadU(i, out.x0), hn::LoadU(i, out.x1)),
-                                   hn::Lt(hn::LoadU(i, out.y0), hn::LoadU(i, out.y1))));
+  const auto y0 = hn::Max(hn::LoadU(i, out.y0), first_row), y1 = hn::Min(hn::LoadU(i, out.y1), end_row);
+  hn::StoreU(y0, i, out.y0);
+  hn::StoreU(y1, i, out.y1);
+  return hn::RebindMask(f, hn::And(hn::Lt(hn::LoadU(i, out.x0), hn::LoadU(i, out.x1)), hn::Lt(y0, y1)));
 }
 
 /// Stores what says which pixels discs cover, and how near.
@@ -236,63 +285,84 @@ HWY_INLINE void store_forms(const FaceLanes& d, VF per_height, FaceDiscs& out) {
   hn::StoreU(hn::Div(hn::Set(f, kBump), hn::Mul(d.radius, hn::Sqrt(length2))), f, out.bump);
 }
 
-/// Draws discs on the faces across an axis: each on the one that its centre lies before. A disc seen
-/// under less than 30 degrees reaches no face whose side its centre is not on.
-HWY_INLINE void draw_across(const CubeGeometry& cube, const CubePixels& pixels, const CubeLanes& discs, VF per_height,
-                            MF mask, int axis, const std::uint32_t* colours, VU viewpoint) {
+/// Sorts discs by the axes across which faces see them: each on the face that its centre lies before. A
+/// disc seen under less than 30 degrees reaches no face whose side its centre is not on.
+HWY_INLINE void sort_by_axis(const CubeLanes& discs, MF mask, VU colour, AxisDiscs (&axes)[3]) {
+  const F f;
+  const U u32;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto far = hn::Add(hn::Abs(discs.c[axis]), discs.radius);  // beyond it no sphere around the disc reaches
+    const auto reaches = [&](VF c) { return hn::Lt(hn::Sub(hn::Abs(c), discs.radius), far); };
+    const auto seen = hn::And(mask, hn::And(reaches(discs.c[u]), reaches(discs.c[v])));
+    AxisDiscs& out = axes[axis];
+    const std::size_t at = out.size;
+    hn::CompressBlendedStore(discs.c[axis], seen, f, out.cw + at);
+    hn::CompressBlendedStore(discs.c[u], seen, f, out.cu + at);
+    hn::CompressBlendedStore(discs.c[v], seen, f, out.cv + at);
+    hn::CompressBlendedStore(discs.n[axis], seen, f, out.nw + at);
+    hn::CompressBlendedStore(discs.n[u], seen, f, out.nu + at);
+    hn::CompressBlendedStore(discs.n[v], seen, f, out.nv + at);
+    hn::CompressBlendedStore(discs.radius, seen, f, out.radius + at);
+    out.size += hn::CompressBlendedStore(colour, hn::RebindMask(u32, seen), u32, out.rgbe + at);
+  }
+}
+
+/// Draws the discs of an axis.
+HWY_INLINE void draw_across(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
+                            const AxisDiscs& discs, int axis, VU viewpoint) {
   const F f;
   const I i;
-  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-  const auto negative = hn::Lt(discs.c[axis], hn::Zero(f));
-  const FaceLanes d{hn::Abs(discs.c[axis]),
-                    discs.c[u],
-                    discs.c[v],
-                    hn::IfThenElse(negative, hn::Neg(discs.n[axis]), discs.n[axis]),
-                    discs.n[u],
-                    discs.n[v],
-                    discs.radius,
-                    discs.radius2};
-  const auto far = hn::Add(d.cw, d.radius);  // beyond it no sphere around the disc reaches
-  const auto reaches = [&](VF c) { return hn::Lt(hn::Sub(hn::Abs(c), d.radius), far); };
-  mask = hn::And(mask, hn::And(reaches(d.cu), reaches(d.cv)));
-  if (hn::AllFalse(f, mask)) return;
+  const int face_pixels = cube.resolution * cube.resolution, plus = 2 * axis, minus = 2 * axis + 1;
   FaceDiscs set;
-  mask = hn::And(mask, store_bounds(d, static_cast<float>(cube.resolution), set));
-  if (hn::AllFalse(f, mask)) return;
-  store_forms(d, per_height, set);
-  const int face_pixels = cube.resolution * cube.resolution;
-  const auto plus = hn::Set(i, 2 * axis * face_pixels), minus = hn::Set(i, (2 * axis + 1) * face_pixels);
-  hn::StoreU(hn::IfThenElse(hn::RebindMask(i, negative), minus, plus), i, set.first);
-  for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
-    const auto k = static_cast<std::size_t>(std::countr_zero(rest));
-    draw_on_face(cube, pixels, set, k, colours[k], viewpoint);
+  for (std::size_t begin = 0; begin < discs.size; begin += hn::Lanes(f)) {
+    const auto load = [&](const float* column) { return hn::LoadU(f, column + begin); };
+    const auto cw = load(discs.cw), nw = load(discs.nw), radius = load(discs.radius);
+    const auto negative = hn::Lt(cw, hn::Zero(f));
+    const FaceLanes d{hn::Abs(cw), load(discs.cu), load(discs.cv), hn::IfThenElse(negative, hn::Neg(nw), nw),
+                      load(discs.nu), load(discs.nv), radius, hn::Mul(radius, radius)};
+    const auto of_face = [&](int at_plus, int at_minus) {
+      return hn::IfThenElse(hn::RebindMask(i, negative), hn::Set(i, at_minus), hn::Set(i, at_plus));
+    };
+    auto mask = store_bounds(d, static_cast<float>(cube.resolution), of_face(rows.first[plus], rows.first[minus]),
+                             of_face(rows.end[plus], rows.end[minus]), set);
+    mask = hn::And(mask, hn::FirstN(f, discs.size - begin));
+    if (hn::AllFalse(f, mask)) continue;
+    const auto height = hn::MulAdd(d.cw, d.nw, hn::MulAdd(d.cu, d.nu, hn::Mul(d.cv, d.nv)));
+    store_forms(d, hn::Div(hn::Set(f, 1.0F), height), set);
+    hn::StoreU(of_face(plus * face_pixels, minus * face_pixels), i, set.first);
+    for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
+      const auto k = static_cast<std::size_t>(std::countr_zero(rest));
+      draw_on_face(cube.centre, cube.resolution, pixels, set, k, discs.rgbe[begin + k], viewpoint);
+    }
   }
 }
 
 }  // namespace
 
-void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides,
-                unsigned viewpoint) {
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const DiscQueue& discs,
+                Sides sides, unsigned viewpoint) {
   const F f;
   const U u;
   const auto from = hn::Set(u, viewpoint);
   const auto lanes = static_cast<int>(hn::Lanes(f));
-  alignas(64) std::uint32_t colours[kLanes];
-  for (int begin = 0; begin < discs.size; begin += lanes) {
-    const CubeLanes d = load_discs(cube, discs, begin);
-    const auto back = hn::Ge(d.height, hn::Zero(f));
-    const auto wide = hn::Lt(dot(d.c, d.c), hn::Mul(hn::Set(f, 4.0F), d.radius2));
-    auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(d.radius, hn::Zero(f)));
-    // Backs are clear to receivers within two radii.
-    drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, wide), drawn);
-    if (hn::AllFalse(f, drawn)) continue;
-    hn::StoreU(hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin)), u, colours);
-    if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) {
-      draw_wide_discs(cube, pixels, d, near, colours, from);
-      drawn = hn::AndNot(wide, drawn);
+  AxisDiscs axes[3];
+  for (int chunk = 0; chunk < discs.size; chunk += kChunk) {
+    for (AxisDiscs& axis : axes) axis.size = 0;
+    for (int begin = chunk; begin < std::min(discs.size, chunk + kChunk); begin += lanes) {
+      const CubeLanes d = load_discs(cube, discs, begin);
+      const auto back = hn::Ge(d.height, hn::Zero(f));
+      const auto wide = hn::Lt(dot(d.c, d.c), hn::Mul(hn::Set(f, 4.0F), d.radius2));
+      auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(d.radius, hn::Zero(f)));
+      // Backs are clear to receivers within two radii.
+      drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, wide), drawn);
+      const auto colour = hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin));
+      if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) {
+        draw_wide_discs(cube, pixels, rows, d, near, colour, from);
+      }
+      sort_by_axis(d, hn::AndNot(wide, drawn), colour, axes);
     }
-    const auto per_height = hn::Div(hn::Set(f, 1.0F), d.height);
-    for (int axis = 0; axis < 3; ++axis) draw_across(cube, pixels, d, per_height, drawn, axis, colours, from);
+    for (int axis = 0; axis < 3; ++axis) draw_across(cube, pixels, rows, axes[axis], axis, from);
   }
 }
 
@@ -304,9 +374,9 @@ namespace ptc {
 
 HWY_EXPORT(draw_discs);
 
-void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const DiscQueue& discs, Sides sides,
-                unsigned viewpoint) {
-  HWY_DYNAMIC_DISPATCH(draw_discs)(cube, pixels, discs, sides, viewpoint);
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const DiscQueue& discs,
+                Sides sides, unsigned viewpoint) {
+  HWY_DYNAMIC_DISPATCH(draw_discs)(cube, pixels, rows, discs, sides, viewpoint);
 }
 
 }  // namespace ptc

@@ -135,12 +135,13 @@ struct Gather::Impl {
                         .sides = options.sides,
                         .last = left == nullptr};
     CellOutput out{queue, left, payloads};
+    const Horizon horizon = cell.has_horizon ? Horizon{cell.axis, cell.cone_sin} : Horizon{};
     bool touched = false;
     const auto flush = [&] {
       if (queue.size == 0) return;
       if (!touched) own.copy(inherited);
       touched = true;
-      own.draw(*grid, queue, options.sides, static_cast<unsigned>(depth));
+      own.draw(*grid, queue, options.sides, static_cast<unsigned>(depth), horizon);
       queue.size = 0;
     };
     if (depth > 0) {
