@@ -110,7 +110,7 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
 }
 
 DirectionBuffer::DirectionBuffer(unsigned resolution)
-    : nearness_(std::size_t{6} * resolution * resolution, 0), rgbe_(nearness_.size(), 0) {}
+    : nearness_(std::size_t{6} * resolution * resolution + 1, 0), rgbe_(nearness_.size(), 0) {}
 
 void DirectionBuffer::clear() noexcept {
   std::ranges::fill(nearness_, 0.0F);

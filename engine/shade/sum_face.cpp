@@ -24,10 +24,10 @@ using WU = hn::RebindToUnsigned<W>;
 constexpr int kMostResolution = 64;
 constexpr float kMostShift = 4;  // pixels: beyond it the first order says nothing
 
-/// What the pixels of a row show, in columns.
-struct Row {
-  alignas(64) float nearness[kMostResolution + kSumLanes];
-  float value[7][kMostResolution + kSumLanes];  // covered, red, green, blue, sky red, green, blue
+/// Weights that pass over the edges of a row's pixels.
+struct Passed {
+  alignas(64) float right[1 + kMostResolution + kSumLanes] = {};  // from pixel x - 1 to x
+  float down[kMostResolution] = {};                               // from the row above
 };
 
 /// An entry of a table of kViewpoints for each lane.
@@ -62,41 +62,75 @@ HWY_INLINE hn::VFromD<W> shift_of(hn::VFromD<W> a, hn::VFromD<W> b, hn::VFromD<W
 
 /// Sums of a face, a lane each.
 struct LaneSums {
-  hn::VFromD<W> total, value[7], open_w, open_u, open_v;
+  hn::VFromD<W> total, covered, light[3], sky[3], open_w, open_u, open_v;
 };
 
-/// Decodes a row and adds it up.
-template <int kValues>
-HWY_INLINE void add_row(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, int y, float cosine_row,
-                        float nu, Row& out, LaneSums& sums) {
+/// A face and the receiver's normal and places in its axes.
+struct FaceView {
+  const CubeGeometry& cube;
+  const FacePixels& pixels;
+  const float* sky;
+  const FaceOffsets* offsets;
+  float nw, nu, nv;
+
+  /// Cosine to a row of directions (1, u, v), without what u adds.
+  [[nodiscard]] float cosine(float v) const { return nw + nv * v; }
+  [[nodiscard]] bool sees(int y) const { return y < cube.resolution && cosine(cube.centre[y]) + std::abs(nu) > 0; }
+  HWY_INLINE hn::VFromD<W> cosine(hn::VFromD<W> u, float row) const {
+    const W f;
+    return hn::Max(hn::Zero(f), hn::MulAdd(hn::Set(f, nu), u, hn::Set(f, row)));
+  }
+};
+
+/// Lets the nearer of two neighbours in a row, and of row y and the next, take over weight.
+HWY_INLINE void pass_weights(const FaceView& face, int y, Passed& passed, float* HWY_RESTRICT down) {
   const W f;
-  const auto zero = hn::Zero(f);
-  const auto lanes = static_cast<int>(hn::Lanes(f));
+  const CubeGeometry& cube = face.cube;
+  const float half_resolution = 0.5F * static_cast<float>(cube.resolution);
+  const float half_step = 1 / static_cast<float>(cube.resolution);
+  const float row = face.cosine(cube.centre[y]), edge = cube.centre[y] + half_step;
+  const bool next_row = face.sees(y + 1);
+  for (int x = 0; x < cube.resolution; x += static_cast<int>(hn::Lanes(f))) {
+    const std::ptrdiff_t at = std::ptrdiff_t{y} * cube.resolution + x;
+    const float* here = face.pixels.nearness + at;
+    const auto near = hn::LoadU(f, here), pu = hn::LoadU(f, cube.centre + x);
+    const auto u = hn::Add(pu, hn::Set(f, half_step));
+    const auto along = shift_of(near, hn::LoadU(f, here + 1), u, face.offsets->w, face.offsets->u, half_resolution);
+    hn::StoreU(hn::Mul(along, hn::Mul(face.cosine(u, row), hn::LoadU(f, cube.edge_u + at))), f, passed.right + 1 + x);
+    if (!next_row) continue;
+    const auto across = shift_of(near, hn::LoadU(f, here + cube.resolution), hn::Set(f, edge), face.offsets->w,
+                                 face.offsets->v, half_resolution);
+    hn::StoreU(hn::Mul(across, hn::Mul(face.cosine(pu, face.cosine(edge)), hn::LoadU(f, cube.edge_v + at))), f, down + x);
+  }
+  if (!next_row) std::fill_n(down, cube.resolution, 0.0F);
+}
+
+/// Adds up a row.
+/// @param down  weights that pass to the next row
+HWY_INLINE void add_row(const FaceView& face, int y, const Passed& passed, const float* HWY_RESTRICT down, LaneSums& sums) {
+  const W f;
+  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  const CubeGeometry& cube = face.cube;
   const std::size_t plane = static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
+  const float row = face.cosine(cube.centre[y]);
   auto row_open = zero;
-  for (int x = 0; x < cube.resolution; x += lanes) {
+  for (int x = 0; x < cube.resolution; x += static_cast<int>(hn::Lanes(f))) {
     const auto at = static_cast<std::size_t>(y * cube.resolution + x);
     const auto pu = hn::LoadU(f, cube.centre + x);
-    const auto cosine = hn::Max(zero, hn::MulAdd(hn::Set(f, nu), pu, hn::Set(f, cosine_row)));
-    const auto weight = hn::Mul(cosine, hn::LoadU(f, cube.weight + at));
-    const auto near = hn::LoadU(f, pixels.nearness + at);
-    const auto empty = hn::Eq(near, zero);
-    hn::StoreU(near, f, out.nearness + x);
-    const UnpackedRgbe<W> rgbe = unpack_rgbe(f, hn::LoadU(WU(), pixels.rgbe + at));
-    const auto scale = hn::IfThenZeroElse(empty, rgbe.scale);
-    const auto put = [&](int k, hn::VFromD<W> value) {
-      hn::StoreU(value, f, out.value[k] + x);
-      sums.value[k] = hn::MulAdd(value, weight, sums.value[k]);
-    };
-    put(0, hn::IfThenZeroElse(empty, hn::Set(f, 1.0F)));
-    for (int k = 0; k < 3; ++k) put(1 + k, hn::Mul(rgbe.byte[k], scale));
-    if constexpr (kValues == 7) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        put(4 + static_cast<int>(k), hn::IfThenElseZero(empty, hn::LoadU(f, sky + k * plane + at)));
-      }
+    const auto own = hn::Mul(face.cosine(pu, row), hn::LoadU(f, cube.weight + at));
+    const auto right = hn::Sub(hn::LoadU(f, passed.right + 1 + x), hn::LoadU(f, passed.right + x));
+    const auto weight = hn::Add(own, hn::Add(right, hn::Sub(hn::LoadU(f, down + x), hn::LoadU(f, passed.down + x))));
+    const auto empty = hn::Eq(hn::LoadU(f, face.pixels.nearness + at), zero);
+    const auto covered = hn::IfThenZeroElse(empty, weight);
+    sums.total = hn::Add(sums.total, own);
+    sums.covered = hn::Add(sums.covered, covered);
+    const UnpackedRgbe<W> rgbe = unpack_rgbe(f, hn::LoadU(WU(), face.pixels.rgbe + at));
+    const auto scale = hn::Mul(rgbe.scale, covered);
+    for (int k = 0; k < 3; ++k) sums.light[k] = hn::MulAdd(rgbe.byte[k], scale, sums.light[k]);
+    for (std::size_t k = 0; face.sky && k < 3; ++k) {
+      sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at), sums.sky[k]);
     }
-    sums.total = hn::Add(sums.total, weight);
-    const auto direction = hn::IfThenElseZero(empty, hn::Div(weight, hn::LoadU(f, cube.length + at)));
+    const auto direction = hn::IfThenElseZero(empty, hn::Mul(own, hn::Div(one, hn::LoadU(f, cube.length + at))));
     sums.open_w = hn::Add(sums.open_w, direction);
     row_open = hn::Add(row_open, direction);
     sums.open_u = hn::MulAdd(direction, pu, sums.open_u);
@@ -104,71 +138,25 @@ HWY_INLINE void add_row(const CubeGeometry& cube, const FacePixels& pixels, cons
   sums.open_v = hn::MulAdd(row_open, hn::Set(f, cube.centre[y]), sums.open_v);
 }
 
-/// Lets the values of one side of each edge take over weight from the other.
-template <int kValues>
-HWY_INLINE void add_edges(const Row& a, const Row& b, std::size_t at_a, std::size_t at_b, hn::VFromD<W> moved,
-                          LaneSums& sums) {
-  const W f;
-  for (int k = 0; k < kValues; ++k) {
-    const auto change = hn::Sub(hn::LoadU(f, a.value[k] + at_a), hn::LoadU(f, b.value[k] + at_b));
-    sums.value[k] = hn::MulAdd(moved, change, sums.value[k]);
-  }
-}
-
-template <int kValues>
-HWY_INLINE void sum_rows(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, float nw, float nu,
-                         float nv, const FaceOffsets* offsets, FaceSums& sums) {
+/// Sums in which nothing, or what moves, passes weights over edges.
+HWY_INLINE void sum_rows(const FaceView& face, FaceSums& sums) {
   const W f;
   const auto zero = hn::Zero(f);
-  const auto lanes = static_cast<int>(hn::Lanes(f));
-  const float half_resolution = 0.5F * static_cast<float>(cube.resolution);
-  const auto half_step = hn::Set(f, 1 / static_cast<float>(cube.resolution));
-  LaneSums lane{zero, {zero, zero, zero, zero, zero, zero, zero}, zero, zero, zero};
-  Row rows[2];
-  for (Row& row : rows) {  // what lies past the last edge of a row has no weight, but must be a number
-    std::fill_n(row.nearness + cube.resolution, kSumLanes, 0.0F);
-    for (auto& column : row.value) std::fill_n(column + cube.resolution, kSumLanes, 0.0F);
-  }
-  bool above = false;
-  for (int y = 0; y < cube.resolution; ++y) {
-    const float v = cube.centre[y];
-    const float cosine_row = nw + nv * v;
-    if (cosine_row + std::abs(nu) <= 0) {
-      above = false;
-      continue;
-    }
-    Row& row = rows[y % 2];
-    const Row& last = rows[1 - y % 2];
-    add_row<kValues>(cube, pixels, sky, y, cosine_row, nu, row, lane);
-    for (int x = 0; offsets && x < cube.resolution; x += lanes) {
-      const auto k = static_cast<std::size_t>(x);
-      const std::size_t at = static_cast<std::size_t>(y * cube.resolution) + k;
-      const auto pu = hn::LoadU(f, cube.centre + x);
-      const auto here = hn::LoadU(f, row.nearness + k);
-      const auto edge_cosine = [&](hn::VFromD<W> u, float row_cosine) {
-        return hn::Max(zero, hn::MulAdd(hn::Set(f, nu), u, hn::Set(f, row_cosine)));
-      };
-      const auto next = hn::LoadU(f, row.nearness + k + 1);
-      const auto u = hn::Add(pu, half_step);
-      const auto along = hn::Mul(shift_of(here, next, u, offsets->w, offsets->u, half_resolution),
-                                 hn::Mul(edge_cosine(u, cosine_row), hn::LoadU(f, cube.edge_u + at)));
-      add_edges<kValues>(row, row, k, k + 1, along, lane);
-      if (!above) continue;
-      const auto before = hn::LoadU(f, last.nearness + k);
-      const float edge = v - 1 / static_cast<float>(cube.resolution);
-      const auto down = hn::Mul(shift_of(before, here, hn::Set(f, edge), offsets->w, offsets->v, half_resolution),
-                                hn::Mul(edge_cosine(pu, nw + nv * edge),
-                                        hn::LoadU(f, cube.edge_v + at - static_cast<std::size_t>(cube.resolution))));
-      add_edges<kValues>(last, row, k, k, down, lane);
-    }
-    above = true;
+  LaneSums lane{zero, zero, {zero, zero, zero}, {zero, zero, zero}, zero, zero, zero};
+  Passed passed;
+  alignas(64) float down[kMostResolution] = {};
+  for (int y = 0; y < face.cube.resolution; ++y) {
+    if (!face.sees(y)) continue;
+    if (face.offsets) pass_weights(face, y, passed, down);
+    add_row(face, y, passed, down, lane);
+    std::copy_n(down, face.cube.resolution, passed.down);
   }
   const auto add = [&](float& sum, auto lanes_sum) { sum += hn::GetLane(hn::SumOfLanes(f, lanes_sum)); };
   add(sums.total, lane.total);
-  add(sums.covered, lane.value[0]);
+  add(sums.covered, lane.covered);
   for (std::size_t k = 0; k < 3; ++k) {
-    add(sums.light[k], lane.value[1 + k]);
-    if constexpr (kValues == 7) add(sums.sky[k], lane.value[4 + k]);
+    add(sums.light[k], lane.light[k]);
+    add(sums.sky[k], lane.sky[k]);
   }
   add(sums.open[0], lane.open_w);
   add(sums.open[1], lane.open_u);
@@ -179,11 +167,7 @@ HWY_INLINE void sum_rows(const CubeGeometry& cube, const FacePixels& pixels, con
 
 void sum_face(const CubeGeometry& cube, const FacePixels& pixels, const float* sky, float nw, float nu, float nv,
               const FaceOffsets* offsets, FaceSums& sums) {
-  if (sky) {
-    sum_rows<7>(cube, pixels, sky, nw, nu, nv, offsets, sums);
-  } else {
-    sum_rows<4>(cube, pixels, sky, nw, nu, nv, offsets, sums);
-  }
+  sum_rows({cube, pixels, sky, offsets, nw, nu, nv}, sums);
 }
 
 }  // namespace ptc::HWY_NAMESPACE
