@@ -70,7 +70,7 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
       const double solid_angle = corner_solid_angle(u, v) - corner_solid_angle(u + step, v) -
                                  corner_solid_angle(u, v + step) + corner_solid_angle(u + step, v + step);
       const float length = std::sqrt(1 + centre_[x] * centre_[x] + centre_[y] * centre_[y]);
-      length_.push_back(length);
+      inverse_length_.push_back(1 / length);
       weight_.push_back(static_cast<float>(solid_angle) / length);
     }
   }
@@ -81,7 +81,7 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
     if (at + resolution < weight_.size()) edge_v_[at] = 0.5F * (weight_[at] + weight_[at + resolution]);
   }
   geometry_ = {.centre = centre_.data(),
-               .length = length_.data(),
+               .inverse_length = inverse_length_.data(),
                .weight = weight_.data(),
                .edge_u = edge_u_.data(),
                .edge_v = edge_v_.data(),

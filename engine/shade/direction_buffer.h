@@ -33,7 +33,7 @@ class DirectionGrid {
   friend class DirectionBuffer;
   unsigned variant_;
   std::vector<float> centre_;  // resolution: pixel centres in [-1, 1]
-  std::vector<float> length_;  // resolution^2: |(1, u, v)|
+  std::vector<float> inverse_length_;  // resolution^2: 1 / |(1, u, v)|
   std::vector<float> weight_;  // resolution^2: solid angle / length
   std::vector<float> edge_u_;  // as CubeGeometry has them
   std::vector<float> edge_v_;

@@ -15,7 +15,7 @@ namespace ptc {
 /// through a face, u runs along its rows and v along its columns, the axes that follow w cyclically.
 struct CubeGeometry {
   const float* centre;    ///< resolution: pixel centres in [-1, 1]
-  const float* length;    ///< resolution^2: |(1, u, v)|
+  const float* inverse_length;  ///< resolution^2: 1 / |(1, u, v)|
   const float* weight;    ///< resolution^2: solid angle over length
   const float* edge_u;    ///< resolution^2: mean weight of a pixel and the next in its row, 0 for the last
   const float* edge_v;    ///< resolution^2: mean weight of a pixel and the one in the next row

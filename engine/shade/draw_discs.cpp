@@ -100,42 +100,43 @@ struct Span {
 struct WideDisc {
   float cw, cu, cv, nw, nu, nv;
   float radius, height;
+  float d = cw * cw + cu * cu + cv * cv - radius * radius;
+  float a = height * height - 2 * height * nu * cu + nu * nu * d;  // of u^2
+  float per_a = 1 / a;
 
   [[nodiscard]] Span columns(float v, int resolution) const {
-    const float d = cw * cw + cu * cu + cv * cv - radius * radius;
+    if (!(a > 1e-6F * radius * radius)) return {0, resolution};
     const float slope = nw + nv * v, ahead = cw + cv * v;
-    const float a = height * height - 2 * height * nu * cu + nu * nu * d;
     const float b = nu * slope * d - height * (slope * cu + nu * ahead);  // half of the linear term
     const float c = height * height * (1 + v * v) - 2 * height * slope * ahead + slope * slope * d;
     const float square = b * b - a * c;
-    if (!(a > 1e-6F * radius * radius)) return {0, resolution};
     if (square <= 0) return {};
     const float root = std::sqrt(square), scale = 0.5F * static_cast<float>(resolution);
     const auto pixel = [&](float u) { return std::clamp((u + 1) * scale, 0.0F, 2 * scale); };
-    const float low = pixel((-b - root) / a) - 0.5F - kWideSlack, high = pixel((-b + root) / a) + 0.5F + kWideSlack;
+    const float low = pixel((-b - root) * per_a) - 0.5F - kWideSlack, high = pixel((-b + root) * per_a) + 0.5F + kWideSlack;
     return {static_cast<int>(std::max(0.0F, low)), std::min(resolution, static_cast<int>(high))};
   }
 };
 
-/// Covers what a row of pixels sees of a disc, one division a pixel.
+/// Covers what a row of pixels sees of a disc, one division a vector.
 HWY_INLINE void draw_wide_row(const CubeGeometry& cube, const CubePixels& pixels, const WideDisc& disc, int y, int row,
                               const Span& span, VU colour, VU viewpoint) {
   const F f;
   const auto lanes = static_cast<int>(hn::Lanes(f));
   const float v = cube.centre[y];
-  const auto row_slope = hn::Set(f, disc.nw + disc.nv * v);
+  const auto row_slope = hn::Set(f, disc.nw + disc.nv * v), per_height = hn::Set(f, 1 / disc.height);
   const auto square = hn::Set(f, disc.radius * disc.radius), bump = hn::Set(f, kBump / disc.radius);
   for (int x = span.first & -lanes; x < span.end; x += lanes) {
     const auto u = hn::LoadU(f, cube.centre + x);
-    const auto slope = hn::MulAdd(hn::Set(f, disc.nu), u, row_slope);
-    const auto t = hn::Div(hn::Set(f, disc.height), slope);  // infinite, negative or NaN: a miss
+    const auto plane = hn::Mul(hn::MulAdd(hn::Set(f, disc.nu), u, row_slope), per_height);  // nearness of it
+    const auto t = hn::Div(hn::Set(f, 1.0F), plane);  // infinite, negative or NaN: a miss
     const auto du = hn::MulSub(u, t, hn::Set(f, disc.cu));
     const auto dv = hn::MulSub(hn::Set(f, v), t, hn::Set(f, disc.cv));
     const auto dw = hn::Sub(t, hn::Set(f, disc.cw));
     const auto off = hn::MulAdd(du, du, hn::MulAdd(dv, dv, hn::Mul(dw, dw)));
     const auto inside = hn::And(hn::Gt(t, hn::Zero(f)), hn::Lt(off, square));
-    const auto length = hn::LoadU(f, cube.length + y * cube.resolution + x);
-    const auto near = hn::Div(hn::Set(f, 1.0F), hn::Add(t, hn::Div(hn::Mul(bump, off), length)));
+    const auto lost = hn::Mul(hn::Mul(bump, off), hn::LoadU(f, cube.inverse_length + y * cube.resolution + x));
+    const auto near = hn::NegMulAdd(lost, hn::Mul(plane, plane), plane);
     cover(pixels.nearness + row + x, pixels.rgbe + row + x, near, inside, colour, viewpoint);
   }
 }

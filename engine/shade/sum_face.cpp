@@ -109,7 +109,7 @@ HWY_INLINE void pass_weights(const FaceView& face, int y, Passed& passed, float*
 /// @param down  weights that pass to the next row
 HWY_INLINE void add_row(const FaceView& face, int y, const Passed& passed, const float* HWY_RESTRICT down, LaneSums& sums) {
   const W f;
-  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  const auto zero = hn::Zero(f);
   const CubeGeometry& cube = face.cube;
   const std::size_t plane = static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
   const float row = face.cosine(cube.centre[y]);
@@ -130,7 +130,7 @@ HWY_INLINE void add_row(const FaceView& face, int y, const Passed& passed, const
     for (std::size_t k = 0; face.sky && k < 3; ++k) {
       sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at), sums.sky[k]);
     }
-    const auto direction = hn::IfThenElseZero(empty, hn::Mul(own, hn::Div(one, hn::LoadU(f, cube.length + at))));
+    const auto direction = hn::IfThenElseZero(empty, hn::Mul(own, hn::LoadU(f, cube.inverse_length + at)));
     sums.open_w = hn::Add(sums.open_w, direction);
     row_open = hn::Add(row_open, direction);
     sums.open_u = hn::MulAdd(direction, pu, sums.open_u);
