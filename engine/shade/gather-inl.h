@@ -95,8 +95,12 @@ HWY_INLINE void push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal
   queue.size += static_cast<int>(hn::CompressBlendedStore(rgbe, hn::RebindMask(u, mask), u, queue.rgbe + at));
 }
 
+/// Of lengths relative to a cell, over them: what floats may be off after a few operations.
+constexpr float kRounding = 4e-7F;
+
 /// How high the direction to a thing reaches over the horizon of any receiver of the cell, as a length:
-/// to . n at its greatest over the normals of the cone, and how far receivers lie below the centre.
+/// to . n at its greatest over the normals of the cone, how far receivers lie below the centre, and what
+/// rounding may take from both.
 /// @param along  to . axis
 HWY_INLINE VF highest(const ReceiverCell& cell, VF distance2, VF along) {
   const F f;
@@ -104,7 +108,9 @@ HWY_INLINE VF highest(const ReceiverCell& cell, VF distance2, VF along) {
   const auto turned = hn::MulAdd(hn::Set(f, cell.cone_cos), along, hn::Mul(hn::Set(f, cell.cone_sin), across));
   // Inside the cone the greatest is the distance itself.
   const auto inside = hn::Gt(hn::Mul(hn::Set(f, cell.cone_sin), along), hn::Mul(hn::Set(f, cell.cone_cos), across));
-  return hn::Add(hn::IfThenElse(inside, hn::Sqrt(distance2), turned), hn::Set(f, cell.depth));
+  const auto distance = hn::Sqrt(distance2);
+  const auto below = hn::MulAdd(distance, hn::Set(f, kRounding), hn::Set(f, cell.depth * (1 + kRounding)));
+  return hn::Add(hn::IfThenElse(inside, distance, turned), below);
 }
 
 /// Half the extent of a slab along any normal of the cone: at most `thick` along the slab's normal and

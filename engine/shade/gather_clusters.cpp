@@ -18,8 +18,7 @@ namespace ptc::HWY_NAMESPACE {
 namespace {
 
 constexpr float kPi = 3.14159265F;
-constexpr float kFlat = 0.9F;        // length of the mean normal above which a cluster is one surfel
-constexpr float kRounding = 4e-7F;   // of a position relative to a cell, over its distance
+constexpr float kFlat = 0.9F;  // length of the mean normal above which a cluster is one surfel
 
 /// Clusters relative to a cell's centre.
 struct Clusters {

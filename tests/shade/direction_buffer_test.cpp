@@ -186,6 +186,65 @@ TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiv
   CHECK(moved < 0.1 * unmoved);
 }
 
+TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wherever it lies", "[shade][buffer]") {
+  // Centres 0.3 to 3 radii away: discs around the receiver, edge-on, across several faces.
+  std::mt19937 bits(11);
+  std::uniform_real_distribution<float> unit(0, 1);
+  const DirectionGrid& grid = fine_grid();
+  for (int i = 0; i < 200; ++i) {
+    const glm::vec3 normal = random_direction(bits);
+    glm::vec3 to = random_direction(bits) * (0.3F + 2.7F * unit(bits));
+    if (glm::dot(to, normal) > 0) to = -to;  // its front
+    DirectionBuffer buffer(64);
+    buffer.clear();
+    draw_disc(grid, buffer, to, normal, 1, 0, Sides::both);
+    const glm::vec3 up = random_direction(bits);
+    // Stratified cosine directions about `up`.
+    constexpr int kSide = 128;
+    const glm::vec3 x = glm::normalize(glm::cross(up, std::abs(up.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
+    const glm::vec3 y = glm::cross(up, x);
+    int hits = 0;
+    for (int k = 0; k < kSide * kSide; ++k) {
+      const float u = (static_cast<float>(k % kSide) + 0.5F) / kSide;
+      const float a = 2 * kPi * (static_cast<float>(k / kSide) + 0.5F) / kSide;
+      const glm::vec3 d = std::sqrt(u) * (std::cos(a) * x + std::sin(a) * y) + std::sqrt(1 - u) * up;
+      const float t = glm::dot(to, normal) / glm::dot(d, normal);
+      if (t > 0 && glm::length(t * d - to) < 1) ++hits;
+    }
+    CAPTURE(to.x, to.y, to.z, normal.x, normal.y, normal.z);
+    CHECK(buffer.resolve(grid, up).occlusion == Approx(hits / double{kSide * kSide}).margin(0.002));
+  }
+}
+
+TEST_CASE("direction buffer: what is left out below a horizon changes no sum over it", "[shade][buffer]") {
+  std::mt19937 bits(12);
+  std::uniform_real_distribution<float> unit(0, 1);
+  const DirectionGrid grid(32, [](const glm::vec3&) { return glm::vec3(1); });
+  for (int i = 0; i < 50; ++i) {
+    DiscQueue queue;
+    for (int k = 0; k < 300; ++k) {
+      const float distance = 0.5F + 5 * unit(bits);
+      queue.push(random_direction(bits) * distance, random_direction(bits), 0.05F + 0.6F * unit(bits), 0x88c0c0c0U);
+    }
+    const float sine = 0.9F * unit(bits);
+    const Horizon horizon{random_direction(bits), sine};
+    DirectionBuffer whole(32), part(32);
+    whole.clear();
+    part.clear();
+    whole.draw(grid, queue, Sides::both);
+    part.draw(grid, queue, Sides::both, 0, horizon);
+    for (int k = 0; k < 20; ++k) {
+      const glm::vec3 aside = glm::normalize(glm::cross(horizon.axis, random_direction(bits)));
+      const float s = sine * unit(bits);
+      const glm::vec3 normal = std::sqrt(1 - s * s) * horizon.axis + s * aside;
+      const Shading a = whole.resolve(grid, normal), b = part.resolve(grid, normal);
+      CHECK(a.occlusion == b.occlusion);
+      CHECK(a.irradiance == b.irradiance);
+      CHECK(a.sky == b.sky);
+    }
+  }
+}
+
 TEST_CASE("direction buffer: a resolution that the pixel loops cannot take is refused", "[shade][buffer]") {
   for (const unsigned resolution : {0U, 8U, 24U, 80U}) CHECK_THROWS_AS(DirectionGrid(resolution, {}), std::invalid_argument);
   for (const unsigned resolution : {16U, 48U, 64U}) CHECK_NOTHROW(DirectionGrid(resolution, {}));

@@ -27,6 +27,13 @@ void transform(std::vector<Surfel>& surfels, std::vector<Receiver>& receivers, c
   }
 }
 
+/// A rotation far from the axes.
+glm::dmat3 tilted() {
+  const double a = 0.6, b = 1.1;
+  return glm::dmat3(std::cos(a), std::sin(a), 0, -std::sin(a), std::cos(a), 0, 0, 0, 1) *
+         glm::dmat3(1, 0, 0, 0, std::cos(b), std::sin(b), 0, -std::sin(b), std::cos(b));
+}
+
 }  // namespace
 
 TEST_CASE("gather: a plane alone has no occlusion, in any attitude and at any scale", "[shade][gather]") {
@@ -245,15 +252,53 @@ TEST_CASE("gather: a scene ten million metres away equals the same scene at home
   CHECK(e.irradiance_rms < 0.02);
 }
 
+TEST_CASE("gather: scenes ten thousand kilometres apart shade in one call as each alone", "[shade][gather]") {
+  // Relative to the cell around both, floats tell half a unit apart: more than plate and receivers are.
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    const glm::dvec3 gap = glm::dvec3(1e7, 1e7, 1e7) + 0.37 * attempt;
+    std::vector<Surfel> surfels;
+    add_rectangle(surfels, {-2, -2, 0.1}, {0, 4, 0}, {4, 0, 0}, 0.05, glm::vec3(1));  // looks down
+    std::vector<Receiver> receivers;
+    for (int i = 0; i < 64; ++i) {
+      receivers.push_back({{0.1 * attempt + 0.01 * (i % 8), 0.01 * (i / 8) - 0.07 * attempt, 0}, {0, 0, 1}});
+    }
+    transform(surfels, receivers, tilted(), {0, 0, 0});  // so that roundings along the axes do not agree
+    Scene alone(surfels);
+    alone.receivers = receivers;
+    std::vector<Surfel> there = surfels;
+    transform(there, receivers, glm::dmat3(1), gap);
+    surfels.insert(surfels.end(), there.begin(), there.end());
+    Scene apart(surfels);
+    apart.receivers = receivers;
+    apart.receivers.insert(apart.receivers.end(), alone.receivers.begin(), alone.receivers.end());
+    std::vector<Shading> expected = alone.shade();
+    expected.insert(expected.end(), expected.begin(), expected.end());
+    CAPTURE(attempt);
+    CHECK(expected[0].occlusion > 0.9F);
+    CHECK(compare(apart.shade(), expected).occlusion_rms < 0.01);
+  }
+}
+
+TEST_CASE("gather: receivers with nothing near share sums over one buffer", "[shade][gather]") {
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {-3, -3, 5}, {0, 6, 0}, {6, 0, 0}, 0.1, glm::vec3(2));  // looks down
+  Scene scene(surfels);
+  for (int i = 0; i < 400; ++i) scene.receivers.push_back({{0.034 * (i % 20), 0.034 * (i / 20), 0}, {0, 0, 1}});
+  const std::vector<Shading> shared = scene.shade();
+  std::vector<Shading> exact(shared.size());
+  shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both, Executor(2));
+  const Errors e = compare(shared, exact);
+  CAPTURE(e.occlusion_rms, e.irradiance_rms);
+  CHECK(e.occlusion_rms < 0.003);
+  CHECK(e.irradiance_rms < 0.008);
+}
+
 TEST_CASE("gather: turning the scene changes little", "[shade][gather]") {
   std::vector<Surfel> surfels = small_scene(0.03);
   Scene straight(surfels);
   add_floor_receivers(straight.receivers, 0.03);
   std::vector<Receiver> receivers = straight.receivers;
-  const double a = 0.6, b = 1.1;
-  const glm::dmat3 turn = glm::dmat3(std::cos(a), std::sin(a), 0, -std::sin(a), std::cos(a), 0, 0, 0, 1) *
-                          glm::dmat3(1, 0, 0, 0, std::cos(b), std::sin(b), 0, -std::sin(b), std::cos(b));
-  transform(surfels, receivers, turn, {0, 0, 0});
+  transform(surfels, receivers, tilted(), {0, 0, 0});
   Scene turned(surfels);
   turned.receivers = receivers;
   const Errors e = compare(turned.shade(), straight.shade());
