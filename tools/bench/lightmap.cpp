@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <nanoflann.hpp>
 
 #include <glm/geometric.hpp>
+#include <nanoflann.hpp>
 
 #include "format/scalar.h"
 
@@ -48,6 +48,24 @@ std::uint16_t texels_along(float length, double spacing) {
 
 }  // namespace
 
+template <class Radiance>
+void Lightmap::fill(const Grid& grid, const Radiance& radiance) {
+  const unsigned columns = grid.columns, rows = grid.rows;
+  // A texel that the far edge cuts is read at the middle of what is left of it: on the edge itself
+  // what lies beyond would be as near.
+  const float most = 1 - 1 / (3 * static_cast<float>(std::max(columns, rows)));
+  for (unsigned row = 0; row < rows; ++row) {
+    for (unsigned column = 0; column < columns; ++column) {
+      // Those past the far edge stay black, but for one row: rounding leads at() there.
+      if (column * rows + row * columns > columns * rows + std::max(columns, rows)) break;
+      const float x = (static_cast<float>(column) + 0.5F) / static_cast<float>(columns);
+      const float y = (static_cast<float>(row) + 0.5F) / static_cast<float>(rows);
+      const float over = std::max(1.0F, (x + y) / most);
+      texels_[grid.first + row * columns + column] = radiance(x / over, y / over);
+    }
+  }
+}
+
 Lightmap::Lightmap(const Mesh& mesh, std::span<const Surfel> surfels, double spacing) {
   grids_.resize(mesh.triangles.size());
   std::uint64_t count = 0;
@@ -63,19 +81,11 @@ Lightmap::Lightmap(const Mesh& mesh, std::span<const Surfel> surfels, double spa
   const Executor executor;
   executor.for_ranges(grids_.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      const Grid& grid = grids_[t];
       const glm::vec3 a = corner(t, 0), u = corner(t, 1) - a, v = corner(t, 2) - a;
       const glm::vec3 normal = glm::normalize(glm::cross(u, v));
-      for (unsigned row = 0; row < grid.rows; ++row) {
-        for (unsigned column = 0; column < grid.columns; ++column) {
-          const float x = (static_cast<float>(column) + 0.5F) / grid.columns;
-          const float y = (static_cast<float>(row) + 0.5F) / grid.rows;
-          if (static_cast<float>(column) / grid.columns + static_cast<float>(row) / grid.rows > 1) continue;
-          const float over = std::max(1.0F, x + y);  // a texel on the far edge: its middle is pulled in
-          const glm::dvec3 at = mesh.origin + glm::dvec3(a + u * (x / over) + v * (y / over));
-          texels_[grid.first + row * grid.columns + column] = nearest_radiance(tree, surfels, at, normal);
-        }
-      }
+      fill(grids_[t], [&](float x, float y) {
+        return nearest_radiance(tree, surfels, mesh.origin + glm::dvec3(a + u * x + v * y), normal);
+      });
     }
   });
 }

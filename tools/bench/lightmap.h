@@ -20,7 +20,7 @@ class Lightmap {
   /// @param spacing  width of a texel, scene units
   Lightmap(const Mesh& mesh, std::span<const Surfel> surfels, double spacing);
 
-  /// @param u, v  weights of the second and third corner
+  /// @param u, v  weights of the second and third corner, u + v at most 1
   [[nodiscard]] glm::vec3 at(std::uint32_t triangle, float u, float v) const noexcept;
 
  private:
@@ -28,6 +28,11 @@ class Lightmap {
     std::uint64_t first = 0;  // texel
     std::uint16_t columns = 1, rows = 1;
   };
+
+  /// @param radiance  at (u, v), as rgbe
+  template <class Radiance>
+  void fill(const Grid& grid, const Radiance& radiance);
+
   std::vector<Grid> grids_;
   std::vector<std::uint32_t> texels_;  // rgbe
 };

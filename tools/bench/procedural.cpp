@@ -1,8 +1,8 @@
 #include "tools/bench/procedural.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <map>
 
 #include <glm/geometric.hpp>
@@ -129,11 +129,12 @@ LitScene make_fractal(std::uint64_t triangles) {
   scene.mesh.materials = {{.name = "terrain", .albedo = {0.55F, 0.5F, 0.4F}},
                           {.name = "moss", .albedo = {0.25F, 0.5F, 0.2F}},
                           {.name = "clay", .albedo = {0.65F, 0.25F, 0.15F}}};
-  // Two thirds of the triangles are terrain, the rest balls of 2,048.
-  const auto side = static_cast<unsigned>(std::sqrt(static_cast<double>(triangles) / 3));
-  add_terrain(scene.mesh, std::max(1U, side));
+  // A third of the triangles are balls of 2,048, the rest is terrain.
   const Ball ball = make_ball(4);
   const std::uint64_t balls = triangles / 3 / ball.triangles.size();
+  const std::uint64_t rest = triangles - balls * ball.triangles.size();
+  const auto side = static_cast<unsigned>(std::lround(std::sqrt(static_cast<double>(rest) / 2)));
+  add_terrain(scene.mesh, std::max(1U, side));
   const SquarePoints places(17);
   for (std::uint32_t i = 0; i < balls; ++i) {
     const glm::vec2 at = (places.square(i) - 0.5F) * (0.96F * kWidth);

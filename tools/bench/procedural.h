@@ -18,7 +18,7 @@ struct LitScene {
 
 /// Rough terrain under displaced balls: no wall is flat, every triangle is about as small as the
 /// next. +y up, 100 units wide.
-/// @param triangles  about as many come
+/// @param triangles  from 1000 on, as many come within 10 %
 [[nodiscard]] LitScene make_fractal(std::uint64_t triangles);
 
 /// A room of 6 x 3 x 4 m with thick walls, one red and one green, a table, a cupboard and a ball,

@@ -22,7 +22,7 @@ class RayBaseline {
   enum class Packets { single, sixteen };
 
   /// Oriented discs, their radiance on the front; backs as spec/shading.md#sides has them. Of coplanar
-  /// discs a ray meets either.
+  /// discs a ray meets either. They must outlive this.
   RayBaseline(std::span<const Surfel> discs, Sides sides);
   /// Triangles with a lightmap: every texel, about `spacing` wide, has the radiance of the nearest
   /// surfel that faces its way. Backs are black.

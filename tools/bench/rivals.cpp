@@ -24,15 +24,18 @@ double time_at(const std::vector<TimedError>& measured, double error) {
 
 void keep_faster_packets(std::vector<AccuracyRow>& rows) {
   using Key = std::tuple<std::string, std::string, Quantity>;
-  const auto key_of = [](const AccuracyRow& row) -> Key {
-    return {row.method, row.setting.substr(0, row.setting.find(" rays,")), row.job};
-  };
-  std::map<Key, double> fastest;
-  for (const AccuracyRow& row : rows) {
-    const auto [at, added] = fastest.try_emplace(key_of(row), row.us_per_receiver.median);
-    if (!added) at->second = std::min(at->second, row.us_per_receiver.median);
+  std::map<Key, std::size_t> fastest;
+  std::vector<AccuracyRow> kept;
+  for (AccuracyRow& row : rows) {
+    const std::string rays = row.setting.substr(0, row.setting.find(" rays,"));
+    const auto [at, added] = fastest.try_emplace({row.method, rays, row.job}, kept.size());
+    if (added) {
+      kept.push_back(std::move(row));
+    } else if (row.us_per_receiver.median < kept[at->second].us_per_receiver.median) {
+      kept[at->second] = std::move(row);
+    }
   }
-  std::erase_if(rows, [&](const AccuracyRow& row) { return row.us_per_receiver.median > fastest.at(key_of(row)); });
+  rows = std::move(kept);
 }
 
 void set_speedups(std::vector<AccuracyRow>& rows) {
