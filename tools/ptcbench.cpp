@@ -1,6 +1,9 @@
 // ptcbench: what shading costs and how wrong it is, beside a ray tracer in the same run.
+#include <bit>
 #include <filesystem>
+#include <numbers>
 
+#include "engine/base/error.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/accuracy_report.h"
 #include "tools/common.h"
@@ -12,64 +15,138 @@ using namespace ptc::bench;
 
 constexpr char kPurpose[] =
     "Measures time and error together, against rays at the same scene in the same run, and draws charts\n"
-    "of one against the other.";
+    "of one against the other. Scenes are held in memory whole; --memory caps their builds alone.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
-    "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n";
+    "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
+    "  ptcbench accuracy room.obj --set camera --method ptcx --setting 0.02,0.1,32 -o charts\n";
+constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
 
 struct Arguments {
-  std::vector<std::string> scenes{"fractal", "window", "city"};
+  std::vector<std::string> scenes;
   std::filesystem::path directory;
   AccuracyOptions accuracy;
   bool quick = false;
+  const CLI::App* command = nullptr;  ///< knows which options were given
 };
+
+ptc::GatherOptions parse_setting(const std::string& text) {
+  constexpr char kExpected[] = "SR,RAD,R: a solid angle from 1e-6 to 4 pi, a parallax from 0 to pi, and "
+                               "16, 32, 48 or 64 pixels along a cube edge";
+  constexpr double kPi = std::numbers::pi;
+  const std::vector<double> n = ptc::parse_numbers("--setting", text, {3}, kExpected);
+  const bool pixels = n[2] == 16 || n[2] == 32 || n[2] == 48 || n[2] == 64;
+  if (n[0] < 1e-6 ||  n[1] < 0 || n[1] > kPi || !pixels) {
+    ptc::refuse("--setting", text, kExpected);
+  }
+  return {.solid_angle = static_cast<float>(n[0]),
+          .parallax = static_cast<float>(n[1]),
+          .resolution = static_cast<unsigned>(n[2])};
+}
+
+void declare_choices(CLI::App& command, AccuracyOptions& options) {
+  constexpr char kGroup[] = "Expert";
+  const auto set = [&options](const std::vector<std::string>& values) {
+    options.settings.clear();
+    for (const std::string& text : values) options.settings.push_back(parse_setting(text));
+  };
+  command.add_option_function<std::vector<std::string>>(
+             "--setting", set, "Measure PTCX with this solid angle, parallax and resolution, in place of "
+                               "a list from coarse to fine; repeatable")
+      ->type_name("SR,RAD,R")
+      ->allow_extra_args(false)
+      ->group(kGroup);
+  const auto one_of = [&](const char* name, std::vector<std::string>& chosen, const char* description) {
+    std::string words;
+    for (const std::string& word : chosen) words += (words.empty() ? "" : "|") + word;
+    const auto check = [known = chosen, words](const std::string& text) {
+      const bool found = std::ranges::find(known, text) != known.end();
+      return found ? std::string() : "expects " + words + ", not '" + text + "'";
+    };
+    command.add_option(name, chosen, description)
+        ->type_name(words)
+        ->allow_extra_args(false)
+        ->check(CLI::Validator(check, ""))
+        ->group(kGroup);
+  };
+  one_of("--method", options.methods, "Measure this method, not all; repeatable");
+  one_of("--set", options.sets, "Shade these receivers: pixels of a picture, or the scene's own points; repeatable");
+}
 
 void declare_accuracy(CLI::App& app, Arguments& arguments) {
   CLI::App& command = *app.add_subcommand("accuracy", "Time per receiver against error: PTCX over its settings, the plain "
                                                       "gather, Embree on the same discs and on the mesh");
+  arguments.command = &command;
   command.fallthrough();
   command.add_option("scenes", arguments.scenes,
-                     "fractal, window, city, or files of meshes and clouds; +backdrop behind a mesh's name sets it on a "
-                     "ground before a wall")
-      ->type_name("SCENE")
-      ->capture_default_str();
+                     std::string(kScenes) + "; +backdrop behind a mesh's name sets it on a ground before a wall "
+                                            "[default: fractal window city, fractal with --quick]")
+      ->type_name("SCENE");
   command.add_option("-o,--output", arguments.directory, "Directory for accuracy.json, .csv, .svg and .png")
       ->type_name("DIR")
       ->required();
-  command.add_flag("--quick", arguments.quick, "The first scene alone, smaller, in under a minute");
+  command.add_flag("--quick", arguments.quick,
+                   "Under a minute a scene on two cores: 200k points, fewer receivers of each set (192 x 108 pixels, "
+                   "8k points), 200 of them checked, 3 runs of fewer settings; what other options say stays");
   AccuracyOptions& options = arguments.accuracy;
   ptc::add_count(command, "--points", options.scene.points, "Surfels wanted of a mesh or the city; k, M, G count by 1000")
       ->default_str("2M");
   ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers of each set whose error is measured");
   ptc::add_integer(command, "--reference-rays", options.reference_rays, 16, 65536,
-                   "Rays of each half of a reference, a power of two");
+                   "Rays of each half of a reference, a power of two")
+      ->check([](const std::string& text) {
+        const auto rays = ptc::parse_number<unsigned>(text);
+        return rays && std::has_single_bit(*rays) ? std::string() : "must be a power of two, is " + text;
+      });
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every method");
+  declare_choices(command, options);
 }
 
-/// What --quick leaves of a run.
+/// What --quick sets, unless another option did. The references stay as good: they take little time.
 void shorten(Arguments& arguments) {
-  arguments.scenes.resize(1);
+  const auto unless_given = [&](const char* name, auto& value, auto quick) {
+    if (arguments.command->count(name) == 0) value = quick;
+  };
   AccuracyOptions& options = arguments.accuracy;
-  options.scene.points = std::min<std::uint64_t>(options.scene.points, 300'000);
-  options.scene.width = 320;
-  options.scene.height = 180;
-  options.scene.window_width = 64;
-  options.scene.window_height = 36;
-  options.scene.own_points = 20'000;
-  options.checked = std::min(options.checked, 200U);
-  options.repeats = std::min(options.repeats, 3U);
-  options.rays = {64, 256, 1024};
+  unless_given("--points", options.scene.points, 200'000U);
+  unless_given("--checked", options.checked, 200U);
+  unless_given("--repeats", options.repeats, 3U);
+  options.scene.shaded_width = 192;  // in the middle: as dense as the whole picture, or less would be shared
+  options.scene.shaded_height = 108;
+  options.scene.window_width = 48;
+  options.scene.window_height = 27;
+  options.scene.own_points = 8'192;
+  options.rays = {64, 256, 1024, 4096};
   options.plain_solid_angles = {0.01F};
+  if (arguments.command->count("--setting") > 0) return;
+  const std::vector<ptc::GatherOptions> all = AccuracyOptions::default_settings();
+  options.settings = {all[0], all[2], all[3], all[5]};
+}
+
+/// The scenes asked for, whose files can be read.
+std::vector<SceneChoice> choose_scenes(const Arguments& arguments) {
+  std::vector<std::string> texts = arguments.scenes;
+  if (texts.empty()) texts = arguments.quick ? std::vector<std::string>{"fractal"} : std::vector<std::string>{"fractal", "window", "city"};
+  const std::vector<SceneChoice> scenes = parse_scenes(texts);
+  for (const SceneChoice& scene : scenes) {
+    if (scene.file.empty()) continue;
+    if (!std::filesystem::exists(scene.file)) {
+      throw ptc::DataError(scene.file.string() + ": No such file or directory; scenes are " + kScenes);
+    }
+    ptc::check_input(scene.file);
+  }
+  return scenes;
 }
 
 ptc::Outcome measure(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten(arguments);
+  const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
   const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
   const ptc::Executor executor(run.threads);
   std::vector<SceneAccuracy> scenes;
-  for (const std::string& text : arguments.scenes) {
-    const BenchScene scene(parse_scene(text), arguments.accuracy.scene, work, run, progress);
+  for (const SceneChoice& choice : choices) {
+    const BenchScene scene(choice, arguments.accuracy.scene, work, run, progress);
     scenes.push_back(measure_accuracy(scene, arguments.accuracy, executor, progress));
     write_reports(arguments.directory, scenes);  // of those done, should a later one fail
   }

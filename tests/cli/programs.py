@@ -13,7 +13,7 @@ import unittest
 from pathlib import Path
 
 BIN = Path(os.environ["PTC_BIN"])
-PROGRAMS = ["ptcbuild", "ptcshade", "ptcrender", "ptcconvert", "ptcinfo", "ptcverify"]
+PROGRAMS = ["ptcbuild", "ptcshade", "ptcrender", "ptcconvert", "ptcinfo", "ptcverify", "ptcbench"]
 CORE = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b",
         "red", "green", "blue"]
 SMALL_PICTURE = ["--camera", "0.5,0.5,3,0.5,0.5,0.5", "--size", "24x16", "--samples", "1"]

@@ -1,13 +1,12 @@
 #include "tools/bench/accuracy_report.h"
 
-#include <array>
 #include <cmath>
-#include <functional>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "engine/io/file.h"
-#include "engine/measure/chart.h"
+#include "tools/bench/accuracy_chart.h"
 
 namespace ptc::bench {
 namespace {
@@ -35,8 +34,9 @@ Json facts_of(const AccuracyRow& row) {
              {"e_rms_mesh", number(row.irradiance_rms_mesh)},
              {"speedup_discs", number(row.speedup_discs)},
              {"speedup_mesh", number(row.speedup_mesh)}};
-  if (row.counts.receivers == 0) return facts;
-  const auto each = [](std::uint64_t count) { return static_cast<double>(count) / 1000; };
+  const auto each = [&](std::uint64_t count) {
+    return row.counts.receivers > 0 ? Json(static_cast<double>(count) / 1000) : Json(nullptr);
+  };
   facts["groups"] = each(row.counts.groups);
   facts["surfel_blocks"] = each(row.counts.surfel_blocks);
   facts["clusters"] = each(row.counts.clusters);
@@ -66,80 +66,24 @@ void write_text(const std::filesystem::path& path, const std::string& text) {
   file.publish();
 }
 
-/// The rows' members as columns.
+/// A cell of a CSV file (RFC 4180): nothing for null, words in quotes.
+std::string cell_of(const Json& value) {
+  if (value.is_null()) return {};
+  if (!value.is_string()) return value.dump();
+  std::string cell = "\"";
+  for (const char c : value.get_ref<const std::string&>()) cell += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return cell + '"';
+}
+
+/// The rows' members as columns; all rows have the same.
 std::string csv_of(const Json& rows) {
   std::string text;
-  if (rows.empty()) return text;
-  const auto line = [&](const Json& row, bool header) {
-    std::string cells;
-    for (const auto& [key, first] : rows.front().items()) {
-      const Json& value = header ? Json(key) : row.contains(key) ? row.at(key) : Json(nullptr);
-      if (!cells.empty()) cells += ',';
-      if (!value.is_null()) cells += value.dump();
-    }
-    return cells + "\n";
-  };
-  text += line(rows.front(), true);
-  for (const Json& row : rows) text += line(row, false);
-  return text;
-}
-
-/// What a panel shows over time.
-struct Measure {
-  const char* title;
-  const char* label;
-  Quantity job;
-  bool log_scale;
-  std::function<double(const AccuracyRow&)> value;
-};
-
-constexpr unsigned kMeasures = 5;
-
-const std::array<Measure, kMeasures>& measures() {
-  static const std::array<Measure, kMeasures> all{
-      {{"occlusion", "RMS error, % of the mean", Quantity::occlusion, true, [](const AccuracyRow& r) { return 100 * r.occlusion.rms; }},
-       {"irradiance", "RMS error, % of the mean", Quantity::bleeding, true, [](const AccuracyRow& r) { return 100 * r.irradiance.rms; }},
-       {"irradiance, bias", "mean error, % of the mean", Quantity::bleeding, false, [](const AccuracyRow& r) { return 100 * r.irradiance.bias; }},
-       {"irradiance, worst", "99th percentile, % of the mean", Quantity::bleeding, true, [](const AccuracyRow& r) { return 100 * r.irradiance.percentile_99; }},
-       {"picture", "mean FLIP", Quantity::bleeding, true, [](const AccuracyRow& r) { return r.flip; }}}};
-  return all;
-}
-
-ChartPanel panel_of(const std::vector<AccuracyRow>& rows, const std::string& scene, const std::string& set, const Measure& measure) {
-  ChartPanel panel{.title = fmt::format("{}, {}: {}", scene, set, measure.title),
-                   .x_label = "CPU time, us a receiver",
-                   .y_label = measure.label,
-                   .log_x = true,
-                   .log_y = measure.log_scale};
-  for (const char* method : {"ptcx", "plain", "embree-discs", "embree-mesh"}) {
-    ChartSeries series{.name = method};
-    for (const AccuracyRow& row : rows) {
-      if (row.scene != scene || row.set != set || row.method != method || row.job != measure.job) continue;
-      const Spread& us = row.us_per_receiver;
-      series.points.push_back({.x = us.median, .y = measure.value(row), .x_low = us.low, .x_high = us.high});
-    }
-    if (!series.points.empty()) panel.series.push_back(std::move(series));
+  for (const auto& [key, value] : rows.front().items()) text += (text.empty() ? "" : ",") + key;
+  for (const Json& row : rows) {
+    std::string separator = "\n";
+    for (const auto& [key, value] : row.items()) text += std::exchange(separator, ",") + cell_of(value);
   }
-  return panel;
-}
-
-std::string note_of(const SceneAccuracy& scene) {
-  std::string text;
-  for (const ReferenceNote& note : scene.references) {
-    text += fmt::format("{}, {}: {} surfels, {} receivers checked with {} rays each, whose own error is {:.2f} % of occlusion, "
-                        "{:.2f} % of irradiance", note.scene, note.set, scene.surfels, note.receivers, note.rays,
-                        100 * note.occlusion_noise, 100 * note.irradiance_noise);
-    if (std::isfinite(note.occlusion_floor)) {
-      text += fmt::format("; discs differ from the mesh by {:.1f} % and {:.1f} %", 100 * note.occlusion_floor, 100 * note.irradiance_floor);
-    }
-    text += ". ";
-  }
-  return text;
-}
-
-void write_both(const std::filesystem::path& directory, const std::string& name, const Chart& chart) {
-  write_chart(directory / (name + ".svg"), chart);
-  write_chart(directory / (name + ".png"), chart);
+  return text + "\n";
 }
 
 }  // namespace
@@ -157,42 +101,29 @@ void write_reports(const std::filesystem::path& directory, const std::vector<Sce
   const Json facts = facts_of(scenes);
   write_text(directory / "accuracy.json", facts.dump(2) + "\n");
   write_text(directory / "accuracy.csv", csv_of(facts.at("rows")));
-  Chart all{.title = "Time against error", .note = "Each error is against rays at the same model. ", .columns = 4};
-  for (const SceneAccuracy& scene : scenes) {
-    if (scene.references.empty()) continue;
-    const std::string& name = scene.references.front().scene;
-    Chart chart{.title = "Time against error: " + name, .note = note_of(scene), .columns = kMeasures};
-    for (const ReferenceNote& note : scene.references) {
-      for (const Measure& measure : measures()) {
-        if (note.set != "camera" && std::string_view(measure.label) == "mean FLIP") continue;
-        chart.panels.push_back(panel_of(scene.rows, name, note.set, measure));
-      }
-      for (const Measure& measure : {measures()[0], measures()[1]}) {
-        all.panels.push_back(panel_of(scene.rows, name, note.set, measure));
-      }
-    }
-    all.note += note_of(scene);
-    write_both(directory, "accuracy-" + name, chart);
-  }
-  write_both(directory, "accuracy", all);
+  const auto write_both = [&](const std::string& name, const Chart& chart) {
+    for (const char* ending : {".svg", ".png"}) write_chart(directory / (name + ending), chart);
+  };
+  for (const SceneAccuracy& scene : scenes) write_both("accuracy-" + scene.name(), chart_of(scene));
+  write_both("accuracy", chart_of(scenes));
 }
 
 std::string accuracy_text(const std::vector<SceneAccuracy>& scenes) {
   const auto or_dash = [](double value, const char* suffix) {
     return std::isfinite(value) ? fmt::format("{:.1f}{}", value, suffix) : std::string("-");
   };
-  std::string text = fmt::format("{:<10} {:<7} {:<10} {:<28} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "scene", "set", "job",
+  std::string text = fmt::format("{:<10} {:<7} {:<10} {:<32} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "scene", "set", "job",
                                  "setting", "us", "RMS %", "bias %", "p99 %", "FLIP", "x discs", "x mesh");
   for (const SceneAccuracy& scene : scenes) {
     for (const AccuracyRow& row : scene.rows) {
       const ErrorStatistics& e = row.error();
-      text += fmt::format("{:<10} {:<7} {:<10} {:<28} {:>9.1f} {:>8.2f} {:>+8.2f} {:>8.1f} {:>8} {:>8} {:>8}\n", row.scene, row.set,
+      text += fmt::format("{:<10} {:<7} {:<10} {:<32} {:>9.1f} {:>8.2f} {:>+8.2f} {:>8.1f} {:>8} {:>8} {:>8}\n", row.scene, row.set,
                           name_of(row.job), row.method == "ptcx" ? row.setting : row.method + ", " + row.setting,
                           row.us_per_receiver.median, 100 * e.rms, 100 * e.bias, 100 * e.percentile_99,
                           std::isfinite(row.flip) ? fmt::format("{:.4f}", row.flip) : "-", or_dash(row.speedup_discs, "x"),
                           or_dash(row.speedup_mesh, "x"));
     }
-    text += "  " + note_of(scene) + "\n";
+    for (const ReferenceNote& note : scene.references) text += note_text(note, scene) + "\n";
   }
   return text;
 }

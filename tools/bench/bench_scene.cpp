@@ -1,20 +1,59 @@
 #include "tools/bench/bench_scene.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <numbers>
+#include <set>
+#include <stdexcept>
 
 #include "engine/io/points.h"
-#include "engine/pipeline.h"
 #include "engine/primary.h"
 #include "engine/scene/city.h"
 #include "engine/shade/brute_force.h"
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
+#include "format/text.h"
 
 namespace ptc::bench {
 namespace {
 
 constexpr std::uint64_t kMostSurfels = 250'000'000;
+
+/// A name that charts, tables and file systems take.
+std::string plain_name(const std::filesystem::path& file) {
+  const std::string whole = file.filename().string();
+  std::string name = whole.substr(0, whole.find('.', 1));
+  const bool utf8 = is_utf8(name);
+  for (char& c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f || (byte >= 0x80 && !utf8)) c = '_';
+  }
+  return name;
+}
+
+using Hits = std::vector<std::optional<PrimaryHit>>;
+
+/// Receivers where pixels see something, and the window in their middle.
+ReceiverSet camera_set(const Hits& hits, unsigned width, unsigned height, const SceneOptions& options) {
+  ReceiverSet set{.name = "camera",
+                  .window_width = std::min(options.window_width, width),
+                  .window_height = std::min(options.window_height, height)};
+  const unsigned left = (width - set.window_width) / 2, top = (height - set.window_height) / 2;
+  for (unsigned y = 0; y < height; ++y) {
+    for (unsigned x = 0; x < width; ++x) {
+      const auto& hit = hits[std::size_t{y} * width + x];
+      const bool inside = x - left < set.window_width && y - top < set.window_height;
+      if (inside) set.window.push_back({.receiver = ReceiverSet::kNone});
+      if (!hit) continue;
+      if (inside) {
+        set.window.back() = {.receiver = set.receivers.size(), .albedo = hit->albedo, .direct = hit->direct};
+      }
+      set.receivers.push_back({hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
+    }
+  }
+  return set;
+}
 
 }  // namespace
 
@@ -26,19 +65,35 @@ SceneChoice parse_scene(const std::string& text) {
     rest.resize(rest.size() - kBackdrop.size());
     choice.backdrop = true;
   }
+  if (rest.empty()) throw std::invalid_argument("'" + text + "': a scene without a name");
   choice.name = rest;
-  if (rest == "fractal" || rest == "window" || rest == "city") return choice;
+  if (rest == "fractal" || rest == "window" || rest == "city") {
+    if (choice.backdrop) throw std::invalid_argument(text + ": a backdrop is for files of meshes");
+    return choice;
+  }
   choice.file = rest;
-  const std::string file_name = choice.file.filename().string();
-  choice.name = file_name.substr(0, file_name.find('.'));
+  choice.name = plain_name(choice.file);
   return choice;
+}
+
+std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts) {
+  std::vector<SceneChoice> choices;
+  std::set<std::string> taken;
+  for (const std::string& text : texts) {
+    SceneChoice choice = parse_scene(text);
+    const std::string name = choice.name;
+    for (int number = 2; !taken.insert(choice.name).second; ++number) {
+      choice.name = name + "-" + std::to_string(number);
+    }
+    choices.push_back(std::move(choice));
+  }
+  return choices;
 }
 
 BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
                        const RunOptions& run, Progress& progress)
-    : name_(choice.name), path_(work / (choice.name + ".ptcx")) {
-  load(choice, options, run, progress);
-  container_ = std::make_unique<ContainerReader>(path_);
+    : name_(choice.name) {
+  load(choice, options, work, run, progress);
   lit_.lights = recorded_lights(*container_);
   surfels_ = load_surfels(*container_, kMostSurfels);
   const Executor executor(run.threads);
@@ -46,16 +101,10 @@ BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options, c
   add_points(options);
 }
 
-BenchScene::~BenchScene() {
-  container_.reset();
-  std::error_code ignored;
-  std::filesystem::remove(path_, ignored);
-}
-
 double BenchScene::spacing() const { return surfel_spacing(*container_); }
 
-void BenchScene::load(const SceneChoice& choice, const SceneOptions& options, const RunOptions& run,
-                      Progress& progress) {
+void BenchScene::load(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
+                      const RunOptions& run, Progress& progress) {
   BuildRequest request{.backdrop = choice.backdrop, .run = run};
   request.sampling.count = options.points;
   std::vector<MeshCamera> cameras;
@@ -72,10 +121,12 @@ void BenchScene::load(const SceneChoice& choice, const SceneOptions& options, co
     request.inputs.push_back(choice.file);
     lit_.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, &cameras);
   }
-  build_container(request, path_, progress);
+  const std::filesystem::path path = work / (".ptcbench-" + std::to_string(getpid()) + ".ptcx");
+  build_container(request, path, progress);
+  container_ = std::make_unique<ContainerReader>(path);
+  std::filesystem::remove(path);  // what is open stays, and goes with this process however that ends
   if (!camera) {
-    const ContainerReader built(path_);
-    camera = default_camera(built, cameras, choice.backdrop, std::array{options.width, options.height});
+    camera = default_camera(*container_, cameras, choice.backdrop, std::array{options.width, options.height});
   }
   lit_.camera = *camera;
   lit_.camera.width = options.width;
@@ -84,9 +135,6 @@ void BenchScene::load(const SceneChoice& choice, const SceneOptions& options, co
 
 void BenchScene::add_camera(const SceneOptions& options, const Executor& executor, Progress& progress) {
   const Camera& camera = lit_.camera;
-  ReceiverSet set{.name = "camera",
-                  .window_width = std::min(options.window_width, camera.width),
-                  .window_height = std::min(options.window_height, camera.height)};
   std::optional<RayScene> rays;
   std::optional<DirectLight> light;
   std::unique_ptr<PrimaryView> view;
@@ -98,24 +146,14 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
     const auto radius = static_cast<float>(spacing() / std::numbers::sqrt2);
     view = view_mesh(*rays, *light, {.sun_rays = 1, .area_rays = 4, .sky_rays = 0}, camera, 1, options.lift * radius);
   }
-  std::vector<std::optional<PrimaryHit>> hits(std::size_t{camera.width} * camera.height);
-  executor.for_each(camera.height, [&](std::size_t y, unsigned) {
-    for (unsigned x = 0; x < camera.width; ++x) hits[y * camera.width + x] = view->at(x, static_cast<unsigned>(y));
+  const unsigned width = std::min(options.shaded_width, camera.width);
+  const unsigned height = std::min(options.shaded_height, camera.height);
+  const unsigned left = (camera.width - width) / 2, top = (camera.height - height) / 2;
+  Hits hits(std::size_t{width} * height);
+  executor.for_each(height, [&](std::size_t y, unsigned) {
+    for (unsigned x = 0; x < width; ++x) hits[y * width + x] = view->at(left + x, top + static_cast<unsigned>(y));
   });
-  const unsigned left = (camera.width - set.window_width) / 2, top = (camera.height - set.window_height) / 2;
-  for (unsigned y = 0; y < camera.height; ++y) {
-    for (unsigned x = 0; x < camera.width; ++x) {
-      const auto& hit = hits[std::size_t{y} * camera.width + x];
-      const bool inside = x - left < set.window_width && y - top < set.window_height;
-      if (inside) set.window.push_back({.receiver = ReceiverSet::kNone});
-      if (!hit) continue;
-      if (inside) {
-        set.window.back() = {.receiver = set.receivers.size(), .albedo = hit->albedo, .direct = hit->direct};
-      }
-      set.receivers.push_back({hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
-    }
-  }
-  sets_.push_back(std::move(set));
+  sets_.push_back(camera_set(hits, width, height, options));
 }
 
 /// Whole blocks of neighbours, evenly spread: what shading all points meets.

@@ -18,12 +18,15 @@ namespace ptc::bench {
 
 /// Which scene: "fractal", "window", "city", or a mesh's or cloud's file.
 struct SceneChoice {
-  std::string name;             ///< in charts: the word, or the file's name without ending
+  std::string name;             ///< in charts and their files: the word, or the file's name without ending
   std::filesystem::path file;   ///< empty for the words
   bool backdrop = false;        ///< the mesh stands on a ground before a wall
 };
-/// @param text  a word or a path, "+backdrop" appended where wanted
+/// @param text  a word, or a path with "+backdrop" appended where wanted
+/// @throws std::invalid_argument when a word has a backdrop, or there is neither word nor path
 [[nodiscard]] SceneChoice parse_scene(const std::string& text);
+/// Likewise; where names are equal the later ones end in "-2", "-3" and so on.
+[[nodiscard]] std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts);
 
 /// What a pixel of the camera's picture shows besides the light that is gathered.
 struct Pixel {
@@ -36,7 +39,7 @@ struct Pixel {
 struct ReceiverSet {
   std::string name;                  ///< "camera" or "points"
   std::vector<Receiver> receivers;
-  /// Of the camera: a window in the middle of its picture, row by row; receiver is kNone where
+  /// Of the camera: a window in the middle of those pixels, row by row; receiver is kNone where
   /// nothing is seen.
   static constexpr std::size_t kNone = ~std::size_t{0};
   std::vector<Pixel> window;
@@ -45,8 +48,9 @@ struct ReceiverSet {
 
 struct SceneOptions {
   std::uint64_t points = 2'000'000;           ///< surfels wanted; clouds have as many as they have
-  unsigned width = 640, height = 360;         ///< of the camera
-  unsigned window_width = 128, window_height = 72;
+  unsigned width = 640, height = 360;         ///< of the camera's picture
+  unsigned shaded_width = 640, shaded_height = 360;  ///< in its middle, whose pixels are receivers
+  unsigned window_width = 128, window_height = 72;   ///< in the middle of that, to compare pictures
   std::uint64_t own_points = 100'000;         ///< of the scene's points as receivers, in runs
   float lift = 0.15F;                         ///< as ShadeRequest::lift
 };
@@ -54,12 +58,10 @@ struct SceneOptions {
 /// Builds the container, loads what rays need, finds the receivers.
 class BenchScene {
  public:
-  /// @param work  a directory; the container stays there until the scene ends
+  /// @param work  a directory with room for the container, which has no name there once it is open
+  /// @throws DataError, std::system_error, std::invalid_argument as build_container()
   BenchScene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
              const RunOptions& run, Progress& progress);
-  ~BenchScene();
-  BenchScene(const BenchScene&) = delete;
-  BenchScene& operator=(const BenchScene&) = delete;
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const ContainerReader& container() const noexcept { return *container_; }
@@ -71,12 +73,12 @@ class BenchScene {
   [[nodiscard]] const std::vector<ReceiverSet>& sets() const noexcept { return sets_; }
 
  private:
-  void load(const SceneChoice& choice, const SceneOptions& options, const RunOptions& run, Progress& progress);
+  void load(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
+            const RunOptions& run, Progress& progress);
   void add_camera(const SceneOptions& options, const Executor& executor, Progress& progress);
   void add_points(const SceneOptions& options);
 
   std::string name_;
-  std::filesystem::path path_;
   LitScene lit_;
   std::unique_ptr<ContainerReader> container_;
   std::vector<Surfel> surfels_;

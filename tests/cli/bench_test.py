@@ -1,0 +1,125 @@
+"""ptcbench: what it measures, writes and refuses. Nothing here depends on how fast the machine is."""
+
+import csv
+import json
+import unittest
+
+from programs import ProgramTest, ball, write_ply
+
+METHODS = ["ptcx", "plain", "embree-discs", "embree-mesh"]
+
+
+class Bench(ProgramTest):
+    def measure(self, *arguments):
+        """Rows and references of a small run."""
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "accuracy", *arguments, "-o", charts, "--quick", "--quiet", "--checked", "20",
+                     "--repeats", "1", "--reference-rays", "256")
+        self.assertFalse([p.name for p in charts.iterdir() if p.name.startswith(".")])
+        return json.loads((charts / "accuracy.json").read_text())
+
+    def names(self, facts, key):
+        return sorted({row[key] for row in facts["rows"]})
+
+    def test_finer_settings_are_closer_to_the_truth(self):
+        # Two settings of PTCX; what rays and the plain gather do is timed as always.
+        charts = self.here / "charts"
+        settings = ["--setting", "0.06,0.3,32", "--setting", "0.005,0.07,32"]
+        printed = self.succeed("ptcbench", "accuracy", "fractal", "--quick", "--points", "20k", "--checked", "60",
+                               "--repeats", "1", "--reference-rays", "4096", *settings, "-o", charts, "--json")
+        facts = json.loads((charts / "accuracy.json").read_text())
+        self.assertEqual(json.loads(printed.stdout)["rows"], facts["rows"])
+        for place in ("camera", "points"):
+            for job in ("occlusion", "bleeding"):
+                rows = [r for r in facts["rows"] if r["set"] == place and r["job"] == job]
+                self.assertEqual(sorted({r["method"] for r in rows}), sorted(METHODS))
+                coarse, fine = (r for r in rows if r["method"] == "ptcx")
+                self.assertLess(fine["ao_rms"], 0.7 * coarse["ao_rms"])
+                self.assertLess(fine["ao_rms"], 0.02)
+                if job == "bleeding":
+                    self.assertLess(fine["e_rms"], 0.7 * coarse["e_rms"])
+                    self.assertLess(fine["e_rms"], 0.04)
+                rays = [r for r in rows if r["method"] == "embree-discs"]
+                self.assertEqual([r["setting"].split()[0] for r in rays], ["64", "256", "1024", "4096"])
+                self.assertLess(rays[3]["ao_rms"], 0.25 * rays[0]["ao_rms"])
+                self.assertTrue(all(r["us_per_receiver"] > 0 for r in rows))
+        for note in facts["references"]:  # well below what is measured
+            self.assertLess(note["ao_noise"], 0.005)
+            self.assertLess(note["e_noise"], 0.01)
+        for name in ("accuracy", "accuracy-fractal"):
+            self.assertIn("</svg>", (charts / (name + ".svg")).read_text())
+            self.assertEqual((charts / (name + ".png")).read_bytes()[:4], b"\x89PNG")
+        with open(charts / "accuracy.csv", newline="") as file:
+            lines = list(csv.reader(file))
+        self.assertEqual(lines[0], list(facts["rows"][0]))
+        self.assertEqual([len(line) for line in lines], [len(lines[0])] * (len(facts["rows"]) + 1))
+
+    def test_only_what_was_asked_for_is_measured(self):
+        facts = self.measure(self.mesh, "--method", "ptcx", "--set", "points", "--setting", "0.02,0.1,16")
+        self.assertEqual(self.names(facts, "method"), ["ptcx"])
+        self.assertEqual(self.names(facts, "set"), ["points"])
+        self.assertEqual(self.names(facts, "setting"), ["0.02 sr, 0.1 rad, R 16"])
+        facts = self.measure(self.mesh, "--method", "plain", "--method=embree-mesh", "--points", "2k")
+        self.assertEqual(self.names(facts, "method"), ["embree-mesh", "plain"])
+        self.assertEqual(self.names(facts, "set"), ["camera", "points"])
+
+    def test_a_cloud_has_no_mesh_to_be_measured(self):
+        cloud = self.here / "balls.ply"
+        lower = [(p[0], p[1], p[2] - 2.2, *p[3:]) for p in ball(600, 2)]
+        write_ply(cloud, ball(600) + lower)
+        facts = self.measure(cloud)
+        self.assertEqual(self.names(facts, "method"), ["embree-discs", "plain", "ptcx"])
+        self.assertTrue(all(row["ao_rms_mesh"] is None and row["speedup_mesh"] is None for row in facts["rows"]))
+        message = self.fail_with(1, "ptcbench", "accuracy", cloud, "--method", "embree-mesh", "--quick", "--checked",
+                                 "10", "-o", self.here / "charts")
+        self.assertIn("balls: nothing to measure", message)
+
+    def test_scenes_of_one_name_have_charts_of_their_own(self):
+        for folder in ("a", "b"):
+            (self.here / folder).mkdir()
+            (self.here / folder / "box.obj").write_text(self.mesh.read_text())
+        few = ["--method", "embree-mesh", "--set", "points", "--points", "1k"]
+        facts = self.measure(self.here / "a/box.obj", self.here / "b/box.obj+backdrop", *few)
+        self.assertEqual(self.names(facts, "scene"), ["box", "box-2"])
+        for name in ("box", "box-2"):
+            self.assertTrue((self.here / f"charts/accuracy-{name}.svg").is_file())
+
+    def test_containers_that_were_there_stay(self):
+        charts = self.here / "charts"
+        charts.mkdir()
+        (charts / "box.ptcx").write_text("precious")
+        self.measure(self.mesh, "--method", "embree-mesh", "--set", "points", "--points", "1k")
+        self.assertEqual((charts / "box.ptcx").read_text(), "precious")
+
+    def test_scenes_that_cannot_be_read_are_named(self):
+        empty, broken = self.here / "empty.obj", self.here / "broken.ply"
+        empty.touch()
+        broken.write_text("ply\nformat")
+        charts = self.here / "charts"
+        for scene, said in ((empty, "the file is empty"), (self.here, "Is a directory"),
+                            (self.here / "none.obj", "No such file or directory"),
+                            (self.here / "none.obj+backdrop", "No such file or directory")):
+            message = self.fail_with(1, "ptcbench", "accuracy", "fractal", scene, "-o", charts)
+            self.assertIn(str(scene).removesuffix("+backdrop") + ": ", message)
+            self.assertIn(said, message)
+        charts.mkdir()
+        self.assertIn(str(broken), self.fail_with(1, "ptcbench", "accuracy", broken, "-o", charts))
+        self.assertEqual(list(charts.iterdir()), [])
+
+    def test_an_unknown_word_is_told_those_that_are_known(self):
+        for word in ("fractals", "Window"):
+            message = self.fail_with(1, "ptcbench", "accuracy", word, "-o", self.here / "charts")
+            self.assertIn("fractal, window, city", message)
+
+    def test_words_that_cannot_be_meant_are_usage_errors(self):
+        for word in ("city+backdrop", "+backdrop", ""):
+            self.assertIn(word, self.fail_with(2, "ptcbench", "accuracy", word, "-o", self.here / "charts"))
+
+    def test_a_directory_that_cannot_be_made_is_the_machines_fault(self):
+        for place in (self.mesh, self.mesh / "charts"):
+            message = self.fail_with(3, "ptcbench", "accuracy", self.mesh, "--quick", "-o", place)
+            self.assertIn(str(self.mesh), message)
+
+
+if __name__ == "__main__":
+    unittest.main()
