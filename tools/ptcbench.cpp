@@ -36,7 +36,7 @@ ptc::GatherOptions parse_setting(const std::string& text) {
   constexpr double kPi = std::numbers::pi;
   const std::vector<double> n = ptc::parse_numbers("--setting", text, {3}, kExpected);
   const bool pixels = n[2] == 16 || n[2] == 32 || n[2] == 48 || n[2] == 64;
-  if (n[0] < 1e-6 ||  n[1] < 0 || n[1] > kPi || !pixels) {
+  if (n[0] < 1e-6 || n[0] > 4 * kPi || n[1] < 0 || n[1] > kPi || !pixels) {
     ptc::refuse("--setting", text, kExpected);
   }
   return {.solid_angle = static_cast<float>(n[0]),
