@@ -1,9 +1,9 @@
 #include "engine/shade/direction_buffer.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 
 #include <glm/geometric.hpp>
@@ -16,16 +16,6 @@ constexpr float kPi = 3.14159265F;
 
 /// Solid angle of the part of a cube face below and left of (u, v), up to a constant.
 double corner_solid_angle(double u, double v) { return std::atan2(u * v, std::sqrt(u * u + v * v + 1)); }
-
-/// Axes of a face: w points through it, u and v follow cyclically.
-///   face 0 +x  1 -x  2 +y  3 -y  4 +z  5 -z
-struct Axes {
-  int w, u, v;
-  float sign;
-};
-constexpr Axes axes_of(int face) {
-  return {face / 2, (face / 2 + 1) % 3, (face / 2 + 2) % 3, face % 2 == 0 ? 1.0F : -1.0F};
-}
 
 /// A rotation far from every symmetry of the axes; other variants turn on about a fixed axis by the
 /// golden angle, which comes near no multiple of a quarter soon.
@@ -43,7 +33,7 @@ FaceRows rows_over(const CubeGeometry& cube, const Horizon& horizon) {
   const float slack = horizon.cone_sin * 1.7320509F;  // the longest (1, u, v)
   FaceRows rows{};
   for (int face = 0; face < 6; ++face) {
-    const Axes a = axes_of(face);
+    const CubeFace a(face);
     const float best = n[a.w] * a.sign + std::abs(n[a.u]) + slack;
     int first = 0, end = cube.resolution;
     while (first < end && best + n[a.v] * cube.centre[first] <= 0) ++first;
@@ -59,11 +49,12 @@ FaceRows rows_over(const CubeGeometry& cube, const Horizon& horizon) {
 DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
                              unsigned variant)
     : variant_(variant) {
-  if (resolution == 0 || resolution > 64 || resolution % 16 != 0) {
+  if (resolution == 0 || resolution > kMostResolution || resolution % 16 != 0) {
     throw std::invalid_argument("DirectionGrid: the resolution is 16, 32, 48 or 64");
   }
   const double step = 2.0 / resolution;
   for (unsigned i = 0; i < resolution; ++i) centre_.push_back(static_cast<float>((i + 0.5) * step - 1));
+  centre_.resize(resolution + DiscQueue::kReadLanes, std::numeric_limits<float>::quiet_NaN());
   for (unsigned y = 0; y < resolution; ++y) {
     for (unsigned x = 0; x < resolution; ++x) {
       const double u = x * step - 1, v = y * step - 1;
@@ -92,7 +83,7 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
   const std::size_t plane = std::size_t{resolution} * resolution;
   sky_.resize(6 * 3 * plane);
   for (int face = 0; face < 6; ++face) {
-    const Axes a = axes_of(face);
+    const CubeFace a(face);
     for (std::size_t pixel = 0; pixel < plane; ++pixel) {
       // Four samples a pixel: maps are sharper than pixels.
       glm::vec3 sum(0);
@@ -110,7 +101,7 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
 }
 
 DirectionBuffer::DirectionBuffer(unsigned resolution)
-    : nearness_(std::size_t{6} * resolution * resolution + 1, 0), rgbe_(nearness_.size(), 0) {}
+    : nearness_(std::size_t{6} * resolution * resolution + std::size_t{4} * resolution, 0), rgbe_(nearness_.size(), 0) {}
 
 void DirectionBuffer::clear() noexcept {
   std::ranges::fill(nearness_, 0.0F);
@@ -131,37 +122,20 @@ void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Si
 Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
                                  std::span<const glm::vec3> offsets) const noexcept {
   const glm::mat3& rotation = grid.geometry_.rotation;
-  const glm::vec3 n = rotation * normal;
-  const std::size_t plane = std::size_t{grid.resolution()} * grid.resolution();
-  std::array<glm::vec3, kViewpoints> turned{};
-  for (std::size_t i = 0; i < offsets.size(); ++i) turned[i] = rotation * offsets[i];
-  FaceOffsets moves;
-  FaceSums sums;
-  glm::vec3 open(0);
-  for (int face = 0; face < 6; ++face) {
-    const Axes a = axes_of(face);
-    const float nw = n[a.w] * a.sign, nu = n[a.u], nv = n[a.v];
-    if (nw + std::abs(nu) + std::abs(nv) <= 0) continue;
-    sums.open = {};
-    const float* sky = grid.sky_.empty() ? nullptr : grid.sky_.data() + static_cast<std::size_t>(3 * face) * plane;
-    const std::size_t first = static_cast<std::size_t>(face) * plane;
-    for (std::size_t i = 0; i < kViewpoints; ++i) {
-      moves.w[i] = turned[i][a.w] * a.sign;
-      moves.u[i] = turned[i][a.u];
-      moves.v[i] = turned[i][a.v];
-    }
-    sum_face(grid.geometry_, {nearness_.data() + first, rgbe_.data() + first}, sky, nw, nu, nv,
-             offsets.empty() ? nullptr : &moves, sums);
-    open[a.w] += a.sign * sums.open[0];
-    open[a.u] += sums.open[1];
-    open[a.v] += sums.open[2];
+  ViewOffsets turned{};
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    const glm::vec3 offset = rotation * offsets[i];
+    for (int k = 0; k < 3; ++k) turned.axis[k][i] = offset[k];
   }
+  PixelSums sums;
+  sum_pixels(grid.geometry_, {nearness_.data(), rgbe_.data()}, grid.sky_.empty() ? nullptr : grid.sky_.data(),
+             rotation * normal, offsets.empty() ? nullptr : &turned, sums);
   Shading shading;
   shading.occlusion = sums.covered / sums.total;
-  shading.irradiance = glm::vec3(sums.light[0], sums.light[1], sums.light[2]) * (kPi / sums.total);
-  shading.sky = glm::vec3(sums.sky[0], sums.sky[1], sums.sky[2]) * (kPi / sums.total);
-  const float length = std::sqrt(glm::dot(open, open));
-  shading.bent_normal = length > 0 ? glm::transpose(rotation) * (open / length) : normal;
+  shading.irradiance = sums.light * (kPi / sums.total);
+  shading.sky = sums.sky * (kPi / sums.total);
+  const float length = glm::length(sums.open);
+  shading.bent_normal = length > 0 ? glm::transpose(rotation) * (sums.open / length) : normal;
   return shading;
 }
 

@@ -10,16 +10,17 @@ namespace ptc {
 /// Oriented discs relative to the receiver that they are drawn for, in scene units.
 struct DiscQueue {
   static constexpr int kCapacity = 1024;
-  static constexpr int kLanes = 8;  ///< a push may write so many, and a reader reads so many
+  static constexpr int kLanes = 8;       ///< a push may write so many
+  static constexpr int kReadLanes = 16;  ///< a reader reads so many at once
 
-  alignas(64) float x[kCapacity + kLanes];
-  float y[kCapacity + kLanes];
-  float z[kCapacity + kLanes];
-  float nx[kCapacity + kLanes];  ///< unit
-  float ny[kCapacity + kLanes];
-  float nz[kCapacity + kLanes];
-  float radius[kCapacity + kLanes];
-  std::uint32_t rgbe[kCapacity + kLanes];  ///< colour of the front; the back is black
+  alignas(64) float x[kCapacity + kReadLanes];
+  float y[kCapacity + kReadLanes];
+  float z[kCapacity + kReadLanes];
+  float nx[kCapacity + kReadLanes];  ///< unit
+  float ny[kCapacity + kReadLanes];
+  float nz[kCapacity + kReadLanes];
+  float radius[kCapacity + kReadLanes];
+  std::uint32_t rgbe[kCapacity + kReadLanes];  ///< colour of the front; the back is black
   int size = 0;
 
   [[nodiscard]] bool full() const noexcept { return size > kCapacity - kLanes; }

@@ -17,7 +17,7 @@ HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
-constexpr int kLanes = DiscQueue::kLanes;
+constexpr int kLanes = DiscQueue::kReadLanes;
 using F = hn::CappedTag<float, kLanes>;
 using I = hn::RebindToSigned<F>;
 using U = hn::RebindToUnsigned<F>;
@@ -59,39 +59,68 @@ HWY_INLINE void cover(float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT 
   hn::StoreU(hn::IfThenElse(hn::RebindMask(u, take), colour, old_colour), u, rgbe);
 }
 
-/// @param centre  as CubeGeometry has it
-HWY_INLINE void draw_on_face(const float* HWY_RESTRICT centre, int resolution, const CubePixels& pixels,
-                             const FaceDiscs& discs, std::size_t i, std::uint32_t rgbe, VU viewpoint) {
-  const F f;
-  const auto aa = hn::Set(f, discs.aa[i]);
-  const auto alpha = hn::Set(f, discs.alpha[i]);
-  const auto square = hn::Set(f, discs.square[i]);
-  const auto inverse = hn::Set(f, discs.inverse[i]);
-  const auto bump = hn::Set(f, discs.bump[i]);
-  const auto u0 = hn::Set(f, discs.u0[i]);
-  const auto colour = hn::Set(U(), rgbe);
-  const float v0 = discs.v0[i], ab2 = discs.ab2[i], bb = discs.bb[i], beta = discs.beta[i];
-  const int lanes = static_cast<int>(hn::Lanes(f)), x0 = discs.x0[i] & -lanes, x1 = discs.x1[i], y1 = discs.y1[i];
-  const std::ptrdiff_t first = discs.first[i] + discs.y0[i] * resolution;
-  float* HWY_RESTRICT nearness = pixels.nearness + first;
-  std::uint32_t* HWY_RESTRICT colours = pixels.rgbe + first;
-  for (int y = discs.y0[i]; y < y1; ++y, nearness += resolution, colours += resolution) {
-    const float dv = centre[y] - v0;
-    const auto b = hn::Set(f, ab2 * dv), c = hn::Set(f, bb * dv * dv), w0 = hn::Set(f, 1 + beta * dv);
-    for (int x = x0; x < x1; x += lanes) {
-      const auto du = hn::Sub(hn::LoadU(f, centre + x), u0);
-      const auto form = hn::MulAdd(hn::MulAdd(aa, du, b), du, c);
-      const auto w = hn::MulAdd(alpha, du, w0);
-      const auto near = hn::NegMulAdd(form, bump, hn::Mul(w, inverse));  // below 0 behind the receiver
-      const auto inside = hn::Lt(form, hn::Mul(square, hn::Mul(w, w)));
-      cover(nearness + x, colours + x, near, inside, colour, viewpoint);
+/// What a vector of pixels needs of a disc.
+struct FaceDisc {
+  VF aa, alpha, square, inverse, bump, u0;
+  VU colour;
+  float v0, ab2, bb, beta;
+
+  HWY_INLINE FaceDisc(const FaceDiscs& discs, std::size_t i, std::uint32_t rgbe)
+      : aa(hn::Set(F(), discs.aa[i])),
+        alpha(hn::Set(F(), discs.alpha[i])),
+        square(hn::Set(F(), discs.square[i])),
+        inverse(hn::Set(F(), discs.inverse[i])),
+        bump(hn::Set(F(), discs.bump[i])),
+        u0(hn::Set(F(), discs.u0[i])),
+        colour(hn::Set(U(), rgbe)),
+        v0(discs.v0[i]),
+        ab2(discs.ab2[i]),
+        bb(discs.bb[i]),
+        beta(discs.beta[i]) {}
+
+  /// @param v  of the row
+  HWY_INLINE void draw(VF u, float v, float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT rgbe, VU viewpoint) const {
+    const F f;
+    const float dv = v - v0;
+    const auto du = hn::Sub(u, u0);
+    const auto form = hn::MulAdd(hn::MulAdd(aa, du, hn::Set(f, ab2 * dv)), du, hn::Set(f, bb * dv * dv));
+    const auto w = hn::MulAdd(alpha, du, hn::Set(f, 1 + beta * dv));
+    const auto near = hn::NegMulAdd(form, bump, hn::Mul(w, inverse));  // below 0 behind the receiver
+    cover(nearness, rgbe, near, hn::Lt(form, hn::Mul(square, hn::Mul(w, w))), colour, viewpoint);
+  }
+};
+
+/// Draws a disc that reaches into one vector of each of so many rows at most. The rows that it does not reach
+/// are drawn too, without a branch; past the face, centres are NaN and nothing is inside.
+template <int kRows>
+HWY_INLINE void draw_narrow(const CubeGeometry& cube, const CubePixels& pixels, const FaceDiscs& discs, std::size_t i,
+                            std::uint32_t rgbe, VU viewpoint) {
+  const FaceDisc disc(discs, i, rgbe);
+  const std::ptrdiff_t first = discs.first[i] + discs.y0[i] * cube.resolution + discs.x0[i];
+  const auto u = hn::LoadU(F(), cube.centre + discs.x0[i]);
+  for (int row = 0; row < kRows; ++row) {
+    const std::ptrdiff_t at = first + row * cube.resolution;
+    disc.draw(u, cube.centre[discs.y0[i] + row], pixels.nearness + at, pixels.rgbe + at, viewpoint);
+  }
+}
+
+/// Draws a disc of any size.
+HWY_INLINE void draw_broad(const CubeGeometry& cube, const CubePixels& pixels, const FaceDiscs& discs, std::size_t i,
+                           std::uint32_t rgbe, VU viewpoint) {
+  const FaceDisc disc(discs, i, rgbe);
+  const int lanes = static_cast<int>(hn::Lanes(F())), x1 = discs.x1[i], y1 = discs.y1[i];
+  std::ptrdiff_t row = discs.first[i] + discs.y0[i] * cube.resolution;
+  for (int y = discs.y0[i]; y < y1; ++y, row += cube.resolution) {
+    for (int x = discs.x0[i]; x < x1; x += lanes) {
+      disc.draw(hn::LoadU(F(), cube.centre + x), cube.centre[y], pixels.nearness + row + x, pixels.rgbe + row + x, viewpoint);
     }
   }
 }
 
-/// Columns of a row that a disc may cover.
-struct Span {
-  int first = 0, end = 0;
+/// Columns of each row that a disc may cover, from `first` up to `end`.
+struct Spans {
+  alignas(64) std::int32_t first[kMostResolution + kLanes];
+  std::int32_t end[kMostResolution + kLanes];
 };
 
 /// A disc in the axes of a face. The pixel (1, u, v) meets its plane at t = height / slope,
@@ -100,33 +129,47 @@ struct Span {
 struct WideDisc {
   float cw, cu, cv, nw, nu, nv;
   float radius, height;
-  float d = cw * cw + cu * cu + cv * cv - radius * radius;
-  float a = height * height - 2 * height * nu * cu + nu * nu * d;  // of u^2
-  float per_a = 1 / a;
 
-  [[nodiscard]] Span columns(float v, int resolution) const {
-    if (!(a > 1e-6F * radius * radius)) return {0, resolution};
-    const float slope = nw + nv * v, ahead = cw + cv * v;
-    const float b = nu * slope * d - height * (slope * cu + nu * ahead);  // half of the linear term
-    const float c = height * height * (1 + v * v) - 2 * height * slope * ahead + slope * slope * d;
-    const float square = b * b - a * c;
-    if (square <= 0) return {};
-    const float root = std::sqrt(square), scale = 0.5F * static_cast<float>(resolution);
-    const auto pixel = [&](float u) { return std::clamp((u + 1) * scale, 0.0F, 2 * scale); };
-    const float low = pixel((-b - root) * per_a) - 0.5F - kWideSlack, high = pixel((-b + root) * per_a) + 0.5F + kWideSlack;
-    return {static_cast<int>(std::max(0.0F, low)), std::min(resolution, static_cast<int>(high))};
+  HWY_INLINE void find_spans(const CubeGeometry& cube, int first_row, int end_row, Spans& spans) const {
+    const F f;
+    const I i;
+    const auto set = [&](float value) { return hn::Set(f, value); };
+    const float edge = static_cast<float>(cube.resolution);
+    const float d = cw * cw + cu * cu + cv * cv - radius * radius;
+    const float a = height * height - 2 * height * nu * cu + nu * nu * d;  // of u^2
+    const bool bounded = a > 1e-6F * radius * radius;
+    const auto pixel = [&](VF u) { return hn::Min(hn::Max(hn::MulAdd(u, set(0.5F * edge), set(0.5F * edge)), hn::Zero(f)), set(edge)); };
+    for (int y = first_row; y < end_row; y += static_cast<int>(hn::Lanes(f))) {
+      auto first = hn::Zero(i), end = hn::Set(i, cube.resolution);
+      if (bounded) {
+        const auto v = hn::LoadU(f, cube.centre + y);
+        const auto slope = hn::MulAdd(set(nv), v, set(nw)), ahead = hn::MulAdd(set(cv), v, set(cw));
+        // Half of the linear term, and the constant one.
+        const auto b = hn::MulSub(set(nu * d), slope, hn::Mul(set(height), hn::MulAdd(set(cu), slope, hn::Mul(set(nu), ahead))));
+        const auto square_v = hn::MulAdd(hn::Mul(v, v), set(height * height), set(height * height));
+        const auto c = hn::MulAdd(slope, hn::MulSub(set(d), slope, hn::Mul(set(2 * height), ahead)), square_v);
+        const auto square = hn::MulSub(b, b, hn::Mul(set(a), c));
+        const auto root = hn::Sqrt(hn::Max(square, hn::Zero(f))), per_a = set(1 / a);
+        const auto low = pixel(hn::Mul(hn::Neg(hn::Add(b, root)), per_a)), high = pixel(hn::Mul(hn::Sub(root, b), per_a));
+        first = hn::ConvertTo(i, hn::Max(hn::Sub(low, set(0.5F + kWideSlack)), hn::Zero(f)));
+        end = hn::ConvertTo(i, hn::Min(hn::Add(high, set(0.5F + kWideSlack)), set(edge)));
+        end = hn::IfThenElseZero(hn::RebindMask(i, hn::Gt(square, hn::Zero(f))), end);
+      }
+      hn::StoreU(first, i, spans.first + y);
+      hn::StoreU(end, i, spans.end + y);
+    }
   }
 };
 
 /// Covers what a row of pixels sees of a disc, one division a vector.
 HWY_INLINE void draw_wide_row(const CubeGeometry& cube, const CubePixels& pixels, const WideDisc& disc, int y, int row,
-                              const Span& span, VU colour, VU viewpoint) {
+                              int first, int end, VU colour, VU viewpoint) {
   const F f;
   const auto lanes = static_cast<int>(hn::Lanes(f));
   const float v = cube.centre[y];
   const auto row_slope = hn::Set(f, disc.nw + disc.nv * v), per_height = hn::Set(f, 1 / disc.height);
   const auto square = hn::Set(f, disc.radius * disc.radius), bump = hn::Set(f, kBump / disc.radius);
-  for (int x = span.first & -lanes; x < span.end; x += lanes) {
+  for (int x = first & -lanes; x < end; x += lanes) {
     const auto u = hn::LoadU(f, cube.centre + x);
     const auto plane = hn::Mul(hn::MulAdd(hn::Set(f, disc.nu), u, row_slope), per_height);  // nearness of it
     const auto t = hn::Div(hn::Set(f, 1.0F), plane);  // infinite, negative or NaN: a miss
@@ -145,31 +188,19 @@ HWY_INLINE void draw_wide_row(const CubeGeometry& cube, const CubePixels& pixels
 void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const float (&c)[3],
                     const float (&n)[3], float radius, std::uint32_t rgbe, VU viewpoint) {
   const auto colour = hn::Set(U(), rgbe);
+  Spans spans;
   for (int face = 0; face < 6; ++face) {
-    const int a = face / 2, u = (a + 1) % 3, v = (a + 2) % 3;
-    const float sign = face % 2 == 0 ? 1.0F : -1.0F;
-    const float reach = c[a] * sign + radius * std::sqrt(std::max(0.0F, 1 - n[a] * n[a]));
+    const CubeFace a(face);
+    const float reach = c[a.w] * a.sign + radius * std::sqrt(std::max(0.0F, 1 - n[a.w] * n[a.w]));
     if (reach <= 0) continue;
-    const WideDisc disc{.cw = c[a] * sign, .cu = c[u], .cv = c[v], .nw = n[a] * sign, .nu = n[u], .nv = n[v],
+    const WideDisc disc{.cw = c[a.w] * a.sign, .cu = c[a.u], .cv = c[a.v], .nw = n[a.w] * a.sign, .nu = n[a.u], .nv = n[a.v],
                         .radius = radius, .height = c[0] * n[0] + c[1] * n[1] + c[2] * n[2]};
+    disc.find_spans(cube, rows.first[face], rows.end[face], spans);
     for (int y = rows.first[face]; y < rows.end[face]; ++y) {
-      const Span span = disc.columns(cube.centre[y], cube.resolution);
-      draw_wide_row(cube, pixels, disc, y, (face * cube.resolution + y) * cube.resolution, span, colour, viewpoint);
+      draw_wide_row(cube, pixels, disc, y, (face * cube.resolution + y) * cube.resolution, spans.first[y], spans.end[y],
+                    colour, viewpoint);
     }
   }
-}
-
-/// The span of pixels whose centres lie within [middle - half, middle + half] on a face's axis.
-HWY_INLINE void store_span(VF middle, VF half, float resolution, std::int32_t* first,
-                           std::int32_t* last) {
-  const F f;
-  const I i;
-  const auto scale = hn::Set(f, resolution * 0.5F);
-  const auto low = hn::MulAdd(hn::Sub(middle, half), scale, hn::Set(f, resolution * 0.5F - 0.5F - kSlack));
-  const auto high = hn::MulAdd(hn::Add(middle, half), scale, hn::Set(f, resolution * 0.5F + 0.5F + kSlack));
-  const auto clamp = [&](auto v) { return hn::Min(hn::Max(v, hn::Zero(f)), hn::Set(f, resolution)); };
-  hn::StoreU(hn::ConvertTo(i, hn::Ceil(clamp(low))), i, first);
-  hn::StoreU(hn::ConvertTo(i, hn::Floor(clamp(high))), i, last);
 }
 
 /// Discs in the axes of the cube, a lane each.
@@ -185,13 +216,14 @@ struct FaceLanes {
   VF radius, radius2;
 };
 
-/// Discs that faces across one axis see, in columns.
-struct AxisDiscs {
-  alignas(64) float cw[kChunk + kLanes];  ///< negative: before the face of the negative side
-  float cu[kChunk + kLanes], cv[kChunk + kLanes], nw[kChunk + kLanes], nu[kChunk + kLanes], nv[kChunk + kLanes];
-  float radius[kChunk + kLanes];
-  std::uint32_t rgbe[kChunk + kLanes];
-  std::size_t size;
+/// Discs in the axes of the faces that see them, in columns.
+struct FaceQueue {
+  static constexpr int kCapacity = 3 * kChunk + kLanes;  // a disc is before three faces at most
+  alignas(64) float cw[kCapacity];
+  float cu[kCapacity], cv[kCapacity], nw[kCapacity], nu[kCapacity], nv[kCapacity], radius[kCapacity];
+  std::uint32_t rgbe[kCapacity];
+  std::int32_t face[kCapacity];
+  std::size_t size = 0;
 };
 
 HWY_INLINE VF dot(const VF (&a)[3], const VF (&b)[3]) {
@@ -233,10 +265,28 @@ HWY_INLINE void draw_wide_discs(const CubeGeometry& cube, const CubePixels& pixe
   }
 }
 
-/// Stores which pixels discs may cover. @return the discs that cover some
+/// Pixels that discs may cover.
+struct FaceBounds {
+  hn::VFromD<I> x0, x1, y0, y1;
+  MF seen;  // those that may cover some
+
+  /// Discs of so many rows at most that begin and end in one vector.
+  HWY_INLINE MF within(int rows) const {
+    const I i;
+    const auto narrow = hn::Lt(hn::Sub(x1, x0), hn::Set(i, static_cast<int>(hn::Lanes(i)) + 1));
+    return hn::RebindMask(F(), hn::And(narrow, hn::Lt(hn::Sub(y1, y0), hn::Set(i, rows + 1))));
+  }
+  HWY_INLINE void store(FaceDiscs& out) const {
+    const I i;
+    hn::StoreU(x0, i, out.x0);
+    hn::StoreU(x1, i, out.x1);
+    hn::StoreU(y0, i, out.y0);
+    hn::StoreU(y1, i, out.y1);
+  }
+};
+
 /// @param first_row, end_row  of the pixels that matter
-HWY_INLINE MF store_bounds(const FaceLanes& d, float resolution, hn::VFromD<I> first_row, hn::VFromD<I> end_row,
-                           FaceDiscs& out) {
+HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I> first_row, hn::VFromD<I> end_row) {
   const F f;
   const I i;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
@@ -245,22 +295,34 @@ HWY_INLINE MF store_bounds(const FaceLanes& d, float resolution, hn::VFromD<I> f
   const auto p = hn::NegMulAdd(d.cw, d.cw, ew2);  // ew^2 - cw^2, below 0 where the disc is in front
   const auto whole = hn::Ge(p, hn::Mul(hn::Set(f, -1e-4F), d.radius2));
   const auto per_p = hn::Div(hn::Set(f, -1.0F), p);
-  const auto span = [&](VF cx, VF nx, VF ny, std::int32_t* first, std::int32_t* last) {
+  const float edge = static_cast<float>(resolution);
+  const auto scale = hn::Set(f, 0.5F * edge);
+  const auto pixel = [&](VF at, float slack) {
+    return hn::Min(hn::Max(hn::MulAdd(at, scale, hn::Set(f, 0.5F * edge + slack)), zero), hn::Set(f, edge));
+  };
+  // The span of pixels whose centres lie within middle -+ half.
+  const auto span = [&](VF cx, VF nx, VF ny, hn::VFromD<I>& first, hn::VFromD<I>& end) {
     const auto q = hn::MulAdd(cx, d.cw, hn::Mul(d.radius2, hn::Mul(nx, d.nw)));
     const auto cross = hn::MulSub(d.cw, nx, hn::Mul(cx, d.nw));
     auto s = hn::MulAdd(d.cw, d.cw, hn::Mul(cx, cx));
     s = hn::NegMulAdd(cross, cross, s);
     s = hn::NegMulAdd(d.radius2, hn::Mul(ny, ny), s);
-    const auto half = hn::Mul(d.radius, hn::Sqrt(hn::Max(s, zero)));
-    store_span(hn::IfThenZeroElse(whole, hn::Mul(q, per_p)), hn::IfThenElse(whole, one, hn::Mul(half, per_p)),
-               resolution, first, last);
+    const auto middle = hn::IfThenZeroElse(whole, hn::Mul(q, per_p));
+    const auto half = hn::IfThenElse(whole, one, hn::Mul(hn::Mul(d.radius, hn::Sqrt(hn::Max(s, zero))), per_p));
+    first = hn::ConvertTo(i, hn::Ceil(pixel(hn::Sub(middle, half), -0.5F - kSlack)));
+    end = hn::ConvertTo(i, hn::Floor(pixel(hn::Add(middle, half), 0.5F + kSlack)));
   };
-  span(d.cu, d.nu, d.nv, out.x0, out.x1);
-  span(d.cv, d.nv, d.nu, out.y0, out.y1);
-  const auto y0 = hn::Max(hn::LoadU(i, out.y0), first_row), y1 = hn::Min(hn::LoadU(i, out.y1), end_row);
-  hn::StoreU(y0, i, out.y0);
-  hn::StoreU(y1, i, out.y1);
-  return hn::RebindMask(f, hn::And(hn::Lt(hn::LoadU(i, out.x0), hn::LoadU(i, out.x1)), hn::Lt(y0, y1)));
+  FaceBounds b;
+  span(d.cu, d.nu, d.nv, b.x0, b.x1);
+  span(d.cv, d.nv, d.nu, b.y0, b.y1);
+  b.y0 = hn::Max(b.y0, first_row);
+  b.y1 = hn::Min(b.y1, end_row);
+  b.seen = hn::RebindMask(f, hn::And(hn::Lt(b.x0, b.x1), hn::Lt(b.y0, b.y1)));
+  // Whole vectors where that takes no more of them.
+  const int lanes = static_cast<int>(hn::Lanes(i));
+  const auto aligned = hn::And(b.x0, hn::Set(i, -lanes));
+  b.x0 = hn::IfThenElse(hn::Lt(hn::Sub(b.x1, aligned), hn::Set(i, lanes + 1)), aligned, b.x0);
+  return b;
 }
 
 /// Stores what says which pixels discs cover, and how near.
@@ -286,56 +348,64 @@ HWY_INLINE void store_forms(const FaceLanes& d, VF per_height, FaceDiscs& out) {
   hn::StoreU(hn::Div(hn::Set(f, kBump), hn::Mul(d.radius, hn::Sqrt(length2))), f, out.bump);
 }
 
-/// Sorts discs by the axes across which faces see them: each on the face that its centre lies before. A
+/// Appends discs to the faces that may see them, each across every axis on the side where its centre is. A
 /// disc seen under less than 30 degrees reaches no face whose side its centre is not on.
-HWY_INLINE void sort_by_axis(const CubeLanes& discs, MF mask, VU colour, AxisDiscs (&axes)[3]) {
+HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQueue& out) {
   const F f;
+  const I i;
   const U u32;
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    const auto far = hn::Add(hn::Abs(discs.c[axis]), discs.radius);  // beyond it no sphere around the disc reaches
+    const auto cw = hn::Abs(discs.c[axis]), far = hn::Add(cw, discs.radius);  // no sphere around the disc reaches beyond
     const auto reaches = [&](VF c) { return hn::Lt(hn::Sub(hn::Abs(c), discs.radius), far); };
     const auto seen = hn::And(mask, hn::And(reaches(discs.c[u]), reaches(discs.c[v])));
-    AxisDiscs& out = axes[axis];
+    const auto negative = hn::Lt(discs.c[axis], hn::Zero(f));
     const std::size_t at = out.size;
-    hn::CompressBlendedStore(discs.c[axis], seen, f, out.cw + at);
+    hn::CompressBlendedStore(cw, seen, f, out.cw + at);
     hn::CompressBlendedStore(discs.c[u], seen, f, out.cu + at);
     hn::CompressBlendedStore(discs.c[v], seen, f, out.cv + at);
-    hn::CompressBlendedStore(discs.n[axis], seen, f, out.nw + at);
+    hn::CompressBlendedStore(hn::IfThenElse(negative, hn::Neg(discs.n[axis]), discs.n[axis]), seen, f, out.nw + at);
     hn::CompressBlendedStore(discs.n[u], seen, f, out.nu + at);
     hn::CompressBlendedStore(discs.n[v], seen, f, out.nv + at);
     hn::CompressBlendedStore(discs.radius, seen, f, out.radius + at);
+    const auto face = hn::IfThenElse(hn::RebindMask(i, negative), hn::Set(i, 2 * axis + 1), hn::Set(i, 2 * axis));
+    hn::CompressBlendedStore(face, hn::RebindMask(i, seen), i, out.face + at);
     out.size += hn::CompressBlendedStore(colour, hn::RebindMask(u32, seen), u32, out.rgbe + at);
   }
 }
 
-/// Draws the discs of an axis.
-HWY_INLINE void draw_across(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
-                            const AxisDiscs& discs, int axis, VU viewpoint) {
+/// Draws the discs of a queue.
+HWY_INLINE void draw_queue(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const FaceQueue& queue,
+                           VU viewpoint) {
   const F f;
   const I i;
-  const int face_pixels = cube.resolution * cube.resolution, plus = 2 * axis, minus = 2 * axis + 1;
   FaceDiscs set;
-  for (std::size_t begin = 0; begin < discs.size; begin += hn::Lanes(f)) {
+  for (std::size_t begin = 0; begin < queue.size; begin += hn::Lanes(f)) {
     const auto load = [&](const float* column) { return hn::LoadU(f, column + begin); };
-    const auto cw = load(discs.cw), nw = load(discs.nw), radius = load(discs.radius);
-    const auto negative = hn::Lt(cw, hn::Zero(f));
-    const FaceLanes d{hn::Abs(cw), load(discs.cu), load(discs.cv), hn::IfThenElse(negative, hn::Neg(nw), nw),
-                      load(discs.nu), load(discs.nv), radius, hn::Mul(radius, radius)};
-    const auto of_face = [&](int at_plus, int at_minus) {
-      return hn::IfThenElse(hn::RebindMask(i, negative), hn::Set(i, at_minus), hn::Set(i, at_plus));
-    };
-    auto mask = store_bounds(d, static_cast<float>(cube.resolution), of_face(rows.first[plus], rows.first[minus]),
-                             of_face(rows.end[plus], rows.end[minus]), set);
-    mask = hn::And(mask, hn::FirstN(f, discs.size - begin));
+    const auto radius = load(queue.radius);
+    const FaceLanes d{load(queue.cw), load(queue.cu), load(queue.cv), load(queue.nw),
+                      load(queue.nu), load(queue.nv), radius, hn::Mul(radius, radius)};
+    auto mask = hn::FirstN(f, queue.size - begin);
+    const auto face = hn::IfThenElseZero(hn::RebindMask(i, mask), hn::LoadU(i, queue.face + begin));
+    const FaceBounds bounds = bounds_of(d, cube.resolution, hn::GatherIndex(i, rows.first, face), hn::GatherIndex(i, rows.end, face));
+    mask = hn::And(mask, bounds.seen);
     if (hn::AllFalse(f, mask)) continue;
     const auto height = hn::MulAdd(d.cw, d.nw, hn::MulAdd(d.cu, d.nu, hn::Mul(d.cv, d.nv)));
     store_forms(d, hn::Div(hn::Set(f, 1.0F), height), set);
-    hn::StoreU(of_face(plus * face_pixels, minus * face_pixels), i, set.first);
-    for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
-      const auto k = static_cast<std::size_t>(std::countr_zero(rest));
-      draw_on_face(cube.centre, cube.resolution, pixels, set, k, discs.rgbe[begin + k], viewpoint);
-    }
+    hn::StoreU(hn::Mul(face, hn::Set(i, cube.resolution * cube.resolution)), i, set.first);
+    bounds.store(set);
+    const std::uint32_t* rgbe = queue.rgbe + begin;
+    const auto for_each = [&](MF some, const auto& body) {
+      for (unsigned rest = bits_of(f, some); rest != 0; rest &= rest - 1) {
+        const auto k = static_cast<std::size_t>(std::countr_zero(rest));
+        body(k, rgbe[k]);
+      }
+    };
+    // One by one their numbers of rows cannot be foretold, and a branch mistaken costs as much as two rows.
+    const auto two = hn::And(mask, bounds.within(2)), four = hn::AndNot(two, hn::And(mask, bounds.within(4)));
+    for_each(two, [&](std::size_t k, std::uint32_t c) { draw_narrow<2>(cube, pixels, set, k, c, viewpoint); });
+    for_each(four, [&](std::size_t k, std::uint32_t c) { draw_narrow<4>(cube, pixels, set, k, c, viewpoint); });
+    for_each(hn::AndNot(hn::Or(two, four), mask), [&](std::size_t k, std::uint32_t c) { draw_broad(cube, pixels, set, k, c, viewpoint); });
   }
 }
 
@@ -347,9 +417,9 @@ void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRo
   const U u;
   const auto from = hn::Set(u, viewpoint);
   const auto lanes = static_cast<int>(hn::Lanes(f));
-  AxisDiscs axes[3];
+  FaceQueue queue;
   for (int chunk = 0; chunk < discs.size; chunk += kChunk) {
-    for (AxisDiscs& axis : axes) axis.size = 0;
+    queue.size = 0;
     for (int begin = chunk; begin < std::min(discs.size, chunk + kChunk); begin += lanes) {
       const CubeLanes d = load_discs(cube, discs, begin);
       const auto back = hn::Ge(d.height, hn::Zero(f));
@@ -361,9 +431,9 @@ void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRo
       if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) {
         draw_wide_discs(cube, pixels, rows, d, near, colour, from);
       }
-      sort_by_axis(d, hn::AndNot(wide, drawn), colour, axes);
+      add_to_faces(d, hn::AndNot(wide, drawn), colour, queue);
     }
-    for (int axis = 0; axis < 3; ++axis) draw_across(cube, pixels, rows, axes[axis], axis, from);
+    draw_queue(cube, pixels, rows, queue, from);
   }
 }
 

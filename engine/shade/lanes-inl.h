@@ -19,10 +19,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// The lanes of a mask, the first in bit 0.
 template <class D>
 HWY_INLINE unsigned bits_of(D d, hn::Mask<D> mask) {
-  static_assert(hn::MaxLanes(D()) <= 8);
+  static_assert(hn::MaxLanes(D()) <= 16);
   std::uint8_t bits[8] = {};
   hn::StoreMaskBits(d, mask, bits);
-  return bits[0];
+  return bits[0] | unsigned{bits[1]} << 8;
 }
 
 /// Colours of RGBE: bytes, as floats, and what they are multiplied by.
