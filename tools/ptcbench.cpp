@@ -31,17 +31,19 @@ struct Arguments {
 };
 
 ptc::GatherOptions parse_setting(const std::string& text) {
-  constexpr char kExpected[] = "SR,RAD,R: a solid angle from 1e-6 to 4 pi, a parallax from 0 to pi, and "
-                               "16, 32, 48 or 64 pixels along a cube edge";
+  constexpr char kExpected[] = "SR,RAD,R or SR,RAD,R,X: a solid angle from 1e-6 to 4 pi, a parallax from 0 to pi, "
+                               "16, 32, 48 or 64 pixels along a cube edge, an inflation from 0.01 to 100";
   constexpr double kPi = std::numbers::pi;
-  const std::vector<double> n = ptc::parse_numbers("--setting", text, {3}, kExpected);
+  const std::vector<double> n = ptc::parse_numbers("--setting", text, {3, 4}, kExpected);
   const bool pixels = n[2] == 16 || n[2] == 32 || n[2] == 48 || n[2] == 64;
-  if (n[0] < 1e-6 || n[0] > 4 * kPi || n[1] < 0 || n[1] > kPi || !pixels) {
+  ptc::GatherOptions options{.solid_angle = static_cast<float>(n[0]),
+                             .parallax = static_cast<float>(n[1]),
+                             .resolution = static_cast<unsigned>(n[2])};
+  if (n.size() > 3) options.inflation = static_cast<float>(n[3]);
+  if (n[0] < 1e-6 || n[0] > 4 * kPi || n[1] < 0 || n[1] > kPi || !pixels || options.inflation < 0.01F || options.inflation > 100) {
     ptc::refuse("--setting", text, kExpected);
   }
-  return {.solid_angle = static_cast<float>(n[0]),
-          .parallax = static_cast<float>(n[1]),
-          .resolution = static_cast<unsigned>(n[2])};
+  return options;
 }
 
 void declare_choices(CLI::App& command, AccuracyOptions& options) {
@@ -51,9 +53,9 @@ void declare_choices(CLI::App& command, AccuracyOptions& options) {
     for (const std::string& text : values) options.settings.push_back(parse_setting(text));
   };
   command.add_option_function<std::vector<std::string>>(
-             "--setting", set, "Measure PTCX with this solid angle, parallax and resolution, in place of "
-                               "a list from coarse to fine; repeatable")
-      ->type_name("SR,RAD,R")
+             "--setting", set, "Measure PTCX with this solid angle, parallax, resolution and inflation, in place "
+                               "of a list from coarse to fine; repeatable")
+      ->type_name("SR,RAD,R[,X]")
       ->allow_extra_args(false)
       ->group(kGroup);
   const auto one_of = [&](const char* name, std::vector<std::string>& chosen, const char* description) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -100,8 +99,9 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
   }
 }
 
-DirectionBuffer::DirectionBuffer(unsigned resolution)
-    : nearness_(std::size_t{6} * resolution * resolution + std::size_t{4} * resolution, 0), rgbe_(nearness_.size(), 0) {}
+DirectionBuffer::DirectionBuffer(unsigned resolution, bool coloured)
+    : nearness_(std::size_t{6} * resolution * resolution + std::size_t{4} * resolution, 0),
+      rgbe_(coloured ? nearness_.size() : 0, 0) {}
 
 void DirectionBuffer::clear() noexcept {
   std::ranges::fill(nearness_, 0.0F);
@@ -109,8 +109,8 @@ void DirectionBuffer::clear() noexcept {
 }
 
 void DirectionBuffer::copy(const DirectionBuffer& other) noexcept {
-  std::memcpy(nearness_.data(), other.nearness_.data(), nearness_.size() * sizeof(float));
-  std::memcpy(rgbe_.data(), other.rgbe_.data(), rgbe_.size() * sizeof(std::uint32_t));
+  std::ranges::copy(other.nearness_, nearness_.begin());
+  std::ranges::copy(other.rgbe_, rgbe_.begin());
 }
 
 void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides, unsigned viewpoint,

@@ -51,7 +51,8 @@ struct Horizon {
 class DirectionBuffer {
  public:
   /// @param resolution  of the grids that it will be used with
-  explicit DirectionBuffer(unsigned resolution);
+  /// @param coloured    false: what covers has no colour, irradiance is 0
+  explicit DirectionBuffer(unsigned resolution, bool coloured = true);
 
   void clear() noexcept;
   void copy(const DirectionBuffer& other) noexcept;
@@ -70,7 +71,7 @@ class DirectionBuffer {
 
  private:
   std::vector<float> nearness_;  // CubePixels
-  std::vector<std::uint32_t> rgbe_;
+  std::vector<std::uint32_t> rgbe_;  // empty without colours
 };
 
 }  // namespace ptc

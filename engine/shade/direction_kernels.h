@@ -38,7 +38,7 @@ struct CubePixels {
   /// 1 / t, t along the ray (1, u, v) of the pixel; 0 where nothing covers. The lowest 4 bits say
   /// which viewpoint it was drawn from.
   float* nearness;
-  std::uint32_t* rgbe;
+  std::uint32_t* rgbe;  ///< null: colours are left out
 };
 
 /// The same, to be read.

@@ -45,19 +45,38 @@ struct FaceDiscs {
   std::int32_t first[kLanes];  // pixel of the face
 };
 
-/// Covers pixels x .. x + lanes of a row.
-HWY_INLINE void cover(float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT rgbe, VF near,
-                      MF inside, VU colour, VU viewpoint) {
-  const F f;
-  const U u;
-  near = hn::BitCast(f, hn::Or(hn::AndNot(hn::Set(u, kViewpoints - 1U), hn::BitCast(u, near)), viewpoint));
-  const auto old_near = hn::LoadU(f, nearness);
-  const auto old_colour = hn::LoadU(u, rgbe);
-  const auto tie = hn::And(hn::Eq(near, old_near), hn::RebindMask(f, hn::Lt(colour, old_colour)));
-  const auto take = hn::And(inside, hn::Or(hn::Gt(near, old_near), tie));
-  hn::StoreU(hn::IfThenElse(take, near, old_near), f, nearness);
-  hn::StoreU(hn::IfThenElse(hn::RebindMask(u, take), colour, old_colour), u, rgbe);
-}
+/// The pixels that are drawn on from one viewpoint.
+template <bool kColoured>
+class Canvas {
+ public:
+  Canvas(const CubeGeometry& geometry, const CubePixels& pixels, unsigned viewpoint)
+      : cube(geometry), pixels_(pixels), viewpoint_(hn::Set(U(), viewpoint)) {}
+
+  /// Covers a vector of pixels from `at` on.
+  HWY_INLINE void cover(std::ptrdiff_t at, VF near, MF inside, VU colour) const {
+    const F f;
+    const U u;
+    near = hn::BitCast(f, hn::Or(hn::AndNot(hn::Set(u, kViewpoints - 1U), hn::BitCast(u, near)), viewpoint_));
+    float* nearness = pixels_.nearness + at;
+    const auto old_near = hn::LoadU(f, nearness);
+    if constexpr (kColoured) {
+      std::uint32_t* rgbe = pixels_.rgbe + at;
+      const auto old_colour = hn::LoadU(u, rgbe);
+      const auto tie = hn::And(hn::Eq(near, old_near), hn::RebindMask(f, hn::Lt(colour, old_colour)));
+      const auto take = hn::And(inside, hn::Or(hn::Gt(near, old_near), tie));
+      hn::StoreU(hn::IfThenElse(take, near, old_near), f, nearness);
+      hn::StoreU(hn::IfThenElse(hn::RebindMask(u, take), colour, old_colour), u, rgbe);
+    } else {
+      hn::StoreU(hn::IfThenElse(inside, hn::Max(near, old_near), old_near), f, nearness);
+    }
+  }
+
+  const CubeGeometry& cube;
+
+ private:
+  CubePixels pixels_;
+  VU viewpoint_;
+};
 
 /// What a vector of pixels needs of a disc.
 struct FaceDisc {
@@ -78,42 +97,42 @@ struct FaceDisc {
         bb(discs.bb[i]),
         beta(discs.beta[i]) {}
 
-  /// @param v  of the row
-  HWY_INLINE void draw(VF u, float v, float* HWY_RESTRICT nearness, std::uint32_t* HWY_RESTRICT rgbe, VU viewpoint) const {
+  /// @param at  the pixels
+  /// @param v   of their row
+  template <class CanvasType>
+  HWY_INLINE void draw(const CanvasType& canvas, VF u, float v, std::ptrdiff_t at) const {
     const F f;
     const float dv = v - v0;
     const auto du = hn::Sub(u, u0);
     const auto form = hn::MulAdd(hn::MulAdd(aa, du, hn::Set(f, ab2 * dv)), du, hn::Set(f, bb * dv * dv));
     const auto w = hn::MulAdd(alpha, du, hn::Set(f, 1 + beta * dv));
     const auto near = hn::NegMulAdd(form, bump, hn::Mul(w, inverse));  // below 0 behind the receiver
-    cover(nearness, rgbe, near, hn::Lt(form, hn::Mul(square, hn::Mul(w, w))), colour, viewpoint);
+    canvas.cover(at, near, hn::Lt(form, hn::Mul(square, hn::Mul(w, w))), colour);
   }
 };
 
 /// Draws a disc that reaches into one vector of each of so many rows at most. The rows that it does not reach
 /// are drawn too, without a branch; past the face, centres are NaN and nothing is inside.
-template <int kRows>
-HWY_INLINE void draw_narrow(const CubeGeometry& cube, const CubePixels& pixels, const FaceDiscs& discs, std::size_t i,
-                            std::uint32_t rgbe, VU viewpoint) {
+template <int kRows, class CanvasType>
+HWY_INLINE void draw_narrow(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i, std::uint32_t rgbe) {
   const FaceDisc disc(discs, i, rgbe);
-  const std::ptrdiff_t first = discs.first[i] + discs.y0[i] * cube.resolution + discs.x0[i];
-  const auto u = hn::LoadU(F(), cube.centre + discs.x0[i]);
+  const float* centre = canvas.cube.centre;
+  const std::ptrdiff_t first = discs.first[i] + discs.y0[i] * canvas.cube.resolution + discs.x0[i];
+  const auto u = hn::LoadU(F(), centre + discs.x0[i]);
   for (int row = 0; row < kRows; ++row) {
-    const std::ptrdiff_t at = first + row * cube.resolution;
-    disc.draw(u, cube.centre[discs.y0[i] + row], pixels.nearness + at, pixels.rgbe + at, viewpoint);
+    disc.draw(canvas, u, centre[discs.y0[i] + row], first + row * canvas.cube.resolution);
   }
 }
 
 /// Draws a disc of any size.
-HWY_INLINE void draw_broad(const CubeGeometry& cube, const CubePixels& pixels, const FaceDiscs& discs, std::size_t i,
-                           std::uint32_t rgbe, VU viewpoint) {
+template <class CanvasType>
+HWY_INLINE void draw_broad(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i, std::uint32_t rgbe) {
   const FaceDisc disc(discs, i, rgbe);
+  const float* centre = canvas.cube.centre;
   const int lanes = static_cast<int>(hn::Lanes(F())), x1 = discs.x1[i], y1 = discs.y1[i];
-  std::ptrdiff_t row = discs.first[i] + discs.y0[i] * cube.resolution;
-  for (int y = discs.y0[i]; y < y1; ++y, row += cube.resolution) {
-    for (int x = discs.x0[i]; x < x1; x += lanes) {
-      disc.draw(hn::LoadU(F(), cube.centre + x), cube.centre[y], pixels.nearness + row + x, pixels.rgbe + row + x, viewpoint);
-    }
+  std::ptrdiff_t row = discs.first[i] + discs.y0[i] * canvas.cube.resolution;
+  for (int y = discs.y0[i]; y < y1; ++y, row += canvas.cube.resolution) {
+    for (int x = discs.x0[i]; x < x1; x += lanes) disc.draw(canvas, hn::LoadU(F(), centre + x), centre[y], row + x);
   }
 }
 
@@ -162,9 +181,10 @@ struct WideDisc {
 };
 
 /// Covers what a row of pixels sees of a disc, one division a vector.
-HWY_INLINE void draw_wide_row(const CubeGeometry& cube, const CubePixels& pixels, const WideDisc& disc, int y, int row,
-                              int first, int end, VU colour, VU viewpoint) {
+template <class CanvasType>
+HWY_INLINE void draw_wide_row(const CanvasType& canvas, const WideDisc& disc, int y, int row, int first, int end, VU colour) {
   const F f;
+  const CubeGeometry& cube = canvas.cube;
   const auto lanes = static_cast<int>(hn::Lanes(f));
   const float v = cube.centre[y];
   const auto row_slope = hn::Set(f, disc.nw + disc.nv * v), per_height = hn::Set(f, 1 / disc.height);
@@ -180,13 +200,15 @@ HWY_INLINE void draw_wide_row(const CubeGeometry& cube, const CubePixels& pixels
     const auto inside = hn::And(hn::Gt(t, hn::Zero(f)), hn::Lt(off, square));
     const auto lost = hn::Mul(hn::Mul(bump, off), hn::LoadU(f, cube.inverse_length + y * cube.resolution + x));
     const auto near = hn::NegMulAdd(lost, hn::Mul(plane, plane), plane);
-    cover(pixels.nearness + row + x, pixels.rgbe + row + x, near, inside, colour, viewpoint);
+    canvas.cover(row + x, near, inside, colour);
   }
 }
 
 /// A disc within two radii of the receiver may fill the view, so every face is looked at.
-void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const float (&c)[3],
-                    const float (&n)[3], float radius, std::uint32_t rgbe, VU viewpoint) {
+template <class CanvasType>
+void draw_wide_disc(const CanvasType& canvas, const FaceRows& rows, const float (&c)[3], const float (&n)[3], float radius,
+                    std::uint32_t rgbe) {
+  const CubeGeometry& cube = canvas.cube;
   const auto colour = hn::Set(U(), rgbe);
   Spans spans;
   for (int face = 0; face < 6; ++face) {
@@ -197,8 +219,7 @@ void draw_wide_disc(const CubeGeometry& cube, const CubePixels& pixels, const Fa
                         .radius = radius, .height = c[0] * n[0] + c[1] * n[1] + c[2] * n[2]};
     disc.find_spans(cube, rows.first[face], rows.end[face], spans);
     for (int y = rows.first[face]; y < rows.end[face]; ++y) {
-      draw_wide_row(cube, pixels, disc, y, (face * cube.resolution + y) * cube.resolution, spans.first[y], spans.end[y],
-                    colour, viewpoint);
+      draw_wide_row(canvas, disc, y, (face * cube.resolution + y) * cube.resolution, spans.first[y], spans.end[y], colour);
     }
   }
 }
@@ -247,8 +268,8 @@ HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs
   return turned;
 }
 
-HWY_INLINE void draw_wide_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
-                                const CubeLanes& discs, MF mask, VU colour, VU viewpoint) {
+template <class CanvasType>
+HWY_INLINE void draw_wide_discs(const CanvasType& canvas, const FaceRows& rows, const CubeLanes& discs, MF mask, VU colour) {
   const F f;
   alignas(64) float c[3][kLanes], n[3][kLanes], radius[kLanes];
   alignas(64) std::uint32_t colours[kLanes];
@@ -260,8 +281,7 @@ HWY_INLINE void draw_wide_discs(const CubeGeometry& cube, const CubePixels& pixe
   hn::StoreU(discs.radius, f, radius);
   for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(rest));
-    draw_wide_disc(cube, pixels, rows, {c[0][i], c[1][i], c[2][i]}, {n[0][i], n[1][i], n[2][i]}, radius[i], colours[i],
-                   viewpoint);
+    draw_wide_disc(canvas, rows, {c[0][i], c[1][i], c[2][i]}, {n[0][i], n[1][i], n[2][i]}, radius[i], colours[i]);
   }
 }
 
@@ -375,10 +395,11 @@ HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQue
 }
 
 /// Draws the discs of a queue.
-HWY_INLINE void draw_queue(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const FaceQueue& queue,
-                           VU viewpoint) {
+template <class CanvasType>
+HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const FaceQueue& queue) {
   const F f;
   const I i;
+  const CubeGeometry& cube = canvas.cube;
   FaceDiscs set;
   for (std::size_t begin = 0; begin < queue.size; begin += hn::Lanes(f)) {
     const auto load = [&](const float* column) { return hn::LoadU(f, column + begin); };
@@ -387,7 +408,8 @@ HWY_INLINE void draw_queue(const CubeGeometry& cube, const CubePixels& pixels, c
                       load(queue.nu), load(queue.nv), radius, hn::Mul(radius, radius)};
     auto mask = hn::FirstN(f, queue.size - begin);
     const auto face = hn::IfThenElseZero(hn::RebindMask(i, mask), hn::LoadU(i, queue.face + begin));
-    const FaceBounds bounds = bounds_of(d, cube.resolution, hn::GatherIndex(i, rows.first, face), hn::GatherIndex(i, rows.end, face));
+    const FaceBounds bounds =
+        bounds_of(d, cube.resolution, hn::GatherIndex(i, rows.first, face), hn::GatherIndex(i, rows.end, face));
     mask = hn::And(mask, bounds.seen);
     if (hn::AllFalse(f, mask)) continue;
     const auto height = hn::MulAdd(d.cw, d.nw, hn::MulAdd(d.cu, d.nu, hn::Mul(d.cv, d.nv)));
@@ -403,9 +425,32 @@ HWY_INLINE void draw_queue(const CubeGeometry& cube, const CubePixels& pixels, c
     };
     // One by one their numbers of rows cannot be foretold, and a branch mistaken costs as much as two rows.
     const auto two = hn::And(mask, bounds.within(2)), four = hn::AndNot(two, hn::And(mask, bounds.within(4)));
-    for_each(two, [&](std::size_t k, std::uint32_t c) { draw_narrow<2>(cube, pixels, set, k, c, viewpoint); });
-    for_each(four, [&](std::size_t k, std::uint32_t c) { draw_narrow<4>(cube, pixels, set, k, c, viewpoint); });
-    for_each(hn::AndNot(hn::Or(two, four), mask), [&](std::size_t k, std::uint32_t c) { draw_broad(cube, pixels, set, k, c, viewpoint); });
+    for_each(two, [&](std::size_t k, std::uint32_t c) { draw_narrow<2>(canvas, set, k, c); });
+    for_each(four, [&](std::size_t k, std::uint32_t c) { draw_narrow<4>(canvas, set, k, c); });
+    for_each(hn::AndNot(hn::Or(two, four), mask), [&](std::size_t k, std::uint32_t c) { draw_broad(canvas, set, k, c); });
+  }
+}
+
+template <class CanvasType>
+void draw_all(const CanvasType& canvas, const FaceRows& rows, const DiscQueue& discs, Sides sides) {
+  const F f;
+  const U u;
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  FaceQueue queue;
+  for (int chunk = 0; chunk < discs.size; chunk += kChunk) {
+    queue.size = 0;
+    for (int begin = chunk; begin < std::min(discs.size, chunk + kChunk); begin += lanes) {
+      const CubeLanes d = load_discs(canvas.cube, discs, begin);
+      const auto back = hn::Ge(d.height, hn::Zero(f));
+      const auto wide = hn::Lt(dot(d.c, d.c), hn::Mul(hn::Set(f, 4.0F), d.radius2));
+      auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(d.radius, hn::Zero(f)));
+      // Backs are clear to receivers within two radii.
+      drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, wide), drawn);
+      const auto colour = hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin));
+      if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) draw_wide_discs(canvas, rows, d, near, colour);
+      add_to_faces(d, hn::AndNot(wide, drawn), colour, queue);
+    }
+    draw_queue(canvas, rows, queue);
   }
 }
 
@@ -413,27 +458,10 @@ HWY_INLINE void draw_queue(const CubeGeometry& cube, const CubePixels& pixels, c
 
 void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const DiscQueue& discs,
                 Sides sides, unsigned viewpoint) {
-  const F f;
-  const U u;
-  const auto from = hn::Set(u, viewpoint);
-  const auto lanes = static_cast<int>(hn::Lanes(f));
-  FaceQueue queue;
-  for (int chunk = 0; chunk < discs.size; chunk += kChunk) {
-    queue.size = 0;
-    for (int begin = chunk; begin < std::min(discs.size, chunk + kChunk); begin += lanes) {
-      const CubeLanes d = load_discs(cube, discs, begin);
-      const auto back = hn::Ge(d.height, hn::Zero(f));
-      const auto wide = hn::Lt(dot(d.c, d.c), hn::Mul(hn::Set(f, 4.0F), d.radius2));
-      auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(d.radius, hn::Zero(f)));
-      // Backs are clear to receivers within two radii.
-      drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, wide), drawn);
-      const auto colour = hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin));
-      if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) {
-        draw_wide_discs(cube, pixels, rows, d, near, colour, from);
-      }
-      add_to_faces(d, hn::AndNot(wide, drawn), colour, queue);
-    }
-    draw_queue(cube, pixels, rows, queue, from);
+  if (pixels.rgbe) {
+    draw_all(Canvas<true>(cube, pixels, viewpoint), rows, discs, sides);
+  } else {
+    draw_all(Canvas<false>(cube, pixels, viewpoint), rows, discs, sides);
   }
 }
 

@@ -14,7 +14,7 @@ constexpr float kPi = 3.14159265F;
 
 /// One depth of receiver cells: what the current cell there draws and leaves.
 struct Level {
-  explicit Level(unsigned resolution) : buffer(resolution) {}
+  explicit Level(const GatherOptions& options) : buffer(options.resolution, options.bleeding) {}
 
   glm::dvec3 centre{0};  // lattice units
   DirectionBuffer buffer;
@@ -38,7 +38,7 @@ struct Gather::Impl {
   DiscQueue queue;
 
   Impl(const SceneView& view, PageCache& cache, const GatherOptions& o)
-      : scene(view, cache), options(o), empty(o.resolution), leaf(o.resolution) {
+      : scene(view, cache), options(o), empty(o.resolution, o.bleeding), leaf(o.resolution, o.bleeding) {
     empty.clear();
   }
 
@@ -78,7 +78,7 @@ struct Gather::Impl {
       return;
     }
     ++counts.cells;
-    if (depth == levels.size()) levels.push_back(std::make_unique<Level>(options.resolution));
+    if (depth == levels.size()) levels.push_back(std::make_unique<Level>(options));
     Level& level = *levels[depth];
     level.centre = bounds.centre;
     level.left.clear();
@@ -133,6 +133,7 @@ struct Gather::Impl {
                         .shared_from = left ? cell.radius / options.parallax : 0,
                         .inflation = options.inflation,
                         .sides = options.sides,
+                        .bleeding = options.bleeding,
                         .last = left == nullptr};
     CellOutput out{queue, left, payloads};
     const Horizon horizon = cell.has_horizon ? Horizon{cell.axis, cell.cone_sin} : Horizon{};

@@ -91,14 +91,13 @@ HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test
   return hn::And(hn::And(hn::Gt(cosine, hn::Set(f, 0.05F)), hn::Gt(clear, hn::Zero(f))), hn::Gt(dot(axis, to), least));
 }
 
-/// Appends clusters as discs (spec/shading.md#gather).
-/// @param pick  rgbe and share of the face across an axis, of the negative one where the mask says so
+/// The ratio of two ambient cubes, radiance times area and area, as it leaves towards a unit vector.
+/// @param front  what the ratio is multiplied by
+/// @param pick   rgbe and share of the face across an axis, of the negative one where the mask says so
 template <class Pick>
-HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, VF distance, VF area, const Pick& pick,
-                              DiscQueue& queue) {
+HWY_INLINE VU colour_of(const Vec& toward, VF front, const Pick& pick) {
   const F f;
-  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
-  const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
+  const auto zero = hn::Zero(f);
   VF light[3] = {zero, zero, zero}, sum = zero;
   const VF along_axis[3] = {toward.x, toward.y, toward.z};
   for (int axis = 0; axis < 3; ++axis) {
@@ -111,6 +110,18 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
     for (int k = 0; k < 3; ++k) light[k] = hn::MulAdd(colour.byte[k], scale, light[k]);
     sum = hn::Add(sum, weight);
   }
+  const auto mix = hn::IfThenElse(hn::Gt(sum, zero), hn::Div(front, sum), zero);
+  return pack_rgbe(hn::Mul(light[0], mix), hn::Mul(light[1], mix), hn::Mul(light[2], mix));
+}
+
+/// Appends clusters as discs (spec/shading.md#gather).
+/// @param pick  as colour_of()
+template <class Pick>
+HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, VF distance, VF area, const Pick& pick,
+                              DiscQueue& queue) {
+  const F f;
+  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
   // Vector area: the part that faces one way; what is left faces every way alike.
   const auto along = dot(c.mean, toward);
   const auto scattered = hn::Mul(hn::Max(zero, hn::Sub(one, c.length)), hn::Set(f, 0.25F));
@@ -120,14 +131,13 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
   // A flat cluster is one surfel of its area and normal, which keeps surfaces tight at grazing
   // angles; any other a disc of its projected area that faces the receiver, dimmed by the backs.
   const auto flat = hn::Gt(c.length, hn::Set(f, kFlat));
-  const auto mix = hn::IfThenElse(hn::Gt(sum, zero), hn::Div(hn::IfThenElse(flat, one, hn::Div(front, projected)), sum), zero);
   const auto seen = hn::Mul(area, hn::Mul(projected, hn::Set(f, test.inflation / kPi)));
   const auto radius = hn::Sqrt(hn::IfThenElse(flat, hn::Mul(area, hn::Set(f, 0.5F)), seen));
   const Vec disc_normal{hn::IfThenElse(flat, c.normal.x, toward.x), hn::IfThenElse(flat, c.normal.y, toward.y),
                         hn::IfThenElse(flat, c.normal.z, toward.z)};
   mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
   push(queue, mask, c.to, disc_normal, radius,
-       pack_rgbe(hn::Mul(light[0], mix), hn::Mul(light[1], mix), hn::Mul(light[2], mix)));
+       test.bleeding ? colour_of(toward, hn::IfThenElse(flat, one, hn::Div(front, projected)), pick) : hn::Zero(U()));
 }
 
 /// Appends clusters to those left to the children. Positions are rounded to their distance, so the

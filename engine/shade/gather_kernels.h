@@ -23,6 +23,7 @@ struct CellTest {
   float shared_from = 0;   ///< distance from which the cell settles things for all its receivers
   float inflation = 1;
   Sides sides = Sides::both;
+  bool bleeding = true;    ///< colours are wanted
   bool last = false;       ///< nothing is left to children: everything is settled
 };
 

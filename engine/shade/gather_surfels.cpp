@@ -46,7 +46,7 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
     keep = hn::And(wanted, hn::Lt(d, seam_end(test, hn::Abs(height), above, d)));
   }
   if (hn::AllFalse(f, hn::Or(drawn, keep))) return;
-  const VU rgbe = colour();
+  const VU rgbe = test.bleeding ? colour() : hn::Zero(u);
   if (!hn::AllFalse(f, drawn)) push(out.queue, drawn, s.to, s.normal, s.radius, rgbe);
   if (hn::AllFalse(f, keep)) return;
   NearSurfels& left = out.left->surfels;

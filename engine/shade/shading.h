@@ -35,6 +35,7 @@ struct GatherOptions {
   float inflation = 1.57F;      ///< footprint of a cluster that is not flat over its projected area
   unsigned resolution = 32;     ///< direction pixels along a cube edge, 16 to 64, a multiple of 16
   Sides sides = Sides::both;
+  bool bleeding = true;         ///< false: light from surfaces is left out, which takes less time
 };
 
 /// What a gather did.

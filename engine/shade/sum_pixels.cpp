@@ -47,8 +47,8 @@ struct LaneSums {
 struct FaceView {
   const CubeGeometry& cube;
   const float* nearness;
-  const std::uint32_t* rgbe;
-  const float* sky;  ///< 3 planes, or null
+  const std::uint32_t* rgbe;  ///< or null
+  const float* sky;           ///< 3 planes, or null
   float nw, nu, nv;
   alignas(64) float offset_w[kViewpoints], offset_u[kViewpoints], offset_v[kViewpoints];
 
@@ -115,9 +115,11 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
     const auto covered = hn::IfThenZeroElse(empty, weight);
     sums.total = hn::Add(sums.total, own);
     sums.covered = hn::Add(sums.covered, covered);
-    const UnpackedRgbe<W> rgbe = unpack_rgbe(f, hn::LoadU(WU(), face.rgbe + at));
-    const auto scale = hn::Mul(rgbe.scale, covered);
-    for (int k = 0; k < 3; ++k) sums.light[k] = hn::MulAdd(rgbe.byte[k], scale, sums.light[k]);
+    if (face.rgbe) {
+      const UnpackedRgbe<W> rgbe = unpack_rgbe(f, hn::LoadU(WU(), face.rgbe + at));
+      const auto scale = hn::Mul(rgbe.scale, covered);
+      for (int k = 0; k < 3; ++k) sums.light[k] = hn::MulAdd(rgbe.byte[k], scale, sums.light[k]);
+    }
     for (std::size_t k = 0; face.sky && k < 3; ++k) {
       sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at), sums.sky[k]);
     }
@@ -151,7 +153,7 @@ void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* 
     const CubeFace axes(i);
     FaceView face{.cube = cube,
                   .nearness = pixels.nearness + static_cast<std::size_t>(i) * plane,
-                  .rgbe = pixels.rgbe + static_cast<std::size_t>(i) * plane,
+                  .rgbe = pixels.rgbe ? pixels.rgbe + static_cast<std::size_t>(i) * plane : nullptr,
                   .sky = sky ? sky + static_cast<std::size_t>(3 * i) * plane : nullptr,
                   .nw = axes.sign * normal[axes.w],
                   .nu = normal[axes.u],

@@ -55,10 +55,11 @@ class Bench(ProgramTest):
         self.assertEqual([len(line) for line in lines], [len(lines[0])] * (len(facts["rows"]) + 1))
 
     def test_only_what_was_asked_for_is_measured(self):
-        facts = self.measure(self.mesh, "--method", "ptcx", "--set", "points", "--setting", "0.02,0.1,16")
+        facts = self.measure(self.mesh, "--method", "ptcx", "--set", "points", "--setting", "0.02,0.1,16",
+                             "--setting", "0.02,0.1,16,1.2")
         self.assertEqual(self.names(facts, "method"), ["ptcx"])
         self.assertEqual(self.names(facts, "set"), ["points"])
-        self.assertEqual(self.names(facts, "setting"), ["0.02 sr, 0.1 rad, R 16"])
+        self.assertEqual(self.names(facts, "setting"), ["0.02 sr, 0.1 rad, R 16", "0.02 sr, 0.1 rad, R 16, x 1.2"])
         facts = self.measure(self.mesh, "--method", "plain", "--method=embree-mesh", "--points", "2k")
         self.assertEqual(self.names(facts, "method"), ["embree-mesh", "plain"])
         self.assertEqual(self.names(facts, "set"), ["camera", "points"])

@@ -66,7 +66,7 @@ class Usage(ProgramTest):
                           "--samples=0", "--samples=3", "--exposure=inf", "--layer=depth=a.png",
                           "--layer=direct=a.exr", "--layer=direct", "--camera=0,0,0,0,0,0"],
             "ptcconvert": ["--codec=", "--page-size=64"],
-            "ptcbench": ["--setting=0.1,0.1", "--setting=0.1,0.1,32,1", "--setting=0,0.1,32", "--setting=13,0.1,32",
+            "ptcbench": ["--setting=0.1,0.1", "--setting=0.1,0.1,32,0", "--setting=0.1,0.1,32,101", "--setting=0.1,0.1,32,1,1", "--setting=0,0.1,32", "--setting=13,0.1,32",
                          "--setting=0.1,-0.1,32", "--setting=0.1,4,32", "--setting=0.1,0.1,33", "--setting=0.1,0.1,80",
                          "--setting=0.1,0.1,0", "--setting=nan,0.1,32", "--setting=fine", "--setting=",
                          "--method=embree", "--method=", "--set=all", "--set=", "--points=0", "--checked=9",

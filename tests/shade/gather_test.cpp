@@ -211,6 +211,28 @@ TEST_CASE("gather: every instruction set that the machine has gives the same sha
   }
 }
 
+TEST_CASE("gather: without bleeding, occlusion and sky are the same to the bit", "[shade][gather]") {
+  Scene scene(small_scene(0.05));
+  add_floor_receivers(scene.receivers, 0.05);
+  for (const unsigned resolution : {16U, 32U, 48U}) {
+    ShadeOptions options;
+    options.sky = [](const glm::vec3& d) { return glm::vec3(1 + d.z, 1, 0.5F); };
+    options.gather = {.solid_angle = 0.05F, .resolution = resolution};
+    const std::vector<Shading> all = scene.shade(options);
+    options.gather.bleeding = false;
+    const std::vector<Shading> some = scene.shade(options);
+    double light = 0;
+    std::size_t differ = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      light += static_cast<double>(all[i].irradiance.g);
+      CHECK(some[i].irradiance == glm::vec3(0));
+      if (some[i].occlusion != all[i].occlusion || some[i].bent_normal != all[i].bent_normal || some[i].sky != all[i].sky) ++differ;
+    }
+    CHECK(differ == 0);
+    CHECK(light > 0);
+  }
+}
+
 TEST_CASE("gather: threads, cap, page order and mmap change no bit", "[shade][gather]") {
   const std::vector<Surfel> surfels = small_scene(0.1);
   Scene scene(surfels);

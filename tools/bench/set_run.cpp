@@ -50,6 +50,12 @@ GatherCounts mean_counts(const GatherCounts& counts) {
           .retests = mean(counts.retests)};
 }
 
+std::string setting_text(const GatherOptions& options) {
+  std::string text = fmt::format("{} sr, {} rad, R {}", options.solid_angle, options.parallax, options.resolution);
+  if (options.inflation != GatherOptions{}.inflation) text += fmt::format(", x {}", options.inflation);
+  return text;
+}
+
 }  // namespace
 
 /// A method to be measured, and what becomes of it.
@@ -115,9 +121,11 @@ void SetRun::add(std::string method, std::string setting, std::vector<Quantity> 
 
 void SetRun::add_gathers() {
   if (options_.measures("ptcx")) {
-    for (const GatherOptions& options : options_.settings) {
-      add("ptcx", fmt::format("{} sr, {} rad, R {}", options.solid_angle, options.parallax, options.resolution),
-          both_jobs(), ours_, make_gather(scene_, set_, checked_, options, cache_, executor_));
+    for (GatherOptions options : options_.settings) {
+      for (const Quantity job : both_jobs()) {
+        options.bleeding = job == Quantity::bleeding;
+        add("ptcx", setting_text(options), {job}, ours_, make_gather(scene_, set_, checked_, options, cache_, executor_));
+      }
     }
   }
   if (options_.measures("plain")) {
