@@ -146,6 +146,7 @@ struct Inputs {
   std::vector<glm::dvec3> sample;  // places, for splitters
   Clouds clouds;
   LightRig lights;
+  bool emitters = false;         // among the triangles
   std::unique_ptr<LitMesh> lit;  // null without triangles
 };
 
@@ -154,12 +155,8 @@ Inputs lay_city(std::uint64_t points) {
   return {.bounds = bounds, .sample = sample_ground(bounds), .lights = city_lights()};
 }
 
-/// The lights of a request for its meshes, which may bring their own.
-LightRig choose_lights(const BuildRequest& request, const Mesh& mesh) {
-  if (request.lights) return *request.lights;
-  const auto emits = [](const Material& material) { return material.emission != glm::vec3(0); };
-  const bool dark = !mesh.triangles.empty() && std::ranges::none_of(mesh.materials, emits);
-  return dark ? default_rig() : LightRig{};
+bool has_emitters(const Mesh& mesh) {
+  return std::ranges::any_of(mesh.materials, [](const Material& m) { return m.emission != glm::vec3(0); });
 }
 
 Inputs read_inputs(const BuildRequest& request, Progress& progress) {
@@ -170,8 +167,10 @@ Inputs read_inputs(const BuildRequest& request, Progress& progress) {
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
   Mesh mesh = load_meshes(request.inputs, request.mesh.get(), request.backdrop);
-  inputs.lights = choose_lights(request, mesh);
+  if (request.lights) inputs.lights = *request.lights;
   if (mesh.triangles.empty()) return inputs;
+  inputs.emitters = has_emitters(mesh);
+  if (!request.lights && !inputs.emitters) inputs.lights = default_rig();
   inputs.bounds.add(mesh.bounds());
   const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
   inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
@@ -187,7 +186,7 @@ std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Fram
   return keys;
 }
 
-Meta make_meta(const BuildRequest& request, const LightRig& lights, double spacing) {
+Meta make_meta(const BuildRequest& request, const Inputs& inputs, double spacing) {
   Meta meta;
   std::string names;
   for (const auto& input : request.inputs) {
@@ -196,7 +195,8 @@ Meta make_meta(const BuildRequest& request, const LightRig& lights, double spaci
   }
   if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
   meta.text[kInputsKey] = names;
-  meta.text[kLightsKey] = to_json(lights);
+  meta.text[kLightsKey] = to_json(inputs.lights);
+  if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
   if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;
@@ -254,7 +254,7 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
   }
 
   const Stage stage(report.seconds, progress, "sort and build", sorter.statistics().points, "points");
-  const Meta meta = make_meta(request, inputs.lights, spacing);
+  const Meta meta = make_meta(request, inputs, spacing);
   ContainerWriter writer(target, {.page_shift = request.page_shift,
                                   .codec = request.codec,
                                   .uuid = content_uuid(sorter, frame, request, meta)});

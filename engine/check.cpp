@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "engine/base/memory.h"
-#include "engine/scene/mesh_reference.h"
 #include "engine/shade/brute_force.h"
 #include "engine/stages.h"
 
@@ -63,8 +62,7 @@ void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shadi
 
 CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const Sky& sky,
                                  const DirectLight* light, const RayScene* mesh,
-                                 const LightSampling& sampling, const Executor& executor,
-                                 Progress& progress) const {
+                                 const LightPaths& paths, const Executor& executor, Progress& progress) const {
   CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
   if (receivers_.empty()) return report;
   std::vector<Shading> traced(receivers_.size());
@@ -80,7 +78,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
   if (!light || !mesh) return report;
   report.mesh_microseconds = timed(receivers_.size(), executor, [&](std::size_t i) {
     const RayTraced seen = trace_mesh(*mesh, *light, receivers_[i].position, receivers_[i].normal,
-                                      request_.rays, sampling, i);
+                                      request_.rays, paths, i);
     traced[i] = {.occlusion = seen.occlusion, .irradiance = seen.irradiance, .sky = seen.sky};
     progress.advance(1);
   });

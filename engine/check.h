@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/pipeline.h"
+#include "engine/scene/mesh_reference.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
 
@@ -18,12 +19,13 @@ class CheckSample {
   explicit CheckSample(const CheckRequest& request) : request_(request) {}
   void add(std::span<const Receiver> receivers, std::span<const Shading> results);
 
+  /// @param scene  as it was gathered from: with the bounces before the last in its surfels
   /// @param light  with the mesh under it, or null
+  /// @param paths  what rays at the mesh follow
   /// @param progress  advances by one a receiver, once for each reference
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides, const Sky& sky,
                                     const DirectLight* light, const RayScene* mesh,
-                                    const LightSampling& sampling, const Executor& executor,
-                                    Progress& progress) const;
+                                    const LightPaths& paths, const Executor& executor, Progress& progress) const;
 
  private:
   CheckRequest request_;

@@ -98,6 +98,7 @@ struct ShadeRequest {
   std::filesystem::path scene;      ///< surfels that occlude and emit
   std::filesystem::path receivers;  ///< a cloud or container to shade; empty: the scene's own points
   std::uint64_t count = 0;          ///< shade so many of the points, evenly spread in order; 0: all
+  unsigned bounces = 1;             ///< of light, from 1 on; each but one shades all points of the scene
   GatherOptions gather;
   float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii
   std::optional<Sky> sky;           ///< empty: the one that the scene was built with
@@ -108,7 +109,9 @@ struct ShadeRequest {
 
 struct ShadeReport {
   std::uint64_t receivers = 0;
+  unsigned bounces = 1;
   double shade_cpu_seconds = 0;  ///< of the gather alone, all threads
+  double bounce_cpu_seconds = 0; ///< likewise, of the scene's own points for the bounces before
   GatherCounts gather;
   CacheStatistics cache;
   std::optional<CheckReport> check;
@@ -136,6 +139,7 @@ struct RenderRequest {
   unsigned samples = 4;           ///< per pixel, a square number
   std::optional<LightRig> lights; ///< empty: those that the scene was built with
   LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
+  unsigned bounces = 1;           ///< as of ShadeRequest
   GatherOptions gather;
   float lift = 0.15F;             ///< receivers rise by so many radii of a surfel of the scene's spacing
   float exposure = 0;             ///< stops, for PNGs of light

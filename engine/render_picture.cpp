@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/memory.h"
+#include "engine/bounces.h"
 #include "engine/check.h"
 #include "engine/io/image.h"
 #include "engine/pipeline.h"
@@ -21,7 +22,6 @@ namespace {
 
 constexpr unsigned kTileSide = 256;               // pixels
 constexpr std::uint64_t kReceiverBytes = 320;     // of one pixel of a tile: hit, receiver, result, order
-constexpr std::uint64_t kLeastCache = 16 << 20;
 constexpr unsigned kMostVariants = 16;
 
 /// Sums over the samples of every pixel.
@@ -210,10 +210,12 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * kReceiverBytes +
                               std::uint64_t{camera.width} * camera.height * Film::kBytes +
                               (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24);
-  options.cache_bytes = memory_left(request.run, taken,
-                                    std::max(kLeastCache, PageCache::least_bytes(scene, executor.threads())),
-                                    "this picture");
-  std::optional<Shader> shader(std::in_place, scene, options, executor);
+  options.cache_bytes = cache_bytes_left(request.run, taken, scene, executor.threads(), "this picture");
+  const std::unique_ptr<ContainerReader> bounced =
+      bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, targets.front().path)}, executor,
+                   report, progress);
+  const ContainerReader& lit = bounced ? *bounced : scene;
+  std::optional<Shader> shader(std::in_place, lit, options, executor);
   CheckSample check(request.check);
   {
     const Stage stage(report.seconds, progress, "render", samples, "samples");
@@ -228,6 +230,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   }
   report.gather = shader->counts();
   report.receivers = report.gather.receivers;
+  report.bounces = request.bounces;
   report.cache = shader->cache_statistics();
   shader.reset();  // its pages make room for what the writers copy
   for (const PictureTarget& target : targets) {
@@ -240,8 +243,9 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   if (request.check.receivers > 0) {
     const unsigned references = subject.rays ? 2 : 1;
     const Stage stage(report.seconds, progress, "check", references * request.check.receivers, "references");
-    report.check = check.compare(scene, request.gather.sides, lights.sky, subject.light.get(), subject.rays.get(),
-                                 {.sun_rays = 1, .area_rays = 1, .sky_rays = 1}, executor, progress);
+    const LightSampling sampling{.sun_rays = 1, .area_rays = lit_by_emitters(scene) ? 1U : 0U, .sky_rays = 1};
+    report.check = check.compare(lit, request.gather.sides, lights.sky, subject.light.get(), subject.rays.get(),
+                                 {sampling, request.bounces}, executor, progress);
   }
   return report;
 }

@@ -8,8 +8,8 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/memory.h"
+#include "engine/bounces.h"
 #include "engine/check.h"
-#include "engine/io/file.h"
 #include "engine/io/record.h"
 #include "engine/pipeline.h"
 #include "engine/shade/shader.h"
@@ -23,7 +23,6 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kBatch = 16 * Shader::kBlock;  // receivers in memory at once
-constexpr std::uint64_t kLeastCache = 16 << 20;
 constexpr std::uint16_t kGroup = 1;  // of the channels that shading adds
 
 /// What shading says of a point, in the order of the channels.
@@ -201,32 +200,45 @@ class ContainerSink : public ShadedSink {
 
 std::string settings_text(const ShadeRequest& request) {
   const GatherOptions& g = request.gather;
-  return fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
-                     g.solid_angle, g.parallax, g.inflation, g.resolution,
-                     g.sides == Sides::both ? "both" : "front", request.lift);
+  std::string text = fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
+                                 g.solid_angle, g.parallax, g.inflation, g.resolution,
+                                 g.sides == Sides::both ? "both" : "front", request.lift);
+  if (request.bounces > 1) text += fmt::format(" bounces {}", request.bounces);
+  return text;
 }
 
-/// Builds a foreign cloud into a container beside the target, for the time of one run.
-class TemporaryContainer {
- public:
-  TemporaryContainer(const ShadeRequest& request, const std::filesystem::path& target, Progress& progress)
-      : file_(target) {
-    BuildRequest build;
-    build.inputs = {request.receivers};
-    build.lights = LightRig{};  // receivers need none
-    build.run = request.run;
-    build.run.temp_dir = temp_dir(request.run, target);
-    build_container(build, path(), progress);
-  }
-  ~TemporaryContainer() {
-    std::error_code ignored;
-    std::filesystem::remove(path(), ignored);
-  }
-  [[nodiscard]] std::filesystem::path path() const { return file_.temporary().string() + ".receivers"; }
+/// The container of the receivers of a request; a cloud is built into one for the time of the run.
+std::unique_ptr<ContainerReader> open_receivers(const ShadeRequest& request, const std::filesystem::path& target,
+                                                Progress& progress) {
+  if (request.receivers.extension() == ".ptcx") return std::make_unique<ContainerReader>(request.receivers);
+  BuildRequest build{.inputs = {request.receivers}, .lights = LightRig{}, .run = request.run};  // they need no light
+  return make_temporary(temp_dir(request.run, target),
+                        [&](const std::filesystem::path& path) { build_container(build, path, progress); });
+}
 
- private:
-  OutputFile file_;  // reserves the name
-};
+std::unique_ptr<ShadedSink> make_sink(const ShadeRequest& request, const std::filesystem::path& target,
+                                      const ContainerReader& receivers, std::uint64_t points) {
+  if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points);
+  return std::make_unique<ContainerSink>(target, receivers, settings_text(request));
+}
+
+/// Shades what a cursor gives, batch by batch. @return CPU seconds of the gather
+double shade_all(PointCursor& cursor, Shader& shader, float lift, ShadedSink& sink, CheckSample& check,
+                 Progress& progress) {
+  double cpu = 0;
+  std::vector<Surfel> surfels(kBatch);
+  std::vector<Receiver> batch(kBatch);
+  std::vector<Shading> results(kBatch);
+  while (const std::size_t count = cursor.next(surfels)) {
+    for (std::size_t i = 0; i < count; ++i) batch[i] = lifted(surfels[i], lift);
+    const double before = cpu_seconds();
+    shader.shade(std::span(batch).first(count), std::span(results).first(count), progress);
+    cpu += cpu_seconds() - before;
+    check.add(std::span(batch).first(count), std::span(results).first(count));
+    sink.write(std::span(surfels).first(count), std::span(results).first(count));
+  }
+  return cpu;
+}
 
 }  // namespace
 
@@ -234,14 +246,8 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   ShadeReport report;
   const Executor executor(request.run.threads);
   const ContainerReader scene(request.scene);
-  std::unique_ptr<TemporaryContainer> built;
-  std::unique_ptr<ContainerReader> other;
-  if (!request.receivers.empty()) {
-    if (request.receivers.extension() != ".ptcx") {
-      built = std::make_unique<TemporaryContainer>(request, target, progress);
-    }
-    other = std::make_unique<ContainerReader>(built ? built->path() : request.receivers);
-  }
+  const std::unique_ptr<ContainerReader> other =
+      request.receivers.empty() ? nullptr : open_receivers(request, target, progress);
   const ContainerReader& receivers = other ? *other : scene;
   const std::uint64_t all = receivers.superblock().points;
   const std::uint64_t points = request.count == 0 ? all : std::min(request.count, all);
@@ -249,48 +255,32 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
     throw std::invalid_argument("a container of some of the points cannot be written: name a .ply, or shade them all");
   }
 
-  ShadeOptions options;
-  options.gather = request.gather;
   const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
-  options.sky = sky_function(sky);
-  options.access = request.access;
-  options.cache_bytes =
-      memory_left(request.run, kBufferBytes, std::max(kLeastCache, PageCache::least_bytes(scene, executor.threads())),
-                  "shading");
-  Shader shader(scene, options, executor);
-
-  std::unique_ptr<ShadedSink> sink;
-  if (target.extension() == ".ply") {
-    sink = std::make_unique<PlySink>(target, points);
-  } else {
-    sink = std::make_unique<ContainerSink>(target, receivers, settings_text(request));
-  }
+  const ShadeOptions options{
+      .cache_bytes = cache_bytes_left(request.run, kBufferBytes, scene, executor.threads(), "shading"),
+      .access = request.access,
+      .gather = request.gather,
+      .sky = sky_function(sky)};
+  const std::unique_ptr<ShadedSink> sink = make_sink(request, target, receivers, points);
+  const std::unique_ptr<ContainerReader> bounced =
+      bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, target)}, executor, report,
+                   progress);
+  const ContainerReader& lit = bounced ? *bounced : scene;
   CheckSample check(request.check);
   {
     const Stage stage(report.seconds, progress, "shade", points, "points");
+    Shader shader(lit, options, executor);
     PointCursor cursor(receivers, points);
-    std::vector<Surfel> surfels(kBatch);
-    std::vector<Receiver> batch(kBatch);
-    std::vector<Shading> results(kBatch);
-    while (const std::size_t count = cursor.next(surfels)) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const Surfel& s = surfels[i];
-        batch[i] = {s.position + glm::dvec3(s.normal) * static_cast<double>(request.lift * s.radius), s.normal};
-      }
-      const double before = cpu_seconds();
-      shader.shade(std::span(batch).first(count), std::span(results).first(count), progress);
-      report.shade_cpu_seconds += cpu_seconds() - before;
-      check.add(std::span(batch).first(count), std::span(results).first(count));
-      sink->write(std::span(surfels).first(count), std::span(results).first(count));
-    }
+    report.shade_cpu_seconds = shade_all(cursor, shader, request.lift, *sink, check, progress);
+    report.gather = shader.counts();
+    report.cache = shader.cache_statistics();
   }
   sink->finish();
+  report.bounces = request.bounces;
   report.receivers = points;
-  report.gather = shader.counts();
-  report.cache = shader.cache_statistics();
   if (request.check.receivers > 0) {
     const Stage stage(report.seconds, progress, "check", request.check.receivers, "receivers");
-    report.check = check.compare(scene, request.gather.sides, sky, nullptr, nullptr, {}, executor, progress);
+    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {}, executor, progress);
   }
   return report;
 }

@@ -1,10 +1,21 @@
 #include "engine/stages.h"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 namespace ptc {
+namespace {
+
+constexpr std::uint64_t kLeastCache = 16 << 20;
+
+}  // namespace
 
 Stage::Stage(StageSeconds& seconds, Progress& progress, std::string name, std::uint64_t total, const char* unit)
     : seconds_(seconds), progress_(progress), name_(std::move(name)) {
@@ -25,9 +36,29 @@ std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint6
   return run.memory_bytes - taken;
 }
 
+std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
+                               unsigned threads, const char* what_for) {
+  return memory_left(run, taken, std::max(kLeastCache, PageCache::least_bytes(scene, threads)), what_for);
+}
+
 std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target) {
   if (!run.temp_dir.empty()) return run.temp_dir;
   return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
+}
+
+std::unique_ptr<ContainerReader> make_temporary(const std::filesystem::path& directory,
+                                                const std::function<void(const std::filesystem::path&)>& write) {
+  static std::atomic<unsigned> made = 0;
+  const std::filesystem::path path = directory / fmt::format(".ptcx-{}-{}.ptcx", getpid(), ++made);
+  write(path);
+  struct Unlink {
+    const std::filesystem::path& path;
+    ~Unlink() {
+      std::error_code ignored;
+      std::filesystem::remove(path, ignored);
+    }
+  } const unlink{path};
+  return std::make_unique<ContainerReader>(path);
 }
 
 LightRig recorded_lights(const ContainerReader& container) {
@@ -35,6 +66,8 @@ LightRig recorded_lights(const ContainerReader& container) {
   const auto found = text.find(kLightsKey);
   return found == text.end() ? LightRig{} : light_rig_from_json(found->second);
 }
+
+bool lit_by_emitters(const ContainerReader& container) { return container.meta().text.contains(kEmittersKey); }
 
 double surfel_spacing(const ContainerReader& container) {
   const auto& text = container.meta().text;
@@ -49,6 +82,10 @@ double surfel_spacing(const ContainerReader& container) {
 std::uint64_t mesh_bytes(const Mesh& mesh, const RayScene* rays) {
   return mesh.triangles.size() * (sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0])) +
          mesh.positions.size() * (2 * sizeof(glm::vec3) + sizeof(glm::vec2)) + (rays ? rays->bytes() : 0);
+}
+
+Receiver lifted(const Surfel& surfel, float lift) {
+  return {surfel.position + glm::dvec3(surfel.normal) * static_cast<double>(lift * surfel.radius), surfel.normal};
 }
 
 std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky) {

@@ -1,7 +1,9 @@
-// What the calls of pipeline.h share: stage clocks, the memory left, the record in the meta page.
+// What the calls of pipeline.h share: stage clocks, memory left, temporaries, the record in the meta page.
 #pragma once
 
 #include <chrono>
+#include <functional>
+#include <memory>
 #include <string>
 
 #include "engine/pipeline.h"
@@ -28,13 +30,28 @@ class Stage {
 [[nodiscard]] std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least,
                                         const char* what_for);
 
+/// The same for the page cache of a gather.
+[[nodiscard]] std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
+                                             unsigned threads, const char* what_for);
+
 /// Where temporary files go: the given directory, else the target's.
 [[nodiscard]] std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target);
 
+/// A container for the time of one run. Its name goes as soon as it is open: however the run ends
+/// from then on, nothing is left.
+/// @param write  writes the container to the path that it is given, or throws and leaves nothing
+[[nodiscard]] std::unique_ptr<ContainerReader> make_temporary(
+    const std::filesystem::path& directory, const std::function<void(const std::filesystem::path&)>& write);
+
 /// The lights that a container was built with; none when it does not say.
 [[nodiscard]] LightRig recorded_lights(const ContainerReader& container);
+/// Emissive triangles lit the surfels: what these emit is in the radiance of those around them.
+[[nodiscard]] bool lit_by_emitters(const ContainerReader& container);
 /// Spacing of the surfels: recorded, else the square root of area over points.
 [[nodiscard]] double surfel_spacing(const ContainerReader& container);
+
+/// Where light is wanted at a surfel. @param lift  in its radii
+[[nodiscard]] Receiver lifted(const Surfel& surfel, float lift);
 
 /// Sky as a gather takes it; empty for a black one.
 [[nodiscard]] std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky);
@@ -45,6 +62,7 @@ class Stage {
 
 // Keys of the meta page's text.
 inline constexpr const char* kLightsKey = "lights";
+inline constexpr const char* kEmittersKey = "emitters";
 inline constexpr const char* kCameraKey = "camera";
 inline constexpr const char* kSpacingKey = "spacing";
 inline constexpr const char* kInputsKey = "inputs";

@@ -37,6 +37,11 @@ CLI::Option* add_access(CLI::App& app, ContainerReader::Access& access) {
       ->group("Expert");
 }
 
+CLI::Option* add_bounces(CLI::App& app, unsigned& bounces) {
+  return add_integer(app, "--bounces", bounces, 1, 1000,
+                     "Bounces of light off surfaces; each after the first shades all points of the scene once more");
+}
+
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
   constexpr char kGroup[] = "Expert";
   constexpr double kPi = 3.141592653589793;

@@ -18,6 +18,9 @@ CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift);
 /// --io pread|mmap
 CLI::Option* add_access(CLI::App& app, ContainerReader::Access& access);
 
+/// --bounces
+CLI::Option* add_bounces(CLI::App& app, unsigned& bounces);
+
 /// --solid-angle, --parallax, --inflation, --resolution, --sides, --lift
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift);
 

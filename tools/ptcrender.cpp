@@ -121,6 +121,7 @@ int main(int argc, char** argv) {
   declare_scene(command, arguments);
   declare_picture(command.app(), arguments);
   declare_lights(command.app(), arguments);
+  ptc::add_bounces(command.app(), arguments.request.bounces);
   ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
   ptc::add_access(command.app(), arguments.request.access);
   ptc::add_check_options(command.app(), arguments.request.check);

@@ -13,6 +13,7 @@ constexpr char kPurpose[] =
 constexpr char kExamples[] =
     "  ptcshade dragon.ptcx -o lit.ptcx\n"
     "  ptcshade city.ptcx --memory 1G --threads 8 --progress -o lit.ptcx\n"
+    "  ptcshade room.ptcx --bounces 4 -o lit.ptcx\n"
     "  ptcshade room.ptcx --receivers probes.ply --sky 0.4 -o probes-lit.ply\n";
 
 }  // namespace
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
   lights.declare_sky(app);
   app.get_option("--sky")->description(
       "Radiance from everywhere, or a latitude-longitude picture of it [default: as built]");
+  ptc::add_bounces(app, request.bounces);
   ptc::add_gather_options(app, request.gather, request.lift);
   ptc::add_access(app, request.access);
   ptc::add_check_options(app, request.check);

@@ -82,7 +82,9 @@ ordered_json facts_of(const CheckReport& check) {
 
 ordered_json facts_of(const ShadeReport& report) {
   ordered_json facts{{"receivers", report.receivers},
+                     {"bounces", report.bounces},
                      {"shade_cpu_seconds", report.shade_cpu_seconds},
+                     {"bounce_cpu_seconds", report.bounce_cpu_seconds},
                      {"gather", facts_of(report.gather)},
                      {"cache", facts_of(report.cache)}};
   if (report.check) facts["check"] = facts_of(*report.check);

@@ -41,6 +41,19 @@ class Facts(ProgramTest):
         cache = shade["cache"]
         self.assertEqual(cache["lookups"], cache["local_hits"] + cache["shared_hits"] + cache["misses"])
 
+    def test_bounces_are_told_and_add_light(self):
+        facts = {}
+        for program, name in (("ptcshade", "o.ply"), ("ptcrender", "o.png")):
+            picture = SMALL_PICTURE if program == "ptcrender" else []
+            for bounces in (1, 3):
+                facts = json.loads(self.succeed(program, self.scene, "-o", self.here / name, *picture,
+                                                "--bounces", bounces, "--json").stdout)
+                self.assertEqual(facts["bounces"], bounces)
+                self.assertEqual(facts["bounce_cpu_seconds"] > 0, bounces > 1)
+                self.assertEqual([s for s in facts["seconds"] if s.startswith("bounce")],
+                                 ["bounce 1", "bounce 2"] if bounces > 1 else [])
+        self.assertFalse(list(self.here.glob(".ptcx-*")))
+
     def test_quiet_programs_say_nothing(self):
         for command in (["ptcinfo", self.scene], ["ptcverify", self.scene],
                         ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx"],
@@ -93,7 +106,8 @@ class Determinism(ProgramTest):
     def test_threads_and_caps_do_not_change_what_is_written(self):
         for program, operands, name in (("ptcbuild", [self.mesh, "--points", "4k"], "o.ptcx"),
                                         ("ptcshade", [self.scene], "o.ptcx"),
-                                        ("ptcshade", [self.scene], "o.ply")):
+                                        ("ptcshade", [self.scene], "o.ply"),
+                                        ("ptcshade", [self.scene, "--bounces", "3"], "o.ptcx")):
             first = None
             for options in (["--threads", "1"], ["--threads", "2"], ["--threads", "5"],
                             ["--memory", "128M"], ["--temp", str(self.here)]):

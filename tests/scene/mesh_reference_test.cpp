@@ -50,7 +50,7 @@ void check_factor(const glm::vec3& corner, const glm::vec3& u, const glm::vec3& 
   const double expected =
       factor(at, glm::dvec3(kUp), glm::dvec3(corner), glm::dvec3(u), glm::dvec3(v));
   const unsigned rays = 16384;
-  const RayTraced result = trace_mesh(scene, light, at, kUp, rays, {0, 0, 0}, 1);
+  const RayTraced result = trace_mesh(scene, light, at, kUp, rays, {{0, 0, 0}}, 1);
   // Stratified rays do better than random ones, whose deviation this is.
   const double noise = 3 * std::sqrt(expected * (1 - expected) / rays);
   CHECK(static_cast<double>(result.occlusion) == Approx(expected).margin(noise));
@@ -120,10 +120,29 @@ TEST_CASE("trace_mesh: in a furnace the irradiance is pi times emission plus one
   add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
-  const RayTraced result = trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 1024, {1, 16, 1}, 1);
+  const RayTraced result = trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 1024, {{1, 16, 1}}, 1);
   CHECK(result.occlusion == 1);
   CHECK(result.irradiance.x == Approx(1.5 * kPiWide).epsilon(0.01));
   CHECK(result.sky == glm::vec3(0));
+}
+
+TEST_CASE("trace_mesh: in a furnace every bounce adds its power of the albedo, however emission arrives",
+          "[scene][reference]") {
+  Mesh mesh = empty_mesh();
+  mesh.materials[0].emission = glm::vec3(1);
+  mesh.materials[0].albedo = glm::vec3(0.5f);
+  add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  // Shadow rays at the last hit bring emission over one reflection more than rays alone.
+  for (const unsigned area_rays : {0u, 16u}) {
+    for (unsigned n = 1; n <= 4; ++n) {
+      const double expected = 2 - std::pow(0.5, area_rays > 0 ? n : n - 1.0);
+      const RayTraced result = trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 4096, {{1, area_rays, 1}, n}, 1);
+      INFO(area_rays << " area rays, " << n << " bounces");
+      CHECK(result.irradiance.x == Approx(expected * kPiWide).epsilon(0.01));
+    }
+  }
 }
 
 TEST_CASE("trace_mesh: a lit surface sends albedo over pi times its direct light",
