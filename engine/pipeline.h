@@ -138,7 +138,9 @@ struct RenderRequest {
   std::optional<std::array<unsigned, 2>> size;  ///< width and height in place of the camera's
   unsigned samples = 4;           ///< per pixel, a square number
   std::optional<LightRig> lights; ///< empty: those that the scene was built with
-  LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
+  /// Of the camera's pixels. Emissive triangles are surfels, so that the gather brings their light, which
+  /// area rays would bring once more.
+  LightSampling light_sampling{.sun_rays = 4, .area_rays = 0, .sky_rays = 0};
   unsigned bounces = 1;           ///< as of ShadeRequest
   GatherOptions gather;
   float lift = 0.15F;             ///< receivers rise by so many radii of a surfel of the scene's spacing

@@ -1,6 +1,7 @@
 // Light of several bounces, against a furnace and path tracing.
 #include "engine/bounces.h"
 
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <numbers>
@@ -9,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/build/container_points.h"
+#include "engine/io/image.h"
 #include "engine/io/record.h"
 #include "engine/measure/statistics.h"
 #include "engine/scene/mesh_reference.h"
@@ -273,6 +275,37 @@ TEST_CASE("bounces: another cloud's points and a picture see them", "[integratio
   const ShadeReport render = render_picture(picture, std::array{PictureTarget{dir / "a.png"}}, silent);
   CHECK(render.check->discs.irradiance_mean == Approx(1.5 * std::numbers::pi).epsilon(0.02));
   CHECK(entries_in(dir) == 4);
+}
+
+TEST_CASE("bounces: an emitter lights a picture once", "[integration][bounces][render]") {
+  const TemporaryDirectory dir;
+  Mesh mesh;
+  mesh.materials = {{.name = "furnace", .albedo = glm::vec3(0.5F), .emission = glm::vec3(1)}};
+  const glm::vec3 x(2, 0, 0), y(0, 2, 0), z(0, 0, 2), low(-1), high(1);
+  for (const auto& [u, v] : {std::pair(x, y), std::pair(y, z), std::pair(z, x)}) {
+    add_quad(mesh, low, u, v, 0);
+    add_quad(mesh, high, -v, -u, 0);
+  }
+  std::ofstream obj(dir / "furnace.obj");
+  obj << "mtllib furnace.mtl\nusemtl furnace\n";
+  std::ofstream(dir / "furnace.mtl") << "newmtl furnace\nKd 0.5 0.5 0.5\nKe 1 1 1\n";
+  for (const glm::vec3& p : mesh.positions) obj << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
+  for (const auto& t : mesh.triangles) obj << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+  obj.close();
+  BuildRequest build{.inputs = {dir / "furnace.obj"}};
+  build.sampling.count = 10'000;
+  build.sampling.lights.area_rays = 0;
+  Progress silent;
+  build_container(build, dir / "furnace.ptcx", silent);
+  RenderRequest request{.scene = dir / "furnace.ptcx", .meshes = {dir / "furnace.obj"}, .samples = 1};
+  request.camera = Camera{.position = {0, 0, 0.9}, .look_at = {0, 0, -1}, .width = 16, .height = 16};
+  double expected = 1;
+  for (unsigned n = 1; n <= 3; ++n) {
+    request.bounces = n;
+    render_picture(request, std::array{PictureTarget{dir / "a.exr"}}, silent);
+    expected += std::pow(0.5, n);
+    CHECK(static_cast<double>(read_image(dir / "a.exr").pixels[8 * 16 + 8].g) == Approx(expected).epsilon(0.01));
+  }
 }
 
 TEST_CASE("bounces: a run that fails leaves nothing", "[integration][bounces]") {
