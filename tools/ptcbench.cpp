@@ -6,6 +6,8 @@
 #include "engine/base/error.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/accuracy_report.h"
+#include "tools/bench/growth.h"
+#include "tools/bench/growth_report.h"
 #include "tools/common.h"
 #include "tools/values.h"
 
@@ -15,19 +17,24 @@ using namespace ptc::bench;
 
 constexpr char kPurpose[] =
     "Measures time and error together, against rays at the same scene in the same run, and draws charts\n"
-    "of one against the other. Scenes are held in memory whole; --memory caps their builds alone.";
+    "of one against the other, or of how time grows. Scenes are held in memory whole; --memory caps their\n"
+    "builds alone.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
-    "  ptcbench accuracy room.obj --set camera --method ptcx --setting 0.02,0.1,32 -o charts\n";
+    "  ptcbench accuracy room.obj --set camera --method ptcx --setting 0.02,0.1,32 -o charts\n"
+    "  ptcbench growth --quick -o charts\n"
+    "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
 
 struct Arguments {
   std::vector<std::string> scenes;
   std::filesystem::path directory;
   AccuracyOptions accuracy;
+  GrowthOptions growth;
   bool quick = false;
-  const CLI::App* command = nullptr;  ///< knows which options were given
+  const CLI::App* command = nullptr;         ///< knows which options were given
+  const CLI::App* growth_command = nullptr;  ///< likewise
 };
 
 ptc::GatherOptions parse_setting(const std::string& text) {
@@ -46,6 +53,21 @@ ptc::GatherOptions parse_setting(const std::string& text) {
   return options;
 }
 
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : "|") + word;
+  return text;
+}
+
+/// Refuses what is none of these words.
+CLI::Validator one_of(const std::vector<std::string>& known) {
+  const auto check = [known](const std::string& text) {
+    const bool found = std::ranges::find(known, text) != known.end();
+    return found ? std::string() : "expects " + joined(known) + ", not '" + text + "'";
+  };
+  return {check, ""};
+}
+
 void declare_choices(CLI::App& command, AccuracyOptions& options) {
   constexpr char kGroup[] = "Expert";
   const auto set = [&options](const std::vector<std::string>& values) {
@@ -58,21 +80,11 @@ void declare_choices(CLI::App& command, AccuracyOptions& options) {
       ->type_name("SR,RAD,R[,X]")
       ->allow_extra_args(false)
       ->group(kGroup);
-  const auto one_of = [&](const char* name, std::vector<std::string>& chosen, const char* description) {
-    std::string words;
-    for (const std::string& word : chosen) words += (words.empty() ? "" : "|") + word;
-    const auto check = [known = chosen, words](const std::string& text) {
-      const bool found = std::ranges::find(known, text) != known.end();
-      return found ? std::string() : "expects " + words + ", not '" + text + "'";
-    };
-    command.add_option(name, chosen, description)
-        ->type_name(words)
-        ->allow_extra_args(false)
-        ->check(CLI::Validator(check, ""))
-        ->group(kGroup);
+  const auto add_words = [&](const char* name, std::vector<std::string>& chosen, const char* description) {
+    command.add_option(name, chosen, description)->type_name(joined(chosen))->allow_extra_args(false)->check(one_of(chosen))->group(kGroup);
   };
-  one_of("--method", options.methods, "Measure this method, not all; repeatable");
-  one_of("--set", options.sets, "Shade these receivers: pixels of a picture, or the scene's own points; repeatable");
+  add_words("--method", options.methods, "Measure this method, not all; repeatable");
+  add_words("--set", options.sets, "Shade these receivers: pixels of a picture, or the scene's own points; repeatable");
 }
 
 void declare_accuracy(CLI::App& app, Arguments& arguments) {
@@ -102,6 +114,51 @@ void declare_accuracy(CLI::App& app, Arguments& arguments) {
       });
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every method");
   declare_choices(command, options);
+}
+
+void declare_growth(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = *app.add_subcommand("growth", "Time per receiver against surfels, solid angle, depth complexity and memory, "
+                                                    "with its error");
+  arguments.growth_command = &command;
+  command.fallthrough();
+  command.add_option("-o,--output", arguments.directory, "Directory for growth.json, .csv, .svg and .png")
+      ->type_name("DIR")
+      ->required();
+  command.add_flag("--quick", arguments.quick,
+                   "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them checked, 3 runs, no cap below "
+                   "9 %; what other options say stays");
+  GrowthOptions& options = arguments.growth;
+  const auto set = [&options](const std::vector<std::string>& values) {
+    options.points.clear();
+    for (const std::string& text : values) options.points.push_back(ptc::parse_count("--points", text));
+    std::ranges::sort(options.points);
+  };
+  command.add_option_function<std::vector<std::string>>("--points", set,
+                                                        "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the "
+                                                        "greatest is also shaded under caps. Above 40M without a check by rays")
+      ->type_name("COUNT")
+      ->allow_extra_args(false);
+  command.add_option("--panel", options.panels, "Measure against this, not all; repeatable")
+      ->type_name(joined(options.panels))
+      ->allow_extra_args(false)
+      ->check(one_of(options.panels));
+  ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers whose error is measured");
+  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
+}
+
+/// What --quick sets, unless another option did.
+void shorten_growth(Arguments& arguments) {
+  GrowthOptions& options = arguments.growth;
+  const auto given = [&](const char* name) { return arguments.growth_command->count(name) > 0; };
+  if (!given("--points")) options.points = {50'000, 150'000, 500'000};
+  if (!given("--checked")) options.checked = 100;
+  if (!given("--repeats")) options.repeats = 3;
+  options.middle_points = 50'000;
+  options.solid_angles = {0.1F, 0.01F, 0.001F};
+  options.layers = {1, 4, 16};
+  options.caps = {1, 0.29, 0.09};  // less of so few pages is nothing
+  options.own_points = 8'192;
+  options.reference_rays = 4096;
 }
 
 /// What --quick sets, unless another option did. The references stay as good: they take little time.
@@ -155,12 +212,25 @@ ptc::Outcome measure(Arguments& arguments, const ptc::RunOptions& run, ptc::Prog
   return {facts_of(scenes), accuracy_text(scenes)};
 }
 
+ptc::Outcome measure_growing(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten_growth(arguments);
+  std::filesystem::create_directories(arguments.directory);
+  const auto write = [&](const std::vector<GrowthRow>& so_far) { write_reports(arguments.directory, so_far); };
+  const std::vector<GrowthRow> rows = measure_growth(arguments.growth, arguments.directory, run, progress, write);
+  return {facts_of(rows), growth_text(rows)};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   ptc::Command command("ptcbench", kPurpose, kExamples);
   Arguments arguments;
   declare_accuracy(command.app(), arguments);
+  declare_growth(command.app(), arguments);
   command.app().require_subcommand(1);
-  return command.run(argc, argv, [&](ptc::Progress& progress) { return measure(arguments, command.run_options(), progress); });
+  return command.run(argc, argv, [&](ptc::Progress& progress) {
+    const bool growth = command.app().got_subcommand("growth");
+    return growth ? measure_growing(arguments, command.run_options(), progress)
+                  : measure(arguments, command.run_options(), progress);
+  });
 }

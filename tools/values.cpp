@@ -20,15 +20,6 @@ std::string range_text(const std::string& least, const std::string& most) {
   return "expects a number from " + least + " to " + most;
 }
 
-std::uint64_t parse_count(const std::string& option, const std::string& text) {
-  constexpr double kGreatest = 0x1p48;  // points of a file
-  const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
-  if (!(count >= 1 && count <= kGreatest) || std::rint(count) != count) {
-    refuse(option, text, "a whole number from 1 to 2^48, as 250000, 250k or 1.5M");
-  }
-  return static_cast<std::uint64_t>(count);
-}
-
 std::uint64_t parse_size(const std::string& option, const std::string& text) {
   constexpr double kGreatest = 0x1p62;
   const double bytes = parse_scaled(text, {{"K", 0x1p10},
@@ -67,6 +58,15 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
     if (numbers.size() == count) return numbers;
   }
   refuse(option, text, expected);
+}
+
+std::uint64_t parse_count(const std::string& option, const std::string& text) {
+  constexpr double kGreatest = 0x1p48;  // points of a file
+  const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
+  if (!(count >= 1 && count <= kGreatest) || std::rint(count) != count) {
+    refuse(option, text, "a whole number from 1 to 2^48, as 250000, 250k or 1.5M");
+  }
+  return static_cast<std::uint64_t>(count);
 }
 
 CLI::Validator in_range(double least, double most) {

@@ -88,6 +88,8 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
 }
 
 /// A whole number from 1, also with k, M or G for powers of 1000: "250k", "1.5M".
+[[nodiscard]] std::uint64_t parse_count(const std::string& option, const std::string& text);
+/// The same as an option.
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& count,
                        const std::string& description);
 

@@ -106,3 +106,19 @@ TEST_CASE("window room: light leaves it through the window alone", "[bench][proc
     CHECK(escaped <= through_window);
   }
 }
+
+TEST_CASE("layers: half of a sheet's tiles are missing, the rest face up or down", "[bench][scene]") {
+  for (const unsigned layers : {0U, 1U, 16U}) {
+    const Mesh mesh = make_layers(layers).mesh;
+    const double tiles = static_cast<double>(mesh.triangles.size()) / 2 - 1;
+    CHECK(tiles == Approx(512.0 * layers).margin(30 * std::sqrt(layers)));
+    std::size_t up = 0;
+    for (const auto& t : mesh.triangles) {
+      const glm::vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+      const glm::vec3 normal = glm::normalize(glm::cross(b - a, c - a));
+      REQUIRE(std::abs(normal.y) == 1);
+      up += normal.y > 0;
+    }
+    if (layers > 0) CHECK(static_cast<double>(up) == Approx(tiles).epsilon(0.15));
+  }
+}

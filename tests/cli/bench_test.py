@@ -85,6 +85,27 @@ class Bench(ProgramTest):
         for name in ("box", "box-2"):
             self.assertTrue((self.here / f"charts/accuracy-{name}.svg").is_file())
 
+    def test_growth_measures_every_panel_and_leaves_its_files_alone(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "growth", "--quick", "--points", "4k", "--points", "12k", "--checked", "20",
+                               "--repeats", "1", "--threads", "2", "-o", charts, "--json")
+        rows = json.loads((charts / "growth.json").read_text())["rows"]
+        self.assertEqual(json.loads(printed.stdout)["rows"], rows)
+        panels = {name: [r for r in rows if r["panel"] == name] for name in ("surfels", "solid-angle", "depth", "cap")}
+        self.assertEqual([len(panel) for panel in panels.values()], [2, 3, 3, 6])
+        self.assertTrue(all(r["us_per_receiver"] > 0 and r["e_rms"] is not None for r in rows))
+        self.assertEqual(len({r["e_rms"] for r in panels["cap"]}), 1)
+        self.assertEqual([r["threads"] for r in panels["cap"]], [1, 1, 1, 2, 2, 2])
+        self.assertEqual(sorted(p.name for p in charts.iterdir()),
+                         ["growth.csv", "growth.json", "growth.png", "growth.svg"])
+        with open(charts / "growth.csv", newline="") as file:
+            lines = list(csv.reader(file))
+        self.assertEqual([len(line) for line in lines], [len(lines[0])] * (len(rows) + 1))
+
+    def test_growth_beyond_the_disk_is_the_machines_fault(self):
+        message = self.fail_with(3, "ptcbench", "growth", "--points", "40000G", "--panel", "surfels", "-o", self.here)
+        self.assertIn("GB free", message)
+
     def test_containers_that_were_there_stay(self):
         charts = self.here / "charts"
         charts.mkdir()

@@ -19,7 +19,7 @@ class Usage(ProgramTest):
         # would run for long.
         for program in PROGRAMS:
             for line in self.succeed(program, "--help").stdout.split("Examples:\n")[1].splitlines():
-                if not line.startswith("  " + program) or "--city" in line or "--quick" in line:
+                if not line.startswith("  " + program) or "--city" in line or "--quick" in line or " growth " in line:
                     continue
                 words = line.split("|")[0].replace("/scratch", str(self.here)).split()
                 message = self.fail_with(1, program, *words[1:], cwd=self.here)
@@ -80,6 +80,8 @@ class Usage(ProgramTest):
         for program, options in cases.items():
             for option in options:
                 self.fail_with(2, program, *operands[program], option)
+        for option in ("--points=0", "--points=1.5", "--points=x", "--panel=time", "--panel=", "--checked=9", "--repeats=0"):
+            self.fail_with(2, "ptcbench", "growth", "-o", self.here / "o", option)
 
     def test_names_of_outputs_must_tell_their_kind(self):
         for program, operands in (("ptcbuild", [self.mesh, "-o"]), ("ptcshade", [self.scene, "-o"]),

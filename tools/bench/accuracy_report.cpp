@@ -1,19 +1,16 @@
 #include "tools/bench/accuracy_report.h"
 
 #include <cmath>
-#include <utility>
 
 #include <fmt/format.h>
 
-#include "engine/io/file.h"
 #include "tools/bench/accuracy_chart.h"
+#include "tools/bench/report_files.h"
 
 namespace ptc::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json facts_of(const AccuracyRow& row) {
   Json facts{{"scene", row.scene},
@@ -60,32 +57,6 @@ Json facts_of(const ReferenceNote& note, const SceneAccuracy& scene) {
           {"e_floor", number(note.irradiance_floor)}};
 }
 
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  OutputFile file(path);
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
-}
-
-/// A cell of a CSV file (RFC 4180): nothing for null, words in quotes.
-std::string cell_of(const Json& value) {
-  if (value.is_null()) return {};
-  if (!value.is_string()) return value.dump();
-  std::string cell = "\"";
-  for (const char c : value.get_ref<const std::string&>()) cell += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return cell + '"';
-}
-
-/// The rows' members as columns; all rows have the same.
-std::string csv_of(const Json& rows) {
-  std::string text;
-  for (const auto& [key, value] : rows.front().items()) text += (text.empty() ? "" : ",") + key;
-  for (const Json& row : rows) {
-    std::string separator = "\n";
-    for (const auto& [key, value] : row.items()) text += std::exchange(separator, ",") + cell_of(value);
-  }
-  return text + "\n";
-}
-
 }  // namespace
 
 nlohmann::ordered_json facts_of(const std::vector<SceneAccuracy>& scenes) {
@@ -99,13 +70,9 @@ nlohmann::ordered_json facts_of(const std::vector<SceneAccuracy>& scenes) {
 
 void write_reports(const std::filesystem::path& directory, const std::vector<SceneAccuracy>& scenes) {
   const Json facts = facts_of(scenes);
-  write_text(directory / "accuracy.json", facts.dump(2) + "\n");
-  write_text(directory / "accuracy.csv", csv_of(facts.at("rows")));
-  const auto write_both = [&](const std::string& name, const Chart& chart) {
-    for (const char* ending : {".svg", ".png"}) write_chart(directory / (name + ending), chart);
-  };
-  for (const SceneAccuracy& scene : scenes) write_both("accuracy-" + scene.name(), chart_of(scene));
-  write_both("accuracy", chart_of(scenes));
+  write_tables(directory / "accuracy", facts);
+  for (const SceneAccuracy& scene : scenes) write_figures(directory / ("accuracy-" + scene.name()), chart_of(scene));
+  write_figures(directory / "accuracy", chart_of(scenes));
 }
 
 std::string accuracy_text(const std::vector<SceneAccuracy>& scenes) {

@@ -1,13 +1,13 @@
 #include "tools/bench/bench_scene.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <numbers>
 #include <set>
 #include <stdexcept>
 
+#include "engine/build/container_points.h"
 #include "engine/io/points.h"
+#include "engine/io/record.h"
 #include "engine/primary.h"
 #include "engine/scene/city.h"
 #include "engine/shade/brute_force.h"
@@ -95,9 +95,9 @@ BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options, c
     : name_(choice.name) {
   load(choice, options, work, run, progress);
   lit_.lights = recorded_lights(*container_);
-  surfels_ = load_surfels(*container_, kMostSurfels);
+  if (options.rays) surfels_ = load_surfels(*container_, kMostSurfels);
   const Executor executor(run.threads);
-  add_camera(options, executor, progress);
+  if (options.shaded_width > 0) add_camera(options, executor, progress);
   add_points(options);
 }
 
@@ -111,9 +111,11 @@ void BenchScene::load(const SceneChoice& choice, const SceneOptions& options, co
   std::optional<Camera> camera;
   if (choice.name == "city" && choice.file.empty()) {
     request.city_points = options.points;
-    lit_.mesh = city_mesh(options.points);
+    if (options.rays) lit_.mesh = city_mesh(options.points);
   } else if (choice.file.empty()) {
-    lit_ = choice.name == "fractal" ? make_fractal(options.points) : make_window_room();
+    lit_ = choice.layers > 0           ? make_layers(choice.layers)
+           : choice.name == "fractal" ? make_fractal(options.points)
+                                      : make_window_room();
     request.lights = lit_.lights;
     request.mesh = std::make_shared<const Mesh>(lit_.mesh);
     camera = lit_.camera;
@@ -121,10 +123,7 @@ void BenchScene::load(const SceneChoice& choice, const SceneOptions& options, co
     request.inputs.push_back(choice.file);
     lit_.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, &cameras);
   }
-  const std::filesystem::path path = work / (".ptcbench-" + std::to_string(getpid()) + ".ptcx");
-  build_container(request, path, progress);
-  container_ = std::make_unique<ContainerReader>(path);
-  std::filesystem::remove(path);  // what is open stays, and goes with this process however that ends
+  container_ = make_temporary(work, [&](const std::filesystem::path& path) { build_container(request, path, progress); });
   if (!camera) {
     camera = default_camera(*container_, cameras, choice.backdrop, std::array{options.width, options.height});
   }
@@ -159,13 +158,18 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
 /// Whole blocks of neighbours, evenly spread: what shading all points meets.
 void BenchScene::add_points(const SceneOptions& options) {
   ReceiverSet set{.name = "points"};
-  const std::size_t blocks = surfels_.size() / Shader::kBlock;
+  const std::uint64_t points = container_->superblock().points;
+  const std::size_t blocks = points / Shader::kBlock;
   const std::size_t wanted = std::max<std::size_t>(1, std::min<std::size_t>(blocks, options.own_points / Shader::kBlock));
-  for (std::size_t i = 0; i < wanted; ++i) {
-    const std::size_t first = blocks * i / wanted * Shader::kBlock;
-    for (std::size_t k = first; k < std::min(first + Shader::kBlock, surfels_.size()); ++k) {
-      const Surfel& s = surfels_[k];
-      set.receivers.push_back({s.position + glm::dvec3(s.normal * (options.lift * s.radius)), s.normal});
+  ContainerPoints all(*container_);
+  std::vector<PointRecord> block(Shader::kBlock);
+  std::size_t taken = 0;
+  for (std::size_t at = 0; const std::size_t count = all.next(block); ++at) {
+    if (taken == wanted) break;
+    if (blocks > 0 && at != blocks * taken / wanted) continue;
+    ++taken;
+    for (std::size_t i = 0; i < count; ++i) {
+      set.receivers.push_back(lifted(to_surfel(block[i], container_->superblock().frame), options.lift));
     }
   }
   sets_.push_back(std::move(set));

@@ -21,6 +21,7 @@ struct SceneChoice {
   std::string name;             ///< in charts and their files: the word, or the file's name without ending
   std::filesystem::path file;   ///< empty for the words
   bool backdrop = false;        ///< the mesh stands on a ground before a wall
+  unsigned layers = 0;          ///< of make_layers(), instead of a word or a file
 };
 /// @param text  a word, or a path with "+backdrop" appended where wanted
 /// @throws std::invalid_argument when a word has a backdrop, or there is neither word nor path
@@ -49,10 +50,11 @@ struct ReceiverSet {
 struct SceneOptions {
   std::uint64_t points = 2'000'000;           ///< surfels wanted; clouds have as many as they have
   unsigned width = 640, height = 360;         ///< of the camera's picture
-  unsigned shaded_width = 640, shaded_height = 360;  ///< in its middle, whose pixels are receivers
+  unsigned shaded_width = 640, shaded_height = 360;  ///< in its middle, whose pixels are receivers; 0: none
   unsigned window_width = 128, window_height = 72;   ///< in the middle of that, to compare pictures
   std::uint64_t own_points = 100'000;         ///< of the scene's points as receivers, in runs
   float lift = 0.15F;                         ///< as ShadeRequest::lift
+  bool rays = true;                           ///< surfels and mesh are loaded, which rays need
 };
 
 /// Builds the container, loads what rays need, finds the receivers.

@@ -188,4 +188,33 @@ LitScene make_window_room() {
   return scene;
 }
 
+LitScene make_layers(unsigned layers) {
+  constexpr int kTiles = 32;
+  LitScene scene;
+  Mesh& mesh = scene.mesh;
+  mesh.materials = {{.name = "ground", .albedo = glm::vec3(0.6F)},
+                    {.name = "red", .albedo = {0.6F, 0.2F, 0.15F}},
+                    {.name = "blue", .albedo = {0.2F, 0.3F, 0.6F}}};
+  const auto add_tile = [&mesh](const glm::vec3& low, float width, bool up, std::uint16_t material) {
+    const auto a = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), {low, low + glm::vec3(0, 0, width), low + glm::vec3(width, 0, width),
+                                                 low + glm::vec3(width, 0, 0)});
+    add_triangle(mesh, a, up ? a + 1 : a + 2, up ? a + 2 : a + 1, material);
+    add_triangle(mesh, a, up ? a + 2 : a + 3, up ? a + 3 : a + 2, material);
+  };
+  add_tile({0, 0, 0}, kTiles, true, 0);
+  for (unsigned layer = 1; layer <= layers; ++layer) {
+    for (int tile = 0; tile < kTiles * kTiles; ++tile) {
+      const std::uint64_t bits = mix_bits(std::uint64_t{layer} << 32 | static_cast<std::uint64_t>(tile));
+      if ((bits & 1) != 0) continue;
+      const glm::vec3 at(static_cast<float>(tile % kTiles), static_cast<float>(layer), static_cast<float>(tile / kTiles));
+      add_tile(at, 1, (bits & 2) != 0, (bits & 4) != 0 ? 1 : 2);
+    }
+  }
+  scene.lights.suns.push_back({.to_sun = glm::normalize(glm::vec3(0.5F, 0.6F, 0.3F))});
+  scene.lights.sky.radiance = {0.6F, 0.7F, 0.9F};
+  scene.camera = {.position = {50, 30, 55}, .look_at = {16, 2, 16}, .width = 640, .height = 360};
+  return scene;
+}
+
 }  // namespace ptc::bench

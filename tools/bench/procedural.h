@@ -25,4 +25,8 @@ struct LitScene {
 /// lit through one window by sun and sky: most of its light has met a surface.
 [[nodiscard]] LitScene make_window_room();
 
+/// Ground under sheets of tiles, half of them missing at random, one tile's width above each other:
+/// what lies behind a surface grows with their number. +y up, 32 tiles wide.
+[[nodiscard]] LitScene make_layers(unsigned layers);
+
 }  // namespace ptc::bench

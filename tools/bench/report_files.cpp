@@ -1,0 +1,55 @@
+#include "tools/bench/report_files.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "engine/io/file.h"
+
+namespace ptc::bench {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  OutputFile file(path);
+  file.append(std::as_bytes(std::span(text)));
+  file.publish();
+}
+
+/// A cell of a CSV file (RFC 4180): nothing for null, words in quotes.
+std::string cell_of(const Json& value) {
+  if (value.is_null()) return {};
+  if (!value.is_string()) return value.dump();
+  std::string cell = "\"";
+  for (const char c : value.get_ref<const std::string&>()) cell += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return cell + '"';
+}
+
+/// The rows' members as columns; all rows have the same.
+std::string csv_of(const Json& rows) {
+  std::string text;
+  for (const auto& [key, value] : rows.front().items()) text += (text.empty() ? "" : ",") + key;
+  for (const Json& row : rows) {
+    std::string separator = "\n";
+    for (const auto& [key, value] : row.items()) text += std::exchange(separator, ",") + cell_of(value);
+  }
+  return text + "\n";
+}
+
+std::filesystem::path with_ending(const std::filesystem::path& name, const char* ending) { return name.string() + ending; }
+
+}  // namespace
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+void write_tables(const std::filesystem::path& name, const Json& facts) {
+  write_text(with_ending(name, ".json"), facts.dump(2) + "\n");
+  write_text(with_ending(name, ".csv"), csv_of(facts.at("rows")));
+}
+
+void write_figures(const std::filesystem::path& name, const Chart& chart) {
+  for (const char* ending : {".svg", ".png"}) write_chart(with_ending(name, ending), chart);
+}
+
+}  // namespace ptc::bench

@@ -1,0 +1,23 @@
+// Files that measurements end up in.
+#pragma once
+
+#include <filesystem>
+
+#include <nlohmann/json.hpp>
+
+#include "engine/measure/chart.h"
+
+namespace ptc::bench {
+
+/// null where there is no finite number.
+[[nodiscard]] nlohmann::ordered_json number(double value);
+
+/// Writes NAME.json, and its "rows" as NAME.csv: their members as columns, null as an empty cell.
+/// @param facts  "rows" is an array of one or more objects with the same members
+/// @throws std::system_error
+void write_tables(const std::filesystem::path& name, const nlohmann::ordered_json& facts);
+
+/// Writes NAME.svg and NAME.png. @throws as write_chart()
+void write_figures(const std::filesystem::path& name, const Chart& chart);
+
+}  // namespace ptc::bench
