@@ -137,7 +137,7 @@ Means compare_with_paths(const ContainerReader& lit, const DirectLight& light, c
   const std::vector<Shading> shaded = shade(lit, receivers);
   std::vector<float> ours, traced;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
-    const RayTraced t = trace_mesh(rays, light, receivers[i].position, receivers[i].normal, 1024, {{1, 0, 0}, bounces}, i);
+    const RayTraced t = trace_mesh(rays, light, receivers[i].position, receivers[i].normal, 1024, {{1, 0, 4}, bounces}, i);
     for (int c = 0; c < 3; ++c) {
       ours.push_back(shaded[i].irradiance[c]);
       traced.push_back(t.irradiance[c]);
@@ -190,6 +190,29 @@ TEST_CASE("bounces: two rooms are lit as paths on the mesh light them", "[integr
     CHECK(second.rms < 0.1);
     CHECK(second.traced > 1.05 * before);  // each bounce counts
     before = second.traced;
+  }
+}
+
+TEST_CASE("bounces: sky is in the light of the points once", "[integration][bounces]") {
+  const TemporaryDirectory dir;
+  Mesh mesh;
+  mesh.materials = {{.name = "white", .albedo = glm::vec3(0.8F)}};
+  add_quad(mesh, {0, 0, 0}, {0, 0, 2}, {1.5F, 0, 0}, 0);
+  add_quad(mesh, {0, 0, 0}, {0, 1.5F, 0}, {0, 0, 2}, 0);
+  BuildRequest request = rooms_request();
+  request.mesh = std::make_shared<const Mesh>(mesh);
+  request.lights = LightRig{.sky = {.radiance = glm::vec3(1)}};
+  request.sampling.count = 6'000;
+  Progress silent;
+  build_container(request, dir / "corner.ptcx", silent);
+  const ContainerReader scene(dir / "corner.ptcx");
+  const RayScene rays(*request.mesh);
+  const DirectLight light(rays, *request.lights);
+  for (unsigned n = 1; n <= 3; ++n) {
+    const Lit lit = bounce(scene, n, dir);
+    const Means means = compare_with_paths(lit.bounced ? *lit.bounced : scene, light, rays, n, false);
+    INFO(n << " bounces: " << means.ours << " of " << means.traced);
+    CHECK(means.ours == Approx(means.traced).epsilon(0.02));
   }
 }
 

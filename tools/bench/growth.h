@@ -24,7 +24,7 @@ struct GrowthOptions {
   std::vector<float> solid_angles{0.1F, 0.03F, 0.01F, 0.003F, 0.001F};
   std::vector<unsigned> layers{1, 2, 4, 8, 16};
   std::vector<double> caps{1, 0.29, 0.09, 0.04};
-  std::vector<unsigned> rays{256, 1024, 4096};  ///< of Embree, powers of two
+  std::vector<unsigned> rays{64, 256, 1024, 4096};  ///< of Embree, powers of two
   std::vector<std::string> panels{kGrowthPanels.begin(), kGrowthPanels.end()};
   std::uint64_t own_points = 50'000;   ///< receivers, in blocks of neighbours spread over the scene
   unsigned checked = 300;              ///< of them, whose error is measured
