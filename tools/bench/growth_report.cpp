@@ -31,7 +31,8 @@ struct PanelKind {
 constexpr std::array kKinds{PanelKind{"surfels", "Surfels", "surfels of the city", kTime},
                             PanelKind{"solid-angle", "Solid angle", "solid angle, sr", kTime},
                             PanelKind{"depth", "Depth complexity", "sheets above the ground", kTime},
-                            PanelKind{"cap", "Memory", "page cache, % of all pages", "wall time per receiver, \u00b5s"},
+                            PanelKind{"cap", "Memory", "page cache, % of all pages", kTime},
+                            PanelKind{"cap", "Memory, wall time", "page cache, % of all pages", "wall time per receiver, \u00b5s"},
                             PanelKind{"cap", "Reading", "page cache, % of all pages", "bytes read per receiver"}};
 
 std::string percent(double share, int digits) {
@@ -51,14 +52,18 @@ ChartSeries series_of(const std::vector<GrowthRow>& rows, const PanelKind& kind,
   return series;
 }
 
-void add_caps(ChartPanel& panel, const std::vector<GrowthRow>& rows, const PanelKind& kind, bool time) {
+/// What the panel of caps shows.
+double cap_value(const PanelKind& kind, const GrowthRow& row) {
+  const std::string_view title = kind.title;
+  return title == "Reading" ? row.bytes : title == "Memory" ? row.us.median : row.wall_us.median;
+}
+
+void add_caps(ChartPanel& panel, const std::vector<GrowthRow>& rows, const PanelKind& kind) {
   std::vector<unsigned> done;
   for (const GrowthRow& row : rows) {
     if (row.panel != kind.panel || std::ranges::find(done, row.threads) != done.end()) continue;
     done.push_back(row.threads);
-    const auto y = [&](const GrowthRow& r) {
-      return r.threads != row.threads ? std::nan("") : time ? r.wall_us.median : r.bytes;
-    };
+    const auto y = [&](const GrowthRow& r) { return r.threads == row.threads ? cap_value(kind, r) : std::nan(""); };
     panel.series.push_back(series_of(rows, kind, fmt::format("{} thread{}", row.threads, row.threads > 1 ? "s" : ""), y,
                                      [](const GrowthRow& r) { return percent(r.hit_rate, 2); }));
   }
@@ -109,7 +114,7 @@ Chart chart_of(const std::vector<GrowthRow>& rows) {
   for (const PanelKind& kind : kKinds) {
     ChartPanel panel{.title = kind.title, .x_label = kind.x_label, .y_label = kind.y_label};
     if (std::string_view(kind.panel) == "cap") {
-      add_caps(panel, rows, kind, std::string_view(kind.title) == "Memory");
+      add_caps(panel, rows, kind);
     } else {
       add_times(panel, rows, kind);
     }

@@ -14,7 +14,7 @@ namespace ptc::bench {
 
 /// {"rows": [...]}; all rows have the same members, what was not measured is null.
 [[nodiscard]] nlohmann::ordered_json facts_of(const std::vector<GrowthRow>& rows);
-/// A panel for time against each of what varied, and one for what was read under caps.
+/// A panel for time against each of what varied; under caps wall time and what was read, too.
 /// @param rows  one or more
 [[nodiscard]] Chart chart_of(const std::vector<GrowthRow>& rows);
 /// Writes growth.json, .csv, .svg and .png into a directory. @throws std::system_error
