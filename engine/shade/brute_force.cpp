@@ -20,14 +20,18 @@ std::vector<Surfel> load_surfels(const ContainerReader& container, std::uint64_t
   }
   std::vector<Surfel> surfels;
   surfels.reserve(static_cast<std::size_t>(count));
+  append_surfels(container, container.point_pages(), surfels);
+  return surfels;
+}
+
+void append_surfels(const ContainerReader& container, std::span<const std::uint32_t> pages, std::vector<Surfel>& surfels) {
   std::vector<std::byte> payload(container.page_payload_limit());
   PageDecoder decoder;
-  for (const std::uint32_t page : container.point_pages()) {
+  for (const std::uint32_t page : pages) {
     const PageHeader header = container.read_page(page, payload, decoder);
     const PointPage points(payload.data(), header.record_count);
     for (std::uint32_t i = 0; i < points.size(); ++i) surfels.push_back(to_surfel(points[i], container.superblock().frame));
   }
-  return surfels;
 }
 
 void shade_brute_force(std::span<const Surfel> surfels, std::span<const Receiver> receivers,

@@ -1,8 +1,8 @@
 // Embree rays at oriented discs (engine/shade/brute_force.h).
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -38,7 +38,7 @@ struct DiscRays::Impl {
     RTCIntersectContext embree;  // first: Embree hands back a pointer to it
     const Impl* discs;
     bool choose = false;  // second pass: keep the disc with the least bumped depth
-    float best = std::numeric_limits<float>::infinity();
+    float best = 0;
     unsigned best_disc = RTC_INVALID_GEOMETRY_ID;
   };
 
@@ -96,32 +96,40 @@ struct DiscRays::Impl {
     return ray;
   }
 
-  /// The disc that a ray meets first, or RTC_INVALID_GEOMETRY_ID.
-  [[nodiscard]] unsigned meet(const glm::vec3& from, const glm::vec3& along) const {
+  /// Replaces what a ray met before where a disc here is met before that.
+  void meet(const glm::vec3& from, const glm::vec3& along, DiscHit& met) const {
     Context context{};
     rtcInitIntersectContext(&context.embree);
     context.discs = this;
-    RTCRayHit ray = make_ray(from, along, 0, std::numeric_limits<float>::infinity());
+    RTCRayHit ray = make_ray(from, along, 0, met.depth);
     rtcIntersect1(scene, &context.embree, &ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return RTC_INVALID_GEOMETRY_ID;
-    const unsigned first = ray.hit.primID;
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
     const float t = ray.ray.tfar;
-    context.choose = true;
     const float slack = 1e-6F * t;
-    RTCRayHit again = make_ray(from, along, t - slack, t + kBump * surfels[first].radius + slack);
+    const float deepest = t + kBump * surfels[ray.hit.primID].radius + slack;
+    context.choose = true;
+    context.best = met.depth;
+    RTCRayHit again = make_ray(from, along, t - slack, std::min(deepest, met.depth));
     rtcIntersect1(scene, &context.embree, &again);
-    return context.best_disc == RTC_INVALID_GEOMETRY_ID ? first : context.best_disc;
+    if (context.best_disc == RTC_INVALID_GEOMETRY_ID) {
+      if (deepest >= met.depth) return;
+      context.best = deepest;
+      context.best_disc = ray.hit.primID;
+    }
+    const Surfel& disc = surfels[context.best_disc];
+    met = {context.best, glm::dot(along, disc.normal) < 0 ? disc.radiance : glm::vec3(0)};
   }
 };
 
-DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides, std::function<glm::vec3(const glm::vec3&)> sky)
+DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides, std::function<glm::vec3(const glm::vec3&)> sky,
+                   const std::optional<glm::dvec3>& origin)
     : impl_(std::make_unique<Impl>()) {
   impl_->surfels = surfels;
   impl_->sides = sides;
   impl_->sky = std::move(sky);
   Bounds bounds;
   for (const Surfel& s : surfels) bounds.add(s.position);
-  if (!bounds.empty()) impl_->origin = (bounds.low + bounds.high) * 0.5;
+  if (!bounds.empty()) impl_->origin = origin ? *origin : (bounds.low + bounds.high) * 0.5;
   impl_->device = rtcNewDevice(nullptr);
   if (!impl_->device) throw std::runtime_error("Embree: no device");
   impl_->scene = rtcNewScene(impl_->device);
@@ -148,40 +156,64 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides, std::function<g
 
 DiscRays::~DiscRays() = default;
 
-Shading DiscRays::trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const {
-  const auto side = static_cast<unsigned>(std::sqrt(static_cast<double>(rays)));
-  const glm::vec3 from(receiver.position - impl_->origin);
-  const glm::vec3 n = receiver.normal;
+namespace {
+
+/// Calls body(i, along) for cosine-distributed directions, one in each cell of a square.
+/// @param side  of the square
+template <class Body>
+void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const Body& body) {
   const glm::vec3 tangent = glm::normalize(glm::cross(n, std::abs(n.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
   const glm::vec3 bitangent = glm::cross(n, tangent);
   Uniform uniform(seed);
-  unsigned covered = 0;
-  glm::dvec3 light(0), sky(0), open(0);
   for (unsigned j = 0; j < side; ++j) {
     for (unsigned i = 0; i < side; ++i) {
       const float u = (static_cast<float>(i) + uniform()) / static_cast<float>(side);
       const float angle = 2 * kPi * (static_cast<float>(j) + uniform()) / static_cast<float>(side);
       const float sine = std::sqrt(u);
-      const glm::vec3 along = tangent * (sine * std::cos(angle)) + bitangent * (sine * std::sin(angle)) +
-                              n * std::sqrt(std::max(0.0F, 1 - u));
-      const unsigned disc = impl_->meet(from, along);
-      if (disc == RTC_INVALID_GEOMETRY_ID) {
-        open += along;
-        if (impl_->sky) sky += impl_->sky(along);
-        continue;
-      }
-      ++covered;
-      if (glm::dot(along, impl_->surfels[disc].normal) < 0) light += impl_->surfels[disc].radiance;
+      body(std::size_t{j} * side + i, tangent * (sine * std::cos(angle)) + bitangent * (sine * std::sin(angle)) +
+                                          n * std::sqrt(std::max(0.0F, 1 - u)));
     }
   }
+}
+
+unsigned side_of(std::size_t rays) { return static_cast<unsigned>(std::sqrt(static_cast<double>(rays))); }
+
+}  // namespace
+
+void DiscRays::meet(const Receiver& receiver, std::uint64_t seed, std::span<DiscHit> hits) const {
+  const glm::vec3 from(receiver.position - impl_->origin);
+  for_each_ray(receiver.normal, side_of(hits.size()), seed,
+               [&](std::size_t i, const glm::vec3& along) { impl_->meet(from, along, hits[i]); });
+}
+
+Shading DiscRays::sum(const Receiver& receiver, std::uint64_t seed, std::span<const DiscHit> hits,
+                      const std::function<glm::vec3(const glm::vec3&)>& sky_at) {
+  const unsigned side = side_of(hits.size());
+  unsigned covered = 0;
+  glm::dvec3 light(0), sky(0), open(0);
+  for_each_ray(receiver.normal, side, seed, [&](std::size_t i, const glm::vec3& along) {
+    if (hits[i].met()) {
+      ++covered;
+      light += hits[i].radiance;
+    } else {
+      open += along;
+      if (sky_at) sky += sky_at(along);
+    }
+  });
   const double count = static_cast<double>(side) * side;
   Shading shading;
   shading.occlusion = static_cast<float>(covered / count);
   shading.irradiance = glm::vec3(light * (std::numbers::pi / count));
   shading.sky = glm::vec3(sky * (std::numbers::pi / count));
   const double length = glm::length(open);
-  shading.bent_normal = length > 0 ? glm::vec3(open / length) : n;
+  shading.bent_normal = length > 0 ? glm::vec3(open / length) : receiver.normal;
   return shading;
+}
+
+Shading DiscRays::trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const {
+  std::vector<DiscHit> hits(std::size_t{side_of(rays)} * side_of(rays));
+  meet(receiver, seed, hits);
+  return sum(receiver, seed, hits, impl_->sky);
 }
 
 }  // namespace ptc
