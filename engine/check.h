@@ -1,7 +1,9 @@
 // Receivers of a run that are checked against rays afterwards.
 #pragma once
 
+#include <array>
 #include <random>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -12,23 +14,39 @@
 
 namespace ptc {
 
+/// Places of receivers.
+class ReceiverPlaces {
+ public:
+  void add(const Receiver& receiver) { places_.insert(place(receiver)); }
+  [[nodiscard]] bool contains(const Receiver& receiver) const { return places_.contains(place(receiver)); }
+
+ private:
+  using Place = std::array<double, 3>;
+  static Place place(const Receiver& r) { return {r.position.x, r.position.y, r.position.z}; }
+  std::set<Place> places_;
+};
+
 /// Keeps an even sample of a run's receivers with their shading, the same each time (reservoir
 /// sampling, Vitter 1985, algorithm R).
 class CheckSample {
  public:
-  explicit CheckSample(const CheckRequest& request) : request_(request) {}
+  /// @param apart  receivers that are not to be chosen
+  explicit CheckSample(const CheckRequest& request, ReceiverPlaces apart = {})
+      : request_(request), apart_(std::move(apart)) {}
   void add(std::span<const Receiver> receivers, std::span<const Shading> results);
 
   /// @param scene  as it was gathered from: with the bounces before the last in its surfels
   /// @param light  with the mesh under it, or null
   /// @param paths  what rays at the mesh follow
-  /// @param progress  advances by one a receiver, once for each reference
+  /// @param memory_bytes  cap of what rays at the surfels need, StreamedRays::kLeastBytes at least
+  /// @param progress  advances by one a receiver, twice for each reference
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides, const Sky& sky,
-                                    const DirectLight* light, const RayScene* mesh,
-                                    const LightPaths& paths, const Executor& executor, Progress& progress) const;
+                                    const DirectLight* light, const RayScene* mesh, const LightPaths& paths,
+                                    std::uint64_t memory_bytes, const Executor& executor, Progress& progress) const;
 
  private:
   CheckRequest request_;
+  ReceiverPlaces apart_;
   std::uint64_t seen_ = 0;
   std::mt19937_64 bits_;  // its default seed
   std::vector<Receiver> receivers_;

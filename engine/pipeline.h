@@ -1,6 +1,7 @@
 // The calls a user needs: scene to container, container to shaded points, container to picture.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -68,21 +69,34 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
 [[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
                                std::vector<MeshCamera>* cameras = nullptr);
 
-/// A check of some receivers against rays, in the same run. It loads all surfels (and the mesh) into
-/// Embree, outside the memory cap.
+/// A check of some receivers against rays, in the same run. Rays at the surfels keep to the memory cap;
+/// those at the mesh need no more than rendering it does.
 struct CheckRequest {
   unsigned receivers = 0;  ///< about so many, spread over all; 0: no check
   unsigned rays = 4096;    ///< cosine-distributed, for each receiver
 };
 
-/// Errors over the receivers of a check: root mean square and mean of (ours - rays).
+/// Errors over the receivers of a check: root mean square and mean of (ours - rays). Noise is the root mean
+/// square of what the rays themselves are off; the errors are without it.
 struct CheckError {
   double occlusion_rms = 0;    ///< absolute, occlusion is 0 to 1
   double occlusion_bias = 0;
   double occlusion_mean = 0;   ///< of the rays
+  double occlusion_noise = 0;
   double irradiance_rms = 0;   ///< over the mean of the rays
   double irradiance_bias = 0;  ///< likewise
   double irradiance_mean = 0;  ///< of the rays, over receivers and RGB
+  double irradiance_noise = 0; ///< over that mean
+
+  /// What is asked for and met: the larger of both errors over their means; of occlusion alone where no
+  /// light arrives.
+  [[nodiscard]] double relative() const noexcept {
+    return std::max(occlusion_mean > 0 ? occlusion_rms / occlusion_mean : 0.0, irradiance_rms);
+  }
+  /// What the rays are off, likewise.
+  [[nodiscard]] double relative_noise() const noexcept {
+    return std::max(occlusion_mean > 0 ? occlusion_noise / occlusion_mean : 0.0, irradiance_noise);
+  }
 };
 
 struct CheckReport {
@@ -94,12 +108,28 @@ struct CheckReport {
   double mesh_microseconds = 0;
 };
 
+/// What became of an error that was asked for (spec/shading.md#error).
+struct TuningReport {
+  double asked = 0;             ///< share, as CheckError::relative()
+  bool met = false;             ///< else the finest setting was taken, and `measured` is the floor
+  GatherOptions gather;         ///< the cheapest setting that meets it
+  unsigned setting = 0;         ///< its place among all, 0 the coarsest
+  unsigned settings = 0;        ///< how many there are
+  CheckError measured;          ///< at the pilots that did not choose it; where it is not met, at all
+  std::size_t pilots = 0;       ///< receivers compared with rays
+  unsigned rays = 0;            ///< for each of them
+  std::uint64_t shaded = 0;     ///< receivers, over all settings that were tried
+  double ray_cpu_seconds = 0;   ///< all threads, with loading the surfels
+  double shade_cpu_seconds = 0;
+};
+
 struct ShadeRequest {
   std::filesystem::path scene;      ///< surfels that occlude and emit
   std::filesystem::path receivers;  ///< a cloud or container to shade; empty: the scene's own points
   std::uint64_t count = 0;          ///< shade so many of the points, evenly spread in order; 0: all
   unsigned bounces = 1;             ///< of light, from 1 on; each but one shades all points of the scene
   GatherOptions gather;
+  std::optional<double> error;      ///< chooses `gather` but for its sides: share from above 0 to 1
   float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii
   std::optional<Sky> sky;           ///< empty: the one that the scene was built with
   ContainerReader::Access access = ContainerReader::Access::pread;
@@ -114,6 +144,7 @@ struct ShadeReport {
   double bounce_cpu_seconds = 0; ///< likewise, of the scene's own points for the bounces before
   GatherCounts gather;
   CacheStatistics cache;
+  std::optional<TuningReport> tuning;
   std::optional<CheckReport> check;
   StageSeconds seconds;
 };
@@ -133,6 +164,7 @@ struct PictureTarget {
 struct RenderRequest {
   std::filesystem::path scene;
   std::vector<std::filesystem::path> meshes;  ///< what the camera sees; empty: the surfels themselves
+  std::shared_ptr<const Mesh> mesh;           ///< a mesh in memory, beside those
   bool backdrop = false;
   std::optional<Camera> camera;   ///< empty: the mesh's or the build's, else a view of everything
   std::optional<std::array<unsigned, 2>> size;  ///< width and height in place of the camera's
@@ -143,6 +175,7 @@ struct RenderRequest {
   LightSampling light_sampling{.sun_rays = 4, .area_rays = 0, .sky_rays = 0};
   unsigned bounces = 1;           ///< as of ShadeRequest
   GatherOptions gather;
+  std::optional<double> error;    ///< as ShadeRequest::error
   float lift = 0.15F;             ///< receivers rise by so many radii of a surfel of the scene's spacing
   float exposure = 0;             ///< stops, for PNGs of light
   ContainerReader::Access access = ContainerReader::Access::pread;

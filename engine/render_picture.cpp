@@ -16,6 +16,7 @@
 #include "engine/primary.h"
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
+#include "engine/tuning.h"
 
 namespace ptc {
 namespace {
@@ -86,6 +87,16 @@ void write_layer_png(const PictureTarget& target, const Film& film, float exposu
   write_png(target.path, image);
 }
 
+void write_targets(std::span<const PictureTarget> targets, const Film& film, float exposure) {
+  for (const PictureTarget& target : targets) {
+    if (target.path.extension() == ".exr") {
+      write_layers(target.path, film);
+    } else {
+      write_layer_png(target, film, exposure);
+    }
+  }
+}
+
 /// What the camera sees and what lights it, alive as long as the view.
 struct Subject {
   Mesh mesh;
@@ -93,6 +104,53 @@ struct Subject {
   std::unique_ptr<DirectLight> light;
   std::unique_ptr<PrimaryView> view;
 };
+
+/// Makes the rays of a subject that has a mesh.
+void view_mesh_of(Subject& subject, const RenderRequest& request, const ContainerReader& scene, const LightRig& lights,
+                  const Camera& camera, unsigned side) {
+  const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
+  subject.rays = std::make_unique<RayScene>(subject.mesh);
+  subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
+  return_freed_memory();  // what reading the file and building the tree took
+  subject.view = view_mesh(*subject.rays, *subject.light, request.light_sampling, camera, side,
+                           request.lift * static_cast<float>(surfel_radius));
+}
+
+Receiver receiver_at(const PrimaryHit& hit) {
+  return {hit.position + glm::dvec3(hit.offset_normal * hit.lift), hit.normal};
+}
+
+/// Samples lie on a grid of side x side in every pixel.
+std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample, unsigned side) {
+  return {x * side + sample % side, y * side + sample / side};
+}
+
+/// Windows of samples that stand for a picture's, where they see something.
+std::vector<Pilot> pilots_of(const PrimaryView& view, const Camera& camera, unsigned side, const Executor& executor) {
+  constexpr double kGolden[2] = {0.7548776662466927, 0.5698402909980532};  // plane covered evenly (Roberts 2018)
+  constexpr std::uint64_t kWidth = 16;
+  const PilotPlan plan = plan_pilots(std::uint64_t{camera.width} * camera.height * side * side);
+  const auto width = static_cast<unsigned>(std::min<std::uint64_t>({kWidth, camera.width, plan.receivers}));
+  const auto height = static_cast<unsigned>(std::min<std::uint64_t>(camera.height, plan.receivers / width));
+  std::vector<Pilot> pilots(2 * plan.count);  // some see nothing
+  executor.for_each(pilots.size(), [&](std::size_t i, unsigned) {
+    const auto place = [&](int axis, unsigned room) {
+      const double turn = kGolden[axis] * static_cast<double>(i + 1);
+      return static_cast<unsigned>((turn - std::floor(turn)) * (room + 1.0));
+    };
+    const unsigned x0 = place(0, camera.width - width), y0 = place(1, camera.height - height);
+    pilots[i].variant = static_cast<unsigned>(i / 2) % (side * side);
+    for (unsigned y = y0; y < y0 + height; ++y) {
+      for (unsigned x = x0; x < x0 + width; ++x) {
+        const auto [sx, sy] = sample_at(x, y, pilots[i].variant, side);
+        if (const auto hit = view.at(sx, sy)) pilots[i].receivers.push_back(receiver_at(*hit));
+      }
+    }
+  });
+  std::erase_if(pilots, [](const Pilot& pilot) { return pilot.receivers.empty(); });
+  pilots.resize(std::min(pilots.size(), plan.count));
+  return pilots;
+}
 
 /// Renders one sample of every pixel of a tile into the film. Each of a pixel's samples is shaded with
 /// a variant of its own, so that what one of them resolves too coarsely the others average out.
@@ -103,13 +161,26 @@ class TileRenderer {
       : view_(view), shader_(shader), film_(film), camera_(camera), side_(side), sky_(sky), check_(check),
         executor_(executor) {}
 
+  /// The picture, tile by tile.
+  void render_all(Progress& progress) {
+    for (unsigned y = 0; y < camera_.height; y += kTileSide) {
+      for (unsigned x = 0; x < camera_.width; x += kTileSide) {
+        const unsigned x1 = std::min(camera_.width, x + kTileSide), y1 = std::min(camera_.height, y + kTileSide);
+        for (unsigned sample = 0; sample < side_ * side_; ++sample) render(x, y, x1, y1, sample, progress);
+      }
+    }
+  }
+
+  [[nodiscard]] double shade_cpu_seconds() const { return cpu_; }
+
+ private:
   /// @param x0, y0, x1, y1  pixels
   /// @param sample  0 to side^2 - 1
   void render(unsigned x0, unsigned y0, unsigned x1, unsigned y1, unsigned sample, Progress& progress) {
     find_hits(x0, y0, x1, y1, sample);
     receivers_.clear();
     for (const auto& hit : hits_) {
-      if (hit) receivers_.push_back({hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
+      if (hit) receivers_.push_back(receiver_at(*hit));
     }
     results_.resize(receivers_.size());
     const double before = cpu_seconds();
@@ -120,23 +191,15 @@ class TileRenderer {
     progress.advance(hits_.size() - receivers_.size());
   }
 
-  [[nodiscard]] double shade_cpu_seconds() const { return cpu_; }
-
- private:
   void find_hits(unsigned x0, unsigned y0, unsigned x1, unsigned y1, unsigned sample) {
     const std::size_t columns = x1 - x0;
     hits_.assign(columns * (y1 - y0), std::nullopt);
     executor_.for_each(y1 - y0, [&](std::size_t row, unsigned) {
       for (std::size_t i = 0; i < columns; ++i) {
-        const auto [x, y] = sample_at(x0 + static_cast<unsigned>(i), y0 + static_cast<unsigned>(row), sample);
+        const auto [x, y] = sample_at(x0 + static_cast<unsigned>(i), y0 + static_cast<unsigned>(row), sample, side_);
         hits_[row * columns + i] = view_.at(x, y);
       }
     });
-  }
-
-  /// A sample of a pixel on the grid of all samples.
-  [[nodiscard]] std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample) const {
-    return {x * side_ + sample % side_, y * side_ + sample / side_};
   }
 
   void expose(unsigned x0, unsigned y0, unsigned x1, unsigned sample) {
@@ -150,7 +213,7 @@ class TileRenderer {
         film_.add(pixel, *hits_[i], results_[next++], weight);
       } else {
         const float scale = 1.0F / static_cast<float>(side_);
-        const auto [sx, sy] = sample_at(x, y, sample);
+        const auto [sx, sy] = sample_at(x, y, sample, side_);
         film_.beauty[pixel] += weight * sky_.at(camera_.direction((static_cast<float>(sx) + 0.5F) * scale,
                                                                   (static_cast<float>(sy) + 0.5F) * scale));
       }
@@ -183,25 +246,19 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
 
   std::vector<MeshCamera> cameras;
   Subject subject;
-  subject.mesh = load_meshes(request.meshes, nullptr, request.backdrop, &cameras);
+  subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, &cameras);
   Camera camera = request.camera ? *request.camera : default_camera(scene, cameras, request.backdrop, request.size);
   if (request.size) {
     camera.width = (*request.size)[0];
     camera.height = (*request.size)[1];
   }
-  const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
   const std::uint64_t samples = std::uint64_t{camera.width} * camera.height * request.samples;
   if (!subject.mesh.triangles.empty()) {
-    subject.rays = std::make_unique<RayScene>(subject.mesh);
-    subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
-    return_freed_memory();  // what reading the file and building the tree took
-    subject.view = view_mesh(*subject.rays, *subject.light, request.light_sampling, camera, side,
-                             request.lift * static_cast<float>(surfel_radius));
+    view_mesh_of(subject, request, scene, lights, camera, side);
   } else {
     const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
     subject.view = view_surfels(scene, camera, side, request.lift, executor, progress);
   }
-
   Film film(camera.width, camera.height);
   ShadeOptions options{.access = request.access,
                        .gather = request.gather,
@@ -215,17 +272,19 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
       bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, targets.front().path)}, executor,
                    report, progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
+  ReceiverPlaces compared;
+  if (request.error) {
+    const Stage stage(report.seconds, progress, "tune", 0, "receivers");
+    const std::vector<Pilot> pilots = pilots_of(*subject.view, camera, side, executor);
+    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared);
+    options.gather = report.tuning->gather;
+  }
   std::optional<Shader> shader(std::in_place, lit, options, executor);
-  CheckSample check(request.check);
+  CheckSample check(request.check, std::move(compared));
   {
     const Stage stage(report.seconds, progress, "render", samples, "samples");
     TileRenderer tiles(*subject.view, *shader, film, camera, side, lights.sky, check, executor);
-    for (unsigned y = 0; y < camera.height; y += kTileSide) {
-      for (unsigned x = 0; x < camera.width; x += kTileSide) {
-        const unsigned x1 = std::min(camera.width, x + kTileSide), y1 = std::min(camera.height, y + kTileSide);
-        for (unsigned sample = 0; sample < request.samples; ++sample) tiles.render(x, y, x1, y1, sample, progress);
-      }
-    }
+    tiles.render_all(progress);
     report.shade_cpu_seconds = tiles.shade_cpu_seconds();
   }
   report.gather = shader->counts();
@@ -233,19 +292,13 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   report.bounces = request.bounces;
   report.cache = shader->cache_statistics();
   shader.reset();  // its pages make room for what the writers copy
-  for (const PictureTarget& target : targets) {
-    if (target.path.extension() == ".exr") {
-      write_layers(target.path, film);
-    } else {
-      write_layer_png(target, film, request.exposure);
-    }
-  }
+  write_targets(targets, film, request.exposure);
   if (request.check.receivers > 0) {
-    const unsigned references = subject.rays ? 2 : 1;
+    const std::uint64_t references = subject.rays ? 4 : 2;
     const Stage stage(report.seconds, progress, "check", references * request.check.receivers, "references");
     const LightSampling sampling{.sun_rays = 1, .area_rays = lit_by_emitters(scene) ? 1U : 0U, .sky_rays = 1};
     report.check = check.compare(lit, request.gather.sides, lights.sky, subject.light.get(), subject.rays.get(),
-                                 {sampling, request.bounces}, executor, progress);
+                                 {sampling, request.bounces}, options.cache_bytes, executor, progress);
   }
   return report;
 }

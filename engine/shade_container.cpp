@@ -3,6 +3,7 @@
 #include <cstring>
 #include <numbers>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -14,6 +15,7 @@
 #include "engine/pipeline.h"
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
+#include "engine/tuning.h"
 #include "engine/store/writer.h"
 #include "format/checksum.h"
 #include "format/point_page.h"
@@ -54,16 +56,24 @@ std::array<float, ShadedChannels::kFloats> values_of(const Shading& s, const glm
 class PointCursor {
  public:
   /// @param wanted  how many, evenly spread; at most as many as there are
-  PointCursor(const ContainerReader& container, std::uint64_t wanted)
-      : container_(container), wanted_(wanted), payload_(container.page_payload_limit()) {}
+  /// @param from    the first of those wanted that next() gives, below `wanted`
+  PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0)
+      : container_(container), wanted_(wanted), payload_(container.page_payload_limit()) {
+    if (from == 0) return;
+    const std::uint64_t points = container.superblock().points;
+    const std::uint64_t passed = (from * points + wanted - 1) / wanted;  // so far `from` were taken
+    share_ = passed * wanted - from * points;
+    page_ = static_cast<std::size_t>(passed / container.superblock().points_per_page);
+    if (page_ < container.point_pages().size()) read_page();
+    at_ = static_cast<std::uint32_t>(passed % container.superblock().points_per_page);
+  }
 
   std::size_t next(std::span<Surfel> out) {
     std::size_t filled = 0;
     while (filled < out.size()) {
       if (at_ == count_) {
         if (page_ == container_.point_pages().size()) break;
-        count_ = container_.read_page(container_.point_pages()[page_++], payload_, decoder_).record_count;
-        at_ = 0;
+        read_page();
       }
       const PointPage points(payload_.data(), count_);
       for (; at_ < count_ && filled < out.size(); ++at_) {
@@ -77,6 +87,11 @@ class PointCursor {
   }
 
  private:
+  void read_page() {
+    count_ = container_.read_page(container_.point_pages()[page_++], payload_, decoder_).record_count;
+    at_ = 0;
+  }
+
   const ContainerReader& container_;
   std::uint64_t wanted_;
   std::uint64_t share_ = 0;  // wanted_ for each point passed, less the points for each one taken
@@ -198,8 +213,7 @@ class ContainerSink : public ShadedSink {
   std::uint64_t written_ = 0;
 };
 
-std::string settings_text(const ShadeRequest& request) {
-  const GatherOptions& g = request.gather;
+std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
   std::string text = fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
                                  g.solid_angle, g.parallax, g.inflation, g.resolution,
                                  g.sides == Sides::both ? "both" : "front", request.lift);
@@ -214,12 +228,6 @@ std::unique_ptr<ContainerReader> open_receivers(const ShadeRequest& request, con
   BuildRequest build{.inputs = {request.receivers}, .lights = LightRig{}, .run = request.run};  // they need no light
   return make_temporary(temp_dir(request.run, target),
                         [&](const std::filesystem::path& path) { build_container(build, path, progress); });
-}
-
-std::unique_ptr<ShadedSink> make_sink(const ShadeRequest& request, const std::filesystem::path& target,
-                                      const ContainerReader& receivers, std::uint64_t points) {
-  if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points);
-  return std::make_unique<ContainerSink>(target, receivers, settings_text(request));
 }
 
 /// Shades what a cursor gives, batch by batch. @return CPU seconds of the gather
@@ -240,6 +248,27 @@ double shade_all(PointCursor& cursor, Shader& shader, float lift, ShadedSink& si
   return cpu;
 }
 
+/// Runs of points that stand for all that are shaded.
+std::vector<Pilot> pilots_of(const ContainerReader& container, std::uint64_t points, float radii) {
+  const PilotPlan plan = plan_pilots(points);
+  std::vector<Pilot> pilots(plan.count);
+  std::vector<Surfel> surfels(plan.receivers);
+  for (std::size_t i = 0; i < pilots.size(); ++i) {
+    PointCursor cursor(container, points, i * plan.stride + (plan.stride - plan.receivers) / 2);
+    const std::size_t count = cursor.next(surfels);
+    pilots[i].receivers.resize(count);
+    std::ranges::transform(std::span(surfels).first(count), pilots[i].receivers.begin(),
+                           [&](const Surfel& s) { return lifted(s, radii); });
+  }
+  return pilots;
+}
+
+std::unique_ptr<ShadedSink> make_sink(const std::filesystem::path& target, const ContainerReader& receivers,
+                                      std::uint64_t points, const std::string& settings) {
+  if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points);
+  return std::make_unique<ContainerSink>(target, receivers, settings);
+}
+
 }  // namespace
 
 ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target, Progress& progress) {
@@ -256,17 +285,25 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   }
 
   const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
-  const ShadeOptions options{
+  ShadeOptions options{
       .cache_bytes = cache_bytes_left(request.run, kBufferBytes, scene, executor.threads(), "shading"),
       .access = request.access,
       .gather = request.gather,
       .sky = sky_function(sky)};
-  const std::unique_ptr<ShadedSink> sink = make_sink(request, target, receivers, points);
   const std::unique_ptr<ContainerReader> bounced =
       bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, target)}, executor, report,
                    progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
-  CheckSample check(request.check);
+  ReceiverPlaces compared;
+  if (request.error) {
+    const Stage stage(report.seconds, progress, "tune", 0, "receivers");
+    const std::vector<Pilot> pilots = pilots_of(receivers, points, request.lift);
+    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared);
+    options.gather = report.tuning->gather;
+  }
+  const std::unique_ptr<ShadedSink> sink =
+      make_sink(target, receivers, points, settings_text(request, options.gather));
+  CheckSample check(request.check, std::move(compared));
   {
     const Stage stage(report.seconds, progress, "shade", points, "points");
     Shader shader(lit, options, executor);
@@ -279,8 +316,9 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   report.bounces = request.bounces;
   report.receivers = points;
   if (request.check.receivers > 0) {
-    const Stage stage(report.seconds, progress, "check", request.check.receivers, "receivers");
-    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {}, executor, progress);
+    const Stage stage(report.seconds, progress, "check", std::uint64_t{2} * request.check.receivers, "references");
+    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {}, options.cache_bytes, executor,
+                                 progress);
   }
   return report;
 }

@@ -67,10 +67,28 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
       ->group(kGroup);
 }
 
+void add_error_option(CLI::App& app, std::optional<double>& error) {
+  const auto set = [&error](const std::string& text) {
+    const bool percent = text.ends_with('%');
+    const auto number = parse_number<double>(std::string_view(text).substr(0, text.size() - (percent ? 1 : 0)));
+    const double share = number.value_or(0) / (percent ? 100 : 1);
+    if (!(share > 0 && share <= 1)) refuse("--error", text, "a share above 0 up to 1, as 2% or 0.02");
+    error = share;
+  };
+  CLI::Option* option = app.add_option_function<std::string>(
+      "--error", set,
+      "RMS error of occlusion and of light, each over its mean, against rays at the surfels, as 2% or 0.02: takes the\n"
+      "cheapest settings that meet it at pilot receivers, or the finest, and says so, where none does [default: the\n"
+      "expert settings]");
+  option->type_name("SHARE")->group("Quality");
+  for (const char* name : {"--solid-angle", "--parallax", "--inflation", "--resolution"}) {
+    option->excludes(app.get_option(name));
+  }
+}
+
 void add_check_options(CLI::App& app, CheckRequest& check) {
-  constexpr char kGroup[] = "Check";
-  add_integer(app, "--check", check.receivers, 0, 10'000'000,
-              "Compare so many of the receivers with rays, outside the memory cap")
+  constexpr char kGroup[] = "Quality";
+  add_integer(app, "--check", check.receivers, 0, 10'000'000, "Compare so many of the receivers with rays")
       ->group(kGroup);
   add_integer(app, "--check-rays", check.rays, 1, 1 << 24, "Rays for each of them")->group(kGroup);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 
@@ -23,6 +24,9 @@ CLI::Option* add_bounces(CLI::App& app, unsigned& bounces);
 
 /// --solid-angle, --parallax, --inflation, --resolution, --sides, --lift
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift);
+
+/// --error, which stands for all expert settings of the gather that trade time for error
+void add_error_option(CLI::App& app, std::optional<double>& error);
 
 /// --check and --check-rays
 void add_check_options(CLI::App& app, CheckRequest& check);

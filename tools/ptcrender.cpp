@@ -16,6 +16,7 @@ constexpr char kPurpose[] =
 constexpr char kExamples[] =
     "  ptcrender dragon.ptcx --mesh dragon.ply --backdrop -o dragon.png\n"
     "  ptcrender room.ptcx --camera 0,1.6,4,0,1.2,0 --fov 50 --size 1920x1080 -o room.exr\n"
+    "  ptcrender dragon.ptcx --error 3% --check 1000 -o dragon.exr\n"
     "  ptcrender city.ptcx --memory 512M --samples 16 --exposure 0.5 --progress -o city.png\n";
 
 struct Arguments {
@@ -123,6 +124,7 @@ int main(int argc, char** argv) {
   declare_lights(command.app(), arguments);
   ptc::add_bounces(command.app(), arguments.request.bounces);
   ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
+  ptc::add_error_option(command.app(), arguments.request.error);
   ptc::add_access(command.app(), arguments.request.access);
   ptc::add_check_options(command.app(), arguments.request.check);
   return command.run(argc, argv, [&](ptc::Progress& progress) {

@@ -14,6 +14,7 @@ constexpr char kExamples[] =
     "  ptcshade dragon.ptcx -o lit.ptcx\n"
     "  ptcshade city.ptcx --memory 1G --threads 8 --progress -o lit.ptcx\n"
     "  ptcshade room.ptcx --bounces 4 -o lit.ptcx\n"
+    "  ptcshade dragon.ptcx --error 2% --check 1000 -o lit.ptcx\n"
     "  ptcshade room.ptcx --receivers probes.ply --sky 0.4 -o probes-lit.ply\n";
 
 }  // namespace
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
       "Radiance from everywhere, or a latitude-longitude picture of it [default: as built]");
   ptc::add_bounces(app, request.bounces);
   ptc::add_gather_options(app, request.gather, request.lift);
+  ptc::add_error_option(app, request.error);
   ptc::add_access(app, request.access);
   ptc::add_check_options(app, request.check);
 

@@ -15,16 +15,48 @@ namespace {
 
 ordered_json facts_of(const CheckError& error) {
   return {{"occlusion_rms", error.occlusion_rms},     {"occlusion_bias", error.occlusion_bias},
-          {"occlusion_mean", error.occlusion_mean},   {"irradiance_rms", error.irradiance_rms},
-          {"irradiance_bias", error.irradiance_bias}, {"irradiance_mean", error.irradiance_mean}};
+          {"occlusion_mean", error.occlusion_mean},   {"occlusion_noise", error.occlusion_noise},
+          {"irradiance_rms", error.irradiance_rms},   {"irradiance_bias", error.irradiance_bias},
+          {"irradiance_mean", error.irradiance_mean}, {"irradiance_noise", error.irradiance_noise},
+          {"relative", error.relative()}};
+}
+
+ordered_json facts_of(const TuningReport& tuning) {
+  return {{"asked", tuning.asked},
+          {"met", tuning.met},
+          {"setting", tuning.setting},
+          {"settings", tuning.settings},
+          {"solid_angle", tuning.gather.solid_angle},
+          {"parallax", tuning.gather.parallax},
+          {"resolution", tuning.gather.resolution},
+          {"inflation", tuning.gather.inflation},
+          {"measured", facts_of(tuning.measured)},
+          {"pilots", tuning.pilots},
+          {"rays", tuning.rays},
+          {"shaded", tuning.shaded},
+          {"ray_cpu_seconds", tuning.ray_cpu_seconds},
+          {"shade_cpu_seconds", tuning.shade_cpu_seconds}};
+}
+
+std::string tuning_text(const TuningReport& tuning) {
+  const GatherOptions& g = tuning.gather;
+  const std::string setting = fmt::format("{} sr, {} rad, {} pixels", g.solid_angle, g.parallax, g.resolution);
+  const double measured = 100 * tuning.measured.relative();
+  if (tuning.met) {
+    return fmt::format("  error {:.4g} % asked: {} (setting {} of {}), {:.2f} % at {} pilots\n", 100 * tuning.asked,
+                       setting, tuning.setting + 1, tuning.settings, measured, tuning.pilots);
+  }
+  return fmt::format("  error {:.4g} % asked is below the floor: the finest setting ({}) has {:.2f} % at {} pilots, "
+                     "whose rays are off by {:.2f} %\n",
+                     100 * tuning.asked, setting, measured, tuning.pilots, 100 * tuning.measured.relative_noise());
 }
 
 std::string check_line(const char* against, const CheckError& error) {
   return fmt::format(
       "  against rays at the {}: occlusion rms {:.4f} bias {:+.4f}, irradiance rms "
-      "{:.2f} % bias {:+.2f} %\n",
+      "{:.2f} % bias {:+.2f} %; error {:.2f} %\n",
       against, error.occlusion_rms, error.occlusion_bias, 100 * error.irradiance_rms,
-      100 * error.irradiance_bias);
+      100 * error.irradiance_bias, 100 * error.relative());
 }
 
 }  // namespace
@@ -87,6 +119,7 @@ ordered_json facts_of(const ShadeReport& report) {
                      {"bounce_cpu_seconds", report.bounce_cpu_seconds},
                      {"gather", facts_of(report.gather)},
                      {"cache", facts_of(report.cache)}};
+  if (report.tuning) facts["tuning"] = facts_of(*report.tuning);
   if (report.check) facts["check"] = facts_of(*report.check);
   facts["seconds"] = facts_of(report.seconds);
   return facts;
@@ -96,6 +129,7 @@ std::string shade_text(const std::string& output, const ShadeReport& report) {
   std::string text = fmt::format("{}: {} receivers, {:.2f} s, {:.2f} % cache hits\n{}", output,
                                  report.receivers, total_seconds(report.seconds),
                                  100 * report.cache.hit_rate(), stages_text(report.seconds));
+  if (report.tuning) text += tuning_text(*report.tuning);
   if (!report.check) return text;
   text += check_line("surfels", report.check->discs);
   if (report.check->mesh) text += check_line("mesh", *report.check->mesh);

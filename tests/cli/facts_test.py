@@ -75,6 +75,20 @@ class Facts(ProgramTest):
         self.assertGreaterEqual(facts["check"]["receivers"], 20)
         self.assertIn("occlusion_rms", facts["check"]["discs"])
 
+    def test_an_error_is_asked_for_met_and_measured(self):
+        picture = ["-o", self.here / "o.png", *SMALL_PICTURE]
+        for program, operands in (("ptcshade", [self.box, "-o", self.here / "o.ply"]), ("ptcrender", [self.box, *picture])):
+            for text in ("10%", "0.1"):
+                command = [program, *operands, "--error", text, "--check", "100"]
+                facts = json.loads(self.succeed(*command, "--json").stdout)
+                self.assertEqual(facts["tuning"]["asked"], 0.1)
+                self.assertTrue(facts["tuning"]["met"])
+                self.assertLessEqual(facts["check"]["discs"]["relative"], 0.1)
+                self.assertIn("error 10 % asked", self.succeed(*command).stdout)
+        below = ["ptcshade", self.box, "-o", self.here / "o.ply", "--error", "0.001%"]
+        self.assertFalse(json.loads(self.succeed(*below, "--json").stdout)["tuning"]["met"])
+        self.assertIn("below the floor", self.succeed(*below).stdout)
+
     def test_pictures_are_written_in_every_layer(self):
         layers = [f"--layer={name}={self.here}/{name}.png" for name in ("direct", "indirect", "occlusion", "albedo")]
         self.succeed("ptcrender", self.box, "--mesh", self.mesh, "-o", self.here / "o.exr",

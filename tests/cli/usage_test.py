@@ -61,7 +61,9 @@ class Usage(ProgramTest):
                          "--city=5", "--output="],
             "ptcshade": ["--solid-angle=0", "--parallax=-1", "--inflation=nan",
                          "--inflation=0", "--resolution=7", "--resolution=65", "--sides=back",
-                         "--lift=-1", "--bounces=0", "--bounces=1.5", "--bounces=1001", "--io=mail", "--check=-1", "--check-rays=0"],
+                         "--lift=-1", "--bounces=0", "--bounces=1.5", "--bounces=1001", "--io=mail", "--check=-1", "--check-rays=0",
+                         "--error=0", "--error=0%", "--error=-2%", "--error=2", "--error=101%", "--error=nan",
+                         "--error=%", "--error=", "--error=2 %", "--error=two"],
             "ptcrender": ["--bounces=0", "--size=10", "--size=0x10", "--size=10x", "--size=-1x5", "--size=10x70000",
                           "--samples=0", "--samples=3", "--exposure=inf", "--layer=depth=a.png",
                           "--layer=direct=a.exr", "--layer=direct", "--camera=0,0,0,0,0,0"],
@@ -82,6 +84,14 @@ class Usage(ProgramTest):
                 self.fail_with(2, program, *operands[program], option)
         for option in ("--points=0", "--points=1.5", "--points=x", "--panel=time", "--panel=", "--checked=9", "--repeats=0"):
             self.fail_with(2, "ptcbench", "growth", "-o", self.here / "o", option)
+
+    def test_an_error_stands_for_the_settings_that_trade_time_for_it(self):
+        for program, output in (("ptcshade", "o.ply"), ("ptcrender", "o.png")):
+            for option, value in (("--solid-angle", "0.1"), ("--parallax", "0.1"), ("--inflation", "1"),
+                                  ("--resolution", "16")):
+                message = self.fail_with(2, program, self.scene, "-o", self.here / output, "--error", "5%", option, value)
+                self.assertIn(option, message)
+                self.assertIn("--error", message)
 
     def test_names_of_outputs_must_tell_their_kind(self):
         for program, operands in (("ptcbuild", [self.mesh, "-o"]), ("ptcshade", [self.scene, "-o"]),

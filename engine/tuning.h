@@ -1,0 +1,65 @@
+// The cheapest setting of the gather that meets an error (spec/shading.md#error).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/check.h"
+#include "engine/pipeline.h"
+#include "engine/shade/shader.h"
+
+namespace ptc {
+
+/// A setting, and the error that scenes have with it in the middle.
+struct Rung {
+  float solid_angle, parallax;
+  unsigned resolution;
+  double usual_error;
+
+  [[nodiscard]] GatherOptions options(Sides sides) const {
+    return {.solid_angle = solid_angle, .parallax = parallax, .resolution = resolution, .sides = sides};
+  }
+};
+
+/// From coarse and cheap to fine.
+[[nodiscard]] std::span<const Rung> ladder();
+
+/// Neighbours among the receivers of a run: shaded together, some of them compared with rays.
+struct Pilot {
+  static constexpr std::size_t kCompared = 8;  ///< evenly spread; all of fewer
+
+  std::vector<Receiver> receivers;
+  unsigned variant = 0;  ///< as Shader::shade()
+};
+
+/// How many pilots stand for a run, and how long they are.
+struct PilotPlan {
+  std::size_t count = 0;      ///< 0 only for an empty run
+  std::uint64_t stride = 0;   ///< from the beginning of one to that of the next
+  std::size_t receivers = 0;  ///< of each, at most `stride`
+};
+/// @param receivers  of the run
+[[nodiscard]] PilotPlan plan_pilots(std::uint64_t receivers);
+
+/// Compares pilots with rays at the same surfels, finds the cheapest setting.
+/// @param options  but for its gather, of which only the sides count; its cache_bytes are the cap of the
+///                 rays too, StreamedRays::kLeastBytes at least
+/// @param compared  the pilots' receivers that were, appended
+[[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
+                                std::span<const Pilot> pilots, const Executor& executor, Progress& progress,
+                                ReceiverPlaces& compared);
+
+/// What a setting of the ladder gives and costs.
+struct RungError {
+  CheckError error;
+  double us_per_receiver = 0;  ///< CPU time
+};
+
+/// Compares pilots with rays at every setting of the ladder.
+/// @param options  as tune()
+/// @param rays     for each half of a reference, a square number
+[[nodiscard]] std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& options,
+                                           std::span<const Pilot> pilots, unsigned rays, const Executor& executor,
+                                           Progress& progress);
+
+}  // namespace ptc

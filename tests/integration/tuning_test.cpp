@@ -1,0 +1,174 @@
+// The error that was asked for, against the error that is measured.
+#include <catch2/catch.hpp>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "engine/error_sums.h"
+#include "engine/pipeline.h"
+#include "engine/stages.h"
+#include "engine/tuning.h"
+#include "tests/shade/gather_scene.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// A floor, a wall, balls: all lit alike.
+std::vector<Surfel> lit_balls() { return small_scene(0.02); }
+
+/// Crossed sheets over a floor: edges and backs everywhere.
+std::vector<Surfel> crossed_sheets() {
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0.03, {0.6F, 0.6F, 0.4F});
+  for (int i = 0; i < 6; ++i) {
+    const double x = -1.5 + 0.6 * i;
+    add_rectangle(surfels, {x, -1.5, 0}, {0, 3, 0}, {0.2, 0, 0.9}, 0.03, {0.2F, 0.1F * static_cast<float>(i), 0.7F});
+  }
+  return surfels;
+}
+
+/// Surfels over a floor in the dark.
+std::vector<Surfel> dark_balls() {
+  std::vector<Surfel> surfels = small_scene(0.03);
+  for (Surfel& s : surfels) s.radiance = glm::vec3(0);
+  return surfels;
+}
+
+/// Error of each setting of the ladder at a scene's receivers.
+std::vector<double> errors_along_ladder(const Scene& scene) {
+  std::vector<Pilot> pilots;
+  for (std::size_t i = 0; i < scene.receivers.size(); i += 64) {
+    const auto first = scene.receivers.begin() + static_cast<std::ptrdiff_t>(i);
+    pilots.push_back({.receivers = {first, first + 64}});
+  }
+  Progress silent;
+  std::vector<double> errors;
+  for (const RungError& rung : climb(*scene.container, {.cache_bytes = 64U << 20}, pilots, 2304, Executor(1), silent)) {
+    CHECK(rung.us_per_receiver > 0);
+    errors.push_back(rung.error.relative());
+  }
+  return errors;
+}
+
+ShadeReport shade_with(const Scene& scene, double error, const RunOptions& run = {}, const char* name = "o.ply") {
+  ShadeRequest request{.scene = scene.dir / "scene.ptcx", .error = error, .run = run};
+  request.check = {.receivers = 1000, .rays = 2048};
+  Progress silent;
+  return shade_container(request, scene.dir / name, silent);
+}
+
+}  // namespace
+
+TEST_CASE("error sums: what rays are off is told apart from what we are off", "[integration][error]") {
+  std::mt19937 bits;
+  std::normal_distribution<float> normal;
+  ErrorSums sums;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto rays = [&] {
+      return Shading{.occlusion = 0.5F + 0.1F * normal(bits), .irradiance = glm::vec3(2 + 0.2F * normal(bits))};
+    };
+    const Shading ours{.occlusion = 0.5F + 0.04F + 0.03F * normal(bits), .irradiance = glm::vec3(2.1F)};
+    const Shading a = rays(), b = rays();
+    sums.add(ours, a, b);
+  }
+  const CheckError e = sums.error();
+  CHECK(e.occlusion_rms == Approx(0.05).epsilon(0.05));
+  CHECK(e.occlusion_bias == Approx(0.04).epsilon(0.05));
+  CHECK(e.occlusion_mean == Approx(0.5).epsilon(0.01));
+  CHECK(e.occlusion_noise == Approx(0.1 / std::sqrt(2)).epsilon(0.03));
+  CHECK(e.irradiance_rms == Approx(0.05).epsilon(0.05));
+  CHECK(e.relative() == Approx(0.1).epsilon(0.05));
+  CHECK(ErrorSums().error().relative() == 0);
+}
+
+TEST_CASE("tuning: pilots fit into every run and are few of a long one", "[integration][error]") {
+  CHECK(plan_pilots(0).count == 0);
+  for (std::uint64_t n = 1; n < 100'000'000; n += 1 + n / 7) {
+    const PilotPlan plan = plan_pilots(n);
+    CAPTURE(n, plan.count, plan.stride, plan.receivers);
+    REQUIRE(plan.count >= 1);
+    REQUIRE(plan.receivers >= 1);
+    REQUIRE(plan.receivers <= plan.stride);
+    REQUIRE(plan.count * plan.stride <= n);
+    REQUIRE(plan.count >= std::min<std::uint64_t>(n, 2));
+    if (n >= 256) REQUIRE(plan.receivers >= 16);
+    if (n >= 70'000) REQUIRE(plan.count * plan.receivers * 15 <= n);
+  }
+}
+
+TEST_CASE("tuning: the error falls along the ladder", "[integration][error]") {
+  for (const bool sheets : {false, true}) {
+    Scene scene(sheets ? crossed_sheets() : lit_balls());
+    add_floor_receivers(scene.receivers, 0.02);
+    REQUIRE(scene.receivers.size() % 64 == 0);
+    const std::vector<double> errors = errors_along_ladder(scene);
+    REQUIRE(errors.size() == ladder().size());
+    CAPTURE(sheets, errors);
+    for (std::size_t i = 2; i < errors.size(); ++i) CHECK(errors[i] <= 1.05 * errors[i - 2] + 0.002);
+    CHECK(errors.back() < errors.front() / 5);
+    CHECK(errors.back() > 0);
+  }
+  for (std::size_t i = 1; i < ladder().size(); ++i) CHECK(ladder()[i].usual_error < ladder()[i - 1].usual_error);
+}
+
+TEST_CASE("tuning: an error that was asked for is met at receivers that had no part in it", "[integration][error]") {
+  for (const auto& surfels : {lit_balls(), crossed_sheets(), dark_balls()}) {
+    const Scene scene(surfels);
+    unsigned setting = 0;
+    for (const double asked : {0.1, 0.05, 0.03}) {
+      const ShadeReport report = shade_with(scene, asked);
+      REQUIRE(report.tuning);
+      CAPTURE(asked, report.tuning->setting, report.tuning->measured.relative());
+      CHECK(report.tuning->met);
+      CHECK(report.check->discs.relative() <= asked);
+      CHECK(report.tuning->setting >= setting);
+      setting = report.tuning->setting;
+    }
+    CHECK(setting + 1 < ladder().size());
+  }
+}
+
+TEST_CASE("tuning: below the floor the finest setting is taken and the floor told", "[integration][error]") {
+  const Scene scene(lit_balls());
+  const ShadeReport report = shade_with(scene, 1e-4);
+  CHECK_FALSE(report.tuning->met);
+  CHECK(report.tuning->setting == ladder().size() - 1);
+  CHECK(report.tuning->measured.relative() > 1e-4);
+  CHECK(report.check->discs.relative() == Approx(report.tuning->measured.relative()).epsilon(0.5));
+}
+
+TEST_CASE("tuning: neither threads nor the cap change the choice or a byte", "[integration][error]") {
+  const Scene scene(lit_balls());
+  const auto bytes = [&](const char* name) {
+    std::ifstream in(scene.dir / name, std::ios::binary);
+    return std::vector<char>{std::istreambuf_iterator<char>(in), {}};
+  };
+  const ShadeReport one = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ptcx");
+  const ShadeReport two = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{50} << 20, .threads = 2}, "two.ptcx");
+  CHECK(one.tuning->setting == two.tuning->setting);
+  CHECK(one.tuning->measured.relative() == two.tuning->measured.relative());
+  CHECK(bytes("one.ptcx") == bytes("two.ptcx"));
+  const ShadeReport other = shade_with(scene, 0.1, {}, "other.ptcx");
+  CHECK(other.tuning->setting < one.tuning->setting);
+  CHECK(bytes("other.ptcx") != bytes("one.ptcx"));
+}
+
+TEST_CASE("tuning: runs of few receivers and scenes of few surfels have pilots too", "[integration][error]") {
+  const Scene scene(lit_balls());
+  for (const std::uint64_t count : {1U, 2U, 5U, 40U}) {
+    ShadeRequest request{.scene = scene.dir / "scene.ptcx", .count = count, .error = 0.1};
+    Progress silent;
+    const ShadeReport report = shade_container(request, scene.dir / "few.ply", silent);
+    CHECK(report.tuning->pilots >= 1);
+    CHECK(report.tuning->pilots <= count);
+  }
+  const Scene empty({});
+  const ShadeReport report = shade_with(empty, 0.1);
+  CHECK(report.receivers == 0);
+  CHECK(report.tuning->met);
+  CHECK(report.tuning->setting == 0);
+}
