@@ -6,6 +6,8 @@
 #include "engine/base/error.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/accuracy_report.h"
+#include "tools/bench/error_knob.h"
+#include "tools/bench/error_report.h"
 #include "tools/bench/growth.h"
 #include "tools/bench/growth_report.h"
 #include "tools/common.h"
@@ -23,6 +25,7 @@ constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
     "  ptcbench accuracy room.obj --set camera --method ptcx --setting 0.02,0.1,32 -o charts\n"
+    "  ptcbench error fractal window city dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench growth --quick -o charts\n"
     "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
@@ -31,10 +34,10 @@ struct Arguments {
   std::vector<std::string> scenes;
   std::filesystem::path directory;
   AccuracyOptions accuracy;
+  ErrorOptions error;
   GrowthOptions growth;
   bool quick = false;
-  const CLI::App* command = nullptr;         ///< knows which options were given
-  const CLI::App* growth_command = nullptr;  ///< likewise
+  const CLI::App* command = nullptr;  ///< that was chosen: knows which options were given
 };
 
 ptc::GatherOptions parse_setting(const std::string& text) {
@@ -87,18 +90,23 @@ void declare_choices(CLI::App& command, AccuracyOptions& options) {
   add_words("--set", options.sets, "Shade these receivers: pixels of a picture, or the scene's own points; repeatable");
 }
 
-void declare_accuracy(CLI::App& app, Arguments& arguments) {
-  CLI::App& command = *app.add_subcommand("accuracy", "Time per receiver against error: PTCX over its settings, the plain "
-                                                      "gather, Embree on the same discs and on the mesh");
-  arguments.command = &command;
+/// What every subcommand takes.
+CLI::App& declare(CLI::App& app, Arguments& arguments, const char* name, const char* description, const char* files) {
+  CLI::App& command = *app.add_subcommand(name, description);
   command.fallthrough();
   command.add_option("scenes", arguments.scenes,
                      std::string(kScenes) + "; +backdrop behind a mesh's name sets it on a ground before a wall "
                                             "[default: fractal window city, fractal with --quick]")
       ->type_name("SCENE");
-  command.add_option("-o,--output", arguments.directory, "Directory for accuracy.json, .csv, .svg and .png")
-      ->type_name("DIR")
-      ->required();
+  command.add_option("-o,--output", arguments.directory, std::string("Directory for ") + files)->type_name("DIR")->required();
+  return command;
+}
+
+void declare_accuracy(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = declare(app, arguments, "accuracy",
+                              "Time per receiver against error: PTCX over its settings, the plain gather, Embree on the same "
+                              "discs and on the mesh",
+                              "accuracy.json, .csv, .svg and .png");
   command.add_flag("--quick", arguments.quick,
                    "Under a minute a scene on two cores: 200k points, fewer receivers of each set (192 x 108 pixels, "
                    "8k points), 200 of them checked, 3 runs of fewer settings; what other options say stays");
@@ -116,10 +124,23 @@ void declare_accuracy(CLI::App& app, Arguments& arguments) {
   declare_choices(command, options);
 }
 
+void declare_error(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = declare(app, arguments, "error",
+                              "Error measured against --error asked, of points and of a picture; error against time over the "
+                              "settings that --error chooses from",
+                              "error.json, .csv, .svg and .png, ladder.json and .csv");
+  command.add_flag("--quick", arguments.quick, "Small: 50k points, a picture of 320 x 180, 400 receivers checked of each run");
+  ErrorOptions& options = arguments.error;
+  options.scene.points = 500'000;
+  ptc::add_count(command, "--points", options.scene.points, "Surfels wanted of a mesh or the city; k, M, G count by 1000")
+      ->default_str("500k");
+  ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers of each run whose error is measured");
+  ptc::add_integer(command, "--check-rays", options.rays, 16, 1 << 20, "Rays for each of them");
+}
+
 void declare_growth(CLI::App& app, Arguments& arguments) {
   CLI::App& command = *app.add_subcommand("growth", "Time per receiver against surfels, solid angle, depth complexity and memory, "
                                                     "with its error");
-  arguments.growth_command = &command;
   command.fallthrough();
   command.add_option("-o,--output", arguments.directory, "Directory for growth.json, .csv, .svg and .png")
       ->type_name("DIR")
@@ -146,23 +167,17 @@ void declare_growth(CLI::App& app, Arguments& arguments) {
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
 }
 
-/// What --quick sets, unless another option did.
-void shorten_growth(Arguments& arguments) {
-  GrowthOptions& options = arguments.growth;
-  const auto given = [&](const char* name) { return arguments.growth_command->count(name) > 0; };
-  if (!given("--points")) options.points = {50'000, 150'000, 500'000};
-  if (!given("--checked")) options.checked = 100;
-  if (!given("--repeats")) options.repeats = 3;
-  options.middle_points = 50'000;
-  options.solid_angles = {0.1F, 0.01F, 0.001F};
-  options.layers = {1, 4, 16};
-  options.caps = {1, 0.29, 0.09};  // less of so few pages is nothing
-  options.own_points = 8'192;
-  options.reference_rays = 4096;
+/// What --quick sets, unless another option did. The references stay as good: they take little time.
+void shorten_error(Arguments& arguments) {
+  ErrorOptions& options = arguments.error;
+  if (arguments.command->count("--points") == 0) options.scene.points = 50'000;
+  if (arguments.command->count("--checked") == 0) options.checked = 400;
+  options.scene.width = 320;
+  options.scene.height = 180;
 }
 
-/// What --quick sets, unless another option did. The references stay as good: they take little time.
-void shorten(Arguments& arguments) {
+/// Likewise.
+void shorten_accuracy(Arguments& arguments) {
   const auto unless_given = [&](const char* name, auto& value, auto quick) {
     if (arguments.command->count(name) == 0) value = quick;
   };
@@ -182,6 +197,21 @@ void shorten(Arguments& arguments) {
   options.settings = {all[0], all[2], all[3], all[5]};
 }
 
+/// Likewise.
+void shorten_growth(Arguments& arguments) {
+  GrowthOptions& options = arguments.growth;
+  const auto given = [&](const char* name) { return arguments.command->count(name) > 0; };
+  if (!given("--points")) options.points = {50'000, 150'000, 500'000};
+  if (!given("--checked")) options.checked = 100;
+  if (!given("--repeats")) options.repeats = 3;
+  options.middle_points = 50'000;
+  options.solid_angles = {0.1F, 0.01F, 0.001F};
+  options.layers = {1, 4, 16};
+  options.caps = {1, 0.29, 0.09};  // less of so few pages is nothing
+  options.own_points = 8'192;
+  options.reference_rays = 4096;
+}
+
 /// The scenes asked for, whose files can be read.
 std::vector<SceneChoice> choose_scenes(const Arguments& arguments) {
   std::vector<std::string> texts = arguments.scenes;
@@ -197,8 +227,8 @@ std::vector<SceneChoice> choose_scenes(const Arguments& arguments) {
   return scenes;
 }
 
-ptc::Outcome measure(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten(arguments);
+ptc::Outcome run_accuracy(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten_accuracy(arguments);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
   const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
@@ -212,7 +242,20 @@ ptc::Outcome measure(Arguments& arguments, const ptc::RunOptions& run, ptc::Prog
   return {facts_of(scenes), accuracy_text(scenes)};
 }
 
-ptc::Outcome measure_growing(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+ptc::Outcome run_error(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten_error(arguments);
+  const std::vector<SceneChoice> choices = choose_scenes(arguments);
+  std::filesystem::create_directories(arguments.directory);
+  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  std::vector<SceneErrors> scenes;
+  for (const SceneChoice& choice : choices) {
+    scenes.push_back(measure_errors(choice, arguments.error, work, run, progress));
+    write_reports(arguments.directory, scenes);  // of those done, should a later one fail
+  }
+  return {facts_of(scenes), error_text(scenes)};
+}
+
+ptc::Outcome run_growth(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten_growth(arguments);
   std::filesystem::create_directories(arguments.directory);
   const auto write = [&](const std::vector<GrowthRow>& so_far) { write_reports(arguments.directory, so_far); };
@@ -226,11 +269,13 @@ int main(int argc, char** argv) {
   ptc::Command command("ptcbench", kPurpose, kExamples);
   Arguments arguments;
   declare_accuracy(command.app(), arguments);
+  declare_error(command.app(), arguments);
   declare_growth(command.app(), arguments);
   command.app().require_subcommand(1);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
-    const bool growth = command.app().got_subcommand("growth");
-    return growth ? measure_growing(arguments, command.run_options(), progress)
-                  : measure(arguments, command.run_options(), progress);
+    arguments.command = command.app().get_subcommands().front();
+    const std::string name = arguments.command->get_name();
+    const auto measure = name == "growth" ? run_growth : name == "error" ? run_error : run_accuracy;
+    return measure(arguments, command.run_options(), progress);
   });
 }

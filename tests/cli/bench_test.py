@@ -64,6 +64,24 @@ class Bench(ProgramTest):
         self.assertEqual(self.names(facts, "method"), ["embree-mesh", "plain"])
         self.assertEqual(self.names(facts, "set"), ["camera", "points"])
 
+    def test_errors_that_were_asked_for_are_met(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "error", "fractal", "--quick", "--points", "10k", "--checked", "200", "-o", charts,
+                               "--json")
+        facts = json.loads((charts / "error.json").read_text())
+        self.assertEqual(json.loads(printed.stdout)["rows"], facts["rows"])
+        self.assertEqual([r["asked"] for r in facts["rows"]], [a for a in (0.1, 0.05, 0.03, 0.02) for _ in range(2)])
+        for row in facts["rows"]:
+            self.assertGreater(row["measured"], 0)
+            if row["met"]:
+                self.assertLessEqual(row["measured"], row["asked"])
+        self.assertTrue(facts["rows"][0]["met"])
+        errors = [r["error"] for r in facts["ladder"]]
+        self.assertLess(errors[-1], errors[0] / 5)
+        self.assertLess(facts["slopes"]["fractal"], -0.4)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()),
+                         ["error.csv", "error.json", "error.png", "error.svg", "ladder.csv"])
+
     def test_a_cloud_has_no_mesh_to_be_measured(self):
         cloud = self.here / "balls.ply"
         lower = [(p[0], p[1], p[2] - 2.2, *p[3:]) for p in ball(600, 2)]

@@ -90,11 +90,43 @@ std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts) {
   return choices;
 }
 
+LitScene build_scene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& target,
+                     const RunOptions& run, Progress& progress) {
+  BuildRequest request{.backdrop = choice.backdrop, .run = run};
+  request.sampling.count = options.points;
+  LitScene lit;
+  std::vector<MeshCamera> cameras;
+  const bool procedural = choice.file.empty() && choice.name != "city";
+  if (choice.file.empty() && !procedural) {
+    request.city_points = options.points;
+    if (options.rays) lit.mesh = city_mesh(options.points);
+  } else if (procedural) {
+    lit = choice.layers > 0           ? make_layers(choice.layers)
+          : choice.name == "fractal" ? make_fractal(options.points)
+                                     : make_window_room();
+    request.lights = lit.lights;
+    request.mesh = std::make_shared<const Mesh>(lit.mesh);
+  } else {
+    request.inputs.push_back(choice.file);
+    lit.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, &cameras);
+  }
+  build_container(request, target, progress);
+  const ContainerReader container(target);
+  lit.lights = recorded_lights(container);
+  if (!procedural) {
+    lit.camera = default_camera(container, cameras, choice.backdrop, std::array{options.width, options.height});
+  }
+  lit.camera.width = options.width;
+  lit.camera.height = options.height;
+  return lit;
+}
+
 BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
                        const RunOptions& run, Progress& progress)
     : name_(choice.name) {
-  load(choice, options, work, run, progress);
-  lit_.lights = recorded_lights(*container_);
+  container_ = make_temporary(work, [&](const std::filesystem::path& path) {
+    lit_ = build_scene(choice, options, path, run, progress);
+  });
   if (options.rays) surfels_ = load_surfels(*container_, kMostSurfels);
   const Executor executor(run.threads);
   if (options.shaded_width > 0) add_camera(options, executor, progress);
@@ -102,35 +134,6 @@ BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options, c
 }
 
 double BenchScene::spacing() const { return surfel_spacing(*container_); }
-
-void BenchScene::load(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
-                      const RunOptions& run, Progress& progress) {
-  BuildRequest request{.backdrop = choice.backdrop, .run = run};
-  request.sampling.count = options.points;
-  std::vector<MeshCamera> cameras;
-  std::optional<Camera> camera;
-  if (choice.name == "city" && choice.file.empty()) {
-    request.city_points = options.points;
-    if (options.rays) lit_.mesh = city_mesh(options.points);
-  } else if (choice.file.empty()) {
-    lit_ = choice.layers > 0           ? make_layers(choice.layers)
-           : choice.name == "fractal" ? make_fractal(options.points)
-                                      : make_window_room();
-    request.lights = lit_.lights;
-    request.mesh = std::make_shared<const Mesh>(lit_.mesh);
-    camera = lit_.camera;
-  } else {
-    request.inputs.push_back(choice.file);
-    lit_.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, &cameras);
-  }
-  container_ = make_temporary(work, [&](const std::filesystem::path& path) { build_container(request, path, progress); });
-  if (!camera) {
-    camera = default_camera(*container_, cameras, choice.backdrop, std::array{options.width, options.height});
-  }
-  lit_.camera = *camera;
-  lit_.camera.width = options.width;
-  lit_.camera.height = options.height;
-}
 
 void BenchScene::add_camera(const SceneOptions& options, const Executor& executor, Progress& progress) {
   const Camera& camera = lit_.camera;

@@ -57,6 +57,12 @@ struct SceneOptions {
   bool rays = true;                           ///< surfels and mesh are loaded, which rays need
 };
 
+/// Builds a scene's container.
+/// @return  its mesh (empty for a cloud), the light and the camera that belong to it
+/// @throws DataError, std::system_error, std::invalid_argument as build_container()
+[[nodiscard]] LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
+                                   const std::filesystem::path& target, const RunOptions& run, Progress& progress);
+
 /// Builds the container, loads what rays need, finds the receivers.
 class BenchScene {
  public:
@@ -75,8 +81,6 @@ class BenchScene {
   [[nodiscard]] const std::vector<ReceiverSet>& sets() const noexcept { return sets_; }
 
  private:
-  void load(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
-            const RunOptions& run, Progress& progress);
   void add_camera(const SceneOptions& options, const Executor& executor, Progress& progress);
   void add_points(const SceneOptions& options);
 

@@ -1,0 +1,82 @@
+// JSON, CSV, words and the chart of errors made by hand.
+#include "tools/bench/error_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include <catch2/catch.hpp>
+
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::bench;
+
+namespace {
+
+CheckError error_of(double share) {
+  return {.occlusion_rms = share / 4, .occlusion_mean = 0.5, .irradiance_rms = share, .irradiance_mean = 2};
+}
+
+/// Errors that fall as one over the square of time.
+SceneErrors errors(bool mesh) {
+  SceneErrors scene{.name = "room", .surfels = 1000};
+  for (const double asked : {0.1, 0.02}) {
+    ErrorRow row{.scene = "room", .set = "points", .asked = asked, .receivers = 500, .us_per_receiver = 20, .pilot_share = 0.1};
+    row.tuning = {.asked = asked, .met = asked > 0.05, .setting = 3, .measured = error_of(0.07)};
+    row.check = {.receivers = 100, .rays = 4096, .discs = error_of(0.06)};
+    if (mesh) row.check.mesh = error_of(0.08);
+    scene.rows.push_back(row);
+  }
+  for (std::size_t i = 0; i < ladder().size(); ++i) {
+    const double us = 10 * std::pow(1.3, static_cast<double>(i));
+    scene.rungs.push_back({error_of(10 / (us * us)), us});
+  }
+  return scene;
+}
+
+std::string text_of(const std::filesystem::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("error report: the slope is the exponent of error over time", "[bench][error]") {
+  CHECK(errors(false).slope() == Approx(-2));
+  SceneErrors gap = errors(false);
+  gap.rungs[2].error = {};  // nothing to take a logarithm of
+  CHECK(gap.slope() == Approx(-2));
+}
+
+TEST_CASE("error report: rows say what was asked, what was measured, and null where there is no mesh", "[bench][error]") {
+  const nlohmann::ordered_json facts = facts_of(std::vector{errors(false)});
+  REQUIRE(facts.at("rows").size() == 2);
+  const auto& row = facts.at("rows").at(1);
+  CHECK(row.at("asked") == 0.02);
+  CHECK(row.at("met") == false);
+  CHECK(row.at("measured") == 0.06);
+  CHECK(row.at("at_pilots") == 0.07);
+  CHECK(row.at("measured_mesh").is_null());
+  CHECK(facts_of(std::vector{errors(true)}).at("rows").at(0).at("measured_mesh") == 0.08);
+  CHECK(facts.at("ladder").size() == ladder().size());
+  CHECK(facts.at("ladder").at(0).at("occlusion") == Approx(0.1 / 2));
+  CHECK(facts.at("slopes").at("room") == Approx(-2));
+}
+
+TEST_CASE("error report: the floor is told, every file is written", "[bench][error]") {
+  const std::vector<SceneErrors> scenes{errors(true)};
+  const std::string text = error_text(scenes);
+  CHECK(text.find("(floor)") != std::string::npos);
+  CHECK(text.find("power -2.00") != std::string::npos);
+  const test::TemporaryDirectory dir;
+  write_reports(dir.path(), scenes);
+  CHECK(nlohmann::ordered_json::parse(text_of(dir / "error.json")) == facts_of(scenes));
+  const std::string rows = text_of(dir / "error.csv"), rungs = text_of(dir / "ladder.csv");
+  CHECK(std::ranges::count(rows, '\n') == 3);
+  CHECK(std::ranges::count(rungs, '\n') == static_cast<std::ptrdiff_t>(ladder().size()) + 1);
+  CHECK(text_of(dir / "error.svg").find("room, points") != std::string::npos);
+  CHECK(std::filesystem::file_size(dir / "error.png") > 1000);
+}
