@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -18,6 +20,7 @@
 #include "engine/scene/low_discrepancy.h"
 #include "engine/scene/spacing_field.h"
 #include "engine/scene/surface_patches.h"
+#include "engine/scene/surroundings.h"
 
 namespace ptc {
 namespace {
@@ -25,7 +28,14 @@ namespace {
 constexpr double kPatchSurfels = 8192;
 constexpr unsigned kPointsPerSurfel = 16;
 constexpr unsigned kRounds = 6;
+constexpr unsigned kLitPoints = 4;    // of a surfel's points, evenly spread
+constexpr double kLeastNormal = 0.1;  // length of a mean normal that means something
 constexpr double kMostAcross = 3e5;  // spacings along the side of a square as large as the mesh
+
+// What each of some points takes of a number of rays.
+unsigned share(unsigned rays) {
+  return (rays + kLitPoints - 1) / kLitPoints;
+}
 
 double sides_of(const Mesh& mesh, std::uint32_t triangle) {
   return mesh.materials[mesh.material_of[triangle]].double_sided ? 2 : 1;
@@ -82,10 +92,11 @@ glm::vec2 nearest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const gl
 // What a group of points says of its surfel.
 struct Group {
   double area = 0;  // one side's
-  double points = 0;
   glm::dvec3 albedo{0};
   glm::dvec3 emission{0};
-  std::uint32_t nearest = 0;  // the point nearest to the middle
+  glm::dvec3 normal{0};
+  std::vector<std::uint32_t> members;  // ascending, so neighbours follow each other
+  std::uint32_t nearest = 0;           // the point nearest to the middle
   float distance = std::numeric_limits<float>::infinity();
 };
 
@@ -96,6 +107,7 @@ class MeshSource final : public PointSource {
       : light_(light),
         scene_(scene),
         options_(resolved(scene.mesh(), options)),
+        lit_point_{share(options.lights.sun_rays), share(options.lights.area_rays), share(options.lights.sky_rays)},
         executor_(executor),
         field_(options_),
         patches_(scene.mesh(), field_, kPatchSurfels) {}
@@ -135,12 +147,14 @@ class MeshSource final : public PointSource {
   [[nodiscard]] std::vector<Group> sum_up(const std::vector<SurfacePoint>& points,
                                           const std::vector<std::uint32_t>& owners,
                                           const std::vector<Cluster>& clusters) const;
-  [[nodiscard]] SurfaceHit place(const SurfacePoint& point, const Cluster& cluster) const;
-  void light(Surfel& surfel, const glm::vec3& emission, std::uint64_t seed) const;
+  [[nodiscard]] Surfel place(const Group& group, const SurfacePoint& nearest, const Cluster& cluster) const;
+  [[nodiscard]] std::optional<glm::vec3> reflected(const Group& group, std::span<const SurfacePoint> points,
+                                                   float side, std::uint64_t seed) const;
 
   const DirectLight& light_;
   const RayScene& scene_;
   SamplingOptions options_;
+  LightSampling lit_point_;  // for each of a surfel's points
   const Executor& executor_;
   SpacingField field_;
   SurfacePatches patches_;
@@ -159,9 +173,10 @@ std::vector<Group> MeshSource::sum_up(const std::vector<SurfacePoint>& points,
     Group& group = groups[owners[i]];
     const SurfaceHit surface = scene_.surface(p.triangle, p.uv.x, p.uv.y);
     group.area += p.area;
-    group.points += 1;
+    group.members.push_back(i);
     group.albedo += glm::dvec3(surface.albedo);
     group.emission += glm::dvec3(surface.emission);
+    group.normal += glm::dvec3(surface.normal);
     const float distance = glm::distance(p.position, clusters[owners[i]].position);
     if (distance < group.distance) {
       group.distance = distance;
@@ -171,22 +186,43 @@ std::vector<Group> MeshSource::sum_up(const std::vector<SurfacePoint>& points,
   return groups;
 }
 
-// The surface at a group's middle: on the triangle of the point nearest to it.
-SurfaceHit MeshSource::place(const SurfacePoint& point, const Cluster& cluster) const {
+// A surfel at the middle of its group, on the triangle of the point nearest to that, across the group's mean normal;
+// away from edges that it sticks out over.
+Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest, const Cluster& cluster) const {
   const Mesh& mesh = scene_.mesh();
-  const auto& c = mesh.triangles[point.triangle];
-  const glm::vec2 uv =
+  const auto& c = mesh.triangles[nearest.triangle];
+  glm::vec2 uv =
       nearest_on_triangle(glm::dvec3(cluster.position), glm::dvec3(mesh.positions[c[0]]),
                           glm::dvec3(mesh.positions[c[1]]), glm::dvec3(mesh.positions[c[2]]));
-  const bool is_sound = std::isfinite(uv.x) && std::isfinite(uv.y);
-  return is_sound ? scene_.surface(point.triangle, uv.x, uv.y)
-                  : scene_.surface(point.triangle, point.uv.x, point.uv.y);
+  if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = nearest.uv;
+  const SurfaceHit at = scene_.surface(nearest.triangle, uv.x, uv.y);
+  const auto count = static_cast<double>(group.members.size());
+  const double length = glm::length(group.normal);
+  Surfel surfel;
+  surfel.normal = length > kLeastNormal * count ? glm::vec3(group.normal / length) : at.normal;
+  surfel.radius = static_cast<float>(std::sqrt(0.5 * group.area));
+  surfel.albedo = finite_or_black(glm::vec3(group.albedo / count));
+  surfel.position = at.position + glm::dvec3(move_inwards(scene_, at.position, surfel.normal, surfel.radius));
+  return surfel;
 }
 
-void MeshSource::light(Surfel& surfel, const glm::vec3& emission, std::uint64_t seed) const {
-  const DirectLight::Result direct =
-      light_.irradiance(surfel.position, surfel.normal, options_.lights, seed);
-  surfel.radiance = finite_or_black(emission + surfel.albedo / kPi * (direct.local + direct.sky));
+// Light reflected by a group in the mean: by those of a few points that are not buried. Nothing when all are.
+std::optional<glm::vec3> MeshSource::reflected(const Group& group, std::span<const SurfacePoint> points, float side,
+                                               std::uint64_t seed) const {
+  const std::size_t size = group.members.size(), count = std::min<std::size_t>(kLitPoints, size);
+  glm::vec3 sum(0);
+  float lit = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const SurfacePoint& point = points[group.members[(2 * i + 1) * size / (2 * count)]];
+    const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
+    const std::uint64_t own_seed = kLitPoints * seed + i;
+    if (is_buried(scene_, at.position, side * at.geometric_normal, own_seed)) continue;
+    const DirectLight::Result direct = light_.irradiance(at.position, side * at.normal, lit_point_, own_seed);
+    sum += finite_or_black(at.albedo / kPi * (direct.local + direct.sky));
+    lit += 1;
+  }
+  if (lit == 0) return {};
+  return sum / lit;
 }
 
 std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
@@ -197,21 +233,22 @@ std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
   const std::vector<Group> groups = sum_up(patch.points, owners, clusters);
 
   std::vector<Surfel> surfels;
-  double covered = 0;  // sum of 2 r^2
+  double covered = 0;  // sum of 2 r^2, with those that are buried
   for (std::size_t i = 0; i < clusters.size(); ++i) {
     const Group& group = groups[i];
-    const SurfaceHit at = place(patch.points[group.nearest], clusters[i]);
-    Surfel surfel;
-    surfel.position = at.position;
-    surfel.normal = at.normal;
-    surfel.radius = static_cast<float>(std::sqrt(0.5 * group.area));
-    surfel.albedo = finite_or_black(glm::vec3(group.albedo / group.points));
-    light(surfel, glm::vec3(group.emission / group.points), 2 * (patch.first + i));
+    const SurfacePoint& nearest = patch.points[group.nearest];
+    const double sides = sides_of(scene_.mesh(), nearest.triangle);
+    covered += group.area * sides;
+    const auto front = reflected(group, patch.points, 1, 2 * (patch.first + i));
+    const auto back = sides == 1 ? std::nullopt : reflected(group, patch.points, -1, 2 * (patch.first + i) + 1);
+    if (!front && !back) continue;
+    Surfel surfel = place(group, nearest, clusters[i]);
+    const glm::vec3 emission = finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
+    surfel.radiance = emission + front.value_or(glm::vec3(0));
     surfels.push_back(surfel);
-    covered += group.area * sides_of(scene_.mesh(), at.triangle);
-    if (sides_of(scene_.mesh(), at.triangle) == 1) continue;
+    if (sides == 1) continue;
     surfel.normal = -surfel.normal;
-    light(surfel, glm::vec3(0), 2 * (patch.first + i) + 1);
+    surfel.radiance = back.value_or(glm::vec3(0));
     surfels.push_back(surfel);
   }
   const auto scale = static_cast<float>(std::sqrt(patch.area / covered));

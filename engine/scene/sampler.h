@@ -14,7 +14,8 @@ namespace ptc {
 
 struct SamplingOptions {
   double spacing = 0;               ///< scene units between neighbours; 0: from count
-  std::uint64_t count = 2'000'000;  ///< surfels wanted when spacing is 0, met within 2 %
+  std::uint64_t count = 2'000'000;  ///< surfels wanted when spacing is 0, met within 2 % but
+                                    ///< for those that are buried and left out
   std::optional<Camera> camera;     ///< finer where this camera looks close:
   float pixels_per_surfel = 1;      ///< at most so many pixels between neighbours in its view
   float finest = 0.125f;            ///< but never below this share of the spacing
@@ -29,10 +30,12 @@ struct SamplingOptions {
 /// Surfels spread evenly over a mesh, lit: radiance = emission + albedo / pi * irradiance.
 ///
 /// Each surfel stands for a compact patch of surface of about spacing^2: the patches are Voronoi
-/// cells whose middles are nearly regular, whatever the tessellation (see clusters.h). Position and
-/// normal are those of the mesh at the patch's middle, albedo and emission the patch's mean. Sum of
-/// 2 r^2 equals the mesh's area. Double-sided materials give two surfels back to back.
-/// Deterministic for any thread count. The order is that of the Z-curve, roughly.
+/// cells whose middles are nearly regular, whatever the tessellation (see clusters.h). It lies on the
+/// mesh at the patch's middle, across the patch's mean normal, moved inwards in its plane where it
+/// would stick out over an edge (see surroundings.h); albedo, emission and light are the patch's mean.
+/// Sum of 2 r^2 equals the mesh's area, less what is left out: patches all of which is buried in solids.
+/// Double-sided materials give two surfels back to back. Deterministic for any thread count. The
+/// order is that of the Z-curve, roughly.
 /// Memory: sampling_bytes().
 /// @param light, scene, executor  must outlive the source
 /// @throws std::invalid_argument when count, spacing or a camera's number makes no sense, or there

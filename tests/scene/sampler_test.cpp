@@ -1,6 +1,7 @@
 // Mesh to surfels: number, area, evenness, light.
 #include "engine/scene/sampler.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
@@ -143,6 +144,70 @@ TEST_CASE("sampler: surfels lie on the mesh and have its normals and colours", "
     CHECK(glm::length(s.normal) == 1);
     CHECK(s.albedo == mesh.materials[0].albedo);
     CHECK(s.radiance == glm::vec3(0));
+  }
+}
+
+TEST_CASE("sampler: a surfel has the mean normal of its patch where the mesh is finer", "[scene][sampler]") {
+  Mesh mesh = empty_mesh();  // a corrugated square, flat in the mean
+  constexpr int kRoofs = 200;
+  for (int i = 0; i < kRoofs; ++i) {
+    const float x = static_cast<float>(i) / kRoofs, half = 0.5F / kRoofs, height = 0.4F * half;
+    add_quad(mesh, {x, 0, 1}, {half, height, 0}, {0, 0, -1});
+    add_quad(mesh, {x + half, height, 1}, {half, -height, 0}, {0, 0, -1});
+  }
+  double tilt = 0;
+  const auto surfels = sample(mesh, 400);
+  for (const Surfel& s : surfels) tilt += 1 - static_cast<double>(s.normal.y);
+  CHECK(tilt < 0.02 * static_cast<double>(surfels.size()));  // 0.07 with the normals of the roofs
+}
+
+TEST_CASE("sampler: surfels stick out over an edge about as much as they leave out", "[scene][sampler]") {
+  const auto surfels = sample(ground(1), 2000);
+  const auto covered = [&](float x, float z) {
+    return std::ranges::any_of(surfels, [&](const Surfel& s) {
+      return glm::distance(s.position, glm::dvec3(x, 0, z)) < static_cast<double>(s.radius);
+    });
+  };
+  Random random(1);
+  const double spacing = 2 / std::sqrt(2000.0);
+  double net = 0;  // in units of the spacing times the length of the edge
+  constexpr int kProbes = 4000;
+  for (int i = 0; i < kProbes; ++i) {
+    const auto along = static_cast<float>(random.between(-0.9, 0.9)), off = static_cast<float>(random.unit() * spacing);
+    net += (covered(1 + off, along) ? 1.0 : 0.0) / kProbes;
+    net -= (covered(along, 1 - off) ? 0.0 : 1.0) / kProbes;
+  }
+  CHECK(std::abs(net) < 0.05);  // 0.2 with the discs about their middles
+}
+
+TEST_CASE("sampler: what lies inside a solid gives no surfels", "[scene][sampler]") {
+  Mesh mesh = cube();
+  const auto alone = sample(mesh, 3000);
+  add_box(mesh, glm::vec3(-0.25F), glm::vec3(0.25F), false);
+  SamplingOptions options;
+  options.spacing = spacing_for(cube(), 3000);
+  for (const Surfel& s : sample(mesh, options)) CHECK(glm::length(s.position) >= 0.5);
+  CHECK(sample(mesh, options).size() == Approx(alone.size()).epsilon(0.02));
+}
+
+TEST_CASE("sampler: a surfel's light is the mean over its patch, its buried part left out", "[scene][sampler]") {
+  Mesh mesh = ground(1);
+  LightRig rig;
+  rig.suns.push_back({{0, 1, 0}, glm::vec3(kPi), 0});
+  add_box(mesh, {-2, 1, -2}, {0.01F, 2, 2}, false);  // its sharp shadow ends at x = 0.01
+  SamplingOptions options;
+  options.count = 3000;
+  int between = 0;
+  for (const Surfel& s : sample(mesh, options, rig)) {
+    if (s.position.y == 0) between += s.radiance.x > 0.01F && s.radiance.x < 0.49F ? 1 : 0;
+  }
+  CHECK(between > 5);
+  Mesh half = ground(1);
+  add_box(half, {-2, -1, -2}, {0.01F, 2, 2}, false);  // stands over one half
+  rig.suns.clear();
+  rig.sky.radiance = glm::vec3(1);
+  for (const Surfel& s : sample(half, options, rig)) {
+    if (s.position.y == 0 && s.position.x < 1 && s.position.x > -1) CHECK(s.radiance.x > 0.05F);
   }
 }
 
