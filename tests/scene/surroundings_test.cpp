@@ -99,3 +99,13 @@ TEST_CASE("surroundings: what shows itself or its reflecting back buries nothing
   }
   CHECK(!is_buried(reflecting, {0, -1, 0}, kUp, 1));
 }
+
+TEST_CASE("surroundings: what a surface lies on is buried", "[scene][surroundings]") {
+  const Mesh plane = ground(1);
+  const auto up = static_cast<float>(RayScene(plane).epsilon());
+  Mesh mesh = plane;
+  add_quad(mesh, {-0.5F, up, 0.5F}, {0, 0, -1}, {1, 0, 0});  // looks down
+  const RayScene scene(mesh);
+  CHECK(is_buried(scene, {0, 0, 0}, kUp, 1));
+  CHECK(!is_buried(scene, {0.7, 0, 0}, kUp, 1));
+}
