@@ -46,7 +46,7 @@ Floor measure(const bench::LitScene& scene, std::uint64_t count, unsigned side) 
   executor.for_each(hits.size(), [&](std::size_t i, unsigned) {
     const SurfaceHit& h = hits[i];
     ours[i] = discs.trace({h.position + lift * glm::dvec3(h.geometric_normal), h.normal}, 4096, i);
-    truth[i] = trace_mesh(rays, light, h.position, h.normal, 4096, {1, 1, 2}, i);
+    truth[i] = trace_mesh(rays, light, h.position, h.normal, 4096, {.sampling = {1, 1, 2}}, i);
   });
   Floor floor;
   double occlusion = 0, irradiance = 0;
