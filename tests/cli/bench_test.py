@@ -80,7 +80,7 @@ class Bench(ProgramTest):
         self.assertLess(errors[-1], errors[0] / 5)
         self.assertLess(facts["slopes"]["fractal"], -0.4)
         self.assertEqual(sorted(p.name for p in charts.iterdir()),
-                         ["error.csv", "error.json", "error.png", "error.svg", "ladder.csv"])
+                         ["error.csv", "error.json", "error.png", "error.svg", "ladder.csv", "ladder.json"])
 
     def test_a_cloud_has_no_mesh_to_be_measured(self):
         cloud = self.here / "balls.ply"
