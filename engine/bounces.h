@@ -11,7 +11,7 @@
 namespace ptc {
 
 struct BounceOptions {
-  unsigned bounces = 1;  ///< from 1 on: of light that reaches a receiver
+  unsigned bounces = 1;  ///< of light that reaches a receiver
   ShadeOptions shade;    ///< of the receivers; the points are shaded more coarsely, and without the sky
   float lift = 0.15F;    ///< in radii of a surfel
   std::filesystem::path temp_dir;
@@ -23,7 +23,7 @@ struct BounceOptions {
 /// The points are shaded in their order, so they need no second sort; one temporary container a bounce,
 /// two at once. Depends on neither threads nor cap.
 /// @param report  gets a stage and the CPU time of every pass
-/// @return        null for one bounce: the scene itself
+/// @return        null for one bounce or none: the scene itself
 /// @throws std::invalid_argument when the surfels are lit by emissive triangles that are surfels too;
 ///         FormatError, std::system_error
 /// Memory: the cache of `shade`, and within kBufferBytes.

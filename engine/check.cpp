@@ -56,6 +56,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
     report.disc_microseconds =
         timed(receivers_.size(), [&] { discs.trace(twice, half, 0, traced, executor, progress); });
   }
+  if (paths.bounces == 0) leave_out_bleeding(traced);
   report.discs = errors(results_, traced);
   if (!light || !mesh) return report;
   report.mesh_microseconds = timed(receivers_.size(), [&] {

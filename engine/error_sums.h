@@ -12,6 +12,9 @@ namespace ptc {
 /// Every receiver twice, side by side: rays of different seeds are independent.
 [[nodiscard]] std::vector<Receiver> two_of_each(std::span<const Receiver> receivers);
 
+/// Leaves out light from surfaces: what a gather without bleeding is compared with.
+void leave_out_bleeding(std::span<Shading> traced);
+
 /// Sums over receivers, each shaded by us and twice by rays.
 ///
 /// With a and b independent and right in the mean, (ours - a) (ours - b) is in the mean the square of

@@ -127,7 +127,8 @@ struct ShadeRequest {
   std::filesystem::path scene;      ///< surfels that occlude and emit
   std::filesystem::path receivers;  ///< a cloud or container to shade; empty: the scene's own points
   std::uint64_t count = 0;          ///< shade so many of the points, evenly spread in order; 0: all
-  unsigned bounces = 1;             ///< of light, from 1 on; each but one shades all points of the scene
+  unsigned bounces = 1;             ///< of light off surfaces; each but one shades all points of the scene. 0: sky
+                                    ///< and occlusion alone, whatever GatherOptions::bleeding says
   GatherOptions gather;
   std::optional<double> error;      ///< chooses `gather` but for its sides: share from above 0 to 1
   float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii

@@ -264,6 +264,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
                        .gather = request.gather,
                        .sky = sky_function(lights.sky),
                        .variants = std::min(request.samples, kMostVariants)};
+  options.gather.bleeding = request.bounces > 0;
   const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * kReceiverBytes +
                               std::uint64_t{camera.width} * camera.height * Film::kBytes +
                               (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24);

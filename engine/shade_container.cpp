@@ -217,7 +217,7 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
   std::string text = fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
                                  g.solid_angle, g.parallax, g.inflation, g.resolution,
                                  g.sides == Sides::both ? "both" : "front", request.lift);
-  if (request.bounces > 1) text += fmt::format(" bounces {}", request.bounces);
+  if (request.bounces != 1) text += fmt::format(" bounces {}", request.bounces);
   return text;
 }
 
@@ -290,6 +290,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
       .access = request.access,
       .gather = request.gather,
       .sky = sky_function(sky)};
+  options.gather.bleeding = request.bounces > 0;
   const std::unique_ptr<ContainerReader> bounced =
       bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, target)}, executor, report,
                    progress);
@@ -317,7 +318,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   report.receivers = points;
   if (request.check.receivers > 0) {
     const Stage stage(report.seconds, progress, "check", std::uint64_t{2} * request.check.receivers, "references");
-    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {}, options.cache_bytes, executor,
+    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {{}, request.bounces}, options.cache_bytes, executor,
                                  progress);
   }
   return report;

@@ -59,6 +59,7 @@ class Tuner {
     const std::vector<Receiver> twice = two_of_each(compared_);
     traced_.resize(twice.size());
     discs.trace(twice, side * side, 0, traced_, executor_, progress);
+    if (!options_.gather.bleeding) leave_out_bleeding(traced_);
   }
 
   /// Makes room for pages; no rays are traced any more.
@@ -146,7 +147,7 @@ class Tuner {
   /// Errors of each pilot of a part.
   const std::vector<ErrorSums>& errors_of(std::size_t rung, std::size_t part) {
     std::vector<ErrorSums>& errors = errors_[rung][part];
-    if (errors.empty()) errors = shade(ladder()[rung].options(options_.gather.sides), part);
+    if (errors.empty()) errors = shade(ladder()[rung].options(options_.gather), part);
     return errors;
   }
 
@@ -225,7 +226,7 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
   const std::size_t rung = std::min(chosen, ladder().size() - 1);
   TuningReport report{.asked = asked,
                       .met = met,
-                      .gather = ladder()[rung].options(options.gather.sides),
+                      .gather = ladder()[rung].options(options.gather),
                       .setting = static_cast<unsigned>(rung),
                       .settings = static_cast<unsigned>(ladder().size()),
                       .measured = tuner.measure(rung, !met || pilots.size() < 2),

@@ -16,8 +16,13 @@ struct Rung {
   unsigned resolution;
   double usual_error;
 
-  [[nodiscard]] GatherOptions options(Sides sides) const {
-    return {.solid_angle = solid_angle, .parallax = parallax, .resolution = resolution, .sides = sides};
+  /// @param run  says which sides of surfels stop light, and whether colours bleed
+  [[nodiscard]] GatherOptions options(const GatherOptions& run) const {
+    return {.solid_angle = solid_angle,
+            .parallax = parallax,
+            .resolution = resolution,
+            .sides = run.sides,
+            .bleeding = run.bleeding};
   }
 };
 

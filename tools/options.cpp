@@ -38,8 +38,9 @@ CLI::Option* add_access(CLI::App& app, ContainerReader::Access& access) {
 }
 
 CLI::Option* add_bounces(CLI::App& app, unsigned& bounces) {
-  return add_integer(app, "--bounces", bounces, 1, 1000,
-                     "Bounces of light off surfaces; each after the first shades all points of the scene once more");
+  return add_integer(app, "--bounces", bounces, 0, 1000,
+                     "Bounces of light off surfaces; each after the first shades all points of the scene once more. "
+                     "0: occlusion and sky alone, in less time");
 }
 
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {

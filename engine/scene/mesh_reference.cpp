@@ -63,7 +63,7 @@ RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm:
     const auto hit = scene.closest(*origin, direction, 0, std::numeric_limits<double>::infinity());
     if (hit) {
       ++hits;
-      result.irradiance += radiance_of(scene, light, *hit, paths, true, mix_bits(seed) + i);
+      if (paths.bounces > 0) result.irradiance += radiance_of(scene, light, *hit, paths, true, mix_bits(seed) + i);
     } else {
       result.sky += light.rig().sky.at(direction);
     }

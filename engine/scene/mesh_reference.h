@@ -18,7 +18,7 @@ struct RayTraced {
 /// How light gets to what a receiver sees.
 struct LightPaths {
   LightSampling sampling;  ///< of direct light at every hit
-  unsigned bounces = 1;    ///< reflections before the receiver, at most
+  unsigned bounces = 1;    ///< reflections before the receiver, at most; 0: no light from surfaces, emitted neither
 };
 
 /// Traces `rays` stratified cosine rays from a receiver; radiance at a hit is emission plus

@@ -4,7 +4,7 @@ import json
 import struct
 import unittest
 
-from programs import SMALL_PICTURE, ProgramTest
+from programs import SMALL_PICTURE, ProgramTest, read_ply
 
 
 class Facts(ProgramTest):
@@ -53,6 +53,26 @@ class Facts(ProgramTest):
                 self.assertEqual([s for s in facts["seconds"] if s.startswith("bounce")],
                                  ["bounce 1", "bounce 2"] if bounces > 1 else [])
         self.assertFalse(list(self.here.glob(".ptcx-*")))
+
+    def test_without_bounces_there_is_occlusion_alone(self):
+        scene = self.here / "s.ptcx"
+        self.succeed("ptcbuild", self.mesh, "--points", "1k", "-o", scene)
+        columns = {}
+        for bounces in (0, 1):
+            out = self.here / f"o{bounces}.ply"
+            facts = json.loads(self.succeed("ptcshade", scene, "-o", out, "--bounces", bounces, "--check", "20",
+                                            "--json").stdout)
+            names, points = read_ply(out)
+            columns[bounces] = dict(zip(names, zip(*points)))
+            discs = facts["check"]["discs"]
+            self.assertGreater(discs["occlusion_mean"], 0)
+            self.assertEqual(discs["irradiance_mean"] > 0, bounces > 0)
+        self.assertEqual(columns[0]["occlusion"], columns[1]["occlusion"])
+        self.assertGreater(max(columns[1]["irradiance_g"]), 0)
+        self.assertEqual(max(columns[0]["irradiance_g"]), 0)
+        tuned = json.loads(self.succeed("ptcshade", scene, "-o", self.here / "o.ply", "--bounces", "0", "--error", "5%",
+                                        "--json").stdout)
+        self.assertEqual(tuned["tuning"]["measured"]["irradiance_mean"], 0)
 
     def test_quiet_programs_say_nothing(self):
         for command in (["ptcinfo", self.scene], ["ptcverify", self.scene],
