@@ -30,7 +30,7 @@ class Stage {
 [[nodiscard]] std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least,
                                         const char* what_for);
 
-/// The same for the page cache of a gather.
+/// The same for the page cache of a gather, whose threads take kGatherBytes each.
 [[nodiscard]] std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
                                              unsigned threads, const char* what_for);
 
@@ -69,5 +69,8 @@ inline constexpr const char* kInputsKey = "inputs";
 
 /// Part of a cap that buffers outside the large budgets take: open pages, blocks, receivers.
 inline constexpr std::uint64_t kBufferBytes = std::uint64_t{32} << 20;
+/// Of it what a thread that gathers takes: direction buffers and lists of its receiver cells, 14 MiB at the most
+/// seen (receivers 80 surfels apart in a city of 20 million).
+inline constexpr std::uint64_t kGatherBytes = std::uint64_t{16} << 20;
 
 }  // namespace ptc
