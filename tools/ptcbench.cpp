@@ -84,7 +84,11 @@ void declare_choices(CLI::App& command, AccuracyOptions& options) {
       ->allow_extra_args(false)
       ->group(kGroup);
   const auto add_words = [&](const char* name, std::vector<std::string>& chosen, const char* description) {
-    command.add_option(name, chosen, description)->type_name(joined(chosen))->allow_extra_args(false)->check(one_of(chosen))->group(kGroup);
+    command.add_option(name, chosen, description)
+        ->type_name(joined(chosen))
+        ->allow_extra_args(false)
+        ->check(one_of(chosen))
+        ->group(kGroup);
   };
   add_words("--method", options.methods, "Measure this method, not all; repeatable");
   add_words("--set", options.sets, "Shade these receivers: pixels of a picture, or the scene's own points; repeatable");
@@ -215,7 +219,8 @@ void shorten_growth(Arguments& arguments) {
 /// The scenes asked for, whose files can be read.
 std::vector<SceneChoice> choose_scenes(const Arguments& arguments) {
   std::vector<std::string> texts = arguments.scenes;
-  if (texts.empty()) texts = arguments.quick ? std::vector<std::string>{"fractal"} : std::vector<std::string>{"fractal", "window", "city"};
+  if (texts.empty()) texts = {"fractal", "window", "city"};
+  if (arguments.scenes.empty() && arguments.quick) texts.resize(1);
   const std::vector<SceneChoice> scenes = parse_scenes(texts);
   for (const SceneChoice& scene : scenes) {
     if (scene.file.empty()) continue;

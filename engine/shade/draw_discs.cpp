@@ -157,7 +157,8 @@ struct WideDisc {
     const float d = cw * cw + cu * cu + cv * cv - radius * radius;
     const float a = height * height - 2 * height * nu * cu + nu * nu * d;  // of u^2
     const bool bounded = a > 1e-6F * radius * radius;
-    const auto pixel = [&](VF u) { return hn::Min(hn::Max(hn::MulAdd(u, set(0.5F * edge), set(0.5F * edge)), hn::Zero(f)), set(edge)); };
+    const auto half = set(0.5F * edge);
+    const auto pixel = [&](VF u) { return hn::Min(hn::Max(hn::MulAdd(u, half, half), hn::Zero(f)), set(edge)); };
     for (int y = first_row; y < end_row; y += static_cast<int>(hn::Lanes(f))) {
       auto first = hn::Zero(i), end = hn::Set(i, cube.resolution);
       if (bounded) {
