@@ -148,7 +148,7 @@ TEST_CASE("tuning: neither threads nor the cap change the choice or a byte", "[i
     return std::vector<char>{std::istreambuf_iterator<char>(in), {}};
   };
   const ShadeReport one = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ptcx");
-  const ShadeReport two = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{50} << 20, .threads = 2}, "two.ptcx");
+  const ShadeReport two = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{80} << 20, .threads = 2}, "two.ptcx");
   CHECK(one.tuning->setting == two.tuning->setting);
   CHECK(one.tuning->measured.relative() == two.tuning->measured.relative());
   CHECK(bytes("one.ptcx") == bytes("two.ptcx"));
