@@ -1,7 +1,6 @@
 // Discs drawn into the pixels of a direction buffer (direction_kernels.h).
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
 #include "engine/shade/direction_kernels.h"
 
@@ -11,25 +10,15 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "engine/shade/lanes-inl.h"
+#include "engine/shade/canvas-inl.h"
+#include "engine/shade/wide_discs-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
-constexpr int kLanes = DiscQueue::kReadLanes;
-using F = hn::CappedTag<float, kLanes>;
-using I = hn::RebindToSigned<F>;
-using U = hn::RebindToUnsigned<F>;
-using VF = hn::VFromD<F>;
-using VU = hn::VFromD<U>;
-using MF = hn::Mask<F>;
-
-/// Height of the shallow paraboloid that stands for a disc, over its radius (spec/shading.md#surfels).
-constexpr float kBump = 0.01F;
-constexpr float kSlack = 1e-3F;      // pixels: rounding of a disc's bounds
-constexpr float kWideSlack = 0.05F;  // likewise, where squares cancel
-constexpr int kChunk = 64;           // discs that are sorted by face at once
+constexpr float kSlack = 1e-3F;  // pixels: rounding of a disc's bounds
+constexpr int kChunk = 64;       // discs that are sorted by face at once
 
 /// Discs on one face of the cube, set up for their pixels. A pixel at (du, dv) from the projected
 /// centre sees the disc's plane at t = cw / w, w = 1 + alpha du + beta dv, and the disc itself where
@@ -43,39 +32,6 @@ struct FaceDiscs {
   float bump[kLanes];      // nearness lost per unit of the quadratic form
   std::int32_t x0[kLanes], x1[kLanes], y0[kLanes], y1[kLanes];
   std::int32_t first[kLanes];  // pixel of the face
-};
-
-/// The pixels that are drawn on from one viewpoint.
-template <bool kColoured>
-class Canvas {
- public:
-  Canvas(const CubeGeometry& geometry, const CubePixels& pixels, unsigned viewpoint)
-      : cube(geometry), pixels_(pixels), viewpoint_(hn::Set(U(), viewpoint)) {}
-
-  /// Covers a vector of pixels from `at` on.
-  HWY_INLINE void cover(std::ptrdiff_t at, VF near, MF inside, VU colour) const {
-    const F f;
-    const U u;
-    near = hn::BitCast(f, hn::Or(hn::AndNot(hn::Set(u, kViewpoints - 1U), hn::BitCast(u, near)), viewpoint_));
-    float* nearness = pixels_.nearness + at;
-    const auto old_near = hn::LoadU(f, nearness);
-    if constexpr (kColoured) {
-      std::uint32_t* rgbe = pixels_.rgbe + at;
-      const auto old_colour = hn::LoadU(u, rgbe);
-      const auto tie = hn::And(hn::Eq(near, old_near), hn::RebindMask(f, hn::Lt(colour, old_colour)));
-      const auto take = hn::And(inside, hn::Or(hn::Gt(near, old_near), tie));
-      hn::StoreU(hn::IfThenElse(take, near, old_near), f, nearness);
-      hn::StoreU(hn::IfThenElse(hn::RebindMask(u, take), colour, old_colour), u, rgbe);
-    } else {
-      hn::StoreU(hn::IfThenElse(inside, hn::Max(near, old_near), old_near), f, nearness);
-    }
-  }
-
-  const CubeGeometry& cube;
-
- private:
-  CubePixels pixels_;
-  VU viewpoint_;
 };
 
 /// What a vector of pixels needs of a disc.
@@ -133,95 +89,6 @@ HWY_INLINE void draw_broad(const CanvasType& canvas, const FaceDiscs& discs, std
   std::ptrdiff_t row = discs.first[i] + discs.y0[i] * canvas.cube.resolution;
   for (int y = discs.y0[i]; y < y1; ++y, row += canvas.cube.resolution) {
     for (int x = discs.x0[i]; x < x1; x += lanes) disc.draw(canvas, hn::LoadU(F(), centre + x), centre[y], row + x);
-  }
-}
-
-/// Columns of each row that a disc may cover, from `first` up to `end`.
-struct Spans {
-  alignas(64) std::int32_t first[kMostResolution + kLanes];
-  std::int32_t end[kMostResolution + kLanes];
-};
-
-/// A disc in the axes of a face. The pixel (1, u, v) meets its plane at t = height / slope,
-/// slope = n . (1, u, v), and the disc where |t (1, u, v) - c|^2 < r^2; times slope^2, a quadratic in u
-/// for a given v.
-struct WideDisc {
-  float cw, cu, cv, nw, nu, nv;
-  float radius, height;
-
-  HWY_INLINE void find_spans(const CubeGeometry& cube, int first_row, int end_row, Spans& spans) const {
-    const F f;
-    const I i;
-    const auto set = [&](float value) { return hn::Set(f, value); };
-    const float edge = static_cast<float>(cube.resolution);
-    const float d = cw * cw + cu * cu + cv * cv - radius * radius;
-    const float a = height * height - 2 * height * nu * cu + nu * nu * d;  // of u^2
-    const bool bounded = a > 1e-6F * radius * radius;
-    const auto half = set(0.5F * edge);
-    const auto pixel = [&](VF u) { return hn::Min(hn::Max(hn::MulAdd(u, half, half), hn::Zero(f)), set(edge)); };
-    for (int y = first_row; y < end_row; y += static_cast<int>(hn::Lanes(f))) {
-      auto first = hn::Zero(i), end = hn::Set(i, cube.resolution);
-      if (bounded) {
-        const auto v = hn::LoadU(f, cube.centre + y);
-        const auto slope = hn::MulAdd(set(nv), v, set(nw)), ahead = hn::MulAdd(set(cv), v, set(cw));
-        // Half of the linear term, and the constant one.
-        const auto b = hn::MulSub(set(nu * d), slope, hn::Mul(set(height), hn::MulAdd(set(cu), slope, hn::Mul(set(nu), ahead))));
-        const auto square_v = hn::MulAdd(hn::Mul(v, v), set(height * height), set(height * height));
-        const auto c = hn::MulAdd(slope, hn::MulSub(set(d), slope, hn::Mul(set(2 * height), ahead)), square_v);
-        const auto square = hn::MulSub(b, b, hn::Mul(set(a), c));
-        const auto root = hn::Sqrt(hn::Max(square, hn::Zero(f))), per_a = set(1 / a);
-        const auto low = pixel(hn::Mul(hn::Neg(hn::Add(b, root)), per_a)), high = pixel(hn::Mul(hn::Sub(root, b), per_a));
-        first = hn::ConvertTo(i, hn::Max(hn::Sub(low, set(0.5F + kWideSlack)), hn::Zero(f)));
-        end = hn::ConvertTo(i, hn::Min(hn::Add(high, set(0.5F + kWideSlack)), set(edge)));
-        end = hn::IfThenElseZero(hn::RebindMask(i, hn::Gt(square, hn::Zero(f))), end);
-      }
-      hn::StoreU(first, i, spans.first + y);
-      hn::StoreU(end, i, spans.end + y);
-    }
-  }
-};
-
-/// Covers what a row of pixels sees of a disc, one division a vector.
-template <class CanvasType>
-HWY_INLINE void draw_wide_row(const CanvasType& canvas, const WideDisc& disc, int y, int row, int first, int end, VU colour) {
-  const F f;
-  const CubeGeometry& cube = canvas.cube;
-  const auto lanes = static_cast<int>(hn::Lanes(f));
-  const float v = cube.centre[y];
-  const auto row_slope = hn::Set(f, disc.nw + disc.nv * v), per_height = hn::Set(f, 1 / disc.height);
-  const auto square = hn::Set(f, disc.radius * disc.radius), bump = hn::Set(f, kBump / disc.radius);
-  for (int x = first & -lanes; x < end; x += lanes) {
-    const auto u = hn::LoadU(f, cube.centre + x);
-    const auto plane = hn::Mul(hn::MulAdd(hn::Set(f, disc.nu), u, row_slope), per_height);  // nearness of it
-    const auto t = hn::Div(hn::Set(f, 1.0F), plane);  // infinite, negative or NaN: a miss
-    const auto du = hn::MulSub(u, t, hn::Set(f, disc.cu));
-    const auto dv = hn::MulSub(hn::Set(f, v), t, hn::Set(f, disc.cv));
-    const auto dw = hn::Sub(t, hn::Set(f, disc.cw));
-    const auto off = hn::MulAdd(du, du, hn::MulAdd(dv, dv, hn::Mul(dw, dw)));
-    const auto inside = hn::And(hn::Gt(t, hn::Zero(f)), hn::Lt(off, square));
-    const auto lost = hn::Mul(hn::Mul(bump, off), hn::LoadU(f, cube.inverse_length + y * cube.resolution + x));
-    const auto near = hn::NegMulAdd(lost, hn::Mul(plane, plane), plane);
-    canvas.cover(row + x, near, inside, colour);
-  }
-}
-
-/// A disc within two radii of the receiver may fill the view, so every face is looked at.
-template <class CanvasType>
-void draw_wide_disc(const CanvasType& canvas, const FaceRows& rows, const float (&c)[3], const float (&n)[3], float radius,
-                    std::uint32_t rgbe) {
-  const CubeGeometry& cube = canvas.cube;
-  const auto colour = hn::Set(U(), rgbe);
-  Spans spans;
-  for (int face = 0; face < 6; ++face) {
-    const CubeFace a(face);
-    const float reach = c[a.w] * a.sign + radius * std::sqrt(std::max(0.0F, 1 - n[a.w] * n[a.w]));
-    if (reach <= 0) continue;
-    const WideDisc disc{.cw = c[a.w] * a.sign, .cu = c[a.u], .cv = c[a.v], .nw = n[a.w] * a.sign, .nu = n[a.u], .nv = n[a.v],
-                        .radius = radius, .height = c[0] * n[0] + c[1] * n[1] + c[2] * n[2]};
-    disc.find_spans(cube, rows.first[face], rows.end[face], spans);
-    for (int y = rows.first[face]; y < rows.end[face]; ++y) {
-      draw_wide_row(canvas, disc, y, (face * cube.resolution + y) * cube.resolution, spans.first[y], spans.end[y], colour);
-    }
   }
 }
 
