@@ -15,8 +15,8 @@
 #include "engine/pipeline.h"
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
-#include "engine/tuning.h"
 #include "engine/store/writer.h"
+#include "engine/tuning.h"
 #include "format/checksum.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -318,8 +318,8 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   report.receivers = points;
   if (request.check.receivers > 0) {
     const Stage stage(report.seconds, progress, "check", std::uint64_t{2} * request.check.receivers, "references");
-    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {{}, request.bounces}, options.cache_bytes,
-                                 executor, progress);
+    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {{}, request.bounces},
+                                 options.cache_bytes, executor, progress);
   }
   return report;
 }

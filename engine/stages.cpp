@@ -38,7 +38,8 @@ std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint6
 
 std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
                                unsigned threads, const char* what_for) {
-  return memory_left(run, taken + threads * kGatherBytes, std::max(kLeastCache, PageCache::least_bytes(scene, threads)), what_for);
+  const std::uint64_t least = std::max(kLeastCache, PageCache::least_bytes(scene, threads));
+  return memory_left(run, taken + threads * kGatherBytes, least, what_for);
 }
 
 std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target) {

@@ -1,7 +1,5 @@
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 
 #include "engine/build/radius.h"
 #include "engine/io/record.h"
@@ -11,15 +9,6 @@
 
 using namespace ptc;
 using namespace ptc::test;
-
-namespace {
-
-std::vector<char> bytes_of(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-}  // namespace
 
 TEST_CASE("build: a container gives its points back in order", "[build]") {
   const TemporaryDirectory dir;

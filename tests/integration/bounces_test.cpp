@@ -23,11 +23,6 @@ using namespace ptc::test;
 
 namespace {
 
-std::vector<char> bytes_of(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 std::size_t entries_in(const TemporaryDirectory& dir) {
   const std::filesystem::directory_iterator entries(dir.path());
   return static_cast<std::size_t>(std::distance(begin(entries), end(entries)));

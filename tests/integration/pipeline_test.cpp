@@ -1,7 +1,6 @@
 // The road end to end: mesh or cloud to container to shaded points and pictures.
 #include <catch2/catch.hpp>
 #include <fstream>
-#include <iterator>
 
 #include "engine/base/error.h"
 #include "engine/build/verify.h"
@@ -16,11 +15,6 @@ using namespace ptc;
 using namespace ptc::test;
 
 namespace {
-
-std::vector<char> bytes_of(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 /// Checksums of all pages but the one with the record, which names the inputs.
 std::vector<std::uint64_t> pages_of(const std::filesystem::path& path) {

@@ -2,8 +2,6 @@
 #include <catch2/catch.hpp>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <random>
 
 #include "engine/error_sums.h"
@@ -143,10 +141,7 @@ TEST_CASE("tuning: below the floor the finest setting is taken and the floor tol
 
 TEST_CASE("tuning: neither threads nor the cap change the choice or a byte", "[integration][error]") {
   const Scene scene(lit_balls());
-  const auto bytes = [&](const char* name) {
-    std::ifstream in(scene.dir / name, std::ios::binary);
-    return std::vector<char>{std::istreambuf_iterator<char>(in), {}};
-  };
+  const auto bytes = [&](const char* name) { return bytes_of(scene.dir / name); };
   const ShadeReport one = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ptcx");
   const ShadeReport two = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{80} << 20, .threads = 2}, "two.ptcx");
   CHECK(one.tuning->setting == two.tuning->setting);

@@ -61,6 +61,15 @@ void check_factor(const glm::vec3& corner, const glm::vec3& u, const glm::vec3& 
         Approx(3 * kPiWide * (1 - expected)).margin(10 * noise));
 }
 
+/// A closed box that emits 1 and reflects half.
+Mesh furnace() {
+  Mesh mesh = empty_mesh();
+  mesh.materials[0].emission = glm::vec3(1);
+  mesh.materials[0].albedo = glm::vec3(0.5f);
+  add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
+  return mesh;
+}
+
 }  // namespace
 
 TEST_CASE("trace_mesh: a parallel square gives its form factor", "[scene][reference]") {
@@ -114,10 +123,7 @@ TEST_CASE("trace_mesh: unit squares that share an edge at a right angle exchange
 
 TEST_CASE("trace_mesh: in a furnace the irradiance is pi times emission plus one reflection",
           "[scene][reference]") {
-  Mesh mesh = empty_mesh();
-  mesh.materials[0].emission = glm::vec3(1);
-  mesh.materials[0].albedo = glm::vec3(0.5f);
-  add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
+  const Mesh mesh = furnace();
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
   const RayTraced result = trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 1024, {{1, 16, 1}}, 1);
@@ -128,10 +134,7 @@ TEST_CASE("trace_mesh: in a furnace the irradiance is pi times emission plus one
 
 TEST_CASE("trace_mesh: in a furnace every bounce adds its power of the albedo, however emission arrives",
           "[scene][reference]") {
-  Mesh mesh = empty_mesh();
-  mesh.materials[0].emission = glm::vec3(1);
-  mesh.materials[0].albedo = glm::vec3(0.5f);
-  add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
+  const Mesh mesh = furnace();
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
   // Shadow rays at the last hit bring emission over one reflection more than rays alone.

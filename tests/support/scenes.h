@@ -26,6 +26,9 @@ class TemporaryDirectory {
   std::filesystem::path path_;
 };
 
+/// All bytes of a file; none where there is none.
+[[nodiscard]] std::vector<char> bytes_of(const std::filesystem::path& path);
+
 /// Records one block after another from a vector, at most `block` at once.
 class VectorStream : public PointStream {
  public:

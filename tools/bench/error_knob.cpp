@@ -52,9 +52,7 @@ std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, 
     std::vector<Surfel> surfels;
     append_surfels(container, pages.subspan(first, std::min(pages_of_block, pages.size() - first)), surfels);
     surfels.resize(std::min(surfels.size(), Shader::kBlock));
-    for (const Surfel& s : surfels) {
-      blocks[i].receivers.push_back({s.position + glm::dvec3(s.normal * (lift * s.radius)), s.normal});
-    }
+    for (const Surfel& s : surfels) blocks[i].receivers.push_back(lifted(s, lift));
   }
   return blocks;
 }
@@ -98,7 +96,7 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   const ContainerReader container(scene.path());
   const Executor executor(run.threads);
   errors.surfels = container.superblock().points;
-  const ShadeOptions settings{.cache_bytes = memory_left(run, kBufferBytes, std::uint64_t{16} << 20, "the ladder")};
+  const ShadeOptions settings{.cache_bytes = cache_bytes_left(run, kBufferBytes, container, executor.threads(), "the ladder")};
   const std::vector<Pilot> blocks = blocks_of(container, options.climbed, options.scene.lift);
   progress.begin(choice.name + ", the ladder", 0, "receivers");
   errors.rungs = climb(container, settings, blocks, options.rays / 2, executor, progress);

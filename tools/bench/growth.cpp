@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <random>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -94,10 +93,7 @@ class Truth {
  public:
   Truth(const BenchScene& scene, const GrowthOptions& options, const Executor& executor) {
     const ReceiverSet& set = scene.sets().front();
-    std::vector<std::size_t> all(set.receivers.size());
-    for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
-    std::mt19937_64 bits;  // its default seed
-    std::ranges::sample(all, std::back_inserter(checked_.receivers), options.checked, bits);
+    checked_ = choose_checked(scene, set, options.checked);
     const DiscRays oracle(scene.surfels(), Sides::both, {});
     const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) { return oracle.trace(r, rays, seed); };
     reference_ = make_reference(set, checked_, {.half = options.reference_rays}, trace, executor);

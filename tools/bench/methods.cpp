@@ -1,9 +1,11 @@
 #include "tools/bench/methods.h"
 
 #include <algorithm>
+#include <random>
 
 #include "engine/base/memory.h"
 #include "engine/shade/plain_gather.h"
+#include "engine/shade/receiver_cell.h"
 #include "engine/stages.h"
 
 namespace ptc::bench {
@@ -136,6 +138,21 @@ class RayMethod : public OneByOne {
 };
 
 }  // namespace
+
+Checked choose_checked(const BenchScene& scene, const ReceiverSet& set, unsigned wanted) {
+  Checked checked;
+  std::vector<std::size_t> all(set.receivers.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  std::mt19937_64 bits;  // its default seed
+  std::ranges::sample(all, std::back_inserter(checked.receivers), wanted, bits);
+  const Frame& frame = scene.container().superblock().frame;
+  std::ranges::sort(checked.receivers, {},
+                    [&](std::size_t i) { return receiver_key(frame, set.receivers[i].position, 0); });
+  for (const Pixel& pixel : set.window) {
+    if (pixel.receiver != ReceiverSet::kNone) checked.window.push_back(pixel.receiver);
+  }
+  return checked;
+}
 
 std::unique_ptr<Method> make_gather(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
                                     const GatherOptions& options, PageCache& cache, const Executor& executor) {

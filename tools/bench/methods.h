@@ -19,6 +19,9 @@ struct Checked {
   std::vector<std::size_t> window;     ///< likewise, one for each pixel that sees something
 };
 
+/// A random choice of receivers in the order of the Z-curve, the same each time, and the window's.
+[[nodiscard]] Checked choose_checked(const BenchScene& scene, const ReceiverSet& set, unsigned wanted);
+
 /// Shadings of them, in the same order.
 struct Shadings {
   std::vector<Shading> checked, window;

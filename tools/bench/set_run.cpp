@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <random>
 
 #include <fmt/format.h>
 
-#include "engine/shade/receiver_cell.h"
 #include "tools/bench/rivals.h"
 #include "tools/bench/window.h"
 
@@ -15,22 +13,6 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr ErrorStatistics kNoErrors{.rms = kNone, .bias = kNone, .percentile_99 = kNone, .reference_mean = kNone};
-
-/// A random choice of receivers in the order of the Z-curve, and the window's.
-Checked choose(const BenchScene& scene, const ReceiverSet& set, unsigned wanted) {
-  Checked checked;
-  std::vector<std::size_t> all(set.receivers.size());
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
-  std::mt19937_64 bits;  // its default seed
-  std::ranges::sample(all, std::back_inserter(checked.receivers), wanted, bits);
-  const Frame& frame = scene.container().superblock().frame;
-  std::ranges::sort(checked.receivers, {},
-                    [&](std::size_t i) { return receiver_key(frame, set.receivers[i].position, 0); });
-  for (const Pixel& pixel : set.window) {
-    if (pixel.receiver != ReceiverSet::kNone) checked.window.push_back(pixel.receiver);
-  }
-  return checked;
-}
 
 /// Room for all pages: nothing that is timed waits for the disk.
 CacheOptions whole_scene(const ContainerReader& container, unsigned threads) {
@@ -76,7 +58,7 @@ SetRun::SetRun(const BenchScene& scene, const ReceiverSet& set, const AccuracyOp
       set_(set),
       options_(options),
       executor_(executor),
-      checked_(choose(scene, set, options.checked)),
+      checked_(choose_checked(scene, set, options.checked)),
       cache_(scene.container(), whole_scene(scene.container(), executor.threads())) {
   progress.begin(scene_.name() + " " + set_.name + ", references", 0, "rays");
   trace_references(rays);
