@@ -53,7 +53,7 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
              "Receivers that see a cluster within this angle share it, rad")
       ->group(kGroup);
   add_number(app, "--inflation", gather.inflation, 0.01, 100,
-             "Footprint of a cluster that is not flat over its projected area")
+             "Footprint of a cluster that is not flat over its projected area, at most")
       ->group(kGroup);
   add_integer(app, "--resolution", gather.resolution, 16, 64, "Direction pixels along a cube edge, a multiple of 16")
       ->check([](const std::string& text) {

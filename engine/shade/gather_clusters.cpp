@@ -18,7 +18,6 @@ namespace ptc::HWY_NAMESPACE {
 namespace {
 
 constexpr float kPi = 3.14159265F;
-constexpr float kFlat = 0.9F;  // length of the mean normal above which a cluster is one surfel
 
 /// Clusters relative to a cell's centre.
 struct Clusters {
@@ -91,53 +90,58 @@ HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test
   return hn::And(hn::And(hn::Gt(cosine, hn::Set(f, 0.05F)), hn::Gt(clear, hn::Zero(f))), hn::Gt(dot(axis, to), least));
 }
 
-/// The ratio of two ambient cubes, radiance times area and area, as it leaves towards a unit vector.
-/// @param front  what the ratio is multiplied by
-/// @param pick   rgbe and share of the face across an axis, of the negative one where the mask says so
-template <class Pick>
-HWY_INLINE VU colour_of(const Vec& toward, VF front, const Pick& pick) {
-  const F f;
-  const auto zero = hn::Zero(f);
-  VF light[3] = {zero, zero, zero}, sum = zero;
-  const VF along_axis[3] = {toward.x, toward.y, toward.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    VU rgbe;
-    VF share;
-    pick(axis, hn::Lt(along_axis[axis], zero), rgbe, share);
-    const auto weight = hn::Mul(hn::Abs(along_axis[axis]), share);
-    const UnpackedRgbe<F> colour = unpack_rgbe(f, rgbe);
-    const auto scale = hn::Mul(colour.scale, weight);
-    for (int k = 0; k < 3; ++k) light[k] = hn::MulAdd(colour.byte[k], scale, light[k]);
-    sum = hn::Add(sum, weight);
-  }
-  const auto mix = hn::IfThenElse(hn::Gt(sum, zero), hn::Div(front, sum), zero);
-  return pack_rgbe(hn::Mul(light[0], mix), hn::Mul(light[1], mix), hn::Mul(light[2], mix));
-}
-
-/// Appends clusters as discs (spec/shading.md#gather).
-/// @param pick  as colour_of()
-template <class Pick>
-HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, VF distance, VF area, const Pick& pick,
+/// Appends clusters as discs (spec/shading.md#splats).
+/// @param cube  share() of the area that faces along an axis, radiance() of it as rgbe; against the axis where the
+///     mask says so
+template <class Cube>
+HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, VF distance, VF area, const Cube& cube,
                               DiscQueue& queue) {
   const F f;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
   const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
-  // Vector area: the part that faces one way; what is left faces every way alike.
-  const auto along = dot(c.mean, toward);
-  const auto scattered = hn::Mul(hn::Max(zero, hn::Sub(one, c.length)), hn::Set(f, 0.25F));
-  const auto front = hn::Add(hn::Max(zero, along), scattered);
-  const auto projected = test.sides == Sides::both ? hn::Add(hn::Abs(along), scattered) : front;
-
-  // A flat cluster is one surfel of its area and normal, which keeps surfaces tight at grazing
-  // angles; any other a disc of its projected area that faces the receiver, dimmed by the backs.
-  const auto flat = hn::Gt(c.length, hn::Set(f, kFlat));
-  const auto seen = hn::Mul(area, hn::Mul(projected, hn::Set(f, test.inflation / kPi)));
-  const auto radius = hn::Sqrt(hn::IfThenElse(flat, hn::Mul(area, hn::Set(f, 0.5F)), seen));
-  const Vec disc_normal{hn::IfThenElse(flat, c.normal.x, toward.x), hn::IfThenElse(flat, c.normal.y, toward.y),
-                        hn::IfThenElse(flat, c.normal.z, toward.z)};
+  const VF along_axis[3] = {toward.x, toward.y, toward.z};
+  VF weight[3], front = zero;
+  for (int k = 0; k < 3; ++k) {
+    weight[k] = hn::Mul(hn::Abs(along_axis[k]), cube.share(k, hn::Lt(along_axis[k], zero)));
+    front = hn::Add(front, weight[k]);
+  }
+  // Fronts less backs are the mean normal's.
+  const auto projected = test.sides == Sides::both ? hn::Max(front, hn::Sub(front, dot(c.mean, toward))) : front;
   mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
-  push(queue, mask, c.to, disc_normal, radius,
-       test.bleeding ? colour_of(toward, hn::IfThenElse(flat, one, hn::Div(front, projected)), pick) : hn::Zero(U()));
+
+  // The silhouette of an ellipsoid is that of a disc across it, turned towards the receiver.
+  const auto flat = hn::Gt(c.length, hn::Set(f, kFlat)), directed = hn::Gt(c.length, hn::Set(f, kDirected));
+  const Vec normal{hn::IfThenElseZero(directed, c.normal.x), hn::IfThenElseZero(directed, c.normal.y),
+                   hn::IfThenElseZero(directed, c.normal.z)};
+  const auto cosine = dot(normal, toward);
+  const auto ratio = hn::Mul(hn::Set(f, kSlim), hn::Div(c.thickness, c.radius));
+  const auto slim = hn::IfThenElse(hn::And(directed, hn::Lt(ratio, one)), ratio, one);
+  const auto lean2 = hn::NegMulAdd(slim, slim, one);
+  const auto foreshortened = hn::Sqrt(hn::MulAdd(lean2, hn::Mul(cosine, cosine), hn::Mul(slim, slim)));
+  const auto turn = hn::IfThenElse(flat, one, hn::CopySign(hn::Sqrt(lean2), cosine));
+  const auto rest = hn::IfThenElse(flat, zero, hn::NegMulAdd(turn, cosine, foreshortened));
+  const Vec disc_normal{hn::MulAdd(turn, normal.x, hn::Mul(rest, toward.x)),
+                        hn::MulAdd(turn, normal.y, hn::Mul(rest, toward.y)),
+                        hn::MulAdd(turn, normal.z, hn::Mul(rest, toward.z))};
+  const auto seen = hn::Mul(hn::Set(f, test.inflation / kPi), hn::Div(hn::Mul(area, projected), foreshortened));
+  const auto wanted = hn::IfThenElse(flat, hn::Mul(area, hn::Set(f, 0.5F)), seen);
+  const auto most = hn::Mul(hn::IfThenElse(flat, one, hn::Set(f, kSolid)), hn::Mul(c.radius, c.radius));
+  const auto radius2 = hn::IfThenElse(hn::Lt(wanted, most), wanted, most);
+
+  VU colour = hn::Zero(U());
+  if (test.bleeding) {
+    // What is not flat is dimmed by its backs; a flat disc has a black one.
+    const auto over = hn::IfThenElse(flat, front, projected);
+    const auto mix = hn::IfThenElse(hn::Gt(over, zero), hn::Div(one, over), zero);
+    VF light[3] = {zero, zero, zero};
+    for (int k = 0; k < 3; ++k) {
+      const UnpackedRgbe<F> radiance = unpack_rgbe(f, cube.radiance(k, hn::Lt(along_axis[k], zero)));
+      const auto scale = hn::Mul(radiance.scale, hn::Mul(weight[k], mix));
+      for (int channel = 0; channel < 3; ++channel) light[channel] = hn::MulAdd(radiance.byte[channel], scale, light[channel]);
+    }
+    colour = pack_rgbe(light[0], light[1], light[2]);
+  }
+  push(queue, mask, c.to, disc_normal, hn::Sqrt(radius2), colour);
 }
 
 /// Appends clusters to those left to the children. Positions are rounded to their distance, so the
@@ -190,24 +194,54 @@ class GroupLanes {
   }
 
   HWY_INLINE void draw(int first, MF mask, const Clusters& c, VF distance, DiscQueue& queue) const {
-    const U u;
-    draw_clusters(test_, mask, c, distance, load_ufloat16(group_.area() + 2 * first),
-                  [&](int axis, MF negative, VU& rgbe, VF& share) {
-                    const auto load = [&](int k) {
-                      return hn::LoadU(u, reinterpret_cast<const std::uint32_t*>(group_.radiance(k) + 4 * first));
-                    };
-                    rgbe = hn::IfThenElse(hn::RebindMask(u, negative), load(2 * axis + 1), load(2 * axis));
-                    share = hn::IfThenElse(negative, share_[2 * axis + 1], share_[2 * axis]);
-                  },
-                  queue);
+    draw_clusters(test_, mask, c, distance, load_ufloat16(group_.area() + 2 * first), Cube{*this, first}, queue);
   }
 
  private:
+  struct Cube {
+    const GroupLanes& lanes;
+    int first;
+
+    HWY_INLINE VF share(int axis, MF negative) const {
+      return hn::IfThenElse(negative, lanes.share_[2 * axis + 1], lanes.share_[2 * axis]);
+    }
+    HWY_INLINE VU radiance(int axis, MF negative) const {
+      const U u;
+      const auto load = [&](int k) {
+        return hn::LoadU(u, reinterpret_cast<const std::uint32_t*>(lanes.group_.radiance(k) + 4 * first));
+      };
+      return hn::IfThenElse(hn::RebindMask(u, negative), load(2 * axis + 1), load(2 * axis));
+    }
+  };
+
   const GroupView& group_;
   LatticePoint corner_;
   const CellTest& test_;
   float step_;
   VF share_[6];
+};
+
+/// Payloads of clusters that a cell left, one a lane.
+class PayloadLanes {
+ public:
+  /// @param index  of each among the payloads
+  PayloadLanes(const ClusterPayload* payloads, VU index)
+      : base_(reinterpret_cast<const float*>(payloads)), word_(hn::ShiftLeft<4>(hn::BitCast(I(), index))) {}
+
+  HWY_INLINE VF area() const { return hn::GatherIndex(F(), base_ + 12, word_); }
+  HWY_INLINE VF share(int axis, MF negative) const { return hn::GatherIndex(F(), base_ + 6 + 2 * axis, face(negative)); }
+  HWY_INLINE VU radiance(int axis, MF negative) const {
+    return hn::BitCast(U(), hn::GatherIndex(F(), base_ + 2 * axis, face(negative)));
+  }
+
+ private:
+  HWY_INLINE hn::VFromD<I> face(MF negative) const {
+    const I i;
+    return hn::Add(word_, hn::IfThenElseZero(hn::RebindMask(i, negative), hn::Set(i, 1)));
+  }
+
+  const float* base_;
+  hn::VFromD<I> word_;
 };
 
 /// The payload of a child.
@@ -262,7 +296,6 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
                             CellOutput& out, std::vector<std::uint32_t>& opened) {
   const F f;
   const U u;
-  const I i;
   const std::size_t lanes = hn::Lanes(f);
   const Vec moved = spread(move);
   for (; from < near.size && !out.queue.full(); from += lanes) {
@@ -279,17 +312,8 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
     const Verdict verdict = judge(test, c, d, wanted);
     const auto payload = hn::LoadU(u, near.payload.data() + from);
     if (!hn::AllFalse(f, verdict.drawn)) {
-      const auto word = hn::IfThenElseZero(hn::RebindMask(i, verdict.drawn), hn::ShiftLeft<4>(hn::BitCast(i, payload)));
-      const auto* base = reinterpret_cast<const float*>(out.payloads.data());
-      const auto gather = [&](int k, hn::VFromD<I> at) { return hn::GatherIndex(f, base + k, at); };
-      draw_clusters(test, verdict.drawn, c, d, gather(12, word),
-                    [&](int axis, MF negative, VU& rgbe, VF& share) {
-                      const auto one = hn::IfThenElseZero(hn::RebindMask(i, negative), hn::Set(i, 1));
-                      const auto at = hn::Add(word, one);
-                      rgbe = hn::BitCast(u, gather(2 * axis, at));
-                      share = gather(6 + 2 * axis, at);
-                    },
-                    out.queue);
+      const PayloadLanes cube(out.payloads.data(), hn::IfThenElseZero(hn::RebindMask(u, verdict.drawn), payload));
+      draw_clusters(test, verdict.drawn, c, d, cube.area(), cube, out.queue);
     }
     if (!hn::AllFalse(f, verdict.open)) {
       opened.resize(opened.size() + lanes);

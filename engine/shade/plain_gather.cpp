@@ -16,7 +16,6 @@ namespace ptc {
 namespace {
 
 constexpr float kPi = 3.14159265F;
-constexpr float kFlat = 0.9F;  // length of the mean normal above which a cluster is one surfel
 
 /// A child of a group, relative to a receiver, in scene units.
 struct Cluster {
@@ -61,37 +60,60 @@ float top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm:
   return height + std::min(radius, thickness + radius * tilt);
 }
 
-/// Mean radiance towards the receiver: the three faces of the ambient cube that look at it.
-glm::vec3 radiance_towards(const GroupView& group, int i, const Cluster& c, const glm::vec3& toward) {
-  glm::vec3 light(0);
-  float sum = 0;
+/// What leaves towards a receiver by the three faces of the ambient cube that look at it, over the cluster's area.
+struct Front {
+  float area = 0;
+  glm::vec3 radiance{0};  ///< times area
+};
+
+Front front_of(const GroupView& group, int i, const Cluster& c, const glm::vec3& toward) {
+  Front front;
   for (int axis = 0; axis < 3; ++axis) {
     const int face = 2 * axis + (toward[axis] < 0 ? 1 : 0);
     std::uint32_t rgbe = 0;
     std::memcpy(&rgbe, group.radiance(face) + 4 * std::ptrdiff_t{i}, sizeof rgbe);
     const std::array<float, 3> colour = decode_rgbe(rgbe);
     const float weight = std::abs(toward[axis]) * c.facing[static_cast<std::size_t>(face)];
-    light += weight * glm::vec3(colour[0], colour[1], colour[2]);
-    sum += weight;
+    front.radiance += weight * glm::vec3(colour[0], colour[1], colour[2]);
+    front.area += weight;
   }
-  return sum > 0 ? light / sum : glm::vec3(0);
+  return front;
 }
 
 std::uint32_t pack(const glm::vec3& colour) { return encode_rgbe({colour.r, colour.g, colour.b}); }
 
+/// The disc across an ellipsoid about the mean normal that has its silhouette.
+struct Silhouette {
+  glm::vec3 normal;
+  float foreshortened;  ///< cosine between normal and view
+};
+
+Silhouette silhouette(const Cluster& c, const glm::vec3& toward) {
+  if (!(c.flatness > kDirected)) return {toward, 1};
+  const glm::vec3 axis = c.mean / c.flatness;
+  const float cosine = glm::dot(axis, toward);
+  const float slim = std::min(1.0F, kSlim * c.thickness / c.radius);
+  const float lean = std::sqrt(1 - slim * slim);
+  const float foreshortened = std::sqrt(lean * lean * cosine * cosine + slim * slim);
+  const float turn = std::copysign(lean, cosine);
+  return {turn * axis + (foreshortened - turn * cosine) * toward, foreshortened};
+}
+
 void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options, DiscQueue& queue) {
   const glm::vec3 toward = -glm::normalize(c.to);
-  const float along = glm::dot(c.mean, toward);
-  const float scattered = std::max(0.0F, 1 - c.flatness) / 4;
-  const float front = std::max(0.0F, along) + scattered;
-  const float projected = options.sides == Sides::both ? std::abs(along) + scattered : front;
+  const Front front = front_of(group, i, c, toward);
+  const float back = front.area - glm::dot(c.mean, toward);
+  const float projected = options.sides == Sides::both ? std::max(front.area, back) : front.area;
   if (!(c.area * projected > 0)) return;
-  const glm::vec3 colour = radiance_towards(group, i, c, toward);
   if (c.flatness > kFlat) {
-    queue.push(c.to, c.mean / c.flatness, std::sqrt(c.area / 2), pack(colour));
-  } else {
-    queue.push(c.to, toward, std::sqrt(c.area * projected * options.inflation / kPi), pack(colour * (front / projected)));
+    const glm::vec3 colour = front.area > 0 ? front.radiance / front.area : glm::vec3(0);
+    queue.push(c.to, c.mean / c.flatness, std::min(c.radius, std::sqrt(c.area / 2)), pack(colour));
+    return;
   }
+  const Silhouette disc = silhouette(c, toward);
+  const float seen = c.area * projected * options.inflation / (kPi * disc.foreshortened);
+  const float radius = std::sqrt(std::min(seen, kSolid * c.radius * c.radius));
+  queue.push(c.to, disc.normal, radius, pack(front.radiance / projected));
 }
 
 }  // namespace

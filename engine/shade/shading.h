@@ -32,11 +32,17 @@ enum class Sides {
 struct GatherOptions {
   float solid_angle = 0.01F;    ///< a cluster is not opened when its bounding sphere is below it, sr
   float parallax = 0.1F;       ///< a cluster is shared by receivers that see it within this angle, rad
-  float inflation = 1.57F;      ///< footprint of a cluster that is not flat over its projected area
+  float inflation = 2;          ///< footprint of a cluster that is not flat over its projected area, at most
   unsigned resolution = 32;     ///< direction pixels along a cube edge, 16 to 64, a multiple of 16
   Sides sides = Sides::both;
   bool bleeding = true;         ///< false: light from surfaces is left out, which takes less time
 };
+
+// What a cluster is drawn as (spec/shading.md#splats).
+inline constexpr float kFlat = 0.9F;       ///< length of the mean normal above which it is one surfel
+inline constexpr float kDirected = 1e-3F;  ///< and above which it has a normal at all
+inline constexpr float kSlim = 0.5F;       ///< of thickness over radius: the axes of its ellipsoid
+inline constexpr float kSolid = 0.55F;     ///< share of its ellipsoid's silhouette that it covers at most
 
 /// What a gather did.
 struct GatherCounts {
