@@ -38,7 +38,10 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   const auto height = dot(s.to, s.normal);
   if (test.sides == Sides::front) wanted = hn::And(wanted, hn::Lt(height, hn::Set(f, cell.radius)));
   if (hn::AllFalse(f, wanted)) return;
-  const auto d = hn::Sqrt(d2);
+  // Distance of the disc's nearest point: who stands on a disc sees it change with every step, however far its middle.
+  const auto aside = hn::Sqrt(hn::Max(hn::NegMulAdd(height, height, d2), hn::Zero(f)));
+  const auto beyond = hn::Max(hn::Sub(aside, s.radius), hn::Zero(f));
+  const auto d = hn::Sqrt(hn::MulAdd(beyond, beyond, hn::Mul(height, height)));
   const auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
   auto keep = hn::FirstN(f, 0);
   if (!test.last) {

@@ -65,7 +65,7 @@ struct WideDisc {
   }
 };
 
-/// Covers what a row of pixels sees of a disc, one division a vector.
+/// Covers what a row of pixels sees of a disc.
 template <class CanvasType>
 HWY_INLINE void draw_wide_row(const CanvasType& canvas, const WideDisc& disc, int y, int row, int first, int end, VU colour) {
   const F f;
@@ -84,8 +84,8 @@ HWY_INLINE void draw_wide_row(const CanvasType& canvas, const WideDisc& disc, in
     const auto off = hn::MulAdd(du, du, hn::MulAdd(dv, dv, hn::Mul(dw, dw)));
     const auto inside = hn::And(hn::Gt(t, hn::Zero(f)), hn::Lt(off, square));
     const auto lost = hn::Mul(hn::Mul(bump, off), hn::LoadU(f, cube.inverse_length + y * cube.resolution + x));
-    const auto near = hn::NegMulAdd(lost, hn::Mul(plane, plane), plane);
-    canvas.cover(row + x, near, inside, colour);
+    // Not to first order, 1 / t - lost / t^2: so close to the plane that t < lost, that is behind the receiver.
+    canvas.cover(row + x, hn::Div(hn::Set(f, 1.0F), hn::Add(t, lost)), inside, colour);
   }
 }
 

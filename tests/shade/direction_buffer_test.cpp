@@ -141,6 +141,21 @@ TEST_CASE("direction buffer: coplanar overlapping discs divide half way between 
   }
 }
 
+TEST_CASE("direction buffer: right over a plane of discs only the disc of the nearest centre is seen", "[shade][buffer]") {
+  const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0}), blue = encode_rgbe({0, 0, 1});
+  for (const float height : {1e-2F, 1e-3F, 1e-4F, 1e-6F}) {  // less than the bump of a disc, 0.01 e^2 / r, where it can
+    DirectionBuffer buffer(64);
+    draw_disc(fine_grid(), buffer, {0.6F, 0, height}, {0, 0, -1}, 1, red, Sides::both);
+    draw_disc(fine_grid(), buffer, {-0.7F, 0, height}, {0, 0, -1}, 1, green, Sides::both);
+    draw_disc(fine_grid(), buffer, {0, 0, 1}, {0, 0, -1}, 2, blue, Sides::both);
+    const Shading s = buffer.resolve(fine_grid(), {0, 0, 1});
+    CAPTURE(height);
+    CHECK(s.irradiance.r == Approx(kPi).margin(0.1));
+    CHECK(s.irradiance.g < 0.1F);
+    CHECK(s.irradiance.b < 0.01F);
+  }
+}
+
 TEST_CASE("direction buffer: an emitter moving across pixels changes the light smoothly", "[shade][buffer]") {
   const std::uint32_t white = encode_rgbe({1, 1, 1});
   const DirectionGrid grid(32, {});

@@ -315,6 +315,20 @@ TEST_CASE("gather: receivers with nothing near share sums over one buffer", "[sh
   CHECK(e.irradiance_rms < 0.008);
 }
 
+TEST_CASE("gather: receivers beside each other, over and under one disc's plane, see it each from its own side", "[shade][gather]") {
+  const std::vector<Surfel> surfels(1, {.position = {0.8, 0, 0}, .normal = {0, 0, 1}, .radius = 1, .radiance = glm::vec3(1)});
+  Scene scene(surfels);
+  for (int i = 0; i < 200; ++i) {
+    const double height = 0.0002 * (i - 100) + 0.0001;
+    scene.receivers.push_back({{0.002 * (i % 7), 0.002 * (i % 11), height}, {0, 0, -1}});
+  }
+  const std::vector<Shading> results = scene.shade();
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    CAPTURE(scene.receivers[i].position.z);
+    CHECK(results[i].occlusion == Approx(i < 100 ? 0 : 1).margin(0.03));  // backs are clear within two radii
+  }
+}
+
 TEST_CASE("gather: turning the scene changes little", "[shade][gather]") {
   std::vector<Surfel> surfels = small_scene(0.03);
   Scene straight(surfels);
