@@ -28,6 +28,8 @@ class DirectionGrid {
 
   [[nodiscard]] unsigned resolution() const noexcept { return static_cast<unsigned>(geometry_.resolution); }
   [[nodiscard]] unsigned variant() const noexcept { return variant_; }
+  /// From the world to the axes of the cube.
+  [[nodiscard]] const glm::mat3& rotation() const noexcept { return geometry_.rotation; }
 
  private:
   friend class DirectionBuffer;

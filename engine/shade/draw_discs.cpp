@@ -262,6 +262,14 @@ HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQue
   }
 }
 
+/// Discs that cross a face's plane beside their centres: set up for that face, they would lose their figures in
+/// divisions by next to nothing.
+HWY_INLINE MF across_faces(const CubeLanes& discs, VF distance2) {
+  const F f;
+  const auto beside = hn::Min(hn::Abs(discs.c[0]), hn::Min(hn::Abs(discs.c[1]), hn::Abs(discs.c[2])));
+  return hn::And(hn::Lt(beside, hn::Mul(hn::Set(f, 0.05F), discs.radius)), hn::Lt(distance2, hn::Mul(hn::Set(f, 9.0F), discs.radius2)));
+}
+
 /// Draws the discs of a queue.
 template <class CanvasType>
 HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const FaceQueue& queue) {
@@ -310,12 +318,14 @@ void draw_all(const CanvasType& canvas, const FaceRows& rows, const DiscQueue& d
     for (int begin = chunk; begin < std::min(discs.size, chunk + kChunk); begin += lanes) {
       const CubeLanes d = load_discs(canvas.cube, discs, begin);
       const auto back = hn::Ge(d.height, hn::Zero(f));
-      const auto wide = hn::Lt(dot(d.c, d.c), hn::Mul(hn::Set(f, 4.0F), d.radius2));
+      const auto distance2 = dot(d.c, d.c);
+      const auto close = hn::Lt(distance2, hn::Mul(hn::Set(f, 4.0F), d.radius2));
       auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(d.radius, hn::Zero(f)));
       // Backs are clear to receivers within two radii.
-      drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, wide), drawn);
+      drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, close), drawn);
       const auto colour = hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin));
-      if (const auto near = hn::And(drawn, wide); !hn::AllFalse(f, near)) draw_wide_discs(canvas, rows, d, near, colour);
+      const auto wide = hn::And(drawn, hn::Or(close, across_faces(d, distance2)));
+      if (!hn::AllFalse(f, wide)) draw_wide_discs(canvas, rows, d, wide, colour);
       add_to_faces(d, hn::AndNot(wide, drawn), colour, queue);
     }
     draw_queue(canvas, rows, queue);

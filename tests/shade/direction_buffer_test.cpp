@@ -231,6 +231,33 @@ TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wher
   }
 }
 
+TEST_CASE("direction buffer: a disc covers as much across the middle of the cube as a little beside it", "[shade][buffer]") {
+  // Centres of discs in a plane through the cube's middle, and so far beside it.
+  const glm::mat3 to_world = glm::transpose(fine_grid().rotation());
+  std::mt19937 bits(13);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (int i = 0; i < 100; ++i) {
+    const float angle = 2 * kPi * unit(bits), distance = 2.01F + unit(bits);
+    const glm::vec3 normal = random_direction(bits);
+    const auto covered = [&](float beside) {
+      glm::vec3 to(0);
+      to[i % 3] = beside;
+      to[(i + 1) % 3] = distance * std::cos(angle);
+      to[(i + 2) % 3] = distance * std::sin(angle);
+      to = to_world * to;
+      DirectionBuffer buffer(64);
+      draw_disc(fine_grid(), buffer, to, normal, 1, 0, Sides::both);
+      return buffer.resolve(fine_grid(), glm::normalize(to)).occlusion;
+    };
+    CAPTURE(i, angle, distance);
+    const float expected = covered(0.06F);
+    for (const float beside : {0.0F, 1e-8F, 1e-7F, 1e-6F, 1e-5F, 1e-4F, 1e-3F}) {
+      CHECK(covered(beside) == Approx(expected).margin(0.03));
+      CHECK(covered(-beside) == Approx(expected).margin(0.03));
+    }
+  }
+}
+
 TEST_CASE("direction buffer: what is left out below a horizon changes no sum over it", "[shade][buffer]") {
   std::mt19937 bits(12);
   std::uniform_real_distribution<float> unit(0, 1);
