@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <limits>
 #include <vector>
 
 #include "engine/shade/gather_kernels.h"
@@ -130,7 +131,7 @@ struct Gather::Impl {
     const CellTest test{.cell = cell,
                         .unit = unit,
                         .limit = options.solid_angle / kPi,
-                        .shared_from = left ? cell.radius / options.parallax : 0,
+                        .shared_from = left ? std::min(std::numeric_limits<float>::max(), cell.radius / options.parallax) : 0,
                         .inflation = options.inflation,
                         .sides = options.sides,
                         .bleeding = options.bleeding,

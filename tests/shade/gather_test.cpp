@@ -154,11 +154,12 @@ TEST_CASE("gather: equals drawing every surfel when no cluster may stand for any
   Scene scene(small_scene(0.08));
   add_floor_receivers(scene.receivers, 0.08);
   scene.receivers.resize(200);
+  for (std::size_t i = 0; i < 200; i += 3) scene.receivers[i].normal = glm::normalize(glm::vec3(0.7F, 0, 1));
   ShadeOptions options;
   options.gather.solid_angle = 1e-12F;
-  options.gather.parallax = 1e-6F;
   for (const Sides sides : {Sides::both, Sides::front}) {
     options.gather.sides = sides;
+    options.gather.parallax = sides == Sides::both ? 1e-6F : 0.0F;
     const std::vector<Shading> ours = scene.shade(options);
     std::vector<Shading> all(ours.size());
     const DirectionGrid grid(options.gather.resolution, {});
