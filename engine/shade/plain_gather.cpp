@@ -53,14 +53,6 @@ Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const gl
   return c;
 }
 
-/// Height of the top of a thing over the receiver's horizon: a ball, or a slab where that is less.
-float top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm::vec3& slab_normal, float thickness) {
-  const float height = glm::dot(to, normal);
-  const float cosine = glm::dot(slab_normal, normal);
-  const float tilt = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
-  return height + std::min(radius, thickness + radius * tilt);
-}
-
 /// Mean radiance towards the receiver: the three faces of the ambient cube that look at it.
 glm::vec3 radiance_towards(const GroupView& group, int i, const Cluster& c, const glm::vec3& toward) {
   glm::vec3 light(0);
@@ -96,6 +88,13 @@ void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherO
 
 }  // namespace
 
+float height_of_top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm::vec3& slab_normal, float thickness) {
+  const float height = glm::dot(to, normal);
+  const float cosine = glm::dot(slab_normal, normal);
+  const float tilt = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
+  return height + std::min(radius, thickness + radius * tilt);
+}
+
 Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) {
   grid_ = &grid;
   buffer_.clear();
@@ -121,7 +120,7 @@ void PlainGather::visit_group(const ChildRef& reference, const Receiver& receive
   for (int i = 0; i < group.size(); ++i) {
     const Cluster c = read_cluster(group, i, scene_.view().frame(), receiver.position);
     const glm::vec3 slab = c.flatness > 0 ? c.mean / c.flatness : glm::vec3(0);
-    if (top(c.to, receiver.normal, c.radius, slab, c.thickness) <= 0) continue;
+    if (height_of_top(c.to, receiver.normal, c.radius, slab, c.thickness) <= 0) continue;
     if (kPi * c.radius * c.radius >= options_.solid_angle * glm::dot(c.to, c.to)) {
       stack_.push_back(group.child(i));
       continue;
@@ -141,7 +140,7 @@ void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
     const PointPage points(page.payload, page.record_count);
     const Surfel surfel = to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
     const glm::vec3 to(surfel.position - receiver.position);
-    if (!(surfel.radius > 0) || top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0) continue;
+    if (!(surfel.radius > 0) || height_of_top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0) continue;
     ++counts_.surfels;
     queue_.push(to, surfel.normal, surfel.radius, pack(surfel.radiance));
     if (!queue_.full()) continue;

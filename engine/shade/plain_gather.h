@@ -9,6 +9,12 @@
 
 namespace ptc {
 
+/// Height of the top of a thing over a receiver's horizon (spec/shading.md#horizon): of a ball, or of a slab where
+/// that is less.
+/// @param to  of the middle, from the receiver   @param slab_normal  unit; zero: a ball
+[[nodiscard]] float height_of_top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm::vec3& slab_normal,
+                                  float thickness);
+
 /// Shades receivers one at a time by the rules of spec/shading.md#gather, written a second time: what
 /// the hierarchical gather is tested and timed against. One per thread.
 /// Source: Kontkanen, Tabellion and Overbeck 2011, section 3, with exact discs for their splats.
