@@ -10,6 +10,8 @@
 #include "tools/bench/error_report.h"
 #include "tools/bench/growth.h"
 #include "tools/bench/growth_report.h"
+#include "tools/bench/model.h"
+#include "tools/bench/model_report.h"
 #include "tools/common.h"
 #include "tools/values.h"
 
@@ -19,15 +21,16 @@ using namespace ptc::bench;
 
 constexpr char kPurpose[] =
     "Measures time and error together, against rays at the same scene in the same run, and draws charts\n"
-    "of one against the other, or of how time grows. Scenes are held in memory whole; --memory caps their\n"
-    "builds alone.";
+    "of one against the other, of how time grows, or of what each part of the model is worth. Scenes are\n"
+    "held in memory whole; --memory caps their builds alone.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
     "  ptcbench accuracy room.obj --set camera --method ptcx --setting 0.02,0.1,32 -o charts\n"
     "  ptcbench error fractal window city dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench growth --quick -o charts\n"
-    "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n";
+    "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n"
+    "  ptcbench model fractal window -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
 
 struct Arguments {
@@ -36,6 +39,7 @@ struct Arguments {
   AccuracyOptions accuracy;
   ErrorOptions error;
   GrowthOptions growth;
+  ModelOptions model;
   bool quick = false;
   const CLI::App* command = nullptr;  ///< that was chosen: knows which options were given
 };
@@ -171,6 +175,19 @@ void declare_growth(CLI::App& app, Arguments& arguments) {
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
 }
 
+void declare_model(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = declare(app, arguments, "model",
+                              "Error against bytes and against time: what a node may hold (surfel, lobes, vector, cube, "
+                              "spherical harmonics), its rounding, points of a leaf, direction pixels; page compression",
+                              "model.json, .csv and, for each scene, model-SCENE.svg and .png");
+  command.add_flag("--quick", arguments.quick, "Under a minute on two cores: 100k points, 150 receivers checked, 2 runs");
+  ModelOptions& options = arguments.model;
+  ptc::add_count(command, "--points", options.scene.points, "Surfels wanted of a mesh or the city; k, M, G count by 1000")
+      ->default_str("500k");
+  ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers whose error is measured");
+  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
+}
+
 /// What --quick sets, unless another option did. The references stay as good: they take little time.
 void shorten_error(Arguments& arguments) {
   ErrorOptions& options = arguments.error;
@@ -213,6 +230,18 @@ void shorten_growth(Arguments& arguments) {
   options.layers = {1, 4, 16};
   options.caps = {1, 0.29, 0.09};  // less of so few pages is nothing
   options.own_points = 8'192;
+  options.reference_rays = 4096;
+}
+
+/// Likewise.
+void shorten_model(Arguments& arguments) {
+  ModelOptions& options = arguments.model;
+  const auto given = [&](const char* name) { return arguments.command->count(name) > 0; };
+  if (!given("--points")) options.scene.points = 100'000;
+  if (!given("--checked")) options.checked = 150;
+  if (!given("--repeats")) options.repeats = 2;
+  options.scene.shaded_width = 192;
+  options.scene.shaded_height = 108;
   options.reference_rays = 4096;
 }
 
@@ -268,6 +297,21 @@ ptc::Outcome run_growth(Arguments& arguments, const ptc::RunOptions& run, ptc::P
   return {facts_of(rows), growth_text(rows)};
 }
 
+ptc::Outcome run_model(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten_model(arguments);
+  const std::vector<SceneChoice> choices = choose_scenes(arguments);
+  std::filesystem::create_directories(arguments.directory);
+  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  const ptc::Executor executor(run.threads);
+  std::vector<SceneModel> scenes;
+  for (const SceneChoice& choice : choices) {
+    const BenchScene scene(choice, arguments.model.scene, work, run, progress);
+    scenes.push_back(measure_model(scene, arguments.model, work, executor, progress));
+    write_reports(arguments.directory, scenes);  // of those done, should a later one fail
+  }
+  return {facts_of(scenes), model_text(scenes)};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -276,11 +320,12 @@ int main(int argc, char** argv) {
   declare_accuracy(command.app(), arguments);
   declare_error(command.app(), arguments);
   declare_growth(command.app(), arguments);
+  declare_model(command.app(), arguments);
   command.app().require_subcommand(1);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     arguments.command = command.app().get_subcommands().front();
     const std::string name = arguments.command->get_name();
-    const auto measure = name == "growth" ? run_growth : name == "error" ? run_error : run_accuracy;
+    const auto measure = name == "growth" ? run_growth : name == "error" ? run_error : name == "model" ? run_model : run_accuracy;
     return measure(arguments, command.run_options(), progress);
   });
 }

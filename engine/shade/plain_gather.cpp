@@ -52,14 +52,6 @@ Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const gl
   return c;
 }
 
-/// Height of the top of a thing over the receiver's horizon: a ball, or a slab where that is less.
-float top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm::vec3& slab_normal, float thickness) {
-  const float height = glm::dot(to, normal);
-  const float cosine = glm::dot(slab_normal, normal);
-  const float tilt = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
-  return height + std::min(radius, thickness + radius * tilt);
-}
-
 /// What leaves towards a receiver by the three faces of the ambient cube that look at it, over the cluster's area.
 struct Front {
   float area = 0;
@@ -82,41 +74,46 @@ Front front_of(const GroupView& group, int i, const Cluster& c, const glm::vec3&
 
 std::uint32_t pack(const glm::vec3& colour) { return encode_rgbe({colour.r, colour.g, colour.b}); }
 
-/// The disc across an ellipsoid about the mean normal that has its silhouette.
-struct Silhouette {
-  glm::vec3 normal;
-  float foreshortened;  ///< cosine between normal and view
-};
-
-Silhouette silhouette(const Cluster& c, const glm::vec3& toward) {
-  if (!(c.flatness > kDirected)) return {toward, 1};
-  const glm::vec3 axis = c.mean / c.flatness;
-  const float cosine = glm::dot(axis, toward);
-  const float slim = std::min(1.0F, kSlim * c.thickness / c.radius);
-  const float lean = std::sqrt(1 - slim * slim);
-  const float foreshortened = std::sqrt(lean * lean * cosine * cosine + slim * slim);
-  const float turn = std::copysign(lean, cosine);
-  return {turn * axis + (foreshortened - turn * cosine) * toward, foreshortened};
-}
-
 void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options, DiscQueue& queue) {
   const glm::vec3 toward = -glm::normalize(c.to);
   const Front front = front_of(group, i, c, toward);
   const float back = front.area - glm::dot(c.mean, toward);
   const float projected = options.sides == Sides::both ? std::max(front.area, back) : front.area;
   if (!(c.area * projected > 0)) return;
-  if (c.flatness > kFlat) {
-    const glm::vec3 colour = front.area > 0 ? front.radiance / front.area : glm::vec3(0);
-    queue.push(c.to, c.mean / c.flatness, std::min(c.radius, std::sqrt(c.area / 2)), pack(colour));
-    return;
-  }
-  const Silhouette disc = silhouette(c, toward);
-  const float seen = c.area * projected * options.inflation / (kPi * disc.foreshortened);
-  const float radius = std::sqrt(std::min(seen, kSolid * c.radius * c.radius));
-  queue.push(c.to, disc.normal, radius, pack(front.radiance / projected));
+  const Splat splat = make_splat({c.mean, c.area, c.radius, c.thickness}, toward, c.area * projected, options.inflation);
+  const float over = splat.one_surfel ? front.area : projected;
+  const glm::vec3 colour = over > 0 ? front.radiance / over : glm::vec3(0);
+  queue.push(c.to, splat.normal, splat.radius, pack(colour));
 }
 
 }  // namespace
+
+Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float projected, float inflation) {
+  const float length = glm::length(shape.mean);
+  if (length > kFlat) return {shape.mean / length, std::min(shape.radius, std::sqrt(shape.area / 2)), true};
+  // The silhouette of an ellipsoid is that of a disc across it, turned towards the receiver.
+  Splat splat{.normal = toward};
+  float foreshortened = 1;
+  if (length > kDirected) {
+    const glm::vec3 axis = shape.mean / length;
+    const float cosine = glm::dot(axis, toward);
+    const float slim = std::min(1.0F, kSlim * shape.thickness / shape.radius);
+    const float lean = std::sqrt(1 - slim * slim);
+    foreshortened = std::sqrt(lean * lean * cosine * cosine + slim * slim);
+    const float turn = std::copysign(lean, cosine);
+    splat.normal = turn * axis + (foreshortened - turn * cosine) * toward;
+  }
+  const float seen = projected * inflation / (kPi * foreshortened);
+  splat.radius = std::sqrt(std::min(seen, kSolid * shape.radius * shape.radius));
+  return splat;
+}
+
+float height_of_top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm::vec3& slab_normal, float thickness) {
+  const float height = glm::dot(to, normal);
+  const float cosine = glm::dot(slab_normal, normal);
+  const float tilt = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
+  return height + std::min(radius, thickness + radius * tilt);
+}
 
 Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) {
   grid_ = &grid;
@@ -143,7 +140,7 @@ void PlainGather::visit_group(const ChildRef& reference, const Receiver& receive
   for (int i = 0; i < group.size(); ++i) {
     const Cluster c = read_cluster(group, i, scene_.view().frame(), receiver.position);
     const glm::vec3 slab = c.flatness > 0 ? c.mean / c.flatness : glm::vec3(0);
-    if (top(c.to, receiver.normal, c.radius, slab, c.thickness) <= 0) continue;
+    if (height_of_top(c.to, receiver.normal, c.radius, slab, c.thickness) <= 0) continue;
     if (kPi * c.radius * c.radius >= options_.solid_angle * glm::dot(c.to, c.to)) {
       stack_.push_back(group.child(i));
       continue;
@@ -163,7 +160,7 @@ void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
     const PointPage points(page.payload, page.record_count);
     const Surfel surfel = to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
     const glm::vec3 to(surfel.position - receiver.position);
-    if (!(surfel.radius > 0) || top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0) continue;
+    if (!(surfel.radius > 0) || height_of_top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0) continue;
     ++counts_.surfels;
     queue_.push(to, surfel.normal, surfel.radius, pack(surfel.radiance));
     if (!queue_.full()) continue;

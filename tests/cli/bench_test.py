@@ -120,6 +120,18 @@ class Bench(ProgramTest):
             lines = list(csv.reader(file))
         self.assertEqual([len(line) for line in lines], [len(lines[0])] * (len(rows) + 1))
 
+    def test_model_measures_every_part_and_leaves_its_files_alone(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "model", self.mesh, "--quick", "--points", "3k", "--checked", "20", "--repeats", "1",
+                               "-o", charts, "--json")
+        rows = json.loads((charts / "model.json").read_text())["rows"]
+        self.assertEqual(json.loads(printed.stdout)["rows"], rows)
+        axes = [row["axis"] for row in rows]
+        self.assertEqual({axis: axes.count(axis) for axis in axes},
+                         {"payload": 51, "node": 6, "leaf": 6, "directions": 4, "compression": 10})
+        self.assertTrue(all(row["decode_ns"] if row["axis"] == "compression" else row["us_per_receiver"] for row in rows))
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["model-box.png", "model-box.svg", "model.csv", "model.json"])
+
     def test_growth_beyond_the_disk_is_the_machines_fault(self):
         message = self.fail_with(3, "ptcbench", "growth", "--points", "40000G", "--panel", "surfels", "-o", self.here)
         self.assertIn("GB free", message)

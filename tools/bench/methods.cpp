@@ -21,11 +21,11 @@ double timed(std::size_t count, const Body& body) {
 
 class GatherMethod : public Method {
  public:
-  GatherMethod(const BenchScene& scene, const ReceiverSet& set, const Checked& checked, const GatherOptions& options,
-               PageCache& cache, const Executor& executor)
+  GatherMethod(const ContainerReader& container, const Sky& sky, const ReceiverSet& set, const Checked& checked,
+               const GatherOptions& options, PageCache& cache, const Executor& executor)
       : set_(set),
         checked_(checked),
-        shader_(scene.container(), {.gather = options, .sky = sky_function(scene.lights().sky), .cache = &cache}, executor),
+        shader_(container, {.gather = options, .sky = sky_function(sky), .cache = &cache}, executor),
         results_(set.receivers.size()) {}
 
   double run() override {
@@ -154,9 +154,10 @@ Checked choose_checked(const BenchScene& scene, const ReceiverSet& set, unsigned
   return checked;
 }
 
-std::unique_ptr<Method> make_gather(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
-                                    const GatherOptions& options, PageCache& cache, const Executor& executor) {
-  return std::make_unique<GatherMethod>(scene, set, checked, options, cache, executor);
+std::unique_ptr<Method> make_gather(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
+                                    const Checked& checked, const GatherOptions& options, PageCache& cache,
+                                    const Executor& executor) {
+  return std::make_unique<GatherMethod>(container, sky, set, checked, options, cache, executor);
 }
 
 std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,

@@ -41,8 +41,9 @@ class Method {
 };
 
 /// The hierarchical gather of the whole set, pages in `cache`.
-[[nodiscard]] std::unique_ptr<Method> make_gather(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
-                                                  const GatherOptions& options, PageCache& cache, const Executor& executor);
+[[nodiscard]] std::unique_ptr<Method> make_gather(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
+                                                  const Checked& checked, const GatherOptions& options, PageCache& cache,
+                                                  const Executor& executor);
 /// The plain gather of those checked.
 [[nodiscard]] std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
                                                  const GatherOptions& options, PageCache& cache, const Executor& executor);

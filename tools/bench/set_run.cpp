@@ -106,7 +106,8 @@ void SetRun::add_gathers() {
     for (GatherOptions options : options_.settings) {
       for (const Quantity job : both_jobs()) {
         options.bleeding = job == Quantity::bleeding;
-        add("ptcx", setting_text(options), {job}, ours_, make_gather(scene_, set_, checked_, options, cache_, executor_));
+        add("ptcx", setting_text(options), {job}, ours_,
+            make_gather(scene_.container(), scene_.lights().sky, set_, checked_, options, cache_, executor_));
       }
     }
   }

@@ -1,0 +1,159 @@
+#include "tools/bench/model.h"
+
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/base/memory.h"
+#include "engine/build/build.h"
+#include "engine/build/container_points.h"
+#include "engine/shade/brute_force.h"
+#include "engine/stages.h"
+#include "tools/bench/methods.h"
+#include "tools/bench/reference.h"
+
+namespace ptc::bench {
+namespace {
+
+/// Bytes of all pages, as they are stored.
+double stored_bytes(const ContainerReader& container) {
+  double sum = 0;
+  for (std::uint32_t page = 0; page < container.page_count(); ++page) sum += container.entry(page).stored_bytes;
+  return sum;
+}
+
+/// The same points under another tree.
+std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::uint32_t leaf_points,
+                                             const std::filesystem::path& work) {
+  return make_temporary(work, [&](const std::filesystem::path& path) {
+    ContainerPoints points(from);
+    ContainerWriter writer(path, {.page_shift = from.header().page_shift});
+    Progress silent;
+    const Superblock superblock = build_pages(points, from.superblock().frame, writer, {.leaf_points = leaf_points}, silent);
+    writer.finish(from.meta(), superblock);
+  });
+}
+
+/// The gather of PTCX at the default setting but for its pixels, and against rays.
+class GatherStudy {
+ public:
+  GatherStudy(const BenchScene& scene, const ReceiverSet& set, const Checked& checked, const Reference& reference,
+              const Executor& executor)
+      : scene_(scene), set_(set), checked_(checked), reference_(reference), executor_(executor) {}
+
+  [[nodiscard]] ModelRow measure(const ContainerReader& container, unsigned resolution, unsigned repeats, ModelRow row) const {
+    const unsigned threads = executor_.threads();
+    const std::uint64_t bytes = PageCache::bytes_for(container, threads, container.page_count());
+    PageCache cache(container, {.memory_bytes = bytes, .threads = threads});
+    const GatherOptions options{.resolution = resolution};
+    const auto method = make_gather(container, scene_.lights().sky, set_, checked_, options, cache, executor_);
+    std::vector<double> us;
+    for (unsigned repeat = 0; repeat < repeats; ++repeat) us.push_back(method->run());
+    row.scene = scene_.name();
+    row.solid_angle = static_cast<double>(options.solid_angle);
+    row.us = spread_of(us);
+    compare(row, method->result().checked, reference_.mean);
+    return row;
+  }
+
+ private:
+  const BenchScene& scene_;
+  const ReceiverSet& set_;
+  const Checked& checked_;
+  const Reference& reference_;
+  const Executor& executor_;
+};
+
+/// Pages of one kind, compressed anew and decompressed.
+ModelRow measure_compression(const BenchScene& scene, bool nodes, int level, unsigned repeats) {
+  const ContainerReader& container = scene.container();
+  std::vector<std::byte> payload(container.page_payload_limit());
+  PageDecoder decoder;
+  PageEncoder encoder(level > 0 ? Codec::zstd : Codec::raw, level);
+  struct Page {
+    Codec codec;
+    std::uint32_t raw_bytes;
+    std::vector<std::byte> stored;
+  };
+  std::vector<Page> pages;
+  double bytes = 0;
+  for (const std::uint32_t page : nodes ? container.node_pages() : container.point_pages()) {
+    const PageHeader header = container.read_page(page, payload, decoder);
+    Page& made = pages.emplace_back(Page{Codec::raw, header.raw_bytes, {}});
+    made.codec = encoder.encode(std::span(payload).first(header.raw_bytes), made.stored);
+    bytes += static_cast<double>(made.stored.size());
+  }
+  std::vector<double> seconds;
+  for (unsigned repeat = 0; repeat < repeats; ++repeat) {
+    const double before = cpu_seconds();
+    for (const Page& page : pages) decoder.decode(page.codec, page.stored, std::span(payload).first(page.raw_bytes));
+    seconds.push_back(cpu_seconds() - before);
+  }
+  const auto records = static_cast<double>(nodes ? container.superblock().nodes : container.superblock().points);
+  return {.scene = scene.name(),
+          .axis = "compression",
+          .variant = level > 0 ? fmt::format("zstd {}", level) : "raw",
+          .form = nodes ? "nodes" : "points",
+          .bytes = bytes / records,
+          .per = nodes ? "node" : "point",
+          .decode_ns = 1e9 * spread_of(seconds).median / records};
+}
+
+}  // namespace
+
+void compare(ModelRow& row, std::span<const Shading> ours, std::span<const Shading> reference) {
+  row.occlusion = over_mean(error_statistics(occlusion_of(ours), occlusion_of(reference)));
+  row.irradiance = over_mean(error_statistics(irradiance_of(ours), irradiance_of(reference)));
+}
+
+SceneModel measure_model(const BenchScene& scene, const ModelOptions& options, const std::filesystem::path& work,
+                         const Executor& executor, Progress& progress) {
+  const ReceiverSet& set = scene.sets().front();
+  if (set.name != "camera" || set.receivers.empty()) {
+    throw DataError(scene.name() + ": nothing to measure: the camera sees nothing");
+  }
+  const Checked checked = choose_checked(scene, set, options.checked);
+  std::vector<Receiver> receivers;
+  for (const std::size_t i : checked.receivers) receivers.push_back(set.receivers[i]);
+
+  progress.begin(scene.name() + ", reference", 0, "rays");
+  const DiscRays oracle(scene.surfels(), Sides::both, {});
+  const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) { return oracle.trace(r, rays, seed); };
+  const Reference reference = make_reference(set, checked, {.half = options.reference_rays}, trace, executor);
+  progress.end();
+  SceneModel model{.scene = scene.name(),
+                   .surfels = scene.surfels().size(),
+                   .nodes = scene.container().superblock().nodes,
+                   .receivers = receivers.size(),
+                   .rays = 2 * options.reference_rays,
+                   .occlusion_noise = reference.occlusion_noise,
+                   .irradiance_noise = reference.irradiance_noise,
+                   .rows = study_payloads(scene, receivers, options, executor, progress)};
+
+  const GatherStudy gathers(scene, set, checked, reference, executor);
+  progress.begin(scene.name() + ", leaves, directions", options.leaf_points.size() + options.resolutions.size(), "rows");
+  for (const std::uint32_t leaf_points : options.leaf_points) {
+    const auto container = with_leaves(scene.container(), leaf_points, work);
+    const double bytes = stored_bytes(*container) / static_cast<double>(model.surfels);
+    const ModelRow row{.axis = "leaf", .variant = std::to_string(leaf_points), .bytes = bytes, .per = "point"};
+    model.rows.push_back(gathers.measure(*container, GatherOptions{}.resolution, options.repeats, row));
+    progress.advance(1);
+  }
+  for (const unsigned resolution : options.resolutions) {
+    constexpr double kPixelBytes = 8;  // nearness and colour
+    const ModelRow row{.axis = "directions",
+                       .variant = std::to_string(resolution),
+                       .bytes = 6 * kPixelBytes * resolution * resolution,
+                       .per = "cube"};
+    model.rows.push_back(gathers.measure(scene.container(), resolution, options.repeats, row));
+    progress.advance(1);
+  }
+  progress.end();
+  for (const bool nodes : {false, true}) {
+    for (const int level : options.levels) model.rows.push_back(measure_compression(scene, nodes, level, options.repeats));
+  }
+  return model;
+}
+
+}  // namespace ptc::bench
