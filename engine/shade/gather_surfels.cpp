@@ -42,11 +42,19 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   const auto aside = hn::Sqrt(hn::Max(hn::NegMulAdd(height, height, d2), hn::Zero(f)));
   const auto beyond = hn::Max(hn::Sub(aside, s.radius), hn::Zero(f));
   const auto d = hn::Sqrt(hn::MulAdd(beyond, beyond, hn::Mul(height, height)));
-  const auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
+  auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
   auto keep = hn::FirstN(f, 0);
   if (!test.last) {
-    const auto above = hn::Add(dot(s.to, axis), hn::Add(s.radius, hn::Set(f, cell.radius)));
+    const auto rho = hn::Set(f, cell.radius);
+    const auto above = hn::Add(dot(s.to, axis), hn::Add(s.radius, rho));
     keep = hn::And(wanted, hn::Lt(d, seam_end(test, hn::Abs(height), above, d)));
+    // Backs are clear within two radii: of a disc's, that may be so for some receivers of the cell alone.
+    const auto reach = hn::Add(s.radius, s.radius), middle = hn::Sqrt(d2);
+    const auto clear_to_some = hn::And(hn::Lt(hn::Sub(middle, rho), reach), hn::Gt(height, hn::Neg(rho)));
+    const auto clear_to_all = hn::And(hn::Lt(hn::Add(middle, rho), reach), hn::Gt(height, rho));
+    const auto divided = hn::AndNot(clear_to_all, clear_to_some);
+    drawn = hn::AndNot(divided, drawn);
+    keep = hn::Or(keep, hn::And(wanted, divided));
   }
   if (hn::AllFalse(f, hn::Or(drawn, keep))) return;
   const VU rgbe = test.bleeding ? colour() : hn::Zero(u);

@@ -388,3 +388,19 @@ TEST_CASE("gather: receivers right at a disc see at most the hemisphere of it", 
     CHECK(std::isfinite(s.irradiance.g));
   }
 }
+
+TEST_CASE("gather: a back is clear to the receivers of a cell within two radii, and to no others", "[shade][gather]") {
+  // A disc at the edge of that reach, and one whose plane passes between the receivers.
+  for (const Surfel& disc : {Surfel{.position = {0, 0, 2}, .normal = {0, 0, 1}, .radius = 1},
+                             Surfel{.position = {0.7, 0, -0.14}, .normal = {0, 0, 1}, .radius = 1}}) {
+    Scene scene({disc});
+    for (int i = -20; i < 20; ++i) scene.receivers.push_back({{0.001 * i, 0.002 * (i % 3), 0.01 * (i + 0.5)}, {0.6F, 0, 0.8F}});
+    const std::vector<Shading> results = scene.shade({.gather = {.parallax = 0.4F}});
+    std::vector<Shading> all(results.size());
+    shade_brute_force(std::span(&disc, 1), scene.receivers, all, DirectionGrid(32, {}), Sides::both, Executor(1));
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      CAPTURE(disc.position.x, scene.receivers[i].position.z);
+      CHECK(results[i].occlusion == Approx(all[i].occlusion).margin(0.06));
+    }
+  }
+}
