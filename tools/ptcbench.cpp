@@ -30,7 +30,7 @@ constexpr char kExamples[] =
     "  ptcbench error fractal window city dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench growth --quick -o charts\n"
     "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n"
-    "  ptcbench model fractal window -o charts\n";
+    "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
 
 struct Arguments {
