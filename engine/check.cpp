@@ -2,6 +2,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/error_sums.h"
+#include "engine/estimate.h"
 #include "engine/scene/mesh_reference.h"
 #include "engine/shade/streamed_rays.h"
 #include "engine/stages.h"
@@ -26,7 +27,8 @@ double timed(std::size_t count, const Body& body) {
 
 }  // namespace
 
-void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shading> results) {
+void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shading> results,
+                      std::span<const ErrorEstimate> estimates) {
   if (request_.receivers == 0) return;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     const bool filling = receivers_.size() < request_.receivers;
@@ -34,12 +36,13 @@ void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shadi
     ++seen_;
     if (slot >= request_.receivers || apart_.contains(receivers[i])) continue;
     if (filling) {
-      receivers_.push_back(receivers[i]);
-      results_.push_back(results[i]);
-    } else {
-      receivers_[slot] = receivers[i];
-      results_[slot] = results[i];
+      receivers_.emplace_back();
+      results_.emplace_back();
+      if (!estimates.empty()) estimates_.emplace_back();
     }
+    receivers_[slot] = receivers[i];
+    results_[slot] = results[i];
+    if (!estimates.empty()) estimates_[slot] = estimates[i];
   }
 }
 
@@ -58,6 +61,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
   }
   if (paths.bounces == 0) leave_out_bleeding(traced);
   report.discs = errors(results_, traced);
+  if (!estimates_.empty()) report.estimate = check_estimates(estimates_, results_, traced);
   if (!light || !mesh) return report;
   report.mesh_microseconds = timed(receivers_.size(), [&] {
     executor.for_each(twice.size(), [&](std::size_t i, unsigned) {

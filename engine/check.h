@@ -26,6 +26,12 @@ class ReceiverPlaces {
   std::set<Place> places_;
 };
 
+/// What a receiver is off, as estimated: a root mean square, not a bound.
+struct ErrorEstimate {
+  float occlusion = 0;
+  float irradiance = 0;  ///< W / m^2, root mean square over RGB
+};
+
 /// Keeps an even sample of a run's receivers with their shading, the same each time (reservoir
 /// sampling, Vitter 1985, algorithm R).
 class CheckSample {
@@ -33,7 +39,9 @@ class CheckSample {
   /// @param apart  receivers that are not to be chosen
   explicit CheckSample(const CheckRequest& request, ReceiverPlaces apart = {})
       : request_(request), apart_(std::move(apart)) {}
-  void add(std::span<const Receiver> receivers, std::span<const Shading> results);
+  /// @param estimates  as many, or none
+  void add(std::span<const Receiver> receivers, std::span<const Shading> results,
+           std::span<const ErrorEstimate> estimates = {});
 
   /// @param scene  as it was gathered from: with the bounces before the last in its surfels
   /// @param light  with the mesh under it, or null
@@ -51,6 +59,7 @@ class CheckSample {
   std::mt19937_64 bits_;  // its default seed
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
+  std::vector<ErrorEstimate> estimates_;
 };
 
 }  // namespace ptc

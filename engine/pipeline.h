@@ -99,10 +99,26 @@ struct CheckError {
   }
 };
 
+/// How estimates of one quantity hold at receivers that had no part in them. The error of a single one is against
+/// both halves of its rays, with what those are off; ratios are without that, and 0 where there is no error.
+struct EstimateWorth {
+  double rank = 0;         ///< correlation of the ranks of estimate and error (Spearman 1904)
+  double top_tenth = 0;    ///< RMS error of the tenth with the largest estimates, over that of all
+  double bottom_tenth = 0; ///< likewise with the smallest
+  double top_third = 0, bottom_third = 0;
+  double rms = 0;          ///< RMS of the estimates over that of the errors
+  double within_twice = 0; ///< share of receivers whose error is at most twice the estimate
+};
+
+struct EstimateCheck {
+  EstimateWorth occlusion, irradiance;
+};
+
 struct CheckReport {
   std::size_t receivers = 0;
   unsigned rays = 0;
   CheckError discs;                ///< against rays at the same surfels
+  std::optional<EstimateCheck> estimate;  ///< against the same, when there are estimates
   std::optional<CheckError> mesh;  ///< against rays at the mesh, when there is one
   double disc_microseconds = 0;    ///< CPU time of one receiver's rays at the surfels
   double mesh_microseconds = 0;
@@ -123,6 +139,12 @@ struct TuningReport {
   double shade_cpu_seconds = 0;
 };
 
+/// What estimates were made of (spec/shading.md#estimate).
+struct EstimateReport {
+  std::size_t pilots = 0;       ///< receivers compared with rays
+  double cpu_seconds = 0;       ///< all threads: shading with another variant, and the pilots with both; without rays
+};
+
 struct ShadeRequest {
   std::filesystem::path scene;      ///< surfels that occlude and emit
   std::filesystem::path receivers;  ///< a cloud or container to shade; empty: the scene's own points
@@ -131,6 +153,7 @@ struct ShadeRequest {
                                     ///< and occlusion alone, whatever GatherOptions::bleeding says
   GatherOptions gather;
   std::optional<double> error;      ///< chooses `gather` but for its sides: share from above 0 to 1
+  bool estimate = false;            ///< adds what each receiver is off, as estimated; wants `error` or `check`
   float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii
   std::optional<Sky> sky;           ///< empty: the one that the scene was built with
   ContainerReader::Access access = ContainerReader::Access::pread;
@@ -146,13 +169,14 @@ struct ShadeReport {
   GatherCounts gather;
   CacheStatistics cache;
   std::optional<TuningReport> tuning;
+  std::optional<EstimateReport> estimate;
   std::optional<CheckReport> check;
   StageSeconds seconds;
 };
 
 /// Shades every receiver and writes them to `target`: .ptcx (the receivers' container with the new
 /// channels occlusion, bent_normal, irradiance, sky, indirect) or .ply (the same as columns);
-/// indirect = albedo / pi * (irradiance + sky).
+/// indirect = albedo / pi * (irradiance + sky). Estimates come after them: occlusion_error, irradiance_error.
 ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
                             Progress& progress);
 
@@ -177,6 +201,7 @@ struct RenderRequest {
   unsigned bounces = 1;           ///< as of ShadeRequest
   GatherOptions gather;
   std::optional<double> error;    ///< as ShadeRequest::error
+  bool estimate = false;          ///< as ShadeRequest::estimate, in layers of an .exr
   float lift = 0.15F;             ///< receivers rise by so many radii of a surfel of the scene's spacing
   float exposure = 0;             ///< stops, for PNGs of light
   ContainerReader::Access access = ContainerReader::Access::pread;
@@ -188,7 +213,8 @@ struct RenderRequest {
 /// alpha) and .png (one of them).
 ///
 /// direct = emission + albedo / pi * (lights + sky), indirect = albedo / pi * irradiance from
-/// surfaces, beauty = both; pixels that meet nothing show the sky.
+/// surfaces, beauty = both; pixels that meet nothing show the sky. Estimates add the layers occlusion_error and
+/// irradiance_error: of a pixel, the root mean square over its samples, which the error of their mean is not above.
 /// @param targets  one or more files, all from one rendering
 ShadeReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
                            Progress& progress);

@@ -11,6 +11,7 @@
 #include "engine/base/memory.h"
 #include "engine/bounces.h"
 #include "engine/check.h"
+#include "engine/estimate.h"
 #include "engine/io/image.h"
 #include "engine/pipeline.h"
 #include "engine/primary.h"
@@ -23,6 +24,7 @@ namespace {
 
 constexpr unsigned kTileSide = 256;               // pixels
 constexpr std::uint64_t kReceiverBytes = 320;     // of one pixel of a tile: hit, receiver, result, order
+constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);  // more, with estimates
 constexpr unsigned kMostVariants = 16;
 
 /// Sums over the samples of every pixel.
@@ -30,14 +32,18 @@ struct Film {
   unsigned width, height;
   std::vector<glm::vec3> beauty, direct, indirect, bent_normal, albedo;
   std::vector<float> occlusion, alpha;
+  std::vector<float> occlusion_error, irradiance_error;  // squares until finish(); empty without estimates
 
-  Film(unsigned w, unsigned h) : width(w), height(h) {
+  Film(unsigned w, unsigned h, bool estimates) : width(w), height(h) {
     const std::size_t pixels = std::size_t{w} * h;
     for (auto* layer : {&beauty, &direct, &indirect, &bent_normal, &albedo}) layer->resize(pixels, glm::vec3(0));
     for (auto* layer : {&occlusion, &alpha}) layer->resize(pixels, 0);
+    if (!estimates) return;
+    for (auto* layer : {&occlusion_error, &irradiance_error}) layer->resize(pixels, 0);
   }
 
   static constexpr std::uint64_t kBytes = 5 * sizeof(glm::vec3) + 2 * sizeof(float);
+  static constexpr std::uint64_t kEstimateBytes = 2 * sizeof(float);  // of a pixel more
 
   void add(std::size_t pixel, const PrimaryHit& hit, const Shading& s, float weight) {
     const glm::vec3 reflect = hit.albedo * std::numbers::inv_pi_v<float>;
@@ -51,6 +57,17 @@ struct Film {
     occlusion[pixel] += weight * s.occlusion;
     alpha[pixel] += weight;
   }
+
+  void add(std::size_t pixel, const ErrorEstimate& estimate, float weight) {
+    occlusion_error[pixel] += weight * estimate.occlusion * estimate.occlusion;
+    irradiance_error[pixel] += weight * estimate.irradiance * estimate.irradiance;
+  }
+
+  void finish() {
+    for (auto* layer : {&occlusion_error, &irradiance_error}) {
+      for (float& value : *layer) value = std::sqrt(value);
+    }
+  }
 };
 
 std::vector<float> flatten(const std::vector<glm::vec3>& values) {
@@ -62,14 +79,18 @@ std::vector<float> flatten(const std::vector<glm::vec3>& values) {
 
 void write_layers(const std::filesystem::path& target, const Film& film) {
   using Kind = ExrLayer::Kind;
-  write_exr(target, film.width, film.height,
-            {{"", Kind::colour, false, flatten(film.beauty)},
-             {"direct", Kind::colour, false, flatten(film.direct)},
-             {"indirect", Kind::colour, false, flatten(film.indirect)},
-             {"albedo", Kind::colour, false, flatten(film.albedo)},
-             {"occlusion", Kind::scalar, false, film.occlusion},
-             {"alpha", Kind::scalar, false, film.alpha},
-             {"bent_normal", Kind::vector, true, flatten(film.bent_normal)}});
+  std::vector<ExrLayer> layers{{"", Kind::colour, false, flatten(film.beauty)},
+                               {"direct", Kind::colour, false, flatten(film.direct)},
+                               {"indirect", Kind::colour, false, flatten(film.indirect)},
+                               {"albedo", Kind::colour, false, flatten(film.albedo)},
+                               {"occlusion", Kind::scalar, false, film.occlusion},
+                               {"alpha", Kind::scalar, false, film.alpha},
+                               {"bent_normal", Kind::vector, true, flatten(film.bent_normal)}};
+  if (!film.occlusion_error.empty()) {
+    layers.push_back({"occlusion_error", Kind::scalar, true, film.occlusion_error});
+    layers.push_back({"irradiance_error", Kind::scalar, true, film.irradiance_error});
+  }
+  write_exr(target, film.width, film.height, layers);
 }
 
 void write_layer_png(const PictureTarget& target, const Film& film, float exposure) {
@@ -156,9 +177,10 @@ std::vector<Pilot> pilots_of(const PrimaryView& view, const Camera& camera, unsi
 /// a variant of its own, so that what one of them resolves too coarsely the others average out.
 class TileRenderer {
  public:
-  TileRenderer(const PrimaryView& view, Shader& shader, Film& film, const Camera& camera, unsigned side,
+  /// @param estimator  or null
+  TileRenderer(const PrimaryView& view, Shader& shader, Estimator* estimator, Film& film, const Camera& camera, unsigned side,
                const Sky& sky, CheckSample& check, const Executor& executor)
-      : view_(view), shader_(shader), film_(film), camera_(camera), side_(side), sky_(sky), check_(check),
+      : view_(view), shader_(shader), estimator_(estimator), film_(film), camera_(camera), side_(side), sky_(sky), check_(check),
         executor_(executor) {}
 
   /// The picture, tile by tile.
@@ -186,7 +208,9 @@ class TileRenderer {
     const double before = cpu_seconds();
     shader_.shade(receivers_, results_, progress, sample);
     cpu_ += cpu_seconds() - before;
-    check_.add(receivers_, results_);
+    estimates_ = {};
+    if (estimator_) estimates_ = estimator_->estimate(receivers_, results_, sample);
+    check_.add(receivers_, results_, estimates_);
     expose(x0, y0, x1, sample);
     progress.advance(hits_.size() - receivers_.size());
   }
@@ -210,6 +234,7 @@ class TileRenderer {
       const unsigned y = y0 + static_cast<unsigned>(i / (x1 - x0));
       const std::size_t pixel = std::size_t{y} * film_.width + x;
       if (hits_[i]) {
+        if (estimator_) film_.add(pixel, estimates_[next], weight);
         film_.add(pixel, *hits_[i], results_[next++], weight);
       } else {
         const float scale = 1.0F / static_cast<float>(side_);
@@ -222,6 +247,7 @@ class TileRenderer {
 
   const PrimaryView& view_;
   Shader& shader_;
+  Estimator* estimator_;
   Film& film_;
   const Camera& camera_;
   unsigned side_;
@@ -231,6 +257,7 @@ class TileRenderer {
   std::vector<std::optional<PrimaryHit>> hits_;
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
+  std::span<const ErrorEstimate> estimates_;
   double cpu_ = 0;
 };
 
@@ -238,6 +265,10 @@ class TileRenderer {
 
 ShadeReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets, Progress& progress) {
   ShadeReport report;
+  check_estimate_request(request.estimate, request.error, request.check);
+  if (request.estimate && std::ranges::none_of(targets, [](const auto& t) { return t.path.extension() == ".exr"; })) {
+    throw std::invalid_argument("estimates are layers of an .exr: name one to write");
+  }
   const Executor executor(request.run.threads);
   const ContainerReader scene(request.scene);
   const LightRig lights = request.lights ? *request.lights : recorded_lights(scene);
@@ -259,32 +290,44 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
     const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
     subject.view = view_surfels(scene, camera, side, request.lift, executor, progress);
   }
-  Film film(camera.width, camera.height);
+  Film film(camera.width, camera.height, request.estimate);
   ShadeOptions options{.access = request.access,
                        .gather = request.gather,
                        .sky = sky_function(lights.sky),
                        .variants = std::min(request.samples, kMostVariants)};
   options.gather.bleeding = request.bounces > 0;
-  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * kReceiverBytes +
-                              std::uint64_t{camera.width} * camera.height * Film::kBytes +
+  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * (kReceiverBytes + (request.estimate ? kEstimateBytes : 0)) +
+                              std::uint64_t{camera.width} * camera.height *
+                                  (Film::kBytes + (request.estimate ? Film::kEstimateBytes : 0)) +
                               (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24);
-  options.cache_bytes = cache_bytes_left(request.run, taken, scene, executor.threads(), "this picture");
+  options.cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), "this picture");
   const std::unique_ptr<ContainerReader> bounced =
       bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, targets.front().path)}, executor,
                    report, progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
   ReceiverPlaces compared;
+  std::vector<Pilot> pilots;
+  if (request.error || request.estimate) pilots = pilots_of(*subject.view, camera, side, executor);
+  std::vector<Shading> traced;  // by rays, of the pilots
   if (request.error) {
     const Stage stage(report.seconds, progress, "tune", 0, "receivers");
-    const std::vector<Pilot> pilots = pilots_of(*subject.view, camera, side, executor);
-    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared);
+    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared, traced);
     options.gather = report.tuning->gather;
+  }
+  std::unique_ptr<Estimator> estimator;
+  if (request.estimate) {
+    const Stage stage(report.seconds, progress, "estimate", 0, "receivers");
+    if (!request.error) {
+      traced = trace_pilots(lit, options, pilots, request.check.rays, executor, progress, compared);
+    }
+    estimator = std::make_unique<Estimator>(lit, options, pilots, traced, executor);
+    options.cache = &estimator->cache();
   }
   std::optional<Shader> shader(std::in_place, lit, options, executor);
   CheckSample check(request.check, std::move(compared));
   {
     const Stage stage(report.seconds, progress, "render", samples, "samples");
-    TileRenderer tiles(*subject.view, *shader, film, camera, side, lights.sky, check, executor);
+    TileRenderer tiles(*subject.view, *shader, estimator.get(), film, camera, side, lights.sky, check, executor);
     tiles.render_all(progress);
     report.shade_cpu_seconds = tiles.shade_cpu_seconds();
   }
@@ -292,6 +335,12 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   report.receivers = report.gather.receivers;
   report.bounces = request.bounces;
   report.cache = shader->cache_statistics();
+  if (estimator) {
+    report.cache = estimator->cache_statistics();
+    report.estimate = estimator->report();
+  }
+  film.finish();
+  estimator.reset();
   shader.reset();  // its pages make room for what the writers copy
   write_targets(targets, film, request.exposure);
   if (request.check.receivers > 0) {

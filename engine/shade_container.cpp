@@ -11,6 +11,7 @@
 #include "engine/base/memory.h"
 #include "engine/bounces.h"
 #include "engine/check.h"
+#include "engine/estimate.h"
 #include "engine/io/record.h"
 #include "engine/pipeline.h"
 #include "engine/shade/shader.h"
@@ -29,27 +30,36 @@ constexpr std::uint16_t kGroup = 1;  // of the channels that shading adds
 
 /// What shading says of a point, in the order of the channels.
 struct ShadedChannels {
-  static constexpr std::size_t kFloats = 1 + 3 + 3 + 3 + 3;
-  static std::vector<Channel> channels() {
-    return {{"occlusion", ChannelType::half, 1, kGroup},
-            {"bent_normal", ChannelType::half, 3, kGroup},
-            {"irradiance", ChannelType::half, 3, kGroup},
-            {"sky", ChannelType::half, 3, kGroup},
-            {"indirect", ChannelType::half, 3, kGroup}};
+  static constexpr std::size_t kPlain = 1 + 3 + 3 + 3 + 3;
+  static constexpr std::size_t kFloats = kPlain + 2;  // with estimates
+
+  static std::vector<Channel> channels(bool estimates) {
+    std::vector<Channel> channels{{"occlusion", ChannelType::half, 1, kGroup},
+                                  {"bent_normal", ChannelType::half, 3, kGroup},
+                                  {"irradiance", ChannelType::half, 3, kGroup},
+                                  {"sky", ChannelType::half, 3, kGroup},
+                                  {"indirect", ChannelType::half, 3, kGroup}};
+    if (!estimates) return channels;
+    channels.push_back({"occlusion_error", ChannelType::half, 1, kGroup});
+    channels.push_back({"irradiance_error", ChannelType::half, 1, kGroup});
+    return channels;
   }
-  static std::vector<PointColumn> columns() {
+  static std::vector<PointColumn> columns(bool estimates) {
     std::vector<PointColumn> columns;
-    for (const Channel& c : channels()) columns.push_back({c.name, c.components});
+    for (const Channel& c : channels(estimates)) columns.push_back({c.name, c.components});
     return columns;
   }
+  static std::size_t count(bool estimates) { return estimates ? kFloats : kPlain; }
 };
 
+using ShadedValues = std::array<float, ShadedChannels::kFloats>;
+
 /// Values of a shaded surfel: outgoing radiance is albedo / pi times what arrives.
-std::array<float, ShadedChannels::kFloats> values_of(const Shading& s, const glm::vec3& albedo) {
+ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEstimate& estimate) {
   const glm::vec3 out = albedo * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float>;
-  return {s.occlusion,    s.bent_normal.x, s.bent_normal.y, s.bent_normal.z, s.irradiance.r, s.irradiance.g,
-          s.irradiance.b, s.sky.r,         s.sky.g,         s.sky.b,         out.r,          out.g,
-          out.b};
+  return {s.occlusion,    s.bent_normal.x, s.bent_normal.y, s.bent_normal.z, s.irradiance.r,     s.irradiance.g,
+          s.irradiance.b, s.sky.r,         s.sky.g,         s.sky.b,         out.r,              out.g,
+          out.b,          estimate.occlusion, estimate.irradiance};
 }
 
 /// Some of a container's points in order, in blocks.
@@ -106,26 +116,31 @@ class PointCursor {
 class ShadedSink {
  public:
   virtual ~ShadedSink() = default;
-  virtual void write(std::span<const Surfel> surfels, std::span<const Shading> shading) = 0;
+  /// @param estimates  as many, or none where the sink was made without
+  virtual void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
+                     std::span<const ErrorEstimate> estimates) = 0;
   virtual void finish() = 0;
 };
 
 class PlySink : public ShadedSink {
  public:
-  PlySink(const std::filesystem::path& target, std::uint64_t count)
-      : writer_(target, count, ShadedChannels::columns()) {}
-  void write(std::span<const Surfel> surfels, std::span<const Shading> shading) override {
+  PlySink(const std::filesystem::path& target, std::uint64_t count, bool estimates)
+      : floats_(ShadedChannels::count(estimates)), writer_(target, count, ShadedChannels::columns(estimates)) {}
+  void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
+             std::span<const ErrorEstimate> estimates) override {
     std::vector<float> values;
-    values.reserve(surfels.size() * ShadedChannels::kFloats);
+    values.reserve(surfels.size() * floats_);
     for (std::size_t i = 0; i < surfels.size(); ++i) {
-      const auto v = values_of(shading[i], surfels[i].albedo);
-      values.insert(values.end(), v.begin(), v.end());
+      const ShadedValues v =
+          values_of(shading[i], surfels[i].albedo, estimates.empty() ? ErrorEstimate{} : estimates[i]);
+      values.insert(values.end(), v.begin(), v.begin() + static_cast<std::ptrdiff_t>(floats_));
     }
     writer_.write(surfels, values);
   }
   void finish() override { writer_.finish(); }
 
  private:
+  std::size_t floats_;  // of a point
   PlyWriter writer_;
 };
 
@@ -133,20 +148,24 @@ class PlySink : public ShadedSink {
 /// an earlier shading are left out.
 class ContainerSink : public ShadedSink {
  public:
-  ContainerSink(const std::filesystem::path& target, const ContainerReader& from, const std::string& settings)
+  ContainerSink(const std::filesystem::path& target, const ContainerReader& from, const std::string& settings,
+                bool estimates)
       : from_(from),
+        floats_(ShadedChannels::count(estimates)),
         meta_(from.meta()),
         writer_(target, {.page_shift = from.header().page_shift, .uuid = uuid_for(from, settings)}) {
     std::erase_if(meta_.channels, [](const Channel& c) { return c.group == kGroup; });
-    const std::vector<Channel> added = ShadedChannels::channels();
+    const std::vector<Channel> added = ShadedChannels::channels(estimates);
     meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());
     meta_.text["shading"] = settings;
     copy_pages();
   }
 
-  void write(std::span<const Surfel> surfels, std::span<const Shading> shading) override {
+  void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
+             std::span<const ErrorEstimate> estimates) override {
     for (std::size_t i = 0; i < surfels.size(); ++i) {
-      values_.push_back(values_of(shading[i], surfels[i].albedo));
+      values_.push_back(
+          values_of(shading[i], surfels[i].albedo, estimates.empty() ? ErrorEstimate{} : estimates[i]));
       if (values_.size() == page_points()) flush();
     }
   }
@@ -192,8 +211,8 @@ class ContainerSink : public ShadedSink {
 
   void flush() {
     const std::size_t count = values_.size();
-    std::vector<std::byte> payload(count * ShadedChannels::kFloats * 2);
-    for (std::size_t c = 0; c < ShadedChannels::kFloats; ++c) {
+    std::vector<std::byte> payload(count * floats_ * 2);
+    for (std::size_t c = 0; c < floats_; ++c) {
       for (std::size_t i = 0; i < count; ++i) {
         const std::uint16_t half = encode_half(values_[i][c]);
         std::memcpy(payload.data() + 2 * (c * count + i), &half, 2);
@@ -207,9 +226,10 @@ class ContainerSink : public ShadedSink {
   }
 
   const ContainerReader& from_;
+  std::size_t floats_;  // of a point
   Meta meta_;
   ContainerWriter writer_;
-  std::vector<std::array<float, ShadedChannels::kFloats>> values_;
+  std::vector<ShadedValues> values_;
   std::uint64_t written_ = 0;
 };
 
@@ -218,6 +238,7 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
                                  g.solid_angle, g.parallax, g.inflation, g.resolution,
                                  g.sides == Sides::both ? "both" : "front", request.lift);
   if (request.bounces != 1) text += fmt::format(" bounces {}", request.bounces);
+  if (request.estimate) text += " estimates";
   return text;
 }
 
@@ -230,9 +251,11 @@ std::unique_ptr<ContainerReader> open_receivers(const ShadeRequest& request, con
                         [&](const std::filesystem::path& path) { build_container(build, path, progress); });
 }
 
-/// Shades what a cursor gives, batch by batch. @return CPU seconds of the gather
-double shade_all(PointCursor& cursor, Shader& shader, float lift, ShadedSink& sink, CheckSample& check,
-                 Progress& progress) {
+/// Shades what a cursor gives, batch by batch.
+/// @param estimator  or null
+/// @return CPU seconds of the gather
+double shade_all(PointCursor& cursor, Shader& shader, Estimator* estimator, float lift, ShadedSink& sink,
+                 CheckSample& check, Progress& progress) {
   double cpu = 0;
   std::vector<Surfel> surfels(kBatch);
   std::vector<Receiver> batch(kBatch);
@@ -242,8 +265,12 @@ double shade_all(PointCursor& cursor, Shader& shader, float lift, ShadedSink& si
     const double before = cpu_seconds();
     shader.shade(std::span(batch).first(count), std::span(results).first(count), progress);
     cpu += cpu_seconds() - before;
-    check.add(std::span(batch).first(count), std::span(results).first(count));
-    sink.write(std::span(surfels).first(count), std::span(results).first(count));
+    const auto receivers = std::span(batch).first(count);
+    const auto shaded = std::span(results).first(count);
+    std::span<const ErrorEstimate> estimates;
+    if (estimator) estimates = estimator->estimate(receivers, shaded);
+    check.add(receivers, shaded, estimates);
+    sink.write(std::span(surfels).first(count), shaded, estimates);
   }
   return cpu;
 }
@@ -264,15 +291,16 @@ std::vector<Pilot> pilots_of(const ContainerReader& container, std::uint64_t poi
 }
 
 std::unique_ptr<ShadedSink> make_sink(const std::filesystem::path& target, const ContainerReader& receivers,
-                                      std::uint64_t points, const std::string& settings) {
-  if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points);
-  return std::make_unique<ContainerSink>(target, receivers, settings);
+                                      std::uint64_t points, const std::string& settings, bool estimates) {
+  if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points, estimates);
+  return std::make_unique<ContainerSink>(target, receivers, settings, estimates);
 }
 
 }  // namespace
 
 ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target, Progress& progress) {
   ShadeReport report;
+  check_estimate_request(request.estimate, request.error, request.check);
   const Executor executor(request.run.threads);
   const ContainerReader scene(request.scene);
   const std::unique_ptr<ContainerReader> other =
@@ -286,7 +314,8 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
 
   const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
   ShadeOptions options{
-      .cache_bytes = cache_bytes_left(request.run, kBufferBytes, scene, executor.threads(), "shading"),
+      .cache_bytes = cache_bytes_left(request.run, kBufferBytes, scene,
+                                      readers_of(executor, request.estimate), "shading"),
       .access = request.access,
       .gather = request.gather,
       .sky = sky_function(sky)};
@@ -296,22 +325,38 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
                    progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
   ReceiverPlaces compared;
+  std::vector<Pilot> pilots;
+  if (request.error || request.estimate) pilots = pilots_of(receivers, points, request.lift);
+  std::vector<Shading> traced;  // by rays, of the pilots
   if (request.error) {
     const Stage stage(report.seconds, progress, "tune", 0, "receivers");
-    const std::vector<Pilot> pilots = pilots_of(receivers, points, request.lift);
-    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared);
+    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared, traced);
     options.gather = report.tuning->gather;
   }
+  std::unique_ptr<Estimator> estimator;
+  if (request.estimate) {
+    const Stage stage(report.seconds, progress, "estimate", 0, "receivers");
+    if (!request.error) {
+      traced = trace_pilots(lit, options, pilots, request.check.rays, executor, progress, compared);
+    }
+    estimator = std::make_unique<Estimator>(lit, options, pilots, traced, executor);
+    options.cache = &estimator->cache();
+  }
   const std::unique_ptr<ShadedSink> sink =
-      make_sink(target, receivers, points, settings_text(request, options.gather));
+      make_sink(target, receivers, points, settings_text(request, options.gather), request.estimate);
   CheckSample check(request.check, std::move(compared));
   {
     const Stage stage(report.seconds, progress, "shade", points, "points");
     Shader shader(lit, options, executor);
     PointCursor cursor(receivers, points);
-    report.shade_cpu_seconds = shade_all(cursor, shader, request.lift, *sink, check, progress);
+    report.shade_cpu_seconds = shade_all(cursor, shader, estimator.get(), request.lift, *sink, check, progress);
     report.gather = shader.counts();
     report.cache = shader.cache_statistics();
+  }
+  if (estimator) {
+    report.cache = estimator->cache_statistics();
+    report.estimate = estimator->report();
+    estimator.reset();  // its pages make room for rays
   }
   sink->finish();
   report.bounces = request.bounces;

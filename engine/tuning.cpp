@@ -34,8 +34,7 @@ class Tuner {
   Tuner(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots, const Executor& executor)
       : scene_(scene), options_(options), pilots_(pilots), executor_(executor), errors_(ladder().size()) {
     for (const Pilot& pilot : pilots) {
-      const std::size_t count = std::min(Pilot::kCompared, pilot.receivers.size());
-      for (std::size_t k = 0; k < count; ++k) compared_.push_back(pilot.receivers[index_of(pilot, k, count)]);
+      for (std::size_t k = 0; k < pilot.compared(); ++k) compared_.push_back(pilot.receivers[pilot.compared_at(k)]);
     }
   }
 
@@ -89,13 +88,10 @@ class Tuner {
 
   [[nodiscard]] std::uint64_t shaded() const { return shaded_; }
   [[nodiscard]] std::span<const Receiver> compared() const { return compared_; }
+  [[nodiscard]] std::span<const Shading> traced() const { return traced_; }
 
  private:
   static constexpr std::size_t kChoosing = 0, kConfirming = 1;  // even and odd pilots
-
-  static std::size_t index_of(const Pilot& pilot, std::size_t k, std::size_t count) {
-    return (2 * k + 1) * pilot.receivers.size() / (2 * count);
-  }
 
   /// The cheapest rung that the choosing pilots hold for good enough, if errors fall along the ladder; its
   /// size when none is.
@@ -173,12 +169,11 @@ class Tuner {
 
   [[nodiscard]] ErrorSums compare(std::size_t index, std::span<const Shading> results) const {
     std::size_t first = 0;  // of this pilot's in traced_
-    for (std::size_t i = 0; i < index; ++i) first += 2 * std::min(Pilot::kCompared, pilots_[i].receivers.size());
-    const std::size_t count = std::min(Pilot::kCompared, results.size());
+    for (std::size_t i = 0; i < index; ++i) first += 2 * pilots_[i].compared();
     ErrorSums sums;
-    for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t k = 0; k < pilots_[index].compared(); ++k) {
       const Shading* rays = &traced_[first + 2 * k];
-      sums.add(results[index_of(pilots_[index], k, count)], rays[0], rays[1]);
+      sums.add(results[pilots_[index].compared_at(k)], rays[0], rays[1]);
     }
     return sums;
   }
@@ -214,12 +209,13 @@ PilotPlan plan_pilots(std::uint64_t receivers) {
 }
 
 TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked, std::span<const Pilot> pilots,
-                  const Executor& executor, Progress& progress, ReceiverPlaces& compared) {
+                  const Executor& executor, Progress& progress, ReceiverPlaces& compared,
+                  std::vector<Shading>& traced) {
   Tuner tuner(scene, options, pilots, executor);
   for (const Receiver& receiver : tuner.compared()) compared.add(receiver);
   const double before = cpu_seconds();
   const unsigned rays = tuner.trace_for(asked, progress);
-  const double traced = cpu_seconds();
+  const double tracing_done = cpu_seconds();
   tuner.begin_shading();
   const std::size_t chosen = tuner.choose(asked);
   const bool met = chosen < ladder().size();
@@ -233,8 +229,9 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
                       .pilots = tuner.compared().size(),
                       .rays = 2 * rays,
                       .shaded = tuner.shaded(),
-                      .ray_cpu_seconds = traced - before};
-  report.shade_cpu_seconds = cpu_seconds() - traced;
+                      .ray_cpu_seconds = tracing_done - before};
+  report.shade_cpu_seconds = cpu_seconds() - tracing_done;
+  traced.assign(tuner.traced().begin(), tuner.traced().end());
   return report;
 }
 

@@ -1,6 +1,7 @@
 // The cheapest setting of the gather that meets an error (spec/shading.md#error).
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,13 @@ struct Pilot {
 
   std::vector<Receiver> receivers;
   unsigned variant = 0;  ///< as Shader::shade()
+
+  /// How many are compared.
+  [[nodiscard]] std::size_t compared() const noexcept { return std::min(kCompared, receivers.size()); }
+  /// Place of the k-th of those.
+  [[nodiscard]] std::size_t compared_at(std::size_t k) const noexcept {
+    return (2 * k + 1) * receivers.size() / (2 * compared());
+  }
 };
 
 /// How many pilots stand for a run, and how long they are.
@@ -50,9 +58,10 @@ struct PilotPlan {
 /// @param options  but for its gather, of which only the sides count; its cache_bytes are the cap of the
 ///                 rays too, StreamedRays::kLeastBytes at least
 /// @param compared  the pilots' receivers that were, appended
+/// @param traced    gets two by rays of each of them, side by side and pilot by pilot
 [[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
                                 std::span<const Pilot> pilots, const Executor& executor, Progress& progress,
-                                ReceiverPlaces& compared);
+                                ReceiverPlaces& compared, std::vector<Shading>& traced);
 
 /// What a setting of the ladder gives and costs.
 struct RungError {

@@ -87,6 +87,13 @@ void add_error_option(CLI::App& app, std::optional<double>& error) {
   }
 }
 
+void add_estimate_option(CLI::App& app, bool& estimate) {
+  app.add_flag("--estimate", estimate,
+               "Also write what occlusion and irradiance are off at each receiver, as estimated: occlusion_error and\n"
+               "irradiance_error. Wants --error or --check")
+      ->group("Quality");
+}
+
 void add_check_options(CLI::App& app, CheckRequest& check) {
   constexpr char kGroup[] = "Quality";
   add_integer(app, "--check", check.receivers, 0, 10'000'000, "Compare so many of the receivers with rays")

@@ -28,6 +28,9 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift);
 /// --error, which stands for all expert settings of the gather that trade time for error
 void add_error_option(CLI::App& app, std::optional<double>& error);
 
+/// --estimate
+void add_estimate_option(CLI::App& app, bool& estimate);
+
 /// --check and --check-rays
 void add_check_options(CLI::App& app, CheckRequest& check);
 

@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
   ptc::add_bounces(app, request.bounces);
   ptc::add_gather_options(app, request.gather, request.lift);
   ptc::add_error_option(app, request.error);
+  ptc::add_estimate_option(app, request.estimate);
   ptc::add_access(app, request.access);
   ptc::add_check_options(app, request.check);
 

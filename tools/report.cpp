@@ -21,6 +21,21 @@ ordered_json facts_of(const CheckError& error) {
           {"relative", error.relative()}};
 }
 
+ordered_json facts_of(const EstimateWorth& worth) {
+  return {{"rank", worth.rank},
+          {"top_tenth", worth.top_tenth},
+          {"bottom_tenth", worth.bottom_tenth},
+          {"top_third", worth.top_third},
+          {"bottom_third", worth.bottom_third},
+          {"rms", worth.rms},
+          {"within_twice", worth.within_twice}};
+}
+
+ordered_json facts_of(const EstimateReport& estimate) {
+  return {{"pilots", estimate.pilots},
+          {"cpu_seconds", estimate.cpu_seconds}};
+}
+
 ordered_json facts_of(const TuningReport& tuning) {
   return {{"asked", tuning.asked},
           {"met", tuning.met},
@@ -49,6 +64,12 @@ std::string tuning_text(const TuningReport& tuning) {
   return fmt::format("  error {:.4g} % asked is below the floor: the finest setting ({}) has {:.2f} % at {} pilots, "
                      "whose rays are off by {:.2f} %\n",
                      100 * tuning.asked, setting, measured, tuning.pilots, 100 * tuning.measured.relative_noise());
+}
+
+std::string worth_line(const char* of, const EstimateWorth& worth) {
+  return fmt::format("  estimates of {}: rank correlation {:.2f}, their RMS {:.2f} of the error's; RMS error {:.2f} of it in "
+                     "their top tenth, {:.2f} in the bottom one; {:.1f} % within twice\n",
+                     of, worth.rank, worth.rms, worth.top_tenth, worth.bottom_tenth, 100 * worth.within_twice);
 }
 
 std::string check_line(const char* against, const CheckError& error) {
@@ -105,6 +126,10 @@ ordered_json facts_of(const CheckReport& check) {
                      {"rays", check.rays},
                      {"discs", facts_of(check.discs)},
                      {"disc_microseconds", check.disc_microseconds}};
+  if (check.estimate) {
+    facts["estimate"] = {{"occlusion", facts_of(check.estimate->occlusion)},
+                         {"irradiance", facts_of(check.estimate->irradiance)}};
+  }
   if (check.mesh) {
     facts["mesh"] = facts_of(*check.mesh);
     facts["mesh_microseconds"] = check.mesh_microseconds;
@@ -120,6 +145,7 @@ ordered_json facts_of(const ShadeReport& report) {
                      {"gather", facts_of(report.gather)},
                      {"cache", facts_of(report.cache)}};
   if (report.tuning) facts["tuning"] = facts_of(*report.tuning);
+  if (report.estimate) facts["estimate"] = facts_of(*report.estimate);
   if (report.check) facts["check"] = facts_of(*report.check);
   facts["seconds"] = facts_of(report.seconds);
   return facts;
@@ -132,6 +158,9 @@ std::string shade_text(const std::string& output, const ShadeReport& report) {
   if (report.tuning) text += tuning_text(*report.tuning);
   if (!report.check) return text;
   text += check_line("surfels", report.check->discs);
+  if (const auto& estimate = report.check->estimate) {
+    text += worth_line("occlusion", estimate->occlusion) + worth_line("irradiance", estimate->irradiance);
+  }
   if (report.check->mesh) text += check_line("mesh", *report.check->mesh);
   return text;
 }

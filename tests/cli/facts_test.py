@@ -109,6 +109,19 @@ class Facts(ProgramTest):
         self.assertFalse(json.loads(self.succeed(*below, "--json").stdout)["tuning"]["met"])
         self.assertIn("below the floor", self.succeed(*below).stdout)
 
+    def test_estimates_are_written_and_what_they_are_worth_is_told(self):
+        out = self.here / "o.ply"
+        command = ["ptcshade", self.box, "-o", out, "--error", "10%", "--estimate", "--check", "100"]
+        facts = json.loads(self.succeed(*command, "--json").stdout)
+        self.assertGreater(facts["estimate"]["cpu_seconds"], 0)
+        for quantity in ("occlusion", "irradiance"):
+            self.assertIn("rank", facts["check"]["estimate"][quantity])
+        names, points = read_ply(out)
+        columns = dict(zip(names, zip(*points)))
+        self.assertGreater(max(columns["occlusion_error"]), 0)
+        self.assertGreaterEqual(min(columns["irradiance_error"]), 0)
+        self.assertIn("estimates of occlusion", self.succeed(*command).stdout)
+
     def test_pictures_are_written_in_every_layer(self):
         layers = [f"--layer={name}={self.here}/{name}.png" for name in ("direct", "indirect", "occlusion", "albedo")]
         self.succeed("ptcrender", self.box, "--mesh", self.mesh, "-o", self.here / "o.exr",

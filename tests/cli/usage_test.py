@@ -93,6 +93,14 @@ class Usage(ProgramTest):
                 self.assertIn(option, message)
                 self.assertIn("--error", message)
 
+    def test_estimates_need_rays_to_go_by_and_a_place(self):
+        for program, output in (("ptcshade", "o.ply"), ("ptcrender", "o.exr")):
+            for options in ([], ["--check", "0"]):
+                message = self.fail_with(2, program, self.scene, "-o", self.here / output, "--estimate", *options)
+                self.assertIn("--error or --check", message)
+        message = self.fail_with(2, "ptcrender", self.scene, "-o", self.here / "o.png", "--estimate", "--check", "9")
+        self.assertIn(".exr", message)
+
     def test_names_of_outputs_must_tell_their_kind(self):
         for program, operands in (("ptcbuild", [self.mesh, "-o"]), ("ptcshade", [self.scene, "-o"]),
                                   ("ptcrender", [self.scene, "-o"]), ("ptcconvert", [self.scene])):
