@@ -115,7 +115,6 @@ TEST_CASE("model: leaves, directions and compression cost what they should", "[b
     const ModelRow &raw = row_of(model, "compression", "raw", form), &one = row_of(model, "compression", "zstd 1", form);
     CHECK(one.bytes < 0.95 * raw.bytes);
     CHECK(row_of(model, "compression", "zstd 9", form).bytes < one.bytes);
-    CHECK(raw.decode_ns < one.decode_ns);
   }
   CHECK(row_of(model, "compression", "raw", "points").bytes == Approx(34).epsilon(0.05));
 }
