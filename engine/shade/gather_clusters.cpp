@@ -130,8 +130,8 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
 
   VU colour = hn::Zero(U());
   if (test.bleeding) {
-    // What is not flat is dimmed by its backs; a flat disc has a black one.
-    const auto over = hn::IfThenElse(flat, front, projected);
+    // What is not flat is dimmed by its backs, of which most are hidden; a flat disc has a black one.
+    const auto over = hn::IfThenElse(flat, front, hn::Max(front, hn::Mul(hn::Set(f, kDark), projected)));
     const auto mix = hn::IfThenElse(hn::Gt(over, zero), hn::Div(one, over), zero);
     VF light[3] = {zero, zero, zero};
     for (int k = 0; k < 3; ++k) {

@@ -81,7 +81,7 @@ void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherO
   const float projected = options.sides == Sides::both ? std::max(front.area, back) : front.area;
   if (!(c.area * projected > 0)) return;
   const Splat splat = make_splat({c.mean, c.area, c.radius, c.thickness}, toward, c.area * projected, options.inflation);
-  const float over = splat.one_surfel ? front.area : projected;
+  const float over = lit_area(splat, front.area, projected);
   const glm::vec3 colour = over > 0 ? front.radiance / over : glm::vec3(0);
   queue.push(c.to, splat.normal, splat.radius, pack(colour));
 }

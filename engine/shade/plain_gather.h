@@ -1,6 +1,7 @@
 // The gather of one receiver by itself: a cut through the octree, nothing shared, no vectors.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "engine/shade/direction_buffer.h"
@@ -33,6 +34,12 @@ struct Splat {
 /// @param toward     unit, from the cluster to the receiver
 /// @param projected  area of its fronts or of its backs as the receiver sees them, the greater; above 0
 [[nodiscard]] Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float projected, float inflation);
+
+/// What the light of a cluster's fronts is spread over, to be the radiance of its splat.
+/// @param front  projected area of its fronts   @param projected  as for make_splat
+[[nodiscard]] inline float lit_area(const Splat& splat, float front, float projected) {
+  return splat.one_surfel ? front : std::max(front, kDark * projected);
+}
 
 /// Shades receivers one at a time by the rules of spec/shading.md#gather, written a second time: what
 /// the hierarchical gather is tested and timed against. One per thread.

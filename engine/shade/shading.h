@@ -43,6 +43,7 @@ inline constexpr float kFlat = 0.9F;       ///< length of the mean normal above 
 inline constexpr float kDirected = 1e-3F;  ///< and above which it has a normal at all
 inline constexpr float kSlim = 0.5F;       ///< of thickness over radius: the axes of its ellipsoid
 inline constexpr float kSolid = 0.55F;     ///< share of its ellipsoid's silhouette that it covers at most
+inline constexpr float kDark = 0.5F;       ///< share of its backs that counts where its radiance is dimmed
 
 /// What a gather did.
 struct GatherCounts {

@@ -35,8 +35,22 @@ std::vector<Surfel> stack_of_sheets(int sheets) {
   return surfels;
 }
 
+std::vector<Surfel> ball() {
+  std::vector<Surfel> surfels;
+  add_sphere(surfels, {0, 0, 0}, 0.6, kSpacing, glm::vec3(1));
+  return surfels;
+}
+
+/// Open above, white outside and black inside.
+std::vector<Surfel> bowl() {
+  std::vector<Surfel> surfels = ball();
+  std::erase_if(surfels, [](const Surfel& s) { return s.position.z > 0; });
+  return surfels;
+}
+
 struct Covered {
   double rms, bias;  // of what is covered, over its mean
+  double light;      // bias of the mean radiance of what is covered, over its mean
 };
 
 /// Receivers all around that look at surfels of which they open no cluster but the largest.
@@ -59,35 +73,40 @@ Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
   CHECK(shader.counts().surfels == 0);
   std::vector<Shading> exact(results.size());
   shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both, executor);
-  double square = 0, sum = 0, mean = 0;
+  double square = 0, sum = 0, mean = 0, light = 0, mean_light = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const double error = static_cast<double>(results[i].occlusion) - static_cast<double>(exact[i].occlusion);
     square += error * error;
     sum += error;
     mean += static_cast<double>(exact[i].occlusion);
+    light += static_cast<double>(results[i].irradiance.g) - static_cast<double>(exact[i].irradiance.g);
+    mean_light += static_cast<double>(exact[i].irradiance.g);
   }
   const auto n = static_cast<double>(exact.size());
-  return {std::sqrt(square / n) / (mean / n), sum / mean};
+  return {std::sqrt(square / n) / (mean / n), sum / mean, (mean_light + light) / mean_light * mean / (mean + sum) - 1};
 }
 
 }  // namespace
 
-TEST_CASE("splats: clusters cover little more than what is in them", "[shade][gather]") {
+TEST_CASE("splats: clusters cover little more than what is in them and are as bright", "[shade][gather]") {
   struct Shape {
     const char* name;
     std::vector<Surfel> surfels;
-    double rms, bias;
+    double rms, bias, light;
   };
   // A disc spills over the edges of a sheet that stands alone, and an ellipsoid of revolution knows no length.
-  const std::vector<Shape> shapes{{"a cube", box({1, 1, 1}), 0.30, 0.27},
-                                  {"a tower", box({0.6, 0.6, 2}), 0.70, 0.63},
-                                  {"a wall of two sides", box({2, 2, 0.1}), 0.46, 0.08},
-                                  {"a sheet", stack_of_sheets(1), 0.33, 0.30},
-                                  {"six sheets that face one way", stack_of_sheets(6), 0.27, 0.04}};
+  const std::vector<Shape> shapes{{"a cube", box({1, 1, 1}), 0.30, 0.27, 0.15},
+                                  {"a ball", ball(), 0.48, 0.46, 0.06},
+                                  {"a tower", box({0.6, 0.6, 2}), 0.70, 0.63, 0.04},
+                                  {"a bowl", bowl(), 0.36, 0.34, 0.18},  // its inside is seen, black
+                                  {"a wall of two sides", box({2, 2, 0.1}), 0.46, 0.08, 0.03},
+                                  {"a sheet", stack_of_sheets(1), 0.33, 0.30, 0.02},
+                                  {"six sheets that face one way", stack_of_sheets(6), 0.27, 0.04, 0.02}};
   for (const Shape& shape : shapes) {
     const Covered covered = seen_as_clusters(shape.surfels);
-    CAPTURE(shape.name, covered.rms, covered.bias);
+    CAPTURE(shape.name, covered.rms, covered.bias, covered.light);
     CHECK(covered.rms < shape.rms);
     CHECK(std::abs(covered.bias) < shape.bias);
+    CHECK(std::abs(covered.light) < shape.light);
   }
 }

@@ -221,7 +221,8 @@ class Study {
       if (!(projected > 0)) continue;
       const ClusterShape shape{node.normal, static_cast<float>(node.summary.area), node.radius, node.thickness};
       const Splat splat = make_splat(shape, toward, projected, GatherOptions{}.inflation);
-      const float dim = splat.one_surfel ? 1 : seen.front / projected;
+      const float lit = lit_area(splat, seen.front, projected);
+      const float dim = lit > 0 ? seen.front / lit : 0;
       discs_[i].push_back({to, splat.normal, splat.radius, pack(seen.radiance * dim)});
     }
   }
