@@ -13,13 +13,13 @@
 namespace ptc {
 namespace {
 
-/// Usual errors are in the middle of those in README.md#one-knob.
+/// None of them is slower and less exact than another on most scenes. Usual errors: means over terrain, city and dragon.
 constexpr std::array kLadder{
-    Rung{0.4F, 0.8F, 16, 0.100},    Rung{0.2F, 0.4F, 16, 0.065},    Rung{0.1F, 0.4F, 16, 0.058},
-    Rung{0.06F, 0.3F, 16, 0.046},   Rung{0.03F, 0.2F, 16, 0.036},   Rung{0.02F, 0.15F, 16, 0.030},
-    Rung{0.03F, 0.18F, 32, 0.025},  Rung{0.02F, 0.15F, 32, 0.021},  Rung{0.014F, 0.12F, 32, 0.018},
-    Rung{0.01F, 0.1F, 32, 0.0155},  Rung{0.007F, 0.085F, 32, 0.0135}, Rung{0.005F, 0.07F, 32, 0.012},
-    Rung{0.003F, 0.06F, 48, 0.0085}, Rung{0.002F, 0.05F, 64, 0.0065}, Rung{0.001F, 0.03F, 64, 0.0055},
+    Rung{0.4F, 0.8F, 16, 0.114},    Rung{0.2F, 0.4F, 16, 0.075},     Rung{0.1F, 0.4F, 16, 0.074},
+    Rung{0.06F, 0.3F, 16, 0.063},   Rung{0.06F, 0.3F, 32, 0.051},    Rung{0.03F, 0.2F, 32, 0.036},
+    Rung{0.02F, 0.15F, 32, 0.027},  Rung{0.014F, 0.12F, 32, 0.024},  Rung{0.014F, 0.12F, 48, 0.020},
+    Rung{0.01F, 0.1F, 48, 0.019},   Rung{0.007F, 0.085F, 48, 0.017}, Rung{0.005F, 0.07F, 48, 0.015},
+    Rung{0.003F, 0.06F, 48, 0.0134}, Rung{0.002F, 0.05F, 64, 0.0117}, Rung{0.001F, 0.03F, 64, 0.010},
 };
 
 constexpr unsigned kResamples = 200;
