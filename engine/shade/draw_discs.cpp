@@ -249,16 +249,16 @@ HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQue
     const auto seen = hn::And(mask, hn::And(reaches(discs.c[u]), reaches(discs.c[v])));
     const auto negative = hn::Lt(discs.c[axis], hn::Zero(f));
     const std::size_t at = out.size;
-    hn::CompressBlendedStore(cw, seen, f, out.cw + at);
-    hn::CompressBlendedStore(discs.c[u], seen, f, out.cu + at);
-    hn::CompressBlendedStore(discs.c[v], seen, f, out.cv + at);
-    hn::CompressBlendedStore(hn::IfThenElse(negative, hn::Neg(discs.n[axis]), discs.n[axis]), seen, f, out.nw + at);
-    hn::CompressBlendedStore(discs.n[u], seen, f, out.nu + at);
-    hn::CompressBlendedStore(discs.n[v], seen, f, out.nv + at);
-    hn::CompressBlendedStore(discs.radius, seen, f, out.radius + at);
+    append(cw, seen, f, out.cw + at);
+    append(discs.c[u], seen, f, out.cu + at);
+    append(discs.c[v], seen, f, out.cv + at);
+    append(hn::IfThenElse(negative, hn::Neg(discs.n[axis]), discs.n[axis]), seen, f, out.nw + at);
+    append(discs.n[u], seen, f, out.nu + at);
+    append(discs.n[v], seen, f, out.nv + at);
+    append(discs.radius, seen, f, out.radius + at);
     const auto face = hn::IfThenElse(hn::RebindMask(i, negative), hn::Set(i, 2 * axis + 1), hn::Set(i, 2 * axis));
-    hn::CompressBlendedStore(face, hn::RebindMask(i, seen), i, out.face + at);
-    out.size += hn::CompressBlendedStore(colour, hn::RebindMask(u32, seen), u32, out.rgbe + at);
+    append(face, hn::RebindMask(i, seen), i, out.face + at);
+    out.size += append(colour, hn::RebindMask(u32, seen), u32, out.rgbe + at);
   }
 }
 

@@ -85,14 +85,14 @@ HWY_INLINE void push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal
   const F f;
   const U u;
   const auto at = static_cast<std::size_t>(queue.size);
-  hn::CompressBlendedStore(to.x, mask, f, queue.x + at);
-  hn::CompressBlendedStore(to.y, mask, f, queue.y + at);
-  hn::CompressBlendedStore(to.z, mask, f, queue.z + at);
-  hn::CompressBlendedStore(normal.x, mask, f, queue.nx + at);
-  hn::CompressBlendedStore(normal.y, mask, f, queue.ny + at);
-  hn::CompressBlendedStore(normal.z, mask, f, queue.nz + at);
-  hn::CompressBlendedStore(radius, mask, f, queue.radius + at);
-  queue.size += static_cast<int>(hn::CompressBlendedStore(rgbe, hn::RebindMask(u, mask), u, queue.rgbe + at));
+  append(to.x, mask, f, queue.x + at);
+  append(to.y, mask, f, queue.y + at);
+  append(to.z, mask, f, queue.z + at);
+  append(normal.x, mask, f, queue.nx + at);
+  append(normal.y, mask, f, queue.ny + at);
+  append(normal.z, mask, f, queue.nz + at);
+  append(radius, mask, f, queue.radius + at);
+  queue.size += static_cast<int>(append(rgbe, hn::RebindMask(u, mask), u, queue.rgbe + at));
 }
 
 /// Of lengths relative to a cell, over them: what floats may be off after a few operations.

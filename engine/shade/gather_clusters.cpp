@@ -151,15 +151,15 @@ HWY_INLINE void leave(NearClusters& left, MF mask, const Clusters& c, VF distanc
   const U u;
   const std::size_t at = left.size;
   const auto rounding = hn::Mul(distance, hn::Set(f, kRounding));
-  hn::CompressBlendedStore(c.to.x, mask, f, left.x.data() + at);
-  hn::CompressBlendedStore(c.to.y, mask, f, left.y.data() + at);
-  hn::CompressBlendedStore(c.to.z, mask, f, left.z.data() + at);
-  hn::CompressBlendedStore(hn::Add(c.radius, rounding), mask, f, left.radius.data() + at);
-  hn::CompressBlendedStore(hn::Add(c.thickness, rounding), mask, f, left.thickness.data() + at);
-  hn::CompressBlendedStore(c.mean.x, mask, f, left.mean_x.data() + at);
-  hn::CompressBlendedStore(c.mean.y, mask, f, left.mean_y.data() + at);
-  hn::CompressBlendedStore(c.mean.z, mask, f, left.mean_z.data() + at);
-  left.size += hn::CompressBlendedStore(payload, hn::RebindMask(u, mask), u, left.payload.data() + at);
+  append(c.to.x, mask, f, left.x.data() + at);
+  append(c.to.y, mask, f, left.y.data() + at);
+  append(c.to.z, mask, f, left.z.data() + at);
+  append(hn::Add(c.radius, rounding), mask, f, left.radius.data() + at);
+  append(hn::Add(c.thickness, rounding), mask, f, left.thickness.data() + at);
+  append(c.mean.x, mask, f, left.mean_x.data() + at);
+  append(c.mean.y, mask, f, left.mean_y.data() + at);
+  append(c.mean.z, mask, f, left.mean_z.data() + at);
+  left.size += append(payload, hn::RebindMask(u, mask), u, left.payload.data() + at);
 }
 
 /// Eight children of a group from `first` on, in columns of the page.
@@ -317,7 +317,7 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
     }
     if (!hn::AllFalse(f, verdict.open)) {
       opened.resize(opened.size() + lanes);
-      const std::size_t count = hn::CompressBlendedStore(payload, hn::RebindMask(u, verdict.open), u, opened.data() + opened.size() - lanes);
+      const std::size_t count = append(payload, hn::RebindMask(u, verdict.open), u, opened.data() + opened.size() - lanes);
       opened.resize(opened.size() - lanes + count);
     }
     if (!hn::AllFalse(f, verdict.keep)) leave(out.left->clusters, verdict.keep, c, d, payload);

@@ -62,14 +62,14 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   if (hn::AllFalse(f, keep)) return;
   NearSurfels& left = out.left->surfels;
   const std::size_t at = left.size;
-  hn::CompressBlendedStore(s.to.x, keep, f, left.x.data() + at);
-  hn::CompressBlendedStore(s.to.y, keep, f, left.y.data() + at);
-  hn::CompressBlendedStore(s.to.z, keep, f, left.z.data() + at);
-  hn::CompressBlendedStore(s.normal.x, keep, f, left.nx.data() + at);
-  hn::CompressBlendedStore(s.normal.y, keep, f, left.ny.data() + at);
-  hn::CompressBlendedStore(s.normal.z, keep, f, left.nz.data() + at);
-  hn::CompressBlendedStore(s.radius, keep, f, left.radius.data() + at);
-  left.size += hn::CompressBlendedStore(rgbe, hn::RebindMask(u, keep), u, left.rgbe.data() + at);
+  append(s.to.x, keep, f, left.x.data() + at);
+  append(s.to.y, keep, f, left.y.data() + at);
+  append(s.to.z, keep, f, left.z.data() + at);
+  append(s.normal.x, keep, f, left.nx.data() + at);
+  append(s.normal.y, keep, f, left.ny.data() + at);
+  append(s.normal.z, keep, f, left.nz.data() + at);
+  append(s.radius, keep, f, left.radius.data() + at);
+  left.size += append(rgbe, hn::RebindMask(u, keep), u, left.rgbe.data() + at);
 }
 
 /// Coordinates of a page relative to a centre, in scene units.
