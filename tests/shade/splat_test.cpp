@@ -73,17 +73,17 @@ Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
   CHECK(shader.counts().surfels == 0);
   std::vector<Shading> exact(results.size());
   shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both, executor);
-  double square = 0, sum = 0, mean = 0, light = 0, mean_light = 0;
+  double square = 0, sum = 0, mean = 0, light = 0, exact_light = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const double error = static_cast<double>(results[i].occlusion) - static_cast<double>(exact[i].occlusion);
     square += error * error;
     sum += error;
     mean += static_cast<double>(exact[i].occlusion);
-    light += static_cast<double>(results[i].irradiance.g) - static_cast<double>(exact[i].irradiance.g);
-    mean_light += static_cast<double>(exact[i].irradiance.g);
+    light += static_cast<double>(results[i].irradiance.g);
+    exact_light += static_cast<double>(exact[i].irradiance.g);
   }
   const auto n = static_cast<double>(exact.size());
-  return {std::sqrt(square / n) / (mean / n), sum / mean, (mean_light + light) / mean_light * mean / (mean + sum) - 1};
+  return {std::sqrt(square / n) / (mean / n), sum / mean, light / (mean + sum) / (exact_light / mean) - 1};
 }
 
 }  // namespace
