@@ -5,6 +5,7 @@
 #include <array>
 #include <cstring>
 #include <iterator>
+#include <map>
 #include <numeric>
 #include <set>
 #include <string>
@@ -163,6 +164,10 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   std::ranges::sort(order, {}, [&](std::uint32_t page) { return container.entry(page).offset; });
   PageDecoder decoder;
   std::vector<std::byte> payload(container.page_payload_limit());
+  std::map<std::uint16_t, std::vector<PackedColumn>> columns;
+  for (const std::uint16_t group : groups_of(container)) {
+    columns[group] = packed_group_columns(container.meta().channels, group);
+  }
   for (const std::uint32_t page : order) {
     const PageHeader header = container.read_page(page, payload, decoder);
     writer.write_page(page,
@@ -172,7 +177,7 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
                        .record_count = header.record_count,
                        .first_key = header.first_key,
                        .last_key = header.last_key},
-                      std::span(payload).first(header.raw_bytes));
+                      std::span(payload).first(header.raw_bytes), columns[header.group]);
     if (header.type == PageType::point) progress.advance(header.record_count);
   }
 }
@@ -228,11 +233,12 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   const std::uint32_t full = points_per_page(writer.header());
   for (const std::uint16_t group : groups_of(container)) {
     GroupPager pager(container, group);
+    const std::vector<PackedColumn> columns = packed_group_columns(container.meta().channels, group);
     for (std::uint64_t left = container.superblock().points; left > 0;) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
       writer.write_page(writer.reserve_page(),
                         {.type = PageType::attribute, .group = group, .record_count = count},
-                        pager.next(count));
+                        pager.next(count), columns);
       left -= count;
     }
   }

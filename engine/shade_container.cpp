@@ -158,6 +158,7 @@ class ContainerSink : public ShadedSink {
     const std::vector<Channel> added = ShadedChannels::channels(estimates);
     meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());
     meta_.text["shading"] = settings;
+    columns_ = packed_group_columns(meta_.channels, kGroup);
     copy_pages();
   }
 
@@ -205,7 +206,7 @@ class ContainerSink : public ShadedSink {
                                  .record_count = header.record_count,
                                  .first_key = header.first_key,
                                  .last_key = header.last_key},
-                                header.codec, header.raw_bytes, stored);
+                                header.coding, header.raw_bytes, stored);
     }
   }
 
@@ -220,7 +221,7 @@ class ContainerSink : public ShadedSink {
     }
     writer_.write_page(writer_.reserve_page(),
                        {.type = PageType::attribute, .group = kGroup, .record_count = static_cast<std::uint32_t>(count)},
-                       payload);
+                       payload, columns_);
     written_ += count;
     values_.clear();
   }
@@ -228,6 +229,7 @@ class ContainerSink : public ShadedSink {
   const ContainerReader& from_;
   std::size_t floats_;  // of a point
   Meta meta_;
+  std::vector<PackedColumn> columns_;
   ContainerWriter writer_;
   std::vector<ShadedValues> values_;
   std::uint64_t written_ = 0;

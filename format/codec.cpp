@@ -1,12 +1,15 @@
-// Page compression with zstd, one frame a page (spec/container.md#codecs).
+// Page compression with zstd and LZ4, one frame or block a page (spec/container.md#codecs).
 #include "format/codec.h"
 
+#include <lz4.h>
 #include <zstd.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cstdint>
 #include <new>
 #include <stdexcept>
+#include <string>
 
 #include "format/bytes.h"
 #include "format/error.h"
@@ -15,11 +18,13 @@ namespace ptc {
 namespace {
 
 constexpr char kFrameClause[] = "spec/container.md#codec-frame";
+constexpr char kBlockClause[] = "spec/container.md#codec-block";
 constexpr int kWindowLog = 20;  // the greatest page: every frame is a single segment
+constexpr std::size_t kLengthBytes = 4;  // in front of an LZ4 block
 
-// A frame that decodes to exactly `raw_bytes` without a dictionary or a window beyond them:
+// Bytes that a frame decodes to, when it is whole and needs no dictionary or window beyond them:
 // magic, descriptor (bits 7-6 width of the content size, 5 single segment, 1-0 dictionary), size.
-void check_frame(std::span<const std::byte> stored, std::size_t raw_bytes) {
+unsigned long long check_frame(std::span<const std::byte> stored) {
   if (stored.size() < 5 || load<std::uint32_t>(stored.data(), 0) != ZSTD_MAGICNUMBER) {
     throw FormatError(0, kFrameClause, "payload is not a zstd frame");
   }
@@ -28,14 +33,11 @@ void check_frame(std::span<const std::byte> stored, std::size_t raw_bytes) {
     throw FormatError(4, kFrameClause, "zstd frame is not a single segment");
   }
   if ((descriptor & 0x03) != 0) throw FormatError(4, kFrameClause, "zstd frame has a dictionary");
-  const unsigned long long content = ZSTD_getFrameContentSize(stored.data(), stored.size());
-  if (content != raw_bytes) {
-    throw FormatError(5, kFrameClause, "zstd frame declares another size than raw_bytes");
-  }
   const std::size_t frame = ZSTD_findFrameCompressedSize(stored.data(), stored.size());
   if (ZSTD_isError(frame) || frame != stored.size()) {
     throw FormatError(0, kFrameClause, "payload is not exactly one zstd frame");
   }
+  return ZSTD_getFrameContentSize(stored.data(), stored.size());
 }
 
 void check(std::size_t result) {
@@ -62,18 +64,41 @@ PageEncoder::~PageEncoder() {
   ZSTD_freeCCtx(static_cast<ZSTD_CCtx*>(context_));
 }
 
-Codec PageEncoder::encode(std::span<const std::byte> raw, std::vector<std::byte>& out) {
+// Into at most `limit` bytes; false when they do not suffice.
+bool PageEncoder::compress(std::span<const std::byte> from, std::size_t limit, std::vector<std::byte>& out) {
+  out.resize(limit);
   if (codec_ == Codec::zstd) {
-    out.resize(raw.size() * 15 / 16);  // a frame that does not fit is not worth it
-    const std::size_t size = ZSTD_compress2(static_cast<ZSTD_CCtx*>(context_), out.data(),
-                                            out.size(), raw.data(), raw.size());
-    if (!ZSTD_isError(size)) {
-      out.resize(size);
-      return Codec::zstd;
+    const std::size_t size =
+        ZSTD_compress2(static_cast<ZSTD_CCtx*>(context_), out.data(), out.size(), from.data(), from.size());
+    if (ZSTD_isError(size)) return false;
+    out.resize(size);
+    return true;
+  }
+  if (limit <= kLengthBytes) return false;
+  store(out.data(), 0, static_cast<std::uint32_t>(from.size()));
+  const int size = LZ4_compress_default(reinterpret_cast<const char*>(from.data()),
+                                        reinterpret_cast<char*>(out.data() + kLengthBytes),
+                                        static_cast<int>(from.size()), static_cast<int>(limit - kLengthBytes));
+  out.resize(kLengthBytes + static_cast<std::size_t>(std::max(size, 0)));
+  return size > 0;
+}
+
+Coding PageEncoder::encode(std::span<const std::byte> raw, std::vector<std::byte>& out,
+                           const PayloadColumns& columns) {
+  if (codec_ != Codec::raw) {
+    Coding coding{.codec = codec_};
+    std::span<const std::byte> from = raw;
+    if (!columns.columns.empty()) {
+      pack_columns(raw, columns.count, columns.columns, packed_);
+      if (packed_.size() <= raw.size()) {
+        from = packed_;
+        coding.filter = Filter::columns;
+      }
     }
+    if (compress(from, raw.size() * 15 / 16, out)) return coding;
   }
   out.assign(raw.begin(), raw.end());
-  return Codec::raw;
+  return {};
 }
 
 PageDecoder::PageDecoder() : context_(ZSTD_createDCtx()) {
@@ -84,19 +109,49 @@ PageDecoder::~PageDecoder() {
   ZSTD_freeDCtx(static_cast<ZSTD_DCtx*>(context_));
 }
 
-void PageDecoder::decode(Codec codec, std::span<const std::byte> stored, std::span<std::byte> out) {
-  if (codec == Codec::raw) {
-    if (stored.size() != out.size()) {
+std::span<const std::byte> PageDecoder::expand(Codec codec, std::span<const std::byte> stored, std::size_t least,
+                                               std::size_t limit, std::span<std::byte> room) {
+  if (codec == Codec::raw) return stored;
+  if (codec == Codec::zstd) {
+    const unsigned long long bytes = check_frame(stored);
+    if (bytes < least || bytes > limit) {
+      throw FormatError(5, kFrameClause, "zstd frame declares another size than the page's");
+    }
+    const std::size_t size = ZSTD_decompressDCtx(static_cast<ZSTD_DCtx*>(context_), room.data(), bytes,
+                                                 stored.data(), stored.size());
+    if (ZSTD_isError(size) || size != bytes) throw FormatError(0, kFrameClause, "zstd frame does not decode");
+    return room.first(size);
+  }
+  if (stored.size() <= kLengthBytes) throw FormatError(0, kBlockClause, "payload is too short for an LZ4 block");
+  const auto bytes = load<std::uint32_t>(stored.data(), 0);
+  if (bytes < least || bytes > limit) {
+    throw FormatError(0, kBlockClause, "LZ4 block declares another size than the page's");
+  }
+  const int size = LZ4_decompress_safe(reinterpret_cast<const char*>(stored.data() + kLengthBytes),
+                                       reinterpret_cast<char*>(room.data()),
+                                       static_cast<int>(stored.size() - kLengthBytes), static_cast<int>(bytes));
+  if (size < 0 || static_cast<std::uint32_t>(size) != bytes) {
+    throw FormatError(kLengthBytes, kBlockClause, "LZ4 block does not decode to the size it declares");
+  }
+  return room.first(bytes);
+}
+
+void PageDecoder::decode(Coding coding, std::span<const std::byte> stored, std::span<std::byte> out,
+                         const PayloadColumns& columns) {
+  if (coding.filter == Filter::none) {
+    const std::span<const std::byte> raw = expand(coding.codec, stored, out.size(), out.size(), out);
+    if (raw.size() != out.size()) {
       throw FormatError(0, "spec/container.md#page-length", "raw payload has another size");
     }
-    std::ranges::copy(stored, out.begin());
+    if (coding.codec == Codec::raw) std::ranges::copy(raw, out.begin());
     return;
   }
-  check_frame(stored, out.size());
-  const std::size_t size = ZSTD_decompressDCtx(static_cast<ZSTD_DCtx*>(context_), out.data(),
-                                               out.size(), stored.data(), stored.size());
-  if (ZSTD_isError(size) || size != out.size()) {
-    throw FormatError(0, kFrameClause, "zstd frame does not decode");
+  packed_.resize(out.size());  // packing does not lengthen
+  const std::span<const std::byte> packed = expand(coding.codec, stored, 1, out.size(), packed_);
+  try {
+    unpack_columns(packed, columns.count, columns.columns, out);
+  } catch (const FormatError& error) {
+    throw FormatError(0, error.clause(), "packed byte " + std::to_string(error.offset()) + ": " + error.text());
   }
 }
 

@@ -6,10 +6,17 @@
 #include <vector>
 
 #include "format/container.h"
+#include "format/packed_columns.h"
 
 namespace ptc {
 
-/// Compresses page payloads; keeps its context between calls. One per thread.
+/// The columns that a payload may be packed by, none when it has none.
+struct PayloadColumns {
+  std::uint32_t count = 0;  ///< values of each
+  std::span<const PackedColumn> columns;
+};
+
+/// Codes page payloads; keeps its context between calls. One per thread.
 class PageEncoder {
  public:
   /// @param level  of zstd. @throws std::bad_alloc
@@ -18,17 +25,20 @@ class PageEncoder {
   PageEncoder(const PageEncoder&) = delete;
   PageEncoder& operator=(const PageEncoder&) = delete;
 
-  /// Stored form of `raw` into `out` and the codec that was used: raw when compression does not
-  /// save at least a sixteenth.
-  Codec encode(std::span<const std::byte> raw, std::vector<std::byte>& out);
+  /// Stored form of `raw` into `out` and how it was coded: not at all when that does not save at
+  /// least a sixteenth. Columns that are given are packed first, where that does not lengthen them.
+  Coding encode(std::span<const std::byte> raw, std::vector<std::byte>& out, const PayloadColumns& columns = {});
 
  private:
+  [[nodiscard]] bool compress(std::span<const std::byte> from, std::size_t limit, std::vector<std::byte>& out);
+
   Codec codec_;
   int level_;
-  void* context_ = nullptr;
+  void* context_ = nullptr;        ///< of zstd
+  std::vector<std::byte> packed_;  ///< kept between calls
 };
 
-/// Decodes page payloads. One per thread.
+/// Decodes page payloads. One per thread.   Memory: a page.
 class PageDecoder {
  public:
   /// @throws std::bad_alloc
@@ -38,11 +48,18 @@ class PageDecoder {
   PageDecoder& operator=(const PageDecoder&) = delete;
 
   /// Fills `out`, whose size is the page's raw_bytes.
+  /// @param columns  of the page's type; looked at when it is packed
   /// @throws FormatError when the payload does not decode to exactly out.size() bytes
-  void decode(Codec codec, std::span<const std::byte> stored, std::span<std::byte> out);
+  void decode(Coding coding, std::span<const std::byte> stored, std::span<std::byte> out,
+              const PayloadColumns& columns = {});
 
  private:
+  /// Undoes the codec. @param limit  the most bytes that there may be. @return what was decoded, in `room` or `stored`
+  std::span<const std::byte> expand(Codec codec, std::span<const std::byte> stored, std::size_t least,
+                                    std::size_t limit, std::span<std::byte> room);
+
   void* context_;
+  std::vector<std::byte> packed_;  ///< kept between calls
 };
 
 }  // namespace ptc

@@ -19,7 +19,15 @@ inline constexpr std::uint32_t kNoPage = 0xffffffff;
 inline constexpr std::uint64_t kMaxPages = 0xfffffffe;
 
 enum class PageType : std::uint16_t { node = 1, point = 2, directory = 3, meta = 4, attribute = 5 };
-enum class Codec : std::uint16_t { raw = 0, zstd = 1 };
+enum class Codec : std::uint8_t { raw = 0, zstd = 1, lz4 = 2 };
+enum class Filter : std::uint8_t { none = 0, columns = 1 };
+
+/// How a payload lies in the file: filtered first, then compressed.
+struct Coding {
+  Codec codec = Codec::raw;
+  Filter filter = Filter::none;
+  friend bool operator==(const Coding&, const Coding&) = default;
+};
 
 using Uuid = std::array<std::byte, 16>;
 
@@ -37,7 +45,7 @@ struct FileHeader {
 /// 64 bytes in front of every page's payload.
 struct PageHeader {
   PageType type = PageType::node;
-  Codec codec = Codec::raw;
+  Coding coding;
   std::uint32_t page_id = 0;
   std::uint32_t stored_bytes = 0;  ///< payload as it lies in the file
   std::uint32_t raw_bytes = 0;     ///< payload decoded, at most page size - 64

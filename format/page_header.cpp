@@ -46,6 +46,20 @@ bool record_count_fits(const PageFacts& facts) noexcept {
   return false;
 }
 
+Coding decode_coding(const std::byte* p, PageType type) {
+  const auto codec = load<std::uint8_t>(p, 6), filter = load<std::uint8_t>(p, 7);
+  constexpr char kCodec[] = "spec/container.md#page-codec";
+  if (codec > static_cast<std::uint8_t>(Codec::lz4)) throw FormatError(6, kCodec, "unknown codec");
+  if (type == PageType::directory && codec != 0) throw FormatError(6, kCodec, "directory page is compressed");
+  constexpr char kFilter[] = "spec/container.md#page-filter";
+  if (filter > static_cast<std::uint8_t>(Filter::columns)) throw FormatError(7, kFilter, "unknown filter");
+  if (filter != 0 && codec == 0) throw FormatError(7, kFilter, "a raw page is filtered");
+  if (filter != 0 && type != PageType::point && type != PageType::attribute) {
+    throw FormatError(7, kFilter, "a page of this type has no columns to filter");
+  }
+  return {static_cast<Codec>(codec), static_cast<Filter>(filter)};
+}
+
 void check_level_and_keys(const PageHeader& header) {
   const bool node = header.type == PageType::node;
   if (node ? header.level > kMaxLevel : header.level != kNoLevel) {
@@ -87,7 +101,8 @@ void encode_page_header(const PageHeader& header, const Uuid& uuid,
   std::byte* const p = out.data();
   store(p, 0, kPageMagic);
   store(p, 4, type);
-  store(p, 6, static_cast<std::uint16_t>(header.codec));
+  store(p, 6, static_cast<std::uint8_t>(header.coding.codec));
+  store(p, 7, static_cast<std::uint8_t>(header.coding.filter));
   store(p, 8, header.page_id);
   store(p, 12, header.stored_bytes);
   store(p, 16, header.raw_bytes);
@@ -118,7 +133,6 @@ PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader
     throw FormatError(kPageHashAt, "spec/container.md#page-checksum",
                       "page header's checksum is wrong");
   }
-  const auto codec = load<std::uint16_t>(p, 6);
   header.stored_bytes = load<std::uint32_t>(p, 12);
   header.raw_bytes = load<std::uint32_t>(p, 16);
   header.group = load<std::uint16_t>(p, 20);
@@ -131,14 +145,8 @@ PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader
   check_page_facts({type, header.group, header.stored_bytes, header.raw_bytes, header.record_count},
                    file);
   header.type = static_cast<PageType>(type);
-  constexpr char kCodec[] = "spec/container.md#page-codec";
-  if (codec > static_cast<std::uint16_t>(Codec::zstd))
-    throw FormatError(6, kCodec, "unknown codec");
-  header.codec = static_cast<Codec>(codec);
-  if (header.type == PageType::directory && header.codec != Codec::raw) {
-    throw FormatError(6, kCodec, "directory page is compressed");
-  }
-  if ((header.codec == Codec::raw) != (header.stored_bytes == header.raw_bytes)) {
+  header.coding = decode_coding(p, header.type);
+  if ((header.coding.codec == Codec::raw) != (header.stored_bytes == header.raw_bytes)) {
     throw FormatError(12, "spec/container.md#page-length",
                       "stored_bytes equals raw_bytes without codec raw, or the reverse");
   }

@@ -28,7 +28,8 @@ PAGE_HEADER_BYTES = 64
 ENTRY_BYTES = 32
 NO_PAGE = 0xFFFFFFFF
 NODE, POINT, DIRECTORY, META, ATTRIBUTE = 1, 2, 3, 4, 5
-RAW, ZSTD = 0, 1
+RAW, ZSTD, LZ4 = 0, 1, 2
+PACKED = 1  # the filter of packed columns
 
 
 class Broken(Exception):
@@ -82,9 +83,9 @@ def decode_header(block):
 
 # Page header (container.md#page-header) ----------------------------------------------------------
 
-PAGE = struct.Struct("<4sHHIIIHHIIQQQQ")
+PAGE = struct.Struct("<4sHBBIIIHHIIQQQQ")
 
-Page = namedtuple("Page", "type codec page_id stored_bytes raw_bytes group level record_count "
+Page = namedtuple("Page", "type codec filter page_id stored_bytes raw_bytes group level record_count "
                           "first_key last_key payload_xxh3")
 
 
@@ -108,35 +109,46 @@ def check_facts(header, at, type_, group, stored, raw, count):
 def decode_page_header(header, bytes_, at):
     magic, *fields, found = PAGE.unpack(bytes_)
     require(magic == b"PTCp", at, "spec/container.md#page-magic", "no page starts here")
-    (type_, codec, page_id, stored, raw, group, level, count, reserved, first, last, hash_) = fields
+    (type_, codec, filter_, page_id, stored, raw, group, level, count, reserved, first, last,
+     hash_) = fields
     require(found == xxh3_64(bytes_[:56], page_seed(header.uuid, page_id, type_)), at + 56,
             "spec/container.md#page-checksum", "page header's checksum is wrong")
     check_facts(header, at, type_, group, stored, raw, count)
-    require(codec <= (RAW if type_ == DIRECTORY else ZSTD), at + 6,
+    require(codec <= (RAW if type_ == DIRECTORY else LZ4), at + 6,
             "spec/container.md#page-codec", "unknown codec, or a compressed directory page")
+    require(filter_ <= (PACKED if type_ in (POINT, ATTRIBUTE) and codec != RAW else 0), at + 7,
+            "spec/container.md#page-filter", "unknown filter, or one that suits no such page")
     require((codec == RAW) == (stored == raw), at + 12, "spec/container.md#page-length",
             "stored_bytes equals raw_bytes without codec raw, or the reverse")
     require(reserved == 0 and (level <= 62 if type_ == NODE else level == 0xFFFF), at + 22,
             "spec/container.md#page-fields", "level or the reserved field is out of range")
     limit = 1 if type_ in (DIRECTORY, META) else 1 << 63
     require(first <= last < limit, at + 32, "spec/container.md#page-keys", "keys are out of range")
-    return Page(type_, codec, page_id, stored, raw, group, level, count, first, last, hash_)
+    return Page(type_, codec, filter_, page_id, stored, raw, group, level, count, first, last, hash_)
 
 
 # Codecs (container.md#codecs) --------------------------------------------------------------------
 
 FRAME = "spec/container.md#codec-frame"
+LZ4_BLOCK = "spec/container.md#codec-block"
 
 
-def check_frame(stored, raw_bytes, at):
-    """One zstd frame with a single segment and a known size (RFC 8878, section 3.1.1)."""
+def check_size(page, size, at, clause):
+    """What a codec decodes to: the payload, or packed columns that are no longer."""
+    require(1 <= size <= page.raw_bytes and (page.filter == PACKED or size == page.raw_bytes), at,
+            clause, "another content size than the page's")
+    return size
+
+
+def check_frame(stored, page, at):
+    """The content size of one zstd frame with a single segment (RFC 8878, section 3.1.1)."""
     require(stored[:4] == b"\x28\xb5\x2f\xfd" and len(stored) >= 6, at, FRAME, "not a zstd frame")
     descriptor = stored[4]
     require(descriptor & 0x20 and not descriptor & 0x0B, at + 4, FRAME,
             "not a single segment, or a dictionary, or a reserved bit")
     size_bytes = (1, 2, 4, 8)[descriptor >> 6]
     size = int.from_bytes(stored[5:5 + size_bytes], "little") + (256 if size_bytes == 2 else 0)
-    require(size == raw_bytes, at + 5, FRAME, "another content size than raw_bytes")
+    check_size(page, size, at + 5, FRAME)
     end, last = 5 + size_bytes, False
     while not last:
         require(end + 3 <= len(stored), at + end, FRAME, "frame is truncated")
@@ -145,6 +157,43 @@ def check_frame(stored, raw_bytes, at):
         end += 3 + (1 if kind == 1 else length)  # one byte repeated, or as many as it says
     end += 4 if descriptor & 0x04 else 0
     require(end == len(stored), at, FRAME, "not exactly one frame")
+    return size
+
+
+def decode_lz4(stored, page, at):
+    """One LZ4 block behind its decoded size."""
+    require(len(stored) > 4, at, LZ4_BLOCK, "too short for a block")
+    size = check_size(page, int.from_bytes(stored[:4], "little"), at, LZ4_BLOCK)
+    out, i, whole = bytearray(), 4, False
+
+    def byte():
+        nonlocal i
+        require(i < len(stored), at + i, LZ4_BLOCK, "block is truncated")
+        i += 1
+        return stored[i - 1]
+
+    def length(nibble):
+        total, more = nibble, nibble == 15
+        while more:
+            part = byte()
+            total, more = total + part, part == 255
+        return total
+    while not whole:
+        token = byte()
+        literals = length(token >> 4)
+        require(literals <= len(stored) - i, at + i, LZ4_BLOCK, "literals are truncated")
+        out += stored[i:i + literals]
+        i += literals
+        whole = i == len(stored)
+        if not whole:
+            back = byte() | byte() << 8
+            require(1 <= back <= len(out), at + i, LZ4_BLOCK, "match before the start")
+            count = length(token & 15) + 4
+            require(len(out) + count <= size, at + i, LZ4_BLOCK, "longer than it declares")
+            for _ in range(count):
+                out.append(out[-back])
+    require(len(out) == size, at, LZ4_BLOCK, "another size than it declares")
+    return bytes(out)
 
 
 def run_zstd(frames):
@@ -154,7 +203,7 @@ def run_zstd(frames):
 
 
 def decode_frames(jobs):
-    """Payloads of (page, stored, raw_bytes, offset): one process for all, unless one is broken."""
+    """What (page, frame, decoded size, offset) decode to: one process for all, unless one is broken."""
     whole = run_zstd(b"".join(stored for _, stored, _, _ in jobs))
     if whole is not None and len(whole) == sum(raw for _, _, raw, _ in jobs):
         out, at = {}, 0
@@ -352,6 +401,53 @@ class Points:
         self.normal = list(zip(column("h", 20), column("h", 22)))
         self.radiance = tuple(column("e", before) for before in (24, 26, 28))
         self.albedo = tuple(column("B", before) for before in (30, 31, 32))
+
+
+Column = namedtuple("Column", "before bits minus")
+POINT_COLUMNS = [Column(0, 42, None), Column(4, 42, None), Column(8, 42, None),
+                 Column(16, 32, None), Column(20, 16, None), Column(22, 16, None),
+                 Column(26, 16, None), Column(24, 16, 6), Column(28, 16, 6),
+                 Column(31, 8, None), Column(30, 8, 9), Column(32, 8, 9), Column(33, 8, None)]
+
+
+def group_columns(channels, group):
+    out, before = [], 0
+    for c in channels:
+        for _ in range(c.components if c.group == group else 0):
+            out.append(Column(before, 8 * CHANNEL_BYTES[c.type], None))
+            before += CHANNEL_BYTES[c.type]
+    return out
+
+
+def unpack_columns(packed, columns, count, at):
+    """The payload that packed columns stand for (points.md#packed-columns)."""
+    clause, place, values = "spec/points.md#packed-columns", 0, []
+    for column in columns:
+        require(len(packed) - place >= 10, at, clause, "a column's head is truncated")
+        shift, planes, value = struct.unpack_from("<BBQ", packed, place)
+        mask = (1 << column.bits) - 1
+        require(shift < column.bits and planes <= (column.bits + 7) // 8 and value <= mask, at,
+                clause, "shift, planes or base is out of range")
+        end = place + 10 + planes * count
+        require(end <= len(packed), at, clause, "a plane is truncated")
+        out = []
+        for i in range(count):
+            code = sum(packed[place + 10 + k * count + i] << 8 * k for k in range(planes))
+            value = value + ((code >> 1 ^ -(code & 1)) << shift) & mask
+            out.append(value)
+        if column.minus is not None:
+            out = [a + b & mask for a, b in zip(out, values[column.minus])]
+        values.append(out)
+        place = end
+    require(place == len(packed), at, clause, "bytes follow the last column")
+    parts = {}
+    for column, numbers in zip(columns, values):
+        form = {8: "B", 16: "H", 32: "I", 42: "I"}[column.bits]
+        parts[column.before] = struct.pack(f"<{count}{form}", *(v & 0xFFFFFFFF for v in numbers))
+    if columns is POINT_COLUMNS:
+        parts[12] = struct.pack(f"<{count}I", *(x >> 32 | y >> 32 << 10 | z >> 32 << 20
+                                                for x, y, z in zip(*values[:3])))
+    return b"".join(parts[before] for before in sorted(parts))
 
 
 def is_name(bytes_):
@@ -632,11 +728,22 @@ class Container:
             if page.codec == RAW:
                 out[i] = stored
                 continue
-            check_frame(stored, page.raw_bytes, at + PAGE_HEADER_BYTES)
-            jobs.append((i, stored, page.raw_bytes, at + PAGE_HEADER_BYTES))
+            if page.codec == LZ4:
+                out[i] = decode_lz4(stored, page, at + PAGE_HEADER_BYTES)
+                continue
+            size = check_frame(stored, page, at + PAGE_HEADER_BYTES)
+            jobs.append((i, stored, size, at + PAGE_HEADER_BYTES))
         if jobs and self.has_zstd:
             out.update(decode_frames(jobs))
+        for i, payload in out.items():
+            if self.headers[i].filter == PACKED:
+                out[i] = self.unpack(self.headers[i], payload)
         return out
+
+    def unpack(self, page, packed):
+        columns = POINT_COLUMNS if page.type == POINT else group_columns(self.meta.channels,
+                                                                         page.group)
+        return unpack_columns(packed, columns, page.record_count, self.payload_at(page.page_id))
 
     def payload_at(self, page):
         return self.entries[page].offset + PAGE_HEADER_BYTES

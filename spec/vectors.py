@@ -282,6 +282,47 @@ def encode_points(surfels):
     return out + bytes(len(surfels))
 
 
+def pack_columns(payload, columns, count):
+    """The packed form of columns (points.md#packed-columns)."""
+    out, values = b"", []
+    for column in columns:
+        form = {8: "B", 16: "H", 32: "I", 42: "I"}[column.bits]
+        numbers = list(struct.unpack_from(f"<{count}{form}", payload, column.before * count))
+        if column.bits == 42:
+            high = struct.unpack_from(f"<{count}I", payload, 12 * count)
+            numbers = [low | (top >> column.before // 4 * 10 & 1023) << 32
+                       for low, top in zip(numbers, high)]
+        values.append(numbers)
+        mask = (1 << column.bits) - 1
+        if column.minus is not None:
+            numbers = [a - b & mask for a, b in zip(numbers, values[column.minus])]
+        seen = 0
+        for v in numbers:
+            seen |= v
+        shift = (seen & -seen).bit_length() - 1 if seen else 0
+        steps = [b - a & mask for a, b in zip(numbers[:1] + numbers, numbers)]
+        steps = [(d - mask - 1 if d >> column.bits - 1 else d) >> shift for d in steps]
+        codes = [2 * d if d >= 0 else -2 * d - 1 for d in steps]
+        planes = (max(codes).bit_length() + 7) // 8
+        out += struct.pack("<BBQ", shift, planes, numbers[0])
+        for k in range(planes):
+            out += bytes(c >> 8 * k & 255 for c in codes)
+    return out
+
+
+def raw_frame(content):
+    """A zstd frame, made by hand, that holds 256 to 65535 bytes as they are."""
+    return (b"\x28\xb5\x2f\xfd\x60" + struct.pack("<H", len(content) - 256)
+            + (len(content) << 3 | 1).to_bytes(3, "little") + content)
+
+
+def literal_block(content):
+    """An LZ4 block, made by hand, of 15 or more literals."""
+    more = len(content) - 15
+    return (struct.pack("<I", len(content)) + b"\xf0" + b"\xff" * (more // 255)
+            + bytes([more % 255]) + content)
+
+
 def encode_meta(channels=(), text=()):
     out = struct.pack("<II", len(channels), len(text))
     for name, type_, components, group in channels:
@@ -299,13 +340,14 @@ class Page:
     def __init__(self, type_, payload, count, group=0, level=0xFFFF, keys=(0, 0)):
         self.type, self.payload, self.count = type_, bytearray(payload), count
         self.group, self.level, self.keys = group, level, keys
-        self.stored, self.codec = None, r.RAW
+        self.stored, self.codec, self.filter = None, r.RAW, 0
         self.uuid = None
         self.header, self.entry = {}, {}
 
     def fields(self, page_id):
         stored = self.payload if self.stored is None else self.stored
-        out = {"type": self.type, "codec": self.codec, "page_id": page_id,
+        out = {"type": self.type, "codec": self.codec, "filter": self.filter,
+               "page_id": page_id,
                "stored_bytes": len(stored), "raw_bytes": len(self.payload), "group": self.group,
                "level": self.level, "record_count": self.count, "reserved": 0,
                "first_key": self.keys[0], "last_key": self.keys[1],
@@ -384,6 +426,11 @@ class Draft:
                         payload += value * components * page.count
                 self.pages.append(Page(r.ATTRIBUTE, payload, page.count, group, keys=page.keys))
 
+    def pack(self, page, columns, codec):
+        packed = pack_columns(bytes(page.payload), columns, page.count)
+        page.stored = raw_frame(packed) if codec == r.ZSTD else literal_block(packed)
+        page.codec, page.filter = codec, r.PACKED
+
     def compress(self, page):
         """Stores a page as zstd does it."""
         zstd = ["zstd", "-q", "-1", "--no-check", "-c", f"--stream-size={len(page.payload)}"]
@@ -400,9 +447,9 @@ class Draft:
                            h["align_shift"], h["checksum"], h["byte_order"], h["reserved"])
 
     def page_image(self, page, fields, stored):
-        names = ("type", "codec", "page_id", "stored_bytes", "raw_bytes", "group", "level",
+        names = ("type", "codec", "filter", "page_id", "stored_bytes", "raw_bytes", "group", "level",
                  "record_count", "reserved", "first_key", "last_key", "payload_xxh3")
-        body = b"PTCp" + struct.pack("<HHIIIHHIIQQQ", *(fields[name] for name in names))
+        body = b"PTCp" + struct.pack("<HBBIIIHHIIQQQ", *(fields[name] for name in names))
         uuid = page.uuid or self.head["uuid"]
         seed = r.page_seed(uuid, fields["page_id"], fields["type"])
         image = body + struct.pack("<Q", xxh3_64(body, seed)) + stored

@@ -7,7 +7,7 @@ one rule is broken in several ways.
 import struct
 
 import reader as r
-from vectors import UUID, Draft, Page, Surfel, encode_meta, encode_points, scatter
+from vectors import UUID, Draft, Page, Surfel, encode_meta, encode_points, literal_block, scatter
 
 NAN = float("nan")
 CHANNELS = (("irradiance", 3, 3, 1), ("occlusion", 1, 1, 1), ("part", 4, 1, 9))
@@ -41,6 +41,33 @@ def with_rle():
     return draft
 
 
+def rle_block():
+    """34 zeros as an LZ4 block made by hand: a literal, a match that overlaps itself, 5 literals."""
+    return struct.pack("<I", 34) + b"\x1f\0\1\0\x09\x50" + bytes(5)
+
+
+def with_lz4():
+    draft = zero_point()
+    draft.pages[0].stored, draft.pages[0].codec = rle_block(), r.LZ4
+    return draft
+
+
+def slope(count=100):
+    """Points whose numbers differ little from one to the next: what packs well."""
+    return [Surfel((i << 30, i << 29, (1 << 41) + (i << 28)), radius=0.25, radiance=(i, 2 * i, 0.5),
+                   albedo=(i, 2 * i, 255 - i)) for i in range(count)]
+
+
+def packed(codec):
+    draft = Draft(slope(), channels=CHANNELS)
+    for page in draft.pages:
+        if page.type == r.POINT:
+            draft.pack(page, r.POINT_COLUMNS, codec)
+        if page.type == r.ATTRIBUTE and page.group == 1:
+            draft.pack(page, r.group_columns([r.Channel(*c) for c in CHANNELS], 1), r.LZ4)
+    return draft
+
+
 def with_zstd():
     draft = two_pages()
     for page in draft.pages:
@@ -70,6 +97,9 @@ def good(has_zstd):
                               text=(("scene", "caf\u00e9"), ("unit", "m")))
     yield "unknown-compatible-features", with_unknown_bits()
     yield "zstd-frame-by-hand", with_rle()
+    yield "lz4-block-by-hand", with_lz4()
+    yield "packed-columns-zstd", packed(r.ZSTD)
+    yield "packed-columns-lz4", packed(r.LZ4)
     if has_zstd:
         yield "zstd", with_zstd()
 
@@ -117,7 +147,12 @@ def bad_page():
         one_point(), lambda d: d.patches.append((d.offset(0) + 32, b"X")))
     yield "container-page-checksum.other-file", other
     yield "container-page-type", page(both={"type": 6})
-    yield "container-page-codec", page(codec=2)
+    yield "container-page-codec", page(codec=3)
+    yield "container-page-filter", changed(packed(r.LZ4), lambda d: d.pages[0].header.update(filter=2))
+    yield "container-page-filter.raw", page(filter=1)
+    nodes = packed(r.LZ4)
+    nodes.pages[1].stored, nodes.pages[1].codec, nodes.pages[1].filter = rle_block(), r.LZ4, r.PACKED
+    yield "container-page-filter.nodes", nodes
     yield "container-page-length", page(both={"raw_bytes": 33})
     yield "container-page-length.above", page(both={"raw_bytes": 0xFFFFFFFF})
     yield "container-page-fields", page(both={"group": 1})
@@ -142,6 +177,39 @@ def bad_codec():
     yield "container-codec-frame.window", stored(frame[:4] + b"\0\x58" + frame[6:])
     yield "container-codec-frame.dictionary", stored(frame[:4] + b"\x21\x01" + frame[5:])
     yield "container-codec-frame.no-frame", stored(b"\0" * 10)
+
+    def block(bytes_):
+        draft = zero_point()
+        draft.pages[0].stored, draft.pages[0].codec = bytes_, r.LZ4
+        return draft
+    good_block = rle_block()
+    clause = "container-codec-block"
+    yield clause, block(struct.pack("<I", 33) + good_block[4:])
+    yield clause + ".short", block(good_block[:4])
+    yield clause + ".trailing", block(good_block + b"\0")
+    yield clause + ".truncated", block(good_block[:-1])
+    yield clause + ".match-before-start", block(good_block[:6] + b"\2" + good_block[7:])
+    yield clause + ".match-too-long", block(good_block[:8] + b"\xff\xff\xff\xff\0" + good_block[9:])
+
+
+def bad_packed():
+    """Packed columns of the first point page."""
+    def change(edit):
+        draft = packed(r.LZ4)
+        content = bytearray(draft.pages[0].stored[5:])  # behind the size and the token
+        while content[0] == 255:
+            del content[0]
+        del content[0]
+        edit(content)
+        draft.pages[0].stored = literal_block(bytes(content))
+        return draft
+    clause = "points-packed-columns"
+    yield clause, change(lambda c: c.__setitem__(0, 42))
+    yield clause + ".planes", change(lambda c: c.__setitem__(1, 7))
+    yield clause + ".base", change(lambda c: c.__setitem__(9, 1))
+    yield clause + ".plane", change(lambda c: c.__delitem__(slice(-11, None)))
+    yield clause + ".trailing", change(lambda c: c.append(0))
+    yield clause + ".head", change(lambda c: c.__delitem__(slice(-9, None)))
 
 
 def bad_directory():
@@ -416,7 +484,7 @@ def verify_summaries():
 def all_vectors(has_zstd):
     for name, draft in good(has_zstd):
         yield "good", name, draft
-    for source in (bad_header, bad_page, bad_codec, bad_directory, bad_superblock, bad_points,
+    for source in (bad_header, bad_page, bad_codec, bad_packed, bad_directory, bad_superblock, bad_points,
                    bad_meta, bad_attributes, bad_nodes):
         for name, draft in source():
             yield "bad", name, draft

@@ -16,7 +16,7 @@ CLI::Option* add_points(CLI::App& app, std::uint64_t& count) {
 }
 
 CLI::Option* add_codec(CLI::App& app, Codec& codec) {
-  return add_choice<Codec>(app, "--codec", codec, {{"raw", Codec::raw}, {"zstd", Codec::zstd}},
+  return add_choice<Codec>(app, "--codec", codec, {{"raw", Codec::raw}, {"lz4", Codec::lz4}, {"zstd", Codec::zstd}},
                            "Compression of pages");
 }
 

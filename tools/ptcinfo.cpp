@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <vector>
 
 #include "engine/store/reader.h"
 #include "tools/common.h"
@@ -36,7 +37,6 @@ struct Share {
   std::uint64_t pages = 0;
   std::uint64_t stored_bytes = 0;
   std::uint64_t raw_bytes = 0;
-  std::uint64_t compressed_pages = 0;
 };
 
 std::map<ptc::PageType, Share> shares_of(const ptc::ContainerReader& container) {
@@ -47,16 +47,17 @@ std::map<ptc::PageType, Share> shares_of(const ptc::ContainerReader& container) 
     ++share.pages;
     share.stored_bytes += entry.stored_bytes;
     share.raw_bytes += entry.raw_bytes;
-    share.compressed_pages += entry.stored_bytes != entry.raw_bytes;
   }
   return shares;
 }
 
 /// A page that compression does not shorten is stored raw whatever the codec, so the codec of a
-/// file is that of any page that was shortened.
-std::string codec_of(const std::map<ptc::PageType, Share>& shares) {
-  for (const auto& [type, share] : shares) {
-    if (share.compressed_pages > 0) return "zstd";
+/// file is that of the first page that was shortened.
+std::string codec_of(const ptc::ContainerReader& container) {
+  std::vector<std::byte> stored;
+  for (std::uint32_t page = 0; page < container.page_count(); ++page) {
+    if (container.entry(page).stored_bytes == container.entry(page).raw_bytes) continue;
+    return container.read_stored_page(page, stored).coding.codec == ptc::Codec::lz4 ? "lz4" : "zstd";
   }
   return "raw";
 }
@@ -93,7 +94,7 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   facts["page_counts"] = {{"point", shares[PageType::point].pages},
                           {"node", shares[PageType::node].pages},
                           {"attribute", shares[PageType::attribute].pages}};
-  facts["codec"] = codec_of(shares);
+  facts["codec"] = codec_of(container);
   facts["channels"] = channels_of(container.meta());
   facts["leaf_points"] = superblock.leaf_points;
   facts["points_per_page"] = superblock.points_per_page;

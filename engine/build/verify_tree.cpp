@@ -63,7 +63,7 @@ class NodePages {
     const NodePage nodes(found.payload.data(), found.header.record_count);
     const auto at = static_cast<std::size_t>(nodes[slot].mean_x() - found.payload.data()) - 24 -
                     8 * static_cast<std::size_t>(nodes[slot].size());
-    const bool raw = found.header.codec == Codec::raw;
+    const bool raw = found.header.coding.codec == Codec::raw;
     OpenGroup opened;
     opened.group = nodes.decode(slot);
     opened.offset = container_.entry(page).offset + kPageHeaderBytes + (raw ? at : 0);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
+#include <map>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -85,7 +86,7 @@ class Mapping {
 
 /// Errors inside a decoded payload name the byte of the file only when it is stored as it is.
 FormatError placed(const FormatError& error, const PageHeader& page) {
-  if (page.codec == Codec::raw) {
+  if (page.coding.codec == Codec::raw) {
     return {kPageHeaderBytes + error.offset(), error.clause(), error.text()};
   }
   return {kPageHeaderBytes, error.clause(),
@@ -104,6 +105,9 @@ struct ContainerReader::Impl {
         index(index_pages(entries)) {
     at_offset(file, 0, [&] { verify_pages(superblock, entries, index); });
     meta = read_meta();
+    for (const Channel& channel : meta.channels) {
+      columns.try_emplace(channel.group, packed_group_columns(meta.channels, channel.group));
+    }
     at_offset(file, 0, [&] { verify_attributes(superblock, entries, index, meta); });
   }
 
@@ -155,12 +159,18 @@ struct ContainerReader::Impl {
     }
   }
 
+  PayloadColumns columns_of(const PageHeader& page) const {
+    if (page.type == PageType::point) return {page.record_count, packed_point_columns()};
+    if (page.type == PageType::attribute) return {page.record_count, columns.at(page.group)};
+    return {};
+  }
+
   PageHeader decode(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
                     PageDecoder& decoder) const {
     const PageHeader found = checked_header(page, image);
     const std::span<std::byte> payload = out.first(found.raw_bytes);
     try {
-      decoder.decode(found.codec, image.subspan(kPageHeaderBytes), payload);
+      decoder.decode(found.coding, image.subspan(kPageHeaderBytes), payload, columns_of(found));
     } catch (const FormatError& error) {
       throw error.rebased(kPageHeaderBytes, "");
     }
@@ -209,6 +219,7 @@ struct ContainerReader::Impl {
   std::vector<DirectoryEntry> entries;
   PageIndex index;
   Meta meta;
+  std::map<std::uint16_t, std::vector<PackedColumn>> columns;  ///< by channel group
 };
 
 ContainerReader::ContainerReader(const std::filesystem::path& path)

@@ -99,13 +99,14 @@ struct ContainerWriter::Impl {
                              page.type, page.group,        page.record_count};
   }
 
-  void encode_page(std::uint32_t page_id, const PageFacts& facts,
-                   std::span<const std::byte> payload) {
+  void encode_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
+                   std::span<const PackedColumn> columns = {}) {
     require(!payload.empty() && payload.size() <= payload_limit(),
             "a payload that is empty or longer than a page");
     PageHeader page = page_header(page_id, facts);
     page.raw_bytes = static_cast<std::uint32_t>(payload.size());
-    page.codec = encoder.encode(payload, stored);
+    if (facts.type == PageType::point) columns = packed_point_columns();
+    page.coding = encoder.encode(payload, stored, {facts.record_count, columns});
     append_page(page, stored);
   }
 
@@ -205,20 +206,20 @@ std::uint32_t ContainerWriter::reserve_page() {
   return impl_->reserve();
 }
 
-void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts,
-                                 std::span<const std::byte> payload) {
+void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
+                                 std::span<const PackedColumn> columns) {
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
-  impl_->encode_page(page_id, facts, payload);
+  impl_->encode_page(page_id, facts, payload, columns);
 }
 
-void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& facts, Codec codec,
+void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
                                         std::uint32_t raw_bytes,
                                         std::span<const std::byte> stored) {
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
   PageHeader page = impl_->page_header(page_id, facts);
-  page.codec = codec;
+  page.coding = coding;
   page.raw_bytes = raw_bytes;
   impl_->append_page(page, stored);
 }

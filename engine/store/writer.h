@@ -50,10 +50,11 @@ class ContainerWriter {
   };
   /// Compresses, checksums and writes the page. Each reserved page must be written once.
   /// @param payload  1 to page size - 64 bytes
-  void write_page(std::uint32_t page_id, const PageFacts& facts,
-                  std::span<const std::byte> payload);
+  /// @param columns  of an attribute page, from packed_group_columns(); without them it is not packed
+  void write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
+                  std::span<const PackedColumn> columns = {});
   /// Writes a page whose payload is already in its stored form (copied from another container).
-  void write_stored_page(std::uint32_t page_id, const PageFacts& facts, Codec codec,
+  void write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
                          std::uint32_t raw_bytes, std::span<const std::byte> stored);
 
   /// Meta page, directory, superblocks; syncs and publishes under the target's name.

@@ -59,7 +59,7 @@ OpenContainer::OpenContainer(const std::filesystem::path& path) : bytes_(read_fi
     entries_.push_back(container.entry(page));
     headers_.push_back(decode_page_header(
         std::span(bytes_).subspan(entries_.back().offset, kPageHeaderBytes), container.header()));
-    if (headers_.back().codec != Codec::raw) throw std::invalid_argument("a page that is not raw");
+    if (headers_.back().coding.codec != Codec::raw) throw std::invalid_argument("a page that is not raw");
   }
 }
 

@@ -33,7 +33,7 @@ FileHeader example_file() {
 PageHeader example_page() {
   PageHeader header;
   header.type = PageType::point;
-  header.codec = Codec::zstd;
+  header.coding.codec = Codec::zstd;
   header.page_id = 0x01020304;
   header.stored_bytes = 1000;
   header.raw_bytes = 34 * 40;
@@ -174,7 +174,7 @@ TEST_CASE("page header: it comes back", "[format][container]") {
   const PageHeader header = example_page();
   const PageHeader back = decode_page_header(encode_page(header), example_file());
   CHECK(back.type == header.type);
-  CHECK(back.codec == header.codec);
+  CHECK(back.coding.codec == header.coding.codec);
   CHECK(back.page_id == header.page_id);
   CHECK(back.stored_bytes == header.stored_bytes);
   CHECK(back.raw_bytes == header.raw_bytes);
@@ -222,11 +222,18 @@ TEST_CASE("page header: a broken rule is named", "[format][container]") {
   CHECK(page([](PageHeader&) {}) == "none");
   CHECK(page([](PageHeader& h) { h.type = PageType{0}; }) == "spec/container.md#page-type");
   CHECK(page([](PageHeader& h) { h.type = PageType{6}; }) == "spec/container.md#page-type");
-  CHECK(page([](PageHeader& h) { h.codec = Codec{2}; }) == "spec/container.md#page-codec");
+  CHECK(page([](PageHeader& h) { h.coding.codec = Codec{3}; }) == "spec/container.md#page-codec");
+  constexpr char kFilter[] = "spec/container.md#page-filter";
+  CHECK(page([](PageHeader& h) { h.coding = {Codec::zstd, Filter{2}}; }) == kFilter);
+  CHECK(page([](PageHeader& h) { h.coding = {Codec::raw, Filter::columns}; }) == kFilter);
+  CHECK(page([](PageHeader& h) {
+          h.coding = {Codec::zstd, Filter::columns};
+          h.type = PageType::node;
+        }) == kFilter);
   CHECK(page([](PageHeader& h) { h.stored_bytes = 0; }) == kLength);
   CHECK(page([](PageHeader& h) { h.stored_bytes = h.raw_bytes; }) == kLength);
   CHECK(page([](PageHeader& h) { h.stored_bytes = 0xffffffff; }) == kLength);
-  CHECK(page([](PageHeader& h) { h.codec = Codec::raw; }) == kLength);
+  CHECK(page([](PageHeader& h) { h.coding.codec = Codec::raw; }) == kLength);
   CHECK(page([](PageHeader& h) { h.raw_bytes = 4096 - 63; }) == kLength);
   CHECK(page([](PageHeader& h) { h.raw_bytes = 0; }) == kLength);
   CHECK(page([](PageHeader& h) { h.group = 1; }) == kFields);
@@ -246,7 +253,7 @@ TEST_CASE("page header: each type has its own fields", "[format][container]") {
       h.first_key = h.last_key = 0;
       if (type == PageType::node) h.level = 62;
       if (type == PageType::directory) {
-        h.codec = Codec::raw;
+        h.coding.codec = Codec::raw;
         h.stored_bytes = h.raw_bytes = 32 * h.record_count;
       }
       if (type == PageType::meta) h.record_count = 1;
@@ -265,7 +272,7 @@ TEST_CASE("page header: each type has its own fields", "[format][container]") {
         "spec/container.md#page-keys");
   CHECK(of_type(PageType::directory, [](PageHeader& h) { h.record_count = 39; }) == kFields);
   CHECK(of_type(PageType::directory, [](PageHeader& h) {
-          h.codec = Codec::zstd;
+          h.coding.codec = Codec::zstd;
           h.stored_bytes = 100;
         }) == "spec/container.md#page-codec");
   CHECK(of_type(PageType::meta, [](PageHeader& h) { h.record_count = 2; }) == kFields);

@@ -331,7 +331,7 @@ TEST_CASE("reader: payloads that decode to nonsense are found", "[store][lies]")
     std::memcpy(&f.pages[kPoint].stored[at], &nan, sizeof nan);
   });
   liar.expect("codec-frame", [](Forgery& f) {
-    f.pages[kPoint].header.codec = Codec::zstd;
+    f.pages[kPoint].header.coding.codec = Codec::zstd;
     f.pages[kPoint].stored.pop_back();
     --f.pages[kPoint].header.stored_bytes;
     --f.entries[kPoint].stored_bytes;
@@ -354,14 +354,15 @@ TEST_CASE("reader: an error in a compressed page names the decoded byte", "[stor
   const ScratchDirectory scratch;
   write_sample(scratch / "a.ptcx", {});
   Forgery f(scratch / "a.ptcx");
-  REQUIRE(f.pages[kPoint].header.codec == Codec::zstd);
+  REQUIRE(f.pages[kPoint].header.coding == Coding{Codec::zstd, Filter::columns});
   std::vector<std::byte> payload(f.entries[kPoint].raw_bytes);
-  PageDecoder().decode(Codec::zstd, f.pages[kPoint].stored, payload);
+  const PayloadColumns columns{f.entries[kPoint].record_count, packed_point_columns()};
+  PageDecoder().decode({Codec::zstd, Filter::columns}, f.pages[kPoint].stored, payload, columns);
   const std::size_t at = kRadiusColumn * f.entries[kPoint].record_count;
   const float negative = -1;
   std::memcpy(&payload[at], &negative, sizeof negative);
   std::vector<std::byte> stored;
-  REQUIRE(PageEncoder(Codec::zstd).encode(payload, stored) == Codec::zstd);
+  REQUIRE(PageEncoder(Codec::zstd).encode(payload, stored, columns) == Coding{Codec::zstd, Filter::columns});
   f.pages[kPoint].stored = stored;
   f.pages[kPoint].header.stored_bytes = static_cast<std::uint32_t>(stored.size());
   f.entries[kPoint].stored_bytes = static_cast<std::uint32_t>(stored.size());

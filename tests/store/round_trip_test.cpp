@@ -31,9 +31,10 @@ void check_pages(const ContainerReader& reader, const Sample& sample,
     REQUIRE(header.last_key == facts.last_key);
     REQUIRE(header.raw_bytes == payload.size());
     REQUIRE(std::equal(payload.begin(), payload.end(), buffer.begin()));
-    REQUIRE(reader.read_stored_page(page, stored).codec == header.codec);
+    REQUIRE(reader.read_stored_page(page, stored).coding == header.coding);
     std::vector<std::byte> decoded(header.raw_bytes);
-    decoder.decode(header.codec, stored, decoded);
+    const auto columns = facts.type == PageType::point ? packed_point_columns() : std::span<const PackedColumn>();
+    decoder.decode(header.coding, stored, decoded, {facts.record_count, columns});
     REQUIRE((decoded == payload));
   }
 }

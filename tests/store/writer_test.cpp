@@ -100,7 +100,7 @@ TEST_CASE("writer: pages copied in their stored form give the same container", "
   for (std::uint32_t page = copied; page-- > 0;) {
     const PageHeader h = from.read_stored_page(page, stored);
     const Facts facts{h.type, h.group, h.level, h.record_count, h.first_key, h.last_key};
-    to.write_stored_page(page, facts, h.codec, h.raw_bytes, stored);
+    to.write_stored_page(page, facts, h.coding, h.raw_bytes, stored);
   }
   to.finish(from.meta(), from.superblock());
   CHECK((read_file(scratch / "a.ptcx") == read_file(scratch / "b.ptcx")));
@@ -166,15 +166,15 @@ TEST_CASE("writer: a page that no reader would take is refused", "[store][writer
   refused(facts, payload);
   refused(good, {});
   refused(good, std::vector<std::byte>(4096 - 63));
-  const auto stored = [&](Codec codec, std::uint32_t raw_bytes, std::span<const std::byte> bytes) {
-    CHECK_THROWS_AS(writer.write_stored_page(page, good, codec, raw_bytes, bytes),
+  const auto stored = [&](Coding coding, std::uint32_t raw_bytes, std::span<const std::byte> bytes) {
+    CHECK_THROWS_AS(writer.write_stored_page(page, good, coding, raw_bytes, bytes),
                     std::invalid_argument);
   };
   const auto size = static_cast<std::uint32_t>(payload.size());
-  stored(Codec::raw, size + 1, payload);
-  stored(Codec::zstd, size, payload);
-  stored(Codec::raw, 0, payload);
-  stored(Codec::raw, size, {});
+  stored({}, size + 1, payload);
+  stored({Codec::zstd}, size, payload);
+  stored({}, 0, payload);
+  stored({}, size, {});
   CHECK_NOTHROW(writer.write_page(page, good, payload));
 }
 

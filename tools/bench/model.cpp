@@ -72,7 +72,8 @@ ModelRow measure_compression(const BenchScene& scene, bool nodes, int level, uns
   PageDecoder decoder;
   PageEncoder encoder(level > 0 ? Codec::zstd : Codec::raw, level);
   struct Page {
-    Codec codec;
+    Coding coding;
+    PayloadColumns columns;
     std::uint32_t raw_bytes;
     std::vector<std::byte> stored;
   };
@@ -80,14 +81,17 @@ ModelRow measure_compression(const BenchScene& scene, bool nodes, int level, uns
   double bytes = 0;
   for (const std::uint32_t page : nodes ? container.node_pages() : container.point_pages()) {
     const PageHeader header = container.read_page(page, payload, decoder);
-    Page& made = pages.emplace_back(Page{Codec::raw, header.raw_bytes, {}});
-    made.codec = encoder.encode(std::span(payload).first(header.raw_bytes), made.stored);
+    Page& made = pages.emplace_back(Page{{}, {}, header.raw_bytes, {}});
+    if (!nodes && level > 0) made.columns = {header.record_count, packed_point_columns()};
+    made.coding = encoder.encode(std::span(payload).first(header.raw_bytes), made.stored, made.columns);
     bytes += static_cast<double>(made.stored.size());
   }
   std::vector<double> seconds;
   for (unsigned repeat = 0; repeat < repeats; ++repeat) {
     const double before = cpu_seconds();
-    for (const Page& page : pages) decoder.decode(page.codec, page.stored, std::span(payload).first(page.raw_bytes));
+    for (const Page& page : pages) {
+      decoder.decode(page.coding, page.stored, std::span(payload).first(page.raw_bytes), page.columns);
+    }
     seconds.push_back(cpu_seconds() - before);
   }
   const auto records = static_cast<double>(nodes ? container.superblock().nodes : container.superblock().points);

@@ -1,0 +1,191 @@
+// Differences from value to value, zigzagged, one byte plane after another (spec/points.md#packed-columns).
+#include "format/packed_columns.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <stdexcept>
+
+#include "format/bytes.h"
+#include "format/error.h"
+
+namespace ptc {
+namespace {
+
+constexpr char kPacked[] = "spec/points.md#packed-columns";
+constexpr std::size_t kHeadBytes = 10;  // of a column: shift, planes, base
+constexpr std::size_t kHigh = 12;       // bytes a point before a point page's bits 32 to 41 of x, y, z
+constexpr unsigned kHighBits = kCoordinateBits - 32;
+
+using Values = std::vector<std::uint64_t>;
+
+constexpr std::array<PackedColumn, 13> kPointColumns{{
+    {0, kCoordinateBits}, {4, kCoordinateBits}, {8, kCoordinateBits},  // x y z
+    {16, 32},                                                          // radius
+    {20, 16}, {22, 16},                                                // normal
+    {26, 16}, {24, 16, 6}, {28, 16, 6},                                // radiance: g, r - g, b - g
+    {31, 8}, {30, 8, 9}, {32, 8, 9},                                   // albedo likewise
+    {33, 8},                                                           // flags
+}};
+
+constexpr std::uint64_t mask(unsigned bits) noexcept { return (std::uint64_t{1} << bits) - 1; }
+
+template <class T>
+void load_all(const std::byte* column, Values& values) noexcept {
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = load<T>(column, i * sizeof(T));
+}
+
+template <class T>
+void store_all(std::byte* column, const Values& values) noexcept {
+  for (std::size_t i = 0; i < values.size(); ++i) store(column, i * sizeof(T), static_cast<T>(values[i]));
+}
+
+// Where x, y, z keep their upper bits: shift of the axis whose column has so many bytes before it.
+unsigned high_shift(const PackedColumn& column) noexcept { return column.before / 4 * kHighBits; }
+
+void load_column(const std::byte* payload, const PackedColumn& column, Values& values) noexcept {
+  const std::byte* const from = payload + column.before * values.size();
+  if (column.bits == 8) return load_all<std::uint8_t>(from, values);
+  if (column.bits == 16) return load_all<std::uint16_t>(from, values);
+  load_all<std::uint32_t>(from, values);
+  if (column.bits == 32) return;
+  const std::byte* const high = payload + kHigh * values.size();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::uint64_t upper = load<std::uint32_t>(high, 4 * i) >> high_shift(column) & mask(kHighBits);
+    values[i] |= upper << 32;
+  }
+}
+
+void store_column(std::byte* payload, const PackedColumn& column, const Values& values) noexcept {
+  std::byte* const to = payload + column.before * values.size();
+  if (column.bits == 8) return store_all<std::uint8_t>(to, values);
+  if (column.bits == 16) return store_all<std::uint16_t>(to, values);
+  store_all<std::uint32_t>(to, values);
+  if (column.bits == 32) return;
+  std::byte* const high = payload + kHigh * values.size();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::uint32_t others = column.before == 0 ? 0 : load<std::uint32_t>(high, 4 * i);
+    store(high, 4 * i, others | static_cast<std::uint32_t>(values[i] >> 32) << high_shift(column));
+  }
+}
+
+// Differences to the value before, as zigzag numbers without the zero bits that all of them end in.
+void difference(Values& values, unsigned bits, unsigned shift) noexcept {
+  const unsigned top = 64 - bits;
+  std::uint64_t before = values.front();
+  for (std::uint64_t& value : values) {
+    const auto step = static_cast<std::int64_t>((value - before) << top) >> (top + shift);
+    before = value;
+    value = static_cast<std::uint64_t>(step) << 1 ^ static_cast<std::uint64_t>(step >> 63);
+  }
+}
+
+void sum_up(Values& values, unsigned bits, unsigned shift, std::uint64_t base) noexcept {
+  for (std::uint64_t& value : values) {
+    base += (value >> 1 ^ (0 - (value & 1))) << shift;
+    value = base & mask(bits);
+  }
+}
+
+void pack(Values& values, unsigned bits, std::vector<std::byte>& packed) {
+  std::uint64_t seen = 0;
+  for (const std::uint64_t value : values) seen |= value;
+  const unsigned shift = seen == 0 ? 0 : static_cast<unsigned>(std::countr_zero(seen));
+  const std::uint64_t base = values.front();
+  difference(values, bits, shift);
+  seen = 0;
+  for (const std::uint64_t value : values) seen |= value;
+  const auto planes = static_cast<unsigned>(std::bit_width(seen) + 7) / 8;
+
+  const std::size_t at = packed.size(), n = values.size();
+  packed.resize(at + kHeadBytes + planes * n);
+  std::byte* const p = packed.data() + at;
+  store(p, 0, static_cast<std::uint8_t>(shift));
+  store(p, 1, static_cast<std::uint8_t>(planes));
+  store(p, 2, base);
+  for (unsigned plane = 0; plane < planes; ++plane) {
+    std::byte* const out = p + kHeadBytes + plane * n;
+    for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::byte>(values[i] >> (8 * plane));
+  }
+}
+
+void check_size(std::size_t bytes, std::uint32_t count, std::span<const PackedColumn> columns) {
+  std::size_t row = 0;
+  for (const PackedColumn& column : columns) {
+    const std::size_t width = column.bits == kCoordinateBits ? 4 : column.bits / 8;
+    row = std::max(row, column.before + width);
+  }
+  if (count == 0 || bytes != row * count) throw std::invalid_argument("packed columns: a payload of another size");
+}
+
+// Bytes that the column at `at` takes; its numbers are in `values` then.
+std::size_t unpack(std::span<const std::byte> packed, std::size_t at, unsigned bits, Values& values) {
+  if (packed.size() - at < kHeadBytes) throw FormatError(at, kPacked, "packed columns end in a column's head");
+  const std::byte* const p = packed.data() + at;
+  const unsigned shift = load<std::uint8_t>(p, 0), planes = load<std::uint8_t>(p, 1);
+  const auto base = load<std::uint64_t>(p, 2);
+  if (shift >= bits) throw FormatError(at, kPacked, "shift is not below the bits of the column");
+  if (planes > (bits + 7) / 8) throw FormatError(at + 1, kPacked, "more planes than the column has bytes");
+  if (base > mask(bits)) throw FormatError(at + 2, kPacked, "base has more bits than the column");
+  const std::size_t n = values.size();
+  if ((packed.size() - at - kHeadBytes) / n < planes) {
+    throw FormatError(packed.size(), kPacked, "packed columns end in a plane");
+  }
+  std::ranges::fill(values, 0);
+  for (unsigned plane = 0; plane < planes; ++plane) {
+    const std::byte* const in = p + kHeadBytes + plane * n;
+    for (std::size_t i = 0; i < n; ++i) values[i] |= static_cast<std::uint64_t>(in[i]) << (8 * plane);
+  }
+  sum_up(values, bits, shift, base);
+  return kHeadBytes + planes * n;
+}
+
+}  // namespace
+
+std::span<const PackedColumn> packed_point_columns() noexcept { return kPointColumns; }
+
+std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels, std::uint16_t group) {
+  std::vector<PackedColumn> columns;
+  std::uint32_t before = 0;
+  for (const Channel& channel : channels) {
+    if (channel.group != group) continue;
+    const auto bytes = static_cast<std::uint8_t>(channel_bytes(channel.type));
+    for (unsigned component = 0; component < channel.components; ++component, before += bytes) {
+      columns.push_back({.before = before, .bits = static_cast<std::uint8_t>(8 * bytes)});
+    }
+  }
+  return columns;
+}
+
+void pack_columns(std::span<const std::byte> payload, std::uint32_t count, std::span<const PackedColumn> columns,
+                  std::vector<std::byte>& packed) {
+  check_size(payload.size(), count, columns);
+  packed.clear();
+  Values values(count), others(count);
+  for (const PackedColumn& column : columns) {
+    load_column(payload.data(), column, values);
+    if (column.minus != PackedColumn::kNone) {
+      load_column(payload.data(), columns[column.minus], others);
+      for (std::size_t i = 0; i < count; ++i) values[i] = (values[i] - others[i]) & mask(column.bits);
+    }
+    pack(values, column.bits, packed);
+  }
+}
+
+void unpack_columns(std::span<const std::byte> packed, std::uint32_t count, std::span<const PackedColumn> columns,
+                    std::span<std::byte> payload) {
+  check_size(payload.size(), count, columns);
+  Values values(count), others(count);
+  std::size_t at = 0;
+  for (const PackedColumn& column : columns) {
+    at += unpack(packed, at, column.bits, values);
+    if (column.minus != PackedColumn::kNone) {
+      load_column(payload.data(), columns[column.minus], others);
+      for (std::size_t i = 0; i < count; ++i) values[i] += others[i];
+    }
+    store_column(payload.data(), column, values);
+  }
+  if (at != packed.size()) throw FormatError(at, kPacked, "bytes are left over after the packed columns");
+}
+
+}  // namespace ptc
