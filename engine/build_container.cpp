@@ -197,6 +197,7 @@ Meta make_meta(const BuildRequest& request, const Inputs& inputs, double spacing
   meta.text[kInputsKey] = names;
   meta.text[kLightsKey] = to_json(inputs.lights);
   if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
+  if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
   if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;
@@ -207,7 +208,7 @@ Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildR
   std::string text = fmt::format("{:x} {:x} {} {} {} {} {} {} {} {}", sorter.digest()[0], sorter.digest()[1],
                                  frame.origin[0], frame.origin[1], frame.origin[2], frame.edge,
                                  request.tree.leaf_points, request.tree.levels_per_stream, request.page_shift,
-                                 static_cast<int>(request.codec));
+                                 static_cast<int>(request.profile));
   for (const auto& [key, value] : meta.text) text.append("\n").append(key).append("=").append(value);
   const std::array<std::uint64_t, 2> hash = xxh3_128(std::as_bytes(std::span(text)));
   Uuid uuid;
@@ -256,13 +257,20 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
   const Stage stage(report.seconds, progress, "sort and build", sorter.statistics().points, "points");
   const Meta meta = make_meta(request, inputs, spacing);
   ContainerWriter writer(target, {.page_shift = request.page_shift,
-                                  .codec = request.codec,
+                                  .codec = codec_of(request.profile),
                                   .uuid = content_uuid(sorter, frame, request, meta)});
   std::unique_ptr<PointStream> sorted = sorter.finish();
-  std::unique_ptr<PointStream> with_radii;
-  if (inputs.clouds.estimate_radii) with_radii = estimate_radii(*sorted, frame.unit());
-  const Superblock superblock =
-      build_pages(with_radii ? *with_radii : *sorted, frame, writer, request.tree, progress);
+  std::unique_ptr<PointStream> with_radii, rounded;
+  PointStream* points = sorted.get();
+  if (inputs.clouds.estimate_radii) {
+    with_radii = estimate_radii(*points, frame.unit());
+    points = with_radii.get();
+  }
+  if (is_rounded(request.profile)) {
+    rounded = round_points(*points, frame.unit());
+    points = rounded.get();
+  }
+  const Superblock superblock = build_pages(*points, frame, writer, request.tree, progress);
   report.superblock = writer.finish(meta, superblock);
   report.sort = sorter.statistics();
   return report;

@@ -144,10 +144,10 @@ void append_line(std::string& text, const Surfel& s) {
 }
 
 /// A name of its own for the copy: pages of the original must not pass for its pages.
-Uuid derived_uuid(const ContainerReader& container, Codec codec, std::uint8_t page_shift) {
+Uuid derived_uuid(const ContainerReader& container, Profile profile, std::uint8_t page_shift) {
   std::array<std::byte, sizeof(Uuid) + 2> text;
   std::ranges::copy(container.header().uuid, text.begin());
-  text[sizeof(Uuid)] = static_cast<std::byte>(codec);
+  text[sizeof(Uuid)] = static_cast<std::byte>(profile);
   text[sizeof(Uuid) + 1] = static_cast<std::byte>(page_shift);
   const std::array<std::uint64_t, 2> hash = xxh3_128(text);
   Uuid uuid;
@@ -244,12 +244,12 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   }
 }
 
-Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer,
-                         Progress& progress) {
+Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round, Progress& progress) {
   const Superblock& from = container.superblock();
   ContainerPoints points(container);
   const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
-  const Superblock superblock = build_pages(points, from.frame, writer, tree, progress);
+  const std::unique_ptr<PointStream> rounded = round ? round_points(points, from.frame.unit()) : nullptr;
+  const Superblock superblock = build_pages(rounded ? *rounded : points, from.frame, writer, tree, progress);
   repage_channels(container, writer);
   return superblock;
 }
@@ -289,19 +289,21 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   const FileHeader& from = container.header();
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
   ContainerWriter writer(target, {.page_shift = page_shift,
-                                  .codec = options.codec,
-                                  .uuid = derived_uuid(container, options.codec, page_shift)});
+                                  .codec = codec_of(options.profile),
+                                  .uuid = derived_uuid(container, options.profile, page_shift)});
+  Meta meta = container.meta();
+  const bool round = is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
   // finish() numbers the meta page last: where it was not, the others cannot keep their numbers.
-  const bool same_pages = page_shift == from.page_shift &&
+  const bool same_pages = page_shift == from.page_shift && !round &&
                           container.superblock().meta_page == container.page_count() - 1;
   Superblock superblock = container.superblock();
   if (same_pages) {
     copy_pages(container, writer, progress);
   } else {
-    superblock = rebuild_pages(container, writer, progress);
+    superblock = rebuild_pages(container, writer, round, progress);
   }
   superblock.writer.clear();
-  return writer.finish(container.meta(), superblock);
+  return writer.finish(meta, superblock);
 }
 
 }  // namespace

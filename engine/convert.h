@@ -15,7 +15,7 @@ namespace ptc {
 [[nodiscard]] bool is_container(const std::filesystem::path& path);
 
 struct RecodeOptions {
-  Codec codec = Codec::zstd;
+  Profile profile = Profile::exact;
   std::optional<std::uint8_t> page_shift;  ///< empty: as it was
 };
 
@@ -36,9 +36,9 @@ ConvertReport container_to_ply(const ContainerReader& container,
 ConvertReport container_to_xyz(const ContainerReader& container,
                                const std::filesystem::path& target, Progress& progress);
 
-/// Writes a container anew: the same points, channels and record in another codec or page size.
-/// While the page size stays, pages keep their order and numbers; else the octree is built again
-/// from the points. The same input gives the same bytes.
+/// Writes a container anew: the same points, channels and record in another profile or page size. What was rounded
+/// stays so. While the page size stays and points are not rounded, pages keep their order and numbers; else the
+/// octree is built again from the points. The same input gives the same bytes.
 /// @throws FormatError, std::system_error   Memory: a few pages, and what build_pages() takes.
 ConvertReport recode_container(const ContainerReader& container,
                                const std::filesystem::path& target, const RecodeOptions& options,

@@ -15,6 +15,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/build/build.h"
+#include "engine/build/rounding.h"
 #include "engine/cache/page_cache.h"
 #include "engine/io/mesh.h"
 #include "engine/scene/camera.h"
@@ -22,7 +23,6 @@
 #include "engine/scene/sampler.h"
 #include "engine/shade/shading.h"
 #include "engine/sort/external_sort.h"
-#include "format/codec.h"
 
 namespace ptc {
 
@@ -46,7 +46,7 @@ struct BuildRequest {
   SamplingOptions sampling;
   BuildOptions tree;
   std::uint8_t page_shift = 16;
-  Codec codec = Codec::zstd;
+  Profile profile = Profile::compact;
   RunOptions run;
 };
 

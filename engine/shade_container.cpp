@@ -248,7 +248,7 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
 std::unique_ptr<ContainerReader> open_receivers(const ShadeRequest& request, const std::filesystem::path& target,
                                                 Progress& progress) {
   if (request.receivers.extension() == ".ptcx") return std::make_unique<ContainerReader>(request.receivers);
-  BuildRequest build{.inputs = {request.receivers}, .lights = LightRig{}, .run = request.run};  // they need no light
+  BuildRequest build{.inputs = {request.receivers}, .lights = LightRig{}, .profile = Profile::raw, .run = request.run};  // they need no light
   return make_temporary(temp_dir(request.run, target),
                         [&](const std::filesystem::path& path) { build_container(build, path, progress); });
 }

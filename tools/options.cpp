@@ -15,9 +15,14 @@ CLI::Option* add_points(CLI::App& app, std::uint64_t& count) {
       ->group("Sampling");
 }
 
-CLI::Option* add_codec(CLI::App& app, Codec& codec) {
-  return add_choice<Codec>(app, "--codec", codec, {{"raw", Codec::raw}, {"lz4", Codec::lz4}, {"zstd", Codec::zstd}},
-                           "Compression of pages");
+CLI::Option* add_profile(CLI::App& app, Profile& profile) {
+  return add_choice<Profile>(app, "--profile", profile,
+                             {{"raw", Profile::raw},
+                              {"exact", Profile::exact},
+                              {"fast", Profile::fast},
+                              {"compact", Profile::compact}},
+                             "How points are kept: exact ones as they lie in memory (raw) or compressed; rounded to "
+                             "0.001 of their radius, to decode fast or to be small");
 }
 
 CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift) {

@@ -12,8 +12,8 @@ namespace ptc {
 
 /// --points
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count);
-/// --codec raw|zstd
-CLI::Option* add_codec(CLI::App& app, Codec& codec);
+/// --profile raw|exact|fast|compact
+CLI::Option* add_profile(CLI::App& app, Profile& profile);
 /// --page-size, a power of two from 4K to 1M
 CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift);
 /// --io pread|mmap

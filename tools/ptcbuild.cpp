@@ -67,7 +67,7 @@ void declare_lights(CLI::App& app, Arguments& arguments) {
 }
 
 void declare_container(CLI::App& app, ptc::BuildRequest& request) {
-  ptc::add_codec(app, request.codec)->group("Container");
+  ptc::add_profile(app, request.profile)->group("Container");
   ptc::add_page_size(app, request.page_shift)->group("Container");
   ptc::add_integer(app, "--leaf", request.tree.leaf_points, 1, ptc::kMaxLeafPoints,
                    "Cells with no more points are not split")

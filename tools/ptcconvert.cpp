@@ -11,16 +11,16 @@ namespace {
 constexpr char kPurpose[] =
     "Converts by the names' endings: a container to .ply (with all channels) or .xyz, a cloud or "
     "a\n"
-    "mesh to .ptcx, a container to .ptcx in another codec or page size.";
+    "mesh to .ptcx, a container to .ptcx in another profile or page size.";
 constexpr char kExamples[] =
     "  ptcconvert lit.ptcx lit.ply\n"
     "  ptcconvert scan.xyz scan.ptcx --temp /scratch\n"
-    "  ptcconvert scene.ptcx fast.ptcx --codec raw --page-size 16K\n";
+    "  ptcconvert scene.ptcx small.ptcx --profile compact --page-size 16K\n";
 
 struct Arguments {
   std::filesystem::path input;
   std::filesystem::path output;
-  ptc::Codec codec = ptc::Codec::zstd;
+  ptc::Profile profile = ptc::Profile::exact;
   std::uint8_t page_shift = 16;
   bool page_size_given = false;
   ptc::SamplingOptions sampling;
@@ -31,7 +31,7 @@ ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
   ptc::BuildRequest request;
   request.inputs = {arguments.input};
   request.sampling = arguments.sampling;
-  request.codec = arguments.codec;
+  request.profile = arguments.profile;
   request.page_shift = arguments.page_shift;
   request.run = run;
   ptc::BuildReport built = ptc::build_container(request, arguments.output, progress);
@@ -55,7 +55,7 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
   if (ptc::has_ending(arguments.output, ".xyz")) {
     return ptc::container_to_xyz(container, arguments.output, progress);
   }
-  ptc::RecodeOptions options{.codec = arguments.codec};
+  ptc::RecodeOptions options{.profile = arguments.profile};
   if (arguments.page_size_given) options.page_shift = arguments.page_shift;
   return ptc::recode_container(container, arguments.output, options, progress);
 }
@@ -69,7 +69,7 @@ int main(int argc, char** argv) {
   command.add_output("output", arguments.output, {".ptcx", ".ply", ".xyz"},
                      "What to write: .ptcx, .ply or .xyz");
   ptc::add_points(command.app(), arguments.sampling.count);
-  ptc::add_codec(command.app(), arguments.codec)->group("Container");
+  ptc::add_profile(command.app(), arguments.profile)->group("Container");
   const CLI::Option* page_size =
       ptc::add_page_size(command.app(), arguments.page_shift)->group("Container");
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {

@@ -4,6 +4,7 @@
 #include <map>
 #include <vector>
 
+#include "engine/stages.h"
 #include "engine/store/reader.h"
 #include "tools/common.h"
 #include "tools/report.h"
@@ -128,6 +129,9 @@ std::string summary_of(const ordered_json& facts) {
       low[2].dump(), high[0].dump(), high[1].dump(), high[2].dump(), bytes("file"),
       bytes("point_pages"), bytes("node_pages"), bytes("attribute_pages"),
       facts["codec"].get<std::string>());
+  if (const auto rounding = facts["text"].find(ptc::kRoundingKey); rounding != facts["text"].end()) {
+    text += fmt::format("  rounded   {}\n", rounding->get<std::string>());
+  }
   for (const auto& channel : facts["channels"]) {
     text += fmt::format("  channel   {}: {} x {}\n", channel["name"].get<std::string>(),
                         channel["components"].dump(), channel["type"].get<std::string>());

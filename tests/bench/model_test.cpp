@@ -31,7 +31,7 @@ ModelOptions small() {
   options.study_resolution = 32;
   options.leaf_points = {4, 32};
   options.resolutions = {16, 48};
-  options.levels = {0, 1, 9};
+  options.levels = {1, 9};
   return options;
 }
 
@@ -67,7 +67,7 @@ TEST_CASE("model: every axis has its rows, and each says what it costs", "[bench
     CAPTURE(row.axis, row.variant, row.form);
     ++rows[row.axis];
     CHECK((row.bytes > 0) == (row.variant != "exact"));
-    if (row.axis == "compression") {
+    if (row.axis == "pages") {
       CHECK(row.decode_ns > 0);
       CHECK(std::isnan(row.irradiance.rms));
       continue;
@@ -77,7 +77,7 @@ TEST_CASE("model: every axis has its rows, and each says what it costs", "[bench
     CHECK(row.occlusion.rms > 0);
     CHECK((row.evaluate_us > 0) == (row.axis == "payload" || row.axis == "node"));
   }
-  CHECK(rows == std::map<std::string, int>{{"payload", 34}, {"node", 4}, {"leaf", 2}, {"directions", 2}, {"compression", 6}});
+  CHECK(rows == std::map<std::string, int>{{"payload", 34}, {"node", 4}, {"leaf", 2}, {"directions", 2}, {"pages", 14}});
 }
 
 TEST_CASE("model: a payload that tells more shades no worse, within a tenth", "[bench][model]") {
@@ -107,16 +107,24 @@ TEST_CASE("model: rounding changes no error by more than a twentieth", "[bench][
   }
 }
 
-TEST_CASE("model: leaves, directions and compression cost what they should", "[bench][model]") {
+TEST_CASE("model: leaves, directions and pages cost what they should", "[bench][model]") {
   const SceneModel& model = measured();
   CHECK(row_of(model, "leaf", "32", "").bytes < 0.8 * row_of(model, "leaf", "4", "").bytes);
   CHECK(row_of(model, "directions", "48", "").irradiance.rms < 0.7 * row_of(model, "directions", "16", "").irradiance.rms);
+  const auto bytes = [&](const char* variant, const char* form) { return row_of(model, "pages", variant, form).bytes; };
   for (const char* form : {"points", "nodes"}) {
-    const ModelRow &raw = row_of(model, "compression", "raw", form), &one = row_of(model, "compression", "zstd 1", form);
-    CHECK(one.bytes < 0.95 * raw.bytes);
-    CHECK(row_of(model, "compression", "zstd 9", form).bytes < one.bytes);
+    CHECK(bytes("zstd 1", form) < 0.95 * bytes("raw", form));
+    CHECK(bytes("lz4", form) < bytes("raw", form));
+    CHECK(bytes("zstd 9", form) < bytes("zstd 1", form));
   }
-  CHECK(row_of(model, "compression", "raw", "points").bytes == Approx(34).epsilon(0.05));
+  CHECK(bytes("raw", "points") == Approx(34).epsilon(0.05));
+  for (const char* variant : {"lz4", "zstd 1", "zstd 9"}) {
+    CHECK(bytes(variant, "packed") < bytes(variant, "points"));
+    CHECK(bytes(variant, "rounded") < 0.7 * bytes(variant, "packed"));
+    CHECK(row_of(model, "pages", variant, "packed").moved == 0);
+    CHECK(row_of(model, "pages", variant, "rounded").moved <= 0.001);
+    CHECK(row_of(model, "pages", variant, "rounded").moved > 0.0005);
+  }
 }
 
 TEST_CASE("model: nodes as they are stored shade as the plain gather does", "[bench][model]") {

@@ -13,8 +13,9 @@ class RoundTrip(ProgramTest):
         return {name: [p[i] for p in order] for i, name in enumerate(names)}
 
     def test_ply_to_container_to_ply_keeps_every_point(self):
-        back = self.here / "back.ply"
-        self.succeed("ptcconvert", self.scene, back)
+        exact, back = self.here / "exact.ptcx", self.here / "back.ply"
+        self.succeed("ptcbuild", self.cloud, "--profile", "exact", "-o", exact)
+        self.succeed("ptcconvert", exact, back)
         was, now = self.columns(self.cloud), self.columns(back)
         self.assertEqual(list(now), CORE)
         for name in CORE:
@@ -57,9 +58,9 @@ class RoundTrip(ProgramTest):
         for name in ("occlusion", "bent_normal_x", "irradiance_r", "sky_b", "indirect_g"):
             self.assertIn(name, names)
         for page_size in ("4K", "8K", "64K", "1M"):
-            for codec in ("raw", "zstd"):
+            for profile, codec in (("raw", "raw"), ("exact", "zstd"), ("fast", "lz4"), ("compact", "zstd")):
                 other, back = self.here / "other.ptcx", self.here / "other.ply"
-                self.succeed("ptcconvert", lit, other, "--codec", codec, "--page-size", page_size)
+                self.succeed("ptcconvert", lit, other, "--profile", profile, "--page-size", page_size)
                 self.succeed("ptcverify", other)
                 facts = json.loads(self.succeed("ptcinfo", other, "--json").stdout)
                 self.assertEqual(facts["codec"], codec)
@@ -67,15 +68,39 @@ class RoundTrip(ProgramTest):
                 self.succeed("ptcconvert", other, back)
                 self.assertEqual(back.read_bytes(), reference.read_bytes())
 
+    def test_profiles_round_as_they_say(self):
+        exact = self.here / "exact.ptcx"
+        self.succeed("ptcconvert", self.cloud, exact)  # keeps what it is given
+        self.succeed("ptcconvert", exact, self.here / "exact.ply")
+        names, was = read_ply(self.here / "exact.ply")
+        at = {name: i for i, name in enumerate(names)}
+        for profile in ("fast", "compact"):
+            for source in (exact, self.cloud):
+                rounded, back = self.here / "rounded.ptcx", self.here / "rounded.ply"
+                self.succeed("ptcconvert", source, rounded, "--profile", profile)
+                self.succeed("ptcverify", rounded)
+                self.assertIn("0.001 radius", self.succeed("ptcinfo", rounded).stdout)
+                self.succeed("ptcconvert", rounded, back)
+                _, now = read_ply(back)
+                moved = 0
+                for a, b in zip(was, now, strict=True):
+                    radius = b[at["radius"]]
+                    distance = sum((a[at[k]] - b[at[k]]) ** 2 for k in "xyz") ** 0.5
+                    self.assertLessEqual(distance, 0.001 * radius + 1e-12)
+                    self.assertLessEqual(abs(a[at["radius"]] - radius), radius / 500)
+                    moved += distance > 0
+                self.assertGreater(moved, 0)
+        self.assertNotIn("0.001 radius", self.succeed("ptcinfo", exact).stdout)
+
     def test_recoding_twice_gives_the_same_bytes(self):
         for name in ("a.ptcx", "b.ptcx"):
-            self.succeed("ptcconvert", self.scene, self.here / name, "--codec", "raw")
+            self.succeed("ptcconvert", self.scene, self.here / name, "--profile", "raw")
         self.assertEqual((self.here / "a.ptcx").read_bytes(), (self.here / "b.ptcx").read_bytes())
 
     def test_a_container_may_be_recoded_over_itself(self):
         copy = self.here / "copy.ptcx"
         copy.write_bytes(self.scene.read_bytes())
-        self.succeed("ptcconvert", copy, copy, "--codec", "raw", "--page-size", "8K")
+        self.succeed("ptcconvert", copy, copy, "--profile", "raw", "--page-size", "8K")
         self.succeed("ptcverify", copy)
 
     def test_a_container_under_another_name_is_still_one(self):

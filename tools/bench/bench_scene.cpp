@@ -92,7 +92,7 @@ std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts) {
 
 LitScene build_scene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& target,
                      const RunOptions& run, Progress& progress) {
-  BuildRequest request{.backdrop = choice.backdrop, .run = run};
+  BuildRequest request{.backdrop = choice.backdrop, .profile = options.profile, .run = run};
   request.sampling.count = options.points;
   LitScene lit;
   std::vector<MeshCamera> cameras;

@@ -55,6 +55,7 @@ struct SceneOptions {
   std::uint64_t own_points = 100'000;         ///< of the scene's points as receivers, in runs
   float lift = 0.15F;                         ///< as ShadeRequest::lift
   bool rays = true;                           ///< surfels and mesh are loaded, which rays need
+  Profile profile = Profile::compact;         ///< of the container
 };
 
 /// Builds a scene's container.

@@ -65,45 +65,6 @@ class GatherStudy {
   const Executor& executor_;
 };
 
-/// Pages of one kind, compressed anew and decompressed.
-ModelRow measure_compression(const BenchScene& scene, bool nodes, int level, unsigned repeats) {
-  const ContainerReader& container = scene.container();
-  std::vector<std::byte> payload(container.page_payload_limit());
-  PageDecoder decoder;
-  PageEncoder encoder(level > 0 ? Codec::zstd : Codec::raw, level);
-  struct Page {
-    Coding coding;
-    PayloadColumns columns;
-    std::uint32_t raw_bytes;
-    std::vector<std::byte> stored;
-  };
-  std::vector<Page> pages;
-  double bytes = 0;
-  for (const std::uint32_t page : nodes ? container.node_pages() : container.point_pages()) {
-    const PageHeader header = container.read_page(page, payload, decoder);
-    Page& made = pages.emplace_back(Page{{}, {}, header.raw_bytes, {}});
-    if (!nodes && level > 0) made.columns = {header.record_count, packed_point_columns()};
-    made.coding = encoder.encode(std::span(payload).first(header.raw_bytes), made.stored, made.columns);
-    bytes += static_cast<double>(made.stored.size());
-  }
-  std::vector<double> seconds;
-  for (unsigned repeat = 0; repeat < repeats; ++repeat) {
-    const double before = cpu_seconds();
-    for (const Page& page : pages) {
-      decoder.decode(page.coding, page.stored, std::span(payload).first(page.raw_bytes), page.columns);
-    }
-    seconds.push_back(cpu_seconds() - before);
-  }
-  const auto records = static_cast<double>(nodes ? container.superblock().nodes : container.superblock().points);
-  return {.scene = scene.name(),
-          .axis = "compression",
-          .variant = level > 0 ? fmt::format("zstd {}", level) : "raw",
-          .form = nodes ? "nodes" : "points",
-          .bytes = bytes / records,
-          .per = nodes ? "node" : "point",
-          .decode_ns = 1e9 * spread_of(seconds).median / records};
-}
-
 }  // namespace
 
 void compare(ModelRow& row, std::span<const Shading> ours, std::span<const Shading> reference) {
@@ -154,9 +115,7 @@ SceneModel measure_model(const BenchScene& scene, const ModelOptions& options, c
     progress.advance(1);
   }
   progress.end();
-  for (const bool nodes : {false, true}) {
-    for (const int level : options.levels) model.rows.push_back(measure_compression(scene, nodes, level, options.repeats));
-  }
+  for (ModelRow& row : study_pages(scene, options)) model.rows.push_back(std::move(row));
   return model;
 }
 

@@ -24,7 +24,7 @@ constexpr char kReading[] =
     "surfels differs; against all surfels in the same pixels. Left marker: as stored; right: as floats. Whole node: all columns, "
     "bounds too. Dashed: the sum over the node's own surfels, none in front of another, which payloads approximate. Clusters are "
     "drawn as by PTCX. Over time: solid angles from coarse to fine. Leaves and directions: PTCX "
-    "at its default setting, against rays.\n";
+    "at its default setting, against rays. Rounded points lie at most 0.001 of their radius from where they were.\n";
 
 double occlusion(const ModelRow& row) { return 100 * row.occlusion.rms; }
 double irradiance(const ModelRow& row) { return 100 * row.irradiance.rms; }
@@ -99,10 +99,10 @@ ChartPanel gathers_over(const SceneModel& scene, const char* axis, const char* t
   return panel;
 }
 
-ChartPanel compression(const SceneModel& scene) {
-  ChartPanel panel{.title = "Page compression", .x_label = "bytes of a point or node", .y_label = "CPU time to decode it, ns"};
-  for (const char* form : {"points", "nodes"}) {
-    const auto chosen = [&](const ModelRow& r) { return r.axis == "compression" && r.form == form; };
+ChartPanel pages(const SceneModel& scene) {
+  ChartPanel panel{.title = "Pages", .x_label = "bytes of a point or node", .y_label = "CPU time to decode it, ns"};
+  for (const char* form : {"points", "packed", "rounded", "nodes"}) {
+    const auto chosen = [&](const ModelRow& r) { return r.axis == "pages" && r.form == form; };
     add_series(panel, scene, form, chosen, bytes, [](const ModelRow& r) { return r.decode_ns; }, variant);
   }
   return panel;
@@ -121,6 +121,7 @@ Json row_facts(const ModelRow& row) {
           {"us_high", number(row.us.high)},
           {"evaluate_us", number(row.evaluate_us)},
           {"decode_ns", number(row.decode_ns)},
+          {"moved_radii", number(row.moved)},
           {"ao_rms", number(row.occlusion.rms)},
           {"ao_bias", number(row.occlusion.bias)},
           {"ao_p99", number(row.occlusion.percentile_99)},
@@ -162,7 +163,7 @@ Chart chart_of(const SceneModel& scene) {
                   gathers_over(scene, "leaf", "Points of a leaf", "bytes of a point, with its nodes", bytes),
                   gathers_over(scene, "leaf", "Points of a leaf", kTime, time),
                   gathers_over(scene, "directions", "Directions: pixels along a cube edge", kTime, time),
-                  compression(scene)};
+                  pages(scene)};
   std::erase_if(chart.panels, [](const ChartPanel& panel) { return panel.series.empty(); });
   return chart;
 }

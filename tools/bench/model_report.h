@@ -14,7 +14,7 @@ namespace ptc::bench {
 
 /// {"rows": [...], "scenes": [...]}; all rows have the same members, what was not measured is null.
 [[nodiscard]] nlohmann::ordered_json facts_of(const std::vector<SceneModel>& scenes);
-/// Payloads over bytes and over time; leaves over both; directions over time; compression.
+/// Payloads over bytes and over time; leaves over both; directions over time; pages.
 /// @param scene  with rows
 [[nodiscard]] Chart chart_of(const SceneModel& scene);
 /// Writes model.json, .csv and, for each scene, model-SCENE.svg and .png into a directory. @throws std::system_error

@@ -1,0 +1,76 @@
+#include "engine/build/rounding.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+
+namespace ptc {
+namespace {
+
+/// To 8 bits behind the leading one.
+float rounded_radius(float radius) noexcept {
+  const std::uint32_t bits = (std::bit_cast<std::uint32_t>(radius + 0.0F) + 0x4000) & ~0x7fffU;
+  return std::bit_cast<float>(std::min(bits, 0x7f7f8000U));  // the greatest that is finite
+}
+
+/// To a multiple of 32; the ends of the range, which the axes lie on, stay.
+std::int16_t rounded_normal(std::int16_t component) noexcept {
+  const int size = std::min((std::abs(int{component}) + 16) / 32 * 32, 32767);
+  return static_cast<std::int16_t>(component < 0 ? -size : size);
+}
+
+/// A half to 7 bits behind the leading one.
+std::uint16_t rounded_radiance(std::uint16_t half) noexcept {
+  if (half == 0x8000) return 0;  // -0
+  return static_cast<std::uint16_t>(std::min((half + 4) & ~7, 0x7bf8));
+}
+
+class RoundedStream : public PointStream {
+ public:
+  RoundedStream(PointStream& sorted, double unit) : sorted_(sorted), unit_(unit) {}
+
+  std::size_t next(std::span<PointRecord> out) override {
+    const std::size_t count = sorted_.next(out);
+    for (PointRecord& point : out.first(count)) round(point);
+    return count;
+  }
+
+ private:
+  void round(PointRecord& point) noexcept {
+    point.radius = rounded_radius(point.radius);
+    for (std::int16_t& component : point.normal) component = rounded_normal(component);
+    for (std::uint16_t& half : point.radiance) half = rounded_radiance(half);
+    point.key = rounded_key(point.key, point.radius);
+  }
+
+  /// The low corner of the largest cell around the point whose diagonal the radius allows. A coarser cell than
+  /// that of the point before may start in front of it: then a smaller one is taken, at the end the point itself.
+  [[nodiscard]] MortonKey rounded_key(const MortonKey& key, float radius) noexcept {
+    const double edge = static_cast<double>(radius) / unit_ * (kRoundedPosition / std::sqrt(3.0));
+    int level = edge >= 1 ? std::max(kLatticeBits - std::ilogb(edge), 0) : kLatticeBits;
+    while (cell_of(key, level) < last_) ++level;
+    return last_ = cell_of(key, level);
+  }
+
+  PointStream& sorted_;
+  double unit_;
+  MortonKey last_;
+};
+
+}  // namespace
+
+Codec codec_of(Profile profile) noexcept {
+  if (profile == Profile::raw) return Codec::raw;
+  return profile == Profile::fast ? Codec::lz4 : Codec::zstd;
+}
+
+bool is_rounded(Profile profile) noexcept {
+  return profile == Profile::fast || profile == Profile::compact;
+}
+
+std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit) {
+  return std::make_unique<RoundedStream>(sorted, unit);
+}
+
+}  // namespace ptc
