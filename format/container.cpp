@@ -16,7 +16,7 @@ constexpr std::uint64_t kFileMagic = 0x0a1a0a0d43545089;
 constexpr std::uint64_t kHeaderSeed = 0x4441454858435450;  // "PTCXHEAD"
 constexpr std::uint32_t kByteOrderMark = 0x01020304;
 constexpr std::uint16_t kMajor = 1;
-constexpr std::uint8_t kAlignShift = 12;
+constexpr std::uint8_t kAlignShift = 9;
 constexpr std::uint16_t kChecksumXxh3 = 1;
 constexpr std::size_t kHeaderHashAt = 120;
 constexpr std::uint64_t kKnownIncompat = 0;
@@ -27,7 +27,7 @@ void check_constants(const std::byte* p) {
     throw FormatError(12, kConstants, "header_bytes is not 4096");
   }
   if (load<std::uint8_t>(p, 57) != kAlignShift) {
-    throw FormatError(57, kConstants, "align_shift is not 12");
+    throw FormatError(57, kConstants, "align_shift is not 9");
   }
   if (load<std::uint16_t>(p, 58) != kChecksumXxh3) {
     throw FormatError(58, kConstants, "checksum is not XXH3-64");
@@ -139,12 +139,12 @@ DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const Fi
     throw FormatError(24, "spec/container.md#directory-listing", "directory lists itself");
   }
   constexpr char kExtent[] = "spec/container.md#directory-extent";
-  if (entry.offset % kBlockBytes != 0) {
-    throw FormatError(0, kExtent, "page does not start on a block");
+  if (entry.offset % kSectorBytes != 0) {
+    throw FormatError(0, kExtent, "page does not start on a sector");
   }
   const std::uint64_t end = file_bytes < 2 * kBlockBytes ? 0 : file_bytes - 2 * kBlockBytes;
   if (entry.offset < kBlockBytes || entry.offset > end ||
-      round_to_block(kPageHeaderBytes + entry.stored_bytes) > end - entry.offset) {
+      round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes) > end - entry.offset) {
     throw FormatError(0, kExtent, "page lies outside the file's pages");
   }
   return entry;
@@ -158,7 +158,7 @@ std::uint64_t directory_bytes(const FileHeader& file, std::uint32_t page_count) 
   const std::uint32_t full = directory_entries_per_page(file);
   const std::uint64_t rest = page_count % full;
   const std::uint64_t last =
-      rest == 0 ? 0 : round_to_block(kPageHeaderBytes + rest * kDirectoryEntryBytes);
+      rest == 0 ? 0 : round_up(kPageHeaderBytes + rest * kDirectoryEntryBytes, kBlockBytes);
   return (std::uint64_t{page_count / full} << file.page_shift) + last;
 }
 

@@ -12,7 +12,12 @@
 
 namespace ptc {
 
-inline constexpr std::size_t kBlockBytes = 4096;  ///< header, superblocks; pages start on it
+inline constexpr std::size_t kBlockBytes = 4096;  ///< header, superblocks; the directory starts on it
+inline constexpr std::size_t kSectorBytes = 512;  ///< pages start on it
+/// @param unit  kSectorBytes for pages, kBlockBytes for the directory
+[[nodiscard]] constexpr std::uint64_t round_up(std::uint64_t bytes, std::uint64_t unit) noexcept {
+  return (bytes + unit - 1) / unit * unit;
+}
 inline constexpr std::size_t kPageHeaderBytes = 64;
 inline constexpr std::size_t kDirectoryEntryBytes = 32;
 inline constexpr std::uint32_t kNoPage = 0xffffffff;

@@ -24,11 +24,6 @@ void check_page_facts(const PageFacts& facts, const FileHeader& file);
   return (std::uint32_t{1} << file.page_shift) - static_cast<std::uint32_t>(kPageHeaderBytes);
 }
 
-/// Page sizes are rounded up to whole blocks.
-[[nodiscard]] inline std::uint64_t round_to_block(std::uint64_t bytes) noexcept {
-  return (bytes + kBlockBytes - 1) / kBlockBytes * kBlockBytes;
-}
-
 /// Bytes 8 to 119 of the file header, which the superblock repeats.
 void encode_identity(const FileHeader& header, std::span<std::byte, kBlockBytes> block) noexcept;
 

@@ -23,7 +23,7 @@ from collections import namedtuple
 
 from xxh3 import check_table, xxh3_128, xxh3_64
 
-BLOCK = 4096
+BLOCK, SECTOR = 4096, 512
 PAGE_HEADER_BYTES = 64
 ENTRY_BYTES = 32
 NO_PAGE = 0xFFFFFFFF
@@ -72,7 +72,7 @@ def decode_header(block):
             "file header's checksum is wrong")
     require(major == 1, 8, "spec/container.md#header-version", f"version {major} is not supported")
     require(incompat == 0, 16, "spec/container.md#header-features", "file needs an unknown feature")
-    require((header_bytes, align_shift, checksum, byte_order) == (BLOCK, 12, 1, 0x01020304), 12,
+    require((header_bytes, align_shift, checksum, byte_order) == (BLOCK, 9, 1, 0x01020304), 12,
             "spec/container.md#header-constants", "a constant has another value")
     require(12 <= page_shift <= 20, 56, "spec/container.md#header-page-shift",
             "page_shift is not 12 to 20")
@@ -233,7 +233,7 @@ def directory_bytes(header, pages):
 
 
 def extent_bytes(entry):
-    return round_up(PAGE_HEADER_BYTES + entry.stored_bytes, BLOCK)
+    return round_up(PAGE_HEADER_BYTES + entry.stored_bytes, SECTOR)
 
 
 def decode_entry(header, bytes_, file_bytes, at):
@@ -242,7 +242,7 @@ def decode_entry(header, bytes_, file_bytes, at):
                 entry.record_count)
     require(entry.type != DIRECTORY, at + 24, "spec/container.md#directory-listing",
             "directory lists itself")
-    require(entry.offset % BLOCK == 0 and entry.offset >= BLOCK
+    require(entry.offset % SECTOR == 0 and entry.offset >= BLOCK
             and entry.offset + extent_bytes(entry) <= file_bytes - 2 * BLOCK, at,
             "spec/container.md#directory-extent", "page lies outside the file's pages")
     return entry

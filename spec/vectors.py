@@ -363,7 +363,7 @@ class Draft:
         self.surfels = sorted(surfels, key=lambda s: s.key)
         self.page_shift, self.leaf_points, self.origin = page_shift, leaf_points, origin
         self.head = {"major": 1, "minor": 0, "header_bytes": 4096, "incompat": 0, "ro_compat": 0,
-                     "compat": 0, "uuid": UUID, "align_shift": 12, "checksum": 1,
+                     "compat": 0, "uuid": UUID, "align_shift": 9, "checksum": 1,
                      "byte_order": 0x01020304, "reserved": bytes(56)}
         self.pages, self.super, self.super_b, self.directory = [], {}, {}, {}
         self.patches = []  # (offset from the start, or from the end when negative, bytes)
@@ -453,7 +453,7 @@ class Draft:
         uuid = page.uuid or self.head["uuid"]
         seed = r.page_seed(uuid, fields["page_id"], fields["type"])
         image = body + struct.pack("<Q", xxh3_64(body, seed)) + stored
-        return image + bytes(-len(image) % r.BLOCK)
+        return image + bytes(-len(image) % r.SECTOR)
 
     def totals(self):
         s = self.surfels
@@ -502,6 +502,7 @@ class Draft:
                                     e["payload_xxh3"], e["type"], e["group"], e["record_count"])
             records += struct.pack("<HHIQ", e["type"], e["group"], e["record_count"],
                                    e["payload_xxh3"])
+        out += bytes(-len(out) % r.BLOCK)
         facts = {**self.facts(), "directory_offset": len(out), "directory_xxh3": xxh3_64(entries),
                  "content_xxh3": xxh3_128(records)}
         full = ((1 << self.page_shift) - 64) // 32 * 32
@@ -509,6 +510,7 @@ class Draft:
             page = Page(r.DIRECTORY, entries[k:k + full], len(entries[k:k + full]) // 32)
             fields, stored = page.fields(len(self.pages) + k // full)
             out += self.page_image(page, {**fields, **self.directory}, stored)
+        out += bytes(-len(out) % r.BLOCK)
         facts["directory_pages"] = (len(entries) - 1) // full + 1
         facts["file_bytes"] = len(out) + 2 * r.BLOCK
         out += self.superblock(facts, self.super)
@@ -520,7 +522,7 @@ class Draft:
 
     def offset(self, page):
         """Where a page of a raw file without changed lengths starts."""
-        return r.BLOCK + sum(r.round_up(64 + len(p.payload), r.BLOCK) for p in self.pages[:page])
+        return r.BLOCK + sum(r.round_up(64 + len(p.payload), r.SECTOR) for p in self.pages[:page])
 
 
 def write_all(directory):

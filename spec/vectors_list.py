@@ -216,13 +216,14 @@ def bad_directory():
     def entry(**fields):
         return changed(one_point(), lambda d: d.pages[0].entry.update(fields))
     extent = "container-directory-extent"
+    directory_at = r.round_up(one_point().offset(3), r.BLOCK)
     yield extent, entry(offset=r.BLOCK + 64)
     yield extent + ".header", entry(offset=0)
-    yield extent + ".superblock", entry(offset=one_point().offset(3) + r.BLOCK)
+    yield extent + ".superblock", entry(offset=directory_at + r.BLOCK)
     yield extent + ".wraps", entry(offset=(1 << 64) - r.BLOCK)
     yield "container-directory-listing", entry(type=r.DIRECTORY, raw_bytes=32, stored_bytes=32)
     yield "container-directory-overlap", entry(offset=one_point().offset(1))
-    yield "container-directory-overlap.directory", entry(offset=one_point().offset(3))
+    yield "container-directory-overlap.directory", entry(offset=directory_at)
     yield "container-directory-pages", changed(one_point(), lambda d: d.directory.update(page_id=9))
     yield "container-directory-pages.checksum", changed(
         one_point(), lambda d: d.super.update(directory_xxh3=1))
@@ -245,7 +246,7 @@ def bad_superblock():
     pages = "container-superblock-pages"
     yield pages, with_(meta_page=3)
     yield pages + ".none", with_(page_count=0, directory_pages=0)
-    yield pages + ".directory", with_(directory_offset=8192)
+    yield pages + ".directory", with_(directory_offset=4096)
     yield pages + ".directory-pages", with_(directory_pages=2)
     root = "container-superblock-root"
     yield root, with_(root_page=r.NO_PAGE)

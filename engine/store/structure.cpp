@@ -149,8 +149,7 @@ void verify_group(std::span<const DirectoryEntry> entries, const PageIndex& inde
 }  // namespace
 
 std::uint64_t extent_bytes(std::uint32_t stored_bytes) noexcept {
-  const std::uint64_t bytes = kPageHeaderBytes + std::uint64_t{stored_bytes};
-  return (bytes + kBlockBytes - 1) / kBlockBytes * kBlockBytes;
+  return round_up(kPageHeaderBytes + std::uint64_t{stored_bytes}, kSectorBytes);
 }
 
 std::uint64_t directory_page_offset(const Superblock& superblock, std::uint32_t index) noexcept {

@@ -75,7 +75,7 @@ struct ContainerWriter::Impl {
     return page;
   }
 
-  /// Header, payload and zeros up to the next block, at the end of the file, in one write.
+  /// Header, payload and zeros up to the next sector, at the end of the file, in one write.
   void append(PageHeader& page, std::span<const std::byte> payload) {
     page.stored_bytes = static_cast<std::uint32_t>(payload.size());
     page.payload_xxh3 = xxh3_64(payload);
@@ -138,6 +138,7 @@ struct ContainerWriter::Impl {
       page.raw_bytes = static_cast<std::uint32_t>(part.size());
       append(page, part);
     }
+    end = round_up(end, kBlockBytes);
   }
 
   void complete(Superblock& superblock, std::span<const std::byte> directory) const {
@@ -171,6 +172,7 @@ struct ContainerWriter::Impl {
     superblock.meta_page = write_meta(meta);
     finished = true;
     const std::vector<std::byte> directory = encode_directory();
+    end = round_up(end, kBlockBytes);
     complete(superblock, directory);
     const Block block = encode_superblock(superblock);
     check(block, superblock, meta);

@@ -128,8 +128,8 @@ class Bench(ProgramTest):
         self.assertEqual(json.loads(printed.stdout)["rows"], rows)
         axes = [row["axis"] for row in rows]
         self.assertEqual({axis: axes.count(axis) for axis in axes},
-                         {"payload": 51, "node": 6, "leaf": 6, "directions": 4, "compression": 10})
-        self.assertTrue(all(row["decode_ns"] if row["axis"] == "compression" else row["us_per_receiver"] for row in rows))
+                         {"payload": 51, "node": 6, "leaf": 6, "directions": 4, "pages": 22})
+        self.assertTrue(all(row["decode_ns"] if row["axis"] == "pages" else row["us_per_receiver"] for row in rows))
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["model-box.png", "model-box.svg", "model.csv", "model.json"])
 
     def test_growth_beyond_the_disk_is_the_machines_fault(self):

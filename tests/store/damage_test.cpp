@@ -71,13 +71,15 @@ std::vector<bool> ignorable(const std::filesystem::path& path) {
     std::fill(may.begin() + static_cast<std::ptrdiff_t>(from),
               may.begin() + static_cast<std::ptrdiff_t>(to), true);
   };
-  const auto allow_padding = [&](std::uint64_t offset, std::uint64_t stored) {
-    const std::uint64_t end = offset + 64 + stored;
-    allow(end, (end + 4095) / 4096 * 4096);
-  };
-  for (const DirectoryEntry& entry : parts.entries) allow_padding(entry.offset, entry.stored_bytes);
-  allow_padding(parts.superblock.directory_offset, parts.directory[0].stored_bytes);
-  allow(may.size() - 2 * kBlockBytes, may.size());
+  std::uint64_t last = 0;
+  for (const DirectoryEntry& entry : parts.entries) {
+    const std::uint64_t end = entry.offset + 64 + entry.stored_bytes;
+    allow(end, round_up(end, kSectorBytes));
+    last = std::max(last, end);
+  }
+  const std::uint64_t directory = parts.superblock.directory_offset;
+  allow(last, directory);
+  allow(directory + 64 + parts.directory[0].stored_bytes, may.size());  // and the superblocks
   return may;
 }
 

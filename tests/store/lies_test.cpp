@@ -241,7 +241,7 @@ TEST_CASE("reader: a page of another file is found", "[store][lies]") {
     std::vector<std::byte> file = read_file(liar.path());
     const std::vector<std::byte> from = read_file(scratch / "other.ptcx");
     const std::size_t at = mine.entries[page].offset;
-    std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(at), kBlockBytes,
+    std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(at), kSectorBytes,
                 file.begin() + static_cast<std::ptrdiff_t>(at));
     write_file(scratch / "mixed.ptcx", file);
     CHECK_THROWS_WITH(

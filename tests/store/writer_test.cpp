@@ -52,20 +52,22 @@ TEST_CASE("writer: pages lie in the order of the calls, aligned, padded with zer
                       file.begin() + static_cast<std::ptrdiff_t>(to),
                       [](std::byte b) { return b == std::byte{0}; }));
   };
-  const auto expect_page = [&](std::uint64_t offset, std::uint64_t stored) {
+  const auto expect_page = [&](std::uint64_t offset, std::uint64_t stored, std::uint64_t unit) {
     CHECK(offset == expected);
-    expected = (offset + 64 + stored + 4095) / 4096 * 4096;
+    expected = round_up(offset + 64 + stored, unit);
     expect_zeros(offset + 64 + stored, expected);
   };
   // The sample is written from its last page to its first; the meta page comes after all.
   for (std::size_t page = sample.pages.size(); page-- > 0;) {
-    expect_page(parts.entries[page].offset, parts.entries[page].stored_bytes);
+    expect_page(parts.entries[page].offset, parts.entries[page].stored_bytes, 512);
   }
-  expect_page(parts.entries.back().offset, parts.entries.back().stored_bytes);
+  expect_page(parts.entries.back().offset, parts.entries.back().stored_bytes, 512);
   CHECK(parts.entries.back().type == PageType::meta);
+  expect_zeros(expected, parts.superblock.directory_offset);
+  expected = round_up(expected, 4096);
   for (std::size_t i = 0; i < parts.directory.size(); ++i) {
     CHECK(parts.directory[i].page_id == parts.entries.size() + i);
-    expect_page(parts.superblock.directory_offset + i * 4096, parts.directory[i].stored_bytes);
+    expect_page(parts.superblock.directory_offset + i * 4096, parts.directory[i].stored_bytes, 4096);
   }
   CHECK(file.size() == expected + 2 * kBlockBytes);
   const std::span tail = std::span(file).last(2 * kBlockBytes);
