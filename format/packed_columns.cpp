@@ -35,11 +35,6 @@ void load_all(const std::byte* column, Values& values) noexcept {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = load<T>(column, i * sizeof(T));
 }
 
-template <class T>
-void store_all(std::byte* column, const Values& values) noexcept {
-  for (std::size_t i = 0; i < values.size(); ++i) store(column, i * sizeof(T), static_cast<T>(values[i]));
-}
-
 // Where x, y, z keep their upper bits: shift of the axis whose column has so many bytes before it.
 unsigned high_shift(const PackedColumn& column) noexcept { return column.before / 4 * kHighBits; }
 
@@ -56,19 +51,6 @@ void load_column(const std::byte* payload, const PackedColumn& column, Values& v
   }
 }
 
-void store_column(std::byte* payload, const PackedColumn& column, const Values& values) noexcept {
-  std::byte* const to = payload + column.before * values.size();
-  if (column.bits == 8) return store_all<std::uint8_t>(to, values);
-  if (column.bits == 16) return store_all<std::uint16_t>(to, values);
-  store_all<std::uint32_t>(to, values);
-  if (column.bits == 32) return;
-  std::byte* const high = payload + kHigh * values.size();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::uint32_t others = column.before == 0 ? 0 : load<std::uint32_t>(high, 4 * i);
-    store(high, 4 * i, others | static_cast<std::uint32_t>(values[i] >> 32) << high_shift(column));
-  }
-}
-
 // Differences to the value before, as zigzag numbers without the zero bits that all of them end in.
 void difference(Values& values, unsigned bits, unsigned shift) noexcept {
   const unsigned top = 64 - bits;
@@ -77,13 +59,6 @@ void difference(Values& values, unsigned bits, unsigned shift) noexcept {
     const auto step = static_cast<std::int64_t>((value - before) << top) >> (top + shift);
     before = value;
     value = static_cast<std::uint64_t>(step) << 1 ^ static_cast<std::uint64_t>(step >> 63);
-  }
-}
-
-void sum_up(Values& values, unsigned bits, unsigned shift, std::uint64_t base) noexcept {
-  for (std::uint64_t& value : values) {
-    base += (value >> 1 ^ (0 - (value & 1))) << shift;
-    value = base & mask(bits);
   }
 }
 
@@ -118,26 +93,82 @@ void check_size(std::size_t bytes, std::uint32_t count, std::span<const PackedCo
   if (count == 0 || bytes != row * count) throw std::invalid_argument("packed columns: a payload of another size");
 }
 
-// Bytes that the column at `at` takes; its numbers are in `values` then.
-std::size_t unpack(std::span<const std::byte> packed, std::size_t at, unsigned bits, Values& values) {
+/// A column as it is packed, its head checked.
+struct Head {
+  unsigned shift = 0;
+  unsigned planes = 0;
+  std::uint64_t base = 0;
+  const std::byte* codes = nullptr;
+};
+
+Head read_head(std::span<const std::byte> packed, std::size_t at, unsigned bits, std::size_t n) {
   if (packed.size() - at < kHeadBytes) throw FormatError(at, kPacked, "packed columns end in a column's head");
   const std::byte* const p = packed.data() + at;
-  const unsigned shift = load<std::uint8_t>(p, 0), planes = load<std::uint8_t>(p, 1);
-  const auto base = load<std::uint64_t>(p, 2);
-  if (shift >= bits) throw FormatError(at, kPacked, "shift is not below the bits of the column");
-  if (planes > (bits + 7) / 8) throw FormatError(at + 1, kPacked, "more planes than the column has bytes");
-  if (base > mask(bits)) throw FormatError(at + 2, kPacked, "base has more bits than the column");
-  const std::size_t n = values.size();
-  if ((packed.size() - at - kHeadBytes) / n < planes) {
+  const Head head{load<std::uint8_t>(p, 0), load<std::uint8_t>(p, 1), load<std::uint64_t>(p, 2), p + kHeadBytes};
+  if (head.shift >= bits) throw FormatError(at, kPacked, "shift is not below the bits of the column");
+  if (head.planes > (bits + 7) / 8) throw FormatError(at + 1, kPacked, "more planes than the column has bytes");
+  if (head.base > mask(bits)) throw FormatError(at + 2, kPacked, "base has more bits than the column");
+  if ((packed.size() - at - kHeadBytes) / n < head.planes) {
     throw FormatError(packed.size(), kPacked, "packed columns end in a plane");
   }
-  std::ranges::fill(values, 0);
-  for (unsigned plane = 0; plane < planes; ++plane) {
-    const std::byte* const in = p + kHeadBytes + plane * n;
-    for (std::size_t i = 0; i < n; ++i) values[i] |= static_cast<std::uint64_t>(in[i]) << (8 * plane);
+  return head;
+}
+
+template <unsigned kPlanes, class Put>
+void sum_planes(const Head& head, std::size_t n, const Put& put) {
+  std::uint64_t value = head.base;
+  for (std::size_t i = 0; i < n; ++i) {
+    std::uint64_t code = 0;
+    for (unsigned k = 0; k < kPlanes; ++k) code |= load<std::uint8_t>(head.codes, k * n + i) * (std::uint64_t{1} << 8 * k);
+    value += (code >> 1 ^ (0 - (code & 1))) << head.shift;
+    put(i, value);
   }
-  sum_up(values, bits, shift, base);
-  return kHeadBytes + planes * n;
+}
+
+/// Hands out the values of a column one after another, with more bits than it has.
+template <class Put>
+void sum_up(const Head& head, std::size_t n, const Put& put) {
+  switch (head.planes) {
+    case 0: return sum_planes<0>(head, n, put);
+    case 1: return sum_planes<1>(head, n, put);
+    case 2: return sum_planes<2>(head, n, put);
+    case 3: return sum_planes<3>(head, n, put);
+    case 4: return sum_planes<4>(head, n, put);
+    case 5: return sum_planes<5>(head, n, put);
+    default: return sum_planes<6>(head, n, put);
+  }
+}
+
+template <class T>
+void unpack_values(const Head& head, std::size_t n, const std::byte* minus, std::byte* to) {
+  if (minus == nullptr) {
+    return sum_up(head, n, [&](std::size_t i, std::uint64_t value) { store(to, i * sizeof(T), static_cast<T>(value)); });
+  }
+  sum_up(head, n, [&](std::size_t i, std::uint64_t value) {
+    store(to, i * sizeof(T), static_cast<T>(value + load<T>(minus, i * sizeof(T))));
+  });
+}
+
+void unpack_coordinates(const Head& head, std::size_t n, const PackedColumn& column, std::byte* payload) {
+  std::byte* const low = payload + column.before * n;
+  std::byte* const high = payload + kHigh * n;
+  const unsigned shift = high_shift(column);
+  sum_up(head, n, [&](std::size_t i, std::uint64_t value) {
+    const std::uint32_t others = shift == 0 ? 0 : load<std::uint32_t>(high, 4 * i);
+    store(low, 4 * i, static_cast<std::uint32_t>(value));
+    store(high, 4 * i, others | static_cast<std::uint32_t>((value & mask(kCoordinateBits)) >> 32) << shift);
+  });
+}
+
+void unpack(const Head& head, std::size_t n, std::span<const PackedColumn> columns, const PackedColumn& column,
+            std::byte* payload) {
+  if (column.bits == kCoordinateBits) return unpack_coordinates(head, n, column, payload);
+  const std::byte* const minus =
+      column.minus == PackedColumn::kNone ? nullptr : payload + columns[column.minus].before * n;
+  std::byte* const to = payload + column.before * n;
+  if (column.bits == 8) return unpack_values<std::uint8_t>(head, n, minus, to);
+  if (column.bits == 16) return unpack_values<std::uint16_t>(head, n, minus, to);
+  unpack_values<std::uint32_t>(head, n, minus, to);
 }
 
 }  // namespace
@@ -175,15 +206,11 @@ void pack_columns(std::span<const std::byte> payload, std::uint32_t count, std::
 void unpack_columns(std::span<const std::byte> packed, std::uint32_t count, std::span<const PackedColumn> columns,
                     std::span<std::byte> payload) {
   check_size(payload.size(), count, columns);
-  Values values(count), others(count);
   std::size_t at = 0;
   for (const PackedColumn& column : columns) {
-    at += unpack(packed, at, column.bits, values);
-    if (column.minus != PackedColumn::kNone) {
-      load_column(payload.data(), columns[column.minus], others);
-      for (std::size_t i = 0; i < count; ++i) values[i] += others[i];
-    }
-    store_column(payload.data(), column, values);
+    const Head head = read_head(packed, at, column.bits, count);
+    unpack(head, count, columns, column, payload.data());
+    at += kHeadBytes + std::size_t{head.planes} * count;
   }
   if (at != packed.size()) throw FormatError(at, kPacked, "bytes are left over after the packed columns");
 }
