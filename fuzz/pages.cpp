@@ -1,8 +1,10 @@
-// Any bytes: the decoders of header, superblock, page header, meta, point and node pages return
-// values that can be read whole, or throw FormatError.
+// Any bytes: the decoders of header, superblock, page header, meta, point and node pages, codecs and
+// packed columns return values that can be read whole, or throw FormatError.
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "format/codec.h"
 #include "format/container.h"
 #include "format/error.h"
 #include "format/node_page.h"
@@ -30,6 +32,11 @@ void read_points(std::span<const std::byte> bytes, std::uint32_t count) {
   for (std::uint32_t i = 0; i < page.size(); ++i) (void)page[i];
 }
 
+void decode_payload(std::span<const std::byte> bytes, std::uint32_t count, ptc::Coding coding) {
+  std::vector<std::byte> payload(ptc::point_page_bytes(count));
+  ptc::PageDecoder().decode(coding, bytes, payload, {count, ptc::packed_point_columns()});
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -43,5 +50,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   expect_format_error([&] { (void)ptc::decode_meta(body); });
   expect_format_error([&] { read_nodes(body, count); });
   expect_format_error([&] { read_points(body, count); });
+  const ptc::Coding coding{static_cast<ptc::Codec>(data[2] % 3), static_cast<ptc::Filter>(data[3] % 2)};
+  if (count > 0 && coding.codec != ptc::Codec::raw) {
+    expect_format_error([&] { decode_payload(body, count, coding); });
+  }
   return 0;
 }

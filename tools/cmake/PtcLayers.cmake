@@ -18,6 +18,9 @@ target_compile_features(ptc_options INTERFACE cxx_std_20)
 # No contraction: a fused multiply-add in one build and not in another would change the bytes.
 target_compile_options(ptc_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
   -Wsign-conversion -Wno-missing-field-initializers -ffp-contract=off $<$<BOOL:${PTC_WERROR}>:-Werror>)
+if(PTC_FUZZ)  # what is fuzzed tells which of its branches were taken
+  target_compile_options(ptc_options INTERFACE -fsanitize=fuzzer-no-link)
+endif()
 if(PTC_SANITIZE)
   target_compile_options(ptc_options INTERFACE -fsanitize=${PTC_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(ptc_options INTERFACE -fsanitize=${PTC_SANITIZE})
