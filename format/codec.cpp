@@ -5,7 +5,6 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <cassert>
 #include <cstdint>
 #include <new>
 #include <stdexcept>
