@@ -5,7 +5,6 @@
 #include <array>
 #include <cstring>
 #include <iterator>
-#include <map>
 #include <numeric>
 #include <set>
 #include <string>
@@ -164,10 +163,6 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   std::ranges::sort(order, {}, [&](std::uint32_t page) { return container.entry(page).offset; });
   PageDecoder decoder;
   std::vector<std::byte> payload(container.page_payload_limit());
-  std::map<std::uint16_t, std::vector<PackedColumn>> columns;
-  for (const std::uint16_t group : groups_of(container)) {
-    columns[group] = packed_group_columns(container.meta().channels, group);
-  }
   for (const std::uint32_t page : order) {
     const PageHeader header = container.read_page(page, payload, decoder);
     writer.write_page(page,
@@ -177,7 +172,7 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
                        .record_count = header.record_count,
                        .first_key = header.first_key,
                        .last_key = header.last_key},
-                      std::span(payload).first(header.raw_bytes), columns[header.group]);
+                      std::span(payload).first(header.raw_bytes), container.attribute_columns(header.group));
     if (header.type == PageType::point) progress.advance(header.record_count);
   }
 }
@@ -189,12 +184,8 @@ class GroupPager {
       : container_(container),
         pages_(container.attribute_pages(group)),
         payload_(container.page_payload_limit()),
-        point_bytes_(group_point_bytes(container.meta().channels, group)) {
-    for (const Channel& channel : container.meta().channels) {
-      if (channel.group == group)
-        widths_.insert(widths_.end(), channel.components, channel_bytes(channel.type));
-    }
-  }
+        point_bytes_(group_point_bytes(container.meta().channels, group)),
+        columns_(container.attribute_columns(group)) {}
 
   /// Payload of a page with the next `count` points.
   [[nodiscard]] std::vector<std::byte> next(std::size_t count) {
@@ -206,11 +197,10 @@ class GroupPager {
         at_ = 0;
       }
       const std::size_t part = std::min(count - filled, held_ - at_);
-      std::size_t before = 0;  // bytes of a point in the columns so far
-      for (const std::size_t width : widths_) {
-        std::memcpy(out.data() + before * count + filled * width,
-                    payload_.data() + before * held_ + at_ * width, part * width);
-        before += width;
+      for (const PackedColumn& column : columns_) {
+        const std::size_t width = column.bits / 8;
+        std::memcpy(out.data() + column.before * count + filled * width,
+                    payload_.data() + column.before * held_ + at_ * width, part * width);
       }
       filled += part;
       at_ += part;
@@ -224,7 +214,7 @@ class GroupPager {
   PageDecoder decoder_;
   std::vector<std::byte> payload_;
   std::size_t point_bytes_;
-  std::vector<std::size_t> widths_;  ///< of each component's values, bytes
+  std::span<const PackedColumn> columns_;
   std::size_t held_ = 0;             ///< points of the page in payload_
   std::size_t at_ = 0;
 };
@@ -233,12 +223,11 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   const std::uint32_t full = points_per_page(writer.header());
   for (const std::uint16_t group : groups_of(container)) {
     GroupPager pager(container, group);
-    const std::vector<PackedColumn> columns = packed_group_columns(container.meta().channels, group);
     for (std::uint64_t left = container.superblock().points; left > 0;) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
       writer.write_page(writer.reserve_page(),
                         {.type = PageType::attribute, .group = group, .record_count = count},
-                        pager.next(count), columns);
+                        pager.next(count), container.attribute_columns(group));
       left -= count;
     }
   }

@@ -67,7 +67,6 @@ inline constexpr const char* kCameraKey = "camera";
 inline constexpr const char* kSpacingKey = "spacing";
 inline constexpr const char* kInputsKey = "inputs";
 inline constexpr const char* kRoundingKey = "rounding";  ///< its text is kRounding when points were rounded
-inline constexpr const char* kRounding = "position 0.001 radius, radius 1/512, normal 0.0021, radiance 1/256";
 
 /// Part of a cap that buffers outside the large budgets take: open pages, blocks, receivers.
 inline constexpr std::uint64_t kBufferBytes = std::uint64_t{32} << 20;

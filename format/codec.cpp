@@ -110,7 +110,6 @@ PageDecoder::~PageDecoder() {
 
 std::span<const std::byte> PageDecoder::expand(Codec codec, std::span<const std::byte> stored, std::size_t least,
                                                std::size_t limit, std::span<std::byte> room) {
-  if (codec == Codec::raw) return stored;
   if (codec == Codec::zstd) {
     const unsigned long long bytes = check_frame(stored);
     if (bytes < least || bytes > limit) {
@@ -137,12 +136,15 @@ std::span<const std::byte> PageDecoder::expand(Codec codec, std::span<const std:
 
 void PageDecoder::decode(Coding coding, std::span<const std::byte> stored, std::span<std::byte> out,
                          const PayloadColumns& columns) {
-  if (coding.filter == Filter::none) {
-    const std::span<const std::byte> raw = expand(coding.codec, stored, out.size(), out.size(), out);
-    if (raw.size() != out.size()) {
+  if (coding.codec == Codec::raw) {
+    if (stored.size() != out.size()) {
       throw FormatError(0, "spec/container.md#page-length", "raw payload has another size");
     }
-    if (coding.codec == Codec::raw) std::ranges::copy(raw, out.begin());
+    std::ranges::copy(stored, out.begin());
+    return;
+  }
+  if (coding.filter == Filter::none) {
+    static_cast<void>(expand(coding.codec, stored, out.size(), out.size(), out));
     return;
   }
   packed_.resize(out.size());  // packing does not lengthen

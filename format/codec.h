@@ -54,7 +54,7 @@ class PageDecoder {
               const PayloadColumns& columns = {});
 
  private:
-  /// Undoes the codec. @param limit  the most bytes that there may be. @return what was decoded, in `room` or `stored`
+  /// Undoes a codec that is not raw. @param least, limit  how many bytes there may be. @return what was decoded, in `room`
   std::span<const std::byte> expand(Codec codec, std::span<const std::byte> stored, std::size_t least,
                                     std::size_t limit, std::span<std::byte> room);
 

@@ -404,6 +404,7 @@ class Points:
 
 
 Column = namedtuple("Column", "before bits minus")
+COLUMN_FORM = {8: "B", 16: "H", 32: "I", 42: "I"}  # by bits, as payloads hold them
 POINT_COLUMNS = [Column(0, 42, None), Column(4, 42, None), Column(8, 42, None),
                  Column(16, 32, None), Column(20, 16, None), Column(22, 16, None),
                  Column(26, 16, None), Column(24, 16, 6), Column(28, 16, 6),
@@ -442,7 +443,7 @@ def unpack_columns(packed, columns, count, at):
     require(place == len(packed), at, clause, "bytes follow the last column")
     parts = {}
     for column, numbers in zip(columns, values):
-        form = {8: "B", 16: "H", 32: "I", 42: "I"}[column.bits]
+        form = COLUMN_FORM[column.bits]
         parts[column.before] = struct.pack(f"<{count}{form}", *(v & 0xFFFFFFFF for v in numbers))
     if columns is POINT_COLUMNS:
         parts[12] = struct.pack(f"<{count}I", *(x >> 32 | y >> 32 << 10 | z >> 32 << 20

@@ -286,7 +286,7 @@ def pack_columns(payload, columns, count):
     """The packed form of columns (points.md#packed-columns)."""
     out, values = b"", []
     for column in columns:
-        form = {8: "B", 16: "H", 32: "I", 42: "I"}[column.bits]
+        form = r.COLUMN_FORM[column.bits]
         numbers = list(struct.unpack_from(f"<{count}{form}", payload, column.before * count))
         if column.bits == 42:
             high = struct.unpack_from(f"<{count}I", payload, 12 * count)

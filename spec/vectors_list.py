@@ -7,7 +7,8 @@ one rule is broken in several ways.
 import struct
 
 import reader as r
-from vectors import UUID, Draft, Page, Surfel, encode_meta, encode_points, literal_block, scatter
+from vectors import (UUID, Draft, Page, Surfel, encode_meta, encode_points, literal_block,
+                     pack_columns, scatter)
 
 NAN = float("nan")
 CHANNELS = (("irradiance", 3, 3, 1), ("occlusion", 1, 1, 1), ("part", 4, 1, 9))
@@ -196,12 +197,10 @@ def bad_packed():
     """Packed columns of the first point page."""
     def change(edit):
         draft = packed(r.LZ4)
-        content = bytearray(draft.pages[0].stored[5:])  # behind the size and the token
-        while content[0] == 255:
-            del content[0]
-        del content[0]
+        page = draft.pages[0]
+        content = bytearray(pack_columns(bytes(page.payload), r.POINT_COLUMNS, page.count))
         edit(content)
-        draft.pages[0].stored = literal_block(bytes(content))
+        page.stored = literal_block(bytes(content))
         return draft
     clause = "points-packed-columns"
     yield clause, change(lambda c: c.__setitem__(0, 42))

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <map>
-#include <vector>
 
 #include "engine/stages.h"
 #include "engine/store/reader.h"
@@ -55,10 +54,9 @@ std::map<ptc::PageType, Share> shares_of(const ptc::ContainerReader& container) 
 /// A page that compression does not shorten is stored raw whatever the codec, so the codec of a
 /// file is that of the first page that was shortened.
 std::string codec_of(const ptc::ContainerReader& container) {
-  std::vector<std::byte> stored;
   for (std::uint32_t page = 0; page < container.page_count(); ++page) {
     if (container.entry(page).stored_bytes == container.entry(page).raw_bytes) continue;
-    return container.read_stored_page(page, stored).coding.codec == ptc::Codec::lz4 ? "lz4" : "zstd";
+    return container.read_page_header(page).coding.codec == ptc::Codec::lz4 ? "lz4" : "zstd";
   }
   return "raw";
 }

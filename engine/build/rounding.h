@@ -24,6 +24,9 @@ inline constexpr double kRoundedRadius = 1.0 / 512;    ///< share
 inline constexpr double kRoundedNormal = 0.0021;       ///< angle, rad
 inline constexpr double kRoundedRadiance = 1.0 / 256;  ///< share, or 2^-22 if that is more
 
+/// The same in words.
+inline constexpr const char* kRounding = "position 0.001 radius, radius 1/512, normal 0.0021, radiance 1/256";
+
 /// Rounds sorted points; their order stays. Rounding what is rounded changes nothing. Points of radius 0 keep
 /// their position.
 /// @param sorted  must outlive the result

@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <map>
@@ -117,8 +118,8 @@ struct ContainerReader::Impl {
                                 std::to_string(entries.size()));
   }
 
-  /// The header of the page whose image this is, when directory and checksum agree with it.
-  PageHeader checked_header(std::uint32_t page, std::span<const std::byte> image) const {
+  /// The header of the page whose image begins so, when the directory agrees with it.
+  PageHeader agreed_header(std::uint32_t page, std::span<const std::byte> image) const {
     const PageHeader found = decode_page_header(image.first(kPageHeaderBytes), header);
     const DirectoryEntry facts{entries[page].offset, found.stored_bytes, found.raw_bytes,
                                found.payload_xxh3,   found.type,         found.group,
@@ -128,6 +129,12 @@ struct ContainerReader::Impl {
           0, kAgreement,
           "the page header is not what the directory says of page " + std::to_string(page));
     }
+    return found;
+  }
+
+  /// Likewise of a whole image, when its payload's checksum is right too.
+  PageHeader checked_header(std::uint32_t page, std::span<const std::byte> image) const {
+    const PageHeader found = agreed_header(page, image);
     if (xxh3_64(image.subspan(kPageHeaderBytes)) != found.payload_xxh3) {
       throw FormatError(kPageHeaderBytes, kPayload, "payload's checksum is wrong");
     }
@@ -159,10 +166,15 @@ struct ContainerReader::Impl {
     }
   }
 
+  std::span<const PackedColumn> columns_of(std::uint16_t group) const {
+    const auto found = columns.find(group);
+    if (found == columns.end()) return {};
+    return found->second;
+  }
+
   PayloadColumns columns_of(const PageHeader& page) const {
     if (page.type == PageType::point) return {page.record_count, packed_point_columns()};
-    if (page.type == PageType::attribute) return {page.record_count, columns.at(page.group)};
-    return {};
+    return {page.record_count, columns_of(page.group)};
   }
 
   PageHeader decode(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
@@ -267,6 +279,17 @@ std::span<const std::uint32_t> ContainerReader::attribute_pages(std::uint16_t gr
   const auto pages = impl_->index.attributes.find(group);
   if (pages == impl_->index.attributes.end()) return {};
   return pages->second;
+}
+
+std::span<const PackedColumn> ContainerReader::attribute_columns(std::uint16_t group) const {
+  return impl_->columns_of(group);
+}
+
+PageHeader ContainerReader::read_page_header(std::uint32_t page) const {
+  const DirectoryEntry& where = impl_->entry(page);
+  std::array<std::byte, kPageHeaderBytes> image;
+  impl_->file.read_at(where.offset, image);
+  return at_offset(impl_->file, where.offset, [&] { return impl_->agreed_header(page, image); });
 }
 
 PageHeader ContainerReader::read_page(std::uint32_t page, std::span<std::byte> out,

@@ -37,6 +37,8 @@ class ContainerReader {
   [[nodiscard]] std::span<const std::uint32_t> point_pages() const noexcept;
   [[nodiscard]] std::span<const std::uint32_t> node_pages() const noexcept;
   [[nodiscard]] std::span<const std::uint32_t> attribute_pages(std::uint16_t group) const;
+  /// Columns of a group's attribute pages, for ContainerWriter::write_page(); none where there is no such group.
+  [[nodiscard]] std::span<const PackedColumn> attribute_columns(std::uint16_t group) const;
 
   /// mmap decodes from a mapping of the file, and lets go of what was read, so that it stops
   /// counting as resident. A file that shrinks, or a disk that fails, while it is mapped raises
@@ -50,6 +52,8 @@ class ContainerReader {
   /// @throws FormatError naming path and offset
   PageHeader read_page(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder,
                        Access access = Access::pread) const;
+  /// The header of a page, compared with the directory; its payload is not read.
+  [[nodiscard]] PageHeader read_page_header(std::uint32_t page) const;
   /// The payload as it is stored, checksum verified, not decoded, for copying.
   PageHeader read_stored_page(std::uint32_t page, std::vector<std::byte>& stored) const;
 

@@ -2,7 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <stdexcept>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -62,27 +63,29 @@ PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
 /// Codes pages and decodes them again.
 class PageStudy {
  public:
-  PageStudy(const BenchScene& scene, unsigned repeats, bool nodes) : scene_(scene), repeats_(repeats), nodes_(nodes) {}
+  PageStudy(const BenchScene& scene, unsigned repeats) : scene_(scene), repeats_(repeats) {}
 
-  [[nodiscard]] ModelRow measure(const std::vector<Payload>& pages, Codec codec, int level, bool packed) const {
+  /// @param form  points, packed, rounded or nodes
+  [[nodiscard]] ModelRow measure(const std::vector<Payload>& pages, const std::string& form, Codec codec, int level) const {
+    const bool nodes = form == "nodes";
     PageEncoder encoder(codec, level);
     std::vector<Stored> stored(pages.size());
     double bytes = 0;
     for (std::size_t i = 0; i < pages.size(); ++i) {
-      const PayloadColumns columns = packed ? pages[i].columns : PayloadColumns{};
+      const PayloadColumns columns = form == "points" ? PayloadColumns{} : pages[i].columns;
       stored[i].coding = encoder.encode(pages[i].bytes, stored[i].bytes, columns);
       bytes += static_cast<double>(stored[i].bytes.size());
     }
     std::vector<double> seconds;
     for (unsigned repeat = 0; repeat < repeats_; ++repeat) seconds.push_back(decode(pages, stored));
     const Superblock& superblock = scene_.container().superblock();
-    const auto records = static_cast<double>(nodes_ ? superblock.nodes : superblock.points);
+    const auto records = static_cast<double>(nodes ? superblock.nodes : superblock.points);
     return {.scene = scene_.name(),
             .axis = "pages",
             .variant = codec == Codec::zstd ? fmt::format("zstd {}", level) : codec == Codec::lz4 ? "lz4" : "raw",
-            .form = nodes_ ? "nodes" : packed ? "packed" : "points",
+            .form = form,
             .bytes = bytes / records,
-            .per = nodes_ ? "node" : "point",
+            .per = nodes ? "node" : "point",
             .decode_ns = 1e9 * spread_of(seconds).median / records};
   }
 
@@ -104,35 +107,25 @@ class PageStudy {
 
   const BenchScene& scene_;
   unsigned repeats_;
-  bool nodes_;
 };
 
 }  // namespace
 
 std::vector<ModelRow> study_pages(const BenchScene& scene, const ModelOptions& options) {
+  const PageStudy study(scene, options.repeats);
   std::vector<ModelRow> rows;
-  for (const bool rounded : {false, true}) {
-    const PointPayloads points = point_payloads(scene.container(), rounded);
-    const PageStudy study(scene, options.repeats, false);
-    const auto add = [&](Codec codec, int level, bool packed) {
-      ModelRow row = study.measure(points.pages, codec, level, packed);
-      row.moved = points.moved;
-      if (rounded) row.form = "rounded";
-      rows.push_back(row);
-    };
-    if (!rounded) {
-      add(Codec::raw, 0, false);
-      add(Codec::lz4, 0, false);
-      for (const int level : options.levels) add(Codec::zstd, level, false);
-    }
-    add(Codec::lz4, 0, true);
-    for (const int level : options.levels) add(Codec::zstd, level, true);
-  }
-  const std::vector<Payload> nodes = node_payloads(scene.container());
-  const PageStudy study(scene, options.repeats, true);
-  rows.push_back(study.measure(nodes, Codec::raw, 0, false));
-  rows.push_back(study.measure(nodes, Codec::lz4, 0, false));
-  for (const int level : options.levels) rows.push_back(study.measure(nodes, Codec::zstd, level, false));
+  const auto add = [&](const std::vector<Payload>& pages, const std::string& form) {
+    const std::size_t first = rows.size();
+    if (form == "points" || form == "nodes") rows.push_back(study.measure(pages, form, Codec::raw, 0));
+    rows.push_back(study.measure(pages, form, Codec::lz4, 0));
+    for (const int level : options.levels) rows.push_back(study.measure(pages, form, Codec::zstd, level));
+    return std::span(rows).subspan(first);
+  };
+  const PointPayloads exact = point_payloads(scene.container(), false), rounded = point_payloads(scene.container(), true);
+  for (ModelRow& row : add(exact.pages, "points")) row.moved = exact.moved;
+  for (ModelRow& row : add(exact.pages, "packed")) row.moved = exact.moved;
+  for (ModelRow& row : add(rounded.pages, "rounded")) row.moved = rounded.moved;
+  add(node_payloads(scene.container()), "nodes");
   return rows;
 }
 
