@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "engine/build/build.h"
+#include "engine/build/channel_pager.h"
 #include "engine/build/container_points.h"
 #include "engine/io/file.h"
 #include "engine/io/points.h"
@@ -177,52 +178,17 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   }
 }
 
-/// Moves the columns of one channel group from pages of one size to pages of another.
-class GroupPager {
- public:
-  GroupPager(const ContainerReader& container, std::uint16_t group)
-      : container_(container),
-        pages_(container.attribute_pages(group)),
-        payload_(container.page_payload_limit()),
-        point_bytes_(group_point_bytes(container.meta().channels, group)),
-        columns_(container.attribute_columns(group)) {}
-
-  /// Payload of a page with the next `count` points.
-  [[nodiscard]] std::vector<std::byte> next(std::size_t count) {
-    std::vector<std::byte> out(count * point_bytes_);
-    for (std::size_t filled = 0; filled < count;) {
-      if (at_ == held_) {
-        held_ = container_.read_page(pages_.front(), payload_, decoder_).record_count;
-        pages_ = pages_.subspan(1);
-        at_ = 0;
-      }
-      const std::size_t part = std::min(count - filled, held_ - at_);
-      for (const PackedColumn& column : columns_) {
-        const std::size_t width = column.bits / 8;
-        std::memcpy(out.data() + column.before * count + filled * width,
-                    payload_.data() + column.before * held_ + at_ * width, part * width);
-      }
-      filled += part;
-      at_ += part;
-    }
-    return out;
-  }
-
- private:
-  const ContainerReader& container_;
-  std::span<const std::uint32_t> pages_;
-  PageDecoder decoder_;
-  std::vector<std::byte> payload_;
-  std::size_t point_bytes_;
-  std::span<const PackedColumn> columns_;
-  std::size_t held_ = 0;             ///< points of the page in payload_
-  std::size_t at_ = 0;
-};
-
 void repage_channels(const ContainerReader& container, ContainerWriter& writer) {
   const std::uint32_t full = points_per_page(writer.header());
   for (const std::uint16_t group : groups_of(container)) {
-    GroupPager pager(container, group);
+    PageDecoder decoder;
+    auto pages = container.attribute_pages(group);
+    const auto next_page = [&](std::span<std::byte> payload) {
+      const std::uint32_t page = pages.front();
+      pages = pages.subspan(1);
+      return container.read_page(page, payload, decoder).record_count;
+    };
+    ChannelPager pager(container.attribute_columns(group), container.page_payload_limit(), next_page);
     for (std::uint64_t left = container.superblock().points; left > 0;) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
       writer.write_page(writer.reserve_page(),

@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "engine/base/error.h"
+
 namespace ptc {
 namespace {
 
@@ -30,7 +32,7 @@ Stage::~Stage() {
 std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least, const char* what_for) {
   if (run.memory_bytes < taken || run.memory_bytes - taken < least) {
     const std::uint64_t mebibytes = (taken + least + (1 << 20) - 1) >> 20;
-    throw std::invalid_argument("the memory cap is too small for " + std::string(what_for) +
+    throw LimitError("the memory cap is too small for " + std::string(what_for) +
                                 ": the least that works is " + std::to_string(mebibytes) + "M");
   }
   return run.memory_bytes - taken;

@@ -106,6 +106,14 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
   return header;
 }
 
+FileHeader decode_repeated_header(std::span<const std::byte> superblock) {
+  Block block{};
+  store(block.data(), 0, kFileMagic);
+  std::ranges::copy(superblock.subspan(8, kHeaderHashAt - 8), block.begin() + 8);
+  store(block.data(), kHeaderHashAt, xxh3_64(std::span(block).first(kHeaderHashAt), kHeaderSeed));
+  return decode_file_header(block);
+}
+
 void encode_directory_entry(const DirectoryEntry& entry,
                             std::span<std::byte, kDirectoryEntryBytes> out) noexcept {
   std::byte* const p = out.data();

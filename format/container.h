@@ -19,6 +19,7 @@ inline constexpr std::size_t kSectorBytes = 512;  ///< pages start on it
   return (bytes + unit - 1) / unit * unit;
 }
 inline constexpr std::size_t kPageHeaderBytes = 64;
+inline constexpr std::uint32_t kPageMagic = 0x70435450;  ///< "PTCp", the first bytes of a page
 inline constexpr std::size_t kDirectoryEntryBytes = 32;
 inline constexpr std::uint32_t kNoPage = 0xffffffff;
 inline constexpr std::uint64_t kMaxPages = 0xfffffffe;
@@ -108,6 +109,10 @@ using Block = std::array<std::byte, kBlockBytes>;
 /// @param bytes  the first 4096 bytes, or fewer when the file is shorter
 /// @throws FormatError for a wrong magic, checksum, version, limit or unknown incompatible feature
 [[nodiscard]] FileHeader decode_file_header(std::span<const std::byte> bytes);
+/// The file header as a superblock repeats it, for files that lost theirs.
+/// @param superblock  at least 120 bytes, its checksum right
+/// @throws FormatError as decode_file_header()
+[[nodiscard]] FileHeader decode_repeated_header(std::span<const std::byte> superblock);
 
 /// Writes the header whose checksum holds for this file, number and type only.
 void encode_page_header(const PageHeader& header, const Uuid& uuid,

@@ -138,6 +138,11 @@ class GroupView {
   /// rgbe of axis k.
   [[nodiscard]] const std::byte* radiance(int k) const noexcept { return column(14 + 2 * k); }
 
+  /// The group as it lies in the page, without what pads it.
+  [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
+    return {p_, 24 + 60 * static_cast<std::size_t>(size())};
+  }
+
   /// The i-th value of a u16 column.
   [[nodiscard]] static std::uint16_t u16_at(const std::byte* column, int i) noexcept {
     std::uint16_t v;

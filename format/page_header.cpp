@@ -12,7 +12,6 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint32_t kPageMagic = 0x70435450;  // "PTCp"
 constexpr std::size_t kPageHashAt = 56;
 constexpr std::uint16_t kNoLevel = 0xffff;
 constexpr std::uint16_t kGreatestGroup = 255;

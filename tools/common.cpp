@@ -22,6 +22,12 @@
 namespace ptc {
 namespace {
 
+/// A version or feature that is too new is another thing than damage.
+ExitCode exit_code_of(const FormatError& error) {
+  const bool newer = error.clause().ends_with("#header-version") || error.clause().ends_with("#header-features");
+  return newer ? kUnsupported : kInvalidData;
+}
+
 /// Long work is not begun for an output that cannot be written.
 void check_output(const std::filesystem::path& path) {
   const auto refuse = [&](std::errc code) {
@@ -44,19 +50,6 @@ void print(const std::string& text) {
   }
 }
 
-/// Text that may hold bytes of a file, fit for a terminal: control characters become \xNN, and so
-/// do all bytes beyond ASCII when they are not UTF-8.
-std::string printable(std::string_view text) {
-  const bool utf8 = is_utf8(text);
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool plain = (byte >= 0x20 && byte < 0x7f) || (byte >= 0x80 && utf8) || c == '\n';
-    out += plain ? std::string(1, c) : fmt::format("\\x{:02x}", byte);
-  }
-  return out;
-}
-
 /// Refuses names that end in none of `endings`.
 std::function<std::string(const std::string&)> ends_in(const std::vector<std::string>& endings) {
   return [endings](const std::string& name) {
@@ -71,6 +64,17 @@ std::function<std::string(const std::string&)> ends_in(const std::vector<std::st
 }
 
 }  // namespace
+
+std::string printable(std::string_view text) {
+  const bool utf8 = is_utf8(text);
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = (byte >= 0x20 && byte < 0x7f) || (byte >= 0x80 && utf8) || c == '\n';
+    out += plain ? std::string(1, c) : fmt::format("\\x{:02x}", byte);
+  }
+  return out;
+}
 
 void check_input(const std::filesystem::path& path) {
   try {
@@ -93,10 +97,10 @@ bool has_ending(const std::filesystem::path& path, const std::string& ending) {
   return name.size() > ending.size() && name.ends_with(ending);
 }
 
-Command::Command(const std::string& name, const std::string& purpose, const std::string& examples)
+Command::Command(const std::string& name, const std::string& purpose, const std::string& examples,
+                 const std::string& exit_codes)
     : app_(purpose, name) {
-  app_.footer("Examples:\n" + examples +
-              "\nExit codes: 0 done, 1 data invalid or different, 2 usage, 3 system.");
+  app_.footer("Examples:\n" + examples + "\nExit codes: " + exit_codes);
   app_.get_formatter()->column_width(34);
   app_.set_help_flag();  // declared with the other common options, behind those of the program
 }
@@ -165,7 +169,9 @@ void Command::check_files() const {
     if (!path->empty()) check_input(*path);
   }
   for (const auto* paths : input_lists_) std::ranges::for_each(*paths, check_input);
-  for (const auto* path : outputs_) check_output(*path);
+  for (const auto* path : outputs_) {
+    if (!path->empty()) check_output(*path);
+  }
   for (const auto* paths : output_lists_) std::ranges::for_each(*paths, check_output);
 }
 
@@ -199,11 +205,17 @@ int Command::perform(const std::function<Outcome(Progress&)>& body) const {
     outcome.facts["peak_resident_bytes"] = peak_resident_bytes();
     outcome.facts["cpu_seconds"] = cpu_seconds();
     constexpr auto kReplace = nlohmann::json::error_handler_t::replace;  // names that are no UTF-8
-    print(outcome.facts.dump(2, ' ', false, kReplace) + "\n");
-  } else if (!quiet_) {
+    const int indent = outcome.lines ? -1 : 2;
+    std::string text;
+    if (outcome.lines) {
+      for (const auto& line : *outcome.lines) text += line.dump(indent, ' ', false, kReplace) + "\n";
+    }
+    print(text + outcome.facts.dump(indent, ' ', false, kReplace) + "\n");
+  } else if (!quiet_ && outcome.exit_code == kDone) {
     print(outcome.summary);
   }
-  return kDone;
+  if (outcome.exit_code != kDone) std::fputs(outcome.summary.c_str(), stderr);
+  return outcome.exit_code;
 }
 
 int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>& body) {
@@ -219,9 +231,11 @@ int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>&
   } catch (const CLI::ParseError& error) {  // of the body: what only it could judge
     return report(error);
   } catch (const FormatError& error) {
-    return fail(kInvalidData, error.what());
+    return fail(exit_code_of(error), error.what());
   } catch (const DataError& error) {
     return fail(kInvalidData, error.what());
+  } catch (const LimitError& error) {
+    return fail(kLimit, error.what());
   } catch (const std::invalid_argument& error) {
     return fail(kUsage, error.what());
   } catch (const std::bad_alloc&) {

@@ -3,7 +3,9 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -20,19 +22,30 @@ enum ExitCode : int {
   kInvalidData = 1,  ///< an input is missing, damaged or not what it should be; data differ
   kUsage = 2,        ///< the command line asks for what there is not
   kSystem = 3,       ///< the machine refused: disk full, no memory
+  kUnsupported = 4,  ///< a version or feature of the format that this program does not know
+  kLimit = 5,        ///< a cap that the user set is too small
+  kUnfinished = 6,   ///< ptcverify: the file is unfinished or truncated
 };
 
 /// What a program tells when it is done.
 struct Outcome {
   nlohmann::ordered_json facts;  ///< for machines, printed with --json
   std::string summary;           ///< for people, printed otherwise; lines end with '\n'
+  ExitCode exit_code = kDone;    ///< any other: the summary goes to standard error, whatever was asked for
+  /// Printed with --json, a line each, before the facts, which then take one line too.
+  std::optional<std::vector<nlohmann::ordered_json>> lines = std::nullopt;
 };
+
+/// What the exit codes mean, for --help.
+inline constexpr char kExitCodes[] =
+    "0 done, 1 data invalid or different, 2 usage, 3 system, 4 format not supported, 5 limit too small.";
 
 /// A command line program: declare options on app(), then run().
 class Command {
  public:
   /// @param examples  lines of the form "  COMMAND LINE", shown at the end of --help
-  Command(const std::string& name, const std::string& purpose, const std::string& examples);
+  Command(const std::string& name, const std::string& purpose, const std::string& examples,
+          const std::string& exit_codes = kExitCodes);
 
   [[nodiscard]] CLI::App& app() noexcept { return app_; }
   /// --memory, --threads and --temp, once the body runs.
@@ -45,8 +58,8 @@ class Command {
   /// The same, any number of times; an option takes one path each time.
   CLI::Option* add_inputs(const std::string& name, std::vector<std::filesystem::path>& paths,
                           const std::string& description);
-  /// Declares what is written, "-o,--output" or positional. Its directory must exist when the body
-  /// runs.
+  /// Declares what is written, "-o,--output" or positional, required unless that is taken back. Its directory must
+  /// exist when the body runs.
   /// @param endings  those allowed, e.g. ".exr"; what belongs to none is a usage error
   CLI::Option* add_output(const std::string& name, std::filesystem::path& path,
                           const std::vector<std::string>& endings, const std::string& description);
@@ -82,6 +95,10 @@ class Command {
 /// file's fault, unless the machine is out of means.
 /// @throws DataError, std::system_error
 void check_input(const std::filesystem::path& path);
+
+/// Text that may hold bytes of a file, fit for a terminal: control characters become \xNN, and so
+/// do all bytes beyond ASCII when they are not UTF-8.
+[[nodiscard]] std::string printable(std::string_view text);
 
 /// True when the name ends so, in upper or lower case.
 [[nodiscard]] bool has_ending(const std::filesystem::path& path, const std::string& ending);

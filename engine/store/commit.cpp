@@ -42,20 +42,6 @@ Copy decode_copy(const Block& block, const FileHeader& header, std::uint64_t fil
   }
 }
 
-/// Length that a whole superblock near the end of the file gives it, when there is one.
-std::optional<std::uint64_t> committed_length(const InputFile& file, const FileHeader& header) {
-  const std::uint64_t blocks = file.size() / kBlockBytes;
-  for (std::uint64_t back = 1; back <= std::min(kSearchBlocks, blocks); ++back) {
-    const std::uint64_t offset = (blocks - back) * kBlockBytes;
-    const Block block = read_block(file, offset);
-    if (!has_superblock_magic(block)) continue;
-    for (const std::uint64_t length : {offset + kBlockBytes, offset + 2 * kBlockBytes}) {
-      if (std::holds_alternative<Superblock>(decode_copy(block, header, length))) return length;
-    }
-  }
-  return std::nullopt;
-}
-
 [[noreturn]] void refuse_length(std::uint64_t is, std::uint64_t committed) {
   const std::string by = std::to_string(is > committed ? is - committed : committed - is);
   throw FormatError(is, kLength,
@@ -102,7 +88,37 @@ Superblock choose_superblock(const InputFile& file, const FileHeader& header) {
   throw FormatError(size, kMagic, "no superblock at the end: the file is unfinished or truncated");
 }
 
-/// The entries of directory page `index`, as bytes, into `out`, which has their exact size.
+}  // namespace
+
+FileHeader read_file_header(const InputFile& file) {
+  Block block;
+  const auto bytes = std::span(block).first(std::min<std::uint64_t>(file.size(), block.size()));
+  file.read_at(0, bytes);
+  return at_offset(file, 0, [&] { return decode_file_header(bytes); });
+}
+
+Superblock read_superblock(const InputFile& file, const FileHeader& header) {
+  return at_offset(file, 0, [&] { return choose_superblock(file, header); });
+}
+
+std::optional<std::uint64_t> committed_length(const InputFile& file, const FileHeader& header) {
+  const std::uint64_t blocks = file.size() / kBlockBytes;
+  for (std::uint64_t back = 1; back <= std::min(kSearchBlocks, blocks); ++back) {
+    const std::uint64_t offset = (blocks - back) * kBlockBytes;
+    const Block block = read_block(file, offset);
+    if (!has_superblock_magic(block)) continue;
+    for (const std::uint64_t length : {offset + kBlockBytes, offset + 2 * kBlockBytes}) {
+      if (std::holds_alternative<Superblock>(decode_copy(block, header, length))) return length;
+    }
+  }
+  return std::nullopt;
+}
+
+std::size_t directory_page_entry_bytes(const Superblock& superblock, std::uint32_t index) noexcept {
+  const std::size_t full = directory_entries_per_page(superblock.header);
+  return std::min(full, superblock.page_count - index * full) * kDirectoryEntryBytes;
+}
+
 void read_directory_page(const InputFile& file, const Superblock& superblock, std::uint32_t index,
                          std::span<std::byte> out) {
   const std::uint64_t offset = directory_page_offset(superblock, index);
@@ -121,26 +137,11 @@ void read_directory_page(const InputFile& file, const Superblock& superblock, st
   });
 }
 
-}  // namespace
-
-FileHeader read_file_header(const InputFile& file) {
-  Block block;
-  const auto bytes = std::span(block).first(std::min<std::uint64_t>(file.size(), block.size()));
-  file.read_at(0, bytes);
-  return at_offset(file, 0, [&] { return decode_file_header(bytes); });
-}
-
-Superblock read_superblock(const InputFile& file, const FileHeader& header) {
-  return at_offset(file, 0, [&] { return choose_superblock(file, header); });
-}
-
 std::vector<DirectoryEntry> read_directory(const InputFile& file, const Superblock& superblock) {
-  const std::size_t whole = superblock.page_count * kDirectoryEntryBytes;
-  const std::size_t full = directory_entries_per_page(superblock.header) * kDirectoryEntryBytes;
   std::vector<std::byte> all;  // grows with what was verified: a file may be long and empty
   for (std::uint32_t i = 0; i < superblock.directory_pages; ++i) {
     const std::size_t at = all.size();
-    all.resize(at + std::min(full, whole - at));
+    all.resize(at + directory_page_entry_bytes(superblock, i));
     read_directory_page(file, superblock, i, std::span(all).subspan(at));
   }
   if (xxh3_64(all) != superblock.directory_xxh3) {

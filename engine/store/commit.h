@@ -1,7 +1,10 @@
 // What commits a file: header, superblocks and directory, read and checked (spec/container.md).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/io/file.h"
@@ -27,6 +30,16 @@ decltype(auto) at_offset(const InputFile& file, std::uint64_t base, Body&& body)
 /// refused. Without a whole copy the error says whether the file is longer or shorter than when it
 /// was committed, its superblocks are damaged, or there is none: unfinished or truncated.
 [[nodiscard]] Superblock read_superblock(const InputFile& file, const FileHeader& header);
+
+/// Length that a whole superblock within the last MiB gives the file, when there is one.
+[[nodiscard]] std::optional<std::uint64_t> committed_length(const InputFile& file, const FileHeader& header);
+
+/// Bytes of the entries of directory page `index`.
+[[nodiscard]] std::size_t directory_page_entry_bytes(const Superblock& superblock, std::uint32_t index) noexcept;
+/// Reads the entries of directory page `index`, checksum verified.
+/// @param out  as many bytes as directory_page_entry_bytes()
+void read_directory_page(const InputFile& file, const Superblock& superblock, std::uint32_t index,
+                         std::span<std::byte> out);
 
 /// All entries; each alone is checked, not yet against the others.
 /// @pre the superblock has passed its decoder: the file is as long as the directory needs

@@ -5,9 +5,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cerrno>
-#include <map>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -15,18 +13,16 @@
 
 #include "engine/io/file.h"
 #include "engine/store/commit.h"
+#include "engine/store/page_content.h"
 #include "engine/store/structure.h"
 #include "format/checksum.h"
 #include "format/error.h"
-#include "format/node_page.h"
-#include "format/point_page.h"
 
 namespace ptc {
 namespace {
 
 constexpr char kAgreement[] = "spec/container.md#page-agreement";
 constexpr char kPayload[] = "spec/container.md#page-payload";
-constexpr char kReferences[] = "spec/nodes.md#references";
 
 /// The file mapped whole on first use. A file that shrinks while it is mapped raises SIGBUS in the
 /// thread that touches what is gone, so pread is the default.
@@ -85,15 +81,6 @@ class Mapping {
   std::byte* data_ = nullptr;
 };
 
-/// Errors inside a decoded payload name the byte of the file only when it is stored as it is.
-FormatError placed(const FormatError& error, const PageHeader& page) {
-  if (page.coding.codec == Codec::raw) {
-    return {kPageHeaderBytes + error.offset(), error.clause(), error.text()};
-  }
-  return {kPageHeaderBytes, error.clause(),
-          "decoded byte " + std::to_string(error.offset()) + ": " + error.text()};
-}
-
 }  // namespace
 
 struct ContainerReader::Impl {
@@ -106,9 +93,7 @@ struct ContainerReader::Impl {
         index(index_pages(entries)) {
     at_offset(file, 0, [&] { verify_pages(superblock, entries, index); });
     meta = read_meta();
-    for (const Channel& channel : meta.channels) {
-      columns.try_emplace(channel.group, packed_group_columns(meta.channels, channel.group));
-    }
+    columns = columns_by_group(meta);
     at_offset(file, 0, [&] { verify_attributes(superblock, entries, index, meta); });
   }
 
@@ -141,56 +126,16 @@ struct ContainerReader::Impl {
     return found;
   }
 
-  /// Every interior child is a group that exists: who follows a reference has only to check that
-  /// levels increase.
-  void verify_references(const NodePage& nodes) const {
-    for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
-      const GroupView group = nodes[slot];
-      for (unsigned rest = group.interior_mask(); rest != 0; rest &= rest - 1) {
-        const ChildRef child = group.child(std::countr_zero(rest));
-        const DirectoryEntry& target = entries[child.page];
-        if (target.type == PageType::node && child.slot < target.record_count) continue;
-        throw FormatError(0, kReferences,
-                          "group " + std::to_string(slot) + " refers to group " +
-                              std::to_string(child.slot) + " of page " +
-                              std::to_string(child.page) + ", which there is not");
-      }
-    }
-  }
-
-  void verify_content(const PageHeader& page, std::span<const std::byte> payload) const {
-    if (page.type == PageType::point) PointPage(payload, page.record_count).verify();
-    if (page.type == PageType::node) {
-      const auto pages = static_cast<std::uint32_t>(entries.size());
-      verify_references(NodePage(payload, page.record_count, pages, superblock.points));
-    }
-  }
-
   std::span<const PackedColumn> columns_of(std::uint16_t group) const {
     const auto found = columns.find(group);
     if (found == columns.end()) return {};
     return found->second;
   }
 
-  PayloadColumns columns_of(const PageHeader& page) const {
-    if (page.type == PageType::point) return {page.record_count, packed_point_columns()};
-    return {page.record_count, columns_of(page.group)};
-  }
-
   PageHeader decode(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
                     PageDecoder& decoder) const {
     const PageHeader found = checked_header(page, image);
-    const std::span<std::byte> payload = out.first(found.raw_bytes);
-    try {
-      decoder.decode(found.coding, image.subspan(kPageHeaderBytes), payload, columns_of(found));
-    } catch (const FormatError& error) {
-      throw error.rebased(kPageHeaderBytes, "");
-    }
-    try {
-      verify_content(found, payload);
-    } catch (const FormatError& error) {
-      throw placed(error, found);
-    }
+    decode_payload(found, image.subspan(kPageHeaderBytes), {entries, superblock.points, &columns}, out, decoder);
     return found;
   }
 
@@ -219,7 +164,7 @@ struct ContainerReader::Impl {
       try {
         return decode_meta(payload);
       } catch (const FormatError& error) {
-        throw placed(error, found);
+        throw placed_in_page(error, found);
       }
     });
   }
@@ -231,7 +176,7 @@ struct ContainerReader::Impl {
   std::vector<DirectoryEntry> entries;
   PageIndex index;
   Meta meta;
-  std::map<std::uint16_t, std::vector<PackedColumn>> columns;  ///< by channel group
+  GroupColumns columns;
 };
 
 ContainerReader::ContainerReader(const std::filesystem::path& path)
@@ -265,6 +210,10 @@ std::size_t ContainerReader::page_payload_limit() const noexcept {
 
 const DirectoryEntry& ContainerReader::entry(std::uint32_t page) const {
   return impl_->entry(page);
+}
+
+std::span<const DirectoryEntry> ContainerReader::entries() const noexcept {
+  return impl_->entries;
 }
 
 std::span<const std::uint32_t> ContainerReader::point_pages() const noexcept {

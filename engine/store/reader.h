@@ -33,6 +33,7 @@ class ContainerReader {
   [[nodiscard]] std::size_t page_payload_limit() const noexcept;  ///< page size - 64
   /// @throws std::invalid_argument when there is no such page, as for every function here
   [[nodiscard]] const DirectoryEntry& entry(std::uint32_t page) const;
+  [[nodiscard]] std::span<const DirectoryEntry> entries() const noexcept;  ///< by page
   /// Pages of a kind by ascending number: the k-th point page holds points k * points_per_page on.
   [[nodiscard]] std::span<const std::uint32_t> point_pages() const noexcept;
   [[nodiscard]] std::span<const std::uint32_t> node_pages() const noexcept;

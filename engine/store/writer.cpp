@@ -153,7 +153,7 @@ struct ContainerWriter::Impl {
     ContentDigest digest;
     for (const DirectoryEntry& entry : entries) digest.add(entry);
     superblock.content_xxh3 = digest.value();
-    if (superblock.writer.empty()) superblock.writer = "ptc " PTC_VERSION;
+    if (superblock.writer.empty()) superblock.writer = writer_name();
   }
 
   void check(const Block& block, const Superblock& superblock, const Meta& meta) const {
@@ -224,6 +224,10 @@ void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& 
   page.coding = coding;
   page.raw_bytes = raw_bytes;
   impl_->append_page(page, stored);
+}
+
+const char* writer_name() noexcept {
+  return "ptc " PTC_VERSION;
 }
 
 Superblock ContainerWriter::finish(const Meta& meta, Superblock superblock) {

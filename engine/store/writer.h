@@ -21,6 +21,9 @@ struct WriterOptions {
   Uuid uuid{};
 };
 
+/// What superblocks say of who wrote them, unless they are told otherwise: program and version.
+[[nodiscard]] const char* writer_name() noexcept;
+
 /// A container on its way to the disk. Page numbers are given out by reserve_page(), so that a
 /// parent can refer to a page that is written later; pages are written in any order, and lie in the
 /// file in the order of the calls.

@@ -40,11 +40,11 @@ class BadInput(ProgramTest):
         }
         return commands[kind]
 
-    def refuse(self, kind, path, *places):
-        """Expects every consumer of a kind to refuse a file, naming it and one of `places`."""
+    def refuse(self, kind, path, *places, verdict=1):
+        """Expects every consumer of a kind to refuse a file, naming it and one of `places`; ptcverify with its verdict."""
         for command in self.consumers(kind):
             arguments = [path if word == "{}" else word for word in command]
-            message = self.fail_with(1, *arguments)
+            message = self.fail_with(verdict if arguments[0] == "ptcverify" else 1, *arguments)
             self.assertIn(str(path), message)
             if places:
                 self.assertTrue(any(place in message for place in places), message)
@@ -101,7 +101,7 @@ class BadInput(ProgramTest):
         for size in (1, 7, 8, 100, 4095, 4096, 5000, len(whole) // 2, len(whole) - 8192,
                      len(whole) - 4096, len(whole) - 1):
             path.write_bytes(whole[:size])
-            self.refuse("container", path, "offset ")
+            self.refuse("container", path, "offset ", verdict=6)
 
     def test_containers_that_grew(self):
         path = self.here / "long.ptcx"

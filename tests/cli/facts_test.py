@@ -3,8 +3,11 @@
 import json
 import struct
 import unittest
+from pathlib import Path
 
-from programs import SMALL_PICTURE, ProgramTest, read_ply
+from programs import SMALL_PICTURE, ProgramTest, read_ply, run
+
+VECTORS = Path(__file__).resolve().parents[2] / "spec/vectors"
 
 
 class Facts(ProgramTest):
@@ -146,7 +149,56 @@ class Verify(ProgramTest):
             flipped[offset] ^= 0x40
             path.write_bytes(flipped)
             message = self.fail_with(1, "ptcverify", path)
-            self.assertRegex(message, rf"{path}: offset \d+: .+ \(spec/[a-z]+\.md#[a-z0-9-]+\)")
+            self.assertRegex(message, rf"{path}: offset \d+: .+ \(spec/[a-z]+\.md#[a-z0-9-]+\); bit-flip")
+
+    def test_exit_codes_tell_what_is_wrong(self):
+        whole = self.scene.read_bytes()
+        path = self.here / "wrong.ptcx"
+        newer = (VECTORS / "bad/container-header-version.ptcx").read_bytes()
+        for code, content, cause in ((0, whole, None), (1, whole[:5000] + b"x" + whole[5001:], None),
+                                     (1, whole + b"more", "appended"), (1, whole.replace(b"\n", b"\r\n"), "text-mode"),
+                                     (4, newer, "newer"), (6, whole[:-9], "truncated"), (6, whole[:20000], "unfinished")):
+            path.write_bytes(content)
+            result = run("ptcverify", path, "--json")
+            self.assertEqual(result.returncode, code, (cause, result.stdout, result.stderr))
+            lines = [json.loads(line) for line in result.stdout.splitlines()]
+            self.assertEqual(lines[-1]["valid"], code == 0)
+            self.assertEqual(lines[-1]["damage"], len(lines) - 1)
+            for line in lines[:-1]:
+                self.assertEqual(line["rule"].split("#")[1], line["code"])
+                self.assertTrue(line["hint"])
+            if cause:
+                self.assertEqual(lines[0]["cause"], cause)
+        self.fail_with(5, "ptcverify", self.scene, "--memory", "1M")
+
+    def test_what_is_whole_is_salvaged_and_said(self):
+        whole = self.scene.read_bytes()
+        path, kept = self.here / "wrong.ptcx", self.here / "kept.ptcx"
+        path.write_bytes(bytes(4096) + whole[4096:])
+        result = run("ptcverify", path, "--salvage", kept, "--json")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("salvaged 600 of 600 points (100.00 %)", result.stderr)
+        facts = json.loads(result.stdout.splitlines()[-1])
+        self.assertEqual(facts["salvage"]["points"], 600)
+        self.assertEqual(facts["salvage"]["energy_share"], 1)
+        self.succeed("ptcverify", kept, "--level", "4")
+        kept.unlink()
+        path.write_bytes(whole[:20000])
+        result = run("ptcverify", path, "--salvage", kept, "--json")
+        self.assertEqual(result.returncode, 6)
+        self.assertIn("the frame is lost", result.stderr)
+        self.assertIsNone(json.loads(result.stdout.splitlines()[-1])["salvage"])
+        self.assertFalse(kept.exists())
+        self.fail_with(2, "ptcverify", self.scene, "--salvage", self.scene)
+
+    def test_a_map_of_the_damage_is_drawn(self):
+        path = self.here / "wrong.ptcx"
+        path.write_bytes(self.scene.read_bytes()[:-9])
+        for ending, magic in (("svg", b"<?xml"), ("png", b"\x89PNG")):
+            picture = self.here / f"map.{ending}"
+            self.assertEqual(run("ptcverify", path, "--map", picture).returncode, 6)
+            self.assertTrue(picture.read_bytes().startswith(magic))
+        self.assertIn(b"bytes shorter than its superblock says", (self.here / "map.svg").read_bytes())
 
 
 class Determinism(ProgramTest):

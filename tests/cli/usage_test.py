@@ -116,7 +116,7 @@ class Usage(ProgramTest):
                                   ("ptcshade", [self.scene, "-o", self.here / "o.ply"]),
                                   ("ptcrender", [self.scene, "-o", self.here / "o.png"]),
                                   ("ptcverify", [self.scene])):
-            message = self.fail_with(2, program, *operands, "--memory", "1M")
+            message = self.fail_with(5, program, *operands, "--memory", "1M")
             least = message.split("the least that works is ")[1].split()[0]
             self.succeed(program, *operands, "--memory", least,
                          *(SMALL_PICTURE if program == "ptcrender" else []))

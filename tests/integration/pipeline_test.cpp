@@ -3,7 +3,7 @@
 #include <fstream>
 
 #include "engine/base/error.h"
-#include "engine/build/verify.h"
+#include "engine/verify/verify.h"
 #include "engine/io/image.h"
 #include "engine/io/points.h"
 #include "engine/pipeline.h"
@@ -125,7 +125,7 @@ TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integr
   CHECK(roomy.sort.spilled_bytes == 0);
   CHECK(tight.sort.spilled_bytes > 0);
   CHECK(bytes_of(dir / "roomy.ptcx") == bytes_of(dir / "tight.ptcx"));
-  verify_container(dir / "tight.ptcx", {}, silent);
+  CHECK(verify_container(dir / "tight.ptcx", {}, silent).sound());
 }
 
 TEST_CASE("pipeline: shading adds channels, keeps the points and verifies", "[integration][shade]") {
@@ -138,7 +138,7 @@ TEST_CASE("pipeline: shading adds channels, keeps the points and verifies", "[in
   const std::vector<char> before = bytes_of(dir / "scene.ptcx");
   shade_container(request, dir / "shaded.ptcx", silent);
   CHECK(bytes_of(dir / "scene.ptcx") == before);
-  verify_container(dir / "shaded.ptcx", {}, silent);
+  CHECK(verify_container(dir / "shaded.ptcx", {}, silent).sound());
   const ContainerReader scene(dir / "scene.ptcx"), shaded(dir / "shaded.ptcx");
   CHECK(shaded.superblock().points == scene.superblock().points);
   REQUIRE(shaded.meta().channels.size() == 5);

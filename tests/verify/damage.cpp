@@ -1,15 +1,14 @@
 // Where checksums lie and what they cover (spec/checksums.md).
-#include "tests/cli/damage.h"
+#include "tests/verify/damage.h"
 
 #include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
-#include "engine/build/verify.h"
+#include "engine/verify/verify.h"
 #include "engine/store/reader.h"
 #include "format/checksum.h"
-#include "format/error.h"
 #include "tests/support/scenes.h"
 
 namespace ptc::test {
@@ -27,12 +26,11 @@ std::vector<Surfel> small_scene() {
 
 std::string fault_of(const std::filesystem::path& path) {
   Progress silent;
-  try {
-    verify_container(path, {.threads = 1}, silent);
-  } catch (const FormatError& error) {
-    return error.what();
+  std::string faults;
+  for (const Finding& finding : verify_container(path, {.threads = 1, .flip_budget = 0}, silent).findings) {
+    faults += line_of(finding) + "\n";
   }
-  return "";
+  return faults;
 }
 
 std::vector<std::byte> read_file(const std::filesystem::path& path) {

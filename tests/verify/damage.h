@@ -16,7 +16,7 @@ namespace ptc::test {
 /// A room with a ball in it, lit unevenly: flat cells, round cells, colours.
 [[nodiscard]] std::vector<Surfel> small_scene();
 
-/// What verify_container() says of a file; empty when nothing is wrong.
+/// What verify_container() finds in a file, a line each; empty when nothing is wrong.
 [[nodiscard]] std::string fault_of(const std::filesystem::path& path);
 
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path);

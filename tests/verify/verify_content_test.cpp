@@ -7,7 +7,7 @@
 
 #include "format/node_page.h"
 #include "format/scalar.h"
-#include "tests/cli/damage.h"
+#include "tests/verify/damage.h"
 #include "tests/support/scenes.h"
 
 namespace ptc::test {
@@ -108,7 +108,7 @@ bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at
 }  // namespace
 
 TEST_CASE("verify: a wrong number in any node is found though checksums are right",
-          "[cli][verify]") {
+          "[verify]") {
   Specimen specimen(small_scene(), {.leaf_points = 12});
   OpenContainer& container = specimen.container;
   REQUIRE(specimen.fault() == "");
@@ -137,7 +137,7 @@ TEST_CASE("verify: a wrong number in any node is found though checksums are righ
 }
 
 TEST_CASE("verify: a reference that leads elsewhere is found though checksums are right",
-          "[cli][verify]") {
+          "[verify]") {
   Specimen specimen(small_scene(), {.leaf_points = 4});
   OpenContainer& container = specimen.container;
   std::size_t tried = 0;
@@ -160,7 +160,7 @@ TEST_CASE("verify: a reference that leads elsewhere is found though checksums ar
 }
 
 TEST_CASE("verify: a group with a wrong level or cell is found though checksums are right",
-          "[cli][verify]") {
+          "[verify]") {
   Specimen specimen(small_scene(), {.leaf_points = 4});
   OpenContainer& container = specimen.container;
   for_each_child(container, [&](std::byte* start, const GroupView& group, int child) {
@@ -185,7 +185,7 @@ TEST_CASE("verify: a group with a wrong level or cell is found though checksums 
 }
 
 TEST_CASE("verify: a page header that says otherwise is found though checksums are right",
-          "[cli][verify]") {
+          "[verify]") {
   Specimen specimen(random_surfels(500, 4));
   OpenContainer& container = specimen.container;
   const auto fault = [&](std::size_t page, const std::function<void(PageHeader&)>& edit) {
@@ -208,7 +208,7 @@ TEST_CASE("verify: a page header that says otherwise is found though checksums a
 }
 
 TEST_CASE("verify: wrong totals in the superblock are found though checksums are right",
-          "[cli][verify]") {
+          "[verify]") {
   Specimen specimen(small_scene());
   const auto fault = [&](const std::function<void(Superblock&)>& edit) {
     const Superblock before = specimen.container.superblock();
@@ -234,7 +234,7 @@ TEST_CASE("verify: wrong totals in the superblock are found though checksums are
   CHECK(fault([](Superblock& s) { s.frame.origin[0] += s.frame.unit(); }) != "");
 }
 
-TEST_CASE("verify: a point that moved is found though checksums are right", "[cli][verify]") {
+TEST_CASE("verify: a point that moved is found though checksums are right", "[verify]") {
   Specimen specimen(small_scene());
   OpenContainer& container = specimen.container;
   struct PointEdit {

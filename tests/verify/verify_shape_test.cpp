@@ -6,7 +6,7 @@
 #include "engine/store/writer.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
-#include "tests/cli/damage.h"
+#include "tests/verify/damage.h"
 #include "tests/support/scenes.h"
 
 namespace ptc::test {
@@ -64,7 +64,7 @@ void write_flat_tree(const std::filesystem::path& target, const SortedScene& sce
 
 }  // namespace
 
-TEST_CASE("verify: a tree that splits where none should is found", "[cli][verify]") {
+TEST_CASE("verify: a tree that splits where none should is found", "[verify]") {
   const TemporaryDirectory directory;
   const auto path = directory / "scene.ptcx";
   std::vector<Surfel> surfels = random_surfels(32, 11);

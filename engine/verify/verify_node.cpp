@@ -1,5 +1,5 @@
 // The bounds of quantisation, one function a quantity.
-#include "engine/build/verify_node.h"
+#include "engine/verify/verify_node.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,85 @@
+// Decoding and what is checked after it (engine/store/page_content.h).
+#include "engine/store/page_content.h"
+
+#include <bit>
+#include <limits>
+#include <string>
+
+#include "format/node_page.h"
+#include "format/point_page.h"
+
+namespace ptc {
+namespace {
+
+constexpr char kReferences[] = "spec/nodes.md#references";
+
+/// Every interior child is a group that exists: who follows a reference has only to check that
+/// levels increase.
+void verify_references(const NodePage& nodes, std::span<const DirectoryEntry> entries) {
+  for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
+    const GroupView group = nodes[slot];
+    for (unsigned rest = group.interior_mask(); rest != 0; rest &= rest - 1) {
+      const ChildRef child = group.child(std::countr_zero(rest));
+      const DirectoryEntry& target = entries[child.page];
+      if (target.type == PageType::node && child.slot < target.record_count) continue;
+      throw FormatError(0, kReferences,
+                        "group " + std::to_string(slot) + " refers to group " +
+                            std::to_string(child.slot) + " of page " + std::to_string(child.page) +
+                            ", which there is not");
+    }
+  }
+}
+
+void verify_content(const PageHeader& page, std::span<const std::byte> payload, const PageRules& rules) {
+  if (page.type == PageType::point) PointPage(payload, page.record_count).verify();
+  if (page.type != PageType::node) return;
+  if (rules.entries.empty()) {
+    static_cast<void>(NodePage(payload, page.record_count, kNoPage, std::numeric_limits<std::uint64_t>::max()));
+    return;
+  }
+  const auto pages = static_cast<std::uint32_t>(rules.entries.size());
+  verify_references(NodePage(payload, page.record_count, pages, rules.points), rules.entries);
+}
+
+PayloadColumns columns_of(const PageHeader& page, const PageRules& rules) {
+  if (page.type == PageType::point) return {page.record_count, packed_point_columns()};
+  if (rules.columns == nullptr) return {page.record_count, {}};
+  const auto found = rules.columns->find(page.group);
+  if (found == rules.columns->end()) return {page.record_count, {}};
+  return {page.record_count, found->second};
+}
+
+}  // namespace
+
+GroupColumns columns_by_group(const Meta& meta) {
+  GroupColumns columns;
+  for (const Channel& channel : meta.channels) {
+    columns.try_emplace(channel.group, packed_group_columns(meta.channels, channel.group));
+  }
+  return columns;
+}
+
+void decode_payload(const PageHeader& page, std::span<const std::byte> stored, const PageRules& rules,
+                    std::span<std::byte> out, PageDecoder& decoder) {
+  const std::span<std::byte> payload = out.first(page.raw_bytes);
+  try {
+    decoder.decode(page.coding, stored, payload, columns_of(page, rules));
+  } catch (const FormatError& error) {
+    throw error.rebased(kPageHeaderBytes, "");
+  }
+  try {
+    verify_content(page, payload, rules);
+  } catch (const FormatError& error) {
+    throw placed_in_page(error, page);
+  }
+}
+
+FormatError placed_in_page(const FormatError& error, const PageHeader& page) {
+  if (page.coding.codec == Codec::raw) {
+    return {kPageHeaderBytes + error.offset(), error.clause(), error.text()};
+  }
+  return {kPageHeaderBytes, error.clause(),
+          "decoded byte " + std::to_string(error.offset()) + ": " + error.text()};
+}
+
+}  // namespace ptc

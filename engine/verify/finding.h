@@ -1,0 +1,89 @@
+// What a verifier finds: where, which rule, and what may have done it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "format/error.h"
+
+namespace ptc {
+
+/// What a fault looks like it came from (spec/recovery.md#causes).
+enum class Cause : std::uint8_t {
+  unknown,      ///< bytes changed, and how cannot be told
+  bit_flip,     ///< one bit changed
+  zeroed,       ///< whole sectors are zero: a hole, as copies that lose blocks leave
+  swapped,      ///< another page of the file lies here
+  stale,        ///< a page of another file, or of an earlier version of this one
+  unfinished,   ///< the writer never finished
+  truncated,    ///< bytes are missing at the end
+  appended,     ///< bytes follow the end
+  text_mode,    ///< a transfer took the file for text
+  unreadable,   ///< the system could not read it
+  foreign,      ///< no file of this format
+  newer,        ///< a version or feature that this program does not know
+  writer,       ///< checksums are right and a rule is broken: so it was written
+};
+
+/// The name that --json prints, e.g. "bit-flip".
+[[nodiscard]] const char* name_of(Cause cause) noexcept;
+/// What to do about it: a sentence.
+[[nodiscard]] const char* hint_of(Cause cause) noexcept;
+
+enum class Severity : std::uint8_t {
+  damage,   ///< the file is not sound
+  warning,  ///< it is, but differs from what this program would have written
+};
+
+struct Finding {
+  Severity severity = Severity::damage;
+  Cause cause = Cause::unknown;
+  int level = 0;                      ///< of the verification that finds it, 0 to 4
+  std::uint64_t offset = 0;           ///< in the file
+  std::uint64_t bytes = 0;            ///< that are at fault from there on; 0: not known
+  unsigned bit = 0;                   ///< of that byte, for Cause::bit_flip
+  std::optional<std::uint32_t> page;  ///< when it lies in one
+  std::string rule;                   ///< anchor, e.g. "spec/container.md#page-payload"
+  std::string text;
+  std::string expected;  ///< empty where the text says it all
+  std::string actual;
+};
+
+/// The finding that an error of the format amounts to; its cause is to be filled in.
+[[nodiscard]] Finding finding_of(const FormatError& error, int level);
+/// The stable code of a finding: what follows '#' in its rule.
+[[nodiscard]] std::string code_of(const Finding& finding);
+/// "offset 4096: TEXT (RULE); bit-flip".
+[[nodiscard]] std::string line_of(const Finding& finding);
+/// 16 hexadecimal digits.
+[[nodiscard]] std::string hex(std::uint64_t value);
+
+/// Thrown through a verification that was to stop at the first finding.
+struct StopVerifying : std::exception {};
+
+/// Findings in the order in which they were added; the first ones are kept, the rest counted.
+/// Threads: one at a time.
+class Findings {
+ public:
+  Findings(std::size_t keep, bool fail_fast) : keep_(keep), fail_fast_(fail_fast) {}
+
+  /// @throws StopVerifying after the first damage when it was asked for
+  void add(Finding finding);
+
+  [[nodiscard]] const std::vector<Finding>& kept() const noexcept { return kept_; }
+  [[nodiscard]] std::uint64_t damage() const noexcept { return damage_; }
+  [[nodiscard]] std::uint64_t warnings() const noexcept { return warnings_; }
+
+ private:
+  std::size_t keep_;
+  bool fail_fast_;
+  std::vector<Finding> kept_;
+  std::uint64_t damage_ = 0;
+  std::uint64_t warnings_ = 0;
+};
+
+}  // namespace ptc

@@ -1,0 +1,281 @@
+// From the pages that prove themselves to a new file (spec/recovery.md#salvage).
+#include "engine/verify/salvage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <system_error>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/build/build.h"
+#include "engine/build/channel_pager.h"
+#include "engine/store/writer.h"
+#include "engine/verify/surveyed_page.h"
+#include "format/bytes.h"
+#include "format/checksum.h"
+#include "format/point_page.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
+constexpr std::uint64_t kFlipBudget = std::uint64_t{1} << 39;  // bytes hashed to turn flipped bits back
+constexpr std::uint64_t kPagesOpen = 80;                       // of the build: one a level, and some
+
+/// A sound page with its place among the pages of its kind.
+struct Kept {
+  const PageSite* site = nullptr;
+  std::uint32_t count = 0;  ///< points
+};
+
+/// Points of the kept pages, page by page.
+class KeptPoints : public PointStream {
+ public:
+  KeptPoints(SurveyedPage& page, FlipBudget& flips, const std::map<std::uint64_t, Kept>& pages)
+      : page_(page), flips_(flips), next_(pages.begin()), end_(pages.end()) {}
+
+  std::size_t next(std::span<PointRecord> out) override {
+    std::size_t filled = 0;
+    while (filled < out.size()) {
+      if (at_ == count_) {
+        if (next_ == end_) break;
+        const Kept& kept = (next_++)->second;
+        if (const auto finding = page_.check(*kept.site, 3, flips_)) throw DataError(line_of(*finding));
+        count_ = kept.count;
+        at_ = 0;
+      }
+      const PointPage points(page_.payload().data(), count_);
+      while (at_ < count_ && filled < out.size()) out[filled++] = points[at_++];
+    }
+    return filled;
+  }
+
+ private:
+  SurveyedPage& page_;
+  FlipBudget& flips_;
+  std::map<std::uint64_t, Kept>::const_iterator next_, end_;
+  std::uint32_t count_ = 0, at_ = 0;
+};
+
+class Salvage {
+ public:
+  Salvage(const std::filesystem::path& path, const SalvageOptions& options, Progress& progress)
+      : file_(path), options_(options), progress_(progress) {}
+
+  SalvageReport run(const std::filesystem::path& target) {
+    Findings ignored(0, false);
+    survey_ = survey_file(file_, ignored, flips_, false, progress_);
+    require_what_it_takes();
+    page_.emplace(file_, survey_, true);
+    find_meta();
+    for (const std::uint16_t group : groups()) by_group_[group];
+    find_sound_pages();
+    rank_pages();
+    if (points_.empty()) refuse("spec/recovery.md#survey", "no point page is whole: there is nothing to salvage");
+    write(target);
+    return report_;
+  }
+
+ private:
+  [[noreturn]] void refuse(const char* rule, const std::string& text) const {
+    throw FormatError(0, rule, text).rebased(0, file_.path().string());
+  }
+
+  void require_what_it_takes() const {
+    if (!survey_.header) refuse("spec/recovery.md#survey", "neither the header nor a superblock is whole: no page proves that it is of this file");
+    if (survey_.header->feature_ro_compat != 0) refuse("spec/versions.md#features", "the file uses a feature that forbids to repair it");
+    if (!survey_.superblock) refuse("spec/recovery.md#survey", "no superblock is whole: the frame is lost, and points have no place without it");
+    const std::uint64_t page = std::uint64_t{1} << survey_.header->page_shift;
+    const std::uint64_t least = kBaseBytes + 140 * survey_.sites.size() + kPagesOpen * page;
+    if (options_.memory_bytes < least) {
+      throw LimitError(fmt::format("the memory cap is too small to salvage this file: the least that works is {}M", (least >> 20) + 1));
+    }
+  }
+
+  [[nodiscard]] std::set<std::uint16_t> groups() const {
+    std::set<std::uint16_t> groups;
+    for (const Channel& channel : survey_.meta.channels) groups.insert(channel.group);
+    return groups;
+  }
+
+  using Sites = std::map<std::uint32_t, const PageSite*>;  ///< by page; null: known and lost
+
+  /// The map that pages of this kind belong in; null for those that are not kept.
+  Sites* kind_of(const DirectoryEntry& entry) {
+    if (entry.type == PageType::point) return &point_sites_;
+    const bool wanted = entry.type == PageType::attribute && by_group_.contains(entry.group);
+    return wanted ? &attribute_sites_[entry.group] : nullptr;
+  }
+
+  /// Of several sites with one number the first that is sound counts. A page that is not where it should be may lie
+  /// elsewhere, if two were swapped.
+  void find_sound_pages() {
+    progress_.begin("check pages", survey_.sites.size(), "pages");
+    bool lost = false;
+    for (const PageSite& site : survey_.sites) {
+      lost |= !consider(site);
+      progress_.advance(1);
+    }
+    progress_.end();
+    if (!lost) return;
+    moved_ = find_pages(file_, *survey_.header, progress_);
+    std::map<std::uint32_t, const DirectoryEntry*> listed;
+    for (const PageSite& site : survey_.sites) {
+      if (site.listed) listed[site.page] = &site.entry;
+    }
+    for (const PageSite& site : moved_) {
+      const auto said = listed.find(site.page);
+      DirectoryEntry here = site.entry;
+      if (said != listed.end()) here.offset = said->second->offset;
+      if (said == listed.end() || here == *said->second) consider(site);
+    }
+  }
+
+  /// @return  false when the site should hold a page to be kept and does not
+  bool consider(const PageSite& site) {
+    Sites* const kind = kind_of(site.entry);
+    if (kind == nullptr) return true;
+    const PageSite*& known = (*kind)[site.page];
+    if (known != nullptr) return true;
+    if (page_->check(site, 3, flips_)) return false;
+    known = &site;
+    return true;
+  }
+
+  /// The k-th attribute page of a group lies beside the k-th point page, when none is missing.
+  void rank_pages() {
+    const Superblock& s = *survey_.superblock;
+    const std::uint64_t per_page = points_per_page(s.header);
+    const std::uint64_t pages = (s.points + per_page - 1) / per_page;
+    std::uint64_t k = 0, last_key = 0;
+    for (const auto& [number, site] : point_sites_) {
+      const std::uint64_t rank = k++;
+      if (site == nullptr || page_->check(*site, 3, flips_) || page_->header().first_key < last_key) continue;
+      last_key = page_->header().last_key;
+      points_[rank] = {site, site->entry.record_count};
+    }
+    report_.point_pages_before = pages;
+    report_.point_pages = points_.size();
+    report_.points_before = s.points;
+    for (auto& [group, kept] : by_group_) {
+      report_.attribute_pages_before += pages;
+      const auto found = attribute_sites_.find(group);
+      // Where some are not even known, ranks say nothing.
+      if (point_sites_.size() != pages || found == attribute_sites_.end() || found->second.size() != pages) continue;
+      k = 0;
+      for (const auto& [number, site] : found->second) {
+        const std::uint64_t rank = k++;
+        const auto beside = points_.find(rank);
+        if (site == nullptr || beside == points_.end() || site->entry.record_count != beside->second.count) continue;
+        kept[rank] = site;
+        ++report_.attribute_pages;
+      }
+    }
+  }
+
+  /// The meta page once more: a flipped bit in it is no loss.
+  void find_meta() {
+    for (const PageSite& site : survey_.sites) {
+      if (site.entry.type != PageType::meta || page_->check(site, 3, flips_)) continue;
+      try {
+        survey_.meta = decode_meta(page_->payload());
+        survey_.columns = columns_by_group(survey_.meta);
+        report_.meta = true;
+      } catch (const FormatError&) {  // lost
+      }
+    }
+  }
+
+  void write(const std::filesystem::path& target) {
+    const Superblock& before = *survey_.superblock;
+    ContainerWriter writer(target, {.page_shift = survey_.header->page_shift, .codec = codec(), .uuid = new_uuid()});
+    const BuildOptions tree{.leaf_points = std::max(1U, before.leaf_points)};
+    KeptPoints points(*page_, flips_, points_);
+    progress_.begin("build", before.points, "points");
+    Superblock after = build_pages(points, before.frame, writer, tree, progress_);
+    progress_.end();
+    for (const auto& [group, kept] : by_group_) write_channels(writer, group, kept, after.points);
+    Meta meta = survey_.meta;
+    meta.text.insert_or_assign("salvaged", fmt::format("{} of {} points, {} of {} pages of channels", after.points, before.points,
+                                                       report_.attribute_pages, report_.attribute_pages_before));
+    report_.superblock = writer.finish(meta, std::move(after));
+    report_.points = report_.superblock.points;
+    const auto share = [](double part, double whole) { return whole > 0 ? part / whole : 1.0; };
+    const auto flux = [](const Superblock& s) { return s.flux[0] + s.flux[1] + s.flux[2]; };
+    report_.area_share = share(report_.superblock.area, before.area);
+    report_.flux_share = share(flux(report_.superblock), flux(before));
+  }
+
+  void write_channels(ContainerWriter& writer, std::uint16_t group, const std::map<std::uint64_t, const PageSite*>& kept,
+                      std::uint64_t points) {
+    const std::vector<PackedColumn>& columns = survey_.columns.at(group);
+    auto beside = points_.begin();
+    const auto next_page = [&](std::span<std::byte> payload) {
+      const auto& [rank, page] = *beside++;
+      std::ranges::fill(payload, std::byte{0});
+      const auto found = kept.find(rank);
+      if (found != kept.end() && !page_->check(*found->second, 3, flips_)) std::ranges::copy(page_->payload(), payload.begin());
+      return page.count;
+    };
+    ChannelPager pager(columns, (std::size_t{1} << survey_.header->page_shift) - kPageHeaderBytes, next_page);
+    const std::uint32_t full = points_per_page(writer.header());
+    for (std::uint64_t left = points; left > 0;) {
+      const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
+      writer.write_page(writer.reserve_page(), {.type = PageType::attribute, .group = group, .record_count = count},
+                        pager.next(count), columns);
+      left -= count;
+    }
+  }
+
+  /// That of the first point page.
+  Codec codec() {
+    static_cast<void>(page_->check(*points_.begin()->second.site, 1, flips_));
+    return page_->header().coding.codec;
+  }
+
+  /// Pages of the damaged file must not pass for its pages.
+  Uuid new_uuid() const {
+    std::vector<std::byte> text(survey_.header->uuid.begin(), survey_.header->uuid.end());
+    for (const auto& [rank, kept] : points_) {
+      text.resize(text.size() + 8);
+      store(text.data(), text.size() - 8, kept.site->entry.payload_xxh3);
+    }
+    const std::array<std::uint64_t, 2> hash = xxh3_128(text);
+    Uuid uuid;
+    std::memcpy(uuid.data(), hash.data(), uuid.size());
+    return uuid;
+  }
+
+  InputFile file_;
+  SalvageOptions options_;
+  Progress& progress_;
+  FlipBudget flips_{kFlipBudget};
+  Survey survey_;
+  std::optional<SurveyedPage> page_;
+  std::vector<PageSite> moved_;  ///< found by their headers
+  Sites point_sites_;
+  std::map<std::uint16_t, Sites> attribute_sites_;  ///< by group
+  std::map<std::uint64_t, Kept> points_;                                      ///< by rank
+  std::map<std::uint16_t, std::map<std::uint64_t, const PageSite*>> by_group_;  ///< attribute pages, by rank
+  SalvageReport report_;
+};
+
+}  // namespace
+
+SalvageReport salvage_container(const std::filesystem::path& path, const std::filesystem::path& target,
+                                const SalvageOptions& options, Progress& progress) {
+  std::error_code absent;
+  if (std::filesystem::equivalent(path, target, absent)) {
+    throw std::invalid_argument("what is salvaged goes into another file than " + path.string());
+  }
+  return Salvage(path, options, progress).run(target);
+}
+
+}  // namespace ptc

@@ -1,0 +1,38 @@
+// What is whole of a damaged container, as a new one.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "engine/base/progress.h"
+#include "engine/store/reader.h"
+
+namespace ptc {
+
+struct SalvageOptions {
+  std::uint64_t memory_bytes = std::uint64_t{512} << 20;  ///< cap on what the salvage holds
+};
+
+/// What a salvage kept.
+struct SalvageReport {
+  std::uint64_t points = 0;           ///< in the new file
+  std::uint64_t points_before = 0;    ///< as the superblock says
+  std::uint64_t point_pages = 0;      ///< whole
+  std::uint64_t point_pages_before = 0;
+  std::uint64_t attribute_pages = 0;  ///< whole and beside a whole point page
+  std::uint64_t attribute_pages_before = 0;  ///< as the channels that are known want
+  bool meta = false;                  ///< names and types of channels, and texts, were kept
+  double area_share = 0;              ///< of the area that the superblock says, 1 where that is 0
+  double flux_share = 0;              ///< of the flux, summed over colours, likewise: the energy
+  Superblock superblock;              ///< of the new file
+};
+
+/// Writes a new container from every point page and attribute page that proves itself, or does with one bit flipped
+/// back (spec/recovery.md#salvage). The octree is built again from the points. Channel values that are lost are 0.
+/// @throws std::invalid_argument when the target is the file itself; FormatError when neither header nor a superblock is whole, when features
+///         forbid it, when the frame is lost or no point is left; LimitError naming the least cap; std::system_error
+/// Memory: 60 bytes a page of the file, and what build_pages() takes.
+SalvageReport salvage_container(const std::filesystem::path& path, const std::filesystem::path& target,
+                                const SalvageOptions& options, Progress& progress);
+
+}  // namespace ptc

@@ -1,0 +1,317 @@
+// From both ends of a file to its pages, past whatever is broken on the way (spec/recovery.md#survey).
+#include "engine/verify/survey.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "engine/store/commit.h"
+#include "engine/store/structure.h"
+#include "engine/verify/surveyed_page.h"
+#include "format/bytes.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kSearchBlocks = 256;  // before the end that may hold a superblock
+constexpr std::size_t kScanBytes = std::size_t{1} << 20;
+
+/// Calls body(header, offset) for every sector that begins with the header of a page of this file.
+template <class Body>
+void for_each_page(const InputFile& file, const FileHeader& header, Progress& progress, const Body& body) {
+  progress.begin("look for pages", file.size(), "bytes");
+  std::vector<std::byte> chunk(kScanBytes);
+  for (std::uint64_t at = 0; at < file.size(); at += kScanBytes) {
+    const auto part = std::span(chunk).first(std::min<std::uint64_t>(kScanBytes, file.size() - at));
+    file.read_at(at, part);
+    for (std::size_t sector = 0; sector + kPageHeaderBytes <= part.size(); sector += kSectorBytes) {
+      if (load<std::uint32_t>(part.data(), sector) != kPageMagic) continue;
+      try {
+        body(decode_page_header(part.subspan(sector), header), at + sector);
+      } catch (const FormatError&) {  // of another file, or damaged: not one of ours
+      }
+    }
+    progress.advance(part.size());
+  }
+  progress.end();
+}
+
+class Surveyor {
+ public:
+  Surveyor(const InputFile& file, Findings& findings, FlipBudget& flips, Progress& progress)
+      : file_(file), findings_(findings), flips_(flips), progress_(progress) {}
+
+  Survey run(bool structure_only) {
+    look_at_header();
+    if (!survey_.header) return std::move(survey_);
+    look_at_superblocks();
+    if (!open()) {
+      if (survey_.superblock) look_at_directory();
+      const bool all_listed = survey_.superblock && survey_.sites.size() == survey_.superblock->page_count;
+      if (!structure_only && !all_listed) scan();
+      if (no_superblock_) report_end();
+      std::ranges::sort(survey_.sites, {}, [](const PageSite& site) { return site.entry.offset; });
+      read_meta();
+    }
+    return std::move(survey_);
+  }
+
+ private:
+  Block read_block(std::uint64_t offset) const {
+    Block block{};
+    file_.read_at(offset, std::span(block).first(std::min<std::uint64_t>(kBlockBytes, file_.size() - offset)));
+    return block;
+  }
+
+  void add(const FormatError& error, int level, const Diagnosis& diagnosis, std::uint64_t looked_at) {
+    Finding finding = finding_of(error, level);
+    apply(diagnosis, looked_at, finding);
+    findings_.add(std::move(finding));
+  }
+
+  void look_at_header() {
+    Block block = read_block(0);
+    const auto bytes = std::span(block).first(std::min<std::uint64_t>(file_.size(), kBlockBytes));
+    try {
+      survey_.header = decode_file_header(bytes);
+      return;
+    } catch (const FormatError& error) {
+      const Diagnosis diagnosis = diagnose_header(error, bytes);
+      add(error, 0, diagnosis, 0);
+      if (diagnosis.cause == Cause::newer) return;
+    }
+    survey_.header = repeated_header();
+  }
+
+  Diagnosis diagnose_header(const FormatError& error, std::span<std::byte> bytes) {
+    const std::string code = code_of(finding_of(error, 0));
+    if (code == "header-version" || code == "header-features") return {Cause::newer};
+    if (code == "header-length") return {Cause::truncated};
+    Diagnosis diagnosis = diagnose_sealed(bytes, [&] { static_cast<void>(decode_file_header(bytes)); }, flips_);
+    if (diagnosis.cause != Cause::unknown || code == "header-checksum") return diagnosis;
+    if (code == "header-magic") return diagnose_magic(bytes.first(std::min<std::size_t>(16, bytes.size())));
+    return {Cause::writer};
+  }
+
+  /// Of the last superblock that is whole, its own copy of the header being all that is known.
+  std::optional<FileHeader> repeated_header() const {
+    const std::uint64_t blocks = file_.size() / kBlockBytes;
+    for (std::uint64_t back = 1; back <= std::min(kSearchBlocks, blocks); ++back) {
+      const std::uint64_t offset = (blocks - back) * kBlockBytes;
+      const Block block = read_block(offset);
+      for (const std::uint64_t length : {offset + kBlockBytes, offset + 2 * kBlockBytes}) {
+        try {
+          const FileHeader header = decode_repeated_header(block);
+          static_cast<void>(decode_superblock(block, header, length));
+          return header;
+        } catch (const FormatError&) {  // the next may be whole
+        }
+      }
+    }
+    return std::nullopt;
+  }
+
+  /// Both copies where they should be; else a superblock somewhere before the end.
+  void look_at_superblocks() {
+    const std::uint64_t size = file_.size();
+    const bool room = size % kBlockBytes == 0 && size >= 3 * kBlockBytes;
+    std::vector<Finding> faults;
+    std::array<Block, 2> blocks{};
+    for (std::size_t i = 0; room && i < 2; ++i) {
+      const std::uint64_t offset = size - (2 - i) * kBlockBytes;
+      blocks[i] = read_block(offset);
+      if (auto fault = look_at_copy(blocks[i], offset)) faults.push_back(std::move(*fault));
+    }
+    if (survey_.superblock && faults.empty() && blocks[0] != blocks[1]) {
+      const FormatError error(size - 2 * kBlockBytes, "spec/container.md#superblock-copies", "the two superblocks differ");
+      add(error, 0, {Cause::writer}, 0);
+    }
+    if (!survey_.superblock) {
+      if (const auto length = committed_length(file_, *survey_.header)) return report_length(*length);
+      // Damaged ones are named; none at all is another matter.
+      std::erase_if(faults, [](const Finding& f) { return code_of(f) == "superblock-magic" && f.cause == Cause::unknown; });
+      no_superblock_ = faults.empty();
+    }
+    for (Finding& fault : faults) findings_.add(std::move(fault));
+  }
+
+  std::optional<Finding> look_at_copy(Block block, std::uint64_t offset) {
+    const auto decode = [&] { return decode_superblock(block, *survey_.header, file_.size()); };
+    try {
+      const Superblock found = decode();
+      if (!survey_.superblock) survey_.superblock = found;
+      return std::nullopt;
+    } catch (const FormatError& error) {
+      Finding finding = finding_of(error.rebased(offset, ""), 0);
+      const std::string code = code_of(finding);
+      Diagnosis diagnosis = diagnose_sealed(block, [&] { static_cast<void>(decode()); }, flips_);
+      if (diagnosis.cause == Cause::unknown && code != "superblock-magic" && code != "superblock-checksum") {
+        diagnosis.cause = Cause::writer;
+      }
+      apply(diagnosis, offset, finding);
+      return finding;
+    }
+  }
+
+  void report_length(std::uint64_t committed) {
+    const std::uint64_t size = file_.size();
+    const bool longer = size > committed;
+    const std::uint64_t by = longer ? size - committed : committed - size;
+    findings_.add({.cause = longer ? Cause::appended : Cause::truncated,
+                   .offset = std::min(size, committed),
+                   .bytes = longer ? by : 0,
+                   .rule = "spec/container.md#superblock-length",
+                   .text = fmt::format("the file is {} bytes {} than its superblock says", by, longer ? "longer" : "shorter"),
+                   .expected = std::to_string(committed),
+                   .actual = std::to_string(size)});
+    for (const std::uint64_t back : {2 * kBlockBytes, kBlockBytes}) {
+      const std::uint64_t offset = committed - back;
+      if (survey_.superblock || offset + kBlockBytes > size) continue;
+      try {
+        survey_.superblock = decode_superblock(read_block(offset), *survey_.header, committed);
+      } catch (const FormatError&) {  // the other copy is whole
+      }
+    }
+  }
+
+  /// The container as every reader opens it.
+  bool open() {
+    if (!survey_.superblock || survey_.superblock->file_bytes != file_.size()) return false;
+    try {
+      survey_.container = std::make_unique<ContainerReader>(file_.path());
+    } catch (const FormatError& error) {
+      survey_.refusal = finding_of(error, 1);
+      survey_.refusal->cause = Cause::writer;
+      return false;
+    }
+    const ContainerReader& container = *survey_.container;
+    survey_.sites.reserve(container.page_count());
+    for (std::uint32_t page = 0; page < container.page_count(); ++page) list(page, container.entry(page));
+    std::ranges::sort(survey_.sites, {}, [](const PageSite& site) { return site.entry.offset; });
+    const Superblock& s = container.superblock();
+    survey_.directory.push_back({s.directory_offset, s.file_bytes - 2 * kBlockBytes});
+    survey_.meta = container.meta();
+    survey_.columns = columns_by_group(survey_.meta);
+    return true;
+  }
+
+  void list(std::uint32_t page, const DirectoryEntry& entry) {
+    survey_.sites.push_back({entry, page, true});
+    if (page >= listed_.size()) listed_.resize(std::size_t{page} + 1);
+    listed_[page] = true;
+  }
+
+  /// What is left of the directory, page by page.
+  void look_at_directory() {
+    const Superblock& s = *survey_.superblock;
+    std::vector<std::byte> entries;
+    for (std::uint32_t i = 0; i < s.directory_pages; ++i) {
+      const std::uint64_t offset = directory_page_offset(s, i);
+      const std::size_t bytes = directory_page_entry_bytes(s, i);
+      if (offset + kPageHeaderBytes + bytes > file_.size()) break;  // said already: the file is too short
+      entries.resize(bytes);
+      try {
+        read_directory_page(file_, s, i, entries);
+        survey_.directory.push_back({offset, offset + kPageHeaderBytes + bytes});
+        list_entries(i, entries);
+      } catch (const FormatError& error) {
+        add(error, 1, diagnose_directory_page(offset, bytes), offset);
+      }
+    }
+  }
+
+  Diagnosis diagnose_directory_page(std::uint64_t offset, std::size_t bytes) {
+    std::vector<std::byte> image(kPageHeaderBytes + bytes);
+    file_.read_at(offset, image);
+    const auto header = std::span(image).first(kPageHeaderBytes);
+    const auto decode = [&] { return decode_page_header(header, *survey_.header); };
+    try {
+      const std::uint64_t expected = decode().payload_xxh3;
+      Diagnosis found = diagnose_payload(std::span(image).subspan(kPageHeaderBytes), expected, true,
+                                         offset + kPageHeaderBytes, flips_);
+      found.offset += kPageHeaderBytes;
+      return found;
+    } catch (const FormatError&) {
+      return diagnose_sealed(header, [&] { static_cast<void>(decode()); }, flips_);
+    }
+  }
+
+  void list_entries(std::uint32_t directory_page, std::span<const std::byte> bytes) {
+    const Superblock& s = *survey_.superblock;
+    const std::uint32_t first = directory_page * directory_entries_per_page(s.header);
+    for (std::uint32_t i = 0; i * kDirectoryEntryBytes < bytes.size(); ++i) {
+      try {
+        list(first + i, decode_directory_entry(bytes.subspan(i * kDirectoryEntryBytes), s.header, s.file_bytes));
+      } catch (const FormatError&) {  // the refusal of the whole names it
+      }
+    }
+  }
+
+  /// Pages that are not listed, by the header that each has on a sector.
+  void scan() {
+    for_each_page(file_, *survey_.header, progress_, [&](const PageHeader& header, std::uint64_t offset) {
+      if (header.type == PageType::directory) {
+        directory_end_ = offset + kPageHeaderBytes + header.stored_bytes;
+      } else if (header.page_id >= listed_.size() || !listed_[header.page_id]) {
+        survey_.sites.push_back({facts_of(header, offset), header.page_id});
+      }
+    });
+  }
+
+  void report_end() {
+    Finding finding{.cause = Cause::unfinished,
+                    .offset = file_.size(),
+                    .rule = "spec/container.md#superblock-magic",
+                    .text = "no superblock at the end: the file is unfinished or truncated"};
+    if (directory_end_ > 0) {
+      const std::uint64_t length = round_up(directory_end_, kBlockBytes) + 2 * kBlockBytes;
+      finding.cause = file_.size() < length ? Cause::truncated : Cause::unknown;
+      finding.text = "no superblock at the end, though a directory is there";
+      finding.expected = fmt::format("at least {}", length);
+      finding.actual = std::to_string(file_.size());
+      Block last = read_block((file_.size() - 1) / kBlockBytes * kBlockBytes);
+      if (finding.cause == Cause::unknown && last == Block{}) finding.cause = Cause::zeroed;
+    }
+    findings_.add(std::move(finding));
+  }
+
+  void read_meta() {
+    for (const PageSite& site : survey_.sites) {
+      if (site.entry.type != PageType::meta) continue;
+      SurveyedPage page(file_, survey_);
+      if (page.check(site, 3, flips_)) continue;
+      try {
+        survey_.meta = decode_meta(page.payload());
+        survey_.columns = columns_by_group(survey_.meta);
+      } catch (const FormatError&) {  // named when pages are checked
+      }
+    }
+  }
+
+  const InputFile& file_;
+  Findings& findings_;
+  FlipBudget& flips_;
+  Progress& progress_;
+  Survey survey_;
+  std::vector<bool> listed_;  ///< by page
+  bool no_superblock_ = false;
+  std::uint64_t directory_end_ = 0;  ///< of the last directory page that a scan met
+};
+
+}  // namespace
+
+Survey survey_file(const InputFile& file, Findings& findings, FlipBudget& flips, bool structure_only, Progress& progress) {
+  return Surveyor(file, findings, flips, progress).run(structure_only);
+}
+
+std::vector<PageSite> find_pages(const InputFile& file, const FileHeader& header, Progress& progress) {
+  std::vector<PageSite> sites;
+  for_each_page(file, header, progress, [&](const PageHeader& page, std::uint64_t offset) {
+    if (page.type != PageType::directory) sites.push_back({facts_of(page, offset), page.page_id});
+  });
+  return sites;
+}
+
+}  // namespace ptc

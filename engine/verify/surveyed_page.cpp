@@ -1,0 +1,175 @@
+// The rules of one page in the order of spec/container.md#opening, and what its damage looks like.
+#include "engine/verify/surveyed_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+
+#include "format/bytes.h"
+#include "format/checksum.h"
+#include "format/node_page.h"
+#include "format/point_page.h"
+
+namespace ptc {
+namespace {
+
+constexpr char kPayload[] = "spec/container.md#page-payload";
+constexpr char kAgreement[] = "spec/container.md#page-agreement";
+constexpr char kPageKeys[] = "spec/container.md#page-keys";
+constexpr char kPageLevel[] = "spec/container.md#page-level";
+constexpr char kValues[] = "spec/points.md#attribute-pages";
+
+constexpr std::size_t kPayloadHashAt = 48;  // in the page header
+
+void check_keys(const PageHeader& header, std::uint64_t first, std::uint64_t last, const char* whose) {
+  if (header.first_key == first && header.last_key == last) return;
+  throw FormatError(32, kPageKeys, fmt::format("keys are not those of its {}", whose));
+}
+
+void check_groups(const PageHeader& header, const NodePage& nodes) {
+  int least = kMaxLevel;
+  std::uint64_t first = ~std::uint64_t{0}, last = 0;
+  for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
+    least = std::min(least, nodes[slot].level());
+    first = std::min(first, nodes[slot].cell().high);
+    last = std::max(last, nodes[slot].cell().high);
+  }
+  if (least != header.level) throw FormatError(22, kPageLevel, "level is not the least of its groups");
+  check_keys(header, first, last, "groups");
+}
+
+/// Halves and floats are finite: exponents below the greatest.
+void check_values(const PageHeader& header, const Meta& meta, const std::byte* column) {
+  const auto check = [&]<class T>(T infinity, std::size_t count, const std::string& name) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if ((load<T>(column, i * sizeof(T)) & infinity) != infinity) continue;
+      throw FormatError(0, kValues, fmt::format("{} of point {} is not finite", name, i % header.record_count));
+    }
+  };
+  for (const Channel& channel : meta.channels) {
+    if (channel.group != header.group) continue;
+    const std::size_t count = std::size_t{channel.components} * header.record_count;
+    if (channel.type == ChannelType::half) check(std::uint16_t{0x7c00}, count, channel.name);
+    if (channel.type == ChannelType::f32) check(std::uint32_t{0x7f800000}, count, channel.name);
+    column += count * channel_bytes(channel.type);
+  }
+}
+
+Finding finding_in(const PageSite& site, int level, const FormatError& error) {
+  Finding finding = finding_of(error.rebased(site.entry.offset, ""), level);
+  finding.page = site.page;
+  finding.text = fmt::format("page {}: {}", site.page, finding.text);
+  return finding;
+}
+
+}  // namespace
+
+DirectoryEntry facts_of(const PageHeader& header, std::uint64_t offset) {
+  return {offset, header.stored_bytes, header.raw_bytes, header.payload_xxh3, header.type, header.group, header.record_count};
+}
+
+std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, FlipBudget& budget) {
+  const std::uint64_t offset = site.entry.offset;
+  if (site.end() > file_.size()) {
+    Finding finding = finding_in(site, 2, {kPageHeaderBytes, kPayload, "the file ends in it"});
+    finding.cause = Cause::truncated;
+    return finding;
+  }
+  image_.resize(level < 2 ? kPageHeaderBytes : site.end() - offset);
+  try {
+    file_.read_at(offset, image_);
+  } catch (const std::system_error& error) {
+    if (error.code().value() != EIO) throw;
+    Finding finding = finding_in(site, 1, {0, kPayload, error.what()});
+    finding.cause = Cause::unreadable;
+    finding.bytes = image_.size();
+    return finding;
+  }
+  if (auto finding = check_header(site, budget)) return finding;
+  if (auto finding = check_agreement(site)) return finding;
+  if (level < 2) return std::nullopt;
+  if (auto finding = check_payload(site, budget)) return finding;
+  if (level < 3) return std::nullopt;
+  payload_.resize(std::max<std::size_t>(payload_.size(), header_.raw_bytes));
+  PageRules rules{.columns = &survey_.columns};
+  try {
+    if (survey_.container) {
+      rules.entries = survey_.container->entries();
+      rules.points = survey_.container->superblock().points;
+    }
+    decode_payload(header_, stored(), rules, payload_, decoder_);
+    check_content();
+  } catch (const FormatError& error) {
+    Finding finding = finding_in(site, 3, error);
+    finding.cause = Cause::writer;
+    return finding;
+  }
+  return std::nullopt;
+}
+
+std::optional<Finding> SurveyedPage::check_header(const PageSite& site, FlipBudget& budget) {
+  const auto bytes = std::span(image_).first(kPageHeaderBytes);
+  try {
+    header_ = decode_page_header(bytes, *survey_.header);
+    return std::nullopt;
+  } catch (const FormatError& error) {
+    Finding finding = finding_in(site, 1, error);
+    const std::string code = code_of(finding);
+    const auto decode = [&] { static_cast<void>(decode_page_header(bytes, *survey_.header)); };
+    Diagnosis seen = diagnose_sealed(bytes, decode, budget);
+    if (code != "page-magic" && code != "page-checksum") seen = {Cause::writer};
+    if (code == "page-checksum" && seen.cause == Cause::unknown && image_.size() > kPageHeaderBytes &&
+        xxh3_64(stored().first(std::min<std::size_t>(stored().size(), load<std::uint32_t>(image_.data(), 12)))) ==
+            load<std::uint64_t>(image_.data(), kPayloadHashAt)) {
+      seen = {Cause::stale, "it is a whole page of another file"};
+    }
+    apply(seen, site.entry.offset, finding);
+    if (!repaired(finding, site.entry.offset)) return finding;
+    header_ = decode_page_header(bytes, *survey_.header);
+    return std::nullopt;
+  }
+}
+
+std::optional<Finding> SurveyedPage::check_agreement(const PageSite& site) const {
+  if (header_.page_id == site.page && facts_of(header_, site.entry.offset) == site.entry) return std::nullopt;
+  Finding finding = finding_in(site, 1, {0, kAgreement, fmt::format("the page header is not what the directory says of page {}", site.page)});
+  finding.cause = header_.page_id != site.page ? Cause::swapped : Cause::stale;
+  finding.bytes = kPageHeaderBytes + header_.stored_bytes;
+  finding.expected = header_.page_id != site.page ? fmt::format("page {}", site.page) : "payload " + hex(site.entry.payload_xxh3);
+  finding.actual = header_.page_id != site.page ? fmt::format("page {}", header_.page_id) : "payload " + hex(header_.payload_xxh3);
+  return finding;
+}
+
+std::optional<Finding> SurveyedPage::check_payload(const PageSite& site, FlipBudget& budget) {
+  const auto bytes = std::span(image_).subspan(kPageHeaderBytes);
+  const std::uint64_t actual = xxh3_64(bytes);
+  if (actual == header_.payload_xxh3) return std::nullopt;
+  Finding finding = finding_in(site, 2, {kPageHeaderBytes, kPayload, "payload's checksum is wrong"});
+  finding.bytes = bytes.size();
+  finding.expected = hex(header_.payload_xxh3);
+  finding.actual = hex(actual);
+  const std::uint64_t offset = site.entry.offset + kPageHeaderBytes;
+  apply(diagnose_payload(bytes, header_.payload_xxh3, header_.coding.codec != Codec::raw, offset, budget), offset, finding);
+  if (repaired(finding, site.entry.offset)) return std::nullopt;
+  return finding;
+}
+
+bool SurveyedPage::repaired(const Finding& finding, std::uint64_t page_offset) {
+  if (!repair_ || finding.cause != Cause::bit_flip) return false;
+  image_[finding.offset - page_offset] ^= std::byte{1} << finding.bit;
+  return true;
+}
+
+void SurveyedPage::check_content() const {
+  const std::byte* const data = payload_.data();
+  if (header_.type == PageType::point) {
+    const PointPage points(data, header_.record_count);
+    check_keys(header_, points[0].key.high, points[points.size() - 1].key.high, "points");
+  }
+  if (header_.type == PageType::node) check_groups(header_, NodePage(data, header_.record_count));
+  if (header_.type == PageType::attribute) check_values(header_, survey_.meta, data);
+}
+
+}  // namespace ptc

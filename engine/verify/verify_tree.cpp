@@ -1,0 +1,413 @@
+// The octree against its points (spec/nodes.md#verify).
+#include "engine/verify/verify_tree.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/build/octree.h"
+#include "engine/verify/node_pages.h"
+#include "engine/verify/verify_node.h"
+#include "format/node_page.h"
+#include "format/point_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr char kLevel[] = "spec/nodes.md#node-level";
+constexpr char kCell[] = "spec/nodes.md#node-cell";
+constexpr char kChildren[] = "spec/nodes.md#node-children";
+constexpr char kLeaf[] = "spec/nodes.md#node-leaf";
+constexpr char kReferences[] = "spec/nodes.md#references";
+constexpr char kOrder[] = "spec/points.md#point-order";
+constexpr char kCounts[] = "spec/container.md#superblock-counts";
+constexpr char kRoot[] = "spec/container.md#superblock-root";
+constexpr char kTotals[] = "spec/container.md#superblock-totals";
+
+constexpr double kRelative = 1e-6;  // of totals: sums in another order
+
+/// Adds what is wrong to the findings: checksums are right, so that it was written so.
+class Report {
+ public:
+  Report(const ContainerReader& container, Findings& findings) : container_(container), findings_(findings) {}
+
+  void superblock(const char* clause, const std::string& text) const {
+    findings_.add({.cause = Cause::writer,
+                   .level = 3,
+                   .offset = container_.superblock().file_bytes - 2 * kBlockBytes,
+                   .rule = clause,
+                   .text = text});
+  }
+  void page(std::uint32_t page, std::uint64_t from_header, const char* clause, const std::string& text) const {
+    findings_.add({.cause = Cause::writer,
+                   .level = 3,
+                   .offset = container_.entry(page).offset + from_header,
+                   .page = page,
+                   .rule = clause,
+                   .text = fmt::format("page {}: {}", page, text)});
+  }
+
+ private:
+  const ContainerReader& container_;
+  Findings& findings_;
+};
+
+/// A group, where it lies, and what was found below it so far.
+struct OpenGroup {
+  NodeGroup group;
+  std::uint32_t page = 0;
+  std::uint64_t from_header = 0;  ///< where it lies in the page; of its payload when that is compressed
+  std::string place;              ///< for messages
+  std::size_t next = 0;           ///< child to be visited
+  std::uint64_t points = 0;       ///< in the children visited
+  int last_octant = -1;           ///< of the child before
+  bool complete = true;           ///< all children so far were visited whole
+  std::array<NodeSummary, kMaxChildren> exact;  ///< of the children visited
+};
+
+OpenGroup open_group(NodePages& pages, std::uint32_t page, std::uint16_t slot) {
+  const NodePages::Place place = pages.page(page);
+  const auto at = static_cast<std::size_t>(place.nodes[slot].bytes().data() - place.payload);
+  OpenGroup opened;
+  opened.group = place.nodes.decode(slot);
+  opened.page = page;
+  opened.from_header = kPageHeaderBytes + (place.raw ? at : 0);
+  opened.place = (place.raw ? "" : fmt::format("decoded byte {}: ", at)) + fmt::format("group {}: ", slot);
+  return opened;
+}
+
+/// Which groups were reached: a bit each, numbered through all node pages.
+class ReachedGroups {
+ public:
+  explicit ReachedGroups(const ContainerReader& container)
+      : container_(container), first_(container.page_count()) {
+    std::uint64_t groups = 0;
+    for (const std::uint32_t page : container.node_pages()) {
+      first_[page] = groups;
+      groups += container.entry(page).record_count;
+    }
+    bits_.resize(groups);
+  }
+
+  /// False when it was reached before.
+  bool reach(std::uint32_t page, std::uint16_t slot) {
+    const std::uint64_t group = first_[page] + slot;
+    if (bits_[group]) return false;
+    return bits_[group] = true;
+  }
+
+  /// Groups that were not reached, page by page.
+  void report_rest(const Report& report) const {
+    for (const std::uint32_t page : container_.node_pages()) {
+      const auto first = bits_.begin() + static_cast<std::ptrdiff_t>(first_[page]);
+      const auto last = first + container_.entry(page).record_count;
+      const auto missed = std::find(first, last, false);
+      if (missed == last) continue;
+      const auto others = std::count(missed, last, false) - 1;
+      report.page(page, 0, kReferences,
+                  fmt::format("group {} is the child of no node{}", missed - first,
+                              others > 0 ? fmt::format(", nor are {} more", others) : ""));
+    }
+  }
+
+ private:
+  const ContainerReader& container_;
+  std::vector<std::uint64_t> first_;  ///< of a node page's groups
+  std::vector<bool> bits_;
+};
+
+/// Runs of points in their order, with the totals of all that were taken.
+class PointRuns {
+ public:
+  PointRuns(const ContainerReader& container, const std::vector<bool>& damaged, const Report& report)
+      : container_(container), damaged_(damaged), report_(report), payload_(container.page_payload_limit()) {}
+
+  /// Points from `first` on, which must not lie before any taken already; nothing when some are in damaged pages.
+  /// Valid until the next call.
+  std::optional<std::span<const PointRecord>> take(std::uint64_t first, std::size_t count) {
+    block_.clear();
+    const std::uint64_t per_page = container_.superblock().points_per_page;
+    for (std::uint64_t at = first; at < first + count;) {
+      const std::uint32_t page = container_.point_pages()[at / per_page];
+      if (damaged_[page]) return std::nullopt;
+      if (page != page_) {
+        count_ = container_.read_page(page, payload_, decoder_).record_count;
+        page_ = page;
+      }
+      const PointPage points(payload_.data(), count_);
+      for (auto i = static_cast<std::uint32_t>(at % per_page); i < count_ && at < first + count; ++i, ++at) {
+        block_.push_back(points[i]);
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) add(first + i, block_[i]);
+    return block_;
+  }
+
+  /// Compares the totals with the superblock's.
+  void finish() const {
+    const Superblock& s = container_.superblock();
+    if (next_ != s.points) report_.superblock(kCounts, fmt::format("leaves hold {} of {} points", next_, s.points));
+    compare("area", s.area, area_);
+    for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
+    if (next_ > 0 && (s.bounds_low != low_ || s.bounds_high != high_)) {
+      report_.superblock(kTotals, fmt::format("bounds are not those of the points, {} {} {} to {} {} {}", low_[0], low_[1],
+                                              low_[2], high_[0], high_[1], high_[2]));
+    }
+  }
+
+ private:
+  void add(std::uint64_t number, const PointRecord& point) {
+    if (point.key < last_) {
+      report_.page(page_, kPageHeaderBytes, kOrder, fmt::format("key of point {} is below the one before", number));
+    }
+    last_ = point.key;
+    const std::array<double, 3> at = container_.superblock().frame.to_position(decode_morton(point.key));
+    const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
+    area_ += area;
+    for (std::size_t k = 0; k < 3; ++k) {
+      low_[k] = next_ == 0 ? at[k] : std::min(low_[k], at[k]);
+      high_[k] = next_ == 0 ? at[k] : std::max(high_[k], at[k]);
+      flux_[k] += area * static_cast<double>(decode_half(point.radiance[k]));
+    }
+    next_ = number + 1;
+  }
+
+  void compare(const char* what, double said, double found) const {
+    if (std::abs(said - found) <= kRelative * std::max(std::abs(said), std::abs(found))) return;
+    report_.superblock(kTotals, fmt::format("superblock says {} {}, the points have {}", what, said, found));
+  }
+
+  const ContainerReader& container_;
+  const std::vector<bool>& damaged_;
+  const Report& report_;
+  PageDecoder decoder_;
+  std::vector<std::byte> payload_;
+  std::uint32_t page_ = kNoPage;  ///< in payload_
+  std::uint32_t count_ = 0;       ///< its points
+  std::vector<PointRecord> block_;
+  MortonKey last_{};
+  std::uint64_t next_ = 0;  ///< behind the last taken
+  double area_ = 0;
+  std::array<double, 3> flux_{};
+  std::array<double, 3> low_{};
+  std::array<double, 3> high_{};
+};
+
+/// The walk: groups from the root to where it is now.
+class TreeWalk {
+ public:
+  TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged, std::size_t cached_pages,
+           Findings& findings, Progress& progress)
+      : container_(container),
+        superblock_(container.superblock()),
+        damaged_(damaged),
+        report_(container, findings),
+        progress_(progress),
+        pages_(container, cached_pages),
+        reached_(container),
+        points_(container, damaged, report_) {}
+
+  TreeCounts run() {
+    if (superblock_.points > 0) {
+      enter(superblock_.root_page, superblock_.root_slot);
+      while (!path_.empty()) step();
+    }
+    if (!counts_.complete) return counts_;
+    reached_.report_rest(report_);
+    points_.finish();
+    require_equal(kCounts, "nodes", superblock_.nodes, counts_.nodes);
+    require_equal(kCounts, "node groups", superblock_.node_groups, counts_.groups);
+    require_equal(kRoot, "levels", superblock_.levels, static_cast<std::uint64_t>(counts_.levels));
+    return counts_;
+  }
+
+ private:
+  void require_equal(const char* clause, const char* what, std::uint64_t said, std::uint64_t found) const {
+    if (said == found) return;
+    report_.superblock(clause, fmt::format("superblock says {} {}, the tree has {}", said, what, found));
+  }
+
+  void fault(const OpenGroup& open, const char* clause, const std::string& text) const {
+    report_.page(open.page, open.from_header, clause, open.place + text);
+  }
+
+  /// Passes over what the child that is next holds.
+  void pass_over() {
+    resume_ = true;
+    leave_incomplete();
+  }
+
+  /// Of the child that is next not all was visited.
+  void leave_incomplete() {
+    counts_.complete = false;
+    if (path_.empty()) return;
+    path_.back().complete = false;
+    ++path_.back().next;
+  }
+
+  /// Visits one child, or leaves the innermost group when all were visited.
+  void step() {
+    OpenGroup& open = path_.back();
+    if (open.next == open.group.children.size()) {
+      leave();
+      return;
+    }
+    const ChildRef& ref = open.group.children[open.next].ref;
+    if (ref.interior) {
+      enter(ref.page, ref.slot);
+    } else {
+      visit_leaf(open, ref);
+    }
+  }
+
+  void enter(std::uint32_t page, std::uint16_t slot) {
+    if (damaged_[page]) return pass_over();
+    OpenGroup open = open_group(pages_, page, slot);
+    if (!reached_.reach(page, slot)) {
+      fault(open, kReferences, "is the child of two nodes");
+      return pass_over();
+    }
+    if (path_.empty()) {
+      check_root(open);
+    } else if (!check_inside(open, path_.back())) {
+      return pass_over();
+    }
+    ++counts_.groups;
+    counts_.nodes += open.group.children.size();
+    counts_.levels = std::max(counts_.levels, open.group.level + 1);
+    path_.push_back(std::move(open));
+  }
+
+  void check_root(const OpenGroup& open) const {
+    const std::vector<NodeChild>& children = open.group.children;
+    if (children.size() > 1) return;
+    if (children[0].ref.interior || open.group.level != 0) {
+      fault(open, kChildren, "a root with one child is not a leaf at level 0");
+    }
+  }
+
+  /// @return  false when its level is not below its parent's: going on might never end
+  bool check_inside(const OpenGroup& open, OpenGroup& parent) const {
+    const NodeGroup& group = open.group;
+    const NodeGroup& around = parent.group;
+    if (group.level <= around.level) {
+      fault(open, kLevel, fmt::format("level {} is not below its parent's {}", group.level, around.level));
+      return false;
+    }
+    if (group.children.size() < 2) fault(open, kChildren, "has one child and is not the root");
+    if (!contains(around, group.cell)) {
+      fault(open, kCell, "cell lies outside its parent's");
+    } else {
+      check_next_octant(parent, group.cell);
+    }
+    return true;
+  }
+
+  static bool contains(const NodeGroup& group, const MortonKey& key) {
+    return cell_of(key, std::min(group.level, kLatticeBits)) == group.cell;
+  }
+
+  /// Children lie in octants of their own, in ascending order. Below the lattice rank tells them
+  /// apart, and a root that is a leaf has no octants.
+  void check_next_octant(OpenGroup& open, const MortonKey& key) const {
+    if (open.group.level >= kLatticeBits || open.group.children.size() == 1) return;
+    const int digit = octant(key, open.group.level + 1);
+    if (digit <= open.last_octant) {
+      fault(open, kChildren, fmt::format("child {} is not in an octant behind the one before", open.next));
+    }
+    open.last_octant = digit;
+  }
+
+  void visit_leaf(OpenGroup& open, const ChildRef& ref) {
+    const auto child_fault = [&](const char* clause, const std::string& text) {
+      fault(open, clause, fmt::format("child {}: {}", open.next, text));
+    };
+    if (ref.first_point != next_point_ && !(resume_ && ref.first_point > next_point_)) {
+      child_fault(kLeaf, fmt::format("its points begin with {}, the next is {}", ref.first_point, next_point_));
+      return pass_over();
+    }
+    resume_ = false;
+    next_point_ = ref.first_point + ref.point_count;
+    if (ref.point_count > superblock_.leaf_points) {
+      child_fault(kLeaf, fmt::format("has {} points, a leaf has at most {}", ref.point_count, superblock_.leaf_points));
+    }
+    const auto points = points_.take(ref.first_point, ref.point_count);
+    progress_.advance(ref.point_count);
+    if (!points) return pass_over();
+    const auto outside = [&](const PointRecord& point) { return !contains(open.group, point.key); };
+    if (std::ranges::any_of(*points, outside)) {
+      child_fault(kCell, "points lie outside the cell");
+    } else {
+      check_one_octant(open, *points);
+    }
+    const NodeSummary& stored = open.group.children[open.next].node;
+    const double unit = superblock_.frame.unit();
+    auto wrong = check_bounds(stored, *points, unit);
+    if (wrong) child_fault(wrong->clause, wrong->text);
+    close_child(open, summarise_points(*points, unit), points->size(), !wrong);
+  }
+
+  void check_one_octant(OpenGroup& open, std::span<const PointRecord> points) const {
+    check_next_octant(open, points.front().key);
+    const int level = open.group.level + 1;
+    if (level > kLatticeBits || open.group.children.size() == 1) return;
+    if (octant(points.front().key, level) != octant(points.back().key, level)) {
+      fault(open, kChildren, fmt::format("child {} lies in two octants", open.next));
+    }
+  }
+
+  /// The child that is next was visited: `exact` is what lies below it.
+  /// @param compare  false when the child was found to be wrong already
+  void close_child(OpenGroup& open, const NodeSummary& exact, std::uint64_t points, bool compare) {
+    const NodeSummary& stored = open.group.children[open.next].node;
+    if (const auto wrong = compare ? compare_summary(stored, exact, open.group.level) : std::nullopt) {
+      fault(open, wrong->clause, fmt::format("child {}: {}", open.next, wrong->text));
+    }
+    open.exact[open.next] = exact;
+    open.points += points;
+    ++open.next;
+  }
+
+  void leave() {
+    const OpenGroup open = std::move(path_.back());
+    path_.pop_back();
+    if (!open.complete) return leave_incomplete();
+    const std::size_t count = open.group.children.size();
+    if (count > 1 && open.points <= superblock_.leaf_points) {
+      fault(open, kLeaf, fmt::format("splits {} points, which are a leaf", open.points));
+    }
+    if (path_.empty()) return;
+    std::array<const NodeSummary*, kMaxChildren> parts{};
+    for (std::size_t i = 0; i < count; ++i) parts[i] = &open.exact[i];
+    close_child(path_.back(), summarise_nodes(std::span(parts).first(count)), open.points, true);
+  }
+
+  const ContainerReader& container_;
+  const Superblock& superblock_;
+  const std::vector<bool>& damaged_;
+  Report report_;
+  Progress& progress_;
+  NodePages pages_;
+  ReachedGroups reached_;
+  PointRuns points_;
+  std::vector<OpenGroup> path_;  ///< at most 63: levels ascend
+  TreeCounts counts_;
+  std::uint64_t next_point_ = 0;  ///< of the next leaf
+  bool resume_ = false;           ///< something was passed over: the next leaf may begin later
+};
+
+}  // namespace
+
+TreeCounts verify_tree(const ContainerReader& container, const std::vector<bool>& damaged, std::size_t cached_pages,
+                       Findings& findings, Progress& progress) {
+  return TreeWalk(container, damaged, cached_pages, findings, progress).run();
+}
+
+}  // namespace ptc
