@@ -165,6 +165,7 @@ def decode_lz4(stored, page, at):
     require(len(stored) > 4, at, LZ4_BLOCK, "too short for a block")
     size = check_size(page, int.from_bytes(stored[:4], "little"), at, LZ4_BLOCK)
     out, i, whole = bytearray(), 4, False
+    begin = end = 0  # of the last match
 
     def byte():
         nonlocal i
@@ -189,10 +190,13 @@ def decode_lz4(stored, page, at):
             back = byte() | byte() << 8
             require(1 <= back <= len(out), at + i, LZ4_BLOCK, "match before the start")
             count = length(token & 15) + 4
-            require(len(out) + count <= size, at + i, LZ4_BLOCK, "longer than it declares")
+            begin, end = len(out), len(out) + count
+            require(end <= size, at + i, LZ4_BLOCK, "longer than it declares")
             for _ in range(count):
                 out.append(out[-back])
     require(len(out) == size, at, LZ4_BLOCK, "another size than it declares")
+    require(end == 0 or end <= size - 5 and begin <= size - 12, at, LZ4_BLOCK,
+            "the last match ends in the last 5 bytes or begins in the last 12")
     return bytes(out)
 
 
@@ -625,10 +629,23 @@ class Container:
         (block_a, a), (block_b, b) = self.superblock_copies()
         whole = [s for s in (a, b) if isinstance(s, Superblock)]
         if not whole:
+            self.look_for_superblock()
             raise b if block_b[:8] == SUPER_MAGIC and block_a[:8] != SUPER_MAGIC else a
         require(len(whole) == 1 or block_a == block_b, self.file_bytes - 2 * BLOCK,
                 "spec/container.md#superblock-copies", "the two superblocks differ")
         return whole[0]
+
+    def look_for_superblock(self):
+        """One that is whole near the end of a file tells that the file is longer or shorter than it was."""
+        blocks = self.file_bytes // BLOCK
+        for at in range(BLOCK * max(blocks - 256, 0), BLOCK * blocks, BLOCK):
+            for length in (at + BLOCK, at + 2 * BLOCK):
+                try:
+                    decode_superblock(self.header, self.read(at, BLOCK), length, at)
+                except Broken:
+                    continue
+                raise Broken(self.file_bytes, "spec/container.md#superblock-length",
+                             f"file has {self.file_bytes} bytes, its superblock says {length}")
 
     def entry_at(self, page):
         """Where the directory entry of a page lies in the file."""

@@ -163,8 +163,6 @@ class Verifier:
         """Visits a group; yields its interior children, checked against it."""
         s = self.c.superblock
         group, at = self.group_at(page, slot)
-        require((page, slot) not in self.reached, at, "spec/nodes.md#references",
-                "group is the child of two nodes")
         self.reached.add((page, slot))
         self.nodes += len(group.children)
         self.levels = max(self.levels, group.level + 1)
@@ -172,6 +170,8 @@ class Verifier:
         for child in group.children:
             if child.interior:
                 below, below_at = self.group_at(child.page, child.slot)
+                require((child.page, child.slot) not in self.reached, below_at,
+                        "spec/nodes.md#references", "group is the child of two nodes")
                 require(below.level > group.level, below_at, "spec/nodes.md#node-level",
                         "level is not below the parent's")
                 require(len(below.children) >= 2, below_at, "spec/nodes.md#node-children",
