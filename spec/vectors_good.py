@@ -172,8 +172,10 @@ def channels_of_every_type():
 
 def texts():
     """UTF-8 of every length and at its limits; control characters; the longest writer's name."""
-    draft = Draft(text=[("a", ""), ("controls", "\x01\t\r\n\x1b[31m\x7f\x9b\u2028\u202e\ufeff\\\""),
-                        ("k" * 31, "\x7f\x80\u07ff\u0800\ud7ff\ue000\uffff\U00010000\U0010ffff")])
+    draft = Draft(text=[
+        ("a", ""),
+        ("k" * 31, "\x7f\x80\u07ff\u0800\ud7ff\ue000\uffff\U00010000\U0010ffff"),
+        ("rounding", "\x01\t\r\n\x1b[31m\x7f\x9b\u2028\u202e\ufeff\\\"")])
     draft.super["writer"] = "caf\u00e9 \x1b[2J".encode().ljust(59, b"x") + "\U0001d11e".encode()
     return draft
 
