@@ -317,14 +317,27 @@ def all_vectors():
             yield folder, name, draft
 
 
+def expected(name, draft, whole):
+    """A line of good.txt: what every reader finds in a good file."""
+    s = r.unpack_superblock(whole[-r.BLOCK:])
+    payloads = xxh3_64(b"".join(bytes(page.payload) for page in draft.pages))
+    return (f"{name} {s.points} {s.nodes} {s.node_groups} {s.levels} {s.page_count} "
+            f"{s.content_xxh3[1]:016x}{s.content_xxh3[0]:016x} {payloads:016x}\n")
+
+
 def write_all(directory):
-    """Writes all vectors; the number of an exit code."""
-    made = 0
-    for folder, name, draft in all_vectors():
-        folder = os.path.join(directory, folder)
+    """Writes all vectors and good.txt; the number of an exit code."""
+    made, lines = 0, []
+    for kind, name, draft in all_vectors():
+        folder = os.path.join(directory, kind)
         os.makedirs(folder, exist_ok=True)
+        whole = draft if isinstance(draft, bytes) else draft.to_bytes()
         with open(os.path.join(folder, name + ".ptcx"), "wb") as file:
-            file.write(draft if isinstance(draft, bytes) else draft.to_bytes())
+            file.write(whole)
+        if kind == "good":
+            lines.append(expected(name, draft, whole))
         made += 1
+    with open(os.path.join(directory, "good.txt"), "w", encoding="utf-8") as file:
+        file.writelines(sorted(lines))
     print(made, "vectors written")
     return 0

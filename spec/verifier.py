@@ -28,7 +28,6 @@ class Verifier:
         for _, found in copies:
             if isinstance(found, Broken):
                 raise found
-        self.check_padding()
         order = c.point_pages + [i for i in range(c.superblock.page_count)
                                  if c.entries[i].type != POINT]  # points by their numbers
         for k in range(0, len(order), self.BATCH):
@@ -39,9 +38,10 @@ class Verifier:
                     self.check_page(page, c.headers[page], loaded[page])
                 else:
                     self.undecoded += 1
+        self.check_padding()
         if self.undecoded == 0:
-            self.check_totals()
             self.check_tree()
+            self.check_totals()
 
     def check_padding(self):
         c, s, end = self.c, self.c.superblock, BLOCK
