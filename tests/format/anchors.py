@@ -1,5 +1,5 @@
 """Every clause that the sources cite exists in the spec; every rule is listed in errors.md and has a
-vector; what security.md names exists.
+vector; released versions are frozen; what security.md names exists.
 
 anchors.py SOURCE_DIR: collects "spec/FILE.md#anchor" and "spec/FILE.md" in sources and documents.
 """
@@ -56,6 +56,17 @@ def check_vectors(spec, errors):
             yield f"spec/errors.md and vectors/{kind} do not agree on {rule}"
     if len(rules["bad"] | rules["verify"]) < 60:
         yield "spec/errors.md: hardly any rules found: the search is broken"
+
+
+def check_versions(spec, text):
+    """Faults: versions that were released and of which there are no frozen vectors, or the reverse."""
+    history = text.split("## How the format may change")[0]
+    released = {version for version, body in re.findall(r"^## ([0-9.]+)\n(.*?)(?=^## |\Z)", history, re.M | re.S)
+                if "Not released yet" not in body}
+    frozen = os.path.join(spec, "vectors", "frozen")
+    found = set(os.listdir(frozen)) if os.path.exists(frozen) else set()
+    for version in sorted(released ^ found):
+        yield f"spec/versions.md and vectors/frozen do not agree on {version}"
 
 
 def check_security(root, text):
@@ -117,6 +128,7 @@ def main(root):
                 if f"[{rule}]({name}#{rule})" not in documents["errors.md"]:
                     faults.append(f"spec/errors.md does not list {rule} of {name}")
     faults.extend(check_vectors(spec, documents["errors.md"]))
+    faults.extend(check_versions(spec, documents["versions.md"]))
     faults.extend(check_security(root, documents["security.md"]))
     if cited < 100:
         faults.append(f"only {cited} citations found: the search is broken")

@@ -36,9 +36,9 @@ def files(folder):
     return sorted(n for n in os.listdir(folder) if n.endswith(".ptcx"))
 
 
-def found_in(name):
+def found_in(folder, name):
     """The line of good.txt, from what the reader finds."""
-    path = os.path.join(SPEC, "vectors", "good", name)
+    path = os.path.join(folder, name)
     facts = verifier.verify(path)
     container = reader.open_container(path)
     pages = container.load(range(facts["pages"]))
@@ -49,10 +49,15 @@ def found_in(name):
 
 
 def check_content():
-    with open(os.path.join(SPEC, "vectors", "good.txt"), encoding="utf-8") as file:
-        expected = set(file)
-    found = {found_in(name) for name in files(os.path.join(SPEC, "vectors", "good"))}
-    faults.extend(f"good.txt: {line}" for line in expected ^ found)
+    """Of today's vectors, and of those of each version that was released."""
+    root = os.path.join(SPEC, "vectors")
+    frozen = os.path.join(root, "frozen")
+    for folder in [root, *(e.path for e in os.scandir(frozen))] if os.path.exists(frozen) else [root]:
+        with open(os.path.join(folder, "good.txt"), encoding="utf-8") as file:
+            expected = set(file)
+        good = os.path.join(folder, "good")
+        found = {found_in(good, name) for name in files(good)}
+        faults.extend(f"{folder}/good.txt: {line}" for line in expected ^ found)
 
 
 def check_verdicts():
