@@ -3,6 +3,7 @@
 They agree on whether a file is valid, and on the rule that refuses it. The changes are the same each time.
 """
 
+import json
 import random
 import struct
 import sys
@@ -76,7 +77,33 @@ def change(choice, draft):
             place[name] = value
 
 
+def write_far(path):
+    """A point whose attributes, nodes and directory lie behind a hole of 4 GiB."""
+    draft = Draft([Surfel((1, 2, 3), radius=0.5)], channels=good.CHANNELS)
+    hole = draft.offset(1)
+    for i, page in enumerate(draft.pages[1:], 1):
+        page.entry["offset"] = draft.offset(i) + (1 << 32)
+    plain = reader.unpack_superblock(draft.to_bytes()[-reader.BLOCK:])
+    draft.super.update(file_bytes=plain.file_bytes + (1 << 32), directory_offset=plain.directory_offset + (1 << 32))
+    whole = draft.to_bytes()
+    with open(path, "wb") as file:
+        file.write(whole[:hole])
+        file.seek(1 << 32, 1)
+        file.write(whole[hole:])
+
+
 class Readers(ProgramTest):
+    def test_offsets_beyond_32_bits(self):
+        path = self.here / "far.ptcx"
+        write_far(path)
+        container = reader.open_container(path)
+        self.assertEqual([p.x for p in container.points()], [[1]])
+        self.assertEqual(len(container.groups(container.node_pages[0])[0]), 1)
+        container.close()
+        facts = json.loads(self.succeed("ptcinfo", path, "--json").stdout)
+        self.assertEqual((facts["points"], facts["bytes"]["file"]), (1, path.stat().st_size))
+        self.succeed("ptcconvert", path, self.here / "out.ptcx")
+
     def verdicts(self, path):
         try:
             verifier.verify(path)
