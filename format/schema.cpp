@@ -124,7 +124,7 @@ Meta decode_meta(std::span<const std::byte> payload) {
   const auto channel_count = load<std::uint32_t>(payload.data(), 0);
   const auto text_count = load<std::uint32_t>(payload.data(), 4);
   std::span<const std::byte> rest = payload.subspan(kHeadBytes);
-  if (channel_count > kMaxGroup * kMaxGroupBytes || channel_count > rest.size() / kChannelBytes) {
+  if (channel_count > rest.size() / kChannelBytes) {
     throw FormatError(0, kSize, "channels run past the end of the meta page");
   }
   const auto here = [&] { return payload.size() - rest.size(); };

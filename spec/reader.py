@@ -18,6 +18,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
 from array import array
 from collections import namedtuple
 
@@ -165,6 +166,7 @@ def decode_lz4(stored, page, at):
     require(len(stored) > 4, at, LZ4_BLOCK, "too short for a block")
     size = check_size(page, int.from_bytes(stored[:4], "little"), at, LZ4_BLOCK)
     out, i, whole = bytearray(), 4, False
+    begin = end = 0  # of the last match
 
     def byte():
         nonlocal i
@@ -189,30 +191,37 @@ def decode_lz4(stored, page, at):
             back = byte() | byte() << 8
             require(1 <= back <= len(out), at + i, LZ4_BLOCK, "match before the start")
             count = length(token & 15) + 4
-            require(len(out) + count <= size, at + i, LZ4_BLOCK, "longer than it declares")
+            begin, end = len(out), len(out) + count
+            require(end <= size, at + i, LZ4_BLOCK, "longer than it declares")
             for _ in range(count):
                 out.append(out[-back])
     require(len(out) == size, at, LZ4_BLOCK, "another size than it declares")
+    require(end == 0 or end <= size - 5 and begin <= size - 12, at, LZ4_BLOCK,
+            "the last match ends in the last 5 bytes or begins in the last 12")
     return bytes(out)
 
 
-def run_zstd(frames):
-    result = subprocess.run(["zstd", "-dcq"], input=frames, stdout=subprocess.PIPE,
-                            stderr=subprocess.DEVNULL, check=False)
-    return result.stdout if result.returncode == 0 else None
+def run_zstd(frames, size):
+    """What frames decode to, unless it is not `size` bytes; no more of it is taken."""
+    with tempfile.TemporaryFile() as file:
+        file.write(frames)
+        file.seek(0)
+        with subprocess.Popen(["zstd", "-dcq"], stdin=file, stdout=subprocess.PIPE,
+                              stderr=subprocess.DEVNULL) as zstd:
+            out = zstd.stdout.read(size + 1)
+    return out if zstd.returncode == 0 and len(out) == size else None
 
 
 def decode_frames(jobs):
     """What (page, frame, decoded size, offset) decode to: one process for all, unless one is broken."""
-    whole = run_zstd(b"".join(stored for _, stored, _, _ in jobs))
-    if whole is not None and len(whole) == sum(raw for _, _, raw, _ in jobs):
+    whole = run_zstd(b"".join(stored for _, stored, _, _ in jobs), sum(raw for _, _, raw, _ in jobs))
+    if whole is not None:
         out, at = {}, 0
         for page, _, raw, _ in jobs:
             out[page], at = whole[at:at + raw], at + raw
         return out
     for _, stored, raw, at in jobs:
-        alone = run_zstd(stored)
-        require(alone is not None and len(alone) == raw, at, FRAME, "frame does not decode")
+        require(run_zstd(stored, raw) is not None, at, FRAME, "frame does not decode")
     raise Broken(jobs[0][3], FRAME, "frames do not decode together")
 
 
@@ -588,6 +597,13 @@ class Container:
 
     def __init__(self, path):
         self.file = open(path, "rb")
+        try:
+            self.open()
+        except Broken:
+            self.close()
+            raise
+
+    def open(self):
         self.file_bytes = os.fstat(self.file.fileno()).st_size
         self.has_zstd = shutil.which("zstd") is not None
         self.header = decode_header(self.read(0, min(BLOCK, self.file_bytes)))
@@ -625,10 +641,23 @@ class Container:
         (block_a, a), (block_b, b) = self.superblock_copies()
         whole = [s for s in (a, b) if isinstance(s, Superblock)]
         if not whole:
+            self.look_for_superblock()
             raise b if block_b[:8] == SUPER_MAGIC and block_a[:8] != SUPER_MAGIC else a
         require(len(whole) == 1 or block_a == block_b, self.file_bytes - 2 * BLOCK,
                 "spec/container.md#superblock-copies", "the two superblocks differ")
         return whole[0]
+
+    def look_for_superblock(self):
+        """One that is whole near the end of a file tells that the file is longer or shorter than it was."""
+        blocks = self.file_bytes // BLOCK
+        for at in range(BLOCK * max(blocks - 256, 0), BLOCK * blocks, BLOCK):
+            for length in (at + BLOCK, at + 2 * BLOCK):
+                try:
+                    decode_superblock(self.header, self.read(at, BLOCK), length, at)
+                except Broken:
+                    continue
+                raise Broken(self.file_bytes, "spec/container.md#superblock-length",
+                             f"file has {self.file_bytes} bytes, its superblock says {length}")
 
     def entry_at(self, page):
         """Where the directory entry of a page lies in the file."""
@@ -669,10 +698,6 @@ class Container:
                     "spec/container.md#directory-overlap", f"page {page} overlaps another")
         require(self.pages_of(META) == [s.meta_page], tail, "spec/container.md#meta-page",
                 "meta_page is not the one page of type meta")
-        if s.points:
-            root = self.entries[s.root_page]
-            require(root.type == NODE and s.root_slot < root.record_count, tail,
-                    "spec/container.md#superblock-root", "root group is in no node page")
         counts = "spec/container.md#superblock-counts"
         self.point_pages, self.node_pages = self.pages_of(POINT), self.pages_of(NODE)
         require(s.points == sum(self.entries[i].record_count for i in self.point_pages), tail,
@@ -680,6 +705,14 @@ class Container:
         require(s.node_groups == sum(self.entries[i].record_count for i in self.node_pages), tail,
                 counts, "directory has another number of groups")
         require(s.nodes <= 8 * s.node_groups, tail, counts, "more than 8 nodes a group")
+        if s.points:
+            root = self.entries[s.root_page]
+            require(root.type == NODE and s.root_slot < root.record_count, tail,
+                    "spec/container.md#superblock-root", "root group is in no node page")
+        records = b"".join(struct.pack("<HHIQ", e.type, e.group, e.record_count, e.payload_xxh3)
+                           for e in self.entries)
+        require(xxh3_128(records) == s.content_xxh3, tail, "spec/container.md#superblock-digest",
+                "content digest is not that of the directory")
         full, clause = points_per_page(self.header), "spec/points.md#point-pages"
         require(not s.points or s.points_per_page == full, tail, clause,
                 "points_per_page is not what a page holds")
@@ -688,10 +721,6 @@ class Container:
                     f"page {page} is not full")
         require(not s.points or self.entries[self.point_pages[-1]].record_count <= full, tail,
                 clause, "the last point page is too full")
-        records = b"".join(struct.pack("<HHIQ", e.type, e.group, e.record_count, e.payload_xxh3)
-                           for e in self.entries)
-        require(xxh3_128(records) == s.content_xxh3, tail, "spec/container.md#superblock-digest",
-                "content digest is not that of the directory")
 
     def check_attribute_pages(self):
         clause = "spec/points.md#attribute-pages"

@@ -108,6 +108,9 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   return facts;
 }
 
+/// Text of a file as people may see it: in quotes, with no character that a terminal would obey.
+std::string quoted(const ordered_json& text) { return text.dump(-1, ' ', true); }
+
 std::string summary_of(const ordered_json& facts) {
   const auto& low = facts["bounds"]["low"];
   const auto& high = facts["bounds"]["high"];
@@ -121,14 +124,14 @@ std::string summary_of(const ordered_json& facts) {
       "  bounds    {} {} {} to {} {} {}\n"
       "  bytes     {}: points {}, nodes {}, channels {}; codec {}\n",
       facts["file"].get<std::string>(), facts["format_version"].get<std::string>(),
-      facts["writer"].dump(), facts["points"].dump(), facts["page_counts"]["point"].dump(),
+      quoted(facts["writer"]), facts["points"].dump(), facts["page_counts"]["point"].dump(),
       ptc::bytes_text(facts["page_size"].get<std::uint64_t>()), facts["nodes"].dump(),
       facts["node_groups"].dump(), facts["levels"].dump(), low[0].dump(), low[1].dump(),
       low[2].dump(), high[0].dump(), high[1].dump(), high[2].dump(), bytes("file"),
       bytes("point_pages"), bytes("node_pages"), bytes("attribute_pages"),
       facts["codec"].get<std::string>());
   if (const auto rounding = facts["text"].find(ptc::kRoundingKey); rounding != facts["text"].end()) {
-    text += fmt::format("  rounded   {}\n", rounding->get<std::string>());
+    text += fmt::format("  rounded   {}\n", quoted(*rounding));
   }
   for (const auto& channel : facts["channels"]) {
     text += fmt::format("  channel   {}: {} x {}\n", channel["name"].get<std::string>(),

@@ -137,6 +137,7 @@ struct Gather::Impl {
                         .bleeding = options.bleeding,
                         .last = left == nullptr};
     CellOutput out{queue, left, payloads};
+    WalkLimit limit(scene.view());
     const Horizon horizon = cell.has_horizon ? Horizon{cell.axis, cell.cone_sin} : Horizon{};
     bool touched = false;
     const auto flush = [&] {
@@ -158,8 +159,10 @@ struct Gather::Impl {
       const ChildRef next = stack.back();
       stack.pop_back();
       if (next.interior) {
+        limit.take_group();
         look_at_group(next, test, out);
       } else {
+        limit.take_points(next.point_count);
         look_at_run(next, test, out, flush);
       }
       if (queue.full()) flush();

@@ -120,12 +120,15 @@ Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) 
   buffer_.clear();
   queue_.size = 0;
   stack_.assign(1, scene_.view().root());
+  WalkLimit limit(scene_.view());
   while (!stack_.empty()) {
     const ChildRef next = stack_.back();
     stack_.pop_back();
     if (next.interior) {
+      limit.take_group();
       visit_group(next, receiver);
     } else {
+      limit.take_points(next.point_count);
       visit_points(next, receiver);
     }
   }

@@ -15,6 +15,7 @@ class SceneView {
 
   [[nodiscard]] const Frame& frame() const noexcept { return frame_; }
   [[nodiscard]] std::uint64_t points() const noexcept { return points_; }
+  [[nodiscard]] std::uint64_t groups() const noexcept { return groups_; }
   [[nodiscard]] std::uint32_t points_per_page() const noexcept { return points_per_page_; }
   /// The root group; not interior when the container is empty.
   [[nodiscard]] const ChildRef& root() const noexcept { return root_; }
@@ -22,11 +23,14 @@ class SceneView {
   [[nodiscard]] std::uint32_t point_page(std::uint64_t point) const {
     return container_->point_pages()[static_cast<std::size_t>(point / points_per_page_)];
   }
+  /// Throws a FormatError that names the file, and the superblock as the place: the tree belies it.
+  [[noreturn]] void fail(const char* clause, const char* text) const;
 
  private:
   const ContainerReader* container_;
   Frame frame_;
   std::uint64_t points_;
+  std::uint64_t groups_;
   std::uint32_t points_per_page_;
   ChildRef root_;
 };
@@ -45,6 +49,21 @@ class SceneReader {
  private:
   const SceneView& view_;
   PageReader pages_;
+};
+
+/// What one walk down the tree may still meet: no group or point twice, so a walk ends whatever the references say.
+class WalkLimit {
+ public:
+  explicit WalkLimit(const SceneView& view) : view_(view), groups_(view.groups()), points_(view.points()) {}
+
+  /// @throws FormatError when more were met than there are
+  void take_group();
+  void take_points(std::uint64_t count);
+
+ private:
+  const SceneView& view_;
+  std::uint64_t groups_;
+  std::uint64_t points_;
 };
 
 }  // namespace ptc

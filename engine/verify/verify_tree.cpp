@@ -156,7 +156,7 @@ class PointRuns {
     if (next_ != s.points) report_.superblock(kCounts, fmt::format("leaves hold {} of {} points", next_, s.points));
     compare("area", s.area, area_);
     for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
-    if (next_ > 0 && (s.bounds_low != low_ || s.bounds_high != high_)) {
+    if (s.bounds_low != low_ || s.bounds_high != high_) {
       report_.superblock(kTotals, fmt::format("bounds are not those of the points, {} {} {} to {} {} {}", low_[0], low_[1],
                                               low_[2], high_[0], high_[1], high_[2]));
     }

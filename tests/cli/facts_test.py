@@ -27,6 +27,12 @@ class Facts(ProgramTest):
             self.assertAlmostEqual(low, -1, places=2)
             self.assertAlmostEqual(high, 1, places=2)
 
+    def test_texts_of_a_file_cannot_command_the_terminal(self):
+        vector = Path(__file__).resolve().parents[2] / "spec/vectors/good/texts.ptcx"
+        told = self.succeed("ptcinfo", vector).stdout
+        self.assertIn("rounded", told)
+        self.assertTrue(all(" " <= c <= "~" for line in told.split("\n") for c in line), told)
+
     def test_every_program_tells_machines(self):
         picture = ["-o", self.here / "o.png", *SMALL_PICTURE]
         common = {"seconds", "peak_resident_bytes"}

@@ -1,4 +1,5 @@
-"""Every clause that the sources cite exists in the spec, and every rule is listed in errors.md.
+"""Every clause that the sources cite exists in the spec; every rule is listed in errors.md and has a
+vector; released versions are frozen; what security.md names exists.
 
 anchors.py SOURCE_DIR: collects "spec/FILE.md#anchor" and "spec/FILE.md" in sources and documents.
 """
@@ -30,12 +31,64 @@ def rules_of(text):
     return set(re.findall(r"^- (?:<a id=\"[^\"]+\"></a>)?\*\*([a-z0-9-]+)\*\*:", text, re.M))
 
 
-def sources(root):
-    for folder in FOLDERS:
+def sources(root, folders=FOLDERS):
+    for folder in folders:
         for directory, _, names in os.walk(os.path.join(root, folder)):
             for name in names:
                 if name.endswith(SOURCES):
                     yield os.path.join(directory, name)
+
+
+def check_vectors(spec, errors):
+    """Faults: rules without a vector in the folder of their kind, and vectors of no such rule."""
+    rules = {"bad": set(), "verify": set()}
+    without = set()
+    for rule, document, when, rest in re.findall(
+            r"^\| \[([a-z0-9-]+)\]\(([a-z]+)\.md#[^)]*\) \| ([OPV ]+) \|(.*)$", errors, re.M):
+        for kind, letters in (("bad", "OP"), ("verify", "V")):
+            if set(letters) & set(when):
+                rules[kind].add(f"{document}-{rule}")
+        if "no vector: " in rest:
+            without.add(f"{document}-{rule}")
+    for kind, named in rules.items():
+        shown = {name.split(".")[0] for name in os.listdir(os.path.join(spec, "vectors", kind))}
+        for rule in sorted((named - without) ^ shown):
+            yield f"spec/errors.md and vectors/{kind} do not agree on {rule}"
+    if len(rules["bad"] | rules["verify"]) < 60:
+        yield "spec/errors.md: hardly any rules found: the search is broken"
+
+
+def check_versions(spec, text):
+    """Faults: versions that were released and of which there are no frozen vectors, or the reverse."""
+    history = text.split("## How the format may change")[0]
+    released = {version for version, body in re.findall(r"^## ([0-9.]+)\n(.*?)(?=^## |\Z)", history, re.M | re.S)
+                if "Not released yet" not in body}
+    frozen = os.path.join(spec, "vectors", "frozen")
+    found = set(os.listdir(frozen)) if os.path.exists(frozen) else set()
+    for version in sorted(released ^ found):
+        yield f"spec/versions.md and vectors/frozen do not agree on {version}"
+
+
+def check_security(root, text):
+    """Faults: classes that are missing or that nothing covers; vectors, tests and files that are not there."""
+    tests = ""
+    for path in sources(os.path.join(root, "tests"), ("",)):
+        with open(path, encoding="utf-8") as file:
+            tests += file.read()
+    for k in range(1, 25):
+        row = re.search(rf"^\| A{k} \|.*\|(.*)\|$", text, re.M)
+        vectors = re.findall(r"\b((?:good|bad|verify)/[a-z][a-z0-9.-]*[a-z0-9])", row[1] if row else "")
+        named = re.findall(r'"([a-z ]+: [^"]+)"', row[1] if row else "")
+        files = re.findall(r"`([a-z_/]+\.(?:py|cpp))`", row[1] if row else "")
+        if not vectors + named + files:
+            yield f"spec/security.md: nothing covers A{k}"
+        files += [f"spec/vectors/{vector}.ptcx" for vector in vectors]
+        for path in files:
+            if not os.path.exists(os.path.join(root, path)):
+                yield f"spec/security.md: A{k}: there is no {path}"
+        for name in named:
+            if f'"{name}"' not in tests:
+                yield f"spec/security.md: A{k}: there is no test {name}"
 
 
 def main(root):
@@ -74,6 +127,9 @@ def main(root):
                 check("spec/" + name, name, rule)
                 if f"[{rule}]({name}#{rule})" not in documents["errors.md"]:
                     faults.append(f"spec/errors.md does not list {rule} of {name}")
+    faults.extend(check_vectors(spec, documents["errors.md"]))
+    faults.extend(check_versions(spec, documents["versions.md"]))
+    faults.extend(check_security(root, documents["security.md"]))
     if cited < 100:
         faults.append(f"only {cited} citations found: the search is broken")
     print("\n".join(faults) if faults else f"{cited} citations exist")

@@ -91,6 +91,18 @@ TEST_CASE("meta: counts beyond the payload are refused before anything is alloca
   }
 }
 
+TEST_CASE("meta: as many channels as groups hold come back, one more is of no group", "[format][meta]") {
+  Meta meta;
+  for (unsigned i = 0; i < 255 * 34; ++i) {
+    meta.channels.push_back({std::to_string(i), ChannelType::u8, 1, static_cast<std::uint16_t>(1 + i / 34)});
+  }
+  Bytes payload = encode_meta(meta);
+  CHECK(decode_meta(payload).channels == meta.channels);
+  payload.insert(payload.end(), payload.begin() + 8, payload.begin() + 48);
+  put(payload, 0, std::uint32_t{255 * 34 + 1});
+  CHECK(clause(payload) == "spec/points.md#meta-channel");
+}
+
 TEST_CASE("meta: channels that break a rule are refused on both sides", "[format][meta]") {
   const auto with = [](auto&& change) {
     Meta meta = example();

@@ -1,7 +1,7 @@
 """The second reader against the vectors and against damage.
 
-vectors_test.py SOURCE_DIR TEMP_DIR: good files are valid, every other one is refused by the rule in
-its name, the vectors are what spec/vectors.py writes, and no flipped bit of two small files goes
+vectors_test.py SOURCE_DIR TEMP_DIR: good files are valid and hold what good.txt says, every other one
+is refused by the rule in its name, the vectors are what spec/vectors.py writes, and no flipped bit of two small files goes
 unseen.
 """
 
@@ -34,6 +34,30 @@ def verdict(path):
 
 def files(folder):
     return sorted(n for n in os.listdir(folder) if n.endswith(".ptcx"))
+
+
+def found_in(folder, name):
+    """The line of good.txt, from what the reader finds."""
+    path = os.path.join(folder, name)
+    facts = verifier.verify(path)
+    container = reader.open_container(path)
+    pages = container.load(range(facts["pages"]))
+    container.close()
+    payloads = reader.xxh3_64(b"".join(bytes(pages[i]) for i in range(facts["pages"])))
+    return (f"{name[:-5]} {facts['points']} {facts['nodes']} {facts['groups']} {facts['levels']} "
+            f"{facts['pages']} {facts['content']} {payloads:016x}\n")
+
+
+def check_content():
+    """Of today's vectors, and of those of each version that was released."""
+    root = os.path.join(SPEC, "vectors")
+    frozen = os.path.join(root, "frozen")
+    for folder in [root, *(e.path for e in os.scandir(frozen))] if os.path.exists(frozen) else [root]:
+        with open(os.path.join(folder, "good.txt"), encoding="utf-8") as file:
+            expected = set(file)
+        good = os.path.join(folder, "good")
+        found = {found_in(good, name) for name in files(good)}
+        faults.extend(f"{folder}/good.txt: {line}" for line in expected ^ found)
 
 
 def check_verdicts():
@@ -102,6 +126,7 @@ def check_without_zstd():
 
 os.makedirs(TEMP, exist_ok=True)
 checked = check_verdicts()
+check_content()
 check_written_again()
 check_without_zstd()
 bits = check_flipped_bits("one-point.ptcx") + check_flipped_bits("zstd-frame-by-hand.ptcx")

@@ -64,3 +64,22 @@ TEST_CASE("plain gather: nothing is seen in an empty scene", "[shade][gather]") 
   scene.receivers.push_back({{0, 0, 0}, {0, 0, 1}});
   CHECK(shade_alone(scene, {}).plain[0].occlusion == 0);
 }
+
+TEST_CASE("gather: groups that are children of two nodes are an error, not a walk without end", "[shade][gather]") {
+  for (const char* name : {"itself", "cycle", "fan"}) {
+    INFO(name);
+    const ContainerReader container(PTC_SOURCE_DIR "/spec/vectors/verify/nodes-references." + std::string(name) + ".ptcx");
+    const SceneView view(container);
+    PageCache cache(container, {.memory_bytes = 64U << 20, .threads = 2});
+    const GatherOptions options{.solid_angle = 1e-12F};
+    const DirectionGrid grid(options.resolution, [](const glm::vec3&) { return glm::vec3(1); });
+    const std::vector<Receiver> receivers{{{0, 0, -9}, {0, 0, 1}}, {{9, 0, -9}, {0, 0, 1}}};
+    std::vector<Shading> results(receivers.size());
+    Gather gather(view, cache, options);
+    PlainGather plain(view, cache, options);
+    const auto refusal = Catch::Matches(container.path().string() + ".*spec/nodes.md#references.*");
+    CHECK_THROWS_WITH(gather.shade(receivers, results, grid), refusal);
+    CHECK_THROWS_WITH(gather.shade(std::span(receivers).first(1), std::span(results).first(1), grid), refusal);
+    CHECK_THROWS_WITH(plain.shade(receivers[0], grid), refusal);
+  }
+}

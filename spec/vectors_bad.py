@@ -1,116 +1,20 @@
-"""Which vectors there are: every rule of the format and the smallest file that breaks it.
+"""Files that readers refuse: for each rule the smallest that breaks it and no other.
 
-all_vectors() yields (folder, name, Draft or bytes). A name is document-anchor, with .variant where
-one rule is broken in several ways.
+A name is document-anchor of the rule, with .variant where it is broken in several ways. All
+checksums are right but those that the rule is about.
 """
 
 import struct
 
 import reader as r
-from vectors import (UUID, Draft, Page, Surfel, encode_meta, encode_points, literal_block,
-                     pack_columns, scatter)
+from vectors import UUID, Draft, Page, encode_meta, frame_of, literal_block, pack_columns
+from vectors_good import CHANNELS, changed, one_point, packed, rle_block, zero_point
+from vectors_tree import Surfel, scatter
 
 NAN = float("nan")
-CHANNELS = (("irradiance", 3, 3, 1), ("occlusion", 1, 1, 1), ("part", 4, 1, 9))
 
 
-def one_point():
-    return Draft([Surfel((1 << 41, 3, (1 << 42) - 1), (0, 1, 0), 0.25, (1, 0.5, 0.25),
-                         (255, 128, 0))])
-
-
-def zero_point():
-    """A point whose columns are all zero, but that octahedral zero is +z."""
-    return Draft([Surfel((0, 0, 0))])
-
-
-def two_pages():
-    return Draft(scatter(130, 7))
-
-
-def rle_frame(raw_bytes):
-    """A zstd frame of zeros, made by hand: one segment, one block that repeats a byte."""
-    return b"\x28\xb5\x2f\xfd\x20" + bytes([raw_bytes]) + (raw_bytes << 3 | 1 << 1 | 1).to_bytes(
-        3, "little") + b"\0"
-
-
-# good --------------------------------------------------------------------------------------------
-
-def with_rle():
-    draft = zero_point()
-    draft.pages[0].stored, draft.pages[0].codec = rle_frame(34), r.ZSTD
-    return draft
-
-
-def rle_block():
-    """34 zeros as an LZ4 block made by hand: a literal, a match that overlaps itself, 5 literals."""
-    return struct.pack("<I", 34) + b"\x1f\0\1\0\x09\x50" + bytes(5)
-
-
-def with_lz4():
-    draft = zero_point()
-    draft.pages[0].stored, draft.pages[0].codec = rle_block(), r.LZ4
-    return draft
-
-
-def slope(count=100):
-    """Points whose numbers differ little from one to the next: what packs well."""
-    return [Surfel((i << 30, i << 29, (1 << 41) + (i << 28)), radius=0.25, radiance=(i, 2 * i, 0.5),
-                   albedo=(i, 2 * i, 255 - i)) for i in range(count)]
-
-
-def packed(codec):
-    draft = Draft(slope(), channels=CHANNELS)
-    for page in draft.pages:
-        if page.type == r.POINT:
-            draft.pack(page, r.POINT_COLUMNS, codec)
-        if page.type == r.ATTRIBUTE and page.group == 1:
-            draft.pack(page, r.group_columns([r.Channel(*c) for c in CHANNELS], 1), r.LZ4)
-    return draft
-
-
-def with_zstd():
-    draft = two_pages()
-    for page in draft.pages:
-        draft.compress(page)
-    return draft
-
-
-def with_unknown_bits():
-    draft = one_point()
-    draft.head.update(minor=7, ro_compat=1 << 63, compat=1)
-    return draft
-
-
-def good(has_zstd):
-    top = (1 << 42) - 1
-    corners = [Surfel((x, y, z), radius=1) for x in (0, top) for y in (0, top) for z in (0, top)]
-    coincident = [Surfel((5, 6, 7), radius=0.5, radiance=(1, 1, 1))]
-    yield "empty", Draft()
-    yield "one-point", one_point()
-    yield "three-coincident-points", Draft(coincident * 3, leaf_points=1)
-    yield "coincident-points-on-three-levels", Draft(coincident * 70, leaf_points=1)
-    yield "corners-of-the-lattice", Draft(corners, leaf_points=1)
-    yield "two-pages", two_pages()
-    yield "far-origin", Draft(scatter(20, 3), origin=(1e7, -1e7, 0.0))
-    yield "page-shift-20", Draft(scatter(20, 4), page_shift=20)
-    yield "attributes", Draft(scatter(130, 5), channels=CHANNELS,
-                              text=(("scene", "caf\u00e9"), ("unit", "m")))
-    yield "unknown-compatible-features", with_unknown_bits()
-    yield "zstd-frame-by-hand", with_rle()
-    yield "lz4-block-by-hand", with_lz4()
-    yield "packed-columns-zstd", packed(r.ZSTD)
-    yield "packed-columns-lz4", packed(r.LZ4)
-    if has_zstd:
-        yield "zstd", with_zstd()
-
-
-# bad: container.md -------------------------------------------------------------------------------
-
-def changed(draft, change):
-    change(draft)
-    return draft
-
+# container.md ------------------------------------------------------------------------------------
 
 def bad_header():
     def head(**fields):
@@ -127,6 +31,7 @@ def bad_header():
     yield "container-header-constants.byte-order", head(byte_order=0x04030201)
     yield "container-header-page-shift", Draft(page_shift=11)
     yield "container-header-page-shift.above", Draft(page_shift=21)
+    yield "container-header-page-shift.greatest", head(page_shift=255)
     yield "container-header-zero", head(reserved=b"\1" + bytes(55))
     yield "container-header-zero.rest", patch(4095, b"\1")
 
@@ -148,7 +53,10 @@ def bad_page():
         one_point(), lambda d: d.patches.append((d.offset(0) + 32, b"X")))
     yield "container-page-checksum.other-file", other
     yield "container-page-type", page(both={"type": 6})
+    yield "container-page-type.zero", page(both={"type": 0})
     yield "container-page-codec", page(codec=3)
+    yield "container-page-codec.directory", changed(
+        one_point(), lambda d: d.directory.update(codec=1, stored_bytes=95))
     yield "container-page-filter", changed(packed(r.LZ4), lambda d: d.pages[0].header.update(filter=2))
     yield "container-page-filter.raw", page(filter=1)
     nodes = packed(r.LZ4)
@@ -156,11 +64,19 @@ def bad_page():
     yield "container-page-filter.nodes", nodes
     yield "container-page-length", page(both={"raw_bytes": 33})
     yield "container-page-length.above", page(both={"raw_bytes": 0xFFFFFFFF})
+    yield "container-page-length.zero", page(both={"raw_bytes": 0, "stored_bytes": 0})
+    yield "container-page-length.raw", page(codec=2)
     yield "container-page-fields", page(both={"group": 1})
     yield "container-page-fields.count", page(both={"record_count": 2})
+    yield "container-page-fields.no-records", page(both={"record_count": 0})
+    yield "container-page-fields.wraps", page(both={"record_count": (1 << 31) + 1})
+    yield "container-page-fields.reserved", page(reserved=1)
     yield "container-page-fields.level", fields
     yield "container-page-keys", page(first_key=1 << 62, last_key=1)
+    yield "container-page-keys.bit-63", page(last_key=1 << 63)
     yield "container-page-agreement", page(page_id=1)
+    yield "container-page-agreement.length", changed(
+        one_point(), lambda d: d.pages[1].entry.update(raw_bytes=104, stored_bytes=104))
     yield "container-page-agreement.group-count", page(1, record_count=2)
     yield "container-page-payload", changed(
         one_point(), lambda d: d.patches.append((d.offset(0) + 64 + 30, b"X")))
@@ -171,8 +87,13 @@ def bad_codec():
         draft = zero_point()
         draft.pages[0].stored, draft.pages[0].codec = frame, r.ZSTD
         return draft
-    frame = rle_frame(34)
-    yield "container-codec-frame", stored(rle_frame(33))
+    frame = frame_of(bytes(34))
+    yield "container-codec-frame", stored(frame_of(bytes(33)))
+    yield "container-codec-frame.longer", stored(frame_of(bytes(35)))
+    yield "container-codec-frame.greatest", stored(b"\x28\xb5\x2f\xfd\xe0" + b"\xff" * 8 + frame[6:])
+    yield "container-codec-frame.short-content", stored(frame[:6] + frame_of(bytes(33))[6:])
+    yield "container-codec-frame.long-content", stored(frame[:6] + frame_of(bytes(35))[6:])
+    yield "container-codec-frame.checksum", stored(frame_of(bytes(34), 1, b"\1\2\3\4"))
     yield "container-codec-frame.trailing", stored(frame + b"\0")
     yield "container-codec-frame.truncated", stored(frame[:-1])
     yield "container-codec-frame.window", stored(frame[:4] + b"\0\x58" + frame[6:])
@@ -186,6 +107,11 @@ def bad_codec():
     good_block = rle_block()
     clause = "container-codec-block"
     yield clause, block(struct.pack("<I", 33) + good_block[4:])
+    yield clause + ".longer", block(struct.pack("<I", 35) + good_block[4:])
+    yield clause + ".greatest", block(b"\xff" * 4 + good_block[4:])
+    yield clause + ".short-content", block(good_block[:8] + b"\x08" + good_block[9:])
+    yield clause + ".literals", block(good_block[:4] + b"\xf0\xff" + good_block[6:])
+    yield clause + ".last-literals", block(good_block[:8] + b"\x0a\x40" + bytes(4))
     yield clause + ".short", block(good_block[:4])
     yield clause + ".trailing", block(good_block + b"\0")
     yield clause + ".truncated", block(good_block[:-1])
@@ -211,19 +137,25 @@ def bad_packed():
     yield clause + ".head", change(lambda c: c.__delitem__(slice(-9, None)))
 
 
+def directory_at():
+    return r.round_up(one_point().offset(3), r.BLOCK)
+
+
 def bad_directory():
     def entry(**fields):
         return changed(one_point(), lambda d: d.pages[0].entry.update(fields))
     extent = "container-directory-extent"
-    directory_at = r.round_up(one_point().offset(3), r.BLOCK)
     yield extent, entry(offset=r.BLOCK + 64)
     yield extent + ".header", entry(offset=0)
-    yield extent + ".superblock", entry(offset=directory_at + r.BLOCK)
+    yield extent + ".superblock", entry(offset=directory_at() + r.BLOCK)
     yield extent + ".wraps", entry(offset=(1 << 64) - r.BLOCK)
+    yield extent + ".end-wraps", entry(offset=(1 << 64) - r.SECTOR)
     yield "container-directory-listing", entry(type=r.DIRECTORY, raw_bytes=32, stored_bytes=32)
     yield "container-directory-overlap", entry(offset=one_point().offset(1))
-    yield "container-directory-overlap.directory", entry(offset=directory_at)
+    yield "container-directory-overlap.directory", entry(offset=directory_at())
     yield "container-directory-pages", changed(one_point(), lambda d: d.directory.update(page_id=9))
+    yield "container-directory-pages.fewer", changed(one_point(), lambda d: d.directory.update(
+        record_count=2, raw_bytes=64, stored_bytes=64))
     yield "container-directory-pages.checksum", changed(
         one_point(), lambda d: d.super.update(directory_xxh3=1))
 
@@ -240,6 +172,8 @@ def bad_superblock():
                                                + good_identity[41:])
     yield "container-superblock-length", with_(file_bytes=1 << 20)
     yield "container-superblock-length.appended", one_point().to_bytes() + bytes(4096)
+    yield "container-superblock-length.three-bytes", one_point().to_bytes() + b"\r\n\x1a"
+    yield "container-superblock-length.half", one_point().to_bytes()[:-4096]
     yield "container-superblock-copies", changed(
         one_point(), lambda d: d.super_b.update(area=1.0))
     pages = "container-superblock-pages"
@@ -247,6 +181,11 @@ def bad_superblock():
     yield pages + ".none", with_(page_count=0, directory_pages=0)
     yield pages + ".directory", with_(directory_offset=4096)
     yield pages + ".directory-pages", with_(directory_pages=2)
+    many = {"page_count": r.NO_PAGE - 1, "directory_pages": (r.NO_PAGE - 2) // 126 + 1}
+    yield pages + ".greatest", with_(**many)
+    bytes_ = r.directory_bytes(r.Header(b"", 1, 0, UUID, 12), r.NO_PAGE - 1)
+    yield pages + ".wraps", with_(**many, directory_offset=directory_at() + r.BLOCK - bytes_
+                                  & (1 << 64) - 1)
     root = "container-superblock-root"
     yield root, with_(root_page=r.NO_PAGE)
     yield root + ".point-page", with_(root_page=0)
@@ -256,11 +195,16 @@ def bad_superblock():
     yield counts, with_(points=2)
     yield counts + ".groups", with_(node_groups=2, nodes=2)
     yield counts + ".nodes", with_(nodes=9)
+    yield counts + ".above", with_(points=(1 << 48) + 1)
+    yield counts + ".groups-above", with_(node_groups=1 << 61, nodes=1 << 48)
     yield counts + ".leaf-points", with_(leaf_points=0)
     yield counts + ".points-per-page", with_(points_per_page=0)
     frame = "container-superblock-frame"
     yield frame, with_(edge=3.0)
     yield frame + ".negative", with_(edge=-4.0)
+    yield frame + ".zero", with_(edge=0.0)
+    yield frame + ".nan", with_(edge=NAN)
+    yield frame + ".far-below", with_(origin=(-2.0 ** 33 - 1, 0.0, 0.0))
     yield frame + ".origin", with_(origin=(2.0 ** -21, 0.0, 0.0))
     yield frame + ".far", with_(origin=(0.0, 2.0 ** 34, 0.0))
     totals = "container-superblock-totals"
@@ -269,13 +213,18 @@ def bad_superblock():
     yield totals + ".bounds", with_(bounds_low=(0.0, 1.0, 0.0), bounds_high=(0.0, 0.5, 0.0))
     yield "container-superblock-digest", with_(content_xxh3=(1, 2))
     yield "container-superblock-writer", with_(writer=b"\xff")
+    yield "container-superblock-writer.truncated", with_(writer=b"x" * 62 + b"\xc3")
     yield "container-superblock-writer.unended", with_(writer=b"x" * 64)
     yield "container-superblock-zero", with_(rest=b"\1" + bytes(3695))
     yield "container-superblock-zero.field", with_(reserved=1)
     yield "container-meta-page", with_(meta_page=0)
+    two = one_point()
+    two.pages.insert(0, Page(r.META, encode_meta(), 1))
+    two.renumber([1, 2, 0, 3])
+    yield "container-meta-page.two", changed(two, lambda d: d.super.update(meta_page=2))
 
 
-# bad: points.md ----------------------------------------------------------------------------------
+# points.md ---------------------------------------------------------------------------------------
 
 def bad_points():
     def payload(at, new, draft=None):
@@ -313,10 +262,16 @@ def bad_meta():
     yield size, meta(encode_meta() + b"\0")
     yield size + ".short", meta(bytes(4))
     yield size + ".channels", meta(struct.pack("<II", 0xFFFFFFFF, 0))
+    yield size + ".channels-wrap", meta(struct.pack("<II", 1 << 29, 0))  # 40 * 2^29 is 5 * 2^32
+    yield size + ".text-wraps", meta(struct.pack("<IIII", 0, 1, 2, 0xFFFFFFFF) + b"a")
+    yield size + ".one-channel-more", meta(struct.pack("<II", 2, 0) + encode_meta([("a", 3, 1, 1)])[8:])
     yield size + ".texts", meta(struct.pack("<II", 0, 0xFFFFFFFF))
     yield size + ".text", meta(struct.pack("<IIII", 0, 1, 0xFFFFFFFF, 0xFFFFFFFF))
     yield "points-meta-channel", channel("Upper", 3, 1, 1)
+    yield "points-meta-channel.controls", channel("\x1b[31m", 3, 1, 1)
+    yield "points-meta-channel.unended", channel("a" * 32, 3, 1, 1)
     yield "points-meta-channel.type", channel("a", 5, 1, 1)
+    yield "points-meta-channel.type-zero", channel("a", 0, 1, 1)
     yield "points-meta-channel.components", channel("a", 3, 0, 1)
     yield "points-meta-channel.group", channel("a", 3, 1, 256)
     yield "points-meta-channel.width", channel("a", 4, 9, 1)
@@ -324,12 +279,15 @@ def bad_meta():
     yield "points-meta-channel.order", meta(encode_meta([("a", 3, 1, 2), ("b", 3, 1, 1)]))
     text = "points-meta-text"
     yield text, meta(struct.pack("<IIII", 0, 1, 1, 1) + b"a\xff")
+    for name, value in (("truncated", b"\xf0\x9d\x84"), ("overlong", b"\xc0\x80")):
+        yield f"{text}.{name}", meta(struct.pack("<IIII", 0, 1, 1, len(value)) + b"a" + value)
     yield text + ".key", meta(encode_meta((), [("A", "")]))
     yield text + ".nul", meta(encode_meta((), [("a", "\0")]))
     yield text + ".order", meta(encode_meta((), [("b", ""), ("a", "")]))
-    padded = bytearray(encode_meta([("a", 3, 1, 1)]))
-    padded[8 + 31] = 1
-    yield "points-meta-zero", meta(padded)
+    for name, at in (("points-meta-zero", 31), ("points-meta-zero.field", 39)):
+        padded = bytearray(encode_meta([("a", 3, 1, 1)]))
+        padded[8 + at] = 1
+        yield name, meta(padded)
 
 
 def bad_attributes():
@@ -348,7 +306,7 @@ def bad_attributes():
     yield clause + ".count", count
 
 
-# bad: nodes.md -----------------------------------------------------------------------------------
+# nodes.md ----------------------------------------------------------------------------------------
 
 def bad_nodes():
     """The node page of one point: a slot table of 8 bytes, then a group with one child."""
@@ -378,6 +336,7 @@ def bad_nodes():
     yield "nodes-node-leaf", reference(0)
     yield "nodes-node-leaf.past-the-end", reference(1 | 1 << 48)
     yield "nodes-node-leaf.two", reference(2 << 48)
+    yield "nodes-node-leaf.wraps", reference((1 << 64) - 1)
     yield "nodes-node-number", payload(8 + 32 + 6, b"\x00\xff")
     yield "nodes-node-number.area", payload(8 + 32 + 12, b"\xff\xff")
     yield "nodes-node-number.thickness", payload(8 + 32 + 14, b"\0\xff")
@@ -388,106 +347,7 @@ def bad_nodes():
     yield zero + ".reference", reference(1 | 1 << 48, b"\1")
 
 
-# verify: what only a look at the whole file finds ------------------------------------------------
-
-def tree_of(surfels, change, leaf_points=1):
-    """A file whose groups were changed before they were encoded."""
-    draft = Draft(surfels, leaf_points=leaf_points)
-    change(draft.tree.groups)
-    first = draft.point_pages
-    last = len(draft.pages) - 1
-    draft.pages[first:last] = [draft.node_page(draft.tree.groups)]
-    return draft
-
-
-def four_points():
-    """Two pairs of points: a root with two groups of two leaves each."""
-    far = 1 << 41
-    return [Surfel((x + dx, 0, 0), radius=1) for x in (0, far) for dx in (0, 1 << 30)]
-
-
-def verify_container():
-    yield "container-padding", changed(
-        one_point(), lambda d: d.patches.append((d.offset(0) + 64 + 34, b"\1")))
-    yield "container-padding.directory", changed(
-        one_point(), lambda d: d.patches.append((-8192 - 1, b"\1")))
-    yield "container-page-keys", changed(
-        one_point(), lambda d: d.pages[0].header.update(first_key=0))
-    yield "container-page-keys.groups", changed(
-        one_point(), lambda d: d.pages[1].header.update(last_key=1))
-    yield "container-page-level", changed(
-        one_point(), lambda d: d.pages[1].header.update(level=1))
-    yield "container-superblock-checksum", changed(
-        one_point(), lambda d: d.patches.append((-4096 + 500, b"X")))
-    yield "container-superblock-magic", changed(
-        one_point(), lambda d: d.patches.append((-8192, b"X")))
-    yield "container-superblock-totals", changed(
-        one_point(), lambda d: d.super.update(area=0.126))
-    yield "container-superblock-totals.flux", changed(
-        one_point(), lambda d: d.super.update(flux=(0.125, 0.0625, 0.03126)))
-    yield "container-superblock-totals.bounds", changed(
-        one_point(), lambda d: d.super.update(bounds_low=(0.0, 0.0, 0.0)))
-    yield "container-superblock-counts", changed(
-        one_point(), lambda d: d.super.update(nodes=2))
-    yield "container-superblock-root", changed(
-        one_point(), lambda d: d.super.update(levels=2))
-    nan = Draft(scatter(10, 5), channels=CHANNELS)
-    nan.pages[-3].payload[:2] = b"\x00\x7e"
-    yield "points-attribute-pages", nan
-    swapped = Draft(scatter(113, 9), leaf_points=200)
-    surfels = swapped.surfels[:111] + swapped.surfels[112:] + swapped.surfels[111:112]
-    for page, part in zip(swapped.pages, (surfels[:112], surfels[112:])):
-        page.payload, page.keys = encode_points(part), (part[0].key >> 63, part[-1].key >> 63)
-    yield "points-point-order", swapped
-
-
-def verify_tree():
-    four = four_points()
-
-    def level(groups):
-        groups[0][1] = groups[-1][1] = groups[0][1] + 1
-        groups[-1][0] = 0
-        groups[-1][1] = 20
-    yield "nodes-references", tree_of(four, lambda g: g[2][2].__setitem__(1, (True, 0)))
-    yield "nodes-references.lost", changed(
-        tree_of(four + [Surfel((0, 1 << 30, 0), radius=1)],
-                lambda g: g[2][2].__setitem__(1, (False, (3, 2)))),
-        lambda d: d.super.update(leaf_points=2))
-    yield "nodes-node-level", tree_of(four, level)
-    yield "nodes-node-cell", tree_of(four, lambda g: g[1].__setitem__(0, r.interleave(
-        3 << 40, 0, 0)))
-    yield "nodes-node-cell.point", tree_of(four, lambda g: g[0].__setitem__(1, 20))
-    yield "nodes-node-children", tree_of(four, lambda g: (g[0][2].pop(), g[0][3].pop()))
-    yield "nodes-node-children.octants", tree_of(
-        four, lambda g: g[0].__setitem__(1, g[0][1] - 1))
-    yield "nodes-node-leaf", tree_of(
-        four, lambda g: g[0][2].__setitem__(slice(0, 2), [(False, (1, 1)), (False, (0, 1))]))
-    yield "nodes-node-leaf.small-group", changed(
-        tree_of(four, lambda g: None), lambda d: d.super.update(leaf_points=2))
-    yield "nodes-node-leaf.great-leaf", changed(
-        Draft(scatter(20, 4)), lambda d: d.super.update(leaf_points=1))
-
-
-def verify_summaries():
-    """reader.py does not recompute these."""
-    def column(name, value):
-        return tree_of(four_points(), lambda g: g[2][3][0].__setitem__(name, value))
-    yield "nodes-node-mean", column("mean_x", 9)
-    yield "nodes-node-sphere", column("radius", 0x4000)
-    yield "nodes-node-slab", column("thickness", 0x9300)
-    yield "nodes-node-sums", column("area", 0x3F80)
-    yield "nodes-node-sums.facing", column("facing", [9] * 6)
-    yield "nodes-node-sums.radiance", column("radiance", [0, 0, 0, 0, 0x80808080, 0])
-    yield "nodes-node-cone", column("cone_cos", 0)
-
-
-def all_vectors(has_zstd):
-    for name, draft in good(has_zstd):
-        yield "good", name, draft
-    for source in (bad_header, bad_page, bad_codec, bad_packed, bad_directory, bad_superblock, bad_points,
-                   bad_meta, bad_attributes, bad_nodes):
-        for name, draft in source():
-            yield "bad", name, draft
-    for source in (verify_container, verify_tree, verify_summaries):
-        for name, draft in source():
-            yield "verify", name, draft
+def vectors():
+    for source in (bad_header, bad_page, bad_codec, bad_packed, bad_directory, bad_superblock,
+                   bad_points, bad_meta, bad_attributes, bad_nodes):
+        yield from source()
