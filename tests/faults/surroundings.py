@@ -116,7 +116,7 @@ def disturb(place, arguments, tally):
         if change in (truncate_half, truncate_all) and "mapped" in place.scenario.name:
             continue  # SIGBUS, as the option says
         codes = []
-        for at in arguments.steps(count, place.most(arguments, 5, 1)):
+        for at in arguments.steps(count, place.most(arguments, 7, 1)):
             run = run_changed(place, at, path, change)
             codes.append(run.code)
             wrong = place.complaints(run)
