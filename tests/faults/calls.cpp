@@ -3,7 +3,8 @@
 //
 //   PTC_FAULTS_DIR     the directory
 //   PTC_FAULTS_HOW     what happens: see kHows
-//   PTC_FAULTS_AT      to the how-manieth call that it can happen to, from 1 on
+//   PTC_FAULTS_AT      to the how-manieth call that it can happen to, from 1 on; 0: to none, and
+//                      the report gets a line "call CALL" for each of them
 //   PTC_FAULTS_ON      when set, to all further ones too
 //   PTC_FAULTS_REPORT  file that gets a line "hit CALL PATH" and, at the end, "of N" such calls
 //   PTC_FAULTS_TRACE   file that gets every call that changes files: see record()
@@ -157,7 +158,10 @@ bool counted_in() {
 
 // True when the caller has to meddle with this call itself: to fail or to shorten it.
 bool strikes(const char* call, Kind kind, const char* path) {
-  if (path[0] == '\0' || !can_happen(kind) || !counted_in()) return false;
+  if (path[0] == '\0' || !can_happen(kind)) return false;
+  const bool hit = counted_in();
+  if (at == 0) report("call %s\n", call);
+  if (!hit) return false;
   report("hit %s %s\n", call, path);
   if (how == How::stop) ::raise(SIGSTOP);
   if (how == How::kill) ::raise(SIGKILL);

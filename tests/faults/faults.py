@@ -4,6 +4,7 @@ faults.py [--all] [--scenario NAME]... PART...; see README.md. Environment: harn
 """
 
 import argparse
+import random
 import sys
 from collections import Counter
 
@@ -24,6 +25,11 @@ def steps(count, most):
     if most == 1:
         return [(1 + count) // 2]
     return sorted({1 + i * (count - 1) // (most - 1) for i in range(most)})
+
+
+def one_of_each(names, draw):
+    """Numbers of calls, from 1 on: for each name one of those that have it."""
+    return sorted(draw.choice([i + 1 for i, n in enumerate(names) if n == name]) for name in sorted(set(names)))
 
 
 def judge_call(place, run, how, on):
@@ -49,10 +55,15 @@ def fail_calls(place, arguments, tally):
     """Every call on files fails in every way that it can; errors also from then on."""
     told, runs = [], 0
     for how in KINDS:
-        count = place.run(how=how).calls
-        told.append(f"{how} {count}")
+        clean = place.run(how=how)
+        told.append(f"{how} {clean.calls}")
+        if arguments.all:
+            chosen = arguments.steps(clean.calls, place.most(arguments, 0, 0))
+        else:
+            chosen = one_of_each(clean.names, random.Random(f"{place.scenario} {how}"))
+            chosen = chosen[-1:] if place.scenario.slow else chosen
         for on in (False, True) if how in ("eio", "enospc") else (False,):
-            for at in arguments.steps(count, place.most(arguments, 4, 1)):
+            for at in chosen:
                 run = place.run(how=how, at=at, on=on, old=OLD if at % 2 else None)
                 runs += 1
                 for wrong in judge_call(place, run, how, on):

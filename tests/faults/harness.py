@@ -76,7 +76,7 @@ SCENARIOS = [
 
 class Run:
     """A finished run: exit code (None: it hung), stderr, call and path that the fault hit, how many
-    such calls there were."""
+    such calls there were, and when it hit none, their names."""
 
     def __init__(self, code, errors, report):
         self.code, self.errors = code, errors
@@ -84,6 +84,7 @@ class Run:
         self.call, self.path = hit.groups() if hit else ("", "")
         of = re.search(r"^of (\d+)$", report, re.M)
         self.calls = int(of[1]) if of else 0
+        self.names = re.findall(r"^call (\S+)$", report, re.M)
 
 
 class Place:
@@ -170,7 +171,7 @@ class Place:
                 wrong.append("the target is neither the old file nor the new one")
             elif run.code == 0 and have != self.new:
                 wrong.append("exit 0 without the new file")
-        if run.code > 0 and not run.errors.startswith(self.scenario.command[0] + ": "):
+        if run.code > 0 and not re.search(f"^{self.scenario.command[0]}: ", run.errors, re.M):
             wrong.append("no message")
         names = r"\.(.+\.tmp-\d+-\d+|ptcx-\d+-\d+\.ptcx)"
         left = [name for name in self.leftovers() if not (may_leave and re.fullmatch(names, name))]
