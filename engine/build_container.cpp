@@ -28,7 +28,11 @@ std::array<double, 3> to_array(const glm::dvec3& p) { return {p.x, p.y, p.z}; }
 
 /// The clouds of a request, checked and measured in a first pass.
 struct Clouds {
-  std::vector<std::filesystem::path> paths;
+  struct Cloud {
+    std::filesystem::path path;
+    std::uint64_t points = 0;
+  };
+  std::vector<Cloud> files;
   Bounds bounds;
   std::vector<glm::dvec3> sample;
   std::uint64_t points = 0;
@@ -40,15 +44,16 @@ struct Clouds {
       throw DataError(path.string() + ": the points have no normals (nx ny nz); estimate them first");
     }
     estimate_radii |= !file.info.has_radius;
-    paths.push_back(path);
+    Cloud& cloud = files.emplace_back(Cloud{path});
     std::vector<Surfel> block(kBlock);
     while (const std::size_t count = file.source->next(block)) {
       for (std::size_t i = 0; i < count; ++i) bounds.add(block[i].position);
       for (std::size_t i = 0; i < count; i += 64) sample.push_back(block[i].position);
       thin(sample);
-      points += count;
+      cloud.points += count;
       progress.advance(count);
     }
+    points += cloud.points;
   }
 
   /// Keeps an even share of the sample while it is larger than the sort needs.
@@ -97,18 +102,21 @@ std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
   return sample;
 }
 
-/// Moves everything a source gives into the sort.
-void feed(PointSource& source, const Frame& frame, ExternalSorter& sorter, const Executor& executor,
+/// Moves everything a source gives into the sort. @return how many points
+std::uint64_t feed(PointSource& source, const Frame& frame, ExternalSorter& sorter, const Executor& executor,
           Progress& progress) {
   std::vector<Surfel> surfels(kBlock);
   std::vector<PointRecord> records(kBlock);
+  std::uint64_t points = 0;
   while (const std::size_t count = source.next(surfels)) {
     executor.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) records[i] = to_record(surfels[i], frame);
     });
     sorter.add(std::span(records).first(count));
+    points += count;
     progress.advance(count);
   }
+  return points;
 }
 
 /// Coloured clouds without radiance glow as they were photographed.
@@ -245,7 +253,10 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
     const std::uint64_t wanted = request.city_points > 0 ? request.city_points : inputs.clouds.points;
     const Stage stage(report.seconds, progress, inputs.lit ? "sample and light" : "partition", wanted, "points");
     if (request.city_points > 0) feed(*make_city(request.city_points), frame, sorter, executor, progress);
-    for (const auto& path : inputs.clouds.paths) feed(*open_lit(path), frame, sorter, executor, progress);
+    for (const auto& [path, points] : inputs.clouds.files) {
+      if (feed(*open_lit(path), frame, sorter, executor, progress) == points) continue;
+      throw DataError(path.string() + ": the file changed while it was read");
+    }
     if (const LitMesh* lit = inputs.lit.get()) {
       spacing = request.sampling.spacing > 0 ? request.sampling.spacing
                                              : spacing_for(lit->mesh, request.sampling.count);

@@ -6,11 +6,14 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <new>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/file.h"
 
 namespace ptc {
 namespace {
@@ -21,12 +24,18 @@ constexpr std::uint64_t kLeastCache = 16 << 20;
 
 Stage::Stage(StageSeconds& seconds, Progress& progress, std::string name, std::uint64_t total, const char* unit)
     : seconds_(seconds), progress_(progress), name_(std::move(name)) {
+  seconds_.reserve(seconds_.size() + 1);
   progress_.begin(name_, total, unit);
 }
 
+// May run for want of memory: the row has its room, and a report that cannot be made is left out.
 Stage::~Stage() {
-  progress_.end();
-  seconds_.emplace_back(name_, std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
+  try {
+    progress_.end();
+  } catch (const std::bad_alloc&) {
+  }
+  seconds_.emplace_back(std::move(name_),
+                        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
 }
 
 std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least, const char* what_for) {
@@ -53,14 +62,8 @@ std::unique_ptr<ContainerReader> make_temporary(const std::filesystem::path& dir
                                                 const std::function<void(const std::filesystem::path&)>& write) {
   static std::atomic<unsigned> made = 0;
   const std::filesystem::path path = directory / fmt::format(".ptcx-{}-{}.ptcx", getpid(), ++made);
+  const TemporaryName name(path);  // before: write() may fail when the file is there already
   write(path);
-  struct Unlink {
-    const std::filesystem::path& path;
-    ~Unlink() {
-      std::error_code ignored;
-      std::filesystem::remove(path, ignored);
-    }
-  } const unlink{path};
   return std::make_unique<ContainerReader>(path);
 }
 

@@ -3,6 +3,7 @@
 
 #include <lz4.h>
 #include <zstd.h>
+#include <zstd_errors.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -40,6 +41,7 @@ unsigned long long check_frame(std::span<const std::byte> stored) {
 }
 
 void check(std::size_t result) {
+  if (ZSTD_getErrorCode(result) == ZSTD_error_memory_allocation) throw std::bad_alloc();
   if (ZSTD_isError(result)) throw std::invalid_argument(ZSTD_getErrorName(result));
 }
 
@@ -69,7 +71,8 @@ bool PageEncoder::compress(std::span<const std::byte> from, std::size_t limit, s
   if (codec_ == Codec::zstd) {
     const std::size_t size =
         ZSTD_compress2(static_cast<ZSTD_CCtx*>(context_), out.data(), out.size(), from.data(), from.size());
-    if (ZSTD_isError(size)) return false;
+    if (ZSTD_getErrorCode(size) == ZSTD_error_dstSize_tooSmall) return false;
+    check(size);
     out.resize(size);
     return true;
   }

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <new>
@@ -62,6 +64,16 @@ std::function<std::string(const std::string&)> ends_in(const std::vector<std::st
     return text;
   };
 }
+
+/// The end of the program when an allocation fails, in whatever thread: destructors of libraries
+/// allocate, so that unwinding may end in std::terminate. What began before main() is armed too.
+[[noreturn]] void end_without_memory() {
+  remove_temporaries();
+  std::fprintf(stderr, "%s: out of memory\n", program_invocation_short_name);
+  std::_Exit(kSystem);
+}
+
+[[maybe_unused]] const std::new_handler before_main = std::set_new_handler(end_without_memory);
 
 }  // namespace
 

@@ -1,13 +1,12 @@
 // Buffering, lines and gunzip.
 #include "engine/io/byte_stream.h"
 
-#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
-#include <cerrno>
+#include <array>
 #include <cstring>
-#include <system_error>
+#include <new>
 
 #include "engine/base/error.h"
 
@@ -19,30 +18,66 @@ constexpr std::uint64_t kMostDeflateRatio = 1032;  // 258 bytes from 2 bits
 
 }  // namespace
 
+// Packed bytes come through InputFile, as all others do; zlib reads no file itself.
 struct ByteStream::Gunzip {
-  explicit Gunzip(const InputFile& input) {
-    const int copy = ::dup(input.descriptor());
-    if (copy >= 0) file = gzdopen(copy, "rb");
-    if (file != nullptr) {
-      gzbuffer(file, kBufferBytes);
-      return;
-    }
-    const int error = copy < 0 ? errno : ENOMEM;
-    if (copy >= 0) ::close(copy);
-    throw std::system_error(error, std::generic_category(), "gzdopen " + input.path().string());
+  explicit Gunzip(const InputFile& from) : file(from), input(kBufferBytes) {
+    constexpr int kGzipOnly = 15 + 16;
+    if (inflateInit2(&stream, kGzipOnly) != Z_OK) throw std::bad_alloc();
   }
-  ~Gunzip() { gzclose_r(file); }
+  ~Gunzip() { inflateEnd(&stream); }
   Gunzip(const Gunzip&) = delete;
   Gunzip& operator=(const Gunzip&) = delete;
 
-  gzFile file = nullptr;
+  /// False at the end of the file.
+  bool refill() {
+    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(input.size(), file.size() - at));
+    file.read_at(at, std::span(input).first(count));
+    at += count;
+    stream.next_in = reinterpret_cast<Bytef*>(input.data());
+    stream.avail_in = static_cast<uInt>(count);
+    return count > 0;
+  }
+
+  /// Behind a member comes another one, or what is not meant for us: padding (RFC 1952 says nothing).
+  [[nodiscard]] bool between() const { return members > 0 && stream.total_in <= 2; }
+
+  /// @return bytes unpacked, fewer than there is room for at the end only; or a negative error of zlib
+  int read(std::span<std::byte> out) {
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = static_cast<uInt>(out.size());
+    while (stream.avail_out > 0) {
+      if (stream.avail_in == 0 && !refill()) {
+        if (!between()) return Z_BUF_ERROR;
+        break;
+      }
+      const int result = inflate(&stream, Z_NO_FLUSH);
+      if (result == Z_STREAM_END) {
+        ++members;
+        inflateReset(&stream);
+      } else if (result == Z_DATA_ERROR && between()) {
+        stream.avail_in = 0;
+        at = file.size();
+      } else if (result != Z_OK) {
+        return result;
+      }
+    }
+    return static_cast<int>(out.size() - stream.avail_out);
+  }
+
+  const InputFile& file;
+  std::vector<std::byte> input;
+  std::uint64_t at = 0;  // of the next packed byte to be read
+  z_stream stream{};
+  std::uint64_t members = 0;  // unpacked so far
 };
 
 ByteStream::ByteStream(const std::filesystem::path& path) : file_(path), buffer_(kBufferBytes) {
   if (path.extension() != ".gz") return;
+  constexpr std::array kMagic = {std::byte{0x1f}, std::byte{0x8b}};
+  std::array<std::byte, 2> begin{};
+  if (file_.size() >= begin.size()) file_.read_at(0, begin);
+  if (begin != kMagic) throw DataError(path.string() + ": not a gzip file");
   gunzip_ = std::make_unique<Gunzip>(file_);
-  // zlib copies what is not packed; a name that says .gz must be.
-  if (gzdirect(gunzip_->file) != 0) throw DataError(path.string() + ": not a gzip file");
 }
 
 ByteStream::~ByteStream() = default;
@@ -57,14 +92,13 @@ std::uint64_t ByteStream::most_left() const noexcept {
 
 std::size_t ByteStream::read_some(std::span<std::byte> out) {
   if (gunzip_) {
-    const int count = gzread(gunzip_->file, out.data(), static_cast<unsigned>(out.size()));
-    int error = Z_OK;
-    const char* text = gzerror(gunzip_->file, &error);
-    if (error == Z_ERRNO) {
-      throw std::system_error(errno, std::generic_category(), "gzread " + path().string());
+    const int count = gunzip_->read(out);
+    if (count == Z_MEM_ERROR) throw std::bad_alloc();
+    if (count < 0) {
+      const char* const text = gunzip_->stream.msg;
+      fail_at(base_ + end_, std::string("damaged gzip data: ") +
+                                (count == Z_BUF_ERROR ? "it ends too early" : text ? text : zError(count)));
     }
-    if (count < 0 || error != Z_OK)
-      fail_at(base_ + end_, std::string("damaged gzip data: ") + text);
     return static_cast<std::size_t>(count);
   }
   const std::uint64_t at = base_ + end_;

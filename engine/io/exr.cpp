@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <exception>
+#include <new>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -213,6 +214,9 @@ void write_exr(const std::filesystem::path& target, unsigned width, unsigned hei
     picture.writePixels(static_cast<int>(height));
   }
   stream.rethrow_failure();
+  // Lines that found no memory to be packed in are left out by the library without a word.
+  const Imf::MultiPartInputFile written(file.temporary().c_str(), 0, false);
+  if (!written.partComplete(0)) throw std::bad_alloc();
   file.publish();
 }
 

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <limits>
 #include <list>
+#include <new>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -25,12 +26,17 @@ constexpr auto kOffsetLimit = static_cast<std::uint64_t>(std::numeric_limits<off
   throw std::system_error(error, std::generic_category(), std::string(call) + " " + path.string());
 }
 
-int open_retrying(const std::filesystem::path& path, int flags, mode_t mode = 0) {
-  int fd = -1;
+template <class Call>
+int retrying(Call&& call) {
+  int result = -1;
   do {
-    fd = ::open(path.c_str(), flags | O_CLOEXEC, mode);
-  } while (fd < 0 && errno == EINTR);
-  return fd;
+    result = call();
+  } while (result < 0 && errno == EINTR);
+  return result;
+}
+
+int open_retrying(const std::filesystem::path& path, int flags, mode_t mode = 0) {
+  return retrying([&] { return ::open(path.c_str(), flags | O_CLOEXEC, mode); });
 }
 
 void read_whole(int fd, const std::filesystem::path& path, std::uint64_t offset,
@@ -70,18 +76,30 @@ void write_whole(int fd, const std::filesystem::path& path, std::uint64_t offset
 constexpr std::array kFatalSignals = {SIGINT, SIGTERM, SIGHUP};
 std::atomic_flag registry_lock = ATOMIC_FLAG_INIT;
 
-std::list<std::string>& live_temporaries() {
-  static auto* const names = new std::list<std::string>;  // outlives static destructors
+struct Temporary {
+  const void* owner;
+  std::string name;
+};
+
+std::list<Temporary>& live_temporaries() {
+  // Outlives static destructors, and needs no memory when there is none left.
+  alignas(std::list<Temporary>) static std::byte room[sizeof(std::list<Temporary>)];
+  static auto* const names = new (room) std::list<Temporary>;
   return *names;
+}
+
+// @return what was blocked before
+sigset_t block_fatal_signals() {
+  sigset_t fatal, before;
+  sigemptyset(&fatal);
+  for (const int signal : kFatalSignals) sigaddset(&fatal, signal);
+  pthread_sigmask(SIG_BLOCK, &fatal, &before);
+  return before;
 }
 
 class RegistryGuard {
  public:
-  RegistryGuard() {
-    sigset_t fatal;
-    sigemptyset(&fatal);
-    for (const int signal : kFatalSignals) sigaddset(&fatal, signal);
-    pthread_sigmask(SIG_BLOCK, &fatal, &before_);
+  RegistryGuard() : before_(block_fatal_signals()) {
     while (registry_lock.test_and_set(std::memory_order_acquire)) {
     }
   }
@@ -93,12 +111,12 @@ class RegistryGuard {
   RegistryGuard& operator=(const RegistryGuard&) = delete;
 
  private:
-  sigset_t before_{};
+  sigset_t before_;
 };
 
 // Creates and registers in one step that no handled signal can divide.
-int create_temporary(const std::filesystem::path& path) {
-  std::list<std::string> entry{std::filesystem::absolute(path).string()};
+int create_temporary(const void* owner, const std::filesystem::path& path) {
+  std::list<Temporary> entry{{owner, std::filesystem::absolute(path).string()}};
   auto& names = live_temporaries();
   const RegistryGuard guard;
   const int fd = open_retrying(path, O_RDWR | O_CREAT | O_EXCL, 0666);
@@ -106,24 +124,20 @@ int create_temporary(const std::filesystem::path& path) {
   return fd;
 }
 
-void forget_temporary(const std::filesystem::path& path) {
-  std::error_code ignored;
-  const std::string name = std::filesystem::absolute(path, ignored).string();
-  std::list<std::string> removed;  // freed after the guard
+// Allocates nothing: it is called while an exception is on its way, perhaps for want of memory.
+void forget_temporary(const void* owner) noexcept {
+  std::list<Temporary> removed;  // freed after the guard
   auto& names = live_temporaries();
   const RegistryGuard guard;
   for (auto it = names.begin(); it != names.end(); ++it) {
-    if (*it != name) continue;
+    if (it->owner != owner) continue;
     removed.splice(removed.end(), names, it);
     return;
   }
 }
 
-// Keeps the lock: no other thread may make a file in the little time that is left.
 void unlink_and_reraise(int signal) {
-  while (registry_lock.test_and_set(std::memory_order_acquire)) {
-  }
-  for (const std::string& name : live_temporaries()) ::unlink(name.c_str());
+  remove_temporaries();
   // SA_RESETHAND: the default action follows when this handler returns.
   static_cast<void>(::raise(signal));
 }
@@ -141,7 +155,7 @@ void sync_directory(const std::filesystem::path& file) {
   const std::filesystem::path directory = parent.empty() ? std::filesystem::path(".") : parent;
   const int fd = open_retrying(directory, O_RDONLY | O_DIRECTORY);
   if (fd < 0) fail(errno, "open", directory);
-  const int error = ::fsync(fd) == 0 ? 0 : errno;
+  const int error = retrying([&] { return ::fsync(fd); }) == 0 ? 0 : errno;
   ::close(fd);
   // Some file systems cannot sync a directory and say EINVAL.
   if (error != 0 && error != EINVAL) fail(error, "fsync", directory);
@@ -180,12 +194,13 @@ void InputFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {
 OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
   struct stat old {};
   const bool exists = ::stat(target.c_str(), &old) == 0;
+  if (!exists && errno != ENOENT) fail(errno, "stat", target);
   if ((exists && S_ISDIR(old.st_mode)) || target.filename().empty()) fail(EISDIR, "open", target);
   if (exists && !S_ISREG(old.st_mode)) fail(EINVAL, "open", target);
   if (exists && std::filesystem::is_symlink(target)) target_ = std::filesystem::canonical(target);
   do {
     temporary_ = temporary_name(target_);
-    fd_ = create_temporary(temporary_);
+    fd_ = create_temporary(this, temporary_);
   } while (fd_ < 0 && errno == EEXIST);  // left behind by an earlier process of the same number
   if (fd_ < 0) fail(errno, "open", temporary_);
   if (exists) static_cast<void>(::fchmod(fd_, old.st_mode & 0777));
@@ -195,7 +210,7 @@ OutputFile::~OutputFile() {
   if (fd_ >= 0) ::close(fd_);
   if (published_) return;
   ::unlink(temporary_.c_str());
-  forget_temporary(temporary_);
+  forget_temporary(this);
 }
 
 void OutputFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
@@ -211,16 +226,37 @@ void OutputFile::append(std::span<const std::byte> bytes) {
 }
 
 void OutputFile::sync() {
-  if (::fdatasync(fd_) != 0) fail(errno, "fdatasync", temporary_);
+  if (retrying([&] { return ::fdatasync(fd_); }) != 0) fail(errno, "fdatasync", temporary_);
 }
 
 void OutputFile::publish() {
-  if (::fsync(fd_) != 0) fail(errno, "fsync", temporary_);
-  if (::close(std::exchange(fd_, -1)) != 0) fail(errno, "close", temporary_);
+  if (retrying([&] { return ::fsync(fd_); }) != 0) fail(errno, "fsync", temporary_);
+  // After EINTR the file is closed all the same, and what it holds is on the disk.
+  if (::close(std::exchange(fd_, -1)) != 0 && errno != EINTR) fail(errno, "close", temporary_);
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(errno, "rename", target_);
   published_ = true;
-  forget_temporary(temporary_);
+  forget_temporary(this);
   sync_directory(target_);
+}
+
+TemporaryName::TemporaryName(const std::filesystem::path& path) : path_(path) {
+  std::list<Temporary> entry{{this, std::filesystem::absolute(path).string()}};
+  auto& names = live_temporaries();
+  const RegistryGuard guard;
+  names.splice(names.end(), entry);
+}
+
+TemporaryName::~TemporaryName() {
+  ::unlink(path_.c_str());
+  forget_temporary(this);
+}
+
+// Keeps the lock: no other thread may make a file in the little time that is left.
+void remove_temporaries() noexcept {
+  block_fatal_signals();
+  while (registry_lock.test_and_set(std::memory_order_acquire)) {
+  }
+  for (const Temporary& temporary : live_temporaries()) ::unlink(temporary.name.c_str());
 }
 
 void remove_temporaries_on_signal() {

@@ -70,8 +70,24 @@ class OutputFile {
   bool published_ = false;
 };
 
-/// From now on SIGINT, SIGTERM and SIGHUP remove the temporary names of all OutputFiles before they
-/// end the process as they would have; a signal that was ignored stays ignored. For programs, once.
+/// A name of a file that goes when this ends, or when what ends the process removes temporaries.
+class TemporaryName {
+ public:
+  explicit TemporaryName(const std::filesystem::path& path);
+  ~TemporaryName();
+  TemporaryName(const TemporaryName&) = delete;
+  TemporaryName& operator=(const TemporaryName&) = delete;
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Removes all TemporaryNames and temporary names of OutputFiles, for a process that ends at once: who
+/// makes or drops one from now on waits for ever. Allocates nothing.
+void remove_temporaries() noexcept;
+
+/// From now on SIGINT, SIGTERM and SIGHUP call remove_temporaries() before they end the process as they
+/// would have; a signal that was ignored stays ignored. For programs, once.
 void remove_temporaries_on_signal();
 
 /// A nameless file in `directory` that vanishes when it is closed (O_TMPFILE, or unlinked at once).

@@ -28,7 +28,12 @@ bool is_sane(const glm::vec3& v) {
 
 void check_device(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
-  if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+  if (error == RTC_ERROR_OUT_OF_MEMORY) {
+    // As operator new does: a program's handler goes first, because Embree may call std::terminate
+    // when it has to release a scene without memory.
+    if (const std::new_handler handler = std::get_new_handler()) handler();
+    throw std::bad_alloc();
+  }
   if (error != RTC_ERROR_NONE) {
     throw std::runtime_error("Embree: error " + std::to_string(static_cast<int>(error)));
   }

@@ -342,6 +342,18 @@ TEST_CASE("ply: every truncation of an ascii file but of its last word is refuse
   CHECK(fault(scratch, whole.substr(0, whole.size() - 1)).empty());
 }
 
+TEST_CASE("ply: a gzip file of several members, with or without padding, is read whole",
+          "[io][points]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.ply.gz";
+  const std::string cloud = binary_cloud(false);
+  for (const std::size_t cut : {std::size_t{1}, cloud.size() / 2, cloud.size() - 1}) {
+    const std::string members = gzipped(path, cloud.substr(0, cut)) + gzipped(path, cloud.substr(cut));
+    for (const std::string padding : {"", "\1", "padding"})
+      check_cloud(read_all(scratch.file("b.ply.gz", members + padding)));
+  }
+}
+
 TEST_CASE("ply: every truncation and every flipped byte of a gzip file is refused",
           "[io][points]") {
   const Scratch scratch;

@@ -41,6 +41,7 @@ TEST_CASE("signals: each of them removes the temporary files and ends the proces
       const OutputFile second(scratch.path() / "b");
       OutputFile published(scratch.path() / "c");
       published.publish();
+      const TemporaryName name(scratch.file("d", "published, and in use for a while"));
       ::raise(signal);
     });
     REQUIRE(WIFSIGNALED(status));
