@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -14,17 +13,15 @@
 #include "format/error.h"
 #include "fuzz/byte_source.h"
 #include "fuzz/memory_file.h"
+#include "fuzz/require.h"
 #include "fuzz/seal.h"
 #include "tests/store/sample.h"
 
 namespace {
 
 using namespace ptc;
+using fuzz::require;
 using Bytes = std::vector<std::byte>;
-
-void require(bool holds) {
-  if (!holds) std::abort();
-}
 
 Bytes make_sample(Codec codec, std::uint32_t points) {
   test::SampleOptions options;

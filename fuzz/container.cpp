@@ -2,17 +2,18 @@
 // FormatError; the verifier does not accept what the reader refuses.
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <vector>
 
 #include "engine/build/verify.h"
 #include "engine/store/reader.h"
 #include "format/error.h"
 #include "fuzz/memory_file.h"
+#include "fuzz/require.h"
 
 namespace {
 
 using ptc::ContainerReader;
+using ptc::fuzz::require;
 
 template <class Body>
 bool accepts(const Body& body) {
@@ -31,10 +32,10 @@ bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecod
   const bool same = whole == accepts([&] {
     static_cast<void>(reader.read_page(page, mapped, decoder, ContainerReader::Access::mmap));
   });
-  if (!same || (whole && !std::equal(read.begin(), read.begin() + header.raw_bytes, mapped.begin()))) std::abort();
+  require(same && (!whole || std::equal(read.begin(), read.begin() + header.raw_bytes, mapped.begin())));
   const bool found = accepts([&] { static_cast<void>(reader.read_page_header(page)); });
   const bool copied = accepts([&] { static_cast<void>(reader.read_stored_page(page, stored)); });
-  if (whole > copied || copied > found) std::abort();
+  require(whole <= copied && copied <= found);
   return whole;
 }
 
@@ -56,6 +57,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool verified = accepts([&] {
     static_cast<void>(verify_container(file.path(), {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent));
   });
-  if (verified && !read) std::abort();
+  require(read || !verified);
   return 0;
 }

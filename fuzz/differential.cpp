@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -17,8 +18,11 @@
 #include "engine/store/reader.h"
 #include "format/error.h"
 #include "fuzz/memory_file.h"
+#include "fuzz/require.h"
 
 namespace {
+
+using ptc::fuzz::require;
 
 /// fuzz/reader_server.py, as long as this process runs.
 class SecondReader {
@@ -35,30 +39,34 @@ class SecondReader {
     }
     close(to[0]);
     close(from[1]);
-    paths_ = fdopen(to[1], "w");
-    verdicts_ = fdopen(from[0], "r");
+    paths_ = to[1];
+    verdicts_ = from[0];
   }
   ~SecondReader() {
-    std::fclose(paths_);
-    std::fclose(verdicts_);
+    close(paths_);
+    close(verdicts_);
     wait(nullptr);
   }
   SecondReader(const SecondReader&) = delete;
   SecondReader& operator=(const SecondReader&) = delete;
 
-  std::string ask(const std::filesystem::path& path) {
-    std::array<char, 512> line{};
-    std::fprintf(paths_, "%s\n", path.c_str());
-    std::fflush(paths_);
-    if (std::fgets(line.data(), line.size(), verdicts_) == nullptr) std::abort();
-    std::string verdict(line.data());
+  std::string ask(const std::filesystem::path& path) const {
+    const std::string line = path.string() + "\n";
+    require(write(paths_, line.data(), line.size()) == static_cast<ssize_t>(line.size()));
+    std::string verdict;
+    for (char c = 0; c != '\n'; verdict += c) {
+      ssize_t count = 0;
+      while ((count = read(verdicts_, &c, 1)) < 0 && errno == EINTR) {  // libFuzzer's clock
+      }
+      require(count == 1);
+    }
     verdict.pop_back();
     return verdict;
   }
 
  private:
-  std::FILE* paths_ = nullptr;
-  std::FILE* verdicts_ = nullptr;
+  int paths_ = -1;
+  int verdicts_ = -1;
 };
 
 std::string judge(const std::filesystem::path& path) {
@@ -93,7 +101,7 @@ bool agree(std::string_view first, std::string_view second) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static SecondReader second_reader;
+  static const SecondReader second_reader;
   const ptc::fuzz::MemoryFile file({reinterpret_cast<const std::byte*>(data), size}, "a.ptcx");
   const std::string first = judge(file.path());
   const std::string second = second_reader.ask(file.path());

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -17,15 +16,13 @@
 #include "engine/io/mesh.h"
 #include "engine/io/points.h"
 #include "fuzz/memory_file.h"
+#include "fuzz/require.h"
 
 namespace {
 
 using namespace ptc;
+using fuzz::require;
 using Path = std::filesystem::path;
-
-void require(bool holds) {
-  if (!holds) std::abort();
-}
 
 bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <utility>
 #include <vector>
 
@@ -18,18 +17,16 @@
 #include "format/point_page.h"
 #include "fuzz/byte_source.h"
 #include "fuzz/memory_file.h"
+#include "fuzz/require.h"
 
 namespace {
 
 using namespace ptc;
+using fuzz::require;
 using fuzz::ByteSource;
 using Bytes = std::vector<std::byte>;
 
 constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;
-
-void require(bool holds) {
-  if (!holds) std::abort();
-}
 
 Bytes take_bytes(ByteSource& from, std::size_t count) {
   Bytes bytes(count);
@@ -239,6 +236,7 @@ NodeGroup take_group(ByteSource& from) {
     NodeSummary& node = child.node;
     for (std::size_t i = 0; i < 3; ++i) node.mean[i] = static_cast<double>(corner[i]) + from.take();
     for (double* value : {&node.radius, &node.area, &node.thickness}) *value = from.number<double>(0);
+    node.thickness = std::min(node.thickness, node.radius);
     for (double& facing : node.facing) facing = node.area * from.take() / 255;
     for (auto& rgb : node.flux) rgb.fill(from.number<float>(0));
     node.cone_axis = {0, 0, 1};
