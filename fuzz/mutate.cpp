@@ -106,7 +106,7 @@ class Mutation {
     const std::size_t which = below(kEntryFields.size() - 1) + 1;
     const Field field = kEntryFields[which];
     change(page.entry, field);
-    std::memcpy(&file_[page.header + kRepeats[which]], &file_[page.entry + field.at], field.bytes);
+    std::memmove(&file_[page.header + kRepeats[which]], &file_[page.entry + field.at], field.bytes);
   }
 
   void swap(std::size_t a, std::size_t b, std::size_t bytes) {

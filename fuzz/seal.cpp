@@ -87,7 +87,7 @@ void seal(std::span<std::byte> file, unsigned seals) {
   for (const Layout::Page& page : layout.pages) {
     if (seals & kSealPayloads) {
       hash_to(file, page.header + 48, page.header + kPageHeader, page.stored_bytes);
-      std::memcpy(&file[page.entry + 16], &file[page.header + 48], 8);
+      std::memmove(&file[page.entry + 16], &file[page.header + 48], 8);  // forged ones overlap
     }
     if (seals & kSealPageHeaders) seal_page_header(file, page.header);
   }
