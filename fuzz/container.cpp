@@ -1,12 +1,15 @@
-// Any bytes as a container: ContainerReader opens it and reads every page, the same by either access, or throws
-// FormatError; the verifier does not accept what the reader refuses.
+// Any bytes as a container: ContainerReader opens it and reads every page, the same by either access and as promised, or
+// throws FormatError; the verifier does not accept what the reader refuses.
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "engine/build/verify.h"
 #include "engine/store/reader.h"
 #include "format/error.h"
+#include "format/node_page.h"
+#include "format/point_page.h"
 #include "fuzz/memory_file.h"
 #include "fuzz/require.h"
 
@@ -25,6 +28,22 @@ bool accepts(const Body& body) {
   }
 }
 
+/// What read_page() promises of the pages that it gives.
+void check_promises(const ContainerReader& reader, const ptc::PageHeader& page, const std::byte* payload) {
+  for (std::uint32_t slot = 0; page.type == ptc::PageType::node && slot < page.record_count; ++slot) {
+    for (const ptc::NodeChild& child : ptc::NodePage(payload, page.record_count).decode(slot).children) {
+      const ptc::ChildRef& ref = child.ref;
+      require(ref.interior ? reader.entry(ref.page).type == ptc::PageType::node &&
+                                 ref.slot < reader.entry(ref.page).record_count
+                           : ref.point_count > 0 && ref.first_point + ref.point_count <= reader.superblock().points);
+    }
+  }
+  for (std::uint32_t i = 0; page.type == ptc::PageType::point && i < page.record_count; ++i) {
+    const ptc::PointRecord point = ptc::PointPage(payload, page.record_count)[i];
+    require(point.radius >= 0 && std::isfinite(point.radius) && std::ranges::max(point.radiance) < 0x7c00);
+  }
+}
+
 bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecoder& decoder) {
   std::vector<std::byte> read(reader.page_payload_limit()), mapped(read), stored;
   ptc::PageHeader header;
@@ -33,6 +52,7 @@ bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecod
     static_cast<void>(reader.read_page(page, mapped, decoder, ContainerReader::Access::mmap));
   });
   require(same && (!whole || std::equal(read.begin(), read.begin() + header.raw_bytes, mapped.begin())));
+  if (whole) check_promises(reader, header, read.data());
   const bool found = accepts([&] { static_cast<void>(reader.read_page_header(page)); });
   const bool copied = accepts([&] { static_cast<void>(reader.read_stored_page(page, stored)); });
   require(whole <= copied && copied <= found);

@@ -188,10 +188,14 @@ class Mutation {
     const std::size_t slot = below(count);
     if (below(8) == 0 || 2 * slot + 2 > file_.size()) return {2 * slot, 2};
     const std::size_t group = std::size_t{8} * load<std::uint16_t>(file_.data(), 2 * slot);
-    constexpr std::array<Field, 8> kGroup{{{0, 8}, {8, 8}, {16, 1}, {17, 1}, {18, 1}, {19, 1}, {20, 4}, {24, 8}}};
+    constexpr std::array<Field, 7> kGroup{{{0, 8}, {8, 8}, {16, 1}, {17, 1}, {18, 1}, {19, 1}, {20, 4}}};
+    constexpr std::array<Field, 3> kReference{{{0, 4}, {4, 2}, {6, 2}}};  // page, slot, points of a leaf
     const std::size_t what = below(16);
     if (what < 7) return {group + kGroup[what].at, kGroup[what].bytes};
-    if (what < 12) return {group + 24 + 8 * below(8), 8};
+    if (what < 12) {
+      const Field part = any(kReference);
+      return {group + 24 + 8 * below(8) + part.at, part.bytes};
+    }
     return {group + 32 + 2 * below(240), 2};
   }
 
