@@ -237,7 +237,7 @@ NodeGroup take_group(ByteSource& from) {
     for (std::size_t i = 0; i < 3; ++i) node.mean[i] = static_cast<double>(corner[i]) + from.take();
     for (double* value : {&node.radius, &node.area, &node.thickness}) *value = from.number<double>(0);
     node.thickness = std::min(node.thickness, node.radius);
-    for (double& facing : node.facing) facing = node.area * from.take() / 255;
+    for (double& facing : node.facing) facing = node.area * (from.take() / 255.0);
     for (auto& rgb : node.flux) rgb.fill(from.number<float>(0));
     node.cone_axis = {0, 0, 1};
     node.cone_cos = static_cast<float>(from.take()) / 127.5F - 1;
