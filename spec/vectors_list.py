@@ -428,6 +428,8 @@ def verify_container():
         one_point(), lambda d: d.super.update(flux=(0.125, 0.0625, 0.03126)))
     yield "container-superblock-totals.bounds", changed(
         one_point(), lambda d: d.super.update(bounds_low=(0.0, 0.0, 0.0)))
+    yield "container-superblock-totals.empty", changed(
+        Draft(), lambda d: d.super.update(bounds_high=(1.0, 0.0, 0.0)))
     yield "container-superblock-counts", changed(
         one_point(), lambda d: d.super.update(nodes=2))
     yield "container-superblock-root", changed(

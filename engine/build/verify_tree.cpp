@@ -170,7 +170,7 @@ class PointTotals {
     }
     compare("area", s.area, area_);
     for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
-    if (taken_ > 0 && (s.bounds_low != low_ || s.bounds_high != high_)) {
+    if (s.bounds_low != low_ || s.bounds_high != high_) {
       fail_superblock(container_, kTotals,
                       fmt::format("bounds are not those of the points, {} {} {} to {} {} {}",
                                   low_[0], low_[1], low_[2], high_[0], high_[1], high_[2]));
