@@ -1,6 +1,6 @@
-// Any sequence of operations on page caches over a container, whole or damaged, damaged and mended meanwhile, by any page
-// number: a page is what a direct read gives or was, stays so until its reader takes another, and is refused only where a
-// direct read is; counts add up.
+// Any sequence of operations on page caches over a container, whole or damaged, damaged and mended
+// meanwhile, by any page number: a page is what a direct read gives or was, stays so until its
+// reader takes another, and is refused only where a direct read is; counts add up.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -33,8 +33,9 @@ Bytes make_sample(Codec codec, std::uint32_t points) {
 }
 
 const Bytes& sample(std::size_t which) {
-  static const std::array<Bytes, 4> samples{make_sample(Codec::raw, 0), make_sample(Codec::raw, 130),
-                                            make_sample(Codec::zstd, 300), make_sample(Codec::lz4, 700)};
+  static const std::array<Bytes, 4> samples{
+      make_sample(Codec::raw, 0), make_sample(Codec::raw, 130), make_sample(Codec::zstd, 300),
+      make_sample(Codec::lz4, 700)};
   return samples[which % samples.size()];
 }
 
@@ -69,7 +70,8 @@ Payloads read_directly(const ContainerReader& container) {
 
 class Session {
  public:
-  Session(const fuzz::MemoryFile& file, const std::array<Bytes, 2>& forms, const ContainerReader& container)
+  Session(const fuzz::MemoryFile& file, const std::array<Bytes, 2>& forms,
+          const ContainerReader& container)
       : file_(file), forms_(forms), container_(container) {
     for (std::size_t i = 2; i-- > 0;) {  // the first form is in the file when this is over
       file_.write(forms_[i]);
@@ -81,7 +83,8 @@ class Session {
     CacheOptions options;
     options.threads = 1 + from.take() % kReaders;
     options.local_slots = from.take() % 3 == 0 ? 0 : 1U << from.take() % 10;
-    options.access = from.take() % 2 == 0 ? ContainerReader::Access::pread : ContainerReader::Access::mmap;
+    options.access =
+        from.take() % 2 == 0 ? ContainerReader::Access::pread : ContainerReader::Access::mmap;
     const std::uint64_t frames = from.take() % 24;
     options.memory_bytes = PageCache::bytes_for(container_, options.threads, frames) + from.take();
     try {
@@ -112,13 +115,16 @@ class Session {
     }
     if (!seat.reader && !sit(cache, options, seat)) return;
     // Mostly pages that there are, often the same; any number at times.
-    const std::uint32_t page = what % 8 == 2 ? from.take<std::uint32_t>() : from.take() % (container_.page_count() + 1);
+    const std::uint32_t page =
+        what % 8 == 2 ? from.take<std::uint32_t>() : from.take() % (container_.page_count() + 1);
     get(seat, page);
-    for (const Seat& other : seats_) require(other.shows == nullptr || shows(other.view, *other.shows));
+    for (const Seat& other : seats_)
+      require(other.shows == nullptr || shows(other.view, *other.shows));
   }
 
   bool sit(PageCache& cache, const CacheOptions& options, Seat& seat) {
-    const auto sitting = std::ranges::count_if(seats_, [](const Seat& s) { return s.reader != nullptr; });
+    const auto sitting =
+        std::ranges::count_if(seats_, [](const Seat& s) { return s.reader != nullptr; });
     try {
       seat.reader = std::make_unique<PageReader>(cache);
       require(sitting < options.threads);
@@ -135,12 +141,14 @@ class Session {
       seat.view = seat.reader->get(page);
     } catch (const FormatError&) {
       ++lookups_;
-      return require(page < container_.page_count() && (!payloads_[0][page] || !payloads_[1][page]));
+      return require(page < container_.page_count() &&
+                     (!payloads_[0][page] || !payloads_[1][page]));
     } catch (const std::invalid_argument&) {
       return require(page >= container_.page_count());
     }
     ++lookups_;
-    require(page < container_.page_count() && seat.view.record_count == container_.entry(page).record_count);
+    require(page < container_.page_count() &&
+            seat.view.record_count == container_.entry(page).record_count);
     for (const Payloads& form : payloads_) {
       if (form[page] && shows(seat.view, *form[page])) seat.shows = &*form[page];
     }
@@ -155,7 +163,8 @@ class Session {
     require(counts.lookups == lookups_);
     require(counts.lookups == counts.local_hits + counts.shared_hits + counts.misses);
     require(counts.evictions <= counts.misses && counts.peak_frames <= counts.frames);
-    require(counts.frames <= std::max<std::uint64_t>(frames, 1) && counts.peak_frames <= counts.misses);
+    require(counts.frames <= std::max<std::uint64_t>(frames, 1) &&
+            counts.peak_frames <= counts.misses);
     require(counts.hit_rate() >= 0 && counts.hit_rate() <= 1);
   }
 

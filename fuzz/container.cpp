@@ -1,5 +1,6 @@
-// Any bytes as a container: ContainerReader opens it and reads every page, the same by either access and as promised, or
-// throws FormatError; the verifier does not accept what the reader refuses.
+// Any bytes as a container: ContainerReader opens it and reads every page, the same by either
+// access and as promised, or throws FormatError; the verifier does not accept what the reader
+// refuses.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -29,18 +30,23 @@ bool accepts(const Body& body) {
 }
 
 /// What read_page() promises of the pages that it gives.
-void check_promises(const ContainerReader& reader, const ptc::PageHeader& page, const std::byte* payload) {
-  for (std::uint32_t slot = 0; page.type == ptc::PageType::node && slot < page.record_count; ++slot) {
-    for (const ptc::NodeChild& child : ptc::NodePage(payload, page.record_count).decode(slot).children) {
+void check_promises(const ContainerReader& reader, const ptc::PageHeader& page,
+                    const std::byte* payload) {
+  for (std::uint32_t slot = 0; page.type == ptc::PageType::node && slot < page.record_count;
+       ++slot) {
+    for (const ptc::NodeChild& child :
+         ptc::NodePage(payload, page.record_count).decode(slot).children) {
       const ptc::ChildRef& ref = child.ref;
       require(ref.interior ? reader.entry(ref.page).type == ptc::PageType::node &&
                                  ref.slot < reader.entry(ref.page).record_count
-                           : ref.point_count > 0 && ref.first_point + ref.point_count <= reader.superblock().points);
+                           : ref.point_count > 0 &&
+                                 ref.first_point + ref.point_count <= reader.superblock().points);
     }
   }
   for (std::uint32_t i = 0; page.type == ptc::PageType::point && i < page.record_count; ++i) {
     const ptc::PointRecord point = ptc::PointPage(payload, page.record_count)[i];
-    require(point.radius >= 0 && std::isfinite(point.radius) && std::ranges::max(point.radiance) < 0x7c00);
+    require(point.radius >= 0 && std::isfinite(point.radius) &&
+            std::ranges::max(point.radiance) < 0x7c00);
   }
 }
 
@@ -48,10 +54,12 @@ bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecod
   std::vector<std::byte> read(reader.page_payload_limit()), mapped(read), stored;
   ptc::PageHeader header;
   const bool whole = accepts([&] { header = reader.read_page(page, read, decoder); });
-  const bool same = whole == accepts([&] {
-    static_cast<void>(reader.read_page(page, mapped, decoder, ContainerReader::Access::mmap));
-  });
-  require(same && (!whole || std::equal(read.begin(), read.begin() + header.raw_bytes, mapped.begin())));
+  const bool same =
+      whole == accepts([&] {
+        static_cast<void>(reader.read_page(page, mapped, decoder, ContainerReader::Access::mmap));
+      });
+  require(same &&
+          (!whole || std::equal(read.begin(), read.begin() + header.raw_bytes, mapped.begin())));
   if (whole) check_promises(reader, header, read.data());
   const bool found = accepts([&] { static_cast<void>(reader.read_page_header(page)); });
   const bool copied = accepts([&] { static_cast<void>(reader.read_stored_page(page, stored)); });
@@ -62,10 +70,12 @@ bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecod
 bool read_all(const std::filesystem::path& path) {
   bool whole = true;
   return accepts([&] {
-    const ContainerReader reader(path);
-    ptc::PageDecoder decoder;
-    for (std::uint32_t page = 0; page < reader.page_count(); ++page) whole &= read_page(reader, page, decoder);
-  }) && whole;
+           const ContainerReader reader(path);
+           ptc::PageDecoder decoder;
+           for (std::uint32_t page = 0; page < reader.page_count(); ++page)
+             whole &= read_page(reader, page, decoder);
+         }) &&
+         whole;
 }
 
 }  // namespace
@@ -75,7 +85,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool read = read_all(file.path());
   ptc::Progress silent;
   const bool verified = accepts([&] {
-    static_cast<void>(verify_container(file.path(), {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent));
+    static_cast<void>(verify_container(
+        file.path(), {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent));
   });
   require(read || !verified);
   return 0;

@@ -1,8 +1,10 @@
-// Any bytes as a container: the verifier and spec/reader.py accept the same files, with the same content digest, and refuse
-// by the same rule where the spec orders the rules: those of the file header (container.md#file-header).
+// Any bytes as a container: the verifier and spec/reader.py accept the same files, with the same
+// content digest, and refuse by the same rule where the spec orders the rules: those of the file
+// header (container.md#file-header).
 //
-// Where several other rules are broken at once each may name its own. reader.py does not compare summaries: files that the
-// verifier refuses for these alone it accepts (spec/README.md#the-second-reader).
+// Where several other rules are broken at once each may name its own. reader.py does not compare
+// summaries: files that the verifier refuses for these alone it accepts
+// (spec/README.md#the-second-reader).
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -72,10 +74,12 @@ class SecondReader {
 std::string judge(const std::filesystem::path& path) {
   try {
     ptc::Progress silent;
-    static_cast<void>(verify_container(path, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent));
+    static_cast<void>(
+        verify_container(path, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent));
     const auto digest = ptc::ContainerReader(path).superblock().content_xxh3;
     std::array<char, 64> line{};
-    std::snprintf(line.data(), line.size(), "valid %016llx%016llx", static_cast<unsigned long long>(digest[1]),
+    std::snprintf(line.data(), line.size(), "valid %016llx%016llx",
+                  static_cast<unsigned long long>(digest[1]),
                   static_cast<unsigned long long>(digest[0]));
     return line.data();
   } catch (const ptc::FormatError& error) {

@@ -1,7 +1,9 @@
-// Any bytes, the first of which picks a reader, as mesh, cloud or picture, plain or gzipped: the reader gives what its
-// header promises, or throws DataError, or std::system_error where a file beside it is missing.
+// Any bytes, the first of which picks a reader, as mesh, cloud or picture, plain or gzipped: the
+// reader gives what its header promises, or throws DataError, or std::system_error where a file
+// beside it is missing.
 //
-// What follows the first zero byte of an OBJ is the MTL "a.mtl" beside it, of a glTF the buffer "a.bin".
+// What follows the first zero byte of an OBJ is the MTL "a.mtl" beside it, of a glTF the buffer
+// "a.bin".
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -46,7 +48,8 @@ void read_mesh_file(const Path& path) {
   const MeshFile file = read_mesh(path);
   const Mesh& mesh = file.mesh;
   const std::size_t vertices = mesh.positions.size();
-  require(!mesh.triangles.empty() && mesh.material_of.size() == mesh.triangles.size() && !mesh.materials.empty());
+  require(!mesh.triangles.empty() && mesh.material_of.size() == mesh.triangles.size() &&
+          !mesh.materials.empty());
   require(mesh.normals.empty() || mesh.normals.size() == vertices);
   require(mesh.uvs.empty() || mesh.uvs.size() == vertices);
   require(is_finite(mesh.origin) && std::ranges::all_of(mesh.positions, is_finite));
@@ -74,7 +77,8 @@ void read_cloud(const Path& path) {
     points += count;
     for (std::size_t i = 0; i < count; ++i) {
       const Surfel& s = block[i];
-      require(is_finite(s.position) && std::isfinite(s.radius) && s.radius >= 0 && is_finite(s.radiance));
+      require(is_finite(s.position) && std::isfinite(s.radius) && s.radius >= 0 &&
+              is_finite(s.radiance));
       require(file.info.has_normals ? is_unit(s.normal) : s.normal == glm::vec3(0));
       require(is_finite(s.albedo) && std::min({s.albedo.x, s.albedo.y, s.albedo.z}) >= 0);
     }
@@ -110,7 +114,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Reader& reader = kReaders[data[0] % kReaders.size()];
   std::span bytes(reinterpret_cast<const std::byte*>(data) + 1, size - 1);
   std::optional<fuzz::MemoryFile> beside;
-  const auto zero = static_cast<std::size_t>(std::ranges::find(bytes, std::byte{0}) - bytes.begin());
+  const auto zero =
+      static_cast<std::size_t>(std::ranges::find(bytes, std::byte{0}) - bytes.begin());
   if (reader.beside != nullptr && zero < bytes.size()) {
     beside.emplace(bytes.subspan(zero + 1), reader.beside);
     bytes = bytes.first(zero);

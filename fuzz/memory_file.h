@@ -20,7 +20,8 @@ class MemoryFile {
     if (fd_ < 0) std::abort();
     write(bytes);
     std::filesystem::remove(path_);
-    std::filesystem::create_symlink("/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(fd_), path_);
+    std::filesystem::create_symlink(
+        "/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(fd_), path_);
   }
   ~MemoryFile() {
     std::error_code ignored;
@@ -33,13 +34,15 @@ class MemoryFile {
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// Puts other bytes in their place; as many, while a reader has it open.
   void write(std::span<const std::byte> bytes) const {
-    if (pwrite(fd_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
+    if (pwrite(fd_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+      std::abort();
   }
 
   /// Removed when the process ends.
   static const std::filesystem::path& directory() {
     static const struct Directory {
-      std::filesystem::path path = std::filesystem::temp_directory_path() / ("ptc-fuzz-" + std::to_string(getpid()));
+      std::filesystem::path path =
+          std::filesystem::temp_directory_path() / ("ptc-fuzz-" + std::to_string(getpid()));
       Directory() { std::filesystem::create_directories(path); }
       ~Directory() {
         std::error_code ignored;

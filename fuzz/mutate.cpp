@@ -1,6 +1,7 @@
-// libFuzzer's mutator of containers: changes fields of any structure, records of any payload, compressed ones
-// included, and then, seven times in eight, repairs all checksums, so that rules are what is reached. Half the time it
-// starts from a good vector: most files of a corpus are refused, and what comes behind the refusal is not reached.
+// libFuzzer's mutator of containers: changes fields of any structure, records of any payload,
+// compressed ones included, and then, seven times in eight, repairs all checksums, so that rules
+// are what is reached. Half the time it starts from a good vector: most files of a corpus are
+// refused, and what comes behind the refusal is not reached.
 #include <zstd.h>
 
 #include <algorithm>
@@ -27,25 +28,51 @@ struct Field {
   std::size_t bytes;
 };
 
-constexpr std::array<Field, 13> kHeaderFields{
-    {{0, 8}, {8, 2}, {10, 2}, {12, 4}, {16, 8}, {24, 8}, {32, 8}, {40, 8}, {56, 1}, {57, 1}, {58, 2}, {60, 4}, {64, 8}}};
-constexpr std::array<Field, 14> kPageFields{{{0, 4}, {4, 2}, {6, 1}, {7, 1}, {8, 4}, {12, 4}, {16, 4}, {20, 2}, {22, 2},
-                                             {24, 4}, {28, 4}, {32, 8}, {40, 8}, {48, 8}}};
-constexpr std::array<Field, 7> kEntryFields{{{0, 8}, {8, 4}, {12, 4}, {16, 8}, {24, 2}, {26, 2}, {28, 4}}};
+constexpr std::array<Field, 13> kHeaderFields{{{0, 8},
+                                               {8, 2},
+                                               {10, 2},
+                                               {12, 4},
+                                               {16, 8},
+                                               {24, 8},
+                                               {32, 8},
+                                               {40, 8},
+                                               {56, 1},
+                                               {57, 1},
+                                               {58, 2},
+                                               {60, 4},
+                                               {64, 8}}};
+constexpr std::array<Field, 14> kPageFields{{{0, 4},
+                                             {4, 2},
+                                             {6, 1},
+                                             {7, 1},
+                                             {8, 4},
+                                             {12, 4},
+                                             {16, 4},
+                                             {20, 2},
+                                             {22, 2},
+                                             {24, 4},
+                                             {28, 4},
+                                             {32, 8},
+                                             {40, 8},
+                                             {48, 8}}};
+constexpr std::array<Field, 7> kEntryFields{
+    {{0, 8}, {8, 4}, {12, 4}, {16, 8}, {24, 2}, {26, 2}, {28, 4}}};
 /// Where a page header repeats the fields of its entry.
 constexpr std::array<std::size_t, 7> kRepeats{0, 12, 16, 48, 4, 20, 24};
 constexpr std::array<Field, 37> kSuperFields{
-    {{0, 8},   {8, 8},   {56, 1},  {120, 8}, {128, 4}, {132, 4}, {136, 8}, {144, 8}, {152, 4}, {156, 4},
-     {160, 2}, {162, 2}, {164, 4}, {168, 4}, {172, 4}, {176, 8}, {184, 8}, {192, 8}, {200, 8}, {208, 8},
-     {216, 8}, {224, 8}, {232, 8}, {240, 8}, {248, 8}, {256, 8}, {264, 8}, {272, 8}, {280, 8}, {288, 8},
-     {296, 8}, {304, 8}, {312, 8}, {320, 8}, {328, 8}, {384, 8}, {392, 8}}};
+    {{0, 8},   {8, 8},   {56, 1},  {120, 8}, {128, 4}, {132, 4}, {136, 8}, {144, 8},
+     {152, 4}, {156, 4}, {160, 2}, {162, 2}, {164, 4}, {168, 4}, {172, 4}, {176, 8},
+     {184, 8}, {192, 8}, {200, 8}, {208, 8}, {216, 8}, {224, 8}, {232, 8}, {240, 8},
+     {248, 8}, {256, 8}, {264, 8}, {272, 8}, {280, 8}, {288, 8}, {296, 8}, {304, 8},
+     {312, 8}, {320, 8}, {328, 8}, {384, 8}, {392, 8}}};
 
 class Mutation {
  public:
   Mutation(std::vector<std::byte>& file, std::size_t most_bytes, unsigned seed)
       : file_(file), most_bytes_(most_bytes), random_(seed) {
     for (const Field& field : kSuperFields) {
-      std::memcpy(&numbers_.emplace_back(0), &file_[find_layout(file_).superblock + field.at], field.bytes);
+      std::memcpy(&numbers_.emplace_back(0), &file_[find_layout(file_).superblock + field.at],
+                  field.bytes);
     }
   }
 
@@ -132,7 +159,8 @@ class Mutation {
     store(file_.data(), page.header + 12, static_cast<std::uint32_t>(bytes));
     store(file_.data(), page.header + 16, static_cast<std::uint32_t>(bytes));
     store(file_.data(), page.header + 24, static_cast<std::uint32_t>(bytes / 32));
-    const auto pages = load<std::uint32_t>(file_.data(), layout.superblock + 128) + (more ? 1U : ~0U);
+    const auto pages =
+        load<std::uint32_t>(file_.data(), layout.superblock + 128) + (more ? 1U : ~0U);
     store(file_.data(), layout.superblock + 128, pages);
     for (std::size_t i = 0; i < layout.directory.size(); ++i) {
       store(file_.data(), layout.directory[i].header + 8, static_cast<std::uint32_t>(pages + i));
@@ -150,7 +178,8 @@ class Mutation {
     const std::size_t count = load<std::uint32_t>(file_.data(), page.header + 24);
     const bool packed = file_[page.header + 7] != std::byte{0};
     file_.swap(raw);  // change() works on the file
-    for (std::size_t i = below(3); i > 0; --i) change(0, packed ? byte_field() : record_field(type, count));
+    for (std::size_t i = below(3); i > 0; --i)
+      change(0, packed ? byte_field() : record_field(type, count));
     file_.swap(raw);
     if (type == 4 && below(2) == 0) {
       const std::size_t size = raw.size();
@@ -160,7 +189,8 @@ class Mutation {
     if (!raw.empty()) put(page, raw, packed);
   }
 
-  bool decode(unsigned codec, std::span<const std::byte> stored, std::vector<std::byte>& raw) const {
+  bool decode(unsigned codec, std::span<const std::byte> stored,
+              std::vector<std::byte>& raw) const {
     std::uint64_t size = stored.size();
     if (codec == 1) size = ZSTD_getFrameContentSize(stored.data(), stored.size());
     if (codec == 2 && stored.size() > 4) size = load<std::uint32_t>(stored.data(), 0);
@@ -192,8 +222,10 @@ class Mutation {
     const std::size_t slot = below(count);
     if (below(8) == 0 || 2 * slot + 2 > file_.size()) return {2 * slot, 2};
     const std::size_t group = std::size_t{8} * load<std::uint16_t>(file_.data(), 2 * slot);
-    constexpr std::array<Field, 7> kGroup{{{0, 8}, {8, 8}, {16, 1}, {17, 1}, {18, 1}, {19, 1}, {20, 4}}};
-    constexpr std::array<Field, 3> kReference{{{0, 4}, {4, 2}, {6, 2}}};  // page, slot, points of a leaf
+    constexpr std::array<Field, 7> kGroup{
+        {{0, 8}, {8, 8}, {16, 1}, {17, 1}, {18, 1}, {19, 1}, {20, 4}}};
+    constexpr std::array<Field, 3> kReference{
+        {{0, 4}, {4, 2}, {6, 2}}};  // page, slot, points of a leaf
     const std::size_t what = below(16);
     if (what < 7) return {group + kGroup[what].at, kGroup[what].bytes};
     if (what < 12) {
@@ -221,7 +253,8 @@ class Mutation {
     if (!packed) set_both(16, 12, raw.size());
   }
 
-  /// Zeros behind a page; offsets of what they move follow. @return false when the file would be too long
+  /// Zeros behind a page; offsets of what they move follow. @return false when the file would be
+  /// too long
   bool insert_zeros(const Layout::Page& page, std::size_t bytes) {
     const Layout layout = find_layout(file_);
     if (file_.size() + bytes > most_bytes_ || page.entry < page.header) return false;
@@ -234,7 +267,8 @@ class Mutation {
       move(copy + 136);
       store(file_.data(), copy + 120, file_.size() + bytes);
     }
-    const std::size_t end = std::min((page.header + 64 + page.stored_bytes + 511) / 512 * 512, file_.size());
+    const std::size_t end =
+        std::min((page.header + 64 + page.stored_bytes + 511) / 512 * 512, file_.size());
     file_.insert(file_.begin() + static_cast<std::ptrdiff_t>(end), bytes, std::byte{0});
     return true;
   }
@@ -259,8 +293,8 @@ std::vector<std::vector<std::byte>> read_good_vectors() {
 }  // namespace
 }  // namespace ptc::fuzz
 
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
-                                               unsigned seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size,
+                                               std::size_t max_size, unsigned seed) {
   static const auto good = ptc::fuzz::read_good_vectors();
   const auto* const bytes = reinterpret_cast<const std::byte*>(data);
   std::vector<std::byte> file(bytes, bytes + size);

@@ -1,8 +1,10 @@
 // Runs files through a fuzz target, for builds without libFuzzer:
 //
 //   replay_NAME DIR...        every file below the directories
-//   replay_NAME --odd SOURCE  every odd file of the shared data, behind each of 16 first bytes: by every reader.
-//                             The data is where PTC_SHARED says, else beside SOURCE; without it exit code 77
+//   replay_NAME --odd SOURCE  every odd file of the shared data, behind each of 16 first bytes: by
+//   every reader.
+//                             The data is where PTC_SHARED says, else beside SOURCE; without it
+//                             exit code 77
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>

@@ -21,7 +21,8 @@ std::uint64_t seed(const char* text) {
   return value;
 }
 
-void hash_to(std::span<std::byte> file, std::size_t at, std::size_t from, std::size_t bytes, std::uint64_t under = 0) {
+void hash_to(std::span<std::byte> file, std::size_t at, std::size_t from, std::size_t bytes,
+             std::uint64_t under = 0) {
   store(file.data(), at, xxh3_64(file.subspan(from, bytes), under));
 }
 
@@ -60,7 +61,8 @@ Layout find_layout(std::span<const std::byte> file) {
   Layout layout;
   const std::byte* const bytes = file.data();
   const std::size_t end = layout.superblock = file.size() / kBlock * kBlock - 2 * kBlock;
-  const unsigned shift = std::clamp(load<std::uint8_t>(bytes, 56), std::uint8_t{12}, std::uint8_t{20});
+  const unsigned shift =
+      std::clamp(load<std::uint8_t>(bytes, 56), std::uint8_t{12}, std::uint8_t{20});
   const std::size_t per_page = ((std::size_t{1} << shift) - kPageHeader) / kEntry;
   std::size_t left = load<std::uint32_t>(bytes, end + 128);
   std::size_t at = std::min<std::size_t>(load<std::uint64_t>(bytes, end + 136), end);
@@ -71,7 +73,8 @@ Layout find_layout(std::span<const std::byte> file) {
       const std::size_t entry = at + kPageHeader + i * kEntry;
       const auto offset = load<std::uint64_t>(bytes, entry);
       const std::size_t stored = load<std::uint32_t>(bytes, entry + 8);
-      if (offset > end || end - offset < kPageHeader || stored > end - offset - kPageHeader) continue;
+      if (offset > end || end - offset < kPageHeader || stored > end - offset - kPageHeader)
+        continue;
       layout.pages.push_back({entry, offset, stored});
     }
     left -= count;
@@ -92,11 +95,13 @@ void seal(std::span<std::byte> file, unsigned seals) {
     if (seals & kSealPageHeaders) seal_page_header(file, page.header);
   }
   for (const Layout::DirectoryPage& page : layout.directory) {
-    if (seals & kSealDirectory) hash_to(file, page.header + 48, page.header + kPageHeader, page.bytes);
+    if (seals & kSealDirectory)
+      hash_to(file, page.header + 48, page.header + kPageHeader, page.bytes);
     if (seals & kSealPageHeaders) seal_page_header(file, page.header);
   }
   const std::size_t first = layout.superblock;
-  if (seals & kSealDirectory) store(file.data(), first + 144, xxh3_64(gather_entries(file, layout)));
+  if (seals & kSealDirectory)
+    store(file.data(), first + 144, xxh3_64(gather_entries(file, layout)));
   if (seals & kSealDigest) seal_digest(file, layout);
   if (seals & kSealCopies) {
     std::memcpy(&file[first + 8], &file[8], 112);

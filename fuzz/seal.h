@@ -31,12 +31,12 @@ inline constexpr std::size_t kLeastFile = 3 * 4096;
 /// What seal() repairs, in this order.
 enum Seals : unsigned {
   kSealFileHeader = 1,
-  kSealPayloads = 2,      ///< in page headers and entries
+  kSealPayloads = 2,  ///< in page headers and entries
   kSealPageHeaders = 4,
-  kSealDirectory = 8,     ///< payload hashes of its pages, and of all entries
+  kSealDirectory = 8,  ///< payload hashes of its pages, and of all entries
   kSealDigest = 16,
-  kSealSuperblock = 32,   ///< both copies
-  kSealCopies = 64,       ///< before: the second becomes the first, which repeats the file header
+  kSealSuperblock = 32,  ///< both copies
+  kSealCopies = 64,      ///< before: the second becomes the first, which repeats the file header
   kSealAll = 127
 };
 

@@ -1,5 +1,6 @@
-// Any well-formed values: what a writer here has written, its reader gives back; what the builder has built, the verifier
-// accepts. The first byte picks the writer: container, PLY, packed columns and codecs, node page, EXR.
+// Any well-formed values: what a writer here has written, its reader gives back; what the builder
+// has built, the verifier accepts. The first byte picks the writer: container, PLY, packed columns
+// and codecs, node page, EXR.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,8 +23,8 @@
 namespace {
 
 using namespace ptc;
-using fuzz::require;
 using fuzz::ByteSource;
+using fuzz::require;
 using Bytes = std::vector<std::byte>;
 
 constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;
@@ -43,15 +44,20 @@ std::vector<PointRecord> take_points(ByteSource& from) {
     const std::uint8_t how = from.take();
     for (std::size_t axis = 0; axis < 3 && how % 4 != 0; ++axis) {
       const auto step = std::uint64_t{from.take()} << (how / 4 % 40);
-      place[axis] = (how % 4 == 1 ? place[axis] + step : how % 4 == 2 ? step : kLatticeMax - step) & kLatticeMax;
+      place[axis] = (how % 4 == 1   ? place[axis] + step
+                     : how % 4 == 2 ? step
+                                    : kLatticeMax - step) &
+                    kLatticeMax;
     }
     PointRecord& point = points.emplace_back();
     point.key = encode_morton(place);
     point.radius = from.number<float>(0);
-    for (auto& half : point.radiance) half = std::min<std::uint16_t>(from.take<std::uint16_t>() & 0x7fff, 0x7bff);
+    for (auto& half : point.radiance)
+      half = std::min<std::uint16_t>(from.take<std::uint16_t>() & 0x7fff, 0x7bff);
     point.normal = from.take<std::array<std::int16_t, 2>>();
     point.albedo = from.take<std::array<std::uint8_t, 3>>();
-    for (std::uint8_t copies = from.take() % 64; copies >= 48; --copies) points.push_back(points.back());
+    for (std::uint8_t copies = from.take() % 64; copies >= 48; --copies)
+      points.push_back(points.back());
   }
   std::ranges::stable_sort(points, {}, &PointRecord::key);
   return points;
@@ -75,8 +81,10 @@ Meta take_meta(ByteSource& from) {
   constexpr char kLetters[] = "abz09_.";
   Meta meta;
   for (std::uint8_t n = from.take() % 4; n > 0; --n) {
-    const auto group = static_cast<std::uint16_t>(meta.channels.empty() ? 1 : meta.channels.back().group);
-    meta.channels.push_back({from.text(31, kLetters, 7), static_cast<ChannelType>(1 + from.take() % 4),
+    const auto group =
+        static_cast<std::uint16_t>(meta.channels.empty() ? 1 : meta.channels.back().group);
+    meta.channels.push_back({from.text(31, kLetters, 7),
+                             static_cast<ChannelType>(1 + from.take() % 4),
                              static_cast<std::uint8_t>(1 + from.take() % 16),
                              static_cast<std::uint16_t>(std::min(255, group + from.take() % 3))});
   }
@@ -92,11 +100,12 @@ void take_column(ByteSource& from, ChannelType type, std::span<std::byte> out) {
   for (std::byte& b : out) b = from.take<std::byte>();
   if (type != ChannelType::half && type != ChannelType::f32) return;
   const std::size_t width = channel_bytes(type);
-  for (std::size_t i = width - 1; i < out.size(); i += width) out[i] &= std::byte{0xbb};  // a bit of the exponent is 0
+  for (std::size_t i = width - 1; i < out.size(); i += width)
+    out[i] &= std::byte{0xbb};  // a bit of the exponent is 0
 }
 
-void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& meta, std::uint64_t points,
-                      std::vector<Bytes>& written) {
+void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& meta,
+                      std::uint64_t points, std::vector<Bytes>& written) {
   const std::uint32_t full = points_per_page(writer.header());
   std::uint16_t last = 0;
   for (const Channel& channel : meta.channels) {
@@ -104,7 +113,8 @@ void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& met
     const auto columns = packed_group_columns(meta.channels, channel.group);
     for (std::uint64_t first = 0; first < points; first += full) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, points - first));
-      Bytes& payload = written.emplace_back(count * group_point_bytes(meta.channels, channel.group));
+      Bytes& payload =
+          written.emplace_back(count * group_point_bytes(meta.channels, channel.group));
       std::size_t at = 0;
       for (const Channel& c : meta.channels) {
         if (c.group != channel.group) continue;
@@ -112,22 +122,24 @@ void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& met
         take_column(from, c.type, std::span(payload).subspan(at, bytes));
         at += bytes;
       }
-      writer.write_page(writer.reserve_page(), {.type = PageType::attribute, .group = channel.group, .record_count = count},
-                        payload, columns);
+      writer.write_page(
+          writer.reserve_page(),
+          {.type = PageType::attribute, .group = channel.group, .record_count = count}, payload,
+          columns);
     }
   }
 }
 
-void compare(const ContainerReader& reader, const std::vector<PointRecord>& points, const Meta& meta,
-             const std::vector<Bytes>& attributes) {
+void compare(const ContainerReader& reader, const std::vector<PointRecord>& points,
+             const Meta& meta, const std::vector<Bytes>& attributes) {
   require(reader.meta().channels == meta.channels && reader.meta().text == meta.text);
   ContainerPoints stream(reader);
   std::vector<PointRecord> back(points.size() + 1);
   require(stream.next(back) == points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PointRecord &a = points[i], &b = back[i];
-    require(a.key == b.key && a.radius == b.radius && a.normal == b.normal && a.radiance == b.radiance &&
-            a.albedo == b.albedo);
+    require(a.key == b.key && a.radius == b.radius && a.normal == b.normal &&
+            a.radiance == b.radiance && a.albedo == b.albedo);
   }
   PageDecoder decoder;
   std::size_t k = 0;
@@ -168,9 +180,11 @@ void container(ByteSource& from) {
   write_attributes(from, writer, meta, points.size(), attributes);
   const Superblock written = writer.finish(meta, superblock);
 
-  static_cast<void>(verify_container(path, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent));
+  static_cast<void>(
+      verify_container(path, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent));
   const ContainerReader reader(path);
-  require(reader.superblock().content_xxh3 == written.content_xxh3 && reader.header().uuid == options.uuid);
+  require(reader.superblock().content_xxh3 == written.content_xxh3 &&
+          reader.header().uuid == options.uuid);
   compare(reader, points, meta, attributes);
 }
 
@@ -193,15 +207,16 @@ void ply(ByteSource& from) {
   require(open_points(path).source->next(back) == surfels.size());
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     const Surfel &a = surfels[i], &b = back[i];
-    require(a.position == b.position && a.normal == b.normal && a.radius == b.radius && a.radiance == b.radiance &&
-            a.albedo == b.albedo);
+    require(a.position == b.position && a.normal == b.normal && a.radius == b.radius &&
+            a.radiance == b.radiance && a.albedo == b.albedo);
   }
 }
 
 void codec(ByteSource& from) {
   std::vector<Channel> channels;
   for (std::uint8_t n = 1 + from.take() % 3; n > 0; --n) {
-    channels.push_back({"a", static_cast<ChannelType>(1 + from.take() % 4), static_cast<std::uint8_t>(1 + from.take() % 2)});
+    channels.push_back({"a", static_cast<ChannelType>(1 + from.take() % 4),
+                        static_cast<std::uint8_t>(1 + from.take() % 2)});
   }
   const std::vector<PackedColumn> columns = packed_group_columns(channels, 1);
   const std::uint32_t count = 1 + from.below(300);
@@ -221,7 +236,8 @@ void codec(ByteSource& from) {
 NodeGroup take_group(ByteSource& from) {
   NodeGroup group;
   group.level = from.take() % 63;
-  group.cell = cell_of({from.take<std::uint64_t>() & kKeyMask, from.take<std::uint64_t>() & kKeyMask}, group.level);
+  group.cell = cell_of(
+      {from.take<std::uint64_t>() & kKeyMask, from.take<std::uint64_t>() & kKeyMask}, group.level);
   const LatticePoint corner = decode_morton(group.cell);
   group.children.resize(1 + from.take() % 8);
   for (NodeChild& child : group.children) {
@@ -235,7 +251,8 @@ NodeGroup take_group(ByteSource& from) {
     }
     NodeSummary& node = child.node;
     for (std::size_t i = 0; i < 3; ++i) node.mean[i] = static_cast<double>(corner[i]) + from.take();
-    for (double* value : {&node.radius, &node.area, &node.thickness}) *value = from.number<double>(0);
+    for (double* value : {&node.radius, &node.area, &node.thickness})
+      *value = from.number<double>(0);
     node.thickness = std::min(node.thickness, node.radius);
     for (double& facing : node.facing) facing = node.area * (from.take() / 255.0);
     for (auto& rgb : node.flux) rgb.fill(from.number<float>(0));
@@ -261,11 +278,14 @@ void node_page(ByteSource& from) {
   for (std::uint32_t slot = 0; slot < page.size(); ++slot) {
     const NodeGroup back = page.decode(slot);
     const NodeGroup& group = groups[slot];
-    require(back.cell == group.cell && back.level == group.level && back.children.size() == group.children.size());
+    require(back.cell == group.cell && back.level == group.level &&
+            back.children.size() == group.children.size());
     for (std::size_t i = 0; i < group.children.size(); ++i) {
       const NodeSummary &a = group.children[i].node, &b = back.children[i].node;
-      require(back.children[i].ref == group.children[i].ref && std::isfinite(b.radius) && b.cone_cos <= a.cone_cos);
-      require(b.radius >= std::min(a.radius, 0x1.ffp127) && b.thickness >= std::min(a.thickness, 0x1.ffp127));
+      require(back.children[i].ref == group.children[i].ref && std::isfinite(b.radius) &&
+              b.cone_cos <= a.cone_cos);
+      require(b.radius >= std::min(a.radius, 0x1.ffp127) &&
+              b.thickness >= std::min(a.thickness, 0x1.ffp127));
     }
   }
 }
