@@ -89,13 +89,13 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
     throw FormatError(8, "spec/container.md#header-version",
                       "format version " + std::to_string(header.major) + " is not supported");
   }
-  check_constants(p);
   header.feature_incompat = load<std::uint64_t>(p, 16);
   header.feature_ro_compat = load<std::uint64_t>(p, 24);
   header.feature_compat = load<std::uint64_t>(p, 32);
   if ((header.feature_incompat & ~kKnownIncompat) != 0) {
     throw FormatError(16, "spec/container.md#header-features", "file needs an unknown feature");
   }
+  check_constants(p);
   std::ranges::copy(bytes.subspan(40, 16), header.uuid.begin());
   header.page_shift = load<std::uint8_t>(p, 56);
   if (header.page_shift < 12 || header.page_shift > 20) {

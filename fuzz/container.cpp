@@ -1,27 +1,91 @@
-// Any bytes as a container: ContainerReader opens and reads every page, or throws FormatError.
-#include <sys/mman.h>
-#include <unistd.h>
-
+// Any bytes as a container: ContainerReader opens it and reads every page, the same by either
+// access and as promised, or throws FormatError; the verifier does not accept what the reader
+// refuses.
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <string>
 #include <vector>
 
+#include "engine/verify/verify.h"
 #include "engine/store/reader.h"
 #include "format/error.h"
+#include "format/node_page.h"
+#include "format/point_page.h"
+#include "fuzz/memory_file.h"
+#include "fuzz/require.h"
+
+namespace {
+
+using ptc::ContainerReader;
+using ptc::fuzz::require;
+
+template <class Body>
+bool accepts(const Body& body) {
+  try {
+    body();
+    return true;
+  } catch (const ptc::FormatError&) {
+    return false;
+  }
+}
+
+/// What read_page() promises of the pages that it gives.
+void check_promises(const ContainerReader& reader, const ptc::PageHeader& page,
+                    const std::byte* payload) {
+  for (std::uint32_t slot = 0; page.type == ptc::PageType::node && slot < page.record_count;
+       ++slot) {
+    for (const ptc::NodeChild& child :
+         ptc::NodePage(payload, page.record_count).decode(slot).children) {
+      const ptc::ChildRef& ref = child.ref;
+      require(ref.interior ? reader.entry(ref.page).type == ptc::PageType::node &&
+                                 ref.slot < reader.entry(ref.page).record_count
+                           : ref.point_count > 0 &&
+                                 ref.first_point + ref.point_count <= reader.superblock().points);
+    }
+  }
+  for (std::uint32_t i = 0; page.type == ptc::PageType::point && i < page.record_count; ++i) {
+    const ptc::PointRecord point = ptc::PointPage(payload, page.record_count)[i];
+    require(point.radius >= 0 && std::isfinite(point.radius) &&
+            std::ranges::max(point.radiance) < 0x7c00);
+  }
+}
+
+bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecoder& decoder) {
+  std::vector<std::byte> read(reader.page_payload_limit()), mapped(read), stored;
+  ptc::PageHeader header;
+  const bool whole = accepts([&] { header = reader.read_page(page, read, decoder); });
+  const bool same =
+      whole == accepts([&] {
+        static_cast<void>(reader.read_page(page, mapped, decoder, ContainerReader::Access::mmap));
+      });
+  require(same &&
+          (!whole || std::equal(read.begin(), read.begin() + header.raw_bytes, mapped.begin())));
+  if (whole) check_promises(reader, header, read.data());
+  const bool found = accepts([&] { static_cast<void>(reader.read_page_header(page)); });
+  const bool copied = accepts([&] { static_cast<void>(reader.read_stored_page(page, stored)); });
+  require(whole <= copied && copied <= found);
+  return whole;
+}
+
+bool read_all(const std::filesystem::path& path) {
+  bool whole = true;
+  return accepts([&] {
+           const ContainerReader reader(path);
+           ptc::PageDecoder decoder;
+           for (std::uint32_t page = 0; page < reader.page_count(); ++page)
+             whole &= read_page(reader, page, decoder);
+         }) &&
+         whole;
+}
+
+}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const int fd = memfd_create("fuzz", 0);
-  if (fd < 0 || write(fd, data, size) != static_cast<ssize_t>(size)) std::abort();
-  try {
-    const ptc::ContainerReader reader("/proc/self/fd/" + std::to_string(fd));
-    std::vector<std::byte> payload(reader.page_payload_limit());
-    ptc::PageDecoder decoder;
-    for (std::uint32_t page = 0; page < reader.page_count(); ++page) {
-      (void)reader.read_page(page, payload, decoder);
-    }
-  } catch (const ptc::FormatError&) {
-  }
-  close(fd);
+  const ptc::fuzz::MemoryFile file({reinterpret_cast<const std::byte*>(data), size}, "a.ptcx");
+  const bool read = read_all(file.path());
+  ptc::Progress silent;
+  const ptc::VerifyReport report = verify_container(
+      file.path(), {.memory_bytes = std::uint64_t{1} << 30, .threads = 1, .flip_budget = 1 << 20}, silent);
+  require(read || !report.sound());
   return 0;
 }

@@ -1,25 +1,64 @@
-// Runs every file below the given directories through a fuzz target; for builds without libFuzzer.
+// Runs files through a fuzz target, for builds without libFuzzer:
+//
+//   replay_NAME DIR...        every file below the directories
+//   replay_NAME --odd SOURCE  every odd file of the shared data, behind each of 16 first bytes: by
+//   every reader.
+//                             The data is where PTC_SHARED says, else beside SOURCE; without it
+//                             exit code 77
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <string_view>
 #include <vector>
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
-int main(int argc, char** argv) {
+namespace {
+
+void run(const std::vector<char>& bytes) {
+  LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+}
+
+/// @return how many files there were
+template <class Body>
+std::size_t for_each_file(const std::filesystem::path& directory, const Body& body) {
   std::size_t files = 0;
-  for (int i = 1; i < argc; ++i) {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(argv[i])) {
-      if (!entry.is_regular_file()) continue;
-      std::ifstream in(entry.path(), std::ios::binary);
-      const std::vector<char> bytes((std::istreambuf_iterator<char>(in)), {});
-      LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
-      ++files;
-    }
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(directory)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    body(std::vector<char>((std::istreambuf_iterator<char>(in)), {}));
+    ++files;
   }
   std::printf("%zu files\n", files);
+  return files;
+}
+
+int run_odd(const std::filesystem::path& source) {
+  const char* const given = std::getenv("PTC_SHARED");
+  const auto shared = given != nullptr ? std::filesystem::path(given) : source / "../shared";
+  if (!std::filesystem::is_directory(shared / "data/odd")) {
+    std::puts("skipped: the folder of odd files is not on this machine");
+    return 77;
+  }
+  const std::size_t files = for_each_file(shared / "data/odd", [](std::vector<char> bytes) {
+    bytes.insert(bytes.begin(), '\0');
+    for (char picked = 0; picked < 16; ++picked) {
+      bytes[0] = picked;
+      run(bytes);
+    }
+  });
+  return files == 0 ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 3 && argv[1] == std::string_view("--odd")) return run_odd(argv[2]);
+  std::size_t files = 0;
+  for (int i = 1; i < argc; ++i) files += for_each_file(argv[i], run);
   return files == 0 ? 1 : 0;
 }

@@ -27,6 +27,7 @@ def bad_header():
     yield "container-header-checksum", patch(44, b"\xff")
     yield "container-header-version", head(major=2)
     yield "container-header-features", head(incompat=1 << 5)
+    yield "container-header-features.before-constants", head(incompat=1 << 5, align_shift=13)
     yield "container-header-constants", head(align_shift=13)
     yield "container-header-constants.byte-order", head(byte_order=0x04030201)
     yield "container-header-page-shift", Draft(page_shift=11)

@@ -67,13 +67,15 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
     const LatticePoint q = decode_morton(p.key);
     return Vec3{static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])};
   };
+  // Sums of offsets keep the lattice unit, sums of coordinates up to 2^42 lose it.
+  const Vec3 origin = position(points.front());
   double weight = 0;
   const bool has_area = std::ranges::any_of(points, [](const PointRecord& p) { return p.radius > 0; });
   for (const PointRecord& p : points) {
     const double area = 2.0 * p.radius * p.radius;
     const double w = has_area ? area : 1.0;  // points without extent still have a middle
     const Vec3 at = position(p);
-    for (std::size_t k = 0; k < 3; ++k) node.mean[k] += w * at[k];
+    for (std::size_t k = 0; k < 3; ++k) node.mean[k] += w * (at[k] - origin[k]);
     weight += w;
     node.area += area;
     const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
@@ -85,7 +87,7 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
       }
     }
   }
-  for (double& m : node.mean) m /= weight;
+  for (std::size_t k = 0; k < 3; ++k) node.mean[k] = origin[k] + node.mean[k] / weight;
   const Vec3 slab = slab_normal(node);
   const bool has_axis = set_cone_axis(node, slab);
   node.cone_cos = has_axis ? 1.0F : -1.0F;
@@ -103,11 +105,12 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
 
 NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
   NodeSummary sum;
+  const Vec3& origin = nodes.front()->mean;
   double weight = 0;
   const bool has_area = std::ranges::any_of(nodes, [](const NodeSummary* n) { return n->area > 0; });
   for (const NodeSummary* node : nodes) {
     const double w = has_area ? node->area : 1.0;
-    for (std::size_t k = 0; k < 3; ++k) sum.mean[k] += w * node->mean[k];
+    for (std::size_t k = 0; k < 3; ++k) sum.mean[k] += w * (node->mean[k] - origin[k]);
     weight += w;
     sum.area += node->area;
     for (std::size_t k = 0; k < 6; ++k) {
@@ -115,7 +118,7 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
       for (std::size_t c = 0; c < 3; ++c) sum.flux[k][c] += node->flux[k][c];
     }
   }
-  for (double& m : sum.mean) m /= weight;
+  for (std::size_t k = 0; k < 3; ++k) sum.mean[k] = origin[k] + sum.mean[k] / weight;
   const Vec3 slab = slab_normal(sum);
   const bool has_axis = set_cone_axis(sum, slab);
   double angle = has_axis ? 0 : M_PI;

@@ -207,7 +207,7 @@ PageReader::~PageReader() {
   PageCache::Impl& shared = *cache_.impl_;
   const std::lock_guard lock(shared.mutex);
   for (std::uint32_t i = 0; i <= mask_; ++i) {
-    if (table_[i].page != kNoPage) shared.table.unpin(table_[i].frame);
+    if (table_[i].page != kEmpty) shared.table.unpin(table_[i].frame);
   }
   shared.told.lookups += lookups_;
   shared.told.local_hits += lookups_;
@@ -221,8 +221,8 @@ PageReader::Page PageReader::load(std::uint32_t page) {
   }
   Slot& slot = table_[page & mask_];
   // The slot is empty while its page is under way, and stays so when the page does not arrive.
-  const std::uint32_t released = slot.page == kNoPage ? kNoFrame : slot.frame;
-  slot.page = kNoPage;
+  const std::uint32_t released = slot.page == kEmpty ? kNoFrame : slot.frame;
+  slot.page = kEmpty;
   const auto held = cache_.impl_->acquire(page, released, std::exchange(lookups_, 0), decoder_);
   slot.frame = held.frame;
   slot.view = held.view;

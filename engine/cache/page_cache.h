@@ -98,10 +98,11 @@ class PageReader {
   }
 
  private:
+  static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};  // equal to no page number, kNoPage included
   struct Slot {
-    std::uint32_t page = kNoPage;
-    std::uint32_t frame = 0;  ///< pinned while `page` is not kNoPage
+    std::uint64_t page = kEmpty;
     Page view;
+    std::uint32_t frame = 0;  ///< pinned while `page` is not kEmpty
   };
   Page load(std::uint32_t page);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "engine/base/error.h"
 #include "engine/io/byte_stream.h"
@@ -14,6 +16,22 @@ namespace {
 constexpr std::uint32_t kMultiPart = 0x1000;  // bit of the version field
 constexpr std::size_t kMostName = 255;
 constexpr std::int64_t kMostTileSide = 8192;
+
+/// Types whose values the library reads by these sizes, whatever size the attribute declares: where
+/// the two differ, it would take what follows for names and sizes that were not checked.
+constexpr std::array<std::pair<std::string_view, std::uint32_t>, 24> kTypeBytes = {
+    {{"box2f", 16},   {"box2i", 16},    {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1},
+     {"double", 8},   {"envmap", 1},    {"float", 4},           {"int", 4},         {"keycode", 28},
+     {"lineOrder", 1}, {"m33d", 72},    {"m33f", 36},           {"m44d", 128},      {"m44f", 64},
+     {"rational", 8}, {"tiledesc", 9},  {"timecode", 8},        {"v2d", 16},        {"v2f", 8},
+     {"v2i", 8},      {"v3d", 24},      {"v3f", 12},            {"v3i", 12}}};
+
+/// Whether a value of this type may take so many bytes.
+bool suits(std::string_view type, std::uint32_t size) {
+  if (type == "floatvector") return size % 4 == 0;
+  const auto* const found = std::ranges::find(kTypeBytes, type, [](const auto& t) { return t.first; });
+  return found == kTypeBytes.end() || found->second == size;
+}
 
 class HeaderWalk {
  public:
@@ -62,9 +80,12 @@ class HeaderWalk {
                         "EXR: attribute '" + attribute + "' past the end of the file");
       }
       const std::uint64_t end = stream_.offset() + size;
-      read_value(attribute, type, end);
-      if (stream_.offset() > end) {
-        stream_.fail_at(end, "EXR: attribute '" + attribute + "' is larger than it says");
+      if (!suits(type, size)) {
+        stream_.fail_at(stream_.offset(), "EXR: attribute '" + attribute + "' has not the size of its type");
+      }
+      const bool whole = read_value(attribute, type, end);
+      if (stream_.offset() > end || (whole && stream_.offset() < end)) {
+        stream_.fail_at(end, "EXR: attribute '" + attribute + "' has another size than it says");
       }
       stream_.skip(end - stream_.offset());
     }
@@ -72,7 +93,8 @@ class HeaderWalk {
     return true;
   }
 
-  void read_value(const std::string& attribute, const std::string& type, std::uint64_t end) {
+  /// @return whether it was read as far as the library reads it, which does not look at its size
+  bool read_value(const std::string& attribute, const std::string& type, std::uint64_t end) {
     if (attribute == "dataWindow" && type == "box2i") {
       const std::int64_t low_x = i32();
       const std::int64_t low_y = i32();
@@ -81,6 +103,10 @@ class HeaderWalk {
     } else if (attribute == "tiles" && type == "tiledesc") {
       const std::int64_t width = u32();
       tile_ = {width, u32()};
+    } else if (type == "chlist") {
+      constexpr std::uint64_t kChannelBytes = 16;  // type, linearity, sampling
+      while (!name().empty()) stream_.skip(kChannelBytes);
+      return true;
     } else if (type == "preview") {
       const std::uint64_t width = u32();
       const std::uint64_t height = u32();
@@ -88,6 +114,8 @@ class HeaderWalk {
       if (width > room || (width > 0 && height > room / width)) {
         stream_.fail_at(stream_.offset(), "EXR: a preview larger than its attribute");
       }
+      stream_.skip(4 * width * height);
+      return true;
     } else if (type == "stringvector") {
       while (stream_.offset() < end) {
         const std::uint64_t length = u32();
@@ -97,6 +125,7 @@ class HeaderWalk {
         stream_.skip(length);
       }
     }
+    return false;
   }
 
   // Each tile has an entry of 8 bytes in a table that the library allocates at once.

@@ -47,12 +47,13 @@ class Cursor {
       at_ += static_cast<std::size_t>(count);
     }
   }
+  // Up to a NUL, which ends a line for stb.
   std::string_view line() {
     const auto* begin = reinterpret_cast<const char*>(bytes_.data());
     const std::string_view rest(begin + at_, bytes_.size() - at_);
     const std::size_t length = rest.find('\n');
     skip(length == std::string_view::npos ? bytes_.size() : length + 1);
-    return rest.substr(0, length);
+    return rest.substr(0, std::min(length, rest.find('\0')));
   }
 
  private:
@@ -140,13 +141,13 @@ bool bmp_is_complete(std::span<const std::byte> bytes) {
   return !at.past_end() && !data.past_end();
 }
 
-// One run-length coded line: four channels of `width` bytes.
+// One run-length coded line: four channels of `width` bytes. Runs of none are passed over as stb does,
+// which at the end of the file takes zeros for such runs and never ends.
 void skip_hdr_line(Cursor& at, std::uint64_t width) {
   for (int channel = 0; channel < 4; ++channel) {
     for (std::uint64_t done = 0; done < width && !at.past_end();) {
       const unsigned packet = at.u8();
       const unsigned count = packet > 128 ? packet - 128 : packet;
-      if (count == 0) return;  // damaged: the decoder will say so
       at.skip(packet > 128 ? 1 : count);
       done += count;
     }
@@ -178,7 +179,7 @@ bool hdr_is_complete(std::span<const std::byte> bytes) {
     if (at.past_end()) return false;
   }
   const auto size = hdr_size(at.line());
-  if (!size) return !at.past_end();
+  if (!size) return false;
   const auto [height, width] = *size;
   if (width < 8 || width >= 32768) {
     at.skip(width * height * 4);

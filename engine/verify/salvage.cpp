@@ -26,7 +26,6 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
-constexpr std::uint64_t kFlipBudget = std::uint64_t{1} << 39;  // bytes hashed to turn flipped bits back
 constexpr std::uint64_t kPagesOpen = 80;                       // of the build: one a level, and some
 
 /// A sound page with its place among the pages of its kind.
@@ -67,7 +66,7 @@ class KeptPoints : public PointStream {
 class Salvage {
  public:
   Salvage(const std::filesystem::path& path, const SalvageOptions& options, Progress& progress)
-      : file_(path), options_(options), progress_(progress) {}
+      : file_(path), options_(options), progress_(progress), flips_(options.flip_budget) {}
 
   SalvageReport run(const std::filesystem::path& target) {
     Findings ignored(0, false);
@@ -256,7 +255,7 @@ class Salvage {
   InputFile file_;
   SalvageOptions options_;
   Progress& progress_;
-  FlipBudget flips_{kFlipBudget};
+  FlipBudget flips_;
   Survey survey_;
   std::optional<SurveyedPage> page_;
   std::vector<PageSite> moved_;  ///< found by their headers

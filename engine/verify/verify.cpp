@@ -65,7 +65,8 @@ class FileCheck {
     if (!survey_.superblock) return;
     const Superblock& s = *survey_.superblock;
     const std::uint64_t page = std::uint64_t{1} << s.header.page_shift;
-    const std::uint64_t fixed = kBaseBytes + 100 * survey_.sites.size() + s.node_groups / 8 +
+    const std::uint64_t groups = survey_.container ? s.node_groups : 0;  // a lone superblock may say anything
+    const std::uint64_t fixed = kBaseBytes + 100 * survey_.sites.size() + groups / 8 +
                                 3 * page * executor_.threads() + 100 * s.leaf_points;
     const std::uint64_t least = fixed + kLeastCachedPages * page;
     if (options_.memory_bytes < least) {

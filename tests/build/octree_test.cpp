@@ -164,6 +164,19 @@ TEST_CASE("octree: up to leaf_points points make a root group with one leaf", "[
   CHECK_FALSE(build({}, 8, 1).result.root.interior);
 }
 
+TEST_CASE("octree: points that coincide far from the corner have their mean where they are", "[build][octree]") {
+  std::vector<PointRecord> points(1000);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].key = encode_morton({kLatticeMax, kLatticeMax - 1, 12345});
+    points[i].radius = 0.1F * static_cast<float>(i + 1);
+  }
+  const NodeSummary leaf = summarise_points(points, 1);
+  const std::array<const NodeSummary*, 3> children{&leaf, &leaf, &leaf};
+  for (const NodeSummary& node : {leaf, summarise_nodes(children)}) {
+    CHECK(node.mean == std::array<double, 3>{static_cast<double>(kLatticeMax), static_cast<double>(kLatticeMax - 1), 12345});
+  }
+}
+
 TEST_CASE("octree: points without area or with opposite normals still have a middle and a cone", "[build][octree]") {
   std::vector<PointRecord> points(2);
   points[0].key = encode_morton({0, 0, 0});

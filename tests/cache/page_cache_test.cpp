@@ -264,6 +264,7 @@ TEST_CASE("cache: a page that there is not is refused and not counted", "[cache]
   PageCache cache(pages.container, pages.options(1, 4));
   {
     PageReader reader(cache);
+    CHECK_THROWS_AS(reader.get(kNoPage), std::invalid_argument);  // no slot holds a page yet
     CHECK(pages.same(0, reader.get(0)));
     CHECK_THROWS_AS(reader.get(pages.count()), std::invalid_argument);
     CHECK(pages.same(0, reader.get(0)));

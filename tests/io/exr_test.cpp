@@ -233,3 +233,18 @@ TEST_CASE("exr: a header that claims a huge picture is refused", "[io][exr]") {
     CHECK_THROWS_AS(static_cast<void>(read_image(scratch.file("b.exr", bytes))), DataError);
   }
 }
+
+TEST_CASE("exr: an attribute that is not as long as its type is refused", "[io][exr]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.exr";
+  write_with_library(path, {"RGB", Imf::ZIP_COMPRESSION, Imf::HALF, {{0, 0}, {6, 9}}});
+  const std::string whole = slurp(path);
+  for (const std::string type : {"v2f", "float", "box2i", "compression", "chlist"}) {
+    std::string bytes = whole;
+    const std::size_t at = bytes.find(std::string(1, '\0') + type + '\0') + type.size() + 2;
+    const auto size = static_cast<std::uint8_t>(bytes[at]);
+    bytes[at] = static_cast<char>(size + 4);
+    bytes.insert(at + 4 + size, 4, '\0');
+    CHECK_THROWS_AS(static_cast<void>(read_image(scratch.file("b.exr", bytes))), DataError);
+  }
+}

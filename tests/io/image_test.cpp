@@ -175,6 +175,16 @@ TEST_CASE("image: no flipped byte does more than change the picture or refuse it
   }
 }
 
+TEST_CASE("image: an HDR of empty runs, or of a size that is told two ways, is refused and ends", "[io][image]") {
+  const std::string whole = coded_hdr();
+  const std::size_t pixels = whole.find("+X 8\n") + 5;
+  CHECK_THROWS_AS(decode(whole.substr(0, pixels + 4) + std::string(60, '\0'), "a"), DataError);
+  std::string third = whole.substr(0, pixels + 6);
+  CHECK_THROWS_AS(decode(third.insert(pixels - 1, " 9"), "a"), DataError);
+  std::string ended = whole.substr(0, pixels + 6) + "\n\n-Y 1 +X 1\n1234";
+  CHECK_THROWS_AS(decode(ended.insert(ended.find("\n\n") + 1, "\0x", 2), "a"), DataError);
+}
+
 TEST_CASE("image: a small file cannot ask for many pixels", "[io][image]") {
   std::string bmp = four_colours_bmp();
   bmp.replace(18, 8, raw<std::int32_t>(60000) + raw<std::int32_t>(4000));

@@ -1,0 +1,195 @@
+// Any sequence of operations on page caches over a container, whole or damaged, damaged and mended
+// meanwhile, by any page number: a page is what a direct read gives or was, stays so until its
+// reader takes another, and is refused only where a direct read is; counts add up.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "engine/cache/page_cache.h"
+#include "format/error.h"
+#include "fuzz/byte_source.h"
+#include "fuzz/memory_file.h"
+#include "fuzz/require.h"
+#include "fuzz/seal.h"
+#include "tests/store/sample.h"
+
+namespace {
+
+using namespace ptc;
+using fuzz::require;
+using Bytes = std::vector<std::byte>;
+
+Bytes make_sample(Codec codec, std::uint32_t points) {
+  test::SampleOptions options;
+  options.writer.codec = codec;
+  options.points = points;
+  const auto path = fuzz::MemoryFile::directory() / "sample.ptcx";
+  test::write_sample(path, options);
+  return test::read_file(path);
+}
+
+const Bytes& sample(std::size_t which) {
+  static const std::array<Bytes, 4> samples{
+      make_sample(Codec::raw, 0), make_sample(Codec::raw, 130), make_sample(Codec::zstd, 300),
+      make_sample(Codec::lz4, 700)};
+  return samples[which % samples.size()];
+}
+
+/// Some bytes of the file changed; with `sealed` no checksum tells.
+Bytes damage(Bytes file, fuzz::ByteSource& from) {
+  const std::size_t changes = from.take() % 4;
+  const bool sealed = from.take() % 4 != 0;
+  for (std::size_t i = 0; i < changes; ++i) {
+    const std::uint32_t place = from.below(static_cast<std::uint32_t>(file.size()));
+    file[place] = from.take<std::byte>();
+  }
+  if (sealed && changes > 0) fuzz::seal(file);
+  return file;
+}
+
+/// What direct reads give of each page; nothing where they refuse it.
+using Payloads = std::vector<std::optional<Bytes>>;
+
+Payloads read_directly(const ContainerReader& container) {
+  Payloads payloads(container.page_count());
+  PageDecoder decoder;
+  for (std::uint32_t page = 0; page < container.page_count(); ++page) {
+    Bytes payload(container.page_payload_limit());
+    try {
+      payload.resize(container.read_page(page, payload, decoder).raw_bytes);
+      payloads[page] = std::move(payload);
+    } catch (const FormatError&) {
+    }
+  }
+  return payloads;
+}
+
+class Session {
+ public:
+  Session(const fuzz::MemoryFile& file, const std::array<Bytes, 2>& forms,
+          const ContainerReader& container)
+      : file_(file), forms_(forms), container_(container) {
+    for (std::size_t i = 2; i-- > 0;) {  // the first form is in the file when this is over
+      file_.write(forms_[i]);
+      payloads_[i] = read_directly(container_);
+    }
+  }
+
+  void run(fuzz::ByteSource& from) {
+    CacheOptions options;
+    options.threads = 1 + from.take() % kReaders;
+    options.local_slots = from.take() % 3 == 0 ? 0 : 1U << from.take() % 10;
+    options.access =
+        from.take() % 2 == 0 ? ContainerReader::Access::pread : ContainerReader::Access::mmap;
+    const std::uint64_t frames = from.take() % 24;
+    options.memory_bytes = PageCache::bytes_for(container_, options.threads, frames) + from.take();
+    try {
+      PageCache cache(container_, options);
+      while (!from.empty()) step(cache, options, from);
+      for (auto& seat : seats_) seat.reader.reset();
+      check_counts(cache.statistics(), frames);
+    } catch (const std::invalid_argument&) {  // a cap below the least, or more slots than frames
+      require(frames < std::uint64_t{2} * options.threads || options.local_slots > 0);
+    }
+  }
+
+ private:
+  static constexpr unsigned kReaders = 4;
+  struct Seat {
+    std::unique_ptr<PageReader> reader;
+    PageReader::Page view;
+    const Bytes* shows = nullptr;  ///< what `view` must stay
+  };
+
+  void step(PageCache& cache, const CacheOptions& options, fuzz::ByteSource& from) {
+    const std::uint8_t what = from.take();
+    Seat& seat = seats_[from.take() % seats_.size()];
+    if (what % 32 == 0) return file_.write(forms_[from.take() % 2]);
+    if (what % 32 == 1) {
+      seat.shows = nullptr;
+      return seat.reader.reset();
+    }
+    if (!seat.reader && !sit(cache, options, seat)) return;
+    // Mostly pages that there are, often the same; any number at times.
+    const std::uint32_t page =
+        what % 8 == 2 ? from.take<std::uint32_t>() : from.take() % (container_.page_count() + 1);
+    get(seat, page);
+    for (const Seat& other : seats_)
+      require(other.shows == nullptr || shows(other.view, *other.shows));
+  }
+
+  bool sit(PageCache& cache, const CacheOptions& options, Seat& seat) {
+    const auto sitting =
+        std::ranges::count_if(seats_, [](const Seat& s) { return s.reader != nullptr; });
+    try {
+      seat.reader = std::make_unique<PageReader>(cache);
+      require(sitting < options.threads);
+      return true;
+    } catch (const std::invalid_argument&) {
+      require(sitting == options.threads);
+      return false;
+    }
+  }
+
+  void get(Seat& seat, std::uint32_t page) {
+    seat.shows = nullptr;
+    try {
+      seat.view = seat.reader->get(page);
+    } catch (const FormatError&) {
+      ++lookups_;
+      return require(page < container_.page_count() &&
+                     (!payloads_[0][page] || !payloads_[1][page]));
+    } catch (const std::invalid_argument&) {
+      return require(page >= container_.page_count());
+    }
+    ++lookups_;
+    require(page < container_.page_count() &&
+            seat.view.record_count == container_.entry(page).record_count);
+    for (const Payloads& form : payloads_) {
+      if (form[page] && shows(seat.view, *form[page])) seat.shows = &*form[page];
+    }
+    require(seat.shows != nullptr && reinterpret_cast<std::uintptr_t>(seat.view.payload) % 64 == 0);
+  }
+
+  static bool shows(const PageReader::Page& view, const Bytes& payload) {
+    return std::ranges::equal(std::span(view.payload, view.bytes), payload);
+  }
+
+  void check_counts(const CacheStatistics& counts, std::uint64_t frames) const {
+    require(counts.lookups == lookups_);
+    require(counts.lookups == counts.local_hits + counts.shared_hits + counts.misses);
+    require(counts.evictions <= counts.misses && counts.peak_frames <= counts.frames);
+    require(counts.frames <= std::max<std::uint64_t>(frames, 1) &&
+            counts.peak_frames <= counts.misses);
+    require(counts.hit_rate() >= 0 && counts.hit_rate() <= 1);
+  }
+
+  const fuzz::MemoryFile& file_;
+  const std::array<Bytes, 2>& forms_;
+  const ContainerReader& container_;
+  std::array<Payloads, 2> payloads_;
+  std::array<Seat, kReaders + 1> seats_;
+  std::uint64_t lookups_ = 0;
+};
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::ByteSource from(data, size);
+  const Bytes& whole = sample(from.take());
+  std::array<Bytes, 2> forms;
+  for (Bytes& form : forms) form = damage(whole, from);
+  const fuzz::MemoryFile file(forms[0], "a.ptcx");
+  std::optional<ContainerReader> container;
+  try {
+    container.emplace(file.path());
+  } catch (const FormatError&) {
+    return 0;
+  }
+  Session(file, forms, *container).run(from);
+  return 0;
+}

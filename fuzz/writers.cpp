@@ -1,0 +1,315 @@
+// Any well-formed values: what a writer here has written, its reader gives back; what the builder
+// has built, the verifier accepts. The first byte picks the writer: container, PLY, packed columns
+// and codecs, node page, EXR.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "engine/build/build.h"
+#include "engine/build/container_points.h"
+#include "engine/verify/verify.h"
+#include "engine/io/image.h"
+#include "engine/io/points.h"
+#include "format/codec.h"
+#include "format/node_page.h"
+#include "format/point_page.h"
+#include "fuzz/byte_source.h"
+#include "fuzz/memory_file.h"
+#include "fuzz/require.h"
+
+namespace {
+
+using namespace ptc;
+using fuzz::ByteSource;
+using fuzz::require;
+using Bytes = std::vector<std::byte>;
+
+constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;
+
+Bytes take_bytes(ByteSource& from, std::size_t count) {
+  Bytes bytes(count);
+  for (std::byte& b : bytes) b = from.take<std::byte>();
+  return bytes;
+}
+
+/// Points that crowd in few cells, coincide, or lie at the corners of the lattice.
+std::vector<PointRecord> take_points(ByteSource& from) {
+  std::vector<PointRecord> points;
+  const std::uint32_t most = from.below(600);
+  LatticePoint place{};
+  while (!from.empty() && points.size() < most) {
+    const std::uint8_t how = from.take();
+    for (std::size_t axis = 0; axis < 3 && how % 4 != 0; ++axis) {
+      const auto step = std::uint64_t{from.take()} << (how / 4 % 40);
+      place[axis] = (how % 4 == 1   ? place[axis] + step
+                     : how % 4 == 2 ? step
+                                    : kLatticeMax - step) &
+                    kLatticeMax;
+    }
+    PointRecord& point = points.emplace_back();
+    point.key = encode_morton(place);
+    point.radius = from.number<float>(0);
+    for (auto& half : point.radiance)
+      half = std::min<std::uint16_t>(from.take<std::uint16_t>() & 0x7fff, 0x7bff);
+    point.normal = from.take<std::array<std::int16_t, 2>>();
+    point.albedo = from.take<std::array<std::uint8_t, 3>>();
+    for (std::uint8_t copies = from.take() % 64; copies >= 48; --copies)
+      points.push_back(points.back());
+  }
+  std::ranges::stable_sort(points, {}, &PointRecord::key);
+  return points;
+}
+
+class Stream : public PointStream {
+ public:
+  explicit Stream(std::span<const PointRecord> points) : rest_(points) {}
+  std::size_t next(std::span<PointRecord> out) override {
+    const std::size_t count = std::min(out.size(), rest_.size());
+    std::ranges::copy(rest_.first(count), out.begin());
+    rest_ = rest_.subspan(count);
+    return count;
+  }
+
+ private:
+  std::span<const PointRecord> rest_;
+};
+
+Meta take_meta(ByteSource& from) {
+  constexpr char kLetters[] = "abz09_.";
+  Meta meta;
+  for (std::uint8_t n = from.take() % 4; n > 0; --n) {
+    const auto group =
+        static_cast<std::uint16_t>(meta.channels.empty() ? 1 : meta.channels.back().group);
+    meta.channels.push_back({from.text(31, kLetters, 7),
+                             static_cast<ChannelType>(1 + from.take() % 4),
+                             static_cast<std::uint8_t>(1 + from.take() % 16),
+                             static_cast<std::uint16_t>(std::min(255, group + from.take() % 3))});
+  }
+  for (std::uint8_t n = from.take() % 3; n > 0; --n) {
+    const std::string key = from.text(31, kLetters, 7);
+    meta.text[key] = from.text(80, "a\xc3\xa9 \n", 1);
+  }
+  return meta;
+}
+
+/// A column of finite values.
+void take_column(ByteSource& from, ChannelType type, std::span<std::byte> out) {
+  for (std::byte& b : out) b = from.take<std::byte>();
+  if (type != ChannelType::half && type != ChannelType::f32) return;
+  const std::size_t width = channel_bytes(type);
+  for (std::size_t i = width - 1; i < out.size(); i += width)
+    out[i] &= std::byte{0xbb};  // a bit of the exponent is 0
+}
+
+void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& meta,
+                      std::uint64_t points, std::vector<Bytes>& written) {
+  const std::uint32_t full = points_per_page(writer.header());
+  std::uint16_t last = 0;
+  for (const Channel& channel : meta.channels) {
+    if (channel.group == std::exchange(last, channel.group)) continue;
+    const auto columns = packed_group_columns(meta.channels, channel.group);
+    for (std::uint64_t first = 0; first < points; first += full) {
+      const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, points - first));
+      Bytes& payload =
+          written.emplace_back(count * group_point_bytes(meta.channels, channel.group));
+      std::size_t at = 0;
+      for (const Channel& c : meta.channels) {
+        if (c.group != channel.group) continue;
+        const std::size_t bytes = count * c.components * channel_bytes(c.type);
+        take_column(from, c.type, std::span(payload).subspan(at, bytes));
+        at += bytes;
+      }
+      writer.write_page(
+          writer.reserve_page(),
+          {.type = PageType::attribute, .group = channel.group, .record_count = count}, payload,
+          columns);
+    }
+  }
+}
+
+void compare(const ContainerReader& reader, const std::vector<PointRecord>& points,
+             const Meta& meta, const std::vector<Bytes>& attributes) {
+  require(reader.meta().channels == meta.channels && reader.meta().text == meta.text);
+  ContainerPoints stream(reader);
+  std::vector<PointRecord> back(points.size() + 1);
+  require(stream.next(back) == points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const PointRecord &a = points[i], &b = back[i];
+    require(a.key == b.key && a.radius == b.radius && a.normal == b.normal &&
+            a.radiance == b.radiance && a.albedo == b.albedo);
+  }
+  PageDecoder decoder;
+  std::size_t k = 0;
+  for (std::uint16_t group = 1; group < 256; ++group) {
+    for (const std::uint32_t page : reader.attribute_pages(group)) {
+      Bytes payload(reader.page_payload_limit());
+      payload.resize(reader.read_page(page, payload, decoder).raw_bytes);
+      require(k < attributes.size() && payload == attributes[k++]);
+    }
+  }
+  require(k == attributes.size());
+}
+
+void container(ByteSource& from) {
+  WriterOptions options;
+  options.page_shift = static_cast<std::uint8_t>(12 + from.take() % 3);
+  options.codec = static_cast<Codec>(from.take() % 3);
+  options.uuid = from.take<Uuid>();
+  const Meta meta = take_meta(from);
+  for (const Channel& c : meta.channels) {
+    const auto same = std::ranges::count(meta.channels, c.name, &Channel::name);
+    if (same > 1 || group_point_bytes(meta.channels, c.group) > 34) return;  // not well-formed
+  }
+  BuildOptions build;
+  build.leaf_points = 1 + from.take() % 20;
+  build.levels_per_stream = 1 + from.take() % 63;
+  Frame frame;
+  frame.edge = std::ldexp(1.0, static_cast<std::int8_t>(from.take()));
+  frame.origin.fill(frame.edge * static_cast<std::int8_t>(from.take()) / 128);
+  std::vector<Bytes> attributes;
+  const std::vector<PointRecord> points = take_points(from);
+
+  const auto path = fuzz::MemoryFile::directory() / "a.ptcx";
+  Progress silent;
+  Stream stream(points);
+  ContainerWriter writer(path, options);
+  const Superblock superblock = build_pages(stream, frame, writer, build, silent);
+  write_attributes(from, writer, meta, points.size(), attributes);
+  const Superblock written = writer.finish(meta, superblock);
+
+  require(verify_container(path, {.level = VerifyLevel::rebuild, .memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent)
+              .findings.empty());
+  const ContainerReader reader(path);
+  require(reader.superblock().content_xxh3 == written.content_xxh3 &&
+          reader.header().uuid == options.uuid);
+  compare(reader, points, meta, attributes);
+}
+
+void ply(ByteSource& from) {
+  std::vector<Surfel> surfels(from.take() % 40);
+  for (Surfel& s : surfels) {
+    for (int i = 0; i < 3; ++i) {
+      s.position[i] = from.number<double>();
+      s.radiance[i] = from.number<float>(0);
+      s.albedo[i] = static_cast<float>(from.take()) / 255;
+    }
+    s.radius = from.number<float>(0);
+    s.normal[from.take() % 3] = from.take() % 2 == 0 ? 1.0F : -1.0F;
+  }
+  const auto path = fuzz::MemoryFile::directory() / "a.ply";
+  PlyWriter writer(path, surfels.size(), {{.name = "extra"}});
+  writer.write(surfels, std::vector<float>(surfels.size(), from.take<float>()));
+  writer.finish();
+  std::vector<Surfel> back(surfels.size() + 1);
+  require(open_points(path).source->next(back) == surfels.size());
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    const Surfel &a = surfels[i], &b = back[i];
+    require(a.position == b.position && a.normal == b.normal && a.radius == b.radius &&
+            a.radiance == b.radiance && a.albedo == b.albedo);
+  }
+}
+
+void codec(ByteSource& from) {
+  std::vector<Channel> channels;
+  for (std::uint8_t n = 1 + from.take() % 3; n > 0; --n) {
+    channels.push_back({"a", static_cast<ChannelType>(1 + from.take() % 4),
+                        static_cast<std::uint8_t>(1 + from.take() % 2)});
+  }
+  const std::vector<PackedColumn> columns = packed_group_columns(channels, 1);
+  const std::uint32_t count = 1 + from.below(300);
+  const Bytes raw = take_bytes(from, count * group_point_bytes(channels, 1));
+  Bytes stored, back(raw.size()), packed;
+  for (const Codec kind : {Codec::raw, Codec::zstd, Codec::lz4}) {
+    const Coding coding = PageEncoder(kind).encode(raw, stored, {count, columns});
+    PageDecoder().decode(coding, stored, back, {count, columns});
+    require(back == raw && stored.size() <= raw.size());
+  }
+  pack_columns(raw, count, columns, packed);
+  std::ranges::fill(back, std::byte{0x5a});
+  unpack_columns(packed, count, columns, back);
+  require(back == raw);
+}
+
+NodeGroup take_group(ByteSource& from) {
+  NodeGroup group;
+  group.level = from.take() % 63;
+  group.cell = cell_of(
+      {from.take<std::uint64_t>() & kKeyMask, from.take<std::uint64_t>() & kKeyMask}, group.level);
+  const LatticePoint corner = decode_morton(group.cell);
+  group.children.resize(1 + from.take() % 8);
+  for (NodeChild& child : group.children) {
+    child.ref.interior = from.take() % 2 == 0;
+    if (child.ref.interior) {
+      child.ref.page = from.take() % 100;
+      child.ref.slot = from.take<std::uint16_t>();
+    } else {
+      child.ref.point_count = 1 + from.below(kMaxLeafPoints);
+      child.ref.first_point = from.take<std::uint32_t>();
+    }
+    NodeSummary& node = child.node;
+    for (std::size_t i = 0; i < 3; ++i) node.mean[i] = static_cast<double>(corner[i]) + from.take();
+    for (double* value : {&node.radius, &node.area, &node.thickness})
+      *value = from.number<double>(0);
+    node.thickness = std::min(node.thickness, node.radius);
+    for (double& facing : node.facing) facing = node.area * (from.take() / 255.0);
+    for (auto& rgb : node.flux) rgb.fill(from.number<float>(0));
+    node.cone_axis = {0, 0, 1};
+    node.cone_cos = static_cast<float>(from.take()) / 127.5F - 1;
+  }
+  return group;
+}
+
+void node_page(ByteSource& from) {
+  constexpr std::uint64_t kPoints = std::uint64_t{1} << 40;
+  NodePageEncoder encoder(std::size_t{4032} << from.take() % 9);
+  std::vector<NodeGroup> groups;
+  while (!from.empty()) {
+    NodeGroup group = take_group(from);
+    if (!encoder.fits(group.children.size())) break;
+    require(encoder.add(group) == groups.size());
+    groups.push_back(std::move(group));
+  }
+  if (groups.empty()) return;
+  const Bytes payload = encoder.take();
+  const NodePage page(payload, static_cast<std::uint32_t>(groups.size()), 100, kPoints);
+  for (std::uint32_t slot = 0; slot < page.size(); ++slot) {
+    const NodeGroup back = page.decode(slot);
+    const NodeGroup& group = groups[slot];
+    require(back.cell == group.cell && back.level == group.level &&
+            back.children.size() == group.children.size());
+    for (std::size_t i = 0; i < group.children.size(); ++i) {
+      const NodeSummary &a = group.children[i].node, &b = back.children[i].node;
+      require(back.children[i].ref == group.children[i].ref && std::isfinite(b.radius) &&
+              b.cone_cos <= a.cone_cos);
+      require(b.radius >= std::min(a.radius, 0x1.ffp127) &&
+              b.thickness >= std::min(a.thickness, 0x1.ffp127));
+    }
+  }
+}
+
+void exr(ByteSource& from) {
+  const unsigned width = 1 + from.take() % 20, height = 1 + from.take() % 20;
+  ExrLayer layer;
+  layer.full_float = true;
+  layer.values.resize(std::size_t{3} * width * height);
+  for (float& value : layer.values) value = from.number<float>(0);
+  const auto path = fuzz::MemoryFile::directory() / "a.exr";
+  write_exr(path, width, height, {layer});
+  const Image image = read_image(path);
+  require(image.width == width && image.height == height);
+  for (std::size_t i = 0; i < layer.values.size(); ++i) {
+    require(image.pixels[i / 3][static_cast<int>(i % 3)] == layer.values[i]);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  constexpr std::array kWriters{container, container, ply, codec, node_page, exr};
+  ByteSource from(data, size);
+  kWriters[from.take() % kWriters.size()](from);
+  return 0;
+}
