@@ -91,10 +91,11 @@ std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, Flip
   if (auto finding = check_agreement(site)) return finding;
   if (level < 2) return std::nullopt;
   if (auto finding = check_payload(site, budget)) return finding;
-  if (level < 3) return std::nullopt;
+  if (level < 3 || !has_content()) return std::nullopt;
   payload_.resize(std::max<std::size_t>(payload_.size(), header_.raw_bytes));
   PageRules rules{.columns = &survey_.columns};
   try {
+    check_channels();
     if (survey_.container) {
       rules.entries = survey_.container->entries();
       rules.points = survey_.container->superblock().points;
@@ -160,6 +161,18 @@ bool SurveyedPage::repaired(const Finding& finding, std::uint64_t page_offset) {
   if (!repair_ || finding.cause != Cause::bit_flip) return false;
   image_[finding.offset - page_offset] ^= std::byte{1} << finding.bit;
   return true;
+}
+
+/// Values of channels whose names are lost say nothing.
+bool SurveyedPage::has_content() const {
+  return header_.type != PageType::attribute || survey_.columns.contains(header_.group);
+}
+
+/// Readers check it when they open the file, which this one may not be for them.
+void SurveyedPage::check_channels() const {
+  if (header_.type != PageType::attribute) return;
+  if (header_.raw_bytes == header_.record_count * group_point_bytes(survey_.meta.channels, header_.group)) return;
+  throw FormatError(16, kValues, "is not as long as its channels are");
 }
 
 void SurveyedPage::check_content() const {

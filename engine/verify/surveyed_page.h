@@ -43,6 +43,8 @@ class SurveyedPage {
   [[nodiscard]] std::optional<Finding> check_header(const PageSite& site, FlipBudget& budget);
   [[nodiscard]] std::optional<Finding> check_agreement(const PageSite& site) const;
   [[nodiscard]] std::optional<Finding> check_payload(const PageSite& site, FlipBudget& budget);
+  [[nodiscard]] bool has_content() const;
+  void check_channels() const;
   void check_content() const;
 
   /// Flips the bit that a finding names, where that is wanted.

@@ -203,6 +203,18 @@ TEST_CASE("diagnosis: what is whole is checked past what is lost", "[verify]") {
   }
 }
 
+TEST_CASE("diagnosis: packed channels whose names are lost are no crash", "[verify]") {
+  const TemporaryDirectory directory;
+  const auto good = std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors/good/attributes.ptcx", path = directory / "a.ptcx";
+  Bytes bytes = read_file(good);
+  const ContainerReader container(good);
+  const auto at = container.entry(container.superblock().meta_page).offset + kPageHeaderBytes;
+  bytes[at] ^= std::byte{0xff};
+  bytes[at + 1] ^= std::byte{0xff};
+  write_file(path, bytes);
+  check_one(verify(path), Cause::unknown, "page-payload");
+}
+
 TEST_CASE("diagnosis: the rest of a tree is checked past a damaged page", "[verify]") {
   const Subject subject(Codec::raw);
   OpenContainer wrong(subject.path);
