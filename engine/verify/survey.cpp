@@ -190,8 +190,6 @@ class Surveyor {
     survey_.sites.reserve(container.page_count());
     for (std::uint32_t page = 0; page < container.page_count(); ++page) list(page, container.entry(page));
     std::ranges::sort(survey_.sites, {}, [](const PageSite& site) { return site.entry.offset; });
-    const Superblock& s = container.superblock();
-    survey_.directory.push_back({s.directory_offset, s.file_bytes - 2 * kBlockBytes});
     survey_.meta = container.meta();
     survey_.columns = columns_by_group(survey_.meta);
     return true;
@@ -214,7 +212,6 @@ class Surveyor {
       entries.resize(bytes);
       try {
         read_directory_page(file_, s, i, entries);
-        survey_.directory.push_back({offset, offset + kPageHeaderBytes + bytes});
         list_entries(i, entries);
       } catch (const FormatError& error) {
         add(error, 1, diagnose_directory_page(offset, bytes), offset);

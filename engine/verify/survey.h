@@ -26,19 +26,12 @@ struct PageSite {
   [[nodiscard]] std::uint64_t end() const noexcept { return entry.offset + kPageHeaderBytes + entry.stored_bytes; }
 };
 
-/// Part of a file.
-struct Extent {
-  std::uint64_t begin = 0;
-  std::uint64_t end = 0;
-};
-
 /// Memory: 48 bytes a page for the sites, and those of ContainerReader.
 struct Survey {
   std::optional<FileHeader> header;           ///< the file's own, or one that a superblock repeats
   std::optional<Superblock> superblock;       ///< a whole copy, wherever it lies
   std::unique_ptr<ContainerReader> container; ///< when it opens as every reader opens it
   std::vector<PageSite> sites;                ///< all but directory pages, ascending by offset
-  std::vector<Extent> directory;              ///< directory pages that are whole
   GroupColumns columns;                       ///< of the meta page, when that is whole
   Meta meta;                                  ///< likewise
   std::optional<Finding> refusal;             ///< why `container` does not open, when all before it is whole

@@ -25,6 +25,12 @@ constexpr std::size_t kMostCachedPages = 1024;
 constexpr std::size_t kLeastCachedPages = 8;
 constexpr std::size_t kPagesAtOnce = 256;
 
+/// Part of a file.
+struct Extent {
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+};
+
 class FileCheck {
  public:
   FileCheck(const std::filesystem::path& path, const VerifyOptions& options)

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,10 +12,9 @@
 
 #include "engine/build/octree.h"
 #include "engine/verify/node_pages.h"
+#include "engine/verify/point_runs.h"
 #include "engine/verify/verify_node.h"
 #include "format/node_page.h"
-#include "format/point_page.h"
-#include "format/scalar.h"
 
 namespace ptc {
 namespace {
@@ -26,38 +24,8 @@ constexpr char kCell[] = "spec/nodes.md#node-cell";
 constexpr char kChildren[] = "spec/nodes.md#node-children";
 constexpr char kLeaf[] = "spec/nodes.md#node-leaf";
 constexpr char kReferences[] = "spec/nodes.md#references";
-constexpr char kOrder[] = "spec/points.md#point-order";
 constexpr char kCounts[] = "spec/container.md#superblock-counts";
 constexpr char kRoot[] = "spec/container.md#superblock-root";
-constexpr char kTotals[] = "spec/container.md#superblock-totals";
-
-constexpr double kRelative = 1e-6;  // of totals: sums in another order
-
-/// Adds what is wrong to the findings: checksums are right, so that it was written so.
-class Report {
- public:
-  Report(const ContainerReader& container, Findings& findings) : container_(container), findings_(findings) {}
-
-  void superblock(const char* clause, const std::string& text) const {
-    findings_.add({.cause = Cause::writer,
-                   .level = 3,
-                   .offset = container_.superblock().file_bytes - 2 * kBlockBytes,
-                   .rule = clause,
-                   .text = text});
-  }
-  void page(std::uint32_t page, std::uint64_t from_header, const char* clause, const std::string& text) const {
-    findings_.add({.cause = Cause::writer,
-                   .level = 3,
-                   .offset = container_.entry(page).offset + from_header,
-                   .page = page,
-                   .rule = clause,
-                   .text = fmt::format("page {}: {}", page, text)});
-  }
-
- private:
-  const ContainerReader& container_;
-  Findings& findings_;
-};
 
 /// A group, where it lies, and what was found below it so far.
 struct OpenGroup {
@@ -104,7 +72,7 @@ class ReachedGroups {
   }
 
   /// Groups that were not reached, page by page.
-  void report_rest(const Report& report) const {
+  void report_rest(const TreeReport& report) const {
     for (const std::uint32_t page : container_.node_pages()) {
       const auto first = bits_.begin() + static_cast<std::ptrdiff_t>(first_[page]);
       const auto last = first + container_.entry(page).record_count;
@@ -121,83 +89,6 @@ class ReachedGroups {
   const ContainerReader& container_;
   std::vector<std::uint64_t> first_;  ///< of a node page's groups
   std::vector<bool> bits_;
-};
-
-/// Runs of points in their order, with the totals of all that were taken.
-class PointRuns {
- public:
-  PointRuns(const ContainerReader& container, const std::vector<bool>& damaged, const Report& report)
-      : container_(container), damaged_(damaged), report_(report), payload_(container.page_payload_limit()) {}
-
-  /// Points from `first` on, which must not lie before any taken already; nothing when some are in damaged pages.
-  /// Valid until the next call.
-  std::optional<std::span<const PointRecord>> take(std::uint64_t first, std::size_t count) {
-    block_.clear();
-    const std::uint64_t per_page = container_.superblock().points_per_page;
-    for (std::uint64_t at = first; at < first + count;) {
-      const std::uint32_t page = container_.point_pages()[at / per_page];
-      if (damaged_[page]) return std::nullopt;
-      if (page != page_) {
-        count_ = container_.read_page(page, payload_, decoder_).record_count;
-        page_ = page;
-      }
-      const PointPage points(payload_.data(), count_);
-      for (auto i = static_cast<std::uint32_t>(at % per_page); i < count_ && at < first + count; ++i, ++at) {
-        block_.push_back(points[i]);
-      }
-    }
-    for (std::size_t i = 0; i < count; ++i) add(first + i, block_[i]);
-    return block_;
-  }
-
-  /// Compares the totals with the superblock's.
-  void finish() const {
-    const Superblock& s = container_.superblock();
-    if (next_ != s.points) report_.superblock(kCounts, fmt::format("leaves hold {} of {} points", next_, s.points));
-    compare("area", s.area, area_);
-    for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
-    if (s.bounds_low != low_ || s.bounds_high != high_) {
-      report_.superblock(kTotals, fmt::format("bounds are not those of the points, {} {} {} to {} {} {}", low_[0], low_[1],
-                                              low_[2], high_[0], high_[1], high_[2]));
-    }
-  }
-
- private:
-  void add(std::uint64_t number, const PointRecord& point) {
-    if (point.key < last_) {
-      report_.page(page_, kPageHeaderBytes, kOrder, fmt::format("key of point {} is below the one before", number));
-    }
-    last_ = point.key;
-    const std::array<double, 3> at = container_.superblock().frame.to_position(decode_morton(point.key));
-    const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
-    area_ += area;
-    for (std::size_t k = 0; k < 3; ++k) {
-      low_[k] = next_ == 0 ? at[k] : std::min(low_[k], at[k]);
-      high_[k] = next_ == 0 ? at[k] : std::max(high_[k], at[k]);
-      flux_[k] += area * static_cast<double>(decode_half(point.radiance[k]));
-    }
-    next_ = number + 1;
-  }
-
-  void compare(const char* what, double said, double found) const {
-    if (std::abs(said - found) <= kRelative * std::max(std::abs(said), std::abs(found))) return;
-    report_.superblock(kTotals, fmt::format("superblock says {} {}, the points have {}", what, said, found));
-  }
-
-  const ContainerReader& container_;
-  const std::vector<bool>& damaged_;
-  const Report& report_;
-  PageDecoder decoder_;
-  std::vector<std::byte> payload_;
-  std::uint32_t page_ = kNoPage;  ///< in payload_
-  std::uint32_t count_ = 0;       ///< its points
-  std::vector<PointRecord> block_;
-  MortonKey last_{};
-  std::uint64_t next_ = 0;  ///< behind the last taken
-  double area_ = 0;
-  std::array<double, 3> flux_{};
-  std::array<double, 3> low_{};
-  std::array<double, 3> high_{};
 };
 
 /// The walk: groups from the root to where it is now.
@@ -392,7 +283,7 @@ class TreeWalk {
   const ContainerReader& container_;
   const Superblock& superblock_;
   const std::vector<bool>& damaged_;
-  Report report_;
+  TreeReport report_;
   Progress& progress_;
   NodePages pages_;
   ReachedGroups reached_;
