@@ -32,6 +32,13 @@ bool set_cone_axis(NodeSummary& node, const Vec3& slab) {
   return true;
 }
 
+/// Radius of a disc in lattice units. Any float over any unit: beyond this its square would be infinite, and what is
+/// stored ends at 3e38 anyway.
+double lattice_radius(const PointRecord& point, double unit) {
+  constexpr double kGreatest = 1e150;
+  return std::min(static_cast<double>(point.radius) / unit, kGreatest);
+}
+
 /// Half the extent along a unit direction of a thing `thick` along its normal and `wide` across it;
 /// all of `wide` when the normal is zero.
 double extent_along(const Vec3& direction, const Vec3& normal, double thick, double wide) {
@@ -92,11 +99,11 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
   const bool has_axis = set_cone_axis(node, slab);
   node.cone_cos = has_axis ? 1.0F : -1.0F;
   for (const PointRecord& p : points) {
-    node.radius = std::max(node.radius, distance(position(p), node.mean) + static_cast<double>(p.radius) / unit);
+    node.radius = std::max(node.radius, distance(position(p), node.mean) + lattice_radius(p, unit));
     if (!has_axis) continue;
     const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
     node.cone_cos = std::min(node.cone_cos, round_down(cosine_to_axis(node, n)));
-    const double reach = extent_along(slab, {n[0], n[1], n[2]}, 0, static_cast<double>(p.radius) / unit);
+    const double reach = extent_along(slab, {n[0], n[1], n[2]}, 0, lattice_radius(p, unit));
     node.thickness = std::max(node.thickness, offset_along(slab, position(p), node.mean) + reach);
   }
   node.thickness = has_axis ? std::min(node.thickness, node.radius) : node.radius;

@@ -243,3 +243,14 @@ TEST_CASE("octree: cones hold every normal to the last bit", "[build][octree]") 
     }
   }
 }
+
+TEST_CASE("octree: discs of any size over a lattice of any unit have finite bounds", "[build][octree]") {
+  SortedScene scene = sort_scene(random_surfels(9, 6));
+  for (PointRecord& p : scene.records) p.radius = 3e38F;
+  const NodeSummary all = summarise_points(scene.records, 0x1p-1002);
+  const std::array<const NodeSummary*, 2> two{&all, &all};
+  for (const NodeSummary& node : {all, summarise_nodes(two)}) {
+    CHECK(std::isfinite(node.radius));
+    CHECK(std::isfinite(node.thickness));
+  }
+}
