@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "format/morton.h"
+#include "format/node_layout.h"
 
 namespace ptc {
 
@@ -140,7 +141,7 @@ class GroupView {
 
   /// The group as it lies in the page, without what pads it.
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
-    return {p_, 24 + 60 * static_cast<std::size_t>(size())};
+    return {p_, group_content_bytes(static_cast<std::size_t>(size()))};
   }
 
   /// The i-th value of a u16 column.

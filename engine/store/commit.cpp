@@ -18,9 +18,6 @@ constexpr char kLength[] = "spec/container.md#superblock-length";
 constexpr char kCopies[] = "spec/container.md#superblock-copies";
 constexpr char kDirectoryPages[] = "spec/container.md#directory-pages";
 
-/// Blocks before the end that are searched for a superblock when it is not where it should be.
-constexpr std::uint64_t kSearchBlocks = 256;
-
 Block read_block(const InputFile& file, std::uint64_t offset) {
   Block block;
   file.read_at(offset, block);
@@ -103,7 +100,7 @@ Superblock read_superblock(const InputFile& file, const FileHeader& header) {
 
 std::optional<std::uint64_t> committed_length(const InputFile& file, const FileHeader& header) {
   const std::uint64_t blocks = file.size() / kBlockBytes;
-  for (std::uint64_t back = 1; back <= std::min(kSearchBlocks, blocks); ++back) {
+  for (std::uint64_t back = 1; back <= std::min(kSuperblockSearch, blocks); ++back) {
     const std::uint64_t offset = (blocks - back) * kBlockBytes;
     const Block block = read_block(file, offset);
     if (!has_superblock_magic(block)) continue;

@@ -25,7 +25,7 @@ std::vector<std::byte> content_of(const GroupView& group) {
   const auto bytes = group.bytes();
   std::vector<std::byte> content(bytes.begin(), bytes.end());
   for (unsigned i = 0; i < static_cast<unsigned>(group.size()); ++i) {
-    if ((group.interior_mask() >> i & 1) != 0) std::memset(content.data() + 24 + 8 * std::size_t{i}, 0, 8);
+    if ((group.interior_mask() >> i & 1) != 0) std::memset(content.data() + kGroupHeadBytes + 8 * std::size_t{i}, 0, 8);
   }
   return content;
 }

@@ -8,7 +8,6 @@
 #include <cstring>
 #include <map>
 #include <optional>
-#include <set>
 #include <stdexcept>
 #include <system_error>
 #include <vector>
@@ -28,16 +27,17 @@ namespace {
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
 constexpr std::uint64_t kPagesOpen = 80;                       // of the build: one a level, and some
 
-/// A sound page with its place among the pages of its kind.
-struct Kept {
-  const PageSite* site = nullptr;
-  std::uint32_t count = 0;  ///< points
+/// A page that is known of, and what its header says of its keys where it is sound.
+struct Known {
+  const PageSite* site = nullptr;  ///< null: it is lost
+  std::uint64_t first_key = 0;
+  std::uint64_t last_key = 0;
 };
 
 /// Points of the kept pages, page by page.
 class KeptPoints : public PointStream {
  public:
-  KeptPoints(SurveyedPage& page, FlipBudget& flips, const std::map<std::uint64_t, Kept>& pages)
+  KeptPoints(SurveyedPage& page, FlipBudget& flips, const std::map<std::uint64_t, const PageSite*>& pages)
       : page_(page), flips_(flips), next_(pages.begin()), end_(pages.end()) {}
 
   std::size_t next(std::span<PointRecord> out) override {
@@ -45,9 +45,9 @@ class KeptPoints : public PointStream {
     while (filled < out.size()) {
       if (at_ == count_) {
         if (next_ == end_) break;
-        const Kept& kept = (next_++)->second;
-        if (const auto finding = page_.check(*kept.site, 3, flips_)) throw DataError(line_of(*finding));
-        count_ = kept.count;
+        const PageSite& site = *(next_++)->second;
+        if (const auto finding = page_.check(site, 3, flips_)) throw DataError(line_of(*finding));
+        count_ = site.entry.record_count;
         at_ = 0;
       }
       const PointPage points(page_.payload().data(), count_);
@@ -59,7 +59,7 @@ class KeptPoints : public PointStream {
  private:
   SurveyedPage& page_;
   FlipBudget& flips_;
-  std::map<std::uint64_t, Kept>::const_iterator next_, end_;
+  std::map<std::uint64_t, const PageSite*>::const_iterator next_, end_;
   std::uint32_t count_ = 0, at_ = 0;
 };
 
@@ -74,7 +74,7 @@ class Salvage {
     require_what_it_takes();
     page_.emplace(file_, survey_, true);
     find_meta();
-    for (const std::uint16_t group : groups()) by_group_[group];
+    for (const auto& [group, columns] : survey_.columns) by_group_[group];
     find_sound_pages();
     rank_pages();
     if (points_.empty()) refuse("spec/recovery.md#survey", "no point page is whole: there is nothing to salvage");
@@ -98,13 +98,7 @@ class Salvage {
     }
   }
 
-  [[nodiscard]] std::set<std::uint16_t> groups() const {
-    std::set<std::uint16_t> groups;
-    for (const Channel& channel : survey_.meta.channels) groups.insert(channel.group);
-    return groups;
-  }
-
-  using Sites = std::map<std::uint32_t, const PageSite*>;  ///< by page; null: known and lost
+  using Sites = std::map<std::uint32_t, Known>;  ///< by page
 
   /// The map that pages of this kind belong in; null for those that are not kept.
   Sites* kind_of(const DirectoryEntry& entry) {
@@ -141,10 +135,10 @@ class Salvage {
   bool consider(const PageSite& site) {
     Sites* const kind = kind_of(site.entry);
     if (kind == nullptr) return true;
-    const PageSite*& known = (*kind)[site.page];
-    if (known != nullptr) return true;
+    Known& known = (*kind)[site.page];
+    if (known.site != nullptr) return true;
     if (page_->check(site, 3, flips_)) return false;
-    known = &site;
+    known = {&site, page_->header().first_key, page_->header().last_key};
     return true;
   }
 
@@ -154,11 +148,11 @@ class Salvage {
     const std::uint64_t per_page = points_per_page(s.header);
     const std::uint64_t pages = (s.points + per_page - 1) / per_page;
     std::uint64_t k = 0, last_key = 0;
-    for (const auto& [number, site] : point_sites_) {
+    for (const auto& [number, page] : point_sites_) {
       const std::uint64_t rank = k++;
-      if (site == nullptr || page_->check(*site, 3, flips_) || page_->header().first_key < last_key) continue;
-      last_key = page_->header().last_key;
-      points_[rank] = {site, site->entry.record_count};
+      if (page.site == nullptr || page.first_key < last_key) continue;
+      last_key = page.last_key;
+      points_[rank] = page.site;
     }
     report_.point_pages_before = pages;
     report_.point_pages = points_.size();
@@ -169,11 +163,12 @@ class Salvage {
       // Where some are not even known, ranks say nothing.
       if (point_sites_.size() != pages || found == attribute_sites_.end() || found->second.size() != pages) continue;
       k = 0;
-      for (const auto& [number, site] : found->second) {
+      for (const auto& [number, page] : found->second) {
         const std::uint64_t rank = k++;
         const auto beside = points_.find(rank);
-        if (site == nullptr || beside == points_.end() || site->entry.record_count != beside->second.count) continue;
-        kept[rank] = site;
+        if (page.site == nullptr || beside == points_.end()) continue;
+        if (page.site->entry.record_count != beside->second->entry.record_count) continue;
+        kept[rank] = page.site;
         ++report_.attribute_pages;
       }
     }
@@ -217,11 +212,11 @@ class Salvage {
     const std::vector<PackedColumn>& columns = survey_.columns.at(group);
     auto beside = points_.begin();
     const auto next_page = [&](std::span<std::byte> payload) {
-      const auto& [rank, page] = *beside++;
+      const auto& [rank, site] = *beside++;
       std::ranges::fill(payload, std::byte{0});
       const auto found = kept.find(rank);
       if (found != kept.end() && !page_->check(*found->second, 3, flips_)) std::ranges::copy(page_->payload(), payload.begin());
-      return page.count;
+      return site->entry.record_count;
     };
     ChannelPager pager(columns, (std::size_t{1} << survey_.header->page_shift) - kPageHeaderBytes, next_page);
     const std::uint32_t full = points_per_page(writer.header());
@@ -235,16 +230,16 @@ class Salvage {
 
   /// That of the first point page.
   Codec codec() {
-    static_cast<void>(page_->check(*points_.begin()->second.site, 1, flips_));
+    static_cast<void>(page_->check(*points_.begin()->second, 1, flips_));
     return page_->header().coding.codec;
   }
 
   /// Pages of the damaged file must not pass for its pages.
   Uuid new_uuid() const {
     std::vector<std::byte> text(survey_.header->uuid.begin(), survey_.header->uuid.end());
-    for (const auto& [rank, kept] : points_) {
+    for (const auto& [rank, site] : points_) {
       text.resize(text.size() + 8);
-      store(text.data(), text.size() - 8, kept.site->entry.payload_xxh3);
+      store(text.data(), text.size() - 8, site->entry.payload_xxh3);
     }
     const std::array<std::uint64_t, 2> hash = xxh3_128(text);
     Uuid uuid;
@@ -261,7 +256,7 @@ class Salvage {
   std::vector<PageSite> moved_;  ///< found by their headers
   Sites point_sites_;
   std::map<std::uint16_t, Sites> attribute_sites_;  ///< by group
-  std::map<std::uint64_t, Kept> points_;                                      ///< by rank
+  std::map<std::uint64_t, const PageSite*> points_;                             ///< by rank
   std::map<std::uint16_t, std::map<std::uint64_t, const PageSite*>> by_group_;  ///< attribute pages, by rank
   SalvageReport report_;
 };

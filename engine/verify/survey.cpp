@@ -15,7 +15,6 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kSearchBlocks = 256;  // before the end that may hold a superblock
 constexpr std::size_t kScanBytes = std::size_t{1} << 20;
 
 /// Calls body(header, offset) for every sector that begins with the header of a page of this file.
@@ -98,7 +97,7 @@ class Surveyor {
   /// Of the last superblock that is whole, its own copy of the header being all that is known.
   std::optional<FileHeader> repeated_header() const {
     const std::uint64_t blocks = file_.size() / kBlockBytes;
-    for (std::uint64_t back = 1; back <= std::min(kSearchBlocks, blocks); ++back) {
+    for (std::uint64_t back = 1; back <= std::min(kSuperblockSearch, blocks); ++back) {
       const std::uint64_t offset = (blocks - back) * kBlockBytes;
       const Block block = read_block(offset);
       for (const std::uint64_t length : {offset + kBlockBytes, offset + 2 * kBlockBytes}) {

@@ -34,12 +34,12 @@ class SurveyedPage {
   [[nodiscard]] std::span<const std::byte> payload() const noexcept {
     return std::span(payload_).first(header_.raw_bytes);
   }
-  /// Its payload as it is stored, when the level was 2.
+
+ private:
+  /// Its payload as it is stored, from level 2 on.
   [[nodiscard]] std::span<const std::byte> stored() const noexcept {
     return std::span(image_).subspan(kPageHeaderBytes);
   }
-
- private:
   [[nodiscard]] std::optional<Finding> check_header(const PageSite& site, FlipBudget& budget);
   [[nodiscard]] std::optional<Finding> check_agreement(const PageSite& site) const;
   [[nodiscard]] std::optional<Finding> check_payload(const PageSite& site, FlipBudget& budget);

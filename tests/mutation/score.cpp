@@ -14,7 +14,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <new>
 #include <string>
 #include <thread>
@@ -25,6 +24,7 @@
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
 #include "tests/mutation/mutations.h"
+#include "tests/store/sample.h"
 #include "tests/support/scenes.h"
 
 namespace ptc::test {
@@ -55,31 +55,6 @@ struct Subject {
   Bytes content;
 };
 
-Bytes read_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
-}
-
-void write_file(const std::filesystem::path& path, const Bytes& bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!file.flush()) throw std::runtime_error("write " + path.string());
-}
-
-/// All payloads one after another, as a reader that loads every page has them.
-Bytes content_of(const std::filesystem::path& path) {
-  const ContainerReader container(path);
-  Bytes content, payload(container.page_payload_limit());
-  PageDecoder decoder;
-  for (std::uint32_t page = 0; page < container.page_count(); ++page) {
-    const PageHeader header = container.read_page(page, payload, decoder);
-    content.insert(content.end(), payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(header.raw_bytes));
-  }
-  return content;
-}
-
 Subject make_subject(const TemporaryDirectory& directory, const std::string& name, Profile profile, bool shaded) {
   Progress silent;
   const std::filesystem::path scene = directory / "scene.ptcx", lit = directory / "lit.ptcx";
@@ -92,7 +67,7 @@ Subject make_subject(const TemporaryDirectory& directory, const std::string& nam
   Subject subject{.name = name, .path = directory / "changed.ptcx"};
   recode_container(ContainerReader(shaded ? lit : scene), subject.path, {.profile = profile}, silent);
   subject.whole = read_file(subject.path);
-  subject.content = content_of(subject.path);
+  subject.content = walk(subject.path);
   const ContainerReader container(subject.path);
   for (const DirectoryEntry& entry : container.entries()) {
     subject.pages.push_back({entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
@@ -111,7 +86,7 @@ bool verification_finds_it(const std::filesystem::path& path) {
 
 bool reader_is_misled(const Subject& subject) {
   try {
-    return content_of(subject.path) != subject.content;
+    return walk(subject.path) != subject.content;
   } catch (const std::runtime_error&) {  // refused
     return false;
   }

@@ -2,8 +2,6 @@
 #include "tests/verify/damage.h"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include "engine/verify/verify.h"
@@ -31,22 +29,6 @@ std::string fault_of(const std::filesystem::path& path) {
     faults += line_of(finding) + "\n";
   }
   return faults;
-}
-
-std::vector<std::byte> read_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw std::runtime_error("read " + path.string());
-  std::vector<std::byte> bytes(text.size());
-  std::ranges::transform(text, bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
-  return bytes;
-}
-
-void write_file(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()),
-             static_cast<std::streamsize>(bytes.size()));
-  if (!file.flush()) throw std::runtime_error("write " + path.string());
 }
 
 OpenContainer::OpenContainer(const std::filesystem::path& path) : bytes_(read_file(path)) {

@@ -10,6 +10,7 @@
 
 #include "engine/base/surfel.h"
 #include "format/container.h"
+#include "tests/store/sample.h"
 
 namespace ptc::test {
 
@@ -18,9 +19,6 @@ namespace ptc::test {
 
 /// What verify_container() finds in a file, a line each; empty when nothing is wrong.
 [[nodiscard]] std::string fault_of(const std::filesystem::path& path);
-
-[[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path);
-void write_file(const std::filesystem::path& path, const std::vector<std::byte>& bytes);
 
 /// A container of raw pages in memory, whose payloads, page headers and superblock may be changed
 /// and all checksums made right again.
