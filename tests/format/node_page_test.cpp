@@ -20,10 +20,6 @@ namespace {
 constexpr std::uint32_t kPages = 50;
 constexpr std::uint64_t kPoints = 1000000;
 
-double cell_edge(int level) {
-  return std::exp2(std::max(0, 42 - level));
-}
-
 std::array<float, 3> random_axis(Random& random) {
   std::array<double, 3> n;
   double square = 0;
