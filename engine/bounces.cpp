@@ -33,7 +33,7 @@ GatherOptions coarser(const GatherOptions& gather) {
 class BouncedPoints : public PointStream {
  public:
   BouncedPoints(const ContainerReader& first, Shader& shader, float lift, Progress& progress)
-      : frame_(first.superblock().frame), points_(first), shader_(shader), lift_(lift), progress_(progress),
+      : frame_(first.header().frame), points_(first), shader_(shader), lift_(lift), progress_(progress),
         records_(kBatch), receivers_(kBatch), results_(kBatch) {}
 
   std::size_t next(std::span<PointRecord> out) override {
@@ -95,10 +95,10 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene, cons
     const auto write = [&](const std::filesystem::path& path) {
       Shader shader(lit ? *lit : scene, shade, executor);
       BouncedPoints points(scene, shader, options.lift, progress);
-      ContainerWriter writer(path, {.page_shift = scene.header().page_shift});
+      ContainerWriter writer(path, {.page_shift = scene.header().page_shift, .frame = scene.header().frame});
       Progress silent;
       const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
-      writer.finish({}, build_pages(points, from.frame, writer, tree, silent));
+      writer.finish({}, build_pages(points, writer, tree, silent));
       report.bounce_cpu_seconds += points.cpu_seconds();
     };
     lit = make_temporary(options.temp_dir, write);

@@ -269,7 +269,8 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
   const Meta meta = make_meta(request, inputs, spacing);
   ContainerWriter writer(target, {.page_shift = request.page_shift,
                                   .codec = codec_of(request.profile),
-                                  .uuid = content_uuid(sorter, frame, request, meta)});
+                                  .uuid = content_uuid(sorter, frame, request, meta),
+                                  .frame = frame});
   std::unique_ptr<PointStream> sorted = sorter.finish();
   std::unique_ptr<PointStream> with_radii, rounded;
   PointStream* points = sorted.get();
@@ -281,7 +282,7 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
     rounded = round_points(*points, frame.unit());
     points = rounded.get();
   }
-  const Superblock superblock = build_pages(*points, frame, writer, request.tree, progress);
+  const Superblock superblock = build_pages(*points, writer, request.tree, progress);
   report.superblock = writer.finish(meta, superblock);
   report.sort = sorter.statistics();
   return report;

@@ -82,7 +82,7 @@ class PageCursor {
     const PointPage points(payload_.data(), count);
     surfels.clear();
     for (std::uint32_t i = 0; i < count; ++i) {
-      surfels.push_back(to_surfel(points[i], container_.superblock().frame));
+      surfels.push_back(to_surfel(points[i], container_.header().frame));
     }
     read_channels(count);
     ++page_;
@@ -203,8 +203,8 @@ Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writ
   const Superblock& from = container.superblock();
   ContainerPoints points(container);
   const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
-  const std::unique_ptr<PointStream> rounded = round ? round_points(points, from.frame.unit()) : nullptr;
-  const Superblock superblock = build_pages(rounded ? *rounded : points, from.frame, writer, tree, progress);
+  const std::unique_ptr<PointStream> rounded = round ? round_points(points, container.header().frame.unit()) : nullptr;
+  const Superblock superblock = build_pages(rounded ? *rounded : points, writer, tree, progress);
   repage_channels(container, writer);
   return superblock;
 }
@@ -228,7 +228,7 @@ void write_xyz(const ContainerReader& container, const std::filesystem::path& ta
   std::vector<PointRecord> block(4096);
   while (const std::size_t count = points.next(block)) {
     for (std::size_t i = 0; i < count; ++i) {
-      append_line(text, to_surfel(block[i], container.superblock().frame));
+      append_line(text, to_surfel(block[i], container.header().frame));
     }
     progress.advance(count);
     if (text.size() < kTextBytes) continue;
@@ -245,7 +245,8 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
   ContainerWriter writer(target, {.page_shift = page_shift,
                                   .codec = codec_of(options.profile),
-                                  .uuid = derived_uuid(container, options.profile, page_shift)});
+                                  .uuid = derived_uuid(container, options.profile, page_shift),
+                                  .frame = from.frame});
   Meta meta = container.meta();
   const bool round = is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
   // finish() numbers the meta page last: where it was not, the others cannot keep their numbers.

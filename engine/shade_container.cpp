@@ -90,7 +90,7 @@ class PointCursor {
         share_ += wanted_;
         if (share_ < container_.superblock().points) continue;
         share_ -= container_.superblock().points;
-        out[filled++] = to_surfel(points[at_], container_.superblock().frame);
+        out[filled++] = to_surfel(points[at_], container_.header().frame);
       }
     }
     return filled;
@@ -153,7 +153,7 @@ class ContainerSink : public ShadedSink {
       : from_(from),
         floats_(ShadedChannels::count(estimates)),
         meta_(from.meta()),
-        writer_(target, {.page_shift = from.header().page_shift, .uuid = uuid_for(from, settings)}) {
+        writer_(target, {.page_shift = from.header().page_shift, .uuid = uuid_for(from, settings), .frame = from.header().frame}) {
     std::erase_if(meta_.channels, [](const Channel& c) { return c.group == kGroup; });
     const std::vector<Channel> added = ShadedChannels::channels(estimates);
     meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());

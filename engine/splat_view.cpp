@@ -96,7 +96,7 @@ class SurfelView : public PrimaryView {
       const PageHeader header = scene.read_page(pages[i], payload, decoder);
       const PointPage points(payload.data(), header.record_count);
       for (std::uint32_t k = 0; k < points.size(); ++k) {
-        project(to_surfel(points[k], scene.superblock().frame), discs[i]);
+        project(to_surfel(points[k], scene.header().frame), discs[i]);
       }
       progress.advance(points.size());
     });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cassert>
 #include <cstddef>
@@ -15,10 +16,14 @@ namespace ptc {
 static_assert(std::endian::native == std::endian::little,
               "numbers are copied as they lie in files");
 
+/// What load() and store() take: numbers, and points of three.
+template <class T>
+inline constexpr bool kIsStored = std::is_arithmetic_v<T> || std::is_same_v<T, std::array<double, 3>>;
+
 /// The number at `at`, which the caller has checked to lie inside.
 template <class T>
 [[nodiscard]] T load(const std::byte* bytes, std::size_t at) noexcept {
-  static_assert(std::is_arithmetic_v<T>);
+  static_assert(kIsStored<T>);
   T value;
   std::memcpy(&value, bytes + at, sizeof value);
   return value;
@@ -26,7 +31,7 @@ template <class T>
 
 template <class T>
 void store(std::byte* bytes, std::size_t at, T value) noexcept {
-  static_assert(std::is_arithmetic_v<T>);
+  static_assert(kIsStored<T>);
   std::memcpy(bytes + at, &value, sizeof value);
 }
 

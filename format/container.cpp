@@ -2,6 +2,9 @@
 #include "format/container.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
 
 #include "format/bytes.h"
 #include "format/checksum.h"
@@ -20,6 +23,9 @@ constexpr std::uint8_t kAlignShift = 9;
 constexpr std::uint16_t kChecksumXxh3 = 1;
 constexpr std::size_t kHeaderHashAt = 120;
 constexpr std::uint64_t kKnownIncompat = 0;
+constexpr std::size_t kOriginAt = 64;
+constexpr std::size_t kEdgeAt = 88;
+constexpr double kGreatestWhole = 0x1p53;  // whole numbers up to here are doubles
 
 void check_constants(const std::byte* p) {
   constexpr char kConstants[] = "spec/container.md#header-constants";
@@ -34,6 +40,21 @@ void check_constants(const std::byte* p) {
   }
   if (load<std::uint32_t>(p, 60) != kByteOrderMark) {
     throw FormatError(60, kConstants, "byte order mark is not 0x01020304");
+  }
+}
+
+void check_frame(const Frame& frame) {
+  constexpr char kFrame[] = "spec/container.md#header-frame";
+  const auto bits = std::bit_cast<std::uint64_t>(frame.edge);
+  const bool power_of_two = (bits & 0x800fffffffffffff) == 0;
+  if (!power_of_two || !(frame.edge >= 0x1p-960) || !(frame.edge <= 0x1p1010)) {
+    throw FormatError(kEdgeAt, kFrame, "edge is not a power of two from 2^-960 to 2^1010");
+  }
+  for (const double origin : frame.origin) {
+    const double steps = origin / frame.unit();
+    if (!(steps >= -kGreatestWhole && steps <= kGreatestWhole - 0x1p42) || std::rint(steps) != steps) {
+      throw FormatError(kOriginAt, kFrame, "origin is not a multiple of the unit, or beyond 2^53 units");
+    }
   }
 }
 
@@ -59,6 +80,8 @@ void encode_identity(const FileHeader& header, std::span<std::byte, kBlockBytes>
   store(p, 57, kAlignShift);
   store(p, 58, kChecksumXxh3);
   store(p, 60, kByteOrderMark);
+  store(p, kOriginAt, header.frame.origin);
+  store(p, kEdgeAt, header.frame.edge);
 }
 
 Block encode_file_header(const FileHeader& header) {
@@ -101,7 +124,9 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
   if (header.page_shift < 12 || header.page_shift > 20) {
     throw FormatError(56, "spec/container.md#header-page-shift", "page_shift is not 12 to 20");
   }
-  check_zero(bytes, 64, kHeaderHashAt);
+  header.frame = {load<std::array<double, 3>>(p, kOriginAt), load<double>(p, kEdgeAt)};
+  check_frame(header.frame);
+  check_zero(bytes, kEdgeAt + 8, kHeaderHashAt);
   check_zero(bytes, kHeaderHashAt + 8, kBlockBytes);
   return header;
 }

@@ -46,6 +46,7 @@ struct FileHeader {
   std::uint64_t feature_compat = 0;     ///< an unknown bit: ignore
   Uuid uuid{};                          ///< salts every page header's checksum
   std::uint8_t page_shift = 16;         ///< page size is 2^page_shift bytes, 12 to 20
+  Frame frame;
 };
 
 /// 64 bytes in front of every page's payload.
@@ -92,7 +93,6 @@ struct Superblock {
   std::uint64_t points = 0;
   std::uint64_t nodes = 0;  ///< children of all groups, the root not counted
   std::uint64_t node_groups = 0;
-  Frame frame;
   std::array<double, 3> bounds_low{};  ///< of the points' positions, discs not counted
   std::array<double, 3> bounds_high{};
   double area = 0;               ///< sum of 2 r^2

@@ -1,6 +1,6 @@
 // The commit record (spec/container.md#superblock).
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -22,18 +22,8 @@ constexpr std::size_t kIdentityAt = 8;  // bytes 8 to 119 are those of the file 
 constexpr std::size_t kIdentityBytes = 112;
 constexpr std::size_t kWriterAt = 328;
 constexpr std::size_t kWriterBytes = 64;
-constexpr std::size_t kReservedAt = kWriterAt + kWriterBytes;
+constexpr std::array<std::array<std::size_t, 2>, 3> kReserved{{{172, 176}, {200, 232}, {kWriterAt + kWriterBytes, kHashAt}}};
 constexpr std::uint64_t kGreatestCount = std::uint64_t{1} << 48;
-constexpr double kExact = 0x1p53;  // whole numbers up to here are doubles
-
-template <std::size_t N>
-void store_doubles(std::byte* p, std::size_t at, const std::array<double, N>& values) noexcept {
-  for (std::size_t i = 0; i < N; ++i) store(p, at + 8 * i, values[i]);
-}
-
-std::array<double, 3> load_doubles(const std::byte* p, std::size_t at) noexcept {
-  return {load<double>(p, at), load<double>(p, at + 8), load<double>(p, at + 16)};
-}
 
 void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
                   std::uint64_t file_bytes) {
@@ -103,21 +93,6 @@ void check_tree(const Superblock& s) {
   }
 }
 
-void check_frame(const Frame& frame) {
-  constexpr char kFrame[] = "spec/container.md#superblock-frame";
-  const auto bits = std::bit_cast<std::uint64_t>(frame.edge);
-  const bool power_of_two = (bits & 0x800fffffffffffff) == 0;
-  if (!power_of_two || !(frame.edge >= 0x1p-960) || !(frame.edge <= 0x1p1010)) {
-    throw FormatError(224, kFrame, "edge is not a power of two from 2^-960 to 2^1010");
-  }
-  for (const double origin : frame.origin) {
-    const double steps = origin / frame.unit();
-    if (!(steps >= -kExact && steps <= kExact - 0x1p42) || std::rint(steps) != steps) {
-      throw FormatError(200, kFrame, "origin is not a multiple of the unit, or beyond 2^53 units");
-    }
-  }
-}
-
 void check_totals(const Superblock& s) {
   constexpr char kTotals[] = "spec/container.md#superblock-totals";
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -169,12 +144,10 @@ Block encode_superblock(const Superblock& s) {
   store(p, 176, s.points);
   store(p, 184, s.nodes);
   store(p, 192, s.node_groups);
-  store_doubles(p, 200, s.frame.origin);
-  store(p, 224, s.frame.edge);
-  store_doubles(p, 232, s.bounds_low);
-  store_doubles(p, 256, s.bounds_high);
+  store(p, 232, s.bounds_low);
+  store(p, 256, s.bounds_high);
   store(p, 280, s.area);
-  store_doubles(p, 288, s.flux);
+  store(p, 288, s.flux);
   store(p, 312, s.content_xxh3[0]);
   store(p, 320, s.content_xxh3[1]);
   std::ranges::copy(std::as_bytes(std::span(s.writer)), p + kWriterAt);
@@ -202,23 +175,19 @@ Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader&
   s.points = load<std::uint64_t>(p, 176);
   s.nodes = load<std::uint64_t>(p, 184);
   s.node_groups = load<std::uint64_t>(p, 192);
-  s.frame = {load_doubles(p, 200), load<double>(p, 224)};
-  s.bounds_low = load_doubles(p, 232);
-  s.bounds_high = load_doubles(p, 256);
+  s.bounds_low = load<std::array<double, 3>>(p, 232);
+  s.bounds_high = load<std::array<double, 3>>(p, 256);
   s.area = load<double>(p, 280);
-  s.flux = load_doubles(p, 288);
+  s.flux = load<std::array<double, 3>>(p, 288);
   s.content_xxh3 = {load<std::uint64_t>(p, 312), load<std::uint64_t>(p, 320)};
   s.writer = decode_writer(bytes);
 
   check_directory(s);
   check_tree(s);
-  check_frame(s.frame);
   check_totals(s);
-  const std::size_t rest =
-      kReservedAt + first_nonzero(bytes.subspan(kReservedAt, kHashAt - kReservedAt));
-  if (load<std::uint32_t>(p, 172) != 0 || rest != kHashAt) {
-    throw FormatError(rest != kHashAt ? rest : 172, "spec/container.md#superblock-zero",
-                      "reserved byte is not zero");
+  for (const auto& [first, last] : kReserved) {
+    const std::size_t found = first + first_nonzero(bytes.subspan(first, last - first));
+    if (found != last) throw FormatError(found, "spec/container.md#superblock-zero", "reserved byte is not zero");
   }
   return s;
 }

@@ -28,7 +28,7 @@ struct Field {
   std::size_t bytes;
 };
 
-constexpr std::array<Field, 13> kHeaderFields{{{0, 8},
+constexpr std::array<Field, 15> kHeaderFields{{{0, 8},
                                                {8, 2},
                                                {10, 2},
                                                {12, 4},
@@ -40,7 +40,9 @@ constexpr std::array<Field, 13> kHeaderFields{{{0, 8},
                                                {57, 1},
                                                {58, 2},
                                                {60, 4},
-                                               {64, 8}}};
+                                               {64, 8},
+                                               {88, 8},
+                                               {96, 8}}};
 constexpr std::array<Field, 14> kPageFields{{{0, 4},
                                              {4, 2},
                                              {6, 1},
@@ -59,10 +61,10 @@ constexpr std::array<Field, 7> kEntryFields{
     {{0, 8}, {8, 4}, {12, 4}, {16, 8}, {24, 2}, {26, 2}, {28, 4}}};
 /// Where a page header repeats the fields of its entry.
 constexpr std::array<std::size_t, 7> kRepeats{0, 12, 16, 48, 4, 20, 24};
-constexpr std::array<Field, 37> kSuperFields{
+constexpr std::array<Field, 34> kSuperFields{
     {{0, 8},   {8, 8},   {56, 1},  {120, 8}, {128, 4}, {132, 4}, {136, 8}, {144, 8},
      {152, 4}, {156, 4}, {160, 2}, {162, 2}, {164, 4}, {168, 4}, {172, 4}, {176, 8},
-     {184, 8}, {192, 8}, {200, 8}, {208, 8}, {216, 8}, {224, 8}, {232, 8}, {240, 8},
+     {184, 8}, {192, 8}, {200, 8}, {232, 8}, {240, 8},
      {248, 8}, {256, 8}, {264, 8}, {272, 8}, {280, 8}, {288, 8}, {296, 8}, {304, 8},
      {312, 8}, {320, 8}, {328, 8}, {384, 8}, {392, 8}}};
 

@@ -175,8 +175,9 @@ void container(ByteSource& from) {
   const auto path = fuzz::MemoryFile::directory() / "a.ptcx";
   Progress silent;
   Stream stream(points);
+  options.frame = frame;
   ContainerWriter writer(path, options);
-  const Superblock superblock = build_pages(stream, frame, writer, build, silent);
+  const Superblock superblock = build_pages(stream, writer, build, silent);
   write_attributes(from, writer, meta, points.size(), attributes);
   const Superblock written = writer.finish(meta, superblock);
 

@@ -54,13 +54,24 @@ def round_up(n, unit):
 
 FILE_MAGIC = bytes.fromhex("89505443 0d0a1a0a")
 HEADER_SEED = int.from_bytes(b"PTCXHEAD", "little")
-HEADER = struct.Struct("<8sHHIQQQ16sBBHI56sQ")
+HEADER = struct.Struct("<8sHHIQQQ16sBBHI3dd24sQ")
 
-Header = namedtuple("Header", "identity major minor uuid page_shift")
+Header = namedtuple("Header", "identity major minor uuid page_shift origin edge")
 
 
 def page_size(header):
     return 1 << header.page_shift
+
+
+def check_frame_of(origin, edge):  # morton.md#frame
+    clause = "spec/container.md#header-frame"
+    require(edge > 0 and math.frexp(edge)[0] == 0.5 and 2.0 ** -960 <= edge <= 2.0 ** 1010, 88,
+            clause, "edge is not a power of two in range")
+    unit = edge * 2.0 ** -42
+    for x in origin:
+        steps = x / unit
+        require(-2.0 ** 53 <= steps <= 2.0 ** 53 - 2.0 ** 42 and steps == math.floor(steps), 64,
+                clause, "origin is not a multiple of the unit in range")
 
 
 def decode_header(block):
@@ -68,7 +79,7 @@ def decode_header(block):
     require(len(block) == BLOCK, len(block), "spec/container.md#header-length",
             "file ends in its header")
     (_, major, minor, header_bytes, incompat, _, _, uuid, page_shift, align_shift, checksum,
-     byte_order, reserved, found) = HEADER.unpack_from(block)
+     byte_order, x, y, z, edge, reserved, found) = HEADER.unpack_from(block)
     require(found == xxh3_64(block[:120], HEADER_SEED), 120, "spec/container.md#header-checksum",
             "file header's checksum is wrong")
     require(major == 1, 8, "spec/container.md#header-version", f"version {major} is not supported")
@@ -77,9 +88,10 @@ def decode_header(block):
             "spec/container.md#header-constants", "a constant has another value")
     require(12 <= page_shift <= 20, 56, "spec/container.md#header-page-shift",
             "page_shift is not 12 to 20")
-    require(not any(reserved) and not any(block[128:]), 64, "spec/container.md#header-zero",
+    check_frame_of((x, y, z), edge)
+    require(not any(reserved) and not any(block[128:]), 96, "spec/container.md#header-zero",
             "a reserved byte is not zero")
-    return Header(block[8:120], major, minor, uuid, page_shift)
+    return Header(block[8:120], major, minor, uuid, page_shift, (x, y, z), edge)
 
 
 # Page header (container.md#page-header) ----------------------------------------------------------
@@ -261,19 +273,18 @@ def decode_entry(header, bytes_, file_bytes, at):
 
 SUPER_MAGIC = b"PTCXSUPR"
 SUPER_SEED = int.from_bytes(SUPER_MAGIC, "little")
-SUPER = struct.Struct("<8s112sQIIQQIIHHIIIQQQ3dd3d3dd3d2Q64s3696sQ")
+SUPER = struct.Struct("<8s112sQIIQQIIHHIIIQQQ32s3d3dd3d2Q64s3696sQ")
 
 Superblock = namedtuple(
     "Superblock", "magic identity file_bytes page_count directory_pages directory_offset "
     "directory_xxh3 meta_page root_page root_slot levels leaf_points points_per_page reserved "
-    "points nodes node_groups origin edge bounds_low bounds_high area flux content_xxh3 writer "
+    "points nodes node_groups middle bounds_low bounds_high area flux content_xxh3 writer "
     "rest xxh3")
 
 
 def unpack_superblock(block):
     f = SUPER.unpack(block)
-    return Superblock(*f[:17], f[17:20], f[20], f[21:24], f[24:27], f[27], f[28:31], f[31:33],
-                      *f[33:])
+    return Superblock(*f[:18], f[18:21], f[21:24], f[24], f[25:28], f[28:30], *f[30:])
 
 
 def is_text(bytes_):
@@ -281,17 +292,6 @@ def is_text(bytes_):
         return "\0" not in bytes_.decode("utf-8")
     except UnicodeDecodeError:
         return False
-
-
-def check_frame_of(s, at):  # morton.md#frame
-    clause = "spec/container.md#superblock-frame"
-    require(s.edge > 0 and math.frexp(s.edge)[0] == 0.5 and 2.0 ** -960 <= s.edge <= 2.0 ** 1010,
-            at + 224, clause, "edge is not a power of two in range")
-    unit = s.edge * 2.0 ** -42
-    for x in s.origin:
-        steps = x / unit
-        require(-2.0 ** 53 <= steps <= 2.0 ** 53 - 2.0 ** 42 and steps == math.floor(steps),
-                at + 200, clause, "origin is not a multiple of the unit in range")
 
 
 def check_counts(header, s, at):
@@ -330,7 +330,6 @@ def decode_superblock(header, block, file_bytes, at):
             == file_bytes - 2 * BLOCK, at + 136, pages, "directory does not end at superblock A")
     require(s.meta_page < s.page_count, at + 152, pages, "meta_page is no page")
     check_counts(header, s, at)
-    check_frame_of(s, at)
     totals = "spec/container.md#superblock-totals"
     require(all(map(math.isfinite, s.bounds_low + s.bounds_high))
             and all(a <= b for a, b in zip(s.bounds_low, s.bounds_high)), at + 232, totals,
@@ -340,7 +339,7 @@ def decode_superblock(header, block, file_bytes, at):
     text, _, rest = s.writer.partition(b"\0")
     require(len(text) < 64 and is_text(text) and not any(rest), at + 328,
             "spec/container.md#superblock-writer", "writer is not text followed by zeros")
-    require(s.reserved == 0 and not any(s.rest), at + 172, "spec/container.md#superblock-zero",
+    require(s.reserved == 0 and not any(s.middle) and not any(s.rest), at + 172, "spec/container.md#superblock-zero",
             "a reserved byte is not zero")
     return s
 
@@ -358,9 +357,9 @@ def interleave(x, y, z):
             | s[x & m] | s[y & m] << 1 | s[z & m] << 2)
 
 
-def to_position(s, q):
-    unit = s.edge * 2.0 ** -42
-    return tuple(o + c * unit for o, c in zip(s.origin, q))
+def to_position(header, q):
+    unit = header.edge * 2.0 ** -42
+    return tuple(o + c * unit for o, c in zip(header.origin, q))
 
 
 # Points (points.md) ------------------------------------------------------------------------------

@@ -136,7 +136,7 @@ class Draft:
         self.origin, self.edge, self.unit = origin, edge, edge * 2 ** -42
         self.head = {"major": 1, "minor": 0, "header_bytes": 4096, "incompat": 0, "ro_compat": 0,
                      "compat": 0, "uuid": UUID, "page_shift": page_shift, "align_shift": 9,
-                     "checksum": 1, "byte_order": 0x01020304, "reserved": bytes(56)}
+                     "checksum": 1, "byte_order": 0x01020304, "origin": origin, "edge": edge, "reserved": bytes(24)}
         self.pages, self.super, self.super_b, self.directory = [], {}, {}, {}
         self.lie = sorted  # page numbers to the order in which the pages lie in the file
         self.patches = []  # (offset from the start, or from the end when negative, bytes)
@@ -223,9 +223,10 @@ class Draft:
 
     def identity(self):
         h = self.head
-        return struct.pack("<HHIQQQ16sBBHI56s", h["major"], h["minor"], h["header_bytes"],
+        return struct.pack("<HHIQQQ16sBBHI3dd24s", h["major"], h["minor"], h["header_bytes"],
                            h["incompat"], h["ro_compat"], h["compat"], h["uuid"], h["page_shift"],
-                           h["align_shift"], h["checksum"], h["byte_order"], h["reserved"])
+                           h["align_shift"], h["checksum"], h["byte_order"],
+                           *h["origin"], h["edge"], h["reserved"])
 
     def page_image(self, page, fields, stored):
         names = ("type", "codec", "filter", "page_id", "stored_bytes", "raw_bytes", "group", "level",
@@ -249,10 +250,10 @@ class Draft:
     def superblock(self, facts, overrides):
         f = {**facts, **overrides}
         body = r.SUPER_MAGIC + f["identity"] + struct.pack(
-            "<QIIQQIIHHIIIQQQ3dd3d3dd3d2Q64s3696s", f["file_bytes"], f["page_count"],
+            "<QIIQQIIHHIIIQQQ32s3d3dd3d2Q64s3696s", f["file_bytes"], f["page_count"],
             f["directory_pages"], f["directory_offset"], f["directory_xxh3"], f["meta_page"],
             f["root_page"], f["root_slot"], f["levels"], f["leaf_points"], f["points_per_page"],
-            f["reserved"], f["points"], f["nodes"], f["node_groups"], *f["origin"], f["edge"],
+            f["reserved"], f["points"], f["nodes"], f["node_groups"], f["middle"],
             *f["bounds_low"], *f["bounds_high"], f["area"], *f["flux"], *f["content_xxh3"],
             f["writer"], f["rest"])
         return body + struct.pack("<Q", xxh3_64(body, r.SUPER_SEED))
@@ -266,7 +267,7 @@ class Draft:
                 "leaf_points": self.leaf_points, "reserved": 0, "rest": bytes(3696),
                 "points_per_page": ((1 << self.page_shift) - 64) // 34 // 8 * 8,
                 "points": len(self.surfels), "nodes": sum(len(g[2]) for g in groups),
-                "node_groups": len(groups), "origin": self.origin, "edge": self.edge,
+                "node_groups": len(groups), "middle": bytes(32),
                 "writer": b"spec/vectors.py", **self.totals()}
 
     def to_bytes(self):

@@ -33,7 +33,15 @@ def bad_header():
     yield "container-header-page-shift", Draft(page_shift=11)
     yield "container-header-page-shift.above", Draft(page_shift=21)
     yield "container-header-page-shift.greatest", head(page_shift=255)
-    yield "container-header-zero", head(reserved=b"\1" + bytes(55))
+    frame = "container-header-frame"
+    yield frame, head(edge=3.0)
+    yield frame + ".negative", head(edge=-4.0)
+    yield frame + ".zero", head(edge=0.0)
+    yield frame + ".nan", head(edge=NAN)
+    yield frame + ".far-below", head(origin=(-2.0 ** 33 - 1, 0.0, 0.0))
+    yield frame + ".origin", head(origin=(2.0 ** -21, 0.0, 0.0))
+    yield frame + ".far", head(origin=(0.0, 2.0 ** 34, 0.0))
+    yield "container-header-zero", head(reserved=b"\1" + bytes(23))
     yield "container-header-zero.rest", patch(4095, b"\1")
 
 
@@ -184,7 +192,7 @@ def bad_superblock():
     yield pages + ".directory-pages", with_(directory_pages=2)
     many = {"page_count": r.NO_PAGE - 1, "directory_pages": (r.NO_PAGE - 2) // 126 + 1}
     yield pages + ".greatest", with_(**many)
-    bytes_ = r.directory_bytes(r.Header(b"", 1, 0, UUID, 12), r.NO_PAGE - 1)
+    bytes_ = r.directory_bytes(r.Header(b"", 1, 0, UUID, 12, (0.0,) * 3, 1.0), r.NO_PAGE - 1)
     yield pages + ".wraps", with_(**many, directory_offset=directory_at() + r.BLOCK - bytes_
                                   & (1 << 64) - 1)
     root = "container-superblock-root"
@@ -200,14 +208,6 @@ def bad_superblock():
     yield counts + ".groups-above", with_(node_groups=1 << 61, nodes=1 << 48)
     yield counts + ".leaf-points", with_(leaf_points=0)
     yield counts + ".points-per-page", with_(points_per_page=0)
-    frame = "container-superblock-frame"
-    yield frame, with_(edge=3.0)
-    yield frame + ".negative", with_(edge=-4.0)
-    yield frame + ".zero", with_(edge=0.0)
-    yield frame + ".nan", with_(edge=NAN)
-    yield frame + ".far-below", with_(origin=(-2.0 ** 33 - 1, 0.0, 0.0))
-    yield frame + ".origin", with_(origin=(2.0 ** -21, 0.0, 0.0))
-    yield frame + ".far", with_(origin=(0.0, 2.0 ** 34, 0.0))
     totals = "container-superblock-totals"
     yield totals, with_(area=NAN)
     yield totals + ".flux", with_(flux=(0.0, -1.0, 0.0))
@@ -218,6 +218,7 @@ def bad_superblock():
     yield "container-superblock-writer.unended", with_(writer=b"x" * 64)
     yield "container-superblock-zero", with_(rest=b"\1" + bytes(3695))
     yield "container-superblock-zero.field", with_(reserved=1)
+    yield "container-superblock-zero.middle", with_(middle=b"\1" + bytes(31))
     yield "container-meta-page", with_(meta_page=0)
     two = one_point()
     two.pages.insert(0, Page(r.META, encode_meta(), 1))

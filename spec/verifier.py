@@ -123,8 +123,8 @@ class Verifier:
         for said, sum_ in zip((s.area, *s.flux), found):
             require(math.isclose(said, sum_, rel_tol=1e-6, abs_tol=0), tail, clause,
                     f"superblock's {said} is not the sum {sum_}")
-        low = to_position(s, self.low) if s.points else (0, 0, 0)
-        high = to_position(s, self.high) if s.points else (0, 0, 0)
+        low = to_position(self.c.header, self.low) if s.points else (0, 0, 0)
+        high = to_position(self.c.header, self.high) if s.points else (0, 0, 0)
         require((s.bounds_low, s.bounds_high) == (low, high), tail, clause,
                 "bounds are not those of the points")
 

@@ -97,7 +97,7 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   facts["channels"] = channels_of(container.meta());
   facts["leaf_points"] = superblock.leaf_points;
   facts["points_per_page"] = superblock.points_per_page;
-  facts["frame"] = {{"origin", superblock.frame.origin}, {"edge", superblock.frame.edge}};
+  facts["frame"] = {{"origin", superblock.header.frame.origin}, {"edge", superblock.header.frame.edge}};
   facts["area"] = superblock.area;
   facts["flux"] = superblock.flux;
   facts["uuid"] = hex(container.header().uuid);

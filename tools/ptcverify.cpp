@@ -74,23 +74,29 @@ std::string verdict_text(const std::string& name, const ptc::VerifyReport& repor
 }
 
 ordered_json facts_of(const ptc::SalvageReport& kept) {
+  const auto or_null = [](const auto& value) { return value ? ordered_json(*value) : ordered_json(); };
   return {{"points", kept.points},
-          {"points_before", kept.points_before},
+          {"points_before", or_null(kept.points_before)},
           {"point_pages", kept.point_pages},
           {"point_pages_before", kept.point_pages_before},
           {"attribute_pages", kept.attribute_pages},
           {"attribute_pages_before", kept.attribute_pages_before},
           {"meta", kept.meta},
-          {"area_share", kept.area_share},
-          {"energy_share", kept.flux_share}};
+          {"area_share", or_null(kept.area_share)},
+          {"energy_share", or_null(kept.flux_share)}};
 }
 
 std::string salvage_text(const std::string& name, const ptc::SalvageReport& kept) {
   const auto of = [](std::uint64_t part, std::uint64_t whole) { return fmt::format("{} of {}", part, whole); };
-  std::string text = fmt::format("{}: salvaged {} points ({:.2f} %), {:.2f} % of area and {:.2f} % of energy", name,
-                                 of(kept.points, kept.points_before),
-                                 100.0 * static_cast<double>(kept.points) / static_cast<double>(std::max<std::uint64_t>(1, kept.points_before)),
-                                 100 * kept.area_share, 100 * kept.flux_share);
+  std::string text = fmt::format("{}: salvaged ", name);
+  if (const auto before = kept.points_before) {
+    const double share = static_cast<double>(kept.points) / static_cast<double>(std::max<std::uint64_t>(1, *before));
+    text += fmt::format("{} points ({:.2f} %), {:.2f} % of area and {:.2f} % of energy", of(kept.points, *before), 100 * share,
+                        100 * *kept.area_share, 100 * *kept.flux_share);
+  } else {
+    text += fmt::format("{} points in {} pages; how many there were is not known", kept.points,
+                        of(kept.point_pages, kept.point_pages_before));
+  }
   if (kept.attribute_pages_before > 0) text += fmt::format(", {} pages of channels", of(kept.attribute_pages, kept.attribute_pages_before));
   return text + (kept.meta ? "\n" : "; names of channels and texts are lost\n");
 }

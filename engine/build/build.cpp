@@ -87,9 +87,9 @@ void write_point_page(ContainerWriter& writer, std::span<const PointRecord> poin
                     encode_point_page(points));
 }
 
-void include(Superblock& superblock, std::span<const PointRecord> points, bool first) {
+void include(Superblock& superblock, const Frame& frame, std::span<const PointRecord> points, bool first) {
   for (const PointRecord& point : points) {
-    const std::array<double, 3> at = superblock.frame.to_position(decode_morton(point.key));
+    const std::array<double, 3> at = frame.to_position(decode_morton(point.key));
     for (std::size_t k = 0; k < 3; ++k) {
       superblock.bounds_low[k] = first ? at[k] : std::min(superblock.bounds_low[k], at[k]);
       superblock.bounds_high[k] = first ? at[k] : std::max(superblock.bounds_high[k], at[k]);
@@ -116,10 +116,10 @@ std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
 
 }  // namespace
 
-Superblock build_pages(PointStream& points, const Frame& frame, ContainerWriter& writer,
+Superblock build_pages(PointStream& points, ContainerWriter& writer,
                        const BuildOptions& options, Progress& progress) {
+  const Frame& frame = writer.header().frame;
   Superblock superblock;
-  superblock.frame = frame;
   superblock.leaf_points = options.leaf_points;
   superblock.points_per_page = points_per_page(writer.header());
 
@@ -128,7 +128,7 @@ Superblock build_pages(PointStream& points, const Frame& frame, ContainerWriter&
   std::vector<PointRecord> block(superblock.points_per_page);
   while (const std::size_t count = read_full(points, block)) {
     const std::span<const PointRecord> page = std::span(block).first(count);
-    include(superblock, page, superblock.points == 0);
+    include(superblock, frame, page, superblock.points == 0);
     superblock.points += count;
     write_point_page(writer, page);
     for (const PointRecord& point : page) octree.add(point);

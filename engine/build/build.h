@@ -17,10 +17,10 @@ struct BuildOptions {
 };
 
 /// Writes the pages of all points and nodes in one pass.
-/// @param points  ascending keys in `frame`'s lattice
-/// @return  the superblock for ContainerWriter::finish(), its counts, frame, bounds and totals filled
+/// @param points  ascending keys in the lattice of the writer's frame
+/// @return  the superblock for ContainerWriter::finish(), its counts, bounds and totals filled
 /// Memory: one open page per stream, a page of points.   Deterministic.
-[[nodiscard]] Superblock build_pages(PointStream& points, const Frame& frame, ContainerWriter& writer,
+[[nodiscard]] Superblock build_pages(PointStream& points, ContainerWriter& writer,
                                      const BuildOptions& options, Progress& progress);
 
 }  // namespace ptc

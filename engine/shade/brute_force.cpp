@@ -30,7 +30,7 @@ void append_surfels(const ContainerReader& container, std::span<const std::uint3
   for (const std::uint32_t page : pages) {
     const PageHeader header = container.read_page(page, payload, decoder);
     const PointPage points(payload.data(), header.record_count);
-    for (std::uint32_t i = 0; i < points.size(); ++i) surfels.push_back(to_surfel(points[i], container.superblock().frame));
+    for (std::uint32_t i = 0; i < points.size(); ++i) surfels.push_back(to_surfel(points[i], container.header().frame));
   }
 }
 

@@ -6,7 +6,7 @@ namespace ptc {
 
 SceneView::SceneView(const ContainerReader& container)
     : container_(&container),
-      frame_(container.superblock().frame),
+      frame_(container.header().frame),
       points_(container.superblock().points),
       groups_(container.superblock().node_groups),
       points_per_page_(container.superblock().points_per_page) {

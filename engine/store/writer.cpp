@@ -24,14 +24,6 @@ void require(bool holds, const char* text) {
   if (!holds) throw std::invalid_argument(std::string("container writer: ") + text);
 }
 
-FileHeader make_header(const WriterOptions& options) {
-  require(options.page_shift >= 12 && options.page_shift <= 20, "page_shift is not 12 to 20");
-  FileHeader header;
-  header.uuid = options.uuid;
-  header.page_shift = options.page_shift;
-  return header;
-}
-
 /// Runs a reader's check on what is about to be written: what fails it is the caller's mistake.
 template <class Check>
 void refuse_what_readers_refuse(Check&& check) {
@@ -40,6 +32,15 @@ void refuse_what_readers_refuse(Check&& check) {
   } catch (const FormatError& error) {
     throw std::invalid_argument(std::string("container writer: ") + error.what());
   }
+}
+
+FileHeader make_header(const WriterOptions& options) {
+  FileHeader header;
+  header.uuid = options.uuid;
+  header.page_shift = options.page_shift;
+  header.frame = options.frame;
+  refuse_what_readers_refuse([&] { static_cast<void>(decode_file_header(encode_file_header(header))); });
+  return header;
 }
 
 }  // namespace

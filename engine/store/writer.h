@@ -19,6 +19,7 @@ struct WriterOptions {
   Codec codec = Codec::zstd;
   int level = 1;  ///< of zstd, clamped to its range
   Uuid uuid{};
+  Frame frame;
 };
 
 /// What superblocks say of who wrote them, unless they are told otherwise: program and version.
@@ -34,7 +35,7 @@ struct WriterOptions {
 /// Memory: 32 bytes a page, 80 in finish().   Threads: one at a time.
 class ContainerWriter {
  public:
-  /// @throws std::invalid_argument when page_shift is not 12 to 20
+  /// @throws std::invalid_argument when page_shift is not 12 to 20 or the frame breaks a rule of spec/morton.md#frame
   ContainerWriter(const std::filesystem::path& target, const WriterOptions& options);
   ~ContainerWriter();
 
@@ -61,7 +62,7 @@ class ContainerWriter {
                          std::uint32_t raw_bytes, std::span<const std::byte> stored);
 
   /// Meta page, directory, superblocks; syncs and publishes under the target's name.
-  /// @param superblock  counts, frame, bounds, totals and root; the rest is filled in here, the
+  /// @param superblock  counts, bounds, totals and root; the rest is filled in here, the
   /// writer's name when it is empty
   /// @return  the superblock as it was written
   Superblock finish(const Meta& meta, Superblock superblock);

@@ -72,7 +72,7 @@ void PointRuns::add(std::uint64_t number, const PointRecord& point) {
     report_.page(page_, kPageHeaderBytes, kOrder, fmt::format("key of point {} is below the one before", number));
   }
   last_ = point.key;
-  const std::array<double, 3> at = container_.superblock().frame.to_position(decode_morton(point.key));
+  const std::array<double, 3> at = container_.header().frame.to_position(decode_morton(point.key));
   const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
   area_ += area;
   for (std::size_t k = 0; k < 3; ++k) {

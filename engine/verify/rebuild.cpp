@@ -137,7 +137,7 @@ std::array<std::uint64_t, 2> compare_rebuilt(const ContainerReader& container, s
                                              Findings& findings, Progress& progress) {
   const Superblock& s = container.superblock();
   Comparison comparison(container, cached_pages, findings);
-  OctreeBuilder builder(comparison, std::max(1U, s.leaf_points), s.frame.unit());
+  OctreeBuilder builder(comparison, std::max(1U, s.leaf_points), s.header.frame.unit());
   ContainerPoints points(container);
   std::vector<PointRecord> block(kBlock);
   while (const std::size_t count = points.next(block)) {

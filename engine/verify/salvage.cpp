@@ -8,6 +8,7 @@
 #include <cstring>
 #include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 #include <vector>
@@ -90,7 +91,6 @@ class Salvage {
   void require_what_it_takes() const {
     if (!survey_.header) refuse("spec/recovery.md#survey", "neither the header nor a superblock is whole: no page proves that it is of this file");
     if (survey_.header->feature_ro_compat != 0) refuse("spec/versions.md#features", "the file uses a feature that forbids to repair it");
-    if (!survey_.superblock) refuse("spec/recovery.md#survey", "no superblock is whole: the frame is lost, and points have no place without it");
     const std::uint64_t page = std::uint64_t{1} << survey_.header->page_shift;
     const std::uint64_t least = kBaseBytes + 140 * survey_.sites.size() + kPagesOpen * page;
     if (options_.memory_bytes < least) {
@@ -144,9 +144,11 @@ class Salvage {
 
   /// The k-th attribute page of a group lies beside the k-th point page, when none is missing.
   void rank_pages() {
-    const Superblock& s = *survey_.superblock;
-    const std::uint64_t per_page = points_per_page(s.header);
-    const std::uint64_t pages = (s.points + per_page - 1) / per_page;
+    const std::optional<Superblock>& s = survey_.superblock;
+    const std::uint64_t per_page = points_per_page(*survey_.header);
+    const std::uint64_t pages = s ? (s->points + per_page - 1) / per_page : point_sites_.size();
+    // Where some are not even known, ranks say nothing.
+    const bool all_known = s ? point_sites_.size() == pages : no_number_is_missing();
     std::uint64_t k = 0, last_key = 0;
     for (const auto& [number, page] : point_sites_) {
       const std::uint64_t rank = k++;
@@ -156,12 +158,11 @@ class Salvage {
     }
     report_.point_pages_before = pages;
     report_.point_pages = points_.size();
-    report_.points_before = s.points;
+    if (s) report_.points_before = s->points;
     for (auto& [group, kept] : by_group_) {
       report_.attribute_pages_before += pages;
       const auto found = attribute_sites_.find(group);
-      // Where some are not even known, ranks say nothing.
-      if (point_sites_.size() != pages || found == attribute_sites_.end() || found->second.size() != pages) continue;
+      if (!all_known || found == attribute_sites_.end() || found->second.size() != pages) continue;
       k = 0;
       for (const auto& [number, page] : found->second) {
         const std::uint64_t rank = k++;
@@ -172,6 +173,13 @@ class Salvage {
         ++report_.attribute_pages;
       }
     }
+  }
+
+  /// Of the pages that a scan found: then it found those between them, too.
+  [[nodiscard]] bool no_number_is_missing() const {
+    std::set<std::uint32_t> numbers;
+    for (const PageSite& site : survey_.sites) numbers.insert(site.page);
+    return !numbers.empty() && *numbers.rbegin() == numbers.size() - 1;
   }
 
   /// The meta page once more: a flipped bit in it is no loss.
@@ -188,23 +196,26 @@ class Salvage {
   }
 
   void write(const std::filesystem::path& target) {
-    const Superblock& before = *survey_.superblock;
-    ContainerWriter writer(target, {.page_shift = survey_.header->page_shift, .codec = codec(), .uuid = new_uuid()});
-    const BuildOptions tree{.leaf_points = std::max(1U, before.leaf_points)};
+    const std::optional<Superblock>& before = survey_.superblock;
+    ContainerWriter writer(target, {.page_shift = survey_.header->page_shift, .codec = codec(), .uuid = new_uuid(), .frame = survey_.header->frame});
+    BuildOptions tree;
+    if (before) tree.leaf_points = std::max(1U, before->leaf_points);
     KeptPoints points(*page_, flips_, points_);
-    progress_.begin("build", before.points, "points");
-    Superblock after = build_pages(points, before.frame, writer, tree, progress_);
+    progress_.begin("build", points_.size() * points_per_page(*survey_.header), "points");
+    Superblock after = build_pages(points, writer, tree, progress_);
     progress_.end();
     for (const auto& [group, kept] : by_group_) write_channels(writer, group, kept, after.points);
     Meta meta = survey_.meta;
-    meta.text.insert_or_assign("salvaged", fmt::format("{} of {} points, {} of {} pages of channels", after.points, before.points,
+    meta.text.insert_or_assign("salvaged", fmt::format("{} of {} points, {} of {} pages of channels", after.points,
+                                                       before ? std::to_string(before->points) : "an unknown number of",
                                                        report_.attribute_pages, report_.attribute_pages_before));
     report_.superblock = writer.finish(meta, std::move(after));
     report_.points = report_.superblock.points;
     const auto share = [](double part, double whole) { return whole > 0 ? part / whole : 1.0; };
     const auto flux = [](const Superblock& s) { return s.flux[0] + s.flux[1] + s.flux[2]; };
-    report_.area_share = share(report_.superblock.area, before.area);
-    report_.flux_share = share(flux(report_.superblock), flux(before));
+    if (!before) return;
+    report_.area_share = share(report_.superblock.area, before->area);
+    report_.flux_share = share(flux(report_.superblock), flux(*before));
   }
 
   void write_channels(ContainerWriter& writer, std::uint16_t group, const std::map<std::uint64_t, const PageSite*>& kept,

@@ -239,7 +239,7 @@ class TreeWalk {
       check_one_octant(open, *points);
     }
     const NodeSummary& stored = open.group.children[open.next].node;
-    const double unit = superblock_.frame.unit();
+    const double unit = superblock_.header.frame.unit();
     auto wrong = check_bounds(stored, *points, unit);
     if (wrong) child_fault(wrong->clause, wrong->text);
     close_child(open, summarise_points(*points, unit), points->size(), !wrong);

@@ -42,10 +42,10 @@ TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
   const TemporaryDirectory dir;
   const SortedScene scene = sort_scene(random_surfels(5000, 8));
   const auto write = [&](const std::string& name, std::size_t block) {
-    ContainerWriter writer(dir / name, {.page_shift = 12});
+    ContainerWriter writer(dir / name, {.page_shift = 12, .frame = scene.frame});
     VectorStream stream(scene.records, block);
     Progress silent;
-    writer.finish({}, build_pages(stream, scene.frame, writer, {}, silent));
+    writer.finish({}, build_pages(stream, writer, {}, silent));
   };
   write("one.ptcx", 1);
   write("all.ptcx", 5000);

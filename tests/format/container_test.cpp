@@ -3,6 +3,7 @@
 #include "format/container.h"
 
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "format/checksum.h"
 #include "format/point_page.h"
@@ -18,6 +19,8 @@ using EntryBytes = std::array<std::byte, kDirectoryEntryBytes>;
 
 namespace {
 
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t kHeaderSeed = 0x4441454858435450;  // "PTCXHEAD"
 
 FileHeader example_file() {
@@ -27,6 +30,7 @@ FileHeader example_file() {
   header.feature_ro_compat = 1ull << 63;
   header.feature_compat = 0xff00;
   header.page_shift = 12;
+  header.frame = {{-4, 2, 0}, 8};
   return header;
 }
 
@@ -106,6 +110,8 @@ TEST_CASE("file header: it comes back", "[format][container]") {
   CHECK(back.feature_compat == header.feature_compat);
   CHECK(back.uuid == header.uuid);
   CHECK(back.page_shift == 12);
+  CHECK(back.frame.origin == header.frame.origin);
+  CHECK(back.frame.edge == 8);
 }
 
 TEST_CASE("file header: its bytes lie where the spec says", "[format][container]") {
@@ -122,6 +128,10 @@ TEST_CASE("file header: its bytes lie where the spec says", "[format][container]
   CHECK(get<std::uint8_t>(block, 57) == 9);
   CHECK(get<std::uint16_t>(block, 58) == 1);
   CHECK(get<std::uint32_t>(block, 60) == 0x01020304);
+  CHECK(get<double>(block, 64) == -4);
+  CHECK(get<double>(block, 72) == 2);
+  CHECK(get<double>(block, 80) == 0);
+  CHECK(get<double>(block, 88) == 8);
 }
 
 TEST_CASE("file header: every truncation and every flipped bit is refused", "[format][container]") {
@@ -164,10 +174,33 @@ TEST_CASE("file header: a broken rule is named, checksum right or not", "[format
   CHECK(resealed_header(57, std::uint8_t{13}) == "spec/container.md#header-constants");
   CHECK(resealed_header(58, std::uint16_t{2}) == "spec/container.md#header-constants");
   CHECK(resealed_header(60, std::uint32_t{0x04030201}) == "spec/container.md#header-constants");
-  CHECK(resealed_header(64, 'x') == "spec/container.md#header-zero");
+  CHECK(resealed_header(96, 'x') == "spec/container.md#header-zero");
   CHECK(resealed_header(119, 'x') == "spec/container.md#header-zero");
   CHECK(resealed_header(128, 'x') == "spec/container.md#header-zero");
   CHECK(resealed_header(4095, 'x') == "spec/container.md#header-zero");
+}
+
+TEST_CASE("file header: a frame is exact in doubles", "[format][container]") {
+  constexpr char kFrame[] = "spec/container.md#header-frame";
+  const auto edge = [](double e) { return resealed_header(88, e); };
+  for (const double bad : {0.0, -8.0, 7.0, 0x1p-961, 0x1p1011, kNan, kInfinity, 5e-324}) {
+    CHECK(edge(bad) == kFrame);
+  }
+  const auto origin = [](double x, double e) {
+    FileHeader header = example_file();
+    header.frame = {{x, 0, 0}, e};
+    return header_clause(encode_file_header(header));
+  };
+  CHECK(origin(0x1p-42, 1) == "none");
+  CHECK(origin(-0x1p11, 1) == "none");
+  CHECK(origin(0x1p11 - 1, 1) == "none");
+  CHECK(origin(0, 0x1p1010) == "none");
+  CHECK(origin(0, 0x1p-960) == "none");
+  CHECK(origin(0x1p-43, 1) == kFrame);
+  CHECK(origin(0x1p11, 1) == kFrame);
+  CHECK(origin(-0x1.0000000000001p11, 1) == kFrame);
+  CHECK(origin(kNan, 1) == kFrame);
+  CHECK(origin(-kInfinity, 1) == kFrame);
 }
 
 TEST_CASE("page header: it comes back", "[format][container]") {

@@ -36,7 +36,6 @@ Superblock example() {
   s.points = 10000;
   s.nodes = 4000;
   s.node_groups = 900;
-  s.frame = {{-4, 2, 0}, 8};
   s.bounds_low = {-3.5, 2.25, 0};
   s.bounds_high = {3.5, 9, 0};
   s.area = 12.5;
@@ -79,7 +78,6 @@ TEST_CASE("superblock: it comes back", "[format][superblock]") {
   CHECK(back.root_slot == 7);
   CHECK(back.levels == 63);
   CHECK(back.points == 10000);
-  CHECK(back.frame.origin == s.frame.origin);
   CHECK(back.bounds_high == s.bounds_high);
   CHECK(back.flux == s.flux);
   CHECK(back.content_xxh3 == s.content_xxh3);
@@ -180,27 +178,6 @@ TEST_CASE("superblock: root and counts agree with each other", "[format][superbl
           empty(s);
           s.levels = 1;
         }) == kRoot);
-}
-
-TEST_CASE("superblock: a frame is exact in doubles", "[format][superblock]") {
-  constexpr char kFrame[] = "spec/container.md#superblock-frame";
-  const auto edge = [](double e) { return changed([=](Superblock& s) { s.frame.edge = e; }); };
-  for (const double bad : {0.0, -8.0, 7.0, 0x1p-961, 0x1p1011, kNan, kInfinity, 5e-324}) {
-    CHECK(edge(bad) == kFrame);
-  }
-  const auto origin = [](double x, double e) {
-    return changed([=](Superblock& s) { s.frame = {{x, 0, 0}, e}; });
-  };
-  CHECK(origin(0x1p-42, 1) == "none");
-  CHECK(origin(-0x1p11, 1) == "none");
-  CHECK(origin(0x1p11 - 1, 1) == "none");
-  CHECK(origin(0, 0x1p1010) == "none");
-  CHECK(origin(0, 0x1p-960) == "none");
-  CHECK(origin(0x1p-43, 1) == kFrame);
-  CHECK(origin(0x1p11, 1) == kFrame);
-  CHECK(origin(-0x1.0000000000001p11, 1) == kFrame);
-  CHECK(origin(kNan, 1) == kFrame);
-  CHECK(origin(-kInfinity, 1) == kFrame);
 }
 
 TEST_CASE("superblock: totals are finite, bounds ordered", "[format][superblock]") {

@@ -74,7 +74,7 @@ std::vector<Receiver> all_points(const ContainerReader& scene) {
   std::vector<PointRecord> records(scene.superblock().points);
   ContainerPoints(scene).next(records);
   std::vector<Receiver> receivers;
-  for (const PointRecord& r : records) receivers.push_back(lifted(to_surfel(r, scene.superblock().frame), 0.15F));
+  for (const PointRecord& r : records) receivers.push_back(lifted(to_surfel(r, scene.header().frame), 0.15F));
   return receivers;
 }
 

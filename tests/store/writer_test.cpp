@@ -194,7 +194,6 @@ TEST_CASE("writer: a superblock that the pages belie is refused", "[store][write
   refused([](Superblock& s, Meta&) { s.nodes = s.node_groups * 8 + 1; });
   refused([](Superblock& s, Meta&) { s.root_page = 0; });
   refused([](Superblock& s, Meta&) { s.root_slot = 1; });
-  refused([](Superblock& s, Meta&) { s.frame.edge = 3; });
   refused([](Superblock&, Meta& m) { m.channels.pop_back(); });
   refused([](Superblock&, Meta& m) { m.channels.push_back({"more", ChannelType::f32, 1, 9}); });
   refused([](Superblock&, Meta& m) { m.text["long"] = std::string(5000, 'x'); });
@@ -202,13 +201,14 @@ TEST_CASE("writer: a superblock that the pages belie is refused", "[store][write
   CHECK(scratch.files() == 0);
 }
 
-TEST_CASE("writer: a page size that there is not is refused before a file is made",
+TEST_CASE("writer: a page size or frame that there is not is refused before a file is made",
           "[store][writer]") {
   const ScratchDirectory scratch;
   for (const std::uint8_t shift : {std::uint8_t{0}, std::uint8_t{11}, std::uint8_t{21}}) {
     CHECK_THROWS_AS(ContainerWriter(scratch / "a.ptcx", {shift, Codec::zstd, 1, {}}),
                     std::invalid_argument);
   }
+  CHECK_THROWS_AS(ContainerWriter(scratch / "a.ptcx", {.frame = {{}, 3}}), std::invalid_argument);
   CHECK(scratch.files() == 0);
 }
 

@@ -54,10 +54,10 @@ SortedScene sort_scene(const std::vector<Surfel>& surfels) {
 void write_scene(const std::filesystem::path& target, const std::vector<Surfel>& surfels, const BuildOptions& options,
                  std::uint8_t page_shift, Codec codec) {
   SortedScene scene = sort_scene(surfels);
-  ContainerWriter writer(target, {.page_shift = page_shift, .codec = codec});
+  ContainerWriter writer(target, {.page_shift = page_shift, .codec = codec, .frame = scene.frame});
   VectorStream stream(std::move(scene.records));
   Progress silent;
-  const Superblock superblock = build_pages(stream, scene.frame, writer, options, silent);
+  const Superblock superblock = build_pages(stream, writer, options, silent);
   writer.finish({}, superblock);
 }
 

@@ -230,8 +230,8 @@ TEST_CASE("verify: wrong totals in the superblock are found though checksums are
   CHECK_THAT(fault([](Superblock& s) { --s.leaf_points; }), Contains("node-leaf"));
   CHECK_THAT(fault([](Superblock& s) { s.leaf_points = 40; }), Contains("node-leaf"));
   CHECK(fault([](Superblock& s) { ++s.root_slot; }) != "");
-  CHECK(fault([](Superblock& s) { s.frame.edge *= 2; }) != "");
-  CHECK(fault([](Superblock& s) { s.frame.origin[0] += s.frame.unit(); }) != "");
+  CHECK(fault([](Superblock& s) { s.header.frame.edge *= 2; }) != "");
+  CHECK(fault([](Superblock& s) { s.header.frame.origin[0] += s.header.frame.unit(); }) != "");
 }
 
 TEST_CASE("verify: a point that moved is found though checksums are right", "[verify]") {

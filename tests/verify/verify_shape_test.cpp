@@ -15,7 +15,7 @@ namespace {
 /// Writes points under a tree of one group, whose leaves are runs of so many points.
 void write_flat_tree(const std::filesystem::path& target, const SortedScene& scene, int level,
                      const std::vector<std::uint32_t>& runs) {
-  ContainerWriter writer(target, {.page_shift = 12, .codec = Codec::raw});
+  ContainerWriter writer(target, {.page_shift = 12, .codec = Codec::raw, .frame = scene.frame});
   const MortonKey first = scene.records.front().key;
   NodeGroup group{.cell = cell_of(first, level), .level = level};
   std::uint64_t at = 0;
@@ -26,7 +26,6 @@ void write_flat_tree(const std::filesystem::path& target, const SortedScene& sce
     at += run;
   }
   Superblock superblock;
-  superblock.frame = scene.frame;
   superblock.leaf_points = 8;
   superblock.points = scene.records.size();
   superblock.nodes = runs.size();

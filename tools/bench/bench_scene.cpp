@@ -172,7 +172,7 @@ void BenchScene::add_points(const SceneOptions& options) {
     if (blocks > 0 && at != blocks * taken / wanted) continue;
     ++taken;
     for (std::size_t i = 0; i < count; ++i) {
-      set.receivers.push_back(lifted(to_surfel(block[i], container_->superblock().frame), options.lift));
+      set.receivers.push_back(lifted(to_surfel(block[i], container_->header().frame), options.lift));
     }
   }
   sets_.push_back(std::move(set));

@@ -145,7 +145,7 @@ Checked choose_checked(const BenchScene& scene, const ReceiverSet& set, unsigned
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   std::mt19937_64 bits;  // its default seed
   std::ranges::sample(all, std::back_inserter(checked.receivers), wanted, bits);
-  const Frame& frame = scene.container().superblock().frame;
+  const Frame& frame = scene.container().header().frame;
   std::ranges::sort(checked.receivers, {},
                     [&](std::size_t i) { return receiver_key(frame, set.receivers[i].position, 0); });
   for (const Pixel& pixel : set.window) {

@@ -28,9 +28,9 @@ std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::u
                                              const std::filesystem::path& work) {
   return make_temporary(work, [&](const std::filesystem::path& path) {
     ContainerPoints points(from);
-    ContainerWriter writer(path, {.page_shift = from.header().page_shift});
+    ContainerWriter writer(path, {.page_shift = from.header().page_shift, .frame = from.header().frame});
     Progress silent;
-    const Superblock superblock = build_pages(points, from.superblock().frame, writer, {.leaf_points = leaf_points}, silent);
+    const Superblock superblock = build_pages(points, writer, {.leaf_points = leaf_points}, silent);
     writer.finish(from.meta(), superblock);
   });
 }

@@ -45,7 +45,7 @@ double moved(const PointRecord& from, const PointRecord& to, const Frame& frame)
 }
 
 PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
-  const Frame& frame = container.superblock().frame;
+  const Frame& frame = container.header().frame;
   ContainerPoints originals(container), points(container);
   const std::unique_ptr<PointStream> rounding = rounded ? round_points(points, frame.unit()) : nullptr;
   PointPayloads out;

@@ -44,7 +44,7 @@ struct Cut {
 /// come back from a node page.
 class Tree : private GroupSink {
  public:
-  Tree(const ContainerReader& container, bool stored) : frame_(container.superblock().frame), stored_(stored) {
+  Tree(const ContainerReader& container, bool stored) : frame_(container.header().frame), stored_(stored) {
     OctreeBuilder builder(*this, container.superblock().leaf_points, frame_.unit());
     ContainerPoints points(container);
     std::vector<PointRecord> block(std::size_t{1} << 14);
