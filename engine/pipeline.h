@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -145,6 +146,14 @@ struct EstimateReport {
   double cpu_seconds = 0;       ///< all threads: shading with another variant, and the pilots with both; without rays
 };
 
+/// A scene shaded past pages that are damaged (spec/shading.md#damage).
+struct DamageReport {
+  std::map<std::uint32_t, std::string> pages;  ///< those that were needed and cannot be read, with what is wrong
+  std::uint64_t points = 0;                    ///< that lie on them: neither shaded nor seen
+  std::size_t node_pages = 0;                  ///< among them: what a salvage builds again
+  DamageCounts stand_ins;                      ///< what was drawn in place of what they hold, with a bound on the error
+};
+
 struct ShadeRequest {
   std::filesystem::path scene;      ///< surfels that occlude and emit
   std::filesystem::path receivers;  ///< a cloud or container to shade; empty: the scene's own points
@@ -157,6 +166,8 @@ struct ShadeRequest {
   float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii
   std::optional<Sky> sky;           ///< empty: the one that the scene was built with
   ContainerReader::Access access = ContainerReader::Access::pread;
+  bool tolerate_damage = false;     ///< goes on past pages of the scene that break a rule; wants one bounce or none and no
+                                    ///< rays, and a .ply where the scene's own points are shaded
   CheckRequest check;
   RunOptions run;
 };
@@ -171,6 +182,7 @@ struct ShadeReport {
   std::optional<TuningReport> tuning;
   std::optional<EstimateReport> estimate;
   std::optional<CheckReport> check;
+  std::optional<DamageReport> damage;  ///< when it was to be tolerated
   StageSeconds seconds;
 };
 
@@ -205,6 +217,7 @@ struct RenderRequest {
   float lift = 0.15F;             ///< receivers rise by so many radii of a surfel of the scene's spacing
   float exposure = 0;             ///< stops, for PNGs of light
   ContainerReader::Access access = ContainerReader::Access::pread;
+  bool tolerate_damage = false;   ///< as ShadeRequest::tolerate_damage
   CheckRequest check;
   RunOptions run;
 };

@@ -13,6 +13,7 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/lights.h"
 #include "engine/scene/ray_scene.h"
+#include "engine/shade/lost_pages.h"
 #include "engine/store/reader.h"
 
 namespace ptc {
@@ -44,8 +45,9 @@ class PrimaryView {
 /// The surfels themselves, drawn as discs into a depth buffer: for clouds without a mesh. `direct`
 /// is their baked radiance.   Memory: 24 bytes a sample.
 /// @param lift  in radii of a surfel
+/// @param lost  where damaged pages are told, whose points are then not seen; null: they are errors
 [[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
-                                                        unsigned side, float lift, const Executor& executor,
+                                                        unsigned side, float lift, LostPages* lost, const Executor& executor,
                                                         Progress& progress);
 
 /// The camera where none is given: the container's, else the mesh's first, else one that sees everything

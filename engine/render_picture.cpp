@@ -266,6 +266,7 @@ class TileRenderer {
 ShadeReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets, Progress& progress) {
   ShadeReport report;
   check_estimate_request(request.estimate, request.error, request.check);
+  check_damage_request(request.tolerate_damage, request.bounces, request.error, request.check);
   if (request.estimate && std::ranges::none_of(targets, [](const auto& t) { return t.path.extension() == ".exr"; })) {
     throw std::invalid_argument("estimates are layers of an .exr: name one to write");
   }
@@ -275,6 +276,9 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   const auto side = static_cast<unsigned>(std::lround(std::sqrt(request.samples)));
   if (side * side != request.samples) throw std::invalid_argument("samples per pixel must be a square number");
 
+  std::optional<LostPages> lost;
+  if (request.tolerate_damage) lost.emplace(scene);
+  LostPages* const lost_pages = lost ? &*lost : nullptr;
   std::vector<MeshCamera> cameras;
   Subject subject;
   subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, &cameras);
@@ -288,12 +292,13 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
     view_mesh_of(subject, request, scene, lights, camera, side);
   } else {
     const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
-    subject.view = view_surfels(scene, camera, side, request.lift, executor, progress);
+    subject.view = view_surfels(scene, camera, side, request.lift, lost_pages, executor, progress);
   }
   Film film(camera.width, camera.height, request.estimate);
   ShadeOptions options{.access = request.access,
                        .gather = request.gather,
                        .sky = sky_function(lights.sky),
+                       .lost = lost_pages,
                        .variants = std::min(request.samples, kMostVariants)};
   options.gather.bleeding = request.bounces > 0;
   const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * (kReceiverBytes + (request.estimate ? kEstimateBytes : 0)) +
@@ -334,6 +339,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   report.gather = shader->counts();
   report.receivers = report.gather.receivers;
   report.bounces = request.bounces;
+  if (lost) report.damage = damage_report(scene, *lost, report.gather.damage);
   report.cache = shader->cache_statistics();
   if (estimator) {
     report.cache = estimator->cache_statistics();

@@ -67,8 +67,9 @@ class PointCursor {
  public:
   /// @param wanted  how many, evenly spread; at most as many as there are
   /// @param from    the first of those wanted that next() gives, below `wanted`
-  PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0)
-      : container_(container), wanted_(wanted), payload_(container.page_payload_limit()) {
+  /// @param lost    where damaged pages are told, whose points are passed over; null: they are errors
+  PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0, LostPages* lost = nullptr)
+      : container_(container), wanted_(wanted), lost_(lost), payload_(container.page_payload_limit()) {
     if (from == 0) return;
     const std::uint64_t points = container.superblock().points;
     const std::uint64_t passed = (from * points + wanted - 1) / wanted;  // so far `from` were taken
@@ -90,7 +91,7 @@ class PointCursor {
         share_ += wanted_;
         if (share_ < container_.superblock().points) continue;
         share_ -= container_.superblock().points;
-        out[filled++] = to_surfel(points[at_], container_.header().frame);
+        if (whole_) out[filled++] = to_surfel(points[at_], container_.header().frame);
       }
     }
     return filled;
@@ -98,12 +99,16 @@ class PointCursor {
 
  private:
   void read_page() {
-    count_ = container_.read_page(container_.point_pages()[page_++], payload_, decoder_).record_count;
+    const std::uint32_t page = container_.point_pages()[page_++];
+    whole_ = read_unless_lost(container_, page, payload_, decoder_, lost_);
+    count_ = container_.entry(page).record_count;
     at_ = 0;
   }
 
   const ContainerReader& container_;
   std::uint64_t wanted_;
+  LostPages* lost_;
+  bool whole_ = true;  // the page at hand
   std::uint64_t share_ = 0;  // wanted_ for each point passed, less the points for each one taken
   std::vector<std::byte> payload_;
   PageDecoder decoder_;
@@ -292,6 +297,15 @@ std::vector<Pilot> pilots_of(const ContainerReader& container, std::uint64_t poi
   return pilots;
 }
 
+/// Points that are wanted and can be read.
+std::uint64_t count_whole(const ContainerReader& container, std::uint64_t wanted, LostPages& lost) {
+  PointCursor cursor(container, wanted, 0, &lost);
+  std::vector<Surfel> block(Shader::kBlock);
+  std::uint64_t count = 0;
+  while (const std::size_t more = cursor.next(block)) count += more;
+  return count;
+}
+
 std::unique_ptr<ShadedSink> make_sink(const std::filesystem::path& target, const ContainerReader& receivers,
                                       std::uint64_t points, const std::string& settings, bool estimates) {
   if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points, estimates);
@@ -303,14 +317,22 @@ std::unique_ptr<ShadedSink> make_sink(const std::filesystem::path& target, const
 ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target, Progress& progress) {
   ShadeReport report;
   check_estimate_request(request.estimate, request.error, request.check);
+  check_damage_request(request.tolerate_damage, request.bounces, request.error, request.check);
+  if (request.tolerate_damage && request.receivers.empty() && target.extension() != ".ply") {
+    throw std::invalid_argument("a container would keep what is damaged: name a .ply, or salvage the scene first");
+  }
   const Executor executor(request.run.threads);
   const ContainerReader scene(request.scene);
   const std::unique_ptr<ContainerReader> other =
       request.receivers.empty() ? nullptr : open_receivers(request, target, progress);
   const ContainerReader& receivers = other ? *other : scene;
   const std::uint64_t all = receivers.superblock().points;
-  const std::uint64_t points = request.count == 0 ? all : std::min(request.count, all);
-  if (points < all && target.extension() != ".ply") {
+  const std::uint64_t wanted = request.count == 0 ? all : std::min(request.count, all);
+  std::optional<LostPages> lost;
+  if (request.tolerate_damage) lost.emplace(scene);
+  LostPages* const receivers_lost = lost && !other ? &*lost : nullptr;
+  const std::uint64_t points = receivers_lost ? count_whole(receivers, wanted, *receivers_lost) : wanted;
+  if (wanted < all && target.extension() != ".ply") {
     throw std::invalid_argument("a container of some of the points cannot be written: name a .ply, or shade them all");
   }
 
@@ -320,7 +342,8 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
                                       readers_of(executor, request.estimate), "shading"),
       .access = request.access,
       .gather = request.gather,
-      .sky = sky_function(sky)};
+      .sky = sky_function(sky),
+      .lost = lost ? &*lost : nullptr};
   options.gather.bleeding = request.bounces > 0;
   const std::unique_ptr<ContainerReader> bounced =
       bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, target)}, executor, report,
@@ -350,7 +373,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   {
     const Stage stage(report.seconds, progress, "shade", points, "points");
     Shader shader(lit, options, executor);
-    PointCursor cursor(receivers, points);
+    PointCursor cursor(receivers, wanted, 0, receivers_lost);
     report.shade_cpu_seconds = shade_all(cursor, shader, estimator.get(), request.lift, *sink, check, progress);
     report.gather = shader.counts();
     report.cache = shader.cache_statistics();
@@ -363,6 +386,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   sink->finish();
   report.bounces = request.bounces;
   report.receivers = points;
+  if (lost) report.damage = damage_report(scene, *lost, report.gather.damage);
   if (request.check.receivers > 0) {
     const Stage stage(report.seconds, progress, "check", std::uint64_t{2} * request.check.receivers, "references");
     report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {{}, request.bounces},

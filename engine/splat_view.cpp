@@ -37,12 +37,13 @@ struct Projected {
 
 class SurfelView : public PrimaryView {
  public:
-  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift, const Executor& executor,
+  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift, LostPages* lost, const Executor& executor,
              Progress& progress)
       : position_(camera.position),
         width_(camera.width * side),
         height_(camera.height * side),
         lift_(lift),
+        lost_(lost),
         samples_(std::size_t{width_} * height_) {
     const CameraAxes axes = axes_of(camera);
     axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
@@ -93,12 +94,12 @@ class SurfelView : public PrimaryView {
     executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
       std::vector<std::byte> payload(scene.page_payload_limit());
       PageDecoder decoder;
-      const PageHeader header = scene.read_page(pages[i], payload, decoder);
-      const PointPage points(payload.data(), header.record_count);
+      progress.advance(scene.entry(pages[i]).record_count);
+      if (!read_unless_lost(scene, pages[i], payload, decoder, lost_)) return;
+      const PointPage points(payload.data(), scene.entry(pages[i]).record_count);
       for (std::uint32_t k = 0; k < points.size(); ++k) {
         project(to_surfel(points[k], scene.header().frame), discs[i]);
       }
-      progress.advance(points.size());
     });
     executor.for_each((height_ + kBandRows - 1) / kBandRows, [&](std::size_t band, unsigned) {
       const auto first = static_cast<unsigned>(band) * kBandRows;
@@ -173,6 +174,7 @@ class SurfelView : public PrimaryView {
   glm::mat3 axes_{1};  // columns: right, down, forward
   unsigned width_, height_;
   float lift_;
+  LostPages* lost_;
   float focal_ = 1;  // in samples
   std::vector<Sample> samples_;
 };
@@ -180,8 +182,8 @@ class SurfelView : public PrimaryView {
 }  // namespace
 
 std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera, unsigned side, float lift,
-                                          const Executor& executor, Progress& progress) {
-  return std::make_unique<SurfelView>(scene, camera, side, lift, executor, progress);
+                                          LostPages* lost, const Executor& executor, Progress& progress) {
+  return std::make_unique<SurfelView>(scene, camera, side, lift, lost, executor, progress);
 }
 
 }  // namespace ptc

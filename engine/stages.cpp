@@ -53,6 +53,24 @@ std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const
   return memory_left(run, taken + threads * kGatherBytes, least, what_for);
 }
 
+void check_damage_request(bool tolerate, unsigned bounces, const std::optional<double>& error, const CheckRequest& check) {
+  if (!tolerate) return;
+  if (bounces > 1) throw std::invalid_argument("--tolerate-damage goes with one bounce: more need every point, so salvage the scene first");
+  if (error || check.receivers > 0) {
+    throw std::invalid_argument("--tolerate-damage goes without --error and --check: rays need every point, so salvage the scene first");
+  }
+}
+
+DamageReport damage_report(const ContainerReader& scene, const LostPages& lost, const DamageCounts& stand_ins) {
+  DamageReport report{.pages = lost.list(), .stand_ins = stand_ins};
+  for (const auto& [page, why] : report.pages) {
+    const DirectoryEntry& entry = scene.entry(page);
+    if (entry.type == PageType::point) report.points += entry.record_count;
+    if (entry.type == PageType::node) ++report.node_pages;
+  }
+  return report;
+}
+
 std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target) {
   if (!run.temp_dir.empty()) return run.temp_dir;
   return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "engine/pipeline.h"
+#include "engine/shade/lost_pages.h"
 #include "engine/store/reader.h"
 
 namespace ptc {
@@ -33,6 +34,13 @@ class Stage {
 /// The same for the page cache of a gather, whose threads take kGatherBytes each.
 [[nodiscard]] std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
                                              unsigned threads, const char* what_for);
+
+/// Damage is tolerated by a gather from the scene itself, for which no ray and no earlier bounce reads every point.
+/// @throws std::invalid_argument when it is to be tolerated and something else is asked for
+void check_damage_request(bool tolerate, unsigned bounces, const std::optional<double>& error, const CheckRequest& check);
+
+/// What there is to tell of lost pages.
+[[nodiscard]] DamageReport damage_report(const ContainerReader& scene, const LostPages& lost, const DamageCounts& stand_ins);
 
 /// Where temporary files go: the given directory, else the target's.
 [[nodiscard]] std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target);

@@ -99,6 +99,12 @@ void add_estimate_option(CLI::App& app, bool& estimate) {
       ->group("Quality");
 }
 
+void add_tolerate_damage(CLI::App& app, bool& tolerate) {
+  app.add_flag("--tolerate-damage", tolerate,
+               "Go on where a page of the scene is damaged, with the cluster above it in its place, and tell how many and\n"
+               "a bound on the error; points on such pages are left out [default: stop]");
+}
+
 void add_check_options(CLI::App& app, CheckRequest& check) {
   constexpr char kGroup[] = "Quality";
   add_integer(app, "--check", check.receivers, 0, 10'000'000, "Compare so many of the receivers with rays")

@@ -31,6 +31,9 @@ void add_error_option(CLI::App& app, std::optional<double>& error);
 /// --estimate
 void add_estimate_option(CLI::App& app, bool& estimate);
 
+/// --tolerate-damage
+void add_tolerate_damage(CLI::App& app, bool& tolerate);
+
 /// --check and --check-rays
 void add_check_options(CLI::App& app, CheckRequest& check);
 

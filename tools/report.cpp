@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "engine/base/progress_text.h"
+#include "tools/common.h"
 
 namespace ptc {
 
@@ -137,6 +138,39 @@ ordered_json facts_of(const CheckReport& check) {
   return facts;
 }
 
+/// Over all receivers of a run.
+double mean_bound(const ShadeReport& report) {
+  const double sum = static_cast<double>(report.damage->stand_ins.bounds) * DamageCounts::kBoundUnit;
+  return report.receivers == 0 ? 0 : sum / static_cast<double>(report.receivers);
+}
+
+ordered_json damage_facts(const ShadeReport& report) {
+  const DamageReport& damage = *report.damage;
+  ordered_json pages = ordered_json::array();
+  for (const auto& [page, why] : damage.pages) pages.push_back({{"page", page}, {"text", why}});
+  return {{"pages", pages},
+          {"points", damage.points},
+          {"node_pages", damage.node_pages},
+          {"stand_ins", damage.stand_ins.stand_ins},
+          {"receivers", damage.stand_ins.receivers},
+          {"greatest_bound", damage.stand_ins.greatest_bound},
+          {"mean_bound", mean_bound(report)}};
+}
+
+std::string damage_text(const ShadeReport& report) {
+  const DamageReport& damage = *report.damage;
+  if (damage.pages.empty()) return "  no page that was needed is damaged\n";
+  const auto& [page, why] = *damage.pages.begin();
+  std::string text = fmt::format("  damaged: {} pages, the first {}: {}; {} points left out\n"
+                                 "  {} receivers see what stands in for them: occlusion changed by at most {:.4f}, by at most {:.6f} in the mean of all\n",
+                                 damage.pages.size(), page, printable(why), damage.points, damage.stand_ins.receivers,
+                                 damage.stand_ins.greatest_bound, mean_bound(report));
+  if (damage.node_pages > 0) {
+    text += fmt::format("  {} of them hold nodes, which ptcverify --salvage builds again from the points\n", damage.node_pages);
+  }
+  return text;
+}
+
 ordered_json facts_of(const ShadeReport& report) {
   ordered_json facts{{"receivers", report.receivers},
                      {"bounces", report.bounces},
@@ -147,6 +181,7 @@ ordered_json facts_of(const ShadeReport& report) {
   if (report.tuning) facts["tuning"] = facts_of(*report.tuning);
   if (report.estimate) facts["estimate"] = facts_of(*report.estimate);
   if (report.check) facts["check"] = facts_of(*report.check);
+  if (report.damage) facts["damage"] = damage_facts(report);
   facts["seconds"] = facts_of(report.seconds);
   return facts;
 }
@@ -155,6 +190,7 @@ std::string shade_text(const std::string& output, const ShadeReport& report) {
   std::string text = fmt::format("{}: {} receivers, {:.2f} s, {:.2f} % cache hits\n{}", output,
                                  report.receivers, total_seconds(report.seconds),
                                  100 * report.cache.hit_rate(), stages_text(report.seconds));
+  if (report.damage) text += damage_text(report);
   if (report.tuning) text += tuning_text(*report.tuning);
   if (!report.check) return text;
   text += check_line("surfels", report.check->discs);

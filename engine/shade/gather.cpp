@@ -63,19 +63,21 @@ struct Gather::Impl {
   void run() {
     payloads.clear();
     stack.assign(1, scene.view().root());
-    shade_cell(receivers, empty, 0);
+    shade_cell(receivers, empty, 0, 0);
   }
 
   /// What waits on the stack is looked at for this cell too.
   /// @param inherited  what the cells around this one have drawn
-  void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited, std::size_t depth) {
+  /// @param bound      on what stand-ins among that change
+  void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited, std::size_t depth, float bound) {
     const ReceiverCell bounds(cell, scene.view().frame().unit());
     if (cell.size() == 1) {
-      resolve(cell, collect(bounds, inherited, leaf, nullptr, depth), depth);
+      const DirectionBuffer& drawn = collect(bounds, inherited, leaf, nullptr, depth, bound);
+      resolve(cell, drawn, depth, bound);
       return;
     }
     if (depth + 1 == kViewpoints) {  // cells within cells beyond what a pixel can name: one by one
-      for (std::size_t i = 0; i < cell.size(); ++i) shade_cell(cell.subspan(i, 1), inherited, depth);
+      for (std::size_t i = 0; i < cell.size(); ++i) shade_cell(cell.subspan(i, 1), inherited, depth, bound);
       return;
     }
     ++counts.cells;
@@ -84,18 +86,19 @@ struct Gather::Impl {
     level.centre = bounds.centre;
     level.left.clear();
     const std::size_t before = payloads.size();
-    const DirectionBuffer& drawn = collect(bounds, inherited, level.buffer, &level.left, depth);
+    const DirectionBuffer& drawn = collect(bounds, inherited, level.buffer, &level.left, depth, bound);
     if (level.left.empty()) {
-      resolve(cell, drawn, depth + 1);
+      resolve(cell, drawn, depth + 1, bound);
     } else {
-      split(cell, [&](std::span<const PlacedReceiver> child) { shade_cell(child, drawn, depth + 1); });
+      split(cell, [&](std::span<const PlacedReceiver> child) { shade_cell(child, drawn, depth + 1, bound); });
     }
     payloads.resize(before);
   }
 
   /// Sums for receivers that see the same pixels.
   /// @param depth  of the cells around them: those whose pixels move as they see them
-  void resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn, std::size_t depth) {
+  /// @param bound  on what stand-ins change
+  void resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn, std::size_t depth, float bound) {
     std::array<glm::vec3, kViewpoints> offsets{};
     for (const PlacedReceiver& receiver : cell) {
       for (std::size_t i = 0; i < depth; ++i) {
@@ -104,6 +107,7 @@ struct Gather::Impl {
       results[receiver.index] = drawn.resolve(*grid, receiver.normal, std::span(offsets).first(depth));
     }
     counts.receivers += cell.size();
+    if (bound > 0) counts.damage.add(cell.size(), std::min(1.0F, bound));
   }
 
   /// The occupied children of the smallest octree cell that holds the receivers; coincident
@@ -124,9 +128,10 @@ struct Gather::Impl {
 
   /// Looks at the stack and at what the cell around left. Draws what is settled for all receivers of
   /// the cell; the rest goes to `left`, for its children. Without `left` everything is settled.
+  /// @param bound  grows by what stand-ins may cover
   /// @return  `own`, a copy of `inherited` that was drawn into; `inherited` when nothing was
   const DirectionBuffer& collect(const ReceiverCell& cell, const DirectionBuffer& inherited, DirectionBuffer& own,
-                                 NearLists* left, std::size_t depth) {
+                                 NearLists* left, std::size_t depth, float& bound) {
     const double unit = scene.view().frame().unit();
     const CellTest test{.cell = cell,
                         .unit = unit,
@@ -135,7 +140,8 @@ struct Gather::Impl {
                         .inflation = options.inflation,
                         .sides = options.sides,
                         .bleeding = options.bleeding,
-                        .last = left == nullptr};
+                        .last = left == nullptr,
+                        .damaged = scene.view().lost() != nullptr};
     CellOutput out{queue, left, payloads};
     WalkLimit limit(scene.view());
     const Horizon horizon = cell.has_horizon ? Horizon{cell.axis, cell.cone_sin} : Horizon{};
@@ -168,6 +174,8 @@ struct Gather::Impl {
       if (queue.full()) flush();
     }
     flush();
+    bound += out.stand_in_share;
+    counts.damage.stand_ins += out.stand_ins;
     return touched ? own : inherited;
   }
 
@@ -189,14 +197,15 @@ struct Gather::Impl {
 
   void push(const ClusterPayload& payload) {
     const std::uint64_t word = std::uint64_t{payload.reference[1]} << 32 | payload.reference[0];
-    stack.push_back(decode_reference(word, payload.interior != 0));
+    stack.push_back(decode_reference(word, (payload.kind & kInterior) != 0));
   }
 
   void look_at_group(const ChildRef& reference, const CellTest& test, CellOutput& out) {
     ++counts.groups;
+    const unsigned closed = test.damaged ? scene.lost_children(reference.page, reference.slot) : 0;
     const GroupView group = scene.group(reference.page, reference.slot);
     const int before = queue.size;
-    const unsigned open = gather_group(group, test, out);
+    const unsigned open = gather_group(group, closed, test, out);
     counts.clusters += static_cast<unsigned>(queue.size - before);
     for (unsigned rest = open; rest != 0; rest &= rest - 1) stack.push_back(group.child(std::countr_zero(rest)));
   }
@@ -242,6 +251,20 @@ void GatherCounts::add(const GatherCounts& other) noexcept {
   clusters += other.clusters;
   surfels += other.surfels;
   retests += other.retests;
+  damage.add(other.damage);
+}
+
+void DamageCounts::add(std::uint64_t more, float bound) noexcept {
+  receivers += more;
+  greatest_bound = std::max(greatest_bound, static_cast<double>(bound));
+  bounds += more * static_cast<std::uint64_t>(static_cast<double>(bound) / kBoundUnit);
+}
+
+void DamageCounts::add(const DamageCounts& other) noexcept {
+  stand_ins += other.stand_ins;
+  receivers += other.receivers;
+  greatest_bound = std::max(greatest_bound, other.greatest_bound);
+  bounds += other.bounds;
 }
 
 }  // namespace ptc

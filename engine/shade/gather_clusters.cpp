@@ -35,30 +35,35 @@ HWY_INLINE void set_derived(Clusters& c) {
   c.distance2 = dot(c.to, c.to);
 }
 
-/// Those of which a part may stand over the horizon of some receiver.
-HWY_INLINE MF over_horizon(const CellTest& test, const Clusters& c) {
-  const F f;
+/// How far they may reach over the horizon of some receiver; not above it where negative.
+HWY_INLINE VF top(const CellTest& test, const Clusters& c) {
   const Vec axis = spread(test.cell.axis);
   // What lies in the sphere and in the slab; of a mean normal of zero, NaN, the sphere alone.
   auto rise = greatest_rise(test.cell, dot(c.normal, axis), c.thickness, c.radius);
   rise = hn::IfThenElse(hn::Lt(rise, c.radius), rise, c.radius);
-  return hn::Gt(hn::Add(highest(test.cell, c.distance2, dot(c.to, axis)), rise), hn::Zero(f));
+  return hn::Add(highest(test.cell, c.distance2, dot(c.to, axis)), rise);
 }
+
+HWY_INLINE MF over_horizon(const CellTest& test, const Clusters& c) { return hn::Gt(top(test, c), hn::Zero(F())); }
 
 struct Verdict {
   MF drawn, open, keep;
+  MF stand_in;  ///< of those drawn: not small enough, but closed
 };
 
 /// What becomes of clusters over the horizon.
-HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wanted) {
+/// @param closed  those that are not to be opened, however large they are
+HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wanted, MF closed) {
   const F f;
   const auto limit = hn::Set(f, test.limit), rho = hn::Set(f, test.cell.radius), shared_from = hn::Set(f, test.shared_from);
   const auto nearest = hn::Max(hn::Zero(f), hn::Sub(d, rho));
   const auto r2 = hn::Mul(c.radius, c.radius);
-  const auto small = hn::And(wanted, hn::Lt(r2, hn::Mul(limit, hn::Mul(nearest, nearest))));  // for every receiver
+  const auto fine = hn::Lt(r2, hn::Mul(limit, hn::Mul(nearest, nearest)));  // for every receiver
+  const auto small = hn::And(wanted, hn::Or(fine, closed));
   const auto large = hn::AndNot(small, wanted);
   const auto drawn = hn::And(small, hn::Ge(d, shared_from));
-  if (test.last) return {drawn, large, hn::FirstN(f, 0)};
+  const auto stand_in = hn::AndNot(fine, drawn);
+  if (test.last) return {drawn, large, hn::FirstN(f, 0), stand_in};
   // Open now what the children would open anyway, or what opens into shared parts.
   const auto farthest = hn::Add(d, rho);
   const auto opens = hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from), hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
@@ -67,7 +72,26 @@ HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wante
   const auto height = hn::Max(hn::Abs(dot(c.to, c.mean)), scattered);
   const auto above = hn::Add(dot(c.to, spread(test.cell.axis)), hn::Add(c.radius, rho));
   const auto band = hn::Lt(d, seam_end(test, height, above, d));
-  return {drawn, hn::And(large, opens), hn::Or(hn::AndNot(opens, large), hn::And(small, band))};
+  return {drawn, hn::And(large, opens), hn::Or(hn::AndNot(opens, large), hn::And(small, band)), stand_in};
+}
+
+/// Counts clusters drawn in place of their children, and what these may cover of a receiver's hemisphere, weighted by the
+/// cosine (spec/shading.md#damage): no more than the cluster's sphere, nor than a wedge as wide as the sphere and as high
+/// as the cluster reaches over the horizon.
+HWY_INLINE void count_stand_ins(const CellTest& test, MF mask, const Clusters& c, VF d, CellOutput& out) {
+  const F f;
+  if (hn::AllFalse(f, mask)) return;
+  const auto one = hn::Set(f, 1.0F);
+  const auto nearest = hn::Max(hn::Zero(f), hn::Sub(d, hn::Set(f, test.cell.radius)));
+  const auto wide = hn::Div(c.radius, nearest);
+  auto share = hn::Mul(wide, wide);
+  if (test.cell.has_horizon) {
+    const auto high = hn::Min(hn::Div(top(test, c), hn::Sub(nearest, c.radius)), one);
+    share = hn::Min(share, hn::Mul(hn::Mul(hn::Set(f, 0.5F), wide), hn::Mul(high, high)));
+  }
+  share = hn::IfThenElse(hn::Lt(c.radius, nearest), share, one);
+  out.stand_ins += static_cast<unsigned>(hn::CountTrue(f, mask));
+  out.stand_in_share += hn::GetLane(hn::SumOfLanes(f, hn::IfThenElseZero(mask, share)));
 }
 
 /// Clusters all of whose surfels show their backs to every receiver.
@@ -228,6 +252,11 @@ class PayloadLanes {
   PayloadLanes(const ClusterPayload* payloads, VU index)
       : base_(reinterpret_cast<const float*>(payloads)), word_(hn::ShiftLeft<4>(hn::BitCast(I(), index))) {}
 
+  HWY_INLINE MF closed() const {
+    const U u;
+    const auto kind = hn::BitCast(u, hn::GatherIndex(F(), base_ + 15, word_));
+    return hn::RebindMask(F(), hn::TestBit(kind, hn::Set(u, kClosed)));
+  }
   HWY_INLINE VF area() const { return hn::GatherIndex(F(), base_ + 12, word_); }
   HWY_INLINE VF share(int axis, MF negative) const { return hn::GatherIndex(F(), base_ + 6 + 2 * axis, face(negative)); }
   HWY_INLINE VU radiance(int axis, MF negative) const {
@@ -245,7 +274,7 @@ class PayloadLanes {
 };
 
 /// The payload of a child.
-ClusterPayload payload_of(const GroupView& group, int i) {
+ClusterPayload payload_of(const GroupView& group, int i, bool closed) {
   ClusterPayload payload;
   for (int k = 0; k < 6; ++k) {
     std::memcpy(&payload.rgbe[k], group.radiance(k) + 4 * std::ptrdiff_t{i}, sizeof payload.rgbe[k]);
@@ -255,13 +284,13 @@ ClusterPayload payload_of(const GroupView& group, int i) {
   const std::uint64_t reference = group.reference(i);
   payload.reference[0] = static_cast<std::uint32_t>(reference);
   payload.reference[1] = static_cast<std::uint32_t>(reference >> 32);
-  payload.interior = group.interior_mask() >> i & 1;
+  payload.kind = (group.interior_mask() >> i & kInterior) | (closed ? kClosed : 0);
   return payload;
 }
 
 }  // namespace
 
-unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& out) {
+unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& test, CellOutput& out) {
   const F f;
   const U u;
   const auto lanes = static_cast<int>(hn::Lanes(f));
@@ -274,7 +303,9 @@ unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& 
     if (test.sides == Sides::front) wanted = hn::AndNot(faces_away(group, first, test, c.to, c.distance2, c.radius), wanted);
     if (hn::AllFalse(f, wanted)) continue;
     const auto d = hn::Sqrt(c.distance2);
-    const Verdict verdict = judge(test, c, d, wanted);
+    const MF shut = mask_of(closed >> first);
+    const Verdict verdict = judge(test, c, d, wanted, shut);
+    if (closed != 0) count_stand_ins(test, verdict.stand_in, c, d, out);
     if (!hn::AllFalse(f, verdict.drawn)) loader.draw(first, verdict.drawn, c, d, out.queue);
     opened |= bits_of(f, verdict.open) << first;
     if (hn::AllFalse(f, verdict.keep)) continue;
@@ -284,7 +315,7 @@ unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& 
     for (std::uint32_t count = 0; rest != 0; rest &= rest - 1) {
       const int lane = std::countr_zero(rest);
       index[lane] = next + count++;
-      out.payloads.push_back(payload_of(group, first + lane));
+      out.payloads.push_back(payload_of(group, first + lane, (closed >> (first + lane) & 1) != 0));
     }
     out.left->clusters.make_room(kListLanes);
     leave(out.left->clusters, verdict.keep, c, d, hn::LoadU(u, index));
@@ -309,8 +340,13 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
     if (test.cell.has_horizon) wanted = hn::And(wanted, over_horizon(test, c));
     if (hn::AllFalse(f, wanted)) continue;
     const auto d = hn::Sqrt(c.distance2);
-    const Verdict verdict = judge(test, c, d, wanted);
     const auto payload = hn::LoadU(u, near.payload.data() + from);
+    MF shut = hn::FirstN(f, 0);
+    if (test.damaged) {
+      shut = hn::And(wanted, PayloadLanes(out.payloads.data(), hn::IfThenElseZero(hn::RebindMask(u, wanted), payload)).closed());
+    }
+    const Verdict verdict = judge(test, c, d, wanted, shut);
+    if (test.damaged) count_stand_ins(test, verdict.stand_in, c, d, out);
     if (!hn::AllFalse(f, verdict.drawn)) {
       const PayloadLanes cube(out.payloads.data(), hn::IfThenElseZero(hn::RebindMask(u, verdict.drawn), payload));
       draw_clusters(test, verdict.drawn, c, d, cube.area(), cube, out.queue);
@@ -334,8 +370,8 @@ namespace ptc {
 HWY_EXPORT(gather_group);
 HWY_EXPORT(gather_clusters);
 
-unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& out) {
-  return HWY_DYNAMIC_DISPATCH(gather_group)(group, test, out);
+unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& test, CellOutput& out) {
+  return HWY_DYNAMIC_DISPATCH(gather_group)(group, closed, test, out);
 }
 
 std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move, const CellTest& test,

@@ -25,6 +25,7 @@ struct CellTest {
   Sides sides = Sides::both;
   bool bleeding = true;    ///< colours are wanted
   bool last = false;       ///< nothing is left to children: everything is settled
+  bool damaged = false;    ///< some clusters may be closed: they are drawn, not opened
 };
 
 /// What a cell draws, and what it leaves; all relative to its centre.
@@ -32,12 +33,15 @@ struct CellOutput {
   DiscQueue& queue;
   NearLists* left;                          ///< null when `last`
   std::vector<ClusterPayload>& payloads;    ///< of the clusters left, appended
+  unsigned stand_ins = 0;                   ///< closed clusters that were drawn and would have been opened
+  float stand_in_share = 0;                 ///< of the hemisphere that they may cover, for any receiver of the cell
 };
 
 /// Looks at the children of a group.
+/// @param closed  bit i: child i cannot be opened; 0 unless the test is of a damaged scene
 /// @param out  its queue has room for 8
 /// @return  bit i: child i is replaced by its own children
-unsigned gather_group(const GroupView& group, const CellTest& test, CellOutput& out);
+unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& test, CellOutput& out);
 
 /// Looks at clusters that the cell around left, from index `from` on, until the queue is full.
 /// @param move    of positions, from that cell's centre to this one's

@@ -10,13 +10,16 @@ namespace ptc {
 /// A kernel may write so many entries past the last, and reads as many.
 inline constexpr std::size_t kListLanes = 8;
 
+inline constexpr std::uint32_t kInterior = 1;
+inline constexpr std::uint32_t kClosed = 2;  ///< not to be opened: its children are lost
+
 /// What drawing or opening a cluster needs; the rest is in NearClusters.
 struct alignas(64) ClusterPayload {
   std::uint32_t rgbe[6];       ///< mean radiance towards each axis
   float share[6];              ///< of the area that faces each axis
   float area;                  ///< scene units squared
   std::uint32_t reference[2];  ///< as in the group (spec/nodes.md#node-group)
-  std::uint32_t interior;      ///< 1, or 0 for a leaf
+  std::uint32_t kind;          ///< kInterior, kClosed or both; 0 for a leaf that can be opened
 };
 static_assert(sizeof(ClusterPayload) == 64);
 

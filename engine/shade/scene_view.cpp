@@ -1,11 +1,14 @@
 #include "engine/shade/scene_view.h"
 
+#include <array>
+
 #include "format/error.h"
 
 namespace ptc {
 
-SceneView::SceneView(const ContainerReader& container)
+SceneView::SceneView(const ContainerReader& container, LostPages* lost)
     : container_(&container),
+      lost_(lost),
       frame_(container.header().frame),
       points_(container.superblock().points),
       groups_(container.superblock().node_groups),
@@ -28,6 +31,25 @@ GroupView SceneReader::group(std::uint32_t page, std::uint16_t slot) {
     view_.fail("spec/nodes.md#references", "a node refers to a group that its page does not hold");
   }
   return nodes[slot];
+}
+
+unsigned SceneReader::lost_children(std::uint32_t page, std::uint16_t slot) {
+  const GroupView view = group(page, slot);
+  std::array<ChildRef, 8> children;
+  const int count = view.size();
+  for (int i = 0; i < count; ++i) children[static_cast<std::size_t>(i)] = view.child(i);
+  unsigned lost = 0;
+  for (int i = 0; i < count; ++i) lost |= (is_lost(children[static_cast<std::size_t>(i)]) ? 1U : 0U) << i;
+  return lost;
+}
+
+bool SceneReader::is_lost(const ChildRef& child) {
+  if (child.interior) return view_.lost()->contains(child.page, pages_);
+  const std::uint64_t end = child.first_point + child.point_count, per_page = view_.points_per_page();
+  for (std::uint64_t point = child.first_point; point < end; point = (point / per_page + 1) * per_page) {
+    if (view_.lost()->contains(view_.point_page(point), pages_)) return true;
+  }
+  return false;
 }
 
 void WalkLimit::take_group() {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "engine/cache/page_cache.h"
+#include "engine/shade/lost_pages.h"
 #include "format/node_page.h"
 
 namespace ptc {
@@ -11,7 +12,8 @@ namespace ptc {
 /// What shading needs of a container besides its pages; shared by all threads.
 class SceneView {
  public:
-  explicit SceneView(const ContainerReader& container);
+  /// @param lost  outlives the view: pages found damaged are left out; null: they are errors
+  explicit SceneView(const ContainerReader& container, LostPages* lost = nullptr);
 
   [[nodiscard]] const Frame& frame() const noexcept { return frame_; }
   [[nodiscard]] std::uint64_t points() const noexcept { return points_; }
@@ -19,6 +21,7 @@ class SceneView {
   [[nodiscard]] std::uint32_t points_per_page() const noexcept { return points_per_page_; }
   /// The root group; not interior when the container is empty.
   [[nodiscard]] const ChildRef& root() const noexcept { return root_; }
+  [[nodiscard]] LostPages* lost() const noexcept { return lost_; }
   /// Page that holds a point.
   [[nodiscard]] std::uint32_t point_page(std::uint64_t point) const {
     return container_->point_pages()[static_cast<std::size_t>(point / points_per_page_)];
@@ -28,6 +31,7 @@ class SceneView {
 
  private:
   const ContainerReader* container_;
+  LostPages* lost_;
   Frame frame_;
   std::uint64_t points_;
   std::uint64_t groups_;
@@ -43,10 +47,14 @@ class SceneReader {
   [[nodiscard]] const SceneView& view() const noexcept { return view_; }
   /// A group; valid until the next call. @throws FormatError when the reference leads nowhere
   [[nodiscard]] GroupView group(std::uint32_t page, std::uint16_t slot);
+  /// Children of a group that need a lost page: bit i for child i. Groups given before are gone.
+  [[nodiscard]] unsigned lost_children(std::uint32_t page, std::uint16_t slot);
   /// The page that holds a point; valid until the next call.
   [[nodiscard]] PageReader::Page points(std::uint64_t point) { return pages_.get(view_.point_page(point)); }
 
  private:
+  [[nodiscard]] bool is_lost(const ChildRef& child);
+
   const SceneView& view_;
   PageReader pages_;
 };

@@ -20,7 +20,7 @@ struct Shader::Impl {
 
   Impl(const ContainerReader& container, const ShadeOptions& options, const Executor& e)
       : executor(e),
-        view(container),
+        view(container, options.lost),
         gather_options(options.gather),
         own_cache(options.cache ? nullptr : make_cache(container, options, e)),
         cache(options.cache ? *options.cache : *own_cache),

@@ -20,6 +20,7 @@ struct ShadeOptions {
   std::function<glm::vec3(const glm::vec3&)> sky;
   /// Pages to read through in place of a cache of its own, for as many threads; it outlives the Shader.
   PageCache* cache = nullptr;
+  LostPages* lost = nullptr;  ///< goes on past damaged pages, which it tells there; null: they are errors. It outlives the Shader
   unsigned variants = 1;  ///< turns of the direction cube and shifts of the receiver cells to choose from
 };
 

@@ -45,6 +45,20 @@ inline constexpr float kSlim = 0.5F;       ///< of thickness over radius: the ax
 inline constexpr float kSolid = 0.55F;     ///< share of its ellipsoid's silhouette that it covers at most
 inline constexpr float kDark = 0.5F;       ///< share of its backs that counts where its radiance is dimmed
 
+/// What a gather drew in place of children on lost pages (spec/shading.md#damage). The bound of a receiver is on what
+/// that changes its occlusion by, and its irradiance in units of pi times the greatest radiance around.
+struct DamageCounts {
+  std::uint64_t stand_ins = 0;  ///< clusters drawn in place of their children
+  std::uint64_t receivers = 0;  ///< that see some of them
+  double greatest_bound = 0;    ///< of one receiver, at most 1
+  std::uint64_t bounds = 0;     ///< sum over receivers, in units of kBoundUnit: the same in any order
+
+  static constexpr double kBoundUnit = 0x1p-32;
+  /// So many receivers of one bound, at most 1.
+  void add(std::uint64_t more, float bound) noexcept;
+  void add(const DamageCounts& other) noexcept;
+};
+
 /// What a gather did.
 struct GatherCounts {
   std::uint64_t receivers = 0;
@@ -54,6 +68,7 @@ struct GatherCounts {
   std::uint64_t clusters = 0;       ///< drawn
   std::uint64_t surfels = 0;        ///< drawn
   std::uint64_t retests = 0;        ///< clusters and surfels that one cell left and a cell in it tested
+  DamageCounts damage;
 
   void add(const GatherCounts& other) noexcept;
 };

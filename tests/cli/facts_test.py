@@ -206,6 +206,36 @@ class Verify(ProgramTest):
         self.assertFalse(kept.exists())
         self.fail_with(2, "ptcverify", self.scene, "--salvage", self.scene)
 
+    def test_damage_stops_a_shading_unless_it_is_tolerated(self):
+        scene, broken, out = self.here / "many.ptcx", self.here / "broken.ptcx", self.here / "o.ply"
+        self.succeed("ptcbuild", self.mesh, "--points", "3k", "--page-size", "4K", "-o", scene)
+        whole = bytearray(scene.read_bytes())
+        for byte in (64, 65):  # of the first page, which holds points
+            whole[4096 + byte] ^= 0xff
+        broken.write_bytes(whole)
+        number, count = struct.unpack_from("<I", whole, 4096 + 8)[0], struct.unpack_from("<I", whole, 4096 + 24)[0]
+        points = json.loads(self.succeed("ptcinfo", scene, "--json").stdout)["points"]
+        message = self.fail_with(1, "ptcshade", broken, "-o", out)
+        self.assertIn("broken.ptcx: offset 4160: payload's checksum is wrong", message)
+        self.assertFalse(out.exists())
+        result = self.succeed("ptcshade", broken, "-o", out, "--tolerate-damage", "--json")
+        damage = json.loads(result.stdout)["damage"]
+        self.assertEqual([page["page"] for page in damage["pages"]], [number])
+        self.assertEqual(damage["points"], count)
+        self.assertGreater(damage["stand_ins"], 0)
+        self.assertGreater(damage["greatest_bound"], damage["mean_bound"])
+        self.assertGreater(damage["mean_bound"], 0)
+        self.assertEqual(len(read_ply(out)[1]), points - count)
+        for options in (["--bounces", "2"], ["--check", "20"], ["--error", "5%"]):
+            self.fail_with(2, "ptcshade", broken, "-o", out, "--tolerate-damage", *options)
+        self.fail_with(2, "ptcshade", broken, "-o", self.here / "o.ptcx", "--tolerate-damage")
+        self.succeed("ptcshade", broken, "--receivers", scene, "-o", self.here / "o.ptcx", "--tolerate-damage")
+        self.fail_with(1, "ptcrender", broken, "-o", self.here / "o.png", *SMALL_PICTURE)
+        told = self.succeed("ptcrender", broken, "-o", self.here / "o.png", *SMALL_PICTURE, "--tolerate-damage").stdout
+        self.assertIn("damaged: 1 pages", told)
+        told = self.succeed("ptcshade", scene, "-o", out, "--tolerate-damage").stdout
+        self.assertIn("no page that was needed is damaged", told)
+
     def test_a_map_of_the_damage_is_drawn(self):
         path = self.here / "wrong.ptcx"
         path.write_bytes(self.scene.read_bytes()[:-9])

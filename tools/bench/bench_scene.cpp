@@ -141,7 +141,7 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
   std::optional<DirectLight> light;
   std::unique_ptr<PrimaryView> view;
   if (lit_.mesh.triangles.empty()) {
-    view = view_surfels(*container_, camera, 1, options.lift, executor, progress);
+    view = view_surfels(*container_, camera, 1, options.lift, nullptr, executor, progress);
   } else {
     rays.emplace(lit_.mesh);
     light.emplace(*rays, lit_.lights);
