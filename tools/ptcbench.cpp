@@ -1,6 +1,7 @@
 // ptcbench: what shading costs and how wrong it is, beside a ray tracer in the same run.
 #include <bit>
 #include <filesystem>
+#include <map>
 #include <numbers>
 
 #include "engine/base/error.h"
@@ -12,6 +13,7 @@
 #include "tools/bench/growth_report.h"
 #include "tools/bench/model.h"
 #include "tools/bench/model_report.h"
+#include "tools/bench/sort_report.h"
 #include "tools/common.h"
 #include "tools/values.h"
 
@@ -21,8 +23,8 @@ using namespace ptc::bench;
 
 constexpr char kPurpose[] =
     "Measures time and error together, against rays at the same scene in the same run, and draws charts\n"
-    "of one against the other, of how time grows, or of what each part of the model is worth. Scenes are\n"
-    "held in memory whole; --memory caps their builds alone.";
+    "of one against the other, of how time grows, or of what each part of the model is worth; and the sort\n"
+    "beside the disk. Scenes are held in memory whole; --memory caps their builds and the sort alone.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
@@ -30,7 +32,9 @@ constexpr char kExamples[] =
     "  ptcbench error fractal window city dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench growth --quick -o charts\n"
     "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n"
-    "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n";
+    "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n"
+    "  ptcbench sort --quick -o charts\n"
+    "  ptcbench sort --points 200M --panel disk --order city --memory 1G --temp /scratch -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
 
 struct Arguments {
@@ -40,6 +44,7 @@ struct Arguments {
   ErrorOptions error;
   GrowthOptions growth;
   ModelOptions model;
+  SortBenchOptions sort;
   bool quick = false;
   const CLI::App* command = nullptr;  ///< that was chosen: knows which options were given
 };
@@ -75,6 +80,21 @@ CLI::Validator one_of(const std::vector<std::string>& known) {
   return {check, ""};
 }
 
+/// Some of the words in `chosen`, repeatable. They must stay where they are.
+CLI::Option* add_words(CLI::App& command, const char* name, std::vector<std::string>& chosen, const char* description) {
+  return command.add_option(name, chosen, description)->type_name(joined(chosen))->allow_extra_args(false)->check(one_of(chosen));
+}
+
+/// --points, repeatable; sorted.
+void add_points_list(CLI::App& command, std::vector<std::uint64_t>& points, const char* description) {
+  const auto set = [&points](const std::vector<std::string>& values) {
+    points.clear();
+    for (const std::string& text : values) points.push_back(ptc::parse_count("--points", text));
+    std::ranges::sort(points);
+  };
+  command.add_option_function<std::vector<std::string>>("--points", set, description)->type_name("COUNT")->allow_extra_args(false);
+}
+
 void declare_choices(CLI::App& command, AccuracyOptions& options) {
   constexpr char kGroup[] = "Expert";
   const auto set = [&options](const std::vector<std::string>& values) {
@@ -87,15 +107,9 @@ void declare_choices(CLI::App& command, AccuracyOptions& options) {
       ->type_name("SR,RAD,R[,X]")
       ->allow_extra_args(false)
       ->group(kGroup);
-  const auto add_words = [&](const char* name, std::vector<std::string>& chosen, const char* description) {
-    command.add_option(name, chosen, description)
-        ->type_name(joined(chosen))
-        ->allow_extra_args(false)
-        ->check(one_of(chosen))
-        ->group(kGroup);
-  };
-  add_words("--method", options.methods, "Measure this method, not all; repeatable");
-  add_words("--set", options.sets, "Shade these receivers: pixels of a picture, or the scene's own points; repeatable");
+  add_words(command, "--method", options.methods, "Measure this method, not all; repeatable")->group(kGroup);
+  add_words(command, "--set", options.sets, "Shade these receivers: pixels of a picture, or the scene's own points; repeatable")
+      ->group(kGroup);
 }
 
 /// What every subcommand takes.
@@ -157,21 +171,24 @@ void declare_growth(CLI::App& app, Arguments& arguments) {
                    "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them checked, 3 runs, no cap below "
                    "9 %; what other options say stays");
   GrowthOptions& options = arguments.growth;
-  const auto set = [&options](const std::vector<std::string>& values) {
-    options.points.clear();
-    for (const std::string& text : values) options.points.push_back(ptc::parse_count("--points", text));
-    std::ranges::sort(options.points);
-  };
-  command.add_option_function<std::vector<std::string>>("--points", set,
-                                                        "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the "
-                                                        "greatest is also shaded under caps. Above 40M without a check by rays")
-      ->type_name("COUNT")
-      ->allow_extra_args(false);
-  command.add_option("--panel", options.panels, "Measure against this, not all; repeatable")
-      ->type_name(joined(options.panels))
-      ->allow_extra_args(false)
-      ->check(one_of(options.panels));
+  add_points_list(command, options.points,
+                  "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the greatest is also shaded under caps. Above "
+                  "40M without a check by rays");
+  add_words(command, "--panel", options.panels, "Measure against this, not all; repeatable");
   ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers whose error is measured");
+  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
+}
+
+void declare_sort(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = *app.add_subcommand("sort", "Time and bytes of the external sort beside those of the disk alone, and of its "
+                                                  "core beside std::sort and oneTBB");
+  command.fallthrough();
+  command.add_option("-o,--output", arguments.directory, "Directory for sort.json, .csv, .svg and .png")->type_name("DIR")->required();
+  command.add_flag("--quick", arguments.quick, "Under a minute on two cores: 200k and 1M records, 3 runs; what other options say stays");
+  SortBenchOptions& options = arguments.sort;
+  add_points_list(command, options.points, "Records, in place of 1M, 5M and 20M; repeatable; above 20M on disk alone");
+  add_words(command, "--order", options.orders, "Sort records that come in this order, not all; repeatable");
+  add_words(command, "--panel", options.panels, "Sort there, not both; repeatable");
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
 }
 
@@ -231,6 +248,12 @@ void shorten_growth(Arguments& arguments) {
   options.caps = {1, 0.29, 0.09};  // less of so few pages is nothing
   options.own_points = 8'192;
   options.reference_rays = 4096;
+}
+
+/// Likewise.
+void shorten_sort(Arguments& arguments) {
+  if (arguments.command->count("--points") == 0) arguments.sort.points = {200'000, 1'000'000};
+  if (arguments.command->count("--repeats") == 0) arguments.sort.repeats = 3;
 }
 
 /// Likewise.
@@ -297,6 +320,15 @@ ptc::Outcome run_growth(Arguments& arguments, const ptc::RunOptions& run, ptc::P
   return {facts_of(rows), growth_text(rows)};
 }
 
+ptc::Outcome run_sort(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten_sort(arguments);
+  std::filesystem::create_directories(arguments.directory);
+  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  const auto write = [&](const std::vector<SortRow>& so_far) { write_reports(arguments.directory, so_far); };
+  const std::vector<SortRow> rows = measure_sort(arguments.sort, work, run, progress, write);
+  return {facts_of(rows), sort_text(rows)};
+}
+
 ptc::Outcome run_model(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten_model(arguments);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
@@ -321,11 +353,13 @@ int main(int argc, char** argv) {
   declare_error(command.app(), arguments);
   declare_growth(command.app(), arguments);
   declare_model(command.app(), arguments);
+  declare_sort(command.app(), arguments);
   command.app().require_subcommand(1);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     arguments.command = command.app().get_subcommands().front();
     const std::string name = arguments.command->get_name();
-    const auto measure = name == "growth" ? run_growth : name == "error" ? run_error : name == "model" ? run_model : run_accuracy;
-    return measure(arguments, command.run_options(), progress);
+    static const std::map<std::string, decltype(&run_accuracy)> kRuns{
+        {"accuracy", run_accuracy}, {"error", run_error}, {"growth", run_growth}, {"model", run_model}, {"sort", run_sort}};
+    return kRuns.at(name)(arguments, command.run_options(), progress);
   });
 }

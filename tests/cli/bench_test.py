@@ -132,8 +132,27 @@ class Bench(ProgramTest):
         self.assertTrue(all(row["decode_ns"] if row["axis"] == "pages" else row["us_per_receiver"] for row in rows))
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["model-box.png", "model-box.svg", "model.csv", "model.json"])
 
+    def test_sorts_of_every_order_are_right_and_leave_their_files_alone(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "sort", "--points", "40k", "--repeats", "1", "--memory", "1M", "--threads", "2", "-o", charts,
+                               "--json")
+        rows = json.loads((charts / "sort.json").read_text())["rows"]
+        self.assertEqual(json.loads(printed.stdout)["rows"], rows)
+        orders = {"city", "random", "sorted", "reversed", "equal", "clusters"}
+        self.assertEqual({(r["panel"], r["order"], r["method"]) for r in rows},
+                         {("memory", o, m) for o in orders for m in ("ptcx", "tbb", "std::sort", "memcpy")}
+                         | {("disk", o, m) for o in orders for m in ("ptcx", "floor")})
+        for row in rows:
+            self.assertGreater(row["wall_seconds"], 0)
+            if row["panel"] == "disk":  # in, spilled and read again, out
+                self.assertGreaterEqual(row["moved_bytes"], 4 * 40 * row["points"])
+                self.assertEqual(row["floor_share"] is None, row["method"] == "floor")
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["sort.csv", "sort.json", "sort.png", "sort.svg"])
+
     def test_growth_beyond_the_disk_is_the_machines_fault(self):
         message = self.fail_with(3, "ptcbench", "growth", "--points", "40000G", "--panel", "surfels", "-o", self.here)
+        self.assertIn("GB free", message)
+        message = self.fail_with(3, "ptcbench", "sort", "--points", "40000G", "--panel", "disk", "-o", self.here)
         self.assertIn("GB free", message)
 
     def test_containers_that_were_there_stay(self):

@@ -1,0 +1,91 @@
+#include "tools/bench/record_file.h"
+
+#include <algorithm>
+#include <atomic>
+
+namespace ptc::bench {
+namespace {
+
+constexpr std::size_t kBlockBytes = RecordFile::kBlock * sizeof(PointRecord);
+constexpr std::size_t kCopies = 4;  // blocks under way at once: what this kind of disk needs for its full rate
+
+std::uint64_t blocks_of(const RecordFile& file) noexcept { return (file.records() + RecordFile::kBlock - 1) / RecordFile::kBlock; }
+
+}  // namespace
+
+std::size_t RecordFile::block_bytes(std::uint64_t block) const noexcept {
+  const std::uint64_t left = bytes() - block * kBlockBytes;
+  return static_cast<std::size_t>((std::min<std::uint64_t>(left, kBlockBytes) + kDirectBytes - 1) / kDirectBytes * kDirectBytes);
+}
+
+void RecordFile::copy_to(RecordFile& other) const {
+  const Arena buffers(kCopies * kBlockBytes);
+  std::atomic<std::uint64_t> next = 0;
+  const auto work = [&](std::size_t copy) {
+    std::byte* const buffer = buffers.data() + copy * kBlockBytes;
+    for (std::uint64_t block = next++; block < blocks_of(*this); block = next++) {
+      file_->read_at(block * kBlockBytes, {buffer, block_bytes(block)});
+      other.file_->write_at(block * kBlockBytes, {buffer, block_bytes(block)});
+    }
+  };
+  std::vector<std::future<void>> others;
+  for (std::size_t copy = 1; copy < kCopies; ++copy) others.push_back(std::async(std::launch::async, work, copy));
+  work(0);
+  for (auto& future : others) future.get();
+  other.records_ = records_;
+}
+
+RecordWriter::RecordWriter(RecordFile& file) : file_(file), buffers_(2 * kBlockBytes) {}
+
+void RecordWriter::write(std::span<const PointRecord> records) {
+  while (!records.empty()) {
+    const std::size_t count = std::min(records.size(), RecordFile::kBlock - filled_);
+    auto* const to = reinterpret_cast<PointRecord*>(buffers_.data() + half_ * kBlockBytes) + filled_;
+    std::ranges::copy(records.first(count), to);
+    filled_ += count;
+    records = records.subspan(count);
+    if (filled_ == RecordFile::kBlock) flush();
+  }
+}
+
+void RecordWriter::flush() {
+  if (writing_.valid()) writing_.get();
+  const std::size_t bytes = (filled_ * sizeof(PointRecord) + kDirectBytes - 1) / kDirectBytes * kDirectBytes;
+  const std::span<const std::byte> block(buffers_.data() + half_ * kBlockBytes, bytes);
+  writing_ = std::async(std::launch::async, [this, block, at = offset_] { file_.file_->write_at(at, block); });
+  file_.records_ += filled_;
+  offset_ += kBlockBytes;
+  half_ = 1 - half_;
+  filled_ = 0;
+}
+
+void RecordWriter::finish() {
+  if (filled_ > 0) flush();
+  if (writing_.valid()) writing_.get();
+}
+
+RecordReader::RecordReader(const RecordFile& file) : file_(file), buffers_(2 * kBlockBytes) { read_ahead(); }
+
+RecordReader::~RecordReader() = default;
+
+PointRecord* RecordReader::half(std::uint64_t block) const noexcept {
+  return reinterpret_cast<PointRecord*>(buffers_.data() + block % 2 * kBlockBytes);
+}
+
+void RecordReader::read_ahead() {
+  if (next_ == blocks_of(file_)) return;
+  reading_ = std::async(std::launch::async, [this, block = next_] {
+    file_.file_->read_at(block * kBlockBytes, {reinterpret_cast<std::byte*>(half(block)), file_.block_bytes(block)});
+  });
+}
+
+std::span<const PointRecord> RecordReader::next() {
+  if (!reading_.valid()) return {};
+  reading_.get();
+  const std::uint64_t block = next_++;
+  read_ahead();
+  const std::uint64_t left = file_.records() - block * RecordFile::kBlock;
+  return {half(block), static_cast<std::size_t>(std::min<std::uint64_t>(left, RecordFile::kBlock))};
+}
+
+}  // namespace ptc::bench

@@ -1,0 +1,300 @@
+#include "tools/bench/sort_bench.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_sort.h>
+
+#include "engine/base/memory.h"
+#include "engine/io/record.h"
+#include "engine/scene/city.h"
+#include "tools/bench/record_file.h"
+
+namespace ptc::bench {
+namespace {
+
+constexpr std::size_t kSampleKeys = 100'000;
+
+std::uint64_t mixed(std::uint64_t i) noexcept {  // splitmix64 (Steele et al. 2014)
+  std::uint64_t z = (i + 1) * 0x9e3779b97f4a7c15;
+  z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
+  z = (z ^ z >> 27) * 0x94d049bb133111eb;
+  return z ^ z >> 31;
+}
+
+constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;
+
+/// The i-th of n keys in an order that needs no scene.
+MortonKey key_at(const std::string& order, std::uint64_t i, std::uint64_t n) noexcept {
+  if (order == "random") return {mixed(2 * i) & kKeyMask, mixed(2 * i + 1) & kKeyMask};
+  if (order == "sorted") return {i * (kKeyMask / n), mixed(i) & kKeyMask};
+  if (order == "reversed") return {(n - 1 - i) * (kKeyMask / n), mixed(i) & kKeyMask};
+  if (order == "equal") return {kKeyMask / 3, kKeyMask / 5};
+  const std::uint64_t near = mixed(i) >> 34;  // clusters: cubes of 2^10 lattice points a side
+  return mixed(~i) % 2 == 0 ? MortonKey{0, near} : MortonKey{kKeyMask, kKeyMask - near};
+}
+
+/// Calls sink(records) for all records of an order. Their radiance holds their number.
+template <class Sink>
+void generate(const std::string& order, std::uint64_t points, const Sink& sink) {
+  std::vector<PointRecord> block(4096);
+  std::uint64_t number = 0;
+  const auto give = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i, ++number) {
+      block[i].radiance = {static_cast<std::uint16_t>(number >> 32), static_cast<std::uint16_t>(number >> 16),
+                           static_cast<std::uint16_t>(number)};
+    }
+    sink(std::span<const PointRecord>(block).first(count));
+  };
+  if (order != "city") {
+    for (std::uint64_t i = 0; i < points;) {
+      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(block.size(), points - i));
+      for (std::size_t k = 0; k < count; ++k, ++i) block[k].key = key_at(order, i, points);
+      give(count);
+    }
+    return;
+  }
+  const Bounds bounds = city_bounds(points);
+  const Frame frame = frame_around({bounds.low.x, bounds.low.y, bounds.low.z}, {bounds.high.x, bounds.high.y, bounds.high.z});
+  const std::unique_ptr<PointSource> city = make_city(points);
+  std::vector<Surfel> surfels(block.size());
+  while (const std::size_t count = city->next(surfels)) {
+    for (std::size_t i = 0; i < count; ++i) block[i] = to_record(surfels[i], frame);
+    give(count);
+  }
+}
+
+std::uint64_t number_of(const PointRecord& r) noexcept {
+  return std::uint64_t{r.radiance[0]} << 32 | std::uint64_t{r.radiance[1]} << 16 | r.radiance[2];
+}
+
+/// Sums over records in any order, and whether they come in the right one.
+class Check {
+ public:
+  void add(const PointRecord& r) noexcept {
+    sum_ += mixed(r.key.high ^ mixed(r.key.low ^ mixed(number_of(r))));
+    if (count_++ > 0) sorted_ &= last_.key < r.key || (last_.key == r.key && number_of(last_) < number_of(r));
+    last_ = r;
+  }
+  void require_sorted(const Check& input, const char* method) const {
+    if (!sorted_) throw std::runtime_error(fmt::format("{}: records are not in order", method));
+    if (sum_ != input.sum_ || count_ != input.count_) throw std::runtime_error(fmt::format("{}: other records came out", method));
+  }
+
+ private:
+  std::uint64_t sum_ = 0, count_ = 0;
+  bool sorted_ = true;
+  PointRecord last_;
+};
+
+/// Most that is resident from here on until bytes(), less what is now.
+class ResidentPeak {
+ public:
+  ResidentPeak() {
+    return_freed_memory();
+    std::ofstream("/proc/self/clear_refs") << "5";  // the peak begins anew; where that is not allowed, it is that of all so far
+    before_ = resident_bytes();
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return peak_resident_bytes() - std::min(peak_resident_bytes(), before_); }
+
+ private:
+  std::uint64_t before_;
+};
+
+/// Times of the runs of one method.
+struct Times {
+  std::vector<double> wall, cpu;
+  std::uint64_t resident = 0;
+
+  template <class Body>
+  void run(const Body& body) {
+    const ResidentPeak peak;
+    const double cpu_before = cpu_seconds();
+    const auto start = std::chrono::steady_clock::now();
+    body();
+    wall.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    cpu.push_back(cpu_seconds() - cpu_before);
+    resident = std::max(resident, peak.bytes());
+  }
+};
+
+bool by_key(const PointRecord& a, const PointRecord& b) noexcept { return a.key < b.key; }
+
+class SortRun {
+ public:
+  SortRun(const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run, Progress& progress,
+          const std::function<void(const std::vector<SortRow>&)>& report)
+      : options_(options), work_(work), run_(run), executor_(run.threads), progress_(progress), report_(report) {}
+
+  std::vector<SortRow> measure() {
+    for (const std::string& panel : options_.panels) {
+      for (const std::uint64_t points : options_.points) {
+        if (panel == "memory" && points > options_.memory_points) continue;
+        for (const std::string& order : options_.orders) {
+          panel == "memory" ? in_memory(order, points) : on_disk(order, points);
+          if (report_) report_(rows_);
+        }
+      }
+    }
+    return std::move(rows_);
+  }
+
+ private:
+  SortRow& add_row(const char* panel, const std::string& order, const char* method, std::uint64_t points, const Times& times) {
+    return rows_.emplace_back(SortRow{.panel = panel,
+                                      .order = order,
+                                      .method = method,
+                                      .points = points,
+                                      .threads = executor_.threads(),
+                                      .wall = spread_of(times.wall),
+                                      .cpu = spread_of(times.cpu),
+                                      .resident_bytes = times.resident});
+  }
+
+  void in_memory(const std::string& order, std::uint64_t points) {
+    std::vector<PointRecord> input;
+    input.reserve(points);
+    Check expected;
+    generate(order, points, [&](std::span<const PointRecord> block) {
+      input.insert(input.end(), block.begin(), block.end());
+      for (const PointRecord& r : block) expected.add(r);
+    });
+    std::vector<PointRecord> records(input.size()), scratch(input.size());
+    Times ours, tbb, std_sort, copy;
+    progress_.begin("sort in memory", options_.repeats, "runs");
+    for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
+      copy.run([&] { std::memcpy(static_cast<void*>(records.data()), input.data(), input.size() * sizeof(PointRecord)); });
+      ours.run([&] { radix_sort(records, scratch, executor_); });
+      if (repeat == 0) require(records, expected);
+      records = input;
+      tbb.run([&] {
+        const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, executor_.threads());
+        oneapi::tbb::parallel_sort(records.begin(), records.end(), by_key);
+      });
+      records = input;
+      std_sort.run([&] { std::sort(records.begin(), records.end(), by_key); });
+      progress_.advance(1);
+    }
+    progress_.end();
+    add_row("memory", order, "ptcx", input.size(), ours);
+    add_row("memory", order, "tbb", input.size(), tbb);
+    add_row("memory", order, "std::sort", input.size(), std_sort).threads = 1;
+    SortRow& moved = add_row("memory", order, "memcpy", input.size(), copy);
+    moved.threads = 1;
+    moved.moved_bytes = 2 * input.size() * sizeof(PointRecord);
+  }
+
+  static void require(std::span<const PointRecord> records, const Check& expected) {
+    Check found;
+    for (const PointRecord& r : records) found.add(r);
+    found.require_sorted(expected, "radix_sort");
+  }
+
+  void on_disk(const std::string& order, std::uint64_t points) {
+    check_room(points);
+    RecordFile input(work_);
+    RecordWriter writer(input);
+    Check expected;
+    progress_.begin("write input", points, "records");
+    generate(order, points, [&](std::span<const PointRecord> block) {
+      writer.write(block);
+      for (const PointRecord& r : block) expected.add(r);
+      progress_.advance(block.size());
+    });
+    writer.finish();
+    progress_.end();
+    const std::vector<MortonKey> sample = sample_of(input);
+    Times ours, floor;
+    std::uint64_t spilled = 0;
+    progress_.begin("sort on disk", options_.repeats, "runs");
+    Check found;  // by a run that counts for nothing else
+    sort_file(input, sample, &found);
+    found.require_sorted(expected, "external sort");
+    for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
+      ours.run([&] { spilled = sort_file(input, sample, nullptr); });
+      floor.run([&] {
+        RecordFile between(work_);
+        input.copy_to(between);
+        RecordFile output(work_);
+        between.copy_to(output);
+      });
+      progress_.advance(1);
+    }
+    progress_.end();
+    SortRow& row = add_row("disk", order, "ptcx", input.records(), ours);
+    row.memory_bytes = run_.memory_bytes;
+    row.moved_bytes = 2 * input.bytes() + 2 * spilled;
+    add_row("disk", order, "floor", input.records(), floor).moved_bytes = 4 * input.bytes();
+  }
+
+  /// Input, what is spilled or between copies, and output.
+  void check_room(std::uint64_t points) const {
+    const std::uint64_t wanted = 3 * points * sizeof(PointRecord) * 21 / 20;  // a city has up to 5 % more
+    const std::uint64_t free = std::filesystem::space(work_).available;
+    if (free >= wanted) return;
+    throw std::system_error(ENOSPC, std::generic_category(),
+                            fmt::format("{} records take up to {:.1f} GB in {}, which has {:.1f} GB free; name another directory "
+                                        "with --temp, or fewer --points",
+                                        points, static_cast<double>(wanted) / 1e9, work_.string(), static_cast<double>(free) / 1e9));
+  }
+
+  /// Keys of evenly spread blocks, as the build takes them of its input.
+  static std::vector<MortonKey> sample_of(const RecordFile& input) {
+    std::vector<MortonKey> sample;
+    RecordReader reader(input);
+    const std::uint64_t stride = input.records() / kSampleKeys + 1;
+    for (std::uint64_t at = 0, begin = 0;;) {
+      const std::span<const PointRecord> block = reader.next();
+      if (block.empty()) return sample;
+      for (; at < begin + block.size(); at += stride) sample.push_back(block[static_cast<std::size_t>(at - begin)].key);
+      begin += block.size();
+    }
+  }
+
+  /// @param check  of what comes out, or null
+  /// @return bytes spilled
+  std::uint64_t sort_file(const RecordFile& input, std::span<const MortonKey> sample, Check* check) {
+    ExternalSorter sorter({.memory_bytes = run_.memory_bytes, .temp_dir = work_}, executor_, sample);
+    {
+      RecordReader reader(input);
+      for (std::span<const PointRecord> block = reader.next(); !block.empty(); block = reader.next()) sorter.add(block);
+    }
+    const std::unique_ptr<PointStream> sorted = sorter.finish();
+    RecordFile output(work_);
+    RecordWriter writer(output);
+    std::vector<PointRecord> block(4096);
+    while (const std::size_t count = sorted->next(block)) {
+      const auto records = std::span<const PointRecord>(block).first(count);
+      writer.write(records);
+      if (check) {
+        for (const PointRecord& r : records) check->add(r);
+      }
+    }
+    writer.finish();
+    return sorter.statistics().spilled_bytes;
+  }
+
+  const SortBenchOptions& options_;
+  std::filesystem::path work_;
+  RunOptions run_;
+  Executor executor_;
+  Progress& progress_;
+  const std::function<void(const std::vector<SortRow>&)>& report_;
+  std::vector<SortRow> rows_;
+};
+
+}  // namespace
+
+std::vector<SortRow> measure_sort(const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
+                                  Progress& progress, const std::function<void(const std::vector<SortRow>&)>& report) {
+  return SortRun(options, work, run, progress, report).measure();
+}
+
+}  // namespace ptc::bench
