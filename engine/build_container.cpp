@@ -246,8 +246,10 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
              sampling_bytes(lit->mesh.triangles.size(), request.sampling.count, executor.threads());
   }
   const std::uint64_t sort_bytes = memory_left(request.run, taken, kLeastSort, "this scene's build");
-  ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target)}, executor,
-                        keys_of(inputs.sample, frame));
+  const std::uint64_t expected = inputs.lit ? request.sampling.count + inputs.clouds.points
+                                            : std::max(request.city_points, inputs.clouds.points);
+  ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target), .expected = expected},
+                        executor, keys_of(inputs.sample, frame));
   double spacing = 0;
   {
     const std::uint64_t wanted = request.city_points > 0 ? request.city_points : inputs.clouds.points;

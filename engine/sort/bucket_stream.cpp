@@ -38,25 +38,24 @@ void BucketLoader::push(std::shared_ptr<const Partition> partition) {
   }
 }
 
-std::size_t BucketLoader::load(std::span<PointRecord> out, std::span<PointRecord> scratch) {
+BucketLoader::Block BucketLoader::read(std::span<PointRecord> out, const std::function<std::span<PointRecord>()>& scratch) {
   while (!buckets_.empty()) {
     BucketReader& bucket = buckets_.back();
     if (bucket.left() > out.size() && !bucket.single_key()) {
       BucketReader large = std::move(bucket);
       buckets_.pop_back();
-      split(std::move(large), out, scratch);
+      split(std::move(large), out, scratch());
       continue;
     }
-    const std::span<PointRecord> records = out.first(bucket.read(out, reader_));
     // Records of one key are sorted as they came: they are the input's order.
-    if (!bucket.single_key()) radix_sort(records, scratch, executor_);
+    const Block block{out.first(bucket.read(out, reader_)), bucket.single_key()};
     if (bucket.left() == 0) {
       buckets_.pop_back();
       ++leaves_;
     }
-    return records.size();
+    return block;
   }
-  return 0;
+  return {};
 }
 
 // A bucket that does not fit: a partition of its own, whose ranges come in its place. It ends,
@@ -74,34 +73,49 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
   push(partition);
 }
 
-BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory, std::launch policy,
+BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory, const Executor& executor,
                            std::function<void()> at_end)
-    : loader_(std::move(loader)), policy_(policy), at_end_(std::move(at_end)) {
-  const std::size_t third = memory.size() / 3;
-  current_ = memory.subspan(0, third);
-  ahead_ = memory.subspan(third, third);
-  scratch_ = memory.subspan(2 * third, third);
-  load_ahead();
+    : loader_(std::move(loader)), executor_(executor), at_end_(std::move(at_end)) {
+  const std::size_t quarter = memory.size() / 4;
+  const auto block = [&](std::size_t k) { return memory.subspan(k * quarter, quarter); };
+  scratch_ = block(0);  // on a page boundary, for it is written where a range is partitioned again
+  reading_ = std::async(std::launch::async, [this, out = block(1)] { return loader_.read(out, [this] { return scratch_; }); });
+  advance(block(2));
+  current_ = block(3);
 }
 
 BucketStream::~BucketStream() = default;
 
-void BucketStream::load_ahead() {
-  loading_ = std::async(policy_, [this] { return loader_.load(ahead_, scratch_); });
+// What was read is sorted, and more is read. Reading leaves the processor free: it has a thread even if the executor has
+// only one.
+void BucketStream::advance(std::span<PointRecord> free) {
+  const Block read = reading_.get();
+  const auto sort = [this, read] {
+    if (!read.sorted && !read.records.empty()) radix_sort(read.records, scratch_, executor_);
+    return read;
+  };
+  sorting_ = std::async(executor_.threads() == 1 ? std::launch::deferred : std::launch::async, sort).share();
+  if (read.records.empty()) return;
+  const auto scratch = [this, sorting = sorting_] {
+    sorting.wait();
+    return scratch_;
+  };
+  reading_ = std::async(std::launch::async, [this, free, scratch] { return loader_.read(free, scratch); });
 }
 
 std::span<const PointRecord> BucketStream::next_block() {
   if (error_) std::rethrow_exception(error_);  // what failed once has no next block
-  if (!loading_.valid()) return {};
+  if (!sorting_.valid()) return {};
   try {
-    const std::size_t count = loading_.get();
-    if (count == 0) {
+    const std::span<PointRecord> sorted = sorting_.get().records;
+    if (sorted.empty()) {
+      sorting_ = {};
       at_end_();
       return {};
     }
-    std::swap(current_, ahead_);
-    load_ahead();
-    return current_.first(count);
+    advance(current_);  // which the caller has no more use for
+    current_ = {sorted.data(), scratch_.size()};
+    return sorted;
   } catch (...) {
     error_ = std::current_exception();
     throw;

@@ -39,9 +39,15 @@ class BucketLoader {
   BucketLoader(std::shared_ptr<const Partition> partition, SpillFile& file, const SortPlan& plan,
                const Executor& executor, std::atomic<std::uint32_t>& leaves);
 
-  /// Fills the front of `out` with the next sorted records. @return how many; 0 at the end
-  /// @param scratch  as long as `out`
-  [[nodiscard]] std::size_t load(std::span<PointRecord> out, std::span<PointRecord> scratch);
+  /// Records of one range, all of it unless their keys are equal.
+  struct Block {
+    std::span<PointRecord> records;  ///< none at the end
+    bool sorted = false;             ///< by their equal keys
+  };
+
+  /// Reads the next records into the front of `out`.
+  /// @param scratch  as long as `out`; called where a range does not fit and is partitioned again
+  [[nodiscard]] Block read(std::span<PointRecord> out, const std::function<std::span<PointRecord>()>& scratch);
 
  private:
   void push(std::shared_ptr<const Partition> partition);
@@ -55,26 +61,28 @@ class BucketLoader {
   std::vector<BucketReader> buckets_;  // not loaded yet, the next one last; none is empty
 };
 
-/// Streams from buckets on disk. While one block is handed out the next one is loaded on another
-/// thread, if the executor has more than one.
+/// Streams from buckets on disk. While one block is handed out the next is sorted, if the executor has
+/// more than one thread, and the one after it read.
 class BucketStream final : public BlockStream {
  public:
-  /// @param memory  given back at the end; its three thirds are the two blocks and the scratch
-  BucketStream(BucketLoader loader, std::span<PointRecord> memory, std::launch policy,
+  /// @param memory  given back at the end; its quarters are the three blocks and the scratch
+  BucketStream(BucketLoader loader, std::span<PointRecord> memory, const Executor& executor,
                std::function<void()> at_end);
   /// Waits for a block being loaded.
   ~BucketStream() override;
 
  private:
   std::span<const PointRecord> next_block() override;
-  void load_ahead();
+  using Block = BucketLoader::Block;
+  void advance(std::span<PointRecord> free);
 
   BucketLoader loader_;
-  std::span<PointRecord> current_, ahead_, scratch_;
-  std::launch policy_;
+  const Executor& executor_;
+  std::span<PointRecord> current_, scratch_;  ///< current: handed out, or free at first
   std::function<void()> at_end_;
   std::exception_ptr error_;
-  std::future<std::size_t> loading_;  // into ahead_; last, so that it is waited for first
+  std::shared_future<Block> sorting_;  // these two last, so that they are waited for first
+  std::future<Block> reading_;
 };
 
 }  // namespace ptc

@@ -44,6 +44,9 @@ Digest digest_of(std::span<const PointRecord> records, const Executor& executor)
   return total;
 }
 
+// Of a part: enough for long pieces of each range, little enough that touching its memory takes no time worth naming.
+constexpr std::size_t kPartRecords = kPageRecords * 6 * 1024;  // 126 MB
+
 // All in memory: one block.
 class MemoryStream final : public BlockStream {
  public:
@@ -71,12 +74,12 @@ struct ExternalSorter::Impl {
         arena(2 * plan.run_records * sizeof(PointRecord)) {
     const std::size_t stride = given_sample.size() / plan.sample_keys + 1;
     for (std::size_t i = 0; i < given_sample.size(); i += stride) sample.push_back(given_sample[i]);
+    filling = options.expected > plan.run_records ? part(0) : memory().first(plan.run_records);
   }
 
   [[nodiscard]] std::span<PointRecord> memory() noexcept {
     return {reinterpret_cast<PointRecord*>(arena.data()), 2 * plan.run_records};
   }
-  [[nodiscard]] std::span<PointRecord> run() noexcept { return memory().first(plan.run_records); }
   [[nodiscard]] std::span<PointRecord> scratch() noexcept {
     return memory().last(plan.run_records);
   }
@@ -84,6 +87,9 @@ struct ExternalSorter::Impl {
   void add(std::span<const PointRecord> records);
   void begin_partition();
   void spill();
+  /// Memory in three: while one part is filled, another is grouped into the third, which is written.
+  [[nodiscard]] std::span<PointRecord> part(std::size_t k) noexcept { return memory().subspan(k * part_records(), part_records()); }
+  [[nodiscard]] std::size_t part_records() noexcept { return std::min(kPartRecords, memory().size() / 3); }
   [[nodiscard]] std::unique_ptr<PointStream> stream_memory();
   [[nodiscard]] std::unique_ptr<PointStream> stream_buckets();
 
@@ -91,24 +97,25 @@ struct ExternalSorter::Impl {
   const Executor& executor;
   SortPlan plan;
   std::vector<MortonKey> sample;
-  Arena arena;             // two runs: one being filled, one being written
-  std::size_t filled = 0;  // records in run()
+  Arena arena;             // two runs
+  std::span<PointRecord> filling;  // a run, or a part() once it is known that not all will fit
+  std::size_t filled = 0;          // records there
   std::uint64_t points = 0;
   Digest digest{};
   bool finished = false;
   std::optional<SpillFile> file;  // these two from the first spill on
   std::shared_ptr<Partition> partition;
   std::atomic<std::uint32_t> buckets{0};
-  std::future<void> writing;  // of scratch(); last, so that it is waited for first
+  std::future<void> spilling;  // of what was filled before; last, so that it is waited for first
 };
 
 void ExternalSorter::Impl::add(std::span<const PointRecord> records) {
   digest = sum(digest, digest_of(records, executor));
   points += records.size();
   while (!records.empty()) {
-    if (filled == plan.run_records) spill();
-    const std::size_t count = std::min(records.size(), plan.run_records - filled);
-    std::ranges::copy(records.first(count), run().begin() + static_cast<std::ptrdiff_t>(filled));
+    if (filled == filling.size()) spill();
+    const std::size_t count = std::min(records.size(), filling.size() - filled);
+    std::ranges::copy(records.first(count), filling.begin() + static_cast<std::ptrdiff_t>(filled));
     filled += count;
     records = records.subspan(count);
   }
@@ -120,7 +127,7 @@ void ExternalSorter::Impl::begin_partition() {
   if (sample.size() < kLeastKeys) {
     sample.clear();
     const std::size_t stride = filled / plan.sample_keys + 1;
-    for (std::size_t i = 0; i < filled; i += stride) sample.push_back(run()[i].key);
+    for (std::size_t i = 0; i < filled; i += stride) sample.push_back(filling[i].key);
   }
   const std::size_t ranges = std::clamp<std::size_t>(sample.size() / kKeysPerRange, 3, plan.ranges);
   file.emplace(options.temp_dir);
@@ -128,31 +135,38 @@ void ExternalSorter::Impl::begin_partition() {
   sample = {};
 }
 
-// Groups the run and writes it while the next one is filled.
+// Groups what was filled and writes it while more is filled.
 void ExternalSorter::Impl::spill() {
   if (!partition) begin_partition();
-  if (writing.valid()) writing.get();
-  const std::span<PointRecord> grouped = scratch().first(filled);
-  const std::uint64_t offset = partition->add_run(run().first(filled), grouped, executor);
+  if (spilling.valid()) spilling.get();
+  const std::span<PointRecord> records = filling.first(filled);
+  const bool whole_run = filling.size() > part_records();  // the first one, where it was not known that more would come
+  const std::span<PointRecord> grouped = (whole_run ? scratch() : part(2)).first(filled);
+  filling = whole_run || filling.data() != part(0).data() ? part(0) : part(1);
   filled = 0;
+  const auto group = [this, records, grouped] { return partition->add_run(records, grouped, executor); };
+  const auto write = [this, grouped](std::uint64_t offset) { file->write(offset, grouped); };
   // Direct writes leave the processor free: another thread, even if the executor has only one.
-  writing =
-      std::async(std::launch::async, [this, offset, grouped] { file->write(offset, grouped); });
+  if (whole_run || executor.threads() == 1) {
+    spilling = std::async(std::launch::async, write, group());
+  } else {
+    spilling = std::async(std::launch::async, [group, write] { write(group()); });
+  }
 }
 
 std::unique_ptr<PointStream> ExternalSorter::Impl::stream_memory() {
-  radix_sort(run().first(filled), scratch(), executor);
+  const std::span<PointRecord> records = memory().first(filled);
+  radix_sort(records, scratch(), executor);
   arena.discard(plan.run_records * sizeof(PointRecord), plan.run_records * sizeof(PointRecord));
   buckets = 1;
-  return std::make_unique<MemoryStream>(run().first(filled), [this] { arena = Arena(); });
+  return std::make_unique<MemoryStream>(records, [this] { arena = Arena(); });
 }
 
 std::unique_ptr<PointStream> ExternalSorter::Impl::stream_buckets() {
   if (filled > 0) spill();
-  if (writing.valid()) writing.get();
-  const auto policy = executor.threads() == 1 ? std::launch::deferred : std::launch::async;
+  if (spilling.valid()) spilling.get();
   return std::make_unique<BucketStream>(
-      BucketLoader(std::move(partition), *file, plan, executor, buckets), memory(), policy,
+      BucketLoader(std::move(partition), *file, plan, executor, buckets), memory(), executor,
       [this] { arena = Arena(); });
 }
 

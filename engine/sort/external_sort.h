@@ -24,6 +24,9 @@ struct SortOptions {
   /// All that this stage holds at once; at least 256 KiB.
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
   std::filesystem::path temp_dir = ".";
+  /// About how many records will come; 0: not known. Those that are known not to fit leave for the disk
+  /// sooner and touch less memory.
+  std::uint64_t expected = 0;
 };
 
 struct SortStatistics {
@@ -36,8 +39,8 @@ struct SortStatistics {
 /// neither cap nor threads.
 ///
 /// Records collect in memory until the cap; then they are partitioned on disk by splitters taken
-/// from the sample, and each bucket is radix-sorted in memory, the next one while the one before is
-/// handed out. A bucket that turns out larger than memory is partitioned again. The temporary file
+/// from the sample, and each bucket is radix-sorted in memory: while one is handed out the next is
+/// sorted and the one after it read. A bucket that turns out larger than memory is partitioned again. The temporary file
 /// has no name and vanishes with the sorter.
 /// Threads: add() and next() are called from outside the bodies of the executor's loops.
 class ExternalSorter {

@@ -113,7 +113,8 @@ class WriteCombiner {
 /// How many records of each block fall into each class, and in which bits their keys differ.
 class ClassCounts {
  public:
-  /// @param from  at least one record
+  /// @param from      at least one record
+  /// @param classify  of a record of `from`, in its place there: the same each time
   template <class Classify>
   ClassCounts(std::span<const PointRecord> from, std::size_t classes, std::size_t blocks,
               const Classify& classify, const Executor& executor)
@@ -126,7 +127,7 @@ class ClassCounts {
       const MortonKey first = from_.front().key;
       MortonKey differ;
       for (const PointRecord& record : block(b)) {
-        ++counts[classify(record.key)];
+        ++counts[classify(record)];
         differ.high |= record.key.high ^ first.high;
         differ.low |= record.key.low ^ first.low;
       }
@@ -156,7 +157,7 @@ class ClassCounts {
   void scatter(PointRecord* to, const Classify& classify, const Executor& executor) const {
     each_block(executor, [&](std::size_t b) {
       WriteCombiner out(to, begins(b));
-      for (const PointRecord& record : block(b)) out.put(classify(record.key), record);
+      for (const PointRecord& record : block(b)) out.put(classify(record), record);
       out.finish();
     });
   }

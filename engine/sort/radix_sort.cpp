@@ -170,8 +170,8 @@ class PrefixClasses {
     assign(hits, (samples + wanted - 1) / wanted);
   }
 
-  [[nodiscard]] std::size_t operator()(const MortonKey& key) const noexcept {
-    return class_of_[prefix(key)];
+  [[nodiscard]] std::size_t operator()(const PointRecord& record) const noexcept {
+    return class_of_[prefix(record.key)];
   }
   [[nodiscard]] std::size_t size() const noexcept { return std::size_t{class_of_.back()} + 1; }
 

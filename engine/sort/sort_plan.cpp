@@ -16,21 +16,21 @@ constexpr std::uint64_t kMostRecords = 0xffffffff;  // a run's index has 32 bits
 
 // What a run holds of a range is read in one piece: make it worth the disk's while.
 constexpr std::uint64_t kPieceBytes = 64 << 10;
-constexpr std::size_t kLeastRanges = 32, kMostRanges = 512;
+constexpr std::size_t kLeastRanges = 48, kMostRanges = 512;
 constexpr std::size_t kSampleKeysPerRange = 16;
 constexpr std::uint64_t kLeastReadBytes = SpillReader::kLeastBytes, kMostReadBytes = 4 << 20;
 
-// Three blocks in two runs, each on a page boundary: 512 records are 5 pages.
-constexpr std::size_t kRunStep = 3 * 512;
-static_assert(512 * sizeof(PointRecord) % kDirectBytes == 0);
+// Three parts in two runs, each on a page boundary.
+constexpr std::size_t kRunStep = 3 * kPageRecords;
+static_assert(kPageRecords * sizeof(PointRecord) % kDirectBytes == 0);
 
 }  // namespace
 
 std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept {
   const std::uint64_t runs = 2 * std::uint64_t{plan.run_records} * sizeof(PointRecord);
-  // Grouping a run takes less than radix_sort() but for the first block.
-  const std::uint64_t work =
-      radix_sort_bytes(plan.run_records, threads) + partition_bytes(plan.ranges);
+  // Grouping a run takes less than radix_sort() but for the first block and the numbers of the ranges.
+  const std::uint64_t work = radix_sort_bytes(plan.run_records, threads) + partition_bytes(plan.ranges) +
+                             plan.run_records * sizeof(std::uint16_t);
   return runs + work + 2 * plan.sample_keys * sizeof(MortonKey) + plan.read_bytes;
 }
 

@@ -6,10 +6,13 @@
 
 namespace ptc {
 
-/// Sizes that follow from the cap. Two runs of records are held at once; when buckets are read, the
-/// same memory is three blocks.
+/// Fewest records whose bytes are whole pages, 5 of them.
+inline constexpr std::size_t kPageRecords = 512;
+
+/// Sizes that follow from the cap. Two runs of records are held at once, or three parts of their memory;
+/// when buckets are read, it is four blocks.
 struct SortPlan {
-  std::size_t run_records = 0;  ///< a multiple of 1536: runs and blocks lie on page boundaries
+  std::size_t run_records = 0;  ///< a multiple of 1536: runs and parts lie on page boundaries
   std::size_t ranges = 0;       ///< of a partition
   std::size_t sample_keys = 0;  ///< kept for the splitters, at most
   std::size_t read_bytes = 0;   ///< read from the disk at once

@@ -58,10 +58,10 @@ std::vector<PointRecord> drain(PointStream& stream, std::size_t block) {
 }
 
 Outcome sort(std::span<const PointRecord> input, std::uint64_t cap, unsigned threads,
-             std::span<const MortonKey> sample) {
+             std::span<const MortonKey> sample, std::uint64_t expected = 0) {
   const TempDirectory directory;
   const Executor executor(threads);
-  ExternalSorter sorter({cap, directory.path}, executor, sample);
+  ExternalSorter sorter({cap, directory.path, expected}, executor, sample);
   add_in_blocks(sorter, input, 3001);
   Outcome outcome;
   outcome.records = drain(*sorter.finish(), 2222);
@@ -108,6 +108,10 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
       const Outcome one = sort(input, cap, 1, sample), two = sort(input, cap, 2, sample);
       CHECK(same_bytes(one.records, expected));
       CHECK(same_bytes(two.records, expected));
+      for (const std::uint64_t told : {input.size() / 100, 10 * input.size()}) {  // wrong guesses cost time alone
+        CHECK(same_bytes(sort(input, cap, 2, sample, told).records, expected));
+      }
+      CHECK(same_bytes(sort(input, cap, 1, sample, input.size()).records, expected));
       CHECK(one.digest == two.digest);
       CHECK(one.statistics.points == input.size());
       CHECK(one.statistics.spilled_bytes == two.statistics.spilled_bytes);

@@ -15,13 +15,13 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
     for (const std::size_t classes : {1u, 2u, 3u, 64u})
       for (const std::size_t blocks : {1u, 2u, 5u}) {
         const std::vector<PointRecord> input = make_records(Keys::random, count);
-        const auto classify = [=](const MortonKey& key) { return key.low % classes; };
+        const auto classify = [=](const PointRecord& r) { return r.key.low % classes; };
         std::vector<PointRecord> expected;
         std::vector<std::size_t> starts;
         for (std::size_t c = 0; c < classes; ++c) {
           starts.push_back(expected.size());
           for (const PointRecord& r : input)
-            if (classify(r.key) == c) expected.push_back(r);
+            if (classify(r) == c) expected.push_back(r);
         }
         starts.push_back(count);
 
@@ -39,7 +39,7 @@ TEST_CASE("partition: the differences are the bits that are not the same in all 
           "[sort][partition]") {
   const Executor two(2);
   std::vector<PointRecord> input(100, numbered({0xf0, 1}, 0));
-  const auto classify = [](const MortonKey&) { return std::size_t{0}; };
+  const auto classify = [](const PointRecord&) { return std::size_t{0}; };
   const auto differences = [&] { return ClassCounts(input, 1, 3, classify, two).differences(); };
   CHECK(differences() == MortonKey{0, 0});
   input.back().key.low = 3;

@@ -143,7 +143,7 @@ TEST_CASE("sort plan: it uses most of the cap and never more", "[sort][plan]") {
         CHECK(2 * plan.run_records * sizeof(PointRecord) > cap / 10 * 9);
       CHECK(plan.run_records * sizeof(PointRecord) % kDirectBytes == 0);
       CHECK(2 * plan.run_records / 3 * sizeof(PointRecord) % kDirectBytes == 0);
-      CHECK(plan.ranges >= 32);
+      CHECK(plan.ranges >= 48);
       CHECK(plan.read_bytes >= SpillReader::kLeastBytes);
     }
   CHECK_THROWS_AS(plan_sort((256 << 10) - 1, 1), std::invalid_argument);

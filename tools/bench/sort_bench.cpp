@@ -5,13 +5,13 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <stdexcept>
 #include <system_error>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_sort.h>
 
+#include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/io/record.h"
 #include "engine/scene/city.h"
@@ -84,8 +84,8 @@ class Check {
     last_ = r;
   }
   void require_sorted(const Check& input, const char* method) const {
-    if (!sorted_) throw std::runtime_error(fmt::format("{}: records are not in order", method));
-    if (sum_ != input.sum_ || count_ != input.count_) throw std::runtime_error(fmt::format("{}: other records came out", method));
+    if (!sorted_) throw DataError(fmt::format("{}: records are not in order", method));
+    if (sum_ != input.sum_ || count_ != input.count_) throw DataError(fmt::format("{}: other records came out", method));
   }
 
  private:
@@ -261,7 +261,7 @@ class SortRun {
   /// @param check  of what comes out, or null
   /// @return bytes spilled
   std::uint64_t sort_file(const RecordFile& input, std::span<const MortonKey> sample, Check* check) {
-    ExternalSorter sorter({.memory_bytes = run_.memory_bytes, .temp_dir = work_}, executor_, sample);
+    ExternalSorter sorter({.memory_bytes = run_.memory_bytes, .temp_dir = work_, .expected = input.records()}, executor_, sample);
     {
       RecordReader reader(input);
       for (std::span<const PointRecord> block = reader.next(); !block.empty(); block = reader.next()) sorter.add(block);

@@ -44,7 +44,7 @@ struct SortRow {
 /// Runs everything asked for in one process; the methods of a panel, order and size in turn. Each sorted result is checked
 /// once: ascending, stable where keys are equal, and the same records.
 /// @param work  directory for the files, which have no names
-/// @throws std::system_error (ENOSPC) before a file is written that the disk has no room for; std::runtime_error when a
+/// @throws std::system_error (ENOSPC) before a file is written that the disk has no room for; DataError when a
 ///         result is wrong
 [[nodiscard]] std::vector<SortRow> measure_sort(const SortBenchOptions& options, const std::filesystem::path& work,
                                                 const RunOptions& run, Progress& progress,
