@@ -48,7 +48,8 @@ class ExternalSorter {
   /// @param executor  must outlive the sorter
   /// @param sample    keys drawn evenly from the input, any order; a few thousand are enough; with
   ///                  fewer than 64 the first records that fill the memory serve instead
-  /// @throws std::invalid_argument when the cap is too small, std::bad_alloc
+  /// @throws std::invalid_argument when the cap is too small, std::bad_alloc; std::system_error (ENOSPC)
+  ///         when the directory has no room for what is expected
   ExternalSorter(const SortOptions& options, const Executor& executor,
                  std::span<const MortonKey> sample);
   ~ExternalSorter();

@@ -126,6 +126,19 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
   }
 }
 
+TEST_CASE("external sort: what the disk has no room for is refused before it begins", "[sort][external]") {
+  const TempDirectory directory;
+  const Executor executor(1);
+  try {
+    const ExternalSorter sorter({kLeastCap, directory.path, std::uint64_t{1} << 50}, executor, {});
+    FAIL("begun");
+  } catch (const std::system_error& error) {
+    CHECK(error.code() == std::errc::no_space_on_device);
+    CHECK_THAT(error.what(), Catch::Matchers::Contains(directory.path.string()));
+    CHECK_THAT(error.what(), Catch::Matchers::Contains("42784196.5 GB"));  // what is wanted, less what a guess may be off
+  }
+}
+
 TEST_CASE("external sort: no, few and misleading samples cost passes, not the result",
           "[sort][external]") {
   const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
