@@ -28,11 +28,10 @@ namespace {
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
 constexpr std::uint64_t kPagesOpen = 80;                       // of the build: one a level, and some
 
-/// A page that is known of, and what its header says of its keys where it is sound.
+/// A page that is known of, and of a sound one of points the keys at its ends.
 struct Known {
   const PageSite* site = nullptr;  ///< null: it is lost
-  std::uint64_t first_key = 0;
-  std::uint64_t last_key = 0;
+  MortonKey first_key, last_key;
 };
 
 /// Points of the kept pages, page by page.
@@ -138,7 +137,12 @@ class Salvage {
     Known& known = (*kind)[site.page];
     if (known.site != nullptr) return true;
     if (page_->check(site, 3, flips_)) return false;
-    known = {&site, page_->header().first_key, page_->header().last_key};
+    known.site = &site;
+    if (site.entry.type == PageType::point) {
+      const PointPage points(page_->payload().data(), site.entry.record_count);
+      known.first_key = points[0].key;
+      known.last_key = points[site.entry.record_count - 1].key;
+    }
     return true;
   }
 
@@ -149,7 +153,8 @@ class Salvage {
     const std::uint64_t pages = s ? (s->points + per_page - 1) / per_page : point_sites_.size();
     // Where some are not even known, ranks say nothing.
     const bool all_known = s ? point_sites_.size() == pages : no_number_is_missing();
-    std::uint64_t k = 0, last_key = 0;
+    std::uint64_t k = 0;
+    MortonKey last_key;
     for (const auto& [number, page] : point_sites_) {
       const std::uint64_t rank = k++;
       if (page.site == nullptr || page.first_key < last_key) continue;
