@@ -246,14 +246,15 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
              sampling_bytes(lit->mesh.triangles.size(), request.sampling.count, executor.threads());
   }
   const std::uint64_t sort_bytes = memory_left(request.run, taken, kLeastSort, "this scene's build");
-  const std::uint64_t expected = inputs.lit ? request.sampling.count + inputs.clouds.points
-                                            : std::max(request.city_points, inputs.clouds.points);
+  const std::uint64_t known = request.city_points + inputs.clouds.points;
+  // A given spacing does not say how many points it makes of a mesh.
+  const bool by_spacing = inputs.lit && request.sampling.spacing > 0;
+  const std::uint64_t expected = by_spacing ? 0 : known + (inputs.lit ? request.sampling.count : 0);
   ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target), .expected = expected},
                         executor, keys_of(inputs.sample, frame));
   double spacing = 0;
   {
-    const std::uint64_t wanted = request.city_points > 0 ? request.city_points : inputs.clouds.points;
-    const Stage stage(report.seconds, progress, inputs.lit ? "sample and light" : "partition", wanted, "points");
+    const Stage stage(report.seconds, progress, inputs.lit ? "sample and light" : "partition", known, "points");
     if (request.city_points > 0) feed(*make_city(request.city_points), frame, sorter, executor, progress);
     for (const auto& [path, points] : inputs.clouds.files) {
       if (feed(*open_lit(path), frame, sorter, executor, progress) == points) continue;

@@ -276,9 +276,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   const auto side = static_cast<unsigned>(std::lround(std::sqrt(request.samples)));
   if (side * side != request.samples) throw std::invalid_argument("samples per pixel must be a square number");
 
-  std::optional<LostPages> lost;
-  if (request.tolerate_damage) lost.emplace(scene);
-  LostPages* const lost_pages = lost ? &*lost : nullptr;
+  const std::unique_ptr<LostPages> lost = request.tolerate_damage ? std::make_unique<LostPages>(scene) : nullptr;
   std::vector<MeshCamera> cameras;
   Subject subject;
   subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, &cameras);
@@ -292,13 +290,13 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
     view_mesh_of(subject, request, scene, lights, camera, side);
   } else {
     const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
-    subject.view = view_surfels(scene, camera, side, request.lift, lost_pages, executor, progress);
+    subject.view = view_surfels(scene, camera, side, request.lift, lost.get(), executor, progress);
   }
   Film film(camera.width, camera.height, request.estimate);
   ShadeOptions options{.access = request.access,
                        .gather = request.gather,
                        .sky = sky_function(lights.sky),
-                       .lost = lost_pages,
+                       .lost = lost.get(),
                        .variants = std::min(request.samples, kMostVariants)};
   options.gather.bleeding = request.bounces > 0;
   const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * (kReceiverBytes + (request.estimate ? kEstimateBytes : 0)) +

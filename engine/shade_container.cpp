@@ -328,9 +328,8 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   const ContainerReader& receivers = other ? *other : scene;
   const std::uint64_t all = receivers.superblock().points;
   const std::uint64_t wanted = request.count == 0 ? all : std::min(request.count, all);
-  std::optional<LostPages> lost;
-  if (request.tolerate_damage) lost.emplace(scene);
-  LostPages* const receivers_lost = lost && !other ? &*lost : nullptr;
+  const std::unique_ptr<LostPages> lost = request.tolerate_damage ? std::make_unique<LostPages>(scene) : nullptr;
+  LostPages* const receivers_lost = other ? nullptr : lost.get();
   const std::uint64_t points = receivers_lost ? count_whole(receivers, wanted, *receivers_lost) : wanted;
   if (wanted < all && target.extension() != ".ply") {
     throw std::invalid_argument("a container of some of the points cannot be written: name a .ply, or shade them all");
@@ -343,7 +342,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
       .access = request.access,
       .gather = request.gather,
       .sky = sky_function(sky),
-      .lost = lost ? &*lost : nullptr};
+      .lost = lost.get()};
   options.gather.bleeding = request.bounces > 0;
   const std::unique_ptr<ContainerReader> bounced =
       bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, target)}, executor, report,

@@ -43,14 +43,13 @@ class SurfelView : public PrimaryView {
         width_(camera.width * side),
         height_(camera.height * side),
         lift_(lift),
-        lost_(lost),
         samples_(std::size_t{width_} * height_) {
     const CameraAxes axes = axes_of(camera);
     axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
     focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
     const std::span<const std::uint32_t> pages = scene.point_pages();
     for (std::size_t first = 0; first < pages.size(); first += kPagesAtOnce) {
-      draw(scene, pages.subspan(first, std::min(kPagesAtOnce, pages.size() - first)), executor, progress);
+      draw(scene, pages.subspan(first, std::min(kPagesAtOnce, pages.size() - first)), lost, executor, progress);
     }
   }
 
@@ -88,14 +87,14 @@ class SurfelView : public PrimaryView {
   }
 
   /// Pages are projected side by side, then bands of rows drawn side by side, in the order of points.
-  void draw(const ContainerReader& scene, std::span<const std::uint32_t> pages, const Executor& executor,
+  void draw(const ContainerReader& scene, std::span<const std::uint32_t> pages, LostPages* lost, const Executor& executor,
             Progress& progress) {
     std::vector<std::vector<Projected>> discs(pages.size());
     executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
       std::vector<std::byte> payload(scene.page_payload_limit());
       PageDecoder decoder;
       progress.advance(scene.entry(pages[i]).record_count);
-      if (!read_unless_lost(scene, pages[i], payload, decoder, lost_)) return;
+      if (!read_unless_lost(scene, pages[i], payload, decoder, lost)) return;
       const PointPage points(payload.data(), scene.entry(pages[i]).record_count);
       for (std::uint32_t k = 0; k < points.size(); ++k) {
         project(to_surfel(points[k], scene.header().frame), discs[i]);
@@ -174,7 +173,6 @@ class SurfelView : public PrimaryView {
   glm::mat3 axes_{1};  // columns: right, down, forward
   unsigned width_, height_;
   float lift_;
-  LostPages* lost_;
   float focal_ = 1;  // in samples
   std::vector<Sample> samples_;
 };

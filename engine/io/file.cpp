@@ -15,6 +15,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "engine/base/error.h"
 
 namespace ptc {
@@ -303,6 +305,15 @@ void TempFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) 
 
 void TempFile::drop_cache() const noexcept {
   ::posix_fadvise(fd_, 0, 0, POSIX_FADV_DONTNEED);
+}
+
+void require_room(const std::filesystem::path& directory, std::uint64_t bytes, const std::string& what) {
+  const std::uint64_t free = std::filesystem::space(directory).available;
+  if (bytes <= free) return;
+  const auto giga = [](std::uint64_t n) { return fmt::format("{:.1f} GB", static_cast<double>(n) / 1e9); };
+  throw std::system_error(ENOSPC, std::generic_category(),
+                          fmt::format("{} take up to {} in {}, which has {} free; name another directory with --temp, or fewer points", what,
+                                      giga(bytes), directory.string(), giga(free)));
 }
 
 }  // namespace ptc

@@ -3,18 +3,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
-#include <filesystem>
 #include <future>
 #include <optional>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "engine/base/memory.h"
+#include "engine/io/file.h"
 #include "engine/sort/bucket_stream.h"
 #include "engine/sort/radix_sort.h"
 #include "engine/sort/sort_plan.h"
@@ -81,17 +77,10 @@ struct ExternalSorter::Impl {
     for (std::size_t i = 0; i < given_sample.size(); i += stride) sample.push_back(given_sample[i]);
     const bool will_spill = options.expected > plan.run_records;
     filling = will_spill ? part(0) : memory().first(plan.run_records);
-    if (will_spill) require_room();
-  }
-
-  /// Better now than after an hour of partitioning. What is expected may be a little more than comes.
-  void require_room() const {
-    const std::uint64_t wanted = options.expected / 100 * 95 * sizeof(PointRecord);
-    const std::uint64_t free = std::filesystem::space(options.temp_dir).available;
-    if (wanted <= free) return;
-    throw std::system_error(ENOSPC, std::generic_category(),
-                            fmt::format("{}: sorting some {} points takes {:.1f} GB there, and {:.1f} GB are free", options.temp_dir.string(),
-                                        options.expected, static_cast<double>(wanted) / 1e9, static_cast<double>(free) / 1e9));
+    if (!will_spill) return;
+    // Better now than after an hour of partitioning. What is expected may be a little more than comes.
+    require_room(options.temp_dir, options.expected / 100 * 95 * sizeof(PointRecord),
+                 "some " + std::to_string(options.expected) + " points on their way through the sort");
   }
 
   [[nodiscard]] std::span<PointRecord> memory() noexcept {

@@ -40,8 +40,8 @@ struct SortStatistics {
 ///
 /// Records collect in memory until the cap; then they are partitioned on disk by splitters taken
 /// from the sample, and each bucket is radix-sorted in memory: while one is handed out the next is
-/// sorted and the one after it read. A bucket that turns out larger than memory is partitioned again. The temporary file
-/// has no name and vanishes with the sorter.
+/// sorted and the one after it read. A bucket that turns out larger than memory is partitioned again.
+/// The temporary file has no name and vanishes with the sorter.
 /// Threads: add() and next() are called from outside the bodies of the executor's loops.
 class ExternalSorter {
  public:

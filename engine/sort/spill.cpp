@@ -77,9 +77,14 @@ std::uint64_t Partition::add_run(std::span<const PointRecord> records,
   const std::size_t blocks = partition_blocks(records.size(), ranges(), executor.threads());
   // Looking for a range takes longer than keeping its number.
   const auto range_of = std::make_unique_for_overwrite<std::uint16_t[]>(records.size());
-  const auto number = [&](const PointRecord& record) -> std::uint16_t& { return range_of[static_cast<std::size_t>(&record - records.data())]; };
-  const ClassCounts counts(records, ranges(), blocks, [&](const PointRecord& record) { return number(record) = static_cast<std::uint16_t>(splitters_(record.key)); }, executor);
-  counts.scatter(grouped.data(), number, executor);
+  const auto kept = [&](const PointRecord& record) -> std::uint16_t& {
+    return range_of[static_cast<std::size_t>(&record - records.data())];
+  };
+  const auto find = [&](const PointRecord& record) {
+    return kept(record) = static_cast<std::uint16_t>(splitters_(record.key));
+  };
+  const ClassCounts counts(records, ranges(), blocks, find, executor);
+  counts.scatter(grouped.data(), kept, executor);
   const std::vector<std::size_t> starts = counts.starts();
 
   Run& run = runs_.emplace_back();

@@ -26,6 +26,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
+constexpr std::uint64_t kPageBytes = 320;                      // of a page of the file: its site, twice where pages moved, and two maps
 constexpr std::uint64_t kPagesOpen = 80;                       // of the build: one a level, and some
 
 /// A page that is known of, and of a sound one of points the keys at its ends.
@@ -91,7 +92,7 @@ class Salvage {
     if (!survey_.header) refuse("spec/recovery.md#survey", "neither the header nor a superblock is whole: no page proves that it is of this file");
     if (survey_.header->feature_ro_compat != 0) refuse("spec/versions.md#features", "the file uses a feature that forbids to repair it");
     const std::uint64_t page = std::uint64_t{1} << survey_.header->page_shift;
-    const std::uint64_t least = kBaseBytes + 140 * survey_.sites.size() + kPagesOpen * page;
+    const std::uint64_t least = kBaseBytes + kPageBytes * survey_.sites.size() + kPagesOpen * page;
     if (options_.memory_bytes < least) {
       throw LimitError(fmt::format("the memory cap is too small to salvage this file: the least that works is {}M", (least >> 20) + 1));
     }

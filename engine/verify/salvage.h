@@ -34,7 +34,7 @@ struct SalvageReport {
 /// says which. Channel values that are lost are 0.
 /// @throws std::invalid_argument when the target is the file itself; FormatError when neither header nor a superblock is whole, when features
 ///         forbid it or no point is left; LimitError naming the least cap; std::system_error
-/// Memory: 80 bytes a page of the file, and what build_pages() takes.
+/// Memory: 320 bytes a page of the file, and what build_pages() takes.
 SalvageReport salvage_container(const std::filesystem::path& path, const std::filesystem::path& target,
                                 const SalvageOptions& options, Progress& progress);
 

@@ -76,9 +76,6 @@ void write_reports(const std::filesystem::path& directory, const std::vector<Sce
 }
 
 std::string accuracy_text(const std::vector<SceneAccuracy>& scenes) {
-  const auto or_dash = [](double value, const char* suffix) {
-    return std::isfinite(value) ? fmt::format("{:.1f}{}", value, suffix) : std::string("-");
-  };
   std::string text = fmt::format("{:<10} {:<7} {:<10} {:<32} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "scene", "set", "job",
                                  "setting", "us", "RMS %", "bias %", "p99 %", "FLIP", "x discs", "x mesh");
   for (const SceneAccuracy& scene : scenes) {
@@ -87,8 +84,8 @@ std::string accuracy_text(const std::vector<SceneAccuracy>& scenes) {
       text += fmt::format("{:<10} {:<7} {:<10} {:<32} {:>9.1f} {:>8.2f} {:>+8.2f} {:>8.1f} {:>8} {:>8} {:>8}\n", row.scene, row.set,
                           name_of(row.job), row.method == "ptcx" ? row.setting : row.method + ", " + row.setting,
                           row.us_per_receiver.median, 100 * e.rms, 100 * e.bias, 100 * e.percentile_99,
-                          std::isfinite(row.flip) ? fmt::format("{:.4f}", row.flip) : "-", or_dash(row.speedup_discs, "x"),
-                          or_dash(row.speedup_mesh, "x"));
+                          or_dash(row.flip, "{:.4f}"), or_dash(row.speedup_discs, "{:.1f}x"),
+                          or_dash(row.speedup_mesh, "{:.1f}x"));
     }
     for (const ReferenceNote& note : scene.references) text += note_text(note, scene) + "\n";
   }

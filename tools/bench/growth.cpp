@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <system_error>
 
 #include <fmt/format.h>
 
 #include "engine/base/memory.h"
+#include "engine/io/file.h"
 #include "engine/shade/brute_force.h"
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
@@ -144,15 +144,7 @@ class GrowthRun {
 
   [[nodiscard]] BenchScene make_scene(const SceneChoice& choice, std::uint64_t points) {
     const std::filesystem::path directory = run_.temp_dir.empty() ? work_ : run_.temp_dir;
-    const std::uint64_t free = std::filesystem::space(directory).available;
-    if (free < build_disk_bytes(points)) {
-      constexpr double kGiga = 1e9;
-      throw std::system_error(ENOSPC, std::generic_category(),
-                              fmt::format("{} surfels take up to {:.1f} GB in {}, which has {:.1f} GB free; name another "
-                                          "directory with --temp, or fewer --points",
-                                          points, static_cast<double>(build_disk_bytes(points)) / kGiga, directory.string(),
-                                          static_cast<double>(free) / kGiga));
-    }
+    require_room(directory, build_disk_bytes(points), fmt::format("{} surfels", points));
     const SceneOptions options{.points = points, .shaded_width = 0, .own_points = options_.own_points, .rays = in_reach(points)};
     return {choice, options, work_, run_, progress_};
   }

@@ -130,9 +130,6 @@ void write_reports(const std::filesystem::path& directory, const std::vector<Gro
 }
 
 std::string growth_text(const std::vector<GrowthRow>& rows) {
-  const auto or_dash = [](double value, const char* format) {
-    return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : std::string("-");
-  };
   std::string text = fmt::format("{:<12} {:>10} {:>11} {:>3} {:>9} {:>19} {:>9} {:>7} {:>7} {:>8} {:>8} {:>8} {:>10}\n", "panel", "at",
                                  "surfels", "thr", "us", "[low, high]", "wall us", "AO %", "E %", "x discs", "x mesh", "hits %",
                                  "bytes");

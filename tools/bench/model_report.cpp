@@ -174,9 +174,6 @@ void write_reports(const std::filesystem::path& directory, const std::vector<Sce
 }
 
 std::string model_text(const std::vector<SceneModel>& scenes) {
-  const auto or_dash = [](double value, const char* format) {
-    return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : std::string("-");
-  };
   static constexpr char kHead[] = "{:<10} {:<11} {:<11} {:<7} {:>6} {:>9} {:<6}";
   static constexpr char kTail[] = " {:>9} {:>9} {:>7} {:>7} {:>7} {:>7} {:>7}\n";
   std::string text = fmt::format(kHead, "scene", "axis", "variant", "form", "sr", "bytes", "of a") +

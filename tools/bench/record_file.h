@@ -10,6 +10,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/sort/direct_file.h"
+#include "engine/sort/sort_plan.h"
 #include "format/point_record.h"
 
 namespace ptc::bench {
@@ -20,7 +21,7 @@ class RecordFile {
   explicit RecordFile(const std::filesystem::path& directory) : file_(std::make_unique<DirectFile>(directory)) {}
 
   /// Records that are transferred at once: whole blocks of the disk.
-  static constexpr std::size_t kBlock = std::size_t{200} * 512;
+  static constexpr std::size_t kBlock = 200 * kPageRecords;
   static_assert(kBlock * sizeof(PointRecord) % kDirectBytes == 0);
 
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }

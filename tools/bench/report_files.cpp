@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "engine/io/file.h"
 
 namespace ptc::bench {
@@ -42,6 +44,10 @@ std::filesystem::path with_ending(const std::filesystem::path& name, const char*
 }  // namespace
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+std::string or_dash(double value, const char* format) {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
+}
 
 void write_tables(const std::filesystem::path& name, const Json& facts) {
   write_text(with_ending(name, ".json"), facts.dump(2) + "\n");

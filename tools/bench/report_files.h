@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -11,6 +12,9 @@ namespace ptc::bench {
 
 /// null where there is no finite number.
 [[nodiscard]] nlohmann::ordered_json number(double value);
+
+/// A number for a table that people read: by a format as "{:.1f}", or a dash where it is not finite.
+[[nodiscard]] std::string or_dash(double value, const char* format);
 
 /// Writes NAME.json, and its "rows" as NAME.csv: their members as columns, null as an empty cell.
 /// @param facts  "rows" is an array of one or more objects with the same members

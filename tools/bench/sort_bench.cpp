@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <system_error>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -13,6 +12,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
+#include "engine/io/file.h"
 #include "engine/io/record.h"
 #include "engine/scene/city.h"
 #include "tools/bench/record_file.h"
@@ -198,7 +198,8 @@ class SortRun {
   }
 
   void on_disk(const std::string& order, std::uint64_t points) {
-    check_room(points);
+    constexpr std::uint64_t kFiles = 3;  // input, what is spilled or between copies, and output; a city has up to 5 % more points
+    require_room(work_, kFiles * points * sizeof(PointRecord) * 21 / 20, fmt::format("{} records", points));
     RecordFile input(work_);
     RecordWriter writer(input);
     Check expected;
@@ -232,17 +233,6 @@ class SortRun {
     row.memory_bytes = run_.memory_bytes;
     row.moved_bytes = 2 * input.bytes() + 2 * spilled;
     add_row("disk", order, "floor", input.records(), floor).moved_bytes = 4 * input.bytes();
-  }
-
-  /// Input, what is spilled or between copies, and output.
-  void check_room(std::uint64_t points) const {
-    const std::uint64_t wanted = 3 * points * sizeof(PointRecord) * 21 / 20;  // a city has up to 5 % more
-    const std::uint64_t free = std::filesystem::space(work_).available;
-    if (free >= wanted) return;
-    throw std::system_error(ENOSPC, std::generic_category(),
-                            fmt::format("{} records take up to {:.1f} GB in {}, which has {:.1f} GB free; name another directory "
-                                        "with --temp, or fewer --points",
-                                        points, static_cast<double>(wanted) / 1e9, work_.string(), static_cast<double>(free) / 1e9));
   }
 
   /// Keys of evenly spread blocks, as the build takes them of its input.

@@ -106,9 +106,6 @@ void write_reports(const std::filesystem::path& directory, const std::vector<Sor
 std::string sort_text(const std::vector<SortRow>& rows) {
   std::string text = fmt::format("{:<7} {:<9} {:<9} {:>10} {:>3} {:>8} {:>18} {:>8} {:>9} {:>8} {:>7} {:>7}\n", "panel", "order", "method",
                                  "records", "thr", "wall s", "[low, high]", "cpu ns", "moved GB", "MiB", "floor %", "x sort");
-  const auto or_dash = [](double value, const char* format) {
-    return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : std::string("-");
-  };
   for (const SortRow& row : rows) {
     text += fmt::format("{:<7} {:<9} {:<9} {:>10} {:>3} {:>8.3f} {:>18} {:>8.1f} {:>9.2f} {:>8.0f} {:>7} {:>7}\n", row.panel, row.order,
                         row.method, row.points, row.threads, row.wall.median,
