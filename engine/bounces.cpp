@@ -98,7 +98,7 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene, cons
       ContainerWriter writer(path, {.page_shift = scene.header().page_shift, .frame = scene.header().frame});
       Progress silent;
       const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
-      writer.finish({}, build_pages(points, writer, tree, silent));
+      writer.finish({}, build_pages(points, writer, tree, executor, silent));
       report.bounce_cpu_seconds += points.cpu_seconds();
     };
     lit = make_temporary(options.temp_dir, write);

@@ -282,10 +282,10 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
     points = with_radii.get();
   }
   if (is_rounded(request.profile)) {
-    rounded = round_points(*points, frame.unit());
+    rounded = round_points(*points, frame.unit(), executor);
     points = rounded.get();
   }
-  const Superblock superblock = build_pages(*points, writer, request.tree, progress);
+  const Superblock superblock = build_pages(*points, writer, request.tree, executor, progress);
   report.superblock = writer.finish(meta, superblock);
   report.sort = sorter.statistics();
   return report;

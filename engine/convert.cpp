@@ -199,12 +199,13 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   }
 }
 
-Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round, Progress& progress) {
+Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round, unsigned threads, Progress& progress) {
   const Superblock& from = container.superblock();
   ContainerPoints points(container);
+  const Executor executor(threads);
   const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
-  const std::unique_ptr<PointStream> rounded = round ? round_points(points, container.header().frame.unit()) : nullptr;
-  const Superblock superblock = build_pages(rounded ? *rounded : points, writer, tree, progress);
+  const std::unique_ptr<PointStream> rounded = round ? round_points(points, container.header().frame.unit(), executor) : nullptr;
+  const Superblock superblock = build_pages(rounded ? *rounded : points, writer, tree, executor, progress);
   repage_channels(container, writer);
   return superblock;
 }
@@ -256,7 +257,7 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   if (same_pages) {
     copy_pages(container, writer, progress);
   } else {
-    superblock = rebuild_pages(container, writer, round, progress);
+    superblock = rebuild_pages(container, writer, round, options.threads, progress);
   }
   superblock.writer.clear();
   return writer.finish(meta, superblock);

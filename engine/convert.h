@@ -17,6 +17,7 @@ namespace ptc {
 struct RecodeOptions {
   Profile profile = Profile::exact;
   std::optional<std::uint8_t> page_shift;  ///< empty: as it was
+  unsigned threads = 0;                    ///< 0: as many as cores
 };
 
 /// What a conversion moved.

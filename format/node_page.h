@@ -73,27 +73,13 @@ struct NodeGroup {
 /// a multiple of 8 is not.
 [[nodiscard]] std::size_t node_group_bytes(std::size_t children) noexcept;
 
-/// Collects groups into one page's payload.
-class NodePageEncoder {
- public:
-  /// @param payload_limit  page size - 64; of more than 512 KiB the rest stays unused, as slots
-  ///                       count 8 bytes in 16 bits
-  explicit NodePageEncoder(std::size_t payload_limit);
-  /// True when a group of n children still fits.
-  [[nodiscard]] bool fits(std::size_t children) const noexcept;
-  /// Appends a group, which must fit and whose numbers must be finite and not negative. The sphere
-  /// and the cone are widened by what rounding moves their centre and axis. @return its slot
-  /// @throws std::invalid_argument when it does not fit, or has no or more than 8 children
-  std::uint16_t add(const NodeGroup& group);
-  [[nodiscard]] std::uint32_t size() const noexcept;
-  /// The payload; the encoder is empty afterwards.
-  [[nodiscard]] std::vector<std::byte> take();
+/// Appends a group as it lies in a page, padded, whose numbers must be finite and not negative. The sphere
+/// and the cone are widened by what rounding moves their centre and axis.
+/// @throws std::invalid_argument when it has no or more than 8 children
+void append_group(const NodeGroup& group, std::vector<std::byte>& out);
 
- private:
-  std::size_t limit_;
-  std::vector<std::uint16_t> slots_;
-  std::vector<std::byte> groups_;
-};
+/// Changes the reference of child i of an encoded group; it stays interior or a leaf.
+void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexcept;
 
 /// A view of one group in a page: the columns that shading reads. Valid as long as the payload.
 ///
@@ -162,6 +148,32 @@ class GroupView {
     return p_ + 24 + std::ptrdiff_t{8 + 2 * k} * size();
   }
   const std::byte* p_;
+};
+
+/// Collects groups into one page's payload.
+class NodePageEncoder {
+ public:
+  /// @param payload_limit  page size - 64; of more than 512 KiB the rest stays unused, as slots
+  ///                       count 8 bytes in 16 bits
+  explicit NodePageEncoder(std::size_t payload_limit);
+  /// True when a group of n children still fits.
+  [[nodiscard]] bool fits(std::size_t children) const noexcept;
+  /// Appends a group as append_group() does. @return its slot
+  /// @throws std::invalid_argument when it does not fit, or has no or more than 8 children
+  std::uint16_t add(const NodeGroup& group);
+  /// The same of a group that is encoded already; it lies outside of this.
+  std::uint16_t add(const GroupView& group);
+  [[nodiscard]] std::uint32_t size() const noexcept;
+  /// The payload; the encoder is empty afterwards.
+  [[nodiscard]] std::vector<std::byte> take();
+
+ private:
+  /// @return the new group's slot @throws std::invalid_argument when a group of n children does not fit
+  std::uint16_t new_slot(std::size_t children);
+
+  std::size_t limit_;
+  std::vector<std::uint16_t> slots_;
+  std::vector<std::byte> groups_;
 };
 
 /// A decoded node page: a view into its payload, checked whole when it is made.

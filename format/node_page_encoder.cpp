@@ -171,6 +171,32 @@ class ChildEncoder {
 
 }  // namespace
 
+void append_group(const NodeGroup& group, std::vector<std::byte>& out) {
+  const std::size_t n = group.children.size();
+  if (n < 1 || n > kMaxChildren) throw std::invalid_argument("append_group: no or too many children");
+  assert(group.level >= 0 && group.level <= kMaxLevel);
+  assert(cell_of(group.cell, std::min(group.level, kLatticeBits)) == group.cell);
+  const std::size_t at = out.size();
+  out.resize(at + round_to_slot(group_content_bytes(n)));
+  std::byte* const to = out.data() + at;
+  store(to, 0, group.cell.high);
+  store(to, 8, group.cell.low);
+  store(to, 16, static_cast<std::uint8_t>(group.level));
+  store(to, 17, static_cast<std::uint8_t>(n));
+  const LatticePoint corner = decode_morton(group.cell);
+  std::uint8_t interior_mask = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const NodeChild& child = group.children[i];
+    interior_mask = static_cast<std::uint8_t>(interior_mask | unsigned{child.ref.interior} << i);
+    ChildEncoder(to, n, i, corner, cell_edge(group.level)).encode(child);
+  }
+  store(to, 18, interior_mask);
+}
+
+void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexcept {
+  store(group.data(), kGroupHeadBytes + 8 * static_cast<std::size_t>(i), encode_ref(ref));
+}
+
 std::size_t node_group_bytes(std::size_t children) noexcept {
   return round_to_slot(group_content_bytes(children)) + sizeof(std::uint16_t);
 }
@@ -184,31 +210,26 @@ bool NodePageEncoder::fits(std::size_t children) const noexcept {
   return table + groups_.size() + group <= limit_;
 }
 
-std::uint16_t NodePageEncoder::add(const NodeGroup& group) {
-  const std::size_t n = group.children.size();
-  if (n < 1 || n > kMaxChildren || !fits(n)) {
+std::uint16_t NodePageEncoder::new_slot(std::size_t children) {
+  if (children < 1 || children > kMaxChildren || !fits(children)) {
     throw std::invalid_argument("NodePageEncoder: no or too many children, or no room for them");
   }
-  assert(group.level >= 0 && group.level <= kMaxLevel);
-  assert(cell_of(group.cell, std::min(group.level, kLatticeBits)) == group.cell);
-  const std::size_t at = groups_.size();
-  slots_.push_back(static_cast<std::uint16_t>(at / kSlotUnit));  // take() adds the table's size
-  groups_.resize(at + round_to_slot(group_content_bytes(n)));
-
-  std::byte* const out = groups_.data() + at;
-  store(out, 0, group.cell.high);
-  store(out, 8, group.cell.low);
-  store(out, 16, static_cast<std::uint8_t>(group.level));
-  store(out, 17, static_cast<std::uint8_t>(n));
-  const LatticePoint corner = decode_morton(group.cell);
-  std::uint8_t interior_mask = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const NodeChild& child = group.children[i];
-    interior_mask = static_cast<std::uint8_t>(interior_mask | unsigned{child.ref.interior} << i);
-    ChildEncoder(out, n, i, corner, cell_edge(group.level)).encode(child);
-  }
-  store(out, 18, interior_mask);
+  slots_.push_back(static_cast<std::uint16_t>(groups_.size() / kSlotUnit));  // take() adds the table's size
   return static_cast<std::uint16_t>(slots_.size() - 1);
+}
+
+std::uint16_t NodePageEncoder::add(const NodeGroup& group) {
+  const std::uint16_t slot = new_slot(group.children.size());
+  append_group(group, groups_);
+  return slot;
+}
+
+std::uint16_t NodePageEncoder::add(const GroupView& group) {
+  const std::uint16_t slot = new_slot(static_cast<std::size_t>(group.size()));
+  const std::span<const std::byte> content = group.bytes();
+  groups_.insert(groups_.end(), content.begin(), content.end());
+  groups_.resize(round_to_slot(groups_.size()));
+  return slot;
 }
 
 std::uint32_t NodePageEncoder::size() const noexcept {

@@ -177,7 +177,7 @@ void container(ByteSource& from) {
   Stream stream(points);
   options.frame = frame;
   ContainerWriter writer(path, options);
-  const Superblock superblock = build_pages(stream, writer, build, silent);
+  const Superblock superblock = build_pages(stream, writer, build, Executor(1), silent);
   write_attributes(from, writer, meta, points.size(), attributes);
   const Superblock written = writer.finish(meta, superblock);
 

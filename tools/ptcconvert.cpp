@@ -55,7 +55,7 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
   if (ptc::has_ending(arguments.output, ".xyz")) {
     return ptc::container_to_xyz(container, arguments.output, progress);
   }
-  ptc::RecodeOptions options{.profile = arguments.profile};
+  ptc::RecodeOptions options{.profile = arguments.profile, .threads = run.threads};
   if (arguments.page_size_given) options.page_shift = arguments.page_shift;
   return ptc::recode_container(container, arguments.output, options, progress);
 }

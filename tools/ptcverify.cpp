@@ -102,10 +102,10 @@ std::string salvage_text(const std::string& name, const ptc::SalvageReport& kept
 }
 
 /// What can be kept, or why nothing can: the findings are told in either case.
-void add_salvage(const std::filesystem::path& file, const std::filesystem::path& target, std::uint64_t memory_bytes,
+void add_salvage(const std::filesystem::path& file, const std::filesystem::path& target, const ptc::RunOptions& run,
                  ptc::Progress& progress, ptc::Outcome& outcome) {
   try {
-    const ptc::SalvageReport kept = ptc::salvage_container(file, target, {.memory_bytes = memory_bytes}, progress);
+    const ptc::SalvageReport kept = ptc::salvage_container(file, target, {.memory_bytes = run.memory_bytes, .threads = run.threads}, progress);
     outcome.facts["salvage"] = facts_of(kept);
     outcome.summary += salvage_text(ptc::printable(target.string()), kept);
   } catch (const ptc::FormatError& error) {
@@ -159,7 +159,7 @@ int main(int argc, char** argv) {
                      {"seconds", seconds}};
     if (report.tree_digest) outcome.facts["tree_digest"] = ptc::hex((*report.tree_digest)[1]) + ptc::hex((*report.tree_digest)[0]);
     outcome.summary = findings_text(name, report) + verdict_text(name, report, level, seconds);
-    if (!salvage.empty()) add_salvage(file, salvage, run.memory_bytes, progress, outcome);
+    if (!salvage.empty()) add_salvage(file, salvage, run, progress, outcome);
     return outcome;
   });
 }

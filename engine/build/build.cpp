@@ -1,7 +1,8 @@
 #include "engine/build/build.h"
 
 #include <algorithm>
-#include <map>
+#include <deque>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,35 +14,86 @@
 namespace ptc {
 namespace {
 
-/// Fills node pages, one open page per stream of levels. A page gets its number when it is opened,
-/// so that parents can refer to groups that are not on the disk yet.
-class NodePageStreams : public GroupSink {
- public:
-  NodePageStreams(ContainerWriter& writer, int levels_per_stream)
-      : writer_(writer),
-        levels_per_stream_(levels_per_stream),
-        payload_limit_((std::size_t{1} << writer.header().page_shift) - kPageHeaderBytes) {}
+constexpr std::size_t kPointsAtOnce = std::size_t{1} << 16;
 
-  ChildRef add(const NodeGroup& group) override {
-    const int key = group.level / levels_per_stream_;
-    auto found = streams_.find(key);
-    if (found != streams_.end() && !found->second.encoder.fits(group.children.size())) {
-      flush(found->second);
-      streams_.erase(found);
-      found = streams_.end();
+/// What the superblock says of points.
+struct Totals {
+  std::array<double, 3> low{}, high{};
+  double area = 0;
+  std::array<double, 3> flux{};
+};
+
+Totals totals_of(std::span<const PointRecord> points, const Frame& frame) {
+  Totals totals;
+  totals.low = totals.high = frame.to_position(decode_morton(points.front().key));
+  for (const PointRecord& point : points) {
+    const std::array<double, 3> at = frame.to_position(decode_morton(point.key));
+    for (std::size_t k = 0; k < 3; ++k) {
+      totals.low[k] = std::min(totals.low[k], at[k]);
+      totals.high[k] = std::max(totals.high[k], at[k]);
     }
-    if (found == streams_.end()) {
-      found = streams_.emplace(key, Stream{writer_.reserve_page(), NodePageEncoder(payload_limit_)}).first;
-    }
-    Stream& stream = found->second;
-    stream.keys.include(group);
-    return {.interior = true, .page = stream.page, .slot = stream.encoder.add(group)};
+    const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
+    totals.area += area;
+    for (std::size_t c = 0; c < 3; ++c) totals.flux[c] += area * static_cast<double>(decode_half(point.radiance[c]));
+  }
+  return totals;
+}
+
+/// Adds the sums of one page after another, so that they depend on the page size and on nothing else.
+void include(Superblock& superblock, const Totals& page, std::uint64_t points) {
+  const bool first = superblock.points == 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    superblock.bounds_low[k] = first ? page.low[k] : std::min(superblock.bounds_low[k], page.low[k]);
+    superblock.bounds_high[k] = first ? page.high[k] : std::max(superblock.bounds_high[k], page.high[k]);
+    superblock.flux[k] += page.flux[k];
+  }
+  superblock.area += page.area;
+  superblock.points += points;
+}
+
+using Page = ContainerWriter::Page;
+
+Page point_page(std::span<const PointRecord> points) {
+  return {.facts = {.type = PageType::point,
+                    .record_count = static_cast<std::uint32_t>(points.size()),
+                    .first_key = points.front().key.high,
+                    .last_key = points.back().key.high},
+          .payload = encode_point_page(points)};
+}
+
+/// Pages of points and nodes in the order of the file. A node page is there when it is full, one open page per
+/// stream of levels; it gets its number when it is opened, so that parents can refer to groups that are not on the
+/// disk yet. A point page comes before the groups that end in it.
+class PageOrder : public GroupSink {
+ public:
+  PageOrder(ContainerWriter& writer, std::uint32_t points_per_page, int levels_per_stream)
+      : writer_(writer),
+        points_per_page_(points_per_page),
+        levels_per_stream_(levels_per_stream),
+        payload_limit_((std::size_t{1} << writer.header().page_shift) - kPageHeaderBytes),
+        streams_(static_cast<std::size_t>(kMaxLevel / levels_per_stream + 1)) {}
+
+  /// The next page of points; its number is given later.
+  void add(Page points) { points_.push_back(std::move(points)); }
+
+  ChildRef add(const GroupView& group, std::uint64_t end) override {
+    while (!points_.empty() && next_point_ <= end) take_points();
+    std::optional<Stream>& stream = streams_[static_cast<std::size_t>(group.level() / levels_per_stream_)];
+    if (stream && !stream->encoder.fits(static_cast<std::size_t>(group.size()))) flush(stream);
+    if (!stream) stream.emplace(Stream{writer_.reserve_page(), NodePageEncoder(payload_limit_)});
+    stream->keys.include(group);
+    return {.interior = true, .page = stream->page, .slot = stream->encoder.add(group)};
   }
 
-  /// Writes the pages still open, deepest first: the coarse levels end up last in the file.
+  /// The pages that are whole, and room for others.
+  [[nodiscard]] std::vector<Page>& whole() noexcept { return whole_; }
+
+  /// Adds all others; of nodes those still open, deepest first: the coarse levels end up last in the file.
   void finish() {
-    for (auto stream = streams_.rbegin(); stream != streams_.rend(); ++stream) flush(stream->second);
-    streams_.clear();
+    while (!points_.empty()) take_points();
+    for (auto stream = streams_.rbegin(); stream != streams_.rend(); ++stream) {
+      if (*stream) flush(*stream);
+    }
   }
 
  private:
@@ -49,10 +101,10 @@ class NodePageStreams : public GroupSink {
     std::uint64_t first = ~std::uint64_t{0};
     std::uint64_t last = 0;
     std::uint16_t least_level = 0xffff;
-    void include(const NodeGroup& group) {
-      first = std::min(first, group.cell.high);
-      last = std::max(last, group.cell.high);
-      least_level = std::min(least_level, static_cast<std::uint16_t>(group.level));
+    void include(const GroupView& group) {
+      first = std::min(first, group.cell().high);
+      last = std::max(last, group.cell().high);
+      least_level = std::min(least_level, static_cast<std::uint16_t>(group.level()));
     }
   };
   struct Stream {
@@ -61,47 +113,33 @@ class NodePageStreams : public GroupSink {
     Range keys{};
   };
 
-  void flush(Stream& stream) {
-    const std::uint32_t groups = stream.encoder.size();
-    writer_.write_page(stream.page,
-                       {.type = PageType::node,
-                        .level = stream.keys.least_level,
-                        .record_count = groups,
-                        .first_key = stream.keys.first,
-                        .last_key = stream.keys.last},
-                       stream.encoder.take());
+  void take_points() {
+    whole_.push_back(std::move(points_.front()));
+    whole_.back().id = writer_.reserve_page();
+    points_.pop_front();
+    next_point_ += points_per_page_;
+  }
+
+  void flush(std::optional<Stream>& stream) {
+    whole_.push_back({.id = stream->page,
+                      .facts = {.type = PageType::node,
+                                .level = stream->keys.least_level,
+                                .record_count = stream->encoder.size(),
+                                .first_key = stream->keys.first,
+                                .last_key = stream->keys.last},
+                      .payload = stream->encoder.take()});
+    stream.reset();
   }
 
   ContainerWriter& writer_;
+  std::uint32_t points_per_page_;
   int levels_per_stream_;
   std::size_t payload_limit_;
-  std::map<int, Stream> streams_;
+  std::vector<std::optional<Stream>> streams_;
+  std::deque<Page> points_;       ///< not yet taken
+  std::uint64_t next_point_ = 0;  ///< first of these
+  std::vector<Page> whole_;
 };
-
-void write_point_page(ContainerWriter& writer, std::span<const PointRecord> points) {
-  writer.write_page(writer.reserve_page(),
-                    {.type = PageType::point,
-                     .record_count = static_cast<std::uint32_t>(points.size()),
-                     .first_key = points.front().key.high,
-                     .last_key = points.back().key.high},
-                    encode_point_page(points));
-}
-
-void include(Superblock& superblock, const Frame& frame, std::span<const PointRecord> points, bool first) {
-  for (const PointRecord& point : points) {
-    const std::array<double, 3> at = frame.to_position(decode_morton(point.key));
-    for (std::size_t k = 0; k < 3; ++k) {
-      superblock.bounds_low[k] = first ? at[k] : std::min(superblock.bounds_low[k], at[k]);
-      superblock.bounds_high[k] = first ? at[k] : std::max(superblock.bounds_high[k], at[k]);
-    }
-    first = false;
-    const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
-    superblock.area += area;
-    for (std::size_t c = 0; c < 3; ++c) {
-      superblock.flux[c] += area * static_cast<double>(decode_half(point.radiance[c]));
-    }
-  }
-}
 
 /// Fills `block` whole unless the stream ends.
 std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
@@ -116,26 +154,37 @@ std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
 
 }  // namespace
 
-Superblock build_pages(PointStream& points, ContainerWriter& writer,
-                       const BuildOptions& options, Progress& progress) {
+Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
+                       const Executor& executor, Progress& progress) {
   const Frame& frame = writer.header().frame;
   Superblock superblock;
   superblock.leaf_points = options.leaf_points;
   superblock.points_per_page = points_per_page(writer.header());
 
-  NodePageStreams nodes(writer, options.levels_per_stream);
-  OctreeBuilder octree(nodes, options.leaf_points, frame.unit());
-  std::vector<PointRecord> block(superblock.points_per_page);
+  const std::size_t per_page = superblock.points_per_page;
+  PageOrder order(writer, superblock.points_per_page, options.levels_per_stream);
+  OctreeBuilder octree(order, options.leaf_points, frame.unit(), executor);
+  std::vector<PointRecord> block(std::max<std::size_t>(kPointsAtOnce / per_page, 1) * per_page);
   while (const std::size_t count = read_full(points, block)) {
-    const std::span<const PointRecord> page = std::span(block).first(count);
-    include(superblock, frame, page, superblock.points == 0);
-    superblock.points += count;
-    write_point_page(writer, page);
-    for (const PointRecord& point : page) octree.add(point);
+    std::vector<Page> pages((count - 1) / per_page + 1);
+    std::vector<Totals> totals(pages.size());
+    executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
+      const auto page = std::span(block).subspan(i * per_page, std::min(per_page, count - i * per_page));
+      pages[i] = point_page(page);
+      totals[i] = totals_of(page, frame);
+    });
+    for (std::size_t i = 0; i < pages.size(); ++i) {
+      include(superblock, totals[i], pages[i].facts.record_count);
+      order.add(std::move(pages[i]));
+    }
+    octree.add(std::span(block).first(count));
+    writer.write_pages(order.whole(), executor);
+    order.whole().clear();
     progress.advance(count);
   }
   const OctreeBuilder::Result tree = octree.finish();
-  nodes.finish();
+  order.finish();
+  writer.write_pages(order.whole(), executor);
 
   superblock.nodes = tree.nodes;
   superblock.node_groups = tree.groups;

@@ -5,37 +5,44 @@
 #include <span>
 #include <vector>
 
+#include "engine/base/executor.h"
+#include "engine/build/subtree.h"
 #include "format/node_page.h"
 #include "format/point_record.h"
 
 namespace ptc {
 
-/// Takes finished sibling groups, children before parents.
+/// Takes finished sibling groups in post-order: children, each after its own, before their parent.
 class GroupSink {
  public:
   virtual ~GroupSink() = default;
+  /// @param group  as it lies in a page, with what was returned for the groups of its children; valid during the call
+  /// @param end    the point after its last
   /// @return where the group can be found: an interior reference
-  virtual ChildRef add(const NodeGroup& group) = 0;
+  virtual ChildRef add(const GroupView& group, std::uint64_t end) = 0;
 };
 
 /// Builds the octree of surfels that arrive in Morton order (Kontkanen et al. 2011, restated in
-/// Fischer et al. 2024).
+/// Fischer et al. 2024): cells of a few thousand points side by side, the cells around them as theirs are done.
 ///
 /// A cell is split while it holds more than `leaf_points` points; chains of cells with one occupied
 /// child are one node, which stands for the smallest cell that holds its points. Cells of
 /// coincident points are split by rank, below the lattice. Sums run in the order of the tree, so
 /// they depend on the points alone.
 ///
-/// Memory: one open cell per level with at most 8 closed children each, and the points of the one
-/// cell that may still become a leaf: at most leaf_points + 1.
+/// Memory: the points of one call of add() and their groups, some 100 bytes each; of all before, one open cell
+/// per level with at most 8 closed children each and kSubtreePoints or leaf_points points, whichever is more.
 class OctreeBuilder {
  public:
+  /// A cell with no more points is built by one thread.
+  static constexpr std::uint32_t kSubtreePoints = 4096;
+
   /// @param leaf_points  1 to kMaxLeafPoints
   /// @param unit         lattice unit in scene units
-  OctreeBuilder(GroupSink& sink, std::uint32_t leaf_points, double unit);
+  OctreeBuilder(GroupSink& sink, std::uint32_t leaf_points, double unit, const Executor& executor);
 
-  /// @param point  its key not below the one before
-  void add(const PointRecord& point);
+  /// @param points  their keys ascending, none below those before
+  void add(std::span<const PointRecord> points);
 
   struct Result {
     ChildRef root;            ///< of the root group; not interior when there are no points
@@ -49,43 +56,44 @@ class OctreeBuilder {
   [[nodiscard]] Result finish();
 
  private:
-  /// Points of one cell that is closed: a leaf to be, or a node whose children are in the sink.
-  struct Cluster {
+  /// A whole cell of few points whose parent has many: its part of the tree, as built by itself.
+  struct Piece {
     std::uint64_t first = 0;
-    std::uint64_t count = 0;
-    ChildRef ref;
-    NodeSummary node;
-    bool summarised = false;  ///< `node` is known; a leaf is summarised when its parent must split
-  };
-  struct OpenCell {
-    int level = 0;
-    MortonKey key;  ///< of its first point
-    std::uint64_t count = 0;
-    bool splits = false;  ///< holds more than leaf_points
-    std::vector<Cluster> children;
+    std::size_t count = 0;
+    std::uint64_t rank = 0;  ///< of its first point among those with its key
+    int shared = 0;          ///< level of the smallest cell that holds its first point and the one before
+    MortonKey before;        ///< key of that one
+    NodeChild top;           ///< interior references of its groups are numbers of groups
+    SubtreeGroups groups;
   };
 
-  void attach(Cluster cluster);
-  void settle();
-  Cluster close();
-  ChildRef emit(OpenCell& cell);
-  void summarise(Cluster& leaf) const;
+  [[nodiscard]] int common(std::size_t at, std::size_t other) const;
+  [[nodiscard]] int level_before(std::size_t at) const;
+  [[nodiscard]] Piece& new_piece();
+  void cut(bool last);
+  void build(bool last);
+  void join(Piece& piece);
+  [[nodiscard]] ChildRef emit(std::span<std::byte> group, std::uint64_t end);
+  [[nodiscard]] NodeChild close(std::uint64_t end);
 
   GroupSink& sink_;
+  const Executor& executor_;
   std::uint32_t leaf_points_;
+  std::size_t piece_points_;
   double unit_;
-  std::vector<OpenCell> path_;
-  std::vector<PointRecord> window_;  ///< points from window_first_ on: those not yet in a summary
+  std::vector<SubtreeBuilder> builders_;  ///< one a thread
+  std::vector<PointRecord> window_;       ///< points from window_first_ on: those not yet in a piece
   std::uint64_t window_first_ = 0;
-  Cluster current_;
-  MortonKey last_key_;
-  std::uint64_t rank_ = 0;  ///< of the last point among those with its key
+  std::uint64_t rank_ = 0;       ///< of the point that cut() is at among those with its key
+  MortonKey last_key_;           ///< of the point before it
+  std::uint64_t last_rank_ = 0;  ///< likewise
+  std::vector<Piece> pieces_;  ///< kept between calls for their memory
+  std::size_t piece_count_ = 0;
+  std::vector<ChildRef> places_;  ///< of a piece's groups
+  std::vector<NodeGroup> path_;   ///< open cells, from the root on
+  NodeChild current_;             ///< the last that is closed; not yet in a cell
+  std::vector<std::byte> encoded_;
   Result result_;
 };
-
-/// Summary of a run of surfels: exact bounding sphere and cone. @param unit as above
-[[nodiscard]] NodeSummary summarise_points(std::span<const PointRecord> points, double unit);
-/// Summary of several clusters; the sphere holds their spheres, the cone their cones.
-[[nodiscard]] NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes);
 
 }  // namespace ptc

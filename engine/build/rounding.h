@@ -29,8 +29,8 @@ inline constexpr const char* kRounding = "position 0.001 radius, radius 1/512, n
 
 /// Rounds sorted points; their order stays. Rounding what is rounded changes nothing. Points of radius 0 keep
 /// their position.
-/// @param sorted  must outlive the result
-/// @param unit    lattice unit in scene units
-[[nodiscard]] std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit);
+/// @param sorted, executor  must outlive the result
+/// @param unit              lattice unit in scene units
+[[nodiscard]] std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit, const Executor& executor);
 
 }  // namespace ptc

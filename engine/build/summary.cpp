@@ -1,8 +1,9 @@
 // What a node knows of its surfels (spec/nodes.md#summary).
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
-#include "engine/build/octree.h"
+#include "engine/build/subtree.h"
 #include "format/scalar.h"
 
 namespace ptc {
@@ -11,8 +12,9 @@ namespace {
 using Vec3 = std::array<double, 3>;
 
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-double distance(const Vec3& a, const Vec3& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+double distance(const Vec3& a, const Vec3& b) {  // lattice coordinates: no square overflows
+  const Vec3 d{a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return std::sqrt(dot(d, d));
 }
 
 /// Unit normal of the slab that holds a cluster, the mean of its normals; zero where they cancel out.
@@ -68,46 +70,59 @@ float round_down(double x) {
 
 }  // namespace
 
-NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
+PointNumbers numbers_of(const PointRecord& point, double unit) noexcept {
+  const LatticePoint q = decode_morton(point.key);
+  const double radius = point.radius;
+  return {.position = {static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])},
+          .radius = lattice_radius(point, unit),
+          .area = 2.0 * radius * radius,
+          .radiance = {decode_half(point.radiance[0]), decode_half(point.radiance[1]), decode_half(point.radiance[2])},
+          .normal = decode_octahedral(point.normal[0], point.normal[1])};
+}
+
+NodeSummary summarise_points(std::span<const PointNumbers> points) {
   NodeSummary node;
-  const auto position = [](const PointRecord& p) {
-    const LatticePoint q = decode_morton(p.key);
-    return Vec3{static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])};
-  };
   // Sums of offsets keep the lattice unit, sums of coordinates up to 2^42 lose it.
-  const Vec3 origin = position(points.front());
+  const Vec3 origin = points.front().position;
   double weight = 0;
-  const bool has_area = std::ranges::any_of(points, [](const PointRecord& p) { return p.radius > 0; });
-  for (const PointRecord& p : points) {
-    const double area = 2.0 * p.radius * p.radius;
-    const double w = has_area ? area : 1.0;  // points without extent still have a middle
-    const Vec3 at = position(p);
-    for (std::size_t k = 0; k < 3; ++k) node.mean[k] += w * (at[k] - origin[k]);
+  const bool has_area = std::ranges::any_of(points, [](const PointNumbers& p) { return p.area > 0; });
+  std::array<std::array<double, 4>, 6> towards{};  // an axis: facing, flux
+  for (const PointNumbers& p : points) {
+    const double w = has_area ? p.area : 1.0;  // points without extent still have a middle
+    for (std::size_t k = 0; k < 3; ++k) node.mean[k] += w * (p.position[k] - origin[k]);
     weight += w;
-    node.area += area;
-    const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
+    node.area += p.area;
+    const std::array<double, 4> light{1, p.radiance[0], p.radiance[1], p.radiance[2]};
     for (std::size_t k = 0; k < 6; ++k) {
-      const double facing = area * std::max(0.0, static_cast<double>(k % 2 == 0 ? n[k / 2] : -n[k / 2]));
-      node.facing[k] += facing;
-      for (std::size_t c = 0; c < 3; ++c) {
-        node.flux[k][c] += facing * static_cast<double>(decode_half(p.radiance[c]));
-      }
+      const double facing = p.area * std::max(0.0, static_cast<double>(k % 2 == 0 ? p.normal[k / 2] : -p.normal[k / 2]));
+      for (std::size_t c = 0; c < 4; ++c) towards[k][c] += facing * light[c];
     }
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    node.facing[k] = towards[k][0];
+    node.flux[k] = {towards[k][1], towards[k][2], towards[k][3]};
   }
   for (std::size_t k = 0; k < 3; ++k) node.mean[k] = origin[k] + node.mean[k] / weight;
   const Vec3 slab = slab_normal(node);
   const bool has_axis = set_cone_axis(node, slab);
-  node.cone_cos = has_axis ? 1.0F : -1.0F;
-  for (const PointRecord& p : points) {
-    node.radius = std::max(node.radius, distance(position(p), node.mean) + lattice_radius(p, unit));
+  double cosine = 1;
+  for (const PointNumbers& p : points) {
+    node.radius = std::max(node.radius, distance(p.position, node.mean) + p.radius);
     if (!has_axis) continue;
-    const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
-    node.cone_cos = std::min(node.cone_cos, round_down(cosine_to_axis(node, n)));
-    const double reach = extent_along(slab, {n[0], n[1], n[2]}, 0, lattice_radius(p, unit));
-    node.thickness = std::max(node.thickness, offset_along(slab, position(p), node.mean) + reach);
+    cosine = std::min(cosine, cosine_to_axis(node, p.normal));
+    const double reach = extent_along(slab, {p.normal[0], p.normal[1], p.normal[2]}, 0, p.radius);
+    node.thickness = std::max(node.thickness, offset_along(slab, p.position, node.mean) + reach);
   }
+  node.cone_cos = has_axis ? round_down(cosine) : -1.0F;
   node.thickness = has_axis ? std::min(node.thickness, node.radius) : node.radius;
   return node;
+}
+
+NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
+  std::vector<PointNumbers> numbers;
+  numbers.reserve(points.size());
+  for (const PointRecord& point : points) numbers.push_back(numbers_of(point, unit));
+  return summarise_points(numbers);
 }
 
 NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
@@ -139,6 +154,12 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
   sum.thickness = has_axis ? std::min(sum.thickness, sum.radius) : sum.radius;
   sum.cone_cos = angle >= M_PI ? -1.0F : round_down(std::cos(angle));
   return sum;
+}
+
+NodeSummary summarise_children(std::span<const NodeChild> children) {
+  std::array<const NodeSummary*, kMaxChildren> nodes{};
+  std::ranges::transform(children, nodes.begin(), [](const NodeChild& child) { return &child.node; });
+  return summarise_nodes(std::span(nodes).first(children.size()));
 }
 
 }  // namespace ptc

@@ -47,7 +47,7 @@ FileHeader make_header(const WriterOptions& options) {
 
 struct ContainerWriter::Impl {
   Impl(const std::filesystem::path& target, const WriterOptions& options)
-      : header(make_header(options)), encoder(options.codec, options.level), file(target) {
+      : header(make_header(options)), codec(options.codec), level(options.level), file(target) {
     file.write_at(0, encode_file_header(header));
   }
 
@@ -76,44 +76,78 @@ struct ContainerWriter::Impl {
     return page;
   }
 
-  /// Header, payload and zeros up to the next sector, at the end of the file, in one write.
-  void append(PageHeader& page, std::span<const std::byte> payload) {
-    page.stored_bytes = static_cast<std::uint32_t>(payload.size());
-    page.payload_xxh3 = xxh3_64(payload);
-    image.assign(extent_bytes(page.stored_bytes), std::byte{0});
-    encode_page_header(page, header.uuid, std::span(image).first<kPageHeaderBytes>());
-    refuse_what_readers_refuse([&] { static_cast<void>(decode_page_header(image, header)); });
-    std::ranges::copy(payload, image.begin() + kPageHeaderBytes);
-    file.write_at(end, image);
-    end += image.size();
+  /// A page as it will lie in the file: header, payload and zeros up to the next sector.
+  struct Image {
+    PageHeader page;
+    std::vector<std::byte> bytes;
+  };
+
+  void make_image(Image& image, std::span<const std::byte> payload) const {
+    image.page.stored_bytes = static_cast<std::uint32_t>(payload.size());
+    image.page.payload_xxh3 = xxh3_64(payload);
+    image.bytes.assign(extent_bytes(image.page.stored_bytes), std::byte{0});
+    encode_page_header(image.page, header.uuid, std::span(image.bytes).first<kPageHeaderBytes>());
+    refuse_what_readers_refuse([&] { static_cast<void>(decode_page_header(image.bytes, header)); });
+    std::ranges::copy(payload, image.bytes.begin() + kPageHeaderBytes);
   }
 
-  void append_page(PageHeader page, std::span<const std::byte> payload) {
+  /// At the end of the file, in one write.
+  void append(const Image& image) {
+    file.write_at(end, image.bytes);
+    end += image.bytes.size();
+  }
+
+  void append_page(const Image& image) {
     require(!finished, "a page after finish()");
+    const PageHeader& page = image.page;
     require(page.page_id < entries.size(), "a page that was not reserved");
     require(entries[page.page_id].offset == 0, "a page written twice");
-    require(!payload.empty() && payload.size() <= payload_limit(),
-            "a stored payload that is empty or longer than a page");
     const std::uint64_t offset = end;
-    append(page, payload);
+    append(image);
     entries[page.page_id] = {offset,    page.stored_bytes, page.raw_bytes,   page.payload_xxh3,
                              page.type, page.group,        page.record_count};
   }
 
+  /// An encoder and what it fills, for one thread; kept between calls.
+  struct Encoding {
+    Encoding(Codec codec, int level) : encoder(codec, level) {}
+    PageEncoder encoder;
+    std::vector<std::byte> stored;
+  };
+
+  Encoding& encoding(std::size_t thread) {
+    while (encodings.size() <= thread) encodings.push_back(std::make_unique<Encoding>(codec, level));
+    return *encodings[thread];
+  }
+
   void encode_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
-                   std::span<const PackedColumn> columns = {}) {
-    require(!payload.empty() && payload.size() <= payload_limit(),
-            "a payload that is empty or longer than a page");
-    PageHeader page = page_header(page_id, facts);
-    page.raw_bytes = static_cast<std::uint32_t>(payload.size());
+                   std::span<const PackedColumn> columns, Encoding& with, Image& image) const {
+    require(!payload.empty() && payload.size() <= payload_limit(), "a payload that is empty or longer than a page");
+    image.page = page_header(page_id, facts);
+    image.page.raw_bytes = static_cast<std::uint32_t>(payload.size());
     if (facts.type == PageType::point) columns = packed_point_columns();
-    page.coding = encoder.encode(payload, stored, {facts.record_count, columns});
-    append_page(page, stored);
+    image.page.coding = with.encoder.encode(payload, with.stored, {facts.record_count, columns});
+    make_image(image, with.stored);
+  }
+
+  void write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
+                  std::span<const PackedColumn> columns = {}) {
+    encode_page(page_id, facts, payload, columns, encoding(0), single);
+    append_page(single);
+  }
+
+  void write_pages(std::span<const Page> pages, const Executor& executor) {
+    if (images.size() < pages.size()) images.resize(pages.size());
+    static_cast<void>(encoding(executor.threads() - 1));
+    executor.for_each(pages.size(), [&](std::size_t i, unsigned thread) {
+      encode_page(pages[i].id, pages[i].facts, pages[i].payload, {}, *encodings[thread], images[i]);
+    });
+    for (const Image& image : std::span(images).first(pages.size())) append_page(image);
   }
 
   std::uint32_t write_meta(const Meta& meta) {
     const std::uint32_t page = reserve();
-    encode_page(page, {PageType::meta, 0, kNoLevel, 1, 0, 0}, encode_meta(meta));
+    write_page(page, {PageType::meta, 0, kNoLevel, 1, 0, 0}, encode_meta(meta));
     return page;
   }
 
@@ -135,9 +169,10 @@ struct ContainerWriter::Impl {
     for (std::size_t at = 0; at < all.size(); at += full, ++page_id) {
       const auto part = all.subspan(at, std::min(full, all.size() - at));
       const auto count = static_cast<std::uint32_t>(part.size() / kDirectoryEntryBytes);
-      PageHeader page = page_header(page_id, {PageType::directory, 0, kNoLevel, count, 0, 0});
-      page.raw_bytes = static_cast<std::uint32_t>(part.size());
-      append(page, part);
+      single.page = page_header(page_id, {PageType::directory, 0, kNoLevel, count, 0, 0});
+      single.page.raw_bytes = static_cast<std::uint32_t>(part.size());
+      make_image(single, part);
+      append(single);
     }
     end = round_up(end, kBlockBytes);
   }
@@ -187,13 +222,15 @@ struct ContainerWriter::Impl {
   }
 
   FileHeader header;
-  PageEncoder encoder;
+  Codec codec;
+  int level;
   OutputFile file;
   std::vector<DirectoryEntry> entries;  ///< offset 0: reserved, not yet written
   std::uint64_t end = kBlockBytes;      ///< where the next page goes
   bool finished = false;
-  std::vector<std::byte> stored;  ///< of one page; kept between calls
-  std::vector<std::byte> image;   ///< of one page with header and padding; kept between calls
+  std::vector<std::unique_ptr<Encoding>> encodings;
+  Image single;               ///< these two kept between calls
+  std::vector<Image> images;  ///< of write_pages()
 };
 
 ContainerWriter::ContainerWriter(const std::filesystem::path& target, const WriterOptions& options)
@@ -213,7 +250,15 @@ void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts, 
                                  std::span<const PackedColumn> columns) {
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
-  impl_->encode_page(page_id, facts, payload, columns);
+  impl_->write_page(page_id, facts, payload, columns);
+}
+
+void ContainerWriter::write_pages(std::span<const Page> pages, const Executor& executor) {
+  require(std::ranges::none_of(pages, [](const Page& page) {
+            return page.facts.type == PageType::directory || page.facts.type == PageType::meta || page.facts.type == PageType::attribute;
+          }),
+          "write_pages() is for pages of points and nodes");
+  impl_->write_pages(pages, executor);
 }
 
 void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
@@ -221,10 +266,13 @@ void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& 
                                         std::span<const std::byte> stored) {
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
-  PageHeader page = impl_->page_header(page_id, facts);
-  page.coding = coding;
-  page.raw_bytes = raw_bytes;
-  impl_->append_page(page, stored);
+  require(!stored.empty() && stored.size() <= impl_->payload_limit(), "a stored payload that is empty or longer than a page");
+  Impl::Image& image = impl_->single;
+  image.page = impl_->page_header(page_id, facts);
+  image.page.coding = coding;
+  image.page.raw_bytes = raw_bytes;
+  impl_->make_image(image, stored);
+  impl_->append_page(image);
 }
 
 const char* writer_name() noexcept {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/executor.h"
 #include "format/codec.h"
 #include "format/container.h"
 #include "format/schema.h"
@@ -57,6 +58,15 @@ class ContainerWriter {
   /// @param columns  of an attribute page, from packed_group_columns(); without them it is not packed
   void write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
                   std::span<const PackedColumn> columns = {});
+  /// A page that is not compressed yet.
+  struct Page {
+    std::uint32_t id = 0;
+    PageFacts facts;
+    std::vector<std::byte> payload;
+  };
+  /// The same of several, compressed side by side; they lie in the file in their order here. Not of attribute pages.
+  /// Memory: their stored bytes, and an encoder for each thread.
+  void write_pages(std::span<const Page> pages, const Executor& executor);
   /// Writes a page whose payload is already in its stored form (copied from another container).
   void write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
                          std::uint32_t raw_bytes, std::span<const std::byte> stored);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/store/reader.h"
 #include "engine/verify/finding.h"
@@ -17,6 +18,6 @@ namespace ptc {
 /// @return  the digest of the stored tree (spec/nodes.md#tree-digest)
 /// Memory: the cached pages, and what OctreeBuilder takes.
 [[nodiscard]] std::array<std::uint64_t, 2> compare_rebuilt(const ContainerReader& container, std::size_t cached_pages,
-                                                           Findings& findings, Progress& progress);
+                                                           Findings& findings, const Executor& executor, Progress& progress);
 
 }  // namespace ptc

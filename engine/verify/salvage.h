@@ -13,6 +13,7 @@ namespace ptc {
 struct SalvageOptions {
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;  ///< cap on what the salvage holds
   std::uint64_t flip_budget = std::uint64_t{1} << 39;  ///< bytes that may be hashed to turn flipped bits back
+  unsigned threads = 0;                                ///< 0: as many as cores
 };
 
 /// What a salvage kept.

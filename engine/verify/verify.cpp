@@ -158,7 +158,7 @@ class FileCheck {
 
   void rebuild(Progress& progress) {
     progress.begin("build again", survey_.superblock->points, "points");
-    report_.tree_digest = compare_rebuilt(*survey_.container, cached_pages_, findings_, progress);
+    report_.tree_digest = compare_rebuilt(*survey_.container, cached_pages_, findings_, executor_, progress);
     progress.end();
   }
 

@@ -10,7 +10,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/build/octree.h"
+#include "engine/build/subtree.h"
 #include "engine/io/record.h"
 #include "tests/support/scenes.h"
 

@@ -45,7 +45,7 @@ TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
     ContainerWriter writer(dir / name, {.page_shift = 12, .frame = scene.frame});
     VectorStream stream(scene.records, block);
     Progress silent;
-    writer.finish({}, build_pages(stream, writer, {}, silent));
+    writer.finish({}, build_pages(stream, writer, {}, Executor(), silent));
   };
   write("one.ptcx", 1);
   write("all.ptcx", 5000);

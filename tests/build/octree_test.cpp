@@ -14,9 +14,9 @@ using namespace ptc::test;
 namespace {
 
 /// Keeps groups; references count up in page and slot.
-struct KeptGroups : GroupSink {
+struct KeptGroups {
   std::vector<NodeGroup> groups;
-  ChildRef add(const NodeGroup& group) override {
+  ChildRef add(const NodeGroup& group) {
     groups.push_back(group);
     const std::size_t i = groups.size() - 1;
     return {.interior = true, .page = static_cast<std::uint32_t>(i / 100), .slot = static_cast<std::uint16_t>(i % 100)};
@@ -26,15 +26,44 @@ struct KeptGroups : GroupSink {
 
 struct Tree {
   KeptGroups sink;
-  OctreeBuilder::Result result;
+  NodeChild root;
 };
 
 Tree build(const std::vector<PointRecord>& records, std::uint32_t leaf_points, double unit) {
   Tree tree;
-  OctreeBuilder builder(tree.sink, leaf_points, unit);
-  for (const PointRecord& record : records) builder.add(record);
-  tree.result = builder.finish();
+  SubtreeBuilder builder(leaf_points, unit);
+  tree.root = builder.build(records, 0, 0, [&](const NodeGroup& group, std::uint64_t) { return tree.sink.add(group); });
   return tree;
+}
+
+/// Keeps what a builder emits, with the numbers of groups for references, as SubtreeGroups has them.
+struct Emitted : GroupSink {
+  SubtreeGroups out;
+  ChildRef add(const GroupView& group, std::uint64_t end) override {
+    const std::span<const std::byte> content = group.bytes();
+    out.groups.push_back({out.bytes.size(), content.size(), end});
+    out.bytes.insert(out.bytes.end(), content.begin(), content.end());
+    return {.interior = true, .page = static_cast<std::uint32_t>(out.groups.size() - 1)};
+  }
+};
+
+/// The groups of one builder given `block` points at a time, and its result.
+std::pair<SubtreeGroups, OctreeBuilder::Result> streamed(std::span<const PointRecord> records, std::uint32_t leaf_points,
+                                                         std::size_t block, unsigned threads) {
+  Emitted sink;
+  const Executor executor(threads);
+  OctreeBuilder builder(sink, leaf_points, 1.0, executor);
+  for (; records.size() > block; records = records.subspan(block)) builder.add(records.first(block));
+  builder.add(records);
+  const OctreeBuilder::Result result = builder.finish();
+  return {std::move(sink.out), result};
+}
+
+bool equal(const SubtreeGroups& a, const SubtreeGroups& b) {
+  return std::ranges::equal(a.groups, b.groups, [&](const SubtreeGroups::Group& x, const SubtreeGroups::Group& y) {
+    const std::size_t size = std::min(x.size, y.size);  // the one that is padded is longer
+    return x.end == y.end && std::ranges::equal(std::span(a.bytes).subspan(x.begin, size), std::span(b.bytes).subspan(y.begin, size));
+  });
 }
 
 /// The octree by definition, top down: the leaves as (first, count), in order.
@@ -63,7 +92,7 @@ void walk(const Tree& tree, const ChildRef& ref, const std::function<void(const 
 
 std::vector<std::pair<std::uint64_t, std::uint64_t>> leaves_of(const Tree& tree) {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> leaves;
-  walk(tree, tree.result.root, [&](const NodeGroup&, const NodeChild& child) {
+  walk(tree, tree.root.ref, [&](const NodeGroup&, const NodeChild& child) {
     if (!child.ref.interior) leaves.emplace_back(child.ref.first_point, child.ref.point_count);
   });
   return leaves;
@@ -100,7 +129,7 @@ TEST_CASE("octree: a group's cell holds all its points and no deeper cell does",
     CHECK(group.cell == cell_of(scene.records[first].key, group.level));
     return {first, last};
   };
-  const auto [first, last] = check(tree.result.root);
+  const auto [first, last] = check(tree.root.ref);
   CHECK(first == 0);
   CHECK(last == scene.records.size());
 }
@@ -131,7 +160,7 @@ TEST_CASE("octree: spheres hold every disc below them and sums agree with the po
         CHECK(node.area == Approx(area));
         return points;
       };
-  CHECK(check(tree.result.root, tree.result.total).size() == 2000);
+  CHECK(check(tree.root.ref, tree.root.node).size() == 2000);
 }
 
 TEST_CASE("octree: a million coincident points split by rank into full leaves", "[build][octree]") {
@@ -149,19 +178,51 @@ TEST_CASE("octree: a million coincident points split by rank into full leaves", 
   }
   CHECK(next == records.size());
   CHECK(leaves.size() == 125'000);
-  CHECK(tree.result.levels <= kMaxLevel + 1);
-  CHECK(tree.result.total.area == Approx(0.5e6));
+  CHECK(std::ranges::max(tree.sink.groups, {}, &NodeGroup::level).level <= kMaxLevel);
+  CHECK(tree.root.node.area == Approx(0.5e6));
 }
 
 TEST_CASE("octree: up to leaf_points points make a root group with one leaf", "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(8, 4));
   for (std::size_t count = 1; count <= 8; ++count) {
-    const Tree tree = build({scene.records.begin(), scene.records.begin() + static_cast<std::ptrdiff_t>(count)}, 8, 1);
-    REQUIRE(tree.sink.groups.size() == 1);
-    REQUIRE(tree.sink.groups[0].children.size() == 1);
-    CHECK(tree.sink.groups[0].children[0].ref == ChildRef{.first_point = 0, .point_count = static_cast<std::uint32_t>(count)});
+    const auto [groups, result] = streamed(std::span(scene.records).first(count), 8, 3, 1);
+    REQUIRE(groups.groups.size() == 1);
+    CHECK(groups.groups[0].end == count);
+    const GroupView root(groups.bytes.data());
+    REQUIRE(root.size() == 1);
+    CHECK(root.level() == 0);
+    CHECK(root.child(0) == ChildRef{.first_point = 0, .point_count = static_cast<std::uint32_t>(count)});
+    CHECK(result.root == ChildRef{.interior = true});
+    CHECK(result.nodes == 1);
   }
-  CHECK_FALSE(build({}, 8, 1).result.root.interior);
+  const auto [groups, result] = streamed({}, 8, 1, 1);
+  CHECK(groups.groups.empty());
+  CHECK_FALSE(result.root.interior);
+}
+
+TEST_CASE("octree: blocks and threads change neither groups nor their order", "[build][octree]") {
+  std::vector<PointRecord> spread = sort_scene(random_surfels(30'000, 5)).records;
+  std::vector<PointRecord> heaps = spread;  // heaps of coincident points of any size, alone and among others
+  std::size_t at = 0;
+  for (const std::size_t count : {1U, 2U, 7U, 8U, 9U, 600U, 4095U, 4096U, 4097U, 9000U}) {
+    for (std::size_t i = 1; i < count; ++i) heaps[at + i].key = heaps[at].key;
+    at += count + (count % 3);
+  }
+  for (const auto& records : {spread, heaps, std::vector(20'000, spread[0])}) {
+    for (const std::uint32_t leaf_points : {1U, 8U, 5000U, kMaxLeafPoints}) {
+      SubtreeGroups whole;
+      const NodeChild top = SubtreeBuilder(leaf_points, 1.0).build(records, 0, 0, whole);
+      if (!top.ref.interior) continue;
+      for (const auto& [block, threads] : {std::pair(std::size_t{777}, 1U), {std::size_t{10'000}, 3U}, {records.size(), 2U}}) {
+        const auto [groups, result] = streamed(records, leaf_points, block, threads);
+        CHECK(equal(groups, whole));
+        CHECK(result.root == top.ref);
+        CHECK(result.total.area == top.node.area);
+        CHECK(result.groups == whole.groups.size());
+        CHECK(result.points == records.size());
+      }
+    }
+  }
 }
 
 TEST_CASE("octree: points that coincide far from the corner have their mean where they are", "[build][octree]") {

@@ -18,7 +18,8 @@ namespace {
 
 std::vector<PointRecord> rounded(const std::vector<PointRecord>& records, const Frame& frame, std::size_t block = 777) {
   VectorStream stream(records, block);
-  const std::unique_ptr<PointStream> from = round_points(stream, frame.unit());
+  const Executor executor(2);
+  const std::unique_ptr<PointStream> from = round_points(stream, frame.unit(), executor);
   std::vector<PointRecord> out(records.size()), part(block);
   std::size_t at = 0;
   while (const std::size_t count = from->next(part)) {
@@ -42,6 +43,18 @@ std::vector<Surfel> heaps() {
 }
 
 }  // namespace
+
+TEST_CASE("rounding: a point does not depend on which others come with it", "[build][rounding]") {
+  SortedScene scene = sort_scene(heaps());
+  const std::vector<PointRecord> one = rounded(scene.records, scene.frame, 1);
+  const std::vector<PointRecord> all = rounded(scene.records, scene.frame, scene.records.size());
+  CHECK(std::ranges::equal(one, all, {}, &PointRecord::key, &PointRecord::key));
+  std::size_t moved_by_others = 0;  // else the pieces that are rounded side by side would not matter
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    moved_by_others += rounded({scene.records[i]}, scene.frame, 1)[0].key != all[i].key;
+  }
+  CHECK(moved_by_others > 100);
+}
 
 TEST_CASE("rounding: points stay in order and within the bounds", "[build][rounding]") {
   const SortedScene scene = sort_scene(heaps());

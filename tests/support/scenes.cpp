@@ -57,7 +57,7 @@ void write_scene(const std::filesystem::path& target, const std::vector<Surfel>&
   ContainerWriter writer(target, {.page_shift = page_shift, .codec = codec, .frame = scene.frame});
   VectorStream stream(std::move(scene.records));
   Progress silent;
-  const Superblock superblock = build_pages(stream, writer, options, silent);
+  const Superblock superblock = build_pages(stream, writer, options, Executor(), silent);
   writer.finish({}, superblock);
 }
 

@@ -33,7 +33,7 @@ void write_numbered(const std::filesystem::path& path) {
   ContainerWriter writer(path, {.page_shift = 12, .codec = Codec::zstd, .frame = scene.frame});
   VectorStream stream(scene.records);
   Progress silent;
-  const Superblock superblock = build_pages(stream, writer, {.leaf_points = 4}, silent);
+  const Superblock superblock = build_pages(stream, writer, {.leaf_points = 4}, Executor(), silent);
   const Meta meta{.channels = {{.name = "number", .type = ChannelType::u16}}, .text = {{"source", "test"}}};
   const std::uint32_t full = points_per_page(writer.header());
   for (std::size_t first = 0; first < kPoints; first += full) {

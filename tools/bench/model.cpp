@@ -30,7 +30,7 @@ std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::u
     ContainerPoints points(from);
     ContainerWriter writer(path, {.page_shift = from.header().page_shift, .frame = from.header().frame});
     Progress silent;
-    const Superblock superblock = build_pages(points, writer, {.leaf_points = leaf_points}, silent);
+    const Superblock superblock = build_pages(points, writer, {.leaf_points = leaf_points}, Executor(), silent);
     writer.finish(from.meta(), superblock);
   });
 }

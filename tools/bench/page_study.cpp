@@ -47,7 +47,8 @@ double moved(const PointRecord& from, const PointRecord& to, const Frame& frame)
 PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
   const Frame& frame = container.header().frame;
   ContainerPoints originals(container), points(container);
-  const std::unique_ptr<PointStream> rounding = rounded ? round_points(points, frame.unit()) : nullptr;
+  const Executor executor(1);
+  const std::unique_ptr<PointStream> rounding = rounded ? round_points(points, frame.unit(), executor) : nullptr;
   PointPayloads out;
   std::vector<PointRecord> from(container.superblock().points_per_page), to(from.size());
   while (const std::size_t count = originals.next(from)) {  // both hand out page by page

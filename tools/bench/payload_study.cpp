@@ -9,7 +9,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/build/container_points.h"
-#include "engine/build/octree.h"
+#include "engine/build/subtree.h"
 #include "engine/shade/brute_force.h"
 #include "engine/shade/plain_gather.h"
 #include "format/scalar.h"
@@ -42,23 +42,20 @@ struct Cut {
 
 /// A container's octree in memory, built anew from its points: summaries as sums and bounds were found, or as they
 /// come back from a node page.
-class Tree : private GroupSink {
+class Tree {
  public:
   Tree(const ContainerReader& container, bool stored) : frame_(container.header().frame), stored_(stored) {
-    OctreeBuilder builder(*this, container.superblock().leaf_points, frame_.unit());
-    ContainerPoints points(container);
-    std::vector<PointRecord> block(std::size_t{1} << 14);
-    while (const std::size_t count = points.next(block)) {
-      for (const PointRecord& point : std::span(block).first(count)) builder.add(point);
-    }
-    root_ = builder.finish().root;
+    std::vector<PointRecord> points(static_cast<std::size_t>(container.superblock().points));
+    static_cast<void>(ContainerPoints(container).next(points));
+    SubtreeBuilder builder(container.superblock().leaf_points, frame_.unit());
+    root_ = builder.build(points, 0, 0, [this](const NodeGroup& group, std::uint64_t) { return add(group); }).ref;
   }
 
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
   [[nodiscard]] Cut cut(std::span<const Surfel> surfels, const Receiver& receiver, float solid_angle) const;
 
  private:
-  ChildRef add(const NodeGroup& group) override {
+  ChildRef add(const NodeGroup& group) {
     const auto first = static_cast<std::uint32_t>(nodes_.size());
     const NodeGroup kept = stored_ ? through_page(group) : group;
     for (const NodeChild& child : kept.children) nodes_.push_back(node_of(child));
