@@ -25,16 +25,6 @@ std::uint64_t spread(std::uint64_t v) noexcept {
   return v;
 }
 
-std::uint64_t gather(std::uint64_t v) noexcept {
-  v &= 0x1249249249249249;
-  v = (v | v >> 2) & 0x10c30c30c30c30c3;
-  v = (v | v >> 4) & 0x100f00f00f00f00f;
-  v = (v | v >> 8) & 0x001f0000ff0000ff;
-  v = (v | v >> 16) & 0x001f00000000ffff;
-  v = (v | v >> 32) & kHalfMask;
-  return v;
-}
-
 // A half of a key with its digits below `digits` (0 to 21) cleared.
 std::uint64_t leading_digits(std::uint64_t half, int digits) noexcept {
   return digits == 0 ? 0 : half >> (63 - 3 * digits) << (63 - 3 * digits);
@@ -58,24 +48,6 @@ MortonKey encode_morton(const LatticePoint& point) noexcept {
     key.low |= spread(point[static_cast<std::size_t>(axis)] & kHalfMask) << axis;
   }
   return key;
-}
-
-LatticePoint decode_morton(const MortonKey& key) noexcept {
-  LatticePoint point;
-  for (int axis = 0; axis < 3; ++axis) {
-    point[static_cast<std::size_t>(axis)] =
-        gather(key.high >> axis) << kHalfBits | gather(key.low >> axis);
-  }
-  return point;
-}
-
-int common_level(const MortonKey& a, const MortonKey& b) noexcept {
-  // Bit 63 of a half is unused: a difference in the first digit has one to three leading zeros.
-  if (const std::uint64_t differ = a.high ^ b.high) return (std::countl_zero(differ) - 1) / 3;
-  if (const std::uint64_t differ = a.low ^ b.low) {
-    return kHalfBits + (std::countl_zero(differ) - 1) / 3;
-  }
-  return kLatticeBits;
 }
 
 int octant(const MortonKey& key, int level) noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <compare>
 #include <cstdint>
 
@@ -22,12 +23,41 @@ struct MortonKey {
   friend auto operator<=>(const MortonKey&, const MortonKey&) = default;  // NOLINT(*-nullptr)
 };
 
+namespace detail {
+
+/// Bits 0, 3, 6, ... of a half of a key, put together.
+[[nodiscard]] inline std::uint64_t every_third_bit(std::uint64_t v) noexcept {
+  v &= 0x1249249249249249;
+  v = (v | v >> 2) & 0x10c30c30c30c30c3;
+  v = (v | v >> 4) & 0x100f00f00f00f00f;
+  v = (v | v >> 8) & 0x001f0000ff0000ff;
+  v = (v | v >> 16) & 0x001f00000000ffff;
+  v = (v | v >> 32) & 0x1fffff;
+  return v;
+}
+
+}  // namespace detail
+
 /// The key of a lattice point, and back. Bits of coordinates above the 42nd must be zero.
 [[nodiscard]] MortonKey encode_morton(const LatticePoint& point) noexcept;
-[[nodiscard]] LatticePoint decode_morton(const MortonKey& key) noexcept;
+[[nodiscard]] inline LatticePoint decode_morton(const MortonKey& key) noexcept {
+  LatticePoint point;
+  for (int axis = 0; axis < 3; ++axis) {
+    point[static_cast<std::size_t>(axis)] =
+        detail::every_third_bit(key.high >> axis) << (kLatticeBits / 2) | detail::every_third_bit(key.low >> axis);
+  }
+  return point;
+}
 
 /// Number of leading octal digits that a and b share: 0 (only the root cell) to 42 (equal keys).
-[[nodiscard]] int common_level(const MortonKey& a, const MortonKey& b) noexcept;
+[[nodiscard]] inline int common_level(const MortonKey& a, const MortonKey& b) noexcept {
+  // Bit 63 of a half is unused: a difference in the first digit has one to three leading zeros.
+  if (const std::uint64_t differ = a.high ^ b.high) return (std::countl_zero(differ) - 1) / 3;
+  if (const std::uint64_t differ = a.low ^ b.low) {
+    return kLatticeBits / 2 + (std::countl_zero(differ) - 1) / 3;
+  }
+  return kLatticeBits;
+}
 
 /// Octal digit of the key at `level` in [1, 42]: which child of its cell at level - 1 it lies in.
 [[nodiscard]] int octant(const MortonKey& key, int level) noexcept;

@@ -8,15 +8,12 @@
 
 #include "format/bytes.h"
 #include "format/error.h"
+#include "format/packed_layout.h"
 
 namespace ptc {
 namespace {
 
 constexpr char kPacked[] = "spec/points.md#packed-columns";
-constexpr std::size_t kHeadBytes = 10;  // of a column: shift, planes, base
-constexpr std::size_t kHigh = 12;       // bytes a point before a point page's bits 32 to 41 of x, y, z
-constexpr unsigned kHighBits = kCoordinateBits - 32;
-
 constexpr std::array<PackedColumn, 13> kPointColumns{{
     {0, kCoordinateBits}, {4, kCoordinateBits}, {8, kCoordinateBits},  // x y z
     {16, 32},                                                          // radius
@@ -25,80 +22,6 @@ constexpr std::array<PackedColumn, 13> kPointColumns{{
     {31, 8}, {30, 8, 9}, {32, 8, 9},                                   // albedo likewise
     {33, 8},                                                           // flags
 }};
-
-constexpr std::uint64_t mask(unsigned bits) noexcept { return (std::uint64_t{1} << bits) - 1; }
-
-template <class T, class Value>
-void load_all(const std::byte* column, std::vector<Value>& values) noexcept {
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = load<T>(column, i * sizeof(T));
-}
-
-// Where x, y, z keep their upper bits: shift of the axis whose column has so many bytes before it.
-unsigned high_shift(const PackedColumn& column) noexcept { return column.before / 4 * kHighBits; }
-
-void load_column(const std::byte* payload, const PackedColumn& column, std::vector<std::uint32_t>& values) noexcept {
-  const std::byte* const from = payload + column.before * values.size();
-  if (column.bits == 8) return load_all<std::uint8_t>(from, values);
-  if (column.bits == 16) return load_all<std::uint16_t>(from, values);
-  load_all<std::uint32_t>(from, values);
-}
-
-void load_coordinates(const std::byte* payload, const PackedColumn& column, std::vector<std::uint64_t>& values) noexcept {
-  load_all<std::uint32_t>(payload + column.before * values.size(), values);
-  const std::byte* const high = payload + kHigh * values.size();
-  const unsigned shift = high_shift(column);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    values[i] |= std::uint64_t{load<std::uint32_t>(high, 4 * i) >> shift & ((1U << kHighBits) - 1)} << 32;
-  }
-}
-
-template <class Value>
-Value bits_of(const std::vector<Value>& values) noexcept {
-  Value seen = 0;
-  for (const Value value : values) seen |= value;
-  return seen;
-}
-
-// Differences to the value before, as zigzag numbers without the zero bits that all values end in.
-template <class Value>
-void difference(const std::vector<Value>& values, unsigned bits, unsigned shift, std::vector<Value>& codes) noexcept {
-  const unsigned width = bits - shift;  // of what is left
-  const auto all = static_cast<Value>(mask(width));
-  codes[0] = 0;
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    const auto step = static_cast<Value>((values[i] >> shift) - (values[i - 1] >> shift));
-    const auto negative = static_cast<Value>(step >> (width - 1) & 1);
-    codes[i] = static_cast<Value>((step << 1 ^ (Value{0} - negative)) & all);
-  }
-}
-
-template <class Value>
-void pack(const std::vector<Value>& values, unsigned bits, std::vector<Value>& codes, std::vector<std::byte>& packed) {
-  const Value seen = bits_of(values);
-  const unsigned shift = seen == 0 ? 0 : static_cast<unsigned>(std::countr_zero(seen));
-  difference(values, bits, shift, codes);
-  const auto planes = static_cast<unsigned>(std::bit_width(bits_of(codes)) + 7) / 8;
-
-  const std::size_t at = packed.size(), n = values.size();
-  packed.resize(at + kHeadBytes + planes * n);
-  std::byte* const p = packed.data() + at;
-  store(p, 0, static_cast<std::uint8_t>(shift));
-  store(p, 1, static_cast<std::uint8_t>(planes));
-  store(p, 2, std::uint64_t{values.front()});
-  for (unsigned plane = 0; plane < planes; ++plane) {
-    std::byte* const out = p + kHeadBytes + plane * n;
-    for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::byte>(codes[i] >> (8 * plane));
-  }
-}
-
-void check_size(std::size_t bytes, std::uint32_t count, std::span<const PackedColumn> columns) {
-  std::size_t row = 0;
-  for (const PackedColumn& column : columns) {
-    const std::size_t width = column.bits == kCoordinateBits ? 4 : column.bits / 8;
-    row = std::max(row, column.before + width);
-  }
-  if (count == 0 || bytes != row * count) throw std::invalid_argument("packed columns: a payload of another size");
-}
 
 /// A column as it is packed, its head checked.
 struct Head {
@@ -180,6 +103,15 @@ void unpack(const Head& head, std::size_t n, std::span<const PackedColumn> colum
 
 }  // namespace
 
+void check_packed_size(std::size_t bytes, std::uint32_t count, std::span<const PackedColumn> columns) {
+  std::size_t row = 0;
+  for (const PackedColumn& column : columns) {
+    const std::size_t width = column.bits == kCoordinateBits ? 4 : column.bits / 8;
+    row = std::max(row, column.before + width);
+  }
+  if (count == 0 || bytes != row * count) throw std::invalid_argument("packed columns: a payload of another size");
+}
+
 std::span<const PackedColumn> packed_point_columns() noexcept { return kPointColumns; }
 
 std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels, std::uint16_t group) {
@@ -195,33 +127,9 @@ std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels
   return columns;
 }
 
-void pack_columns(std::span<const std::byte> payload, std::uint32_t count, std::span<const PackedColumn> columns,
-                  std::vector<std::byte>& packed) {
-  check_size(payload.size(), count, columns);
-  packed.clear();
-  std::vector<std::uint32_t> values(count), others(count);
-  std::vector<std::uint64_t> coordinates, codes;
-  for (const PackedColumn& column : columns) {
-    if (column.bits == kCoordinateBits) {
-      coordinates.resize(count);
-      codes.resize(count);
-      load_coordinates(payload.data(), column, coordinates);
-      pack(coordinates, column.bits, codes, packed);
-      continue;
-    }
-    load_column(payload.data(), column, values);
-    if (column.minus != PackedColumn::kNone) {
-      load_column(payload.data(), columns[column.minus], others);
-      const auto all = static_cast<std::uint32_t>(mask(column.bits));
-      for (std::size_t i = 0; i < count; ++i) values[i] = (values[i] - others[i]) & all;
-    }
-    pack(values, column.bits, others, packed);
-  }
-}
-
 void unpack_columns(std::span<const std::byte> packed, std::uint32_t count, std::span<const PackedColumn> columns,
                     std::span<std::byte> payload) {
-  check_size(payload.size(), count, columns);
+  check_packed_size(payload.size(), count, columns);
   std::size_t at = 0;
   for (const PackedColumn& column : columns) {
     const Head head = read_head(packed, at, column.bits, count);

@@ -169,24 +169,31 @@ std::uint64_t point_page_bytes(std::uint32_t points) noexcept {
 
 std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
   if (points.empty()) throw std::invalid_argument("encode_point_page: no points");
-  assert(std::ranges::is_sorted(points, {}, &PointRecord::key));
+  assert(std::ranges::is_sorted(points, {}, &PointRecord::key) && std::ranges::all_of(points, storable));
   Columns columns(static_cast<std::uint32_t>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const PointRecord& point = points[i];
-    assert(storable(point));
-    const LatticePoint q = decode_morton(point.key);
-    columns.put(kHigh, i,
-                static_cast<std::uint32_t>(q[0] >> 32 | q[1] >> 32 << kHighBits |
-                                           q[2] >> 32 << (2 * kHighBits)));
-    columns.put(kRadius, i, point.radius + 0.0f);  // -0 becomes 0
-    for (std::size_t k = 0; k < 2; ++k) columns.put(kNormal + 2 * k, i, point.normal[k]);
+  PositionBlock q;
+  for (std::size_t first = 0; first < points.size(); first += kPositionBlock) {
+    const auto block = points.subspan(first, std::min(kPositionBlock, points.size() - first));
+    decode_positions(block, q);
+    const auto fill = [&](std::size_t bytes_before, auto&& value) {
+      for (std::size_t i = 0; i < block.size(); ++i) columns.put(bytes_before, first + i, value(i));
+    };
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint16_t half = point.radiance[k] == 0x8000 ? std::uint16_t{0} : point.radiance[k];
-      columns.put(kPosition + 4 * k, i, static_cast<std::uint32_t>(q[k]));
-      columns.put(kRadiance + 2 * k, i, half);
-      columns.put(kAlbedo + k, i, point.albedo[k]);
+      fill(kPosition + 4 * k, [&](std::size_t i) { return static_cast<std::uint32_t>(q[k][i]); });
+      fill(kRadiance + 2 * k, [&](std::size_t i) {
+        const std::uint16_t half = block[i].radiance[k];
+        return half == 0x8000 ? std::uint16_t{0} : half;
+      });
+      fill(kAlbedo + k, [&](std::size_t i) { return block[i].albedo[k]; });
     }
-    columns.put(kFlags, i, point.flags);
+    fill(kHigh, [&](std::size_t i) {
+      return static_cast<std::uint32_t>(q[0][i] >> 32 | q[1][i] >> 32 << kHighBits | q[2][i] >> 32 << (2 * kHighBits));
+    });
+    fill(kRadius, [&](std::size_t i) { return block[i].radius + 0.0f; });  // -0 becomes 0
+    for (std::size_t k = 0; k < 2; ++k) {
+      fill(kNormal + 2 * k, [&](std::size_t i) { return block[i].normal[k]; });
+    }
+    fill(kFlags, [&](std::size_t i) { return block[i].flags; });
   }
   return columns.take();
 }

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <type_traits>
 
 #include "format/morton.h"
@@ -20,5 +22,12 @@ struct PointRecord {
   std::array<std::uint8_t, 6> reserved{};   ///< 0
 };
 static_assert(sizeof(PointRecord) == 40 && std::is_trivially_copyable_v<PointRecord>);
+
+/// Lattice coordinates of up to kPositionBlock points, an array an axis.
+inline constexpr std::size_t kPositionBlock = 256;
+using PositionBlock = std::array<std::array<std::uint64_t, kPositionBlock>, 3>;
+
+/// @param points  at most kPositionBlock
+void decode_positions(std::span<const PointRecord> points, PositionBlock& out) noexcept;
 
 }  // namespace ptc

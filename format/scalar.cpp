@@ -31,18 +31,6 @@ std::array<float, 2> fold(const std::array<float, 3>& n) noexcept {
   return {std::copysign(1 - std::abs(v), u), std::copysign(1 - std::abs(u), v)};
 }
 
-std::array<float, 3> unfold(float u, float v) noexcept {
-  float x = u;
-  float y = v;
-  const float z = 1 - std::abs(u) - std::abs(v);
-  if (z < 0) {
-    x = std::copysign(1 - std::abs(v), u);
-    y = std::copysign(1 - std::abs(u), v);
-  }
-  const float length = std::sqrt(x * x + y * y + z * z);
-  return {x / length, y / length, z / length};
-}
-
 }  // namespace
 
 std::uint16_t encode_half(float x) noexcept {
@@ -60,17 +48,6 @@ std::uint16_t encode_half(float x) noexcept {
     rounded = std::bit_cast<std::uint32_t>(shifted) - std::bit_cast<std::uint32_t>(0.5f);
   }
   return static_cast<std::uint16_t>(sign | rounded);
-}
-
-float decode_half(std::uint16_t bits) noexcept {
-  const std::uint32_t sign = static_cast<std::uint32_t>(bits & 0x8000) << 16;
-  const std::uint32_t magnitude = bits & 0x7fff;
-  if (magnitude >= 0x7c00) {  // infinity and NaN keep their fraction
-    return std::bit_cast<float>(sign | 0x7f800000 | (magnitude & 0x3ff) << 13);
-  }
-  // Shifted into place the exponent is 112 too small; the product is exact, also for subnormals.
-  const float value = std::bit_cast<float>(magnitude << 13) * 0x1p112f;
-  return std::bit_cast<float>(sign | std::bit_cast<std::uint32_t>(value));
 }
 
 std::uint16_t encode_ufloat16_up(float x) noexcept {
@@ -115,11 +92,6 @@ std::array<std::int16_t, 2> encode_octahedral(const std::array<float, 3>& n) noe
           static_cast<std::int16_t>(nearest(v * 32767))};
 }
 
-std::array<float, 3> decode_octahedral(std::int16_t u, std::int16_t v) noexcept {
-  return unfold(static_cast<float>(std::max<int>(u, -32767)) / 32767,
-                static_cast<float>(std::max<int>(v, -32767)) / 32767);
-}
-
 std::uint16_t encode_octahedral8(const std::array<float, 3>& n) noexcept {
   const auto [u, v] = fold(n);
   return static_cast<std::uint16_t>((nearest(u * 127) & 0xff) | (nearest(v * 127) & 0xff) << 8);
@@ -128,7 +100,7 @@ std::uint16_t encode_octahedral8(const std::array<float, 3>& n) noexcept {
 std::array<float, 3> decode_octahedral8(std::uint16_t bits) noexcept {
   const int u = std::max<int>(static_cast<std::int8_t>(bits & 0xff), -127);
   const int v = std::max<int>(static_cast<std::int8_t>(bits >> 8), -127);
-  return unfold(static_cast<float>(u) / 127, static_cast<float>(v) / 127);
+  return detail::unfold_octahedron(static_cast<float>(u) / 127, static_cast<float>(v) / 127);
 }
 
 }  // namespace ptc

@@ -23,19 +23,23 @@ struct Totals {
   std::array<double, 3> flux{};
 };
 
-Totals totals_of(std::span<const PointRecord> points, const Frame& frame) {
+Totals totals_of(const PointPage& points, const Frame& frame) {
   Totals totals;
-  totals.low = totals.high = frame.to_position(decode_morton(points.front().key));
-  for (const PointRecord& point : points) {
-    const std::array<double, 3> at = frame.to_position(decode_morton(point.key));
+  LatticePoint low = points.position(0), high = low;
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const LatticePoint at = points.position(i);
     for (std::size_t k = 0; k < 3; ++k) {
-      totals.low[k] = std::min(totals.low[k], at[k]);
-      totals.high[k] = std::max(totals.high[k], at[k]);
+      low[k] = std::min(low[k], at[k]);
+      high[k] = std::max(high[k], at[k]);
     }
-    const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
+    const double radius = points.radius(i);
+    const double area = 2.0 * radius * radius;
     totals.area += area;
-    for (std::size_t c = 0; c < 3; ++c) totals.flux[c] += area * static_cast<double>(decode_half(point.radiance[c]));
+    const std::array<std::uint16_t, 3> radiance = points.radiance(i);
+    for (std::size_t c = 0; c < 3; ++c) totals.flux[c] += area * static_cast<double>(decode_half(radiance[c]));
   }
+  totals.low = frame.to_position(low);
+  totals.high = frame.to_position(high);
   return totals;
 }
 
@@ -171,7 +175,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
     executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
       const auto page = std::span(block).subspan(i * per_page, std::min(per_page, count - i * per_page));
       pages[i] = point_page(page);
-      totals[i] = totals_of(page, frame);
+      totals[i] = totals_of(PointPage(pages[i].payload.data(), pages[i].facts.record_count), frame);
     });
     for (std::size_t i = 0; i < pages.size(); ++i) {
       include(superblock, totals[i], pages[i].facts.record_count);

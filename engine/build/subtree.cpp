@@ -34,8 +34,7 @@ NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64
     }
     levels_[i] = static_cast<std::uint8_t>(level);
   }
-  numbers_.resize(points.size());
-  std::ranges::transform(points, numbers_.begin(), [this](const PointRecord& point) { return numbers_of(point, unit_); });
+  columns_.assign(points, unit_);
   path_.resize(kMaxLevel + 2);
   NodeChild top;
   build(0, points.size(), 0, top);
@@ -54,7 +53,7 @@ NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64
 void SubtreeBuilder::build(std::size_t begin, std::size_t end, std::size_t depth, NodeChild& node) {
   if (end - begin <= leaf_points_) {
     node.ref = {.first_point = first_ + begin, .point_count = static_cast<std::uint32_t>(end - begin)};
-    node.node = summarise_points(std::span(numbers_).subspan(begin, end - begin));
+    node.node = summarise_points(columns_, begin, end);
     return;
   }
   const auto at = [this](std::size_t i) { return levels_.begin() + static_cast<std::ptrdiff_t>(i); };

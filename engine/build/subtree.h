@@ -1,12 +1,13 @@
 // The octree of points in memory.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
 
+#include "engine/build/point_columns.h"
+#include "engine/build/summary.h"
 #include "format/node_page.h"
 #include "format/point_record.h"
 
@@ -32,16 +33,7 @@ struct SubtreeGroups {
 /// Octal digits that the ranks of two coincident points share, of kMaxLevel - kLatticeBits.
 [[nodiscard]] int common_rank_level(std::uint64_t a, std::uint64_t b) noexcept;
 
-/// A surfel's numbers, in lattice units where nothing else is said.
-struct PointNumbers {
-  std::array<double, 3> position{};
-  double radius = 0;
-  double area = 0;  ///< 2 radius^2, scene units squared
-  std::array<double, 3> radiance{};
-  std::array<float, 3> normal{};
-};
-
-/// Builds the octree below one cell, as OctreeBuilder says.   Memory: 96 bytes a point, and a group for each level.
+/// Builds the octree below one cell, as OctreeBuilder says.   Memory: 90 bytes a point, and a group for each level.
 class SubtreeBuilder {
  public:
   /// Takes a group when its children are done. @return an interior reference to it
@@ -64,21 +56,11 @@ class SubtreeBuilder {
   std::uint32_t leaf_points_;
   double unit_;
   std::span<const PointRecord> points_;
-  std::vector<PointNumbers> numbers_;
+  PointColumns columns_;
   std::uint64_t first_ = 0;
   const Emit* emit_ = nullptr;
   std::vector<std::uint8_t> levels_;  ///< of the smallest cell that holds a point and the one before
   std::vector<NodeGroup> path_;       ///< groups being filled, by depth; kept for their memory
 };
-
-/// @param unit  as of OctreeBuilder
-[[nodiscard]] PointNumbers numbers_of(const PointRecord& point, double unit) noexcept;
-
-/// Summary of a run of surfels: exact bounding sphere and cone. @param unit as above
-[[nodiscard]] NodeSummary summarise_points(std::span<const PointNumbers> points);
-[[nodiscard]] NodeSummary summarise_points(std::span<const PointRecord> points, double unit);
-/// Summary of several clusters; the sphere holds their spheres, the cone their cones.
-[[nodiscard]] NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes);
-[[nodiscard]] NodeSummary summarise_children(std::span<const NodeChild> children);
 
 }  // namespace ptc

@@ -1,10 +1,9 @@
 // What a node knows of its surfels (spec/nodes.md#summary).
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
-#include "engine/build/subtree.h"
-#include "format/scalar.h"
+#include "engine/build/point_columns.h"
+#include "engine/build/summary.h"
 
 namespace ptc {
 namespace {
@@ -12,33 +11,10 @@ namespace {
 using Vec3 = std::array<double, 3>;
 
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
 double distance(const Vec3& a, const Vec3& b) {  // lattice coordinates: no square overflows
   const Vec3 d{a[0] - b[0], a[1] - b[1], a[2] - b[2]};
   return std::sqrt(dot(d, d));
-}
-
-/// Unit normal of the slab that holds a cluster, the mean of its normals; zero where they cancel out.
-Vec3 slab_normal(const NodeSummary& node) {
-  const Vec3 sum{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3], node.facing[4] - node.facing[5]};
-  const double length = std::sqrt(dot(sum, sum));
-  if (!(length > 1e-6 * node.area)) return {};
-  return {sum[0] / length, sum[1] / length, sum[2] / length};
-}
-
-/// Axis of the normal cone: the slab's normal; +z, with a full cone, where that is zero.
-/// @return false where it is zero
-bool set_cone_axis(NodeSummary& node, const Vec3& slab) {
-  node.cone_axis = {0, 0, 1};
-  if (slab == Vec3{}) return false;
-  for (std::size_t k = 0; k < 3; ++k) node.cone_axis[k] = static_cast<float>(slab[k]);
-  return true;
-}
-
-/// Radius of a disc in lattice units. Any float over any unit: beyond this its square would be infinite, and what is
-/// stored ends at 3e38 anyway.
-double lattice_radius(const PointRecord& point, double unit) {
-  constexpr double kGreatest = 1e150;
-  return std::min(static_cast<double>(point.radius) / unit, kGreatest);
 }
 
 /// Half the extent along a unit direction of a thing `thick` along its normal and `wide` across it;
@@ -70,59 +46,29 @@ float round_down(double x) {
 
 }  // namespace
 
-PointNumbers numbers_of(const PointRecord& point, double unit) noexcept {
-  const LatticePoint q = decode_morton(point.key);
-  const double radius = point.radius;
-  return {.position = {static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])},
-          .radius = lattice_radius(point, unit),
-          .area = 2.0 * radius * radius,
-          .radiance = {decode_half(point.radiance[0]), decode_half(point.radiance[1]), decode_half(point.radiance[2])},
-          .normal = decode_octahedral(point.normal[0], point.normal[1])};
+Vec3 slab_normal(const NodeSummary& node) {
+  const Vec3 sum{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3], node.facing[4] - node.facing[5]};
+  const double length = std::sqrt(dot(sum, sum));
+  if (!(length > 1e-6 * node.area)) return {};
+  return {sum[0] / length, sum[1] / length, sum[2] / length};
 }
 
-NodeSummary summarise_points(std::span<const PointNumbers> points) {
-  NodeSummary node;
-  // Sums of offsets keep the lattice unit, sums of coordinates up to 2^42 lose it.
-  const Vec3 origin = points.front().position;
-  double weight = 0;
-  const bool has_area = std::ranges::any_of(points, [](const PointNumbers& p) { return p.area > 0; });
-  std::array<std::array<double, 4>, 6> towards{};  // an axis: facing, flux
-  for (const PointNumbers& p : points) {
-    const double w = has_area ? p.area : 1.0;  // points without extent still have a middle
-    for (std::size_t k = 0; k < 3; ++k) node.mean[k] += w * (p.position[k] - origin[k]);
-    weight += w;
-    node.area += p.area;
-    const std::array<double, 4> light{1, p.radiance[0], p.radiance[1], p.radiance[2]};
-    for (std::size_t k = 0; k < 6; ++k) {
-      const double facing = p.area * std::max(0.0, static_cast<double>(k % 2 == 0 ? p.normal[k / 2] : -p.normal[k / 2]));
-      for (std::size_t c = 0; c < 4; ++c) towards[k][c] += facing * light[c];
-    }
-  }
-  for (std::size_t k = 0; k < 6; ++k) {
-    node.facing[k] = towards[k][0];
-    node.flux[k] = {towards[k][1], towards[k][2], towards[k][3]};
-  }
-  for (std::size_t k = 0; k < 3; ++k) node.mean[k] = origin[k] + node.mean[k] / weight;
-  const Vec3 slab = slab_normal(node);
-  const bool has_axis = set_cone_axis(node, slab);
-  double cosine = 1;
-  for (const PointNumbers& p : points) {
-    node.radius = std::max(node.radius, distance(p.position, node.mean) + p.radius);
-    if (!has_axis) continue;
-    cosine = std::min(cosine, cosine_to_axis(node, p.normal));
-    const double reach = extent_along(slab, {p.normal[0], p.normal[1], p.normal[2]}, 0, p.radius);
-    node.thickness = std::max(node.thickness, offset_along(slab, p.position, node.mean) + reach);
-  }
-  node.cone_cos = has_axis ? round_down(cosine) : -1.0F;
-  node.thickness = has_axis ? std::min(node.thickness, node.radius) : node.radius;
-  return node;
+bool set_cone_axis(NodeSummary& node, const Vec3& slab) {
+  node.cone_axis = {0, 0, 1};
+  if (slab == Vec3{}) return false;
+  for (std::size_t k = 0; k < 3; ++k) node.cone_axis[k] = static_cast<float>(slab[k]);
+  return true;
+}
+
+void set_bounds(NodeSummary& node, bool has_axis, double cosine, double thickness) {
+  node.cone_cos = has_axis ? round_down(std::max(cosine, -1.0)) : -1.0F;
+  node.thickness = has_axis ? std::min(thickness, node.radius) : node.radius;
 }
 
 NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
-  std::vector<PointNumbers> numbers;
-  numbers.reserve(points.size());
-  for (const PointRecord& point : points) numbers.push_back(numbers_of(point, unit));
-  return summarise_points(numbers);
+  PointColumns columns;
+  columns.assign(points, unit);
+  return summarise_points(columns, 0, points.size());
 }
 
 NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
@@ -151,8 +97,7 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
     const double reach = extent_along(slab, slab_normal(*node), node->thickness, node->radius);
     sum.thickness = std::max(sum.thickness, offset_along(slab, node->mean, sum.mean) + std::min(reach, node->radius));
   }
-  sum.thickness = has_axis ? std::min(sum.thickness, sum.radius) : sum.radius;
-  sum.cone_cos = angle >= M_PI ? -1.0F : round_down(std::cos(angle));
+  set_bounds(sum, has_axis, angle >= M_PI ? -1.0 : std::cos(angle), sum.thickness);
   return sum;
 }
 

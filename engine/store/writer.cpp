@@ -85,10 +85,11 @@ struct ContainerWriter::Impl {
   void make_image(Image& image, std::span<const std::byte> payload) const {
     image.page.stored_bytes = static_cast<std::uint32_t>(payload.size());
     image.page.payload_xxh3 = xxh3_64(payload);
-    image.bytes.assign(extent_bytes(image.page.stored_bytes), std::byte{0});
+    image.bytes.resize(extent_bytes(image.page.stored_bytes));
     encode_page_header(image.page, header.uuid, std::span(image.bytes).first<kPageHeaderBytes>());
     refuse_what_readers_refuse([&] { static_cast<void>(decode_page_header(image.bytes, header)); });
-    std::ranges::copy(payload, image.bytes.begin() + kPageHeaderBytes);
+    const auto rest = std::ranges::copy(payload, image.bytes.begin() + kPageHeaderBytes).out;
+    std::fill(rest, image.bytes.end(), std::byte{0});
   }
 
   /// At the end of the file, in one write.

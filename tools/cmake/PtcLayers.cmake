@@ -16,9 +16,11 @@ set(PTC_LAYERS_tools "${PTC_LAYERS_engine};engine/measure;engine/verify;engine;t
 
 add_library(ptc_options INTERFACE)
 target_compile_features(ptc_options INTERFACE cxx_std_20)
-# No contraction: a fused multiply-add in one build and not in another would change the bytes.
+# No contraction: a fused multiply-add in one build and not in another would change the bytes. Nobody asks for errno or
+# traps of arithmetic, which would keep loops from becoming vectors.
 target_compile_options(ptc_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-  -Wsign-conversion -Wno-missing-field-initializers -ffp-contract=off $<$<BOOL:${PTC_WERROR}>:-Werror>)
+  -Wsign-conversion -Wno-missing-field-initializers -ffp-contract=off -fno-math-errno -fno-trapping-math
+  $<$<BOOL:${PTC_WERROR}>:-Werror>)
 if(PTC_FUZZ)  # what is fuzzed tells which of its branches were taken
   target_compile_options(ptc_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
