@@ -89,8 +89,8 @@ class PageOrder : public GroupSink {
     return {.interior = true, .page = stream->page, .slot = stream->encoder.add(group)};
   }
 
-  /// The pages that are whole, and room for others.
-  [[nodiscard]] std::vector<Page>& whole() noexcept { return whole_; }
+  /// The pages that are whole.
+  [[nodiscard]] std::vector<Page> take() noexcept { return std::exchange(whole_, {}); }
 
   /// Adds all others; of nodes those still open, deepest first: the coarse levels end up last in the file.
   void finish() {
@@ -182,13 +182,13 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
       order.add(std::move(pages[i]));
     }
     octree.add(std::span(block).first(count));
-    writer.write_pages(order.whole(), executor);
-    order.whole().clear();
+    writer.write_pages(order.take(), executor);
     progress.advance(count);
   }
   const OctreeBuilder::Result tree = octree.finish();
   order.finish();
-  writer.write_pages(order.whole(), executor);
+  writer.write_pages(order.take(), executor);
+  writer.flush();
 
   superblock.nodes = tree.nodes;
   superblock.node_groups = tree.groups;

@@ -5,6 +5,8 @@
 #include "engine/store/writer.h"
 
 #include <algorithm>
+#include <future>
+#include <mutex>
 #include <stdexcept>
 #include <utility>
 
@@ -57,6 +59,7 @@ struct ContainerWriter::Impl {
 
   std::uint32_t reserve() {
     require(!finished, "a page after finish()");
+    const std::lock_guard lock(entries_mutex);
     if (entries.size() >= kMaxPages) {
       throw DataError(file.target().string() + ": needs more than 2^32 - 2 pages");
     }
@@ -101,10 +104,14 @@ struct ContainerWriter::Impl {
   void append_page(const Image& image) {
     require(!finished, "a page after finish()");
     const PageHeader& page = image.page;
-    require(page.page_id < entries.size(), "a page that was not reserved");
-    require(entries[page.page_id].offset == 0, "a page written twice");
     const std::uint64_t offset = end;
+    {
+      const std::lock_guard lock(entries_mutex);
+      require(page.page_id < entries.size(), "a page that was not reserved");
+      require(entries[page.page_id].offset == 0, "a page written twice");
+    }
     append(image);
+    const std::lock_guard lock(entries_mutex);
     entries[page.page_id] = {offset,    page.stored_bytes, page.raw_bytes,   page.payload_xxh3,
                              page.type, page.group,        page.record_count};
   }
@@ -131,19 +138,30 @@ struct ContainerWriter::Impl {
     make_image(image, with.stored);
   }
 
+  /// Until the pages that are on their way are in the file.
+  void wait() {
+    if (writing.valid()) writing.get();
+  }
+
   void write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
                   std::span<const PackedColumn> columns = {}) {
+    wait();
     encode_page(page_id, facts, payload, columns, encoding(0), single);
     append_page(single);
   }
 
-  void write_pages(std::span<const Page> pages, const Executor& executor) {
+  void write_pages(std::vector<Page> pages, const Executor& executor) {
+    wait();
     if (images.size() < pages.size()) images.resize(pages.size());
     static_cast<void>(encoding(executor.threads() - 1));
-    executor.for_each(pages.size(), [&](std::size_t i, unsigned thread) {
-      encode_page(pages[i].id, pages[i].facts, pages[i].payload, {}, *encodings[thread], images[i]);
-    });
-    for (const Image& image : std::span(images).first(pages.size())) append_page(image);
+    const auto write = [this, pages = std::move(pages), &executor] {
+      executor.for_each(pages.size(), [&](std::size_t i, unsigned thread) {
+        encode_page(pages[i].id, pages[i].facts, pages[i].payload, {}, *encodings[thread], images[i]);
+      });
+      for (const Image& image : std::span(images).first(pages.size())) append_page(image);
+    };
+    if (executor.threads() == 1) return write();
+    writing = std::async(std::launch::async, write);
   }
 
   std::uint32_t write_meta(const Meta& meta) {
@@ -204,6 +222,7 @@ struct ContainerWriter::Impl {
 
   Superblock finish(const Meta& meta, Superblock superblock) {
     require(!finished, "finish() twice");
+    wait();
     require(std::ranges::none_of(entries, [](const auto& entry) { return entry.offset == 0; }),
             "a reserved page that was never written");
     superblock.meta_page = write_meta(meta);
@@ -226,12 +245,14 @@ struct ContainerWriter::Impl {
   Codec codec;
   int level;
   OutputFile file;
+  std::mutex entries_mutex;             ///< pages are reserved while others are written
   std::vector<DirectoryEntry> entries;  ///< offset 0: reserved, not yet written
   std::uint64_t end = kBlockBytes;      ///< where the next page goes
   bool finished = false;
   std::vector<std::unique_ptr<Encoding>> encodings;
   Image single;               ///< these two kept between calls
   std::vector<Image> images;  ///< of write_pages()
+  std::future<void> writing;  ///< of pages on their way; last, so that it is waited for first
 };
 
 ContainerWriter::ContainerWriter(const std::filesystem::path& target, const WriterOptions& options)
@@ -254,12 +275,16 @@ void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts, 
   impl_->write_page(page_id, facts, payload, columns);
 }
 
-void ContainerWriter::write_pages(std::span<const Page> pages, const Executor& executor) {
+void ContainerWriter::write_pages(std::vector<Page> pages, const Executor& executor) {
   require(std::ranges::none_of(pages, [](const Page& page) {
             return page.facts.type == PageType::directory || page.facts.type == PageType::meta || page.facts.type == PageType::attribute;
           }),
           "write_pages() is for pages of points and nodes");
-  impl_->write_pages(pages, executor);
+  impl_->write_pages(std::move(pages), executor);
+}
+
+void ContainerWriter::flush() {
+  impl_->wait();
 }
 
 void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
@@ -268,6 +293,7 @@ void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& 
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
   require(!stored.empty() && stored.size() <= impl_->payload_limit(), "a stored payload that is empty or longer than a page");
+  impl_->wait();
   Impl::Image& image = impl_->single;
   image.page = impl_->page_header(page_id, facts);
   image.page.coding = coding;

@@ -65,8 +65,12 @@ class ContainerWriter {
     std::vector<std::byte> payload;
   };
   /// The same of several, compressed side by side; they lie in the file in their order here. Not of attribute pages.
-  /// Memory: their stored bytes, and an encoder for each thread.
-  void write_pages(std::span<const Page> pages, const Executor& executor);
+  /// With more than one thread they are on their way when this returns, and what goes wrong is thrown by a later call.
+  /// @param executor  must outlive the next call of flush() or finish()
+  /// Memory: the pages and their stored bytes, and an encoder for each thread.
+  void write_pages(std::vector<Page> pages, const Executor& executor);
+  /// Returns when all pages are in the file. @throws what went wrong with them
+  void flush();
   /// Writes a page whose payload is already in its stored form (copied from another container).
   void write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
                          std::uint32_t raw_bytes, std::span<const std::byte> stored);
