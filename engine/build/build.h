@@ -10,7 +10,7 @@
 namespace ptc {
 
 struct BuildOptions {
-  std::uint32_t leaf_points = 8;  ///< a cell with no more points is not split, 1 to kMaxLeafPoints
+  std::uint32_t leaf_points = 16;  ///< a cell with no more points is not split, 1 to kMaxLeafPoints
   /// Levels of groups that share a stream of node pages: 1 keeps each level to itself, 63 puts all
   /// in the order in which they are finished, which is depth-first (spec/nodes.md#page-order).
   int levels_per_stream = 1;

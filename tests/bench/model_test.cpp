@@ -85,7 +85,7 @@ TEST_CASE("model: a payload that tells more shades no worse, within a tenth", "[
     const auto error = [&](const char* name) { return row_of(measured(), "payload", name, "stored", angle).irradiance.rms; };
     const auto no_worse = [&](const char* more, const char* less) {
       CAPTURE(angle, more, less, error(more), error(less));
-      CHECK(error(more) < 1.1 * error(less));
+      CHECK(error(more) < 1.1 * error(less) + 0.001);  // below a thousandth they differ either way
     };
     no_worse("SH 1", "SH 0");
     no_worse("SH 2", "SH 1");

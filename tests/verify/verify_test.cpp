@@ -183,7 +183,7 @@ TEST_CASE("verify: the error names where the flipped byte lies", "[verify]") {
 TEST_CASE("verify: all damaged pages are named in the order of the file, or the first alone", "[verify]") {
   const TemporaryDirectory directory;
   const auto path = directory / "scene.ptcx";
-  write_scene(path, random_surfels(5000, 9), {}, 12, Codec::raw);
+  write_scene(path, random_surfels(5000, 9), {.leaf_points = 8}, 12, Codec::raw);
   std::vector<std::byte> bytes = read_file(path);
   std::vector<std::uint64_t> offsets;
   {
