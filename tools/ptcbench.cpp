@@ -7,6 +7,7 @@
 #include "engine/base/error.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/accuracy_report.h"
+#include "tools/bench/build_report.h"
 #include "tools/bench/error_knob.h"
 #include "tools/bench/error_report.h"
 #include "tools/bench/growth.h"
@@ -23,8 +24,8 @@ using namespace ptc::bench;
 
 constexpr char kPurpose[] =
     "Measures time and error together, against rays at the same scene in the same run, and draws charts\n"
-    "of one against the other, of how time grows, or of what each part of the model is worth; and the sort\n"
-    "beside the disk. Scenes are held in memory whole; --memory caps their builds and the sort alone.";
+    "of one against the other, of how time grows, or of what each part of the model is worth; and sort and\n"
+    "build beside the disk. Scenes are held in memory whole; --memory caps sort and builds alone.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
@@ -33,6 +34,7 @@ constexpr char kExamples[] =
     "  ptcbench growth --quick -o charts\n"
     "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n"
     "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n"
+    "  ptcbench build --points 1M --points 20M --points 200M --memory 1G --temp /scratch -o charts\n"
     "  ptcbench sort --quick -o charts\n"
     "  ptcbench sort --points 200M --panel disk --order city --memory 1G --temp /scratch -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
@@ -41,6 +43,7 @@ struct Arguments {
   std::vector<std::string> scenes;
   std::filesystem::path directory;
   AccuracyOptions accuracy;
+  BuildBenchOptions build;
   ErrorOptions error;
   GrowthOptions growth;
   ModelOptions model;
@@ -179,6 +182,27 @@ void declare_growth(CLI::App& app, Arguments& arguments) {
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
 }
 
+void declare_build(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = *app.add_subcommand("build", "Time, bytes and memory of sort and build, over points and over the cap, beside a disk "
+                                                   "that moves the same bytes");
+  command.fallthrough();
+  command.add_option("-o,--output", arguments.directory, "Directory for build.json, .csv, .svg and .png")->type_name("DIR")->required();
+  command.add_flag("--quick", arguments.quick, "Under a minute on two cores: 200k and 1M points, 3 runs; what other options say stays");
+  BuildBenchOptions& options = arguments.build;
+  add_points_list(command, options.points, "Points of the city, in place of 1M, 5M and 20M; repeatable");
+  const auto set = [&options](const std::vector<std::string>& values) {
+    options.caps.clear();
+    for (const std::string& text : values) options.caps.push_back(ptc::parse_size("--cap", text));
+    std::ranges::sort(options.caps);
+  };
+  command.add_option_function<std::vector<std::string>>("--cap", set, "Build the most points under this cap, not under 128M to 2G; repeatable")
+      ->type_name("SIZE")
+      ->allow_extra_args(false);
+  add_words(command, "--profile", options.profiles, "Build in this profile, not both; repeatable");
+  add_words(command, "--panel", options.panels, "Measure this, not both; repeatable");
+  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
+}
+
 void declare_sort(CLI::App& app, Arguments& arguments) {
   CLI::App& command = *app.add_subcommand("sort", "Time and bytes of the external sort beside those of the disk alone, and of its "
                                                   "core beside std::sort and oneTBB");
@@ -251,6 +275,13 @@ void shorten_growth(Arguments& arguments) {
 }
 
 /// Likewise.
+void shorten_build(Arguments& arguments) {
+  if (arguments.command->count("--points") == 0) arguments.build.points = {200'000, 1'000'000};
+  if (arguments.command->count("--cap") == 0) arguments.build.caps = {std::uint64_t{96} << 20, std::uint64_t{192} << 20};
+  if (arguments.command->count("--repeats") == 0) arguments.build.repeats = 3;
+}
+
+/// Likewise.
 void shorten_sort(Arguments& arguments) {
   if (arguments.command->count("--points") == 0) arguments.sort.points = {200'000, 1'000'000};
   if (arguments.command->count("--repeats") == 0) arguments.sort.repeats = 3;
@@ -320,6 +351,15 @@ ptc::Outcome run_growth(Arguments& arguments, const ptc::RunOptions& run, ptc::P
   return {facts_of(rows), growth_text(rows)};
 }
 
+ptc::Outcome run_build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten_build(arguments);
+  std::filesystem::create_directories(arguments.directory);
+  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  const auto write = [&](const std::vector<BuildRow>& so_far) { write_reports(arguments.directory, so_far); };
+  const std::vector<BuildRow> rows = measure_build(arguments.build, work, run, progress, write);
+  return {facts_of(rows), build_text(rows)};
+}
+
 ptc::Outcome run_sort(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten_sort(arguments);
   std::filesystem::create_directories(arguments.directory);
@@ -350,6 +390,7 @@ int main(int argc, char** argv) {
   ptc::Command command("ptcbench", kPurpose, kExamples);
   Arguments arguments;
   declare_accuracy(command.app(), arguments);
+  declare_build(command.app(), arguments);
   declare_error(command.app(), arguments);
   declare_growth(command.app(), arguments);
   declare_model(command.app(), arguments);
@@ -359,7 +400,7 @@ int main(int argc, char** argv) {
     arguments.command = command.app().get_subcommands().front();
     const std::string name = arguments.command->get_name();
     static const std::map<std::string, decltype(&run_accuracy)> kRuns{
-        {"accuracy", run_accuracy}, {"error", run_error}, {"growth", run_growth}, {"model", run_model}, {"sort", run_sort}};
+        {"accuracy", run_accuracy}, {"build", run_build}, {"error", run_error}, {"growth", run_growth}, {"model", run_model}, {"sort", run_sort}};
     return kRuns.at(name)(arguments, command.run_options(), progress);
   });
 }

@@ -20,21 +20,6 @@ std::string range_text(const std::string& least, const std::string& most) {
   return "expects a number from " + least + " to " + most;
 }
 
-std::uint64_t parse_size(const std::string& option, const std::string& text) {
-  constexpr double kGreatest = 0x1p62;
-  const double bytes = parse_scaled(text, {{"K", 0x1p10},
-                                           {"M", 0x1p20},
-                                           {"G", 0x1p30},
-                                           {"T", 0x1p40},
-                                           {"KiB", 0x1p10},
-                                           {"MiB", 0x1p20},
-                                           {"GiB", 0x1p30},
-                                           {"TiB", 0x1p40}});
-  if (!(bytes >= 1 && bytes <= kGreatest))
-    refuse(option, text, "a size as 800000000, 256M or 1.5G");
-  return static_cast<std::uint64_t>(bytes);
-}
-
 }  // namespace
 
 void refuse(const std::string& option, const std::string& text, const std::string& expected) {
@@ -104,6 +89,21 @@ CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& co
           name, [&count, name](const std::string& text) { count = parse_count(name, text); },
           description)
       ->type_name("COUNT");
+}
+
+std::uint64_t parse_size(const std::string& option, const std::string& text) {
+  constexpr double kGreatest = 0x1p62;
+  const double bytes = parse_scaled(text, {{"K", 0x1p10},
+                                           {"M", 0x1p20},
+                                           {"G", 0x1p30},
+                                           {"T", 0x1p40},
+                                           {"KiB", 0x1p10},
+                                           {"MiB", 0x1p20},
+                                           {"GiB", 0x1p30},
+                                           {"TiB", 0x1p40}});
+  if (!(bytes >= 1 && bytes <= kGreatest))
+    refuse(option, text, "a size as 800000000, 256M or 1.5G");
+  return static_cast<std::uint64_t>(bytes);
 }
 
 CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& bytes,

@@ -93,7 +93,9 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& count,
                        const std::string& description);
 
-/// Bytes, also with K, M, G or T for powers of 1024: "256M", "1.5G"; the default is shown in the help.
+/// Bytes, also with K, M, G or T for powers of 1024: "256M", "1.5G".
+[[nodiscard]] std::uint64_t parse_size(const std::string& option, const std::string& text);
+/// The same as an option; the default is shown in the help.
 CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& bytes,
                       const std::string& description);
 

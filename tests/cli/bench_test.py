@@ -149,11 +149,31 @@ class Bench(ProgramTest):
                 self.assertEqual(row["floor_share"] is None, row["method"] == "floor")
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["sort.csv", "sort.json", "sort.png", "sort.svg"])
 
+    def test_builds_are_sound_whatever_the_cap_and_leave_their_files_alone(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "build", "--points", "40k", "--points", "400k", "--cap", "96M", "--cap", "256M", "--repeats", "1",
+                               "--threads", "2", "-o", charts, "--json")
+        rows = json.loads((charts / "build.json").read_text())["rows"]
+        self.assertEqual(json.loads(printed.stdout)["rows"], rows)
+        methods = ["compact", "fast", "floor"]
+        self.assertEqual([(r["panel"], r["method"]) for r in rows],
+                         [("points", m) for m in 2 * methods] + [("cap", m) for m in 2 * methods])
+        for row in rows:
+            self.assertGreater(row["wall_seconds"], 0)
+            self.assertGreater(row["moved_bytes"], row["input_bytes"])
+            self.assertEqual(row["floor_share"] is None, row["method"] == "floor")
+            if row["method"] != "floor":
+                self.assertLess(row["bytes_per_point"], 12)
+                self.assertLess(row["bytes_per_node"], 40)
+                self.assertLess(row["resident_bytes"], row["memory_bytes"])
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["build.csv", "build.json", "build.png", "build.svg"])
+
     def test_growth_beyond_the_disk_is_the_machines_fault(self):
         message = self.fail_with(3, "ptcbench", "growth", "--points", "40000G", "--panel", "surfels", "-o", self.here)
         self.assertIn("GB free", message)
-        message = self.fail_with(3, "ptcbench", "sort", "--points", "40000G", "--panel", "disk", "-o", self.here)
-        self.assertIn("GB free", message)
+        for command in (["build"], ["sort", "--panel", "disk"]):
+            message = self.fail_with(3, "ptcbench", *command, "--points", "40000G", "-o", self.here)
+            self.assertIn("GB free", message)
 
     def test_containers_that_were_there_stay(self):
         charts = self.here / "charts"

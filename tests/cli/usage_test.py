@@ -19,7 +19,7 @@ class Usage(ProgramTest):
         # would run for long.
         for program in PROGRAMS:
             for line in self.succeed(program, "--help").stdout.split("Examples:\n")[1].splitlines():
-                long = any(word in line for word in ("--city", "--quick", " growth ", " sort "))
+                long = any(word in line for word in ("--city", "--quick", " build ", " growth ", " sort "))
                 if not line.startswith("  " + program) or long:
                     continue
                 words = line.split("|")[0].replace("/scratch", str(self.here)).split()

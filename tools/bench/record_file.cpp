@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <atomic>
 
+#include "engine/io/record.h"
+#include "engine/scene/city.h"
+
 namespace ptc::bench {
 namespace {
 
@@ -18,14 +21,14 @@ std::size_t RecordFile::block_bytes(std::uint64_t block) const noexcept {
   return static_cast<std::size_t>((std::min<std::uint64_t>(left, kBlockBytes) + kDirectBytes - 1) / kDirectBytes * kDirectBytes);
 }
 
-void RecordFile::copy_to(RecordFile& other) const {
+void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
   const Arena buffers(kCopies * kBlockBytes);
   std::atomic<std::uint64_t> next = 0;
   const auto work = [&](std::size_t copy) {
     std::byte* const buffer = buffers.data() + copy * kBlockBytes;
     for (std::uint64_t block = next++; block < blocks_of(*this); block = next++) {
       file_->read_at(block * kBlockBytes, {buffer, block_bytes(block)});
-      other.file_->write_at(block * kBlockBytes, {buffer, block_bytes(block)});
+      if (block * kBlockBytes < most) other.file_->write_at(block * kBlockBytes, {buffer, block_bytes(block)});
     }
   };
   std::vector<std::future<void>> others;
@@ -86,6 +89,33 @@ std::span<const PointRecord> RecordReader::next() {
   read_ahead();
   const std::uint64_t left = file_.records() - block * RecordFile::kBlock;
   return {half(block), static_cast<std::size_t>(std::min<std::uint64_t>(left, RecordFile::kBlock))};
+}
+
+std::vector<MortonKey> sample_of(const RecordFile& input) {
+  constexpr std::uint64_t kSampleKeys = 100'000;
+  std::vector<MortonKey> sample;
+  RecordReader reader(input);
+  const std::uint64_t stride = input.records() / kSampleKeys + 1;
+  std::uint64_t at = 0, begin = 0;
+  for (std::span<const PointRecord> block = reader.next(); !block.empty(); block = reader.next()) {
+    for (; at < begin + block.size(); at += stride) sample.push_back(block[static_cast<std::size_t>(at - begin)].key);
+    begin += block.size();
+  }
+  return sample;
+}
+
+Frame for_each_city_record(std::uint64_t points, const std::function<void(std::span<const PointRecord>)>& sink) {
+  const Bounds bounds = city_bounds(points);
+  const Frame frame = frame_around({bounds.low.x, bounds.low.y, bounds.low.z}, {bounds.high.x, bounds.high.y, bounds.high.z});
+  const std::unique_ptr<PointSource> city = make_city(points);
+  std::vector<Surfel> surfels(4096);
+  std::vector<PointRecord> records(surfels.size());
+  while (const std::size_t count = city->next(surfels)) {
+    std::transform(surfels.begin(), surfels.begin() + static_cast<std::ptrdiff_t>(count), records.begin(),
+                   [&](const Surfel& surfel) { return to_record(surfel, frame); });
+    sink(std::span<const PointRecord>(records).first(count));
+  }
+  return frame;
 }
 
 }  // namespace ptc::bench

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <span>
@@ -26,8 +27,9 @@ class RecordFile {
 
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }
   [[nodiscard]] std::uint64_t bytes() const noexcept { return records_ * sizeof(PointRecord); }
-  /// As many bytes again in another file: several blocks under way at once, read and written.
-  void copy_to(RecordFile& other) const;
+  /// Reads all and writes as many bytes again to another file, several blocks under way at once.
+  /// @param most  bytes to write, about, when that is less
+  void copy_to(RecordFile& other, std::uint64_t most = ~std::uint64_t{0}) const;
 
  private:
   friend class RecordWriter;
@@ -71,5 +73,12 @@ class RecordReader {
   std::uint64_t next_ = 0;  ///< block
   std::future<void> reading_;
 };
+
+/// Keys spread evenly over a file, as a build takes them of its input.
+[[nodiscard]] std::vector<MortonKey> sample_of(const RecordFile& input);
+
+/// The procedural city in blocks of up to 4,096 records, in the order of its blocks of houses.
+/// @return the frame of their keys
+Frame for_each_city_record(std::uint64_t points, const std::function<void(std::span<const PointRecord>)>& sink);
 
 }  // namespace ptc::bench

@@ -1,10 +1,8 @@
 #include "tools/bench/sort_bench.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -13,14 +11,11 @@
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/io/file.h"
-#include "engine/io/record.h"
-#include "engine/scene/city.h"
 #include "tools/bench/record_file.h"
+#include "tools/bench/timed_runs.h"
 
 namespace ptc::bench {
 namespace {
-
-constexpr std::size_t kSampleKeys = 100'000;
 
 std::uint64_t mixed(std::uint64_t i) noexcept {  // splitmix64 (Steele et al. 2014)
   std::uint64_t z = (i + 1) * 0x9e3779b97f4a7c15;
@@ -61,14 +56,10 @@ void generate(const std::string& order, std::uint64_t points, const Sink& sink) 
     }
     return;
   }
-  const Bounds bounds = city_bounds(points);
-  const Frame frame = frame_around({bounds.low.x, bounds.low.y, bounds.low.z}, {bounds.high.x, bounds.high.y, bounds.high.z});
-  const std::unique_ptr<PointSource> city = make_city(points);
-  std::vector<Surfel> surfels(block.size());
-  while (const std::size_t count = city->next(surfels)) {
-    for (std::size_t i = 0; i < count; ++i) block[i] = to_record(surfels[i], frame);
-    give(count);
-  }
+  for_each_city_record(points, [&](std::span<const PointRecord> records) {
+    std::ranges::copy(records, block.begin());
+    give(records.size());
+  });
 }
 
 std::uint64_t number_of(const PointRecord& r) noexcept {
@@ -94,37 +85,6 @@ class Check {
   PointRecord last_;
 };
 
-/// Most that is resident from here on until bytes(), less what is now.
-class ResidentPeak {
- public:
-  ResidentPeak() {
-    return_freed_memory();
-    std::ofstream("/proc/self/clear_refs") << "5";  // the peak begins anew; where that is not allowed, it is that of all so far
-    before_ = resident_bytes();
-  }
-  [[nodiscard]] std::uint64_t bytes() const { return peak_resident_bytes() - std::min(peak_resident_bytes(), before_); }
-
- private:
-  std::uint64_t before_;
-};
-
-/// Times of the runs of one method.
-struct Times {
-  std::vector<double> wall, cpu;
-  std::uint64_t resident = 0;
-
-  template <class Body>
-  void run(const Body& body) {
-    const ResidentPeak peak;
-    const double cpu_before = cpu_seconds();
-    const auto start = std::chrono::steady_clock::now();
-    body();
-    wall.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    cpu.push_back(cpu_seconds() - cpu_before);
-    resident = std::max(resident, peak.bytes());
-  }
-};
-
 bool by_key(const PointRecord& a, const PointRecord& b) noexcept { return a.key < b.key; }
 
 class SortRun {
@@ -147,7 +107,7 @@ class SortRun {
   }
 
  private:
-  SortRow& add_row(const char* panel, const std::string& order, const char* method, std::uint64_t points, const Times& times) {
+  SortRow& add_row(const char* panel, const std::string& order, const char* method, std::uint64_t points, const TimedRuns& times) {
     return rows_.emplace_back(SortRow{.panel = panel,
                                       .order = order,
                                       .method = method,
@@ -167,7 +127,7 @@ class SortRun {
       for (const PointRecord& r : block) expected.add(r);
     });
     std::vector<PointRecord> records(input.size()), scratch(input.size());
-    Times ours, tbb, std_sort, copy;
+    TimedRuns ours, tbb, std_sort, copy;
     progress_.begin("sort in memory", options_.repeats, "runs");
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
       copy.run([&] { std::memcpy(static_cast<void*>(records.data()), input.data(), input.size() * sizeof(PointRecord)); });
@@ -212,7 +172,7 @@ class SortRun {
     writer.finish();
     progress_.end();
     const std::vector<MortonKey> sample = sample_of(input);
-    Times ours, floor;
+    TimedRuns ours, floor;
     std::uint64_t spilled = 0;
     progress_.begin("sort on disk", options_.repeats, "runs");
     Check found;  // by a run that counts for nothing else
@@ -233,19 +193,6 @@ class SortRun {
     row.memory_bytes = run_.memory_bytes;
     row.moved_bytes = 2 * input.bytes() + 2 * spilled;
     add_row("disk", order, "floor", input.records(), floor).moved_bytes = 4 * input.bytes();
-  }
-
-  /// Keys of evenly spread blocks, as the build takes them of its input.
-  static std::vector<MortonKey> sample_of(const RecordFile& input) {
-    std::vector<MortonKey> sample;
-    RecordReader reader(input);
-    const std::uint64_t stride = input.records() / kSampleKeys + 1;
-    for (std::uint64_t at = 0, begin = 0;;) {
-      const std::span<const PointRecord> block = reader.next();
-      if (block.empty()) return sample;
-      for (; at < begin + block.size(); at += stride) sample.push_back(block[static_cast<std::size_t>(at - begin)].key);
-      begin += block.size();
-    }
   }
 
   /// @param check  of what comes out, or null
