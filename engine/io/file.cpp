@@ -165,6 +165,12 @@ void sync_directory(const std::filesystem::path& file) {
 
 }  // namespace
 
+void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept {
+  if (bytes == 0) return;
+  // Where that cannot be the blocks stay until the file goes.
+  static_cast<void>(::fallocate(fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(offset), static_cast<off_t>(bytes)));
+}
+
 InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
   // O_NONBLOCK: opening a pipe must not wait for its writer.
   fd_ = open_retrying(path, O_RDONLY | O_NONBLOCK);
@@ -306,6 +312,8 @@ void TempFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) 
 void TempFile::drop_cache() const noexcept {
   ::posix_fadvise(fd_, 0, 0, POSIX_FADV_DONTNEED);
 }
+
+void TempFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept { discard_blocks(fd_, offset, bytes); }
 
 void require_room(const std::filesystem::path& directory, std::uint64_t bytes, const std::string& what) {
   const std::uint64_t free = std::filesystem::space(directory).available;

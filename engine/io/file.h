@@ -83,6 +83,9 @@ class TemporaryName {
   std::filesystem::path path_;
 };
 
+/// Gives back the disk's blocks under these bytes of an open file, where the file system can.
+void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept;
+
 /// @param what  is going to be written there, e.g. "5 files": begins the message
 /// @throws std::system_error (ENOSPC) when the directory's disk has less than that free
 void require_room(const std::filesystem::path& directory, std::uint64_t bytes, const std::string& what);
@@ -110,6 +113,8 @@ class TempFile {
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   /// Tells the system that the page cache need not keep what was written or read.
   void drop_cache() const noexcept;
+  /// Gives back the disk's blocks under these bytes, where the file system can; they read as zero then.
+  void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
  private:
   std::filesystem::path directory_;

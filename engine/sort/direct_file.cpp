@@ -68,4 +68,9 @@ void DirectFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes
   }
 }
 
+void DirectFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept {
+  if (buffered_) return buffered_->discard(offset, bytes);
+  discard_blocks(fd_, offset, bytes);
+}
+
 }  // namespace ptc

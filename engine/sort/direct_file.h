@@ -33,6 +33,8 @@ class DirectFile {
   /// @throws std::system_error naming the directory; DataError when the file ends before
   void read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
+  /// As TempFile::discard().
+  void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
  private:
   // True when a transfer that failed is worth another try, now through the page cache.

@@ -37,6 +37,11 @@ void SpillFile::write(std::uint64_t offset, std::span<const PointRecord> records
                           whole_blocks(records.size_bytes())});
 }
 
+void SpillFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept {
+  const std::uint64_t begin = offset / kDirectBytes * kDirectBytes, end = (offset + bytes) / kDirectBytes * kDirectBytes;
+  file_.discard(begin, end - begin);
+}
+
 SpillReader::SpillReader(const SpillFile& file, std::size_t buffer_bytes)
     : file_(file), buffer_(buffer_bytes / (kReads * kDirectBytes) * (kReads * kDirectBytes)) {
   if (buffer_.size() < kLeastBytes) throw std::invalid_argument("SpillReader: buffer too small");
@@ -67,6 +72,11 @@ void SpillReader::read(const Piece& piece, std::span<std::byte> buffer) const {
     bytes = bytes.subspan(count);
     offset += count;
   }
+}
+
+void SpillReader::take(std::span<const Piece> pieces) {
+  read(pieces);
+  for (const Piece& piece : pieces) file_.discard(piece.offset, piece.out.size_bytes());
 }
 
 Partition::Partition(SpillFile& file, Splitters splitters)
@@ -128,7 +138,7 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
       at_ = 0;
     }
   }
-  reader.read(pieces);
+  reader.take(pieces);
   return filled;
 }
 

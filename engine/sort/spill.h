@@ -29,6 +29,9 @@ class SpillFile {
   /// @param records  at an address that is a multiple of kDirectBytes, in memory that can be read
   ///                 up to the next such multiple behind them
   void write(std::uint64_t offset, std::span<const PointRecord> records);
+  /// Gives back the disk's blocks that end in these bytes, which are not read again, nor those in front of them in
+  /// their first block.
+  void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
   /// Bytes reserved so far.
   [[nodiscard]] std::uint64_t bytes() const noexcept { return end_; }
 
@@ -50,6 +53,8 @@ class SpillReader {
   /// @param buffer_bytes  of all reads that run at once, at least kLeastBytes
   SpillReader(const SpillFile& file, std::size_t buffer_bytes);
   void read(std::span<const Piece> pieces);
+  /// The same for the last time: the disk's blocks are given back.
+  void take(std::span<const Piece> pieces);
 
   /// A disk gives its full rate to several requests at once.
   static constexpr std::size_t kReads = 4;
@@ -90,7 +95,8 @@ class Partition {
   std::vector<Run> runs_;
 };
 
-/// Reads the records of one range in the order of the input.
+/// Reads the records of one range in the order of the input. What was read leaves the disk: ranges of a partition
+/// are read by ascending number.
 class BucketReader {
  public:
   BucketReader(std::shared_ptr<const Partition> partition, std::size_t range);

@@ -1,6 +1,9 @@
 // Records on disk, and what a sort makes of its cap.
 #include "engine/sort/spill.h"
 
+#include <sys/stat.h>
+
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <filesystem>
@@ -39,6 +42,17 @@ std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord>
     records = records.subspan(count);
   }
   return partition;
+}
+
+// Bytes on the disk of the files that this process has open and that have no name.
+std::uint64_t nameless_bytes() {
+  std::uint64_t bytes = 0;
+  for (const auto& fd : std::filesystem::directory_iterator("/proc/self/fd")) {
+    struct stat status {};
+    const bool known = ::stat(fd.path().c_str(), &status) == 0;
+    if (known && S_ISREG(status.st_mode) && status.st_nlink == 0) bytes += static_cast<std::uint64_t>(status.st_blocks) * 512;
+  }
+  return bytes;
 }
 
 }  // namespace
@@ -81,15 +95,15 @@ TEST_CASE("direct file: it has no name", "[sort][spill]") {
 }
 
 TEST_CASE("spill: each range gives its records back in the order of the input", "[sort][spill]") {
+  const std::vector<PointRecord> input = make_records(Keys::surface, 3210);
+  const Splitters splitters(sample_of(input, 1000), 10);
   for (const std::size_t run : {512u, 1000u, 5000u}) {
-    const std::vector<PointRecord> input = make_records(Keys::surface, 3210);
-    const Splitters splitters(sample_of(input, 1000), 10);
-    SpillFile file(kDirectory);
-    const auto partition = spilled(file, input, run, 10);
-    SpillReader reader(file, SpillReader::kLeastBytes);
-    REQUIRE(partition->ranges() == splitters.size());
-    for (std::size_t range = 0; range < partition->ranges(); ++range)
-      for (const std::size_t step : {1u, 7u, 5000u}) {
+    for (const std::size_t step : {1u, 7u, 5000u}) {
+      SpillFile file(kDirectory);
+      const auto partition = spilled(file, input, run, 10);
+      SpillReader reader(file, SpillReader::kLeastBytes);
+      REQUIRE(partition->ranges() == splitters.size());
+      for (std::size_t range = 0; range < partition->ranges(); ++range) {
         std::vector<PointRecord> expected, actual, block(step);
         for (const PointRecord& r : input)
           if (splitters(r.key) == range) expected.push_back(r);
@@ -101,7 +115,34 @@ TEST_CASE("spill: each range gives its records back in the order of the input", 
         }
         CHECK(same_bytes(actual, expected));
       }
+    }
   }
+}
+
+TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
+  SpillFile file(kDirectory);
+  const std::uint64_t others = nameless_bytes();
+  const std::vector<PointRecord> records = make_records(Keys::surface, 60'000);
+  const auto partition = spilled(file, records, 7'000, 20);
+  const std::uint64_t all = nameless_bytes() - others;
+  CHECK(all >= records.size() * sizeof(PointRecord));
+  file.discard(0, 0);  // no more than what it is asked for
+  CHECK(nameless_bytes() - others == all);
+
+  SpillReader reader(file, SpillReader::kLeastBytes);
+  std::vector<PointRecord> out(records.size());
+  for (std::size_t range = 0; range < partition->ranges(); ++range) {
+    BucketReader bucket(partition, range);
+    const std::vector<MortonKey> before = bucket.sample(10, reader);  // samples take nothing away
+    CHECK(bucket.read(out, reader) == bucket.size());
+    std::ranges::sort(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(bucket.size()), {}, &PointRecord::key);
+    for (const MortonKey& key : before) {
+      CHECK(std::ranges::binary_search(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(bucket.size()), key, {}, &PointRecord::key));
+    }
+    if (range == partition->ranges() / 2) CHECK(nameless_bytes() - others < all * 6 / 10);
+  }
+  const std::size_t runs = records.size() / 7'000 + 1;
+  CHECK(nameless_bytes() - others <= (runs + 4) * kDirectBytes);  // the last block of each, and what says where they are
 }
 
 TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
@@ -112,12 +153,14 @@ TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
     std::vector<PointRecord> all(static_cast<std::size_t>(bucket.size()));
+    std::vector<std::vector<MortonKey>> samples;
     for (const std::size_t count : {std::size_t{1}, std::size_t{10}, all.size(), 2 * all.size()}) {
-      const std::vector<MortonKey> sample = bucket.sample(count, reader);
-      REQUIRE(sample.size() == std::min(count, all.size()));
+      samples.push_back(bucket.sample(count, reader));
+      REQUIRE(samples.back().size() == std::min(count, all.size()));
       CHECK(bucket.left() == bucket.size());
-      BucketReader again(partition, range);
-      REQUIRE(again.read(all, reader) == all.size());
+    }
+    REQUIRE(bucket.read(all, reader) == all.size());
+    for (const auto& sample : samples) {
       for (std::size_t i = 0; i < sample.size(); ++i) {  // one from each stride
         CHECK(sample[i] >= all[i * all.size() / sample.size()].key);
         CHECK(sample[i] <= all[(i + 1) * all.size() / sample.size() - 1].key);
