@@ -19,8 +19,8 @@ struct BuildOptions {
 /// Writes the pages of all points and nodes in one pass.
 /// @param points  ascending keys in the lattice of the writer's frame
 /// @return  the superblock for ContainerWriter::finish(), its counts, bounds and totals filled
-/// Memory: one open page per stream; of 65,536 points, or a page of them if that is more, the records twice, their
-/// pages and nodes.   Deterministic for any number of threads.
+/// Memory: one open page per stream; of 65,536 points, or a page of them if that is more, the records twice, and their
+/// pages and nodes three times, some 20 MB in all.   Deterministic for any number of threads.
 [[nodiscard]] Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
                                      const Executor& executor, Progress& progress);
 
