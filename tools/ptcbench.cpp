@@ -182,12 +182,23 @@ void declare_growth(CLI::App& app, Arguments& arguments) {
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
 }
 
-void declare_build(CLI::App& app, Arguments& arguments) {
-  CLI::App& command = *app.add_subcommand("build", "Time, bytes and memory of sort and build, over points and over the cap, beside a disk "
-                                                   "that moves the same bytes");
+/// A subcommand that times work on records, without scenes.
+CLI::App& declare_timed(CLI::App& app, Arguments& arguments, const std::string& name, const char* description, unsigned& repeats) {
+  CLI::App& command = *app.add_subcommand(name, description);
   command.fallthrough();
-  command.add_option("-o,--output", arguments.directory, "Directory for build.json, .csv, .svg and .png")->type_name("DIR")->required();
+  command.add_option("-o,--output", arguments.directory, "Directory for " + name + ".json, .csv, .svg and .png")
+      ->type_name("DIR")
+      ->required();
   command.add_flag("--quick", arguments.quick, "Under a minute on two cores: 200k and 1M points, 3 runs; what other options say stays");
+  ptc::add_integer(command, "--repeats", repeats, 1, 1000, "Runs of every measurement");
+  return command;
+}
+
+void declare_build(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = declare_timed(app, arguments, "build",
+                                    "Time, bytes and memory of sort and build, over points and over the cap, beside a disk that moves the "
+                                    "same bytes",
+                                    arguments.build.repeats);
   BuildBenchOptions& options = arguments.build;
   add_points_list(command, options.points, "Points of the city, in place of 1M, 5M and 20M; repeatable");
   const auto set = [&options](const std::vector<std::string>& values) {
@@ -200,20 +211,17 @@ void declare_build(CLI::App& app, Arguments& arguments) {
       ->allow_extra_args(false);
   add_words(command, "--profile", options.profiles, "Build in this profile, not both; repeatable");
   add_words(command, "--panel", options.panels, "Measure this, not both; repeatable");
-  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
 }
 
 void declare_sort(CLI::App& app, Arguments& arguments) {
-  CLI::App& command = *app.add_subcommand("sort", "Time and bytes of the external sort beside those of the disk alone, and of its "
-                                                  "core beside std::sort and oneTBB");
-  command.fallthrough();
-  command.add_option("-o,--output", arguments.directory, "Directory for sort.json, .csv, .svg and .png")->type_name("DIR")->required();
-  command.add_flag("--quick", arguments.quick, "Under a minute on two cores: 200k and 1M records, 3 runs; what other options say stays");
+  CLI::App& command = declare_timed(app, arguments, "sort",
+                                    "Time and bytes of the external sort beside those of the disk alone, and of its core beside std::sort "
+                                    "and oneTBB",
+                                    arguments.sort.repeats);
   SortBenchOptions& options = arguments.sort;
   add_points_list(command, options.points, "Records, in place of 1M, 5M and 20M; repeatable; above 20M on disk alone");
   add_words(command, "--order", options.orders, "Sort records that come in this order, not all; repeatable");
   add_words(command, "--panel", options.panels, "Sort there, not both; repeatable");
-  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
 }
 
 void declare_model(CLI::App& app, Arguments& arguments) {

@@ -31,36 +31,33 @@ double floor_share(const std::vector<BuildRow>& rows, const BuildRow& row) {
 double moved_share(const BuildRow& row) { return static_cast<double>(row.moved_bytes) / static_cast<double>(row.input_bytes); }
 
 Json row_facts(const std::vector<BuildRow>& rows, const BuildRow& row) {
-  return {{"panel", row.panel},
-          {"method", row.method},
-          {"points", row.points},
-          {"threads", row.threads},
-          {"memory_bytes", row.memory_bytes},
-          {"wall_seconds", row.wall.median},
-          {"wall_low", row.wall.low},
-          {"wall_high", row.wall.high},
-          {"cpu_ns_per_point", ns(row.cpu.median, row)},
-          {"cpu_low", ns(row.cpu.low, row)},
-          {"cpu_high", ns(row.cpu.high, row)},
-          {"input_bytes", row.input_bytes},
-          {"moved_bytes", row.moved_bytes},
-          {"moved_share", moved_share(row)},
-          {"resident_bytes", row.resident_bytes},
-          {"nodes", row.nodes},
-          {"bytes_per_point", row.bytes_per_point},
-          {"bytes_per_node", row.bytes_per_node},
-          {"floor_share", number(floor_share(rows, row))}};
+  Json facts{{"panel", row.panel},
+             {"method", row.method},
+             {"points", row.points},
+             {"threads", row.threads},
+             {"memory_bytes", row.memory_bytes}};
+  facts.update(time_facts(row.wall, row.cpu, row.points));
+  facts.update(Json{{"input_bytes", row.input_bytes},
+                    {"moved_bytes", row.moved_bytes},
+                    {"moved_share", moved_share(row)},
+                    {"resident_bytes", row.resident_bytes},
+                    {"nodes", row.nodes},
+                    {"bytes_per_point", row.bytes_per_point},
+                    {"bytes_per_node", row.bytes_per_node},
+                    {"floor_share", number(floor_share(rows, row))}});
+  return facts;
 }
 
 double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / 1048576; }
 
 /// A line for each method of a panel; over points or, of the panel "cap", over the cap.
+/// @param floor  whether it has a line
 ChartPanel panel_of(const std::vector<BuildRow>& rows, const std::string& name, const char* title, const char* y_label,
-                    double (*value)(const BuildRow&)) {
+                    bool floor, double (*value)(const BuildRow&)) {
   const bool caps = name == "cap";
   ChartPanel panel{.title = title, .x_label = caps ? "memory cap, MiB" : "points", .y_label = y_label};
   for (const BuildRow& row : rows) {
-    if (row.panel != name || (caps && row.method == "floor")) continue;
+    if (row.panel != name || (row.method == "floor" && !floor)) continue;
     auto series = std::ranges::find(panel.series, row.method, &ChartSeries::name);
     if (series == panel.series.end()) {
       panel.series.push_back({.name = row.method, .dashed = row.method == "floor"});
@@ -82,16 +79,16 @@ Json facts_of(const std::vector<BuildRow>& rows) {
 Chart chart_of(const std::vector<BuildRow>& rows) {
   Chart chart{.title = "Sort and build", .note = kReading, .columns = 2};
   const auto wall = [](const BuildRow& row) { return ns(row.wall.median, row); };
-  const auto add = [&](const char* panel, const char* title, const char* y_label, double (*value)(const BuildRow&)) {
-    ChartPanel drawn = panel_of(rows, panel, title, y_label, value);
+  const auto add = [&](const char* panel, const char* title, const char* y_label, bool floor, double (*value)(const BuildRow&)) {
+    ChartPanel drawn = panel_of(rows, panel, title, y_label, floor, value);
     if (!drawn.series.empty()) chart.panels.push_back(std::move(drawn));
   };
-  add("points", "Time and size", "wall time per point, ns", wall);
-  add("points", "Bytes and size", "bytes moved per point", [](const BuildRow& row) {
+  add("points", "Time and size", "wall time per point, ns", true, wall);
+  add("points", "Bytes and size", "bytes moved per point", false, [](const BuildRow& row) {
     return static_cast<double>(row.moved_bytes) / static_cast<double>(row.points);
   });
-  add("cap", "Time and memory", "wall time per point, ns", wall);
-  add("cap", "Memory", "most resident, MiB", [](const BuildRow& row) { return mebibytes(row.resident_bytes); });
+  add("cap", "Time and memory", "wall time per point, ns", false, wall);
+  add("cap", "Memory", "most resident, MiB", false, [](const BuildRow& row) { return mebibytes(row.resident_bytes); });
   return chart;
 }
 

@@ -1,5 +1,6 @@
 #include "tools/bench/report_files.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -44,6 +45,16 @@ std::filesystem::path with_ending(const std::filesystem::path& name, const char*
 }  // namespace
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+nlohmann::ordered_json time_facts(const Spread& wall, const Spread& cpu, std::uint64_t points) {
+  const double ns = 1e9 / static_cast<double>(std::max<std::uint64_t>(1, points));
+  return {{"wall_seconds", wall.median},
+          {"wall_low", wall.low},
+          {"wall_high", wall.high},
+          {"cpu_ns_per_point", ns * cpu.median},
+          {"cpu_low", ns * cpu.low},
+          {"cpu_high", ns * cpu.high}};
+}
 
 std::string or_dash(double value, const char* format) {
   return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";

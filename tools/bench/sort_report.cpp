@@ -39,22 +39,18 @@ double speedup(const std::vector<SortRow>& rows, const SortRow& row) {
 }
 
 Json row_facts(const std::vector<SortRow>& rows, const SortRow& row) {
-  return {{"panel", row.panel},
-          {"order", row.order},
-          {"method", row.method},
-          {"points", row.points},
-          {"threads", row.threads},
-          {"memory_bytes", row.memory_bytes},
-          {"wall_seconds", row.wall.median},
-          {"wall_low", row.wall.low},
-          {"wall_high", row.wall.high},
-          {"cpu_ns_per_point", ns(row.cpu.median, row)},
-          {"cpu_low", ns(row.cpu.low, row)},
-          {"cpu_high", ns(row.cpu.high, row)},
-          {"moved_bytes", row.moved_bytes},
-          {"resident_bytes", row.resident_bytes},
-          {"floor_share", number(floor_share(rows, row))},
-          {"speedup", number(speedup(rows, row))}};
+  Json facts{{"panel", row.panel},
+             {"order", row.order},
+             {"method", row.method},
+             {"points", row.points},
+             {"threads", row.threads},
+             {"memory_bytes", row.memory_bytes}};
+  facts.update(time_facts(row.wall, row.cpu, row.points));
+  facts.update(Json{{"moved_bytes", row.moved_bytes},
+                    {"resident_bytes", row.resident_bytes},
+                    {"floor_share", number(floor_share(rows, row))},
+                    {"speedup", number(speedup(rows, row))}});
+  return facts;
 }
 
 /// A line for each order and method of a panel.
