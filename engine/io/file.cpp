@@ -199,6 +199,10 @@ void InputFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {
   read_whole(fd_, path_, offset, out);
 }
 
+void InputFile::read_ahead(std::uint64_t offset, std::uint64_t bytes) const noexcept {
+  ::posix_fadvise(fd_, static_cast<off_t>(offset), static_cast<off_t>(bytes), POSIX_FADV_WILLNEED);
+}
+
 OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
   struct stat old {};
   const bool exists = ::stat(target.c_str(), &old) == 0;

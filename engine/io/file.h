@@ -27,6 +27,8 @@ class InputFile {
   /// Fills `out` from `offset` on; EINTR and short reads are retried.
   /// @throws DataError when the file ends before, std::system_error otherwise
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
+  /// Tells the system to begin reading these bytes, which will be asked for soon.
+  void read_ahead(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
  private:
   std::filesystem::path path_;

@@ -94,6 +94,7 @@ class FileCheck {
     std::vector<std::optional<Finding>> found(kPagesAtOnce);
     for (std::size_t first = 0; first < survey_.sites.size(); first += kPagesAtOnce) {
       const std::size_t count = std::min(kPagesAtOnce, survey_.sites.size() - first);
+      read_ahead(first + count);
       executor_.for_each(count, [&](std::size_t i, unsigned thread) {
         if (!pages[thread]) pages[thread] = std::make_unique<SurveyedPage>(file_, survey_);
         found[i] = pages[thread]->check(survey_.sites[first + i], static_cast<int>(options_.level), flips_);
@@ -106,6 +107,14 @@ class FileCheck {
       progress.advance(count);
     }
     progress.end();
+  }
+
+  /// The pages of the next round, those from `first` on, come from the disk while others are checked.
+  void read_ahead(std::size_t first) const noexcept {
+    if (first >= survey_.sites.size() || options_.level < VerifyLevel::payload) return;
+    const std::uint64_t begin = survey_.sites[first].entry.offset;
+    const std::uint64_t end = survey_.sites[std::min(first + kPagesAtOnce, survey_.sites.size()) - 1].end();
+    if (begin < end) file_.read_ahead(begin, end - begin);
   }
 
   /// What lies between the pages of a container that opens.
