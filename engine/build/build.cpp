@@ -145,6 +145,23 @@ class PageOrder : public GroupSink {
   std::vector<Page> whole_;
 };
 
+/// Waits for pages on their way when a build ends, however it does: they use its executor.
+class Settled {
+ public:
+  explicit Settled(ContainerWriter& writer) : writer_(writer) {}
+  Settled(const Settled&) = delete;
+  Settled& operator=(const Settled&) = delete;
+  ~Settled() {
+    try {
+      writer_.flush();
+    } catch (...) {  // after flush() there are none; else what ended the build is on its way to the caller
+    }
+  }
+
+ private:
+  ContainerWriter& writer_;
+};
+
 /// Fills `block` whole unless the stream ends.
 std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
   std::size_t filled = 0;
@@ -166,6 +183,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
   superblock.points_per_page = points_per_page(writer.header());
 
   const std::size_t per_page = superblock.points_per_page;
+  const Settled settled(writer);
   PageOrder order(writer, superblock.points_per_page, options.levels_per_stream);
   OctreeBuilder octree(order, options.leaf_points, frame.unit(), executor);
   std::vector<PointRecord> block(std::max<std::size_t>(kPointsAtOnce / per_page, 1) * per_page);

@@ -102,7 +102,6 @@ struct ContainerWriter::Impl {
   }
 
   void append_page(const Image& image) {
-    require(!finished, "a page after finish()");
     const PageHeader& page = image.page;
     const std::uint64_t offset = end;
     {
@@ -143,15 +142,20 @@ struct ContainerWriter::Impl {
     if (writing.valid()) writing.get();
   }
 
+  void begin_page() {
+    require(!finished, "a page after finish()");
+    wait();
+  }
+
   void write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
                   std::span<const PackedColumn> columns = {}) {
-    wait();
+    begin_page();
     encode_page(page_id, facts, payload, columns, encoding(0), single);
     append_page(single);
   }
 
   void write_pages(std::vector<Page> pages, const Executor& executor) {
-    wait();
+    begin_page();
     if (images.size() < pages.size()) images.resize(pages.size());
     static_cast<void>(encoding(executor.threads() - 1));
     const auto write = [this, pages = std::move(pages), &executor] {
@@ -293,7 +297,7 @@ void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& 
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
   require(!stored.empty() && stored.size() <= impl_->payload_limit(), "a stored payload that is empty or longer than a page");
-  impl_->wait();
+  impl_->begin_page();
   Impl::Image& image = impl_->single;
   image.page = impl_->page_header(page_id, facts);
   image.page.coding = coding;

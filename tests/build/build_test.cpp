@@ -1,5 +1,9 @@
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <stdexcept>
+#include <thread>
 
 #include "engine/build/radius.h"
 #include "engine/io/record.h"
@@ -50,6 +54,32 @@ TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
   write("one.ptcx", 1);
   write("all.ptcx", 5000);
   CHECK(bytes_of(dir / "one.ptcx") == bytes_of(dir / "all.ptcx"));
+}
+
+TEST_CASE("build: when the stream fails no page is on its way any more", "[build]") {
+  const TemporaryDirectory dir;
+  const SortedScene scene = sort_scene(random_surfels(200'000, 9));
+  struct Failing : PointStream {
+    explicit Failing(const std::vector<PointRecord>& records) : stream(records, 1 << 14) {}
+    std::size_t next(std::span<PointRecord> out) override {
+      const std::size_t count = stream.next(out);
+      if (count == 0) throw std::runtime_error("the stream failed");
+      return count;
+    }
+    VectorStream stream;
+  };
+  const auto written = [&] { return std::filesystem::directory_iterator(dir / ".")->file_size(); };
+  {
+    ContainerWriter writer(dir / "a.ptcx", {.frame = scene.frame});
+    Failing stream(scene.records);
+    Progress silent;
+    // The executor is gone before the writer is: pages that were still being compressed would use it.
+    CHECK_THROWS_WITH(build_pages(stream, writer, {}, Executor(2), silent), "the stream failed");
+    const std::uintmax_t bytes = written();
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    CHECK(written() == bytes);
+  }
+  CHECK(std::filesystem::is_empty(dir / "."));
 }
 
 TEST_CASE("build: a container without points has no root", "[build]") {
