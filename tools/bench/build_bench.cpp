@@ -89,7 +89,7 @@ class BuildRun {
       const Built& moved = methods.begin()->second.second;
       floor.run([&] {
         RecordFile between(work_), output(work_);
-        input.file.copy_to(between, moved.spilled);
+        if (moved.spilled > 0) input.file.copy_to(between, moved.spilled);
         (moved.spilled > 0 ? between : input.file).copy_to(output, moved.file_bytes);
       });
     }
