@@ -22,7 +22,6 @@ namespace {
 
 constexpr std::size_t kBlock = 1 << 14;           // surfels between source and sort
 constexpr std::size_t kSampleKeys = 1 << 16;      // for the sort's splitters
-constexpr std::uint64_t kLeastSort = 48 << 20;
 
 std::array<double, 3> to_array(const glm::dvec3& p) { return {p.x, p.y, p.z}; }
 

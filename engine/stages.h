@@ -78,6 +78,8 @@ inline constexpr const char* kRoundingKey = "rounding";  ///< its text is kRound
 
 /// Part of a cap that buffers outside the large budgets take: open pages, blocks, receivers.
 inline constexpr std::uint64_t kBufferBytes = std::uint64_t{32} << 20;
+/// Least that the sort of a build is given.
+inline constexpr std::uint64_t kLeastSort = std::uint64_t{48} << 20;
 /// What a thread that gathers takes besides: direction buffers and lists of its receiver cells, 14 MiB at the most
 /// seen (receivers 80 surfels apart in a city of 20 million).
 inline constexpr std::uint64_t kGatherBytes = std::uint64_t{16} << 20;

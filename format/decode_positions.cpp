@@ -21,7 +21,7 @@ void decode_all(std::span<const PointRecord> points, PositionBlock& out) {
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      out[axis][i] = detail::every_third_bit(high[i] >> axis) << (kLatticeBits / 2) | detail::every_third_bit(low[i] >> axis);
+      out[axis][i] = detail::coordinate(high[i], low[i], axis);
     }
   }
 }

@@ -9,7 +9,6 @@
 namespace ptc {
 namespace {
 
-constexpr int kHalfBits = kLatticeBits / 2;  // 21 digits in each half of a key
 constexpr std::uint64_t kHalfMask = (std::uint64_t{1} << kHalfBits) - 1;
 constexpr int kLeastExponent = -960;         // edge 2^-960: the unit 2^-1002 is a normal double
 constexpr double kGreatestBound = 0x1p1000;  // origin + edge stays finite

@@ -4,11 +4,13 @@
 #include <array>
 #include <bit>
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 
 namespace ptc {
 
 inline constexpr int kLatticeBits = 42;  ///< bits per axis; the octree has as many levels
+inline constexpr int kHalfBits = kLatticeBits / 2;  ///< digits in each half of a key
 inline constexpr std::uint64_t kLatticeMax = (std::uint64_t{1} << kLatticeBits) - 1;
 
 /// A point of the lattice: each coordinate in [0, 2^42).
@@ -36,17 +38,18 @@ namespace detail {
   return v;
 }
 
+/// Coordinate of an axis, 0 to 2, of a key.
+[[nodiscard]] inline std::uint64_t coordinate(std::uint64_t high, std::uint64_t low, std::size_t axis) noexcept {
+  return every_third_bit(high >> axis) << kHalfBits | every_third_bit(low >> axis);
+}
+
 }  // namespace detail
 
 /// The key of a lattice point, and back. Bits of coordinates above the 42nd must be zero.
 [[nodiscard]] MortonKey encode_morton(const LatticePoint& point) noexcept;
 [[nodiscard]] inline LatticePoint decode_morton(const MortonKey& key) noexcept {
-  LatticePoint point;
-  for (int axis = 0; axis < 3; ++axis) {
-    point[static_cast<std::size_t>(axis)] =
-        detail::every_third_bit(key.high >> axis) << (kLatticeBits / 2) | detail::every_third_bit(key.low >> axis);
-  }
-  return point;
+  return {detail::coordinate(key.high, key.low, 0), detail::coordinate(key.high, key.low, 1),
+          detail::coordinate(key.high, key.low, 2)};
 }
 
 /// Number of leading octal digits that a and b share: 0 (only the root cell) to 42 (equal keys).
@@ -54,7 +57,7 @@ namespace detail {
   // Bit 63 of a half is unused: a difference in the first digit has one to three leading zeros.
   if (const std::uint64_t differ = a.high ^ b.high) return (std::countl_zero(differ) - 1) / 3;
   if (const std::uint64_t differ = a.low ^ b.low) {
-    return kLatticeBits / 2 + (std::countl_zero(differ) - 1) / 3;
+    return kHalfBits + (std::countl_zero(differ) - 1) / 3;
   }
   return kLatticeBits;
 }

@@ -1,6 +1,7 @@
 // ptcbench: what shading costs and how wrong it is, beside a ray tracer in the same run.
 #include <bit>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <numbers>
 
@@ -282,17 +283,11 @@ void shorten_growth(Arguments& arguments) {
   options.reference_rays = 4096;
 }
 
-/// Likewise.
-void shorten_build(Arguments& arguments) {
-  if (arguments.command->count("--points") == 0) arguments.build.points = {200'000, 1'000'000};
-  if (arguments.command->count("--cap") == 0) arguments.build.caps = {std::uint64_t{96} << 20, std::uint64_t{192} << 20};
-  if (arguments.command->count("--repeats") == 0) arguments.build.repeats = 3;
-}
-
-/// Likewise.
-void shorten_sort(Arguments& arguments) {
-  if (arguments.command->count("--points") == 0) arguments.sort.points = {200'000, 1'000'000};
-  if (arguments.command->count("--repeats") == 0) arguments.sort.repeats = 3;
+/// Likewise, of what declare_timed() declares.
+template <class Options>
+void shorten_timed(const Arguments& arguments, Options& options) {
+  if (arguments.command->count("--points") == 0) options.points = {200'000, 1'000'000};
+  if (arguments.command->count("--repeats") == 0) options.repeats = 3;
 }
 
 /// Likewise.
@@ -323,11 +318,15 @@ std::vector<SceneChoice> choose_scenes(const Arguments& arguments) {
   return scenes;
 }
 
+std::filesystem::path work_directory(const Arguments& arguments, const ptc::RunOptions& run) {
+  return run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+}
+
 ptc::Outcome run_accuracy(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten_accuracy(arguments);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
-  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  const std::filesystem::path work = work_directory(arguments, run);
   const ptc::Executor executor(run.threads);
   std::vector<SceneAccuracy> scenes;
   for (const SceneChoice& choice : choices) {
@@ -342,7 +341,7 @@ ptc::Outcome run_error(Arguments& arguments, const ptc::RunOptions& run, ptc::Pr
   if (arguments.quick) shorten_error(arguments);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
-  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  const std::filesystem::path work = work_directory(arguments, run);
   std::vector<SceneErrors> scenes;
   for (const SceneChoice& choice : choices) {
     scenes.push_back(measure_errors(choice, arguments.error, work, run, progress));
@@ -351,37 +350,45 @@ ptc::Outcome run_error(Arguments& arguments, const ptc::RunOptions& run, ptc::Pr
   return {facts_of(scenes), error_text(scenes)};
 }
 
+/// Measures rows, whose reports are written as they come.
+/// @param measure  given what takes the rows so far
+template <class Row>
+ptc::Outcome report_rows(const Arguments& arguments, std::string (*text)(const std::vector<Row>&),
+                         const std::function<std::vector<Row>(const std::function<void(const std::vector<Row>&)>&)>& measure) {
+  std::filesystem::create_directories(arguments.directory);
+  const std::vector<Row> rows = measure([&](const std::vector<Row>& so_far) { write_reports(arguments.directory, so_far); });
+  return {facts_of(rows), text(rows)};
+}
+
 ptc::Outcome run_growth(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten_growth(arguments);
-  std::filesystem::create_directories(arguments.directory);
-  const auto write = [&](const std::vector<GrowthRow>& so_far) { write_reports(arguments.directory, so_far); };
-  const std::vector<GrowthRow> rows = measure_growth(arguments.growth, arguments.directory, run, progress, write);
-  return {facts_of(rows), growth_text(rows)};
+  return report_rows<GrowthRow>(arguments, growth_text, [&](const auto& report) {
+    return measure_growth(arguments.growth, arguments.directory, run, progress, report);
+  });
 }
 
 ptc::Outcome run_build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_build(arguments);
-  std::filesystem::create_directories(arguments.directory);
-  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
-  const auto write = [&](const std::vector<BuildRow>& so_far) { write_reports(arguments.directory, so_far); };
-  const std::vector<BuildRow> rows = measure_build(arguments.build, work, run, progress, write);
-  return {facts_of(rows), build_text(rows)};
+  if (arguments.quick) {
+    shorten_timed(arguments, arguments.build);
+    if (arguments.command->count("--cap") == 0) arguments.build.caps = {std::uint64_t{96} << 20, std::uint64_t{192} << 20};
+  }
+  return report_rows<BuildRow>(arguments, build_text, [&](const auto& report) {
+    return measure_build(arguments.build, work_directory(arguments, run), run, progress, report);
+  });
 }
 
 ptc::Outcome run_sort(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_sort(arguments);
-  std::filesystem::create_directories(arguments.directory);
-  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
-  const auto write = [&](const std::vector<SortRow>& so_far) { write_reports(arguments.directory, so_far); };
-  const std::vector<SortRow> rows = measure_sort(arguments.sort, work, run, progress, write);
-  return {facts_of(rows), sort_text(rows)};
+  if (arguments.quick) shorten_timed(arguments, arguments.sort);
+  return report_rows<SortRow>(arguments, sort_text, [&](const auto& report) {
+    return measure_sort(arguments.sort, work_directory(arguments, run), run, progress, report);
+  });
 }
 
 ptc::Outcome run_model(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten_model(arguments);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
-  const std::filesystem::path work = run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  const std::filesystem::path work = work_directory(arguments, run);
   const ptc::Executor executor(run.threads);
   std::vector<SceneModel> scenes;
   for (const SceneChoice& choice : choices) {

@@ -75,7 +75,7 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
   }
 }
 
-/// What a column has of some points, zero beyond `end`.
+/// What columns have of some points; beyond `end` anything.
 class Lanes {
  public:
   Lanes(const PointColumns& points, std::size_t first, std::size_t end)

@@ -21,7 +21,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kLeastSort = 48 << 20;
 constexpr std::uint64_t kVerifiedWhole = 2'000'000;
 
 /// The records of a city in a file, and what a build must know of them.

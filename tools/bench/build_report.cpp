@@ -21,10 +21,8 @@ double ns(double seconds, const BuildRow& row) { return 1e9 * seconds / static_c
 
 double floor_share(const std::vector<BuildRow>& rows, const BuildRow& row) {
   if (row.method == "floor") return std::nan("");
-  const auto same = [&](const BuildRow& r) {  // the floor follows the methods of its size and cap
-    return r.method == "floor" && &r > &row;
-  };
-  const auto found = std::ranges::find_if(rows, same);
+  const auto from = rows.begin() + (&row - rows.data());  // the floor follows the methods of its size and cap
+  const auto found = std::ranges::find(from, rows.end(), "floor", &BuildRow::method);
   return found == rows.end() ? std::nan("") : found->wall.median / row.wall.median;
 }
 
@@ -58,12 +56,8 @@ ChartPanel panel_of(const std::vector<BuildRow>& rows, const std::string& name, 
   ChartPanel panel{.title = title, .x_label = caps ? "memory cap, MiB" : "points", .y_label = y_label};
   for (const BuildRow& row : rows) {
     if (row.panel != name || (row.method == "floor" && !floor)) continue;
-    auto series = std::ranges::find(panel.series, row.method, &ChartSeries::name);
-    if (series == panel.series.end()) {
-      panel.series.push_back({.name = row.method, .dashed = row.method == "floor"});
-      series = panel.series.end() - 1;
-    }
-    series->points.push_back({.x = caps ? mebibytes(row.memory_bytes) : static_cast<double>(row.points), .y = value(row)});
+    const double x = caps ? mebibytes(row.memory_bytes) : static_cast<double>(row.points);
+    series_of(panel, row.method, row.method == "floor").points.push_back({.x = x, .y = value(row)});
   }
   return panel;
 }

@@ -60,6 +60,12 @@ std::string or_dash(double value, const char* format) {
   return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
 }
 
+ChartSeries& series_of(ChartPanel& panel, const std::string& name, bool dashed) {
+  const auto found = std::ranges::find(panel.series, name, &ChartSeries::name);
+  if (found != panel.series.end()) return *found;
+  return panel.series.emplace_back(ChartSeries{.name = name, .dashed = dashed});
+}
+
 void write_tables(const std::filesystem::path& name, const Json& facts) {
   write_text(with_ending(name, ".json"), facts.dump(2) + "\n");
   write_text(with_ending(name, ".csv"), csv_of(facts.at("rows")));

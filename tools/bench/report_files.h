@@ -21,6 +21,9 @@ namespace ptc::bench {
 /// A number for a table that people read: by a format as "{:.1f}", or a dash where it is not finite.
 [[nodiscard]] std::string or_dash(double value, const char* format);
 
+/// The series of a panel that has this name, a new one if there is none.
+[[nodiscard]] ChartSeries& series_of(ChartPanel& panel, const std::string& name, bool dashed);
+
 /// Writes NAME.json, and its "rows" as NAME.csv: their members as columns, null as an empty cell.
 /// @param facts  "rows" is an array of one or more objects with the same members
 /// @throws std::system_error

@@ -63,16 +63,11 @@ ChartPanel panel_of(const std::vector<SortRow>& rows, const std::string& name) {
     if (row.panel != name) continue;
     const bool compared = disk || row.order == "city" || row.order == "random";
     if (!compared && row.method != "ptcx") continue;
-    const std::string title = row.method + ", " + row.order;
-    auto series = std::ranges::find(panel.series, title, &ChartSeries::name);
-    if (series == panel.series.end()) {
-      panel.series.push_back({.name = title, .dashed = row.method != "ptcx"});
-      series = panel.series.end() - 1;
-    }
+    ChartSeries& series = series_of(panel, row.method + ", " + row.order, row.method != "ptcx");
     const double share = floor_share(rows, row);
-    series->points.push_back({.x = static_cast<double>(row.points),
-                              .y = ns(disk ? row.wall.median : row.cpu.median, row),
-                              .label = std::isfinite(share) ? fmt::format("{:.0f} % of the floor's rate", 100 * share) : std::string()});
+    series.points.push_back({.x = static_cast<double>(row.points),
+                             .y = ns(disk ? row.wall.median : row.cpu.median, row),
+                             .label = std::isfinite(share) ? fmt::format("{:.0f} % of the floor's rate", 100 * share) : std::string()});
   }
   return panel;
 }
