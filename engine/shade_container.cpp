@@ -83,6 +83,7 @@ class PointCursor {
     std::size_t filled = 0;
     while (filled < out.size()) {
       if (at_ == count_) {
+        pass_pages();
         if (page_ == container_.point_pages().size()) break;
         read_page();
       }
@@ -98,6 +99,15 @@ class PointCursor {
   }
 
  private:
+  /// Goes by pages without a point that is wanted.
+  void pass_pages() {
+    for (; page_ < container_.point_pages().size(); ++page_) {
+      const std::uint64_t share = share_ + wanted_ * container_.entry(container_.point_pages()[page_]).record_count;
+      if (share >= container_.superblock().points) return;
+      share_ = share;
+    }
+  }
+
   void read_page() {
     const std::uint32_t page = container_.point_pages()[page_++];
     whole_ = read_unless_lost(container_, page, payload_, decoder_, lost_);
