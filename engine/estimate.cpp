@@ -203,7 +203,7 @@ Estimator::Estimator(const ContainerReader& scene, const ShadeOptions& options,
     : options_(options),
       cache_(std::make_unique<PageCache>(scene, CacheOptions{.memory_bytes = options.cache_bytes,
                                                              .threads = readers_of(executor, true),
-                                                             .access = options.access})) {
+                                                             .back_end = options.back_end})) {
   options_.cache = cache_.get();
   options_.sky = {};  // no estimate of it
   options_.variants = std::max(2U, options.variants);

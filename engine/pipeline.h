@@ -165,7 +165,7 @@ struct ShadeRequest {
   bool estimate = false;            ///< adds what each receiver is off, as estimated; wants `error` or `check`
   float lift = 0.15F;               ///< receivers rise above their surfel by so many of its radii
   std::optional<Sky> sky;           ///< empty: the one that the scene was built with
-  ContainerReader::Access access = ContainerReader::Access::pread;
+  BackEnd back_end = BackEnd::pread;
   bool tolerate_damage = false;     ///< goes on past pages of the scene that break a rule; wants one bounce or none and no
                                     ///< rays, and a .ply where the scene's own points are shaded
   CheckRequest check;
@@ -216,7 +216,7 @@ struct RenderRequest {
   bool estimate = false;          ///< as ShadeRequest::estimate, in layers of an .exr
   float lift = 0.15F;             ///< receivers rise by so many radii of a surfel of the scene's spacing
   float exposure = 0;             ///< stops, for PNGs of light
-  ContainerReader::Access access = ContainerReader::Access::pread;
+  BackEnd back_end = BackEnd::pread;
   bool tolerate_damage = false;   ///< as ShadeRequest::tolerate_damage
   CheckRequest check;
   RunOptions run;

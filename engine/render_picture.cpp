@@ -293,7 +293,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
     subject.view = view_surfels(scene, camera, side, request.lift, lost.get(), executor, progress);
   }
   Film film(camera.width, camera.height, request.estimate);
-  ShadeOptions options{.access = request.access,
+  ShadeOptions options{.back_end = request.back_end,
                        .gather = request.gather,
                        .sky = sky_function(lights.sky),
                        .lost = lost.get(),
@@ -303,7 +303,8 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
                               std::uint64_t{camera.width} * camera.height *
                                   (Film::kBytes + (request.estimate ? Film::kEstimateBytes : 0)) +
                               (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24);
-  options.cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), "this picture");
+  options.cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), request.back_end,
+                                         "this picture");
   const std::unique_ptr<ContainerReader> bounced =
       bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, targets.front().path)}, executor,
                    report, progress);

@@ -348,8 +348,9 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
   ShadeOptions options{
       .cache_bytes = cache_bytes_left(request.run, kBufferBytes, scene,
-                                      readers_of(executor, request.estimate), "shading"),
-      .access = request.access,
+                                      readers_of(executor, request.estimate), request.back_end,
+                                      "shading"),
+      .back_end = request.back_end,
       .gather = request.gather,
       .sky = sky_function(sky),
       .lost = lost.get()};

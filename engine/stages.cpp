@@ -48,8 +48,8 @@ std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint6
 }
 
 std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
-                               unsigned threads, const char* what_for) {
-  const std::uint64_t least = std::max(kLeastCache, PageCache::least_bytes(scene, threads));
+                               unsigned threads, BackEnd back_end, const char* what_for) {
+  const std::uint64_t least = std::max(kLeastCache, PageCache::least_bytes(scene, threads, back_end));
   return memory_left(run, taken + threads * kGatherBytes, least, what_for);
 }
 

@@ -33,7 +33,7 @@ class Stage {
 
 /// The same for the page cache of a gather, whose threads take kGatherBytes each.
 [[nodiscard]] std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
-                                             unsigned threads, const char* what_for);
+                                             unsigned threads, BackEnd back_end, const char* what_for);
 
 /// Damage is tolerated by a gather from the scene itself, for which no ray and no earlier bounce reads every point.
 /// @throws std::invalid_argument when it is to be tolerated and something else is asked for

@@ -66,7 +66,7 @@ class Tuner {
     return_freed_memory();
     cache_ = std::make_unique<PageCache>(scene_, CacheOptions{.memory_bytes = options_.cache_bytes,
                                                               .threads = executor_.threads(),
-                                                              .access = options_.access});
+                                                              .back_end = options_.back_end});
   }
 
   /// The cheapest rung that all pilots hold for good enough; the ladder's size when there is none.

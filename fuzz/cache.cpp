@@ -83,8 +83,9 @@ class Session {
     CacheOptions options;
     options.threads = 1 + from.take() % kReaders;
     options.local_slots = from.take() % 3 == 0 ? 0 : 1U << from.take() % 10;
-    options.access =
-        from.take() % 2 == 0 ? ContainerReader::Access::pread : ContainerReader::Access::mmap;
+    const std::uint8_t kind = from.take();
+    options.back_end = kind % 2 == 0 ? BackEnd::pread : BackEnd::mmap;
+    options.replacement = kind / 2 % 2 == 0 ? Replacement::clock : Replacement::lru;
     const std::uint64_t frames = from.take() % 24;
     options.memory_bytes = PageCache::bytes_for(container_, options.threads, frames) + from.take();
     try {

@@ -51,15 +51,9 @@ void check_promises(const ContainerReader& reader, const ptc::PageHeader& page,
 }
 
 bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecoder& decoder) {
-  std::vector<std::byte> read(reader.page_payload_limit()), mapped(read), stored;
+  std::vector<std::byte> read(reader.page_payload_limit()), stored;
   ptc::PageHeader header;
   const bool whole = accepts([&] { header = reader.read_page(page, read, decoder); });
-  const bool same =
-      whole == accepts([&] {
-        static_cast<void>(reader.read_page(page, mapped, decoder, ContainerReader::Access::mmap));
-      });
-  require(same &&
-          (!whole || std::equal(read.begin(), read.begin() + header.raw_bytes, mapped.begin())));
   if (whole) check_promises(reader, header, read.data());
   const bool found = accepts([&] { static_cast<void>(reader.read_page_header(page)); });
   const bool copied = accepts([&] { static_cast<void>(reader.read_stored_page(page, stored)); });

@@ -35,10 +35,14 @@ CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift) {
       ->type_name("SIZE");
 }
 
-CLI::Option* add_access(CLI::App& app, ContainerReader::Access& access) {
-  using Access = ContainerReader::Access;
-  return add_choice<Access>(app, "--io", access, {{"pread", Access::pread}, {"mmap", Access::mmap}},
-                            "How pages are read; mmap: for files that do not change meanwhile")
+CLI::Option* add_back_end(CLI::App& app, BackEnd& back_end) {
+  return add_choice<BackEnd>(app, "--io", back_end,
+                             {{"pread", BackEnd::pread},
+                              {"mmap", BackEnd::mmap},
+                              {"direct", BackEnd::direct},
+                              {"io_uring", BackEnd::io_uring}},
+                             "How pages are read. pread: through the system's file cache; mmap: from it in place, for files "
+                             "that do not change meanwhile; direct: past it; io_uring: past it, the next page meanwhile")
       ->group("Expert");
 }
 

@@ -16,8 +16,8 @@ CLI::Option* add_points(CLI::App& app, std::uint64_t& count);
 CLI::Option* add_profile(CLI::App& app, Profile& profile);
 /// --page-size, a power of two from 4K to 1M
 CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift);
-/// --io pread|mmap
-CLI::Option* add_access(CLI::App& app, ContainerReader::Access& access);
+/// --io pread|mmap|direct|io_uring
+CLI::Option* add_back_end(CLI::App& app, BackEnd& back_end);
 
 /// --bounces
 CLI::Option* add_bounces(CLI::App& app, unsigned& bounces);

@@ -126,7 +126,7 @@ int main(int argc, char** argv) {
   ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
   ptc::add_error_option(command.app(), arguments.request.error);
   ptc::add_estimate_option(command.app(), arguments.request.estimate);
-  ptc::add_access(command.app(), arguments.request.access);
+  ptc::add_back_end(command.app(), arguments.request.back_end);
   ptc::add_tolerate_damage(command.app(), arguments.request.tolerate_damage);
   ptc::add_check_options(command.app(), arguments.request.check);
   return command.run(argc, argv, [&](ptc::Progress& progress) {

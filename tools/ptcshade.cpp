@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
   ptc::add_gather_options(app, request.gather, request.lift);
   ptc::add_error_option(app, request.error);
   ptc::add_estimate_option(app, request.estimate);
-  ptc::add_access(app, request.access);
+  ptc::add_back_end(app, request.back_end);
   ptc::add_tolerate_damage(app, request.tolerate_damage);
   ptc::add_check_options(app, request.check);
 

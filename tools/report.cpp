@@ -106,7 +106,8 @@ ordered_json facts_of(const CacheStatistics& cache) {
           {"shared_hits", cache.shared_hits}, {"misses", cache.misses},
           {"hit_rate", cache.hit_rate()},     {"evictions", cache.evictions},
           {"bytes_read", cache.bytes_read},   {"frames", cache.frames},
-          {"peak_frames", cache.peak_frames}};
+          {"peak_frames", cache.peak_frames},
+          {"wait_seconds", cache.wait_seconds}};
 }
 
 ordered_json facts_of(const GatherCounts& counts) {

@@ -1,23 +1,22 @@
-// The locked half of the cache: finding, claiming and loading frames.
+// Finding, claiming and loading frames.
 //
-// Why a claim always finds a frame. Let T be the threads, S the slots of a reader's table, F the
-// frames; the constructor sees to T * S <= F. A reader pins at most one frame for each of its
-// slots, and the frame it loads or waits for counts for the slot it will fill: acquire() unpins
-// that slot's old frame first. So when a reader claims a frame, it pins at most S - 1, the others
-// at most (T - 1) * S: together fewer than T * S <= F. A frame that is loading or failed is pinned
-// by its loader or by those who still have to read its error. So some frame is unpinned: it is
-// empty, or ready and in the LRU list. No claim waits, hence there is no deadlock: the only wait is
-// for another thread's read, and who reads holds no lock.
+// Why a claim always finds a frame. Let T be the readers, S the slots of each, F the frames; the constructor sees to
+// T * S <= F. A slot holds at most one frame, and that of the page being asked for is empty by then: hold() left it so.
+// A frame that is loading or failed is held in a slot of its loader and of those who still have to read its error. So
+// when a reader claims, slots hold fewer than T * S <= F frames, and some frame is empty, or ready and held by nobody.
+// No claim waits, hence there is no deadlock: the only wait is for another reader's read, and who reads holds no lock.
 #include "engine/cache/page_cache.h"
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "engine/base/memory.h"
 #include "engine/cache/frame_table.h"
@@ -34,27 +33,27 @@ std::uint64_t frame_bytes(const ContainerReader& container) {
   return (container.page_payload_limit() + 63) / 64 * 64 + kGuardBytes;
 }
 
-/// What the readers take: table, decoder, and the stored form of the page being read.
-std::uint64_t reader_bytes(const ContainerReader& container, unsigned threads) {
-  return threads * (kMostSlots * kTableSlotBytes + kDecoderBytes +
-                    (std::uint64_t{1} << container.header().page_shift));
+std::size_t most_stored(const ContainerReader& container) { return std::size_t{1} << container.header().page_shift; }
+
+/// What the readers take: table, decoder, and the back end's buffers.
+std::uint64_t reader_bytes(const ContainerReader& container, unsigned threads, BackEnd back_end) {
+  return threads * (kMostSlots * kTableSlotBytes + kDecoderBytes + page_source_bytes(back_end, most_stored(container)));
 }
 
 /// Frames within the cap; more than the pages and a working set for each thread are of no use.
 std::uint32_t count_frames(const ContainerReader& container, const CacheOptions& options) {
-  const std::uint64_t least = PageCache::least_bytes(container, options.threads);
+  const std::uint64_t least = PageCache::least_bytes(container, options.threads, options.back_end);
   if (options.memory_bytes < least) {
-    throw std::invalid_argument("page cache: " + std::to_string(options.memory_bytes) +
-                                " bytes are too few, " + std::to_string(least) +
-                                " are needed for " + std::to_string(options.threads) + " threads");
+    throw std::invalid_argument("page cache: " + std::to_string(options.memory_bytes) + " bytes are too few, " +
+                                std::to_string(least) + " are needed for " + std::to_string(options.threads) + " threads");
   }
   const std::uint64_t pages = container.page_count();
-  const std::uint64_t fixed = PageCache::bytes_for(container, options.threads, 0);
-  const std::uint64_t each = frame_bytes(container) + FrameTable::bytes(0, 1);
+  const std::uint64_t fixed = PageCache::bytes_for(container, options.threads, 0, options.back_end);
+  const std::uint64_t each = frame_bytes(container) + FrameTable::bytes(0, 1, 0, 0);
   const std::uint64_t wanted = std::max<std::uint64_t>(
       pages, std::uint64_t{2} * options.threads * std::max(1u, options.local_slots));
-  return static_cast<std::uint32_t>(
-      std::min({(options.memory_bytes - fixed) / each, wanted, std::uint64_t{kNoFrame - 1}}));
+  constexpr std::uint64_t kMostFrames = 0x7fffffff;  // FrameTable needs a bit
+  return static_cast<std::uint32_t>(std::min({(options.memory_bytes - fixed) / each, wanted, kMostFrames}));
 }
 
 std::uint32_t choose_slots(const CacheOptions& options, std::uint32_t frames) {
@@ -74,82 +73,110 @@ std::uint32_t choose_slots(const CacheOptions& options, std::uint32_t frames) {
 }  // namespace
 
 struct PageCache::Impl {
-  Impl(const ContainerReader& from, const CacheOptions& with)
+  Impl(const ContainerReader& from, const CacheOptions& with) : Impl(from, with, count_frames(from, with)) {}
+  Impl(const ContainerReader& from, const CacheOptions& with, std::uint32_t frames)
       : container(from),
         options(with),
-        table(from.page_count(), count_frames(from, with)),
-        slots(choose_slots(with, table.size())),
+        slots(choose_slots(with, frames)),
+        table({from.page_count(), frames, with.threads, slots}, with.replacement),
         frame_stride(frame_bytes(from)),
-        arena(table.size() * frame_stride) {}
+        arena(frames * frame_stride),
+        seats(with.threads) {}
 
-  struct Held {
-    std::uint32_t frame;
-    PageReader::Page view;
+  PageReader::Page view(std::uint32_t frame) const noexcept {
+    return {arena.data() + frame * frame_stride, table.page_bytes(frame), table.record_count(frame)};
+  }
+
+  /// What a reader brings along to the shared level.
+  struct Caller {
+    std::uint32_t number;
+    PageDecoder& decoder;
+    PageSource& source;
+    std::uint64_t lookups;  ///< since it last told, this one included
+    std::uint64_t shared_hits;
   };
 
-  Held hold(std::uint32_t frame) const noexcept {
-    return {
-        frame,
-        {arena.data() + frame * frame_stride, table.page_bytes(frame), table.record_count(frame)}};
-  }
-
-  /// Pins `page`, after it has unpinned the frame `released` (or kNoFrame).
-  /// @param lookups  of the reader since it last told, this one included
-  Held acquire(std::uint32_t page, std::uint32_t released, std::uint64_t lookups,
-               PageDecoder& decoder) {
+  /// Holds a page that hold() did not find.
+  std::uint32_t acquire(std::uint32_t page, const Caller& caller) {
     std::unique_lock lock(mutex);
-    told.lookups += lookups;
-    told.local_hits += lookups - 1;
-    if (released != kNoFrame) table.unpin(released);
-    const std::uint32_t frame = table.find(page);
-    if (frame == kNoFrame) return load(lock, page, decoder);
+    told.lookups += caller.lookups;
+    told.shared_hits += caller.shared_hits;
+    told.local_hits += caller.lookups - 1 - caller.shared_hits;
+    const std::uint32_t frame = table.join(caller.number, page);
+    if (frame == kNoFrame) return load(lock, page, caller);
     ++told.shared_hits;
-    return join(lock, frame);
-  }
-
-  Held join(std::unique_lock<std::mutex>& lock, std::uint32_t frame) {
-    table.pin(frame);
+    const auto begin = Clock::now();
     loaded.wait(lock, [&] { return table.state(frame) != FrameTable::State::loading; });
-    if (table.state(frame) == FrameTable::State::ready) return hold(frame);
+    told.wait_seconds += seconds_since(begin);
+    if (table.state(frame) == FrameTable::State::ready) return frame;
     const std::exception_ptr error = table.error(frame);
-    table.unpin(frame);
+    table.leave(caller.number, frame);
     lock.unlock();
     std::rethrow_exception(error);
   }
 
-  Held load(std::unique_lock<std::mutex>& lock, std::uint32_t page, PageDecoder& decoder) {
+  std::uint32_t load(std::unique_lock<std::mutex>& lock, std::uint32_t page, const Caller& caller) {
     ++told.misses;
-    const std::uint32_t frame = table.claim(page);
+    const std::uint32_t frame = table.claim(caller.number, page);
     lock.unlock();
     PageHeader header;
+    double waited = 0;
     try {
-      header = container.read_page(
-          page, {arena.data() + frame * frame_stride, frame_stride - kGuardBytes}, decoder,
-          options.access);
+      const std::span<const std::byte> image = fetch(page, caller.source, waited);
+      header = container.decode_page(page, image, {arena.data() + frame * frame_stride, frame_stride - kGuardBytes},
+                                     caller.decoder);
     } catch (...) {
       lock.lock();
       table.fail(frame, std::current_exception());
-      table.unpin(frame);
+      table.leave(caller.number, frame);
       loaded.notify_all();
       throw;
     }
     lock.lock();
     told.bytes_read += kPageHeaderBytes + std::uint64_t{header.stored_bytes};
+    told.wait_seconds += waited;
     table.ready(frame, header.raw_bytes, header.record_count);
     loaded.notify_all();
-    return hold(frame);
+    return frame;
+  }
+
+  // Pages of a kind follow the Z-curve, and so do receivers: the next one is wanted soon more often than not.
+  std::span<const std::byte> fetch(std::uint32_t page, PageSource& source, double& waited) const {
+    const auto begin = Clock::now();
+    const std::uint32_t next = options.read_ahead ? next_of_kind(page) : kNoPage;
+    if (next != kNoPage && !table.present(next)) {
+      const ContainerReader::PageRange range = container.page_range(next);
+      source.expect(range.offset, range.bytes);
+    }
+    const ContainerReader::PageRange range = container.page_range(page);
+    const std::span<const std::byte> image = source.read(range.offset, range.bytes);
+    waited = seconds_since(begin);
+    return image;
+  }
+
+  std::uint32_t next_of_kind(std::uint32_t page) const {
+    const PageType type = container.entry(page).type;
+    if (type != PageType::point && type != PageType::node) return kNoPage;
+    const std::span<const std::uint32_t> kind = type == PageType::point ? container.point_pages() : container.node_pages();
+    const auto next = std::ranges::upper_bound(kind, page);
+    return next == kind.end() ? kNoPage : *next;
+  }
+
+  using Clock = std::chrono::steady_clock;
+  static double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
   }
 
   const ContainerReader& container;
   const CacheOptions options;
-  mutable std::mutex mutex;  ///< guards table, told and readers
+  const std::uint32_t slots;
+  mutable std::mutex mutex;  ///< guards told, seats and what of the table is not for readers alone
   std::condition_variable loaded;
   FrameTable table;
-  const std::uint32_t slots;
   const std::uint64_t frame_stride;
   Arena arena;
   CacheStatistics told;
-  unsigned readers = 0;
+  std::vector<bool> seats;  ///< by number of a reader: there is one
 };
 
 double CacheStatistics::hit_rate() const noexcept {
@@ -164,14 +191,14 @@ PageCache::PageCache(const ContainerReader& container, const CacheOptions& optio
 
 PageCache::~PageCache() = default;
 
-std::uint64_t PageCache::least_bytes(const ContainerReader& container, unsigned threads) {
-  return bytes_for(container, threads, std::uint64_t{2} * threads);
+std::uint64_t PageCache::least_bytes(const ContainerReader& container, unsigned threads, BackEnd back_end) {
+  return bytes_for(container, threads, std::uint64_t{2} * threads, back_end);
 }
 
-std::uint64_t PageCache::bytes_for(const ContainerReader& container, unsigned threads,
-                                   std::uint64_t frames) {
-  return reader_bytes(container, threads) + FrameTable::bytes(container.page_count(), frames) +
-         frames * frame_bytes(container);
+std::uint64_t PageCache::bytes_for(const ContainerReader& container, unsigned threads, std::uint64_t frames,
+                                   BackEnd back_end) {
+  return reader_bytes(container, threads, back_end) +
+         FrameTable::bytes(container.page_count(), frames, threads, kMostSlots) + frames * frame_bytes(container);
 }
 
 const ContainerReader& PageCache::container() const noexcept {
@@ -192,40 +219,43 @@ CacheStatistics PageCache::statistics() const {
 }
 
 PageReader::PageReader(PageCache& cache)
-    : cache_(cache),
-      table_(std::make_unique<Slot[]>(cache.impl_->slots)),
-      mask_(cache.impl_->slots - 1) {
+    : shared_(*cache.impl_),
+      table_(std::make_unique<Slot[]>(shared_.slots)),
+      mask_(shared_.slots - 1),
+      source_(make_page_source(shared_.options.back_end, shared_.container.file(), most_stored(shared_.container))) {
   static_assert(sizeof(Slot) <= kTableSlotBytes);
-  const std::lock_guard lock(cache_.impl_->mutex);
-  if (cache_.impl_->readers == cache_.impl_->options.threads) {
+  const std::lock_guard lock(shared_.mutex);
+  const auto seat = std::ranges::find(shared_.seats, false);
+  if (seat == shared_.seats.end()) {
     throw std::invalid_argument("page cache: more readers than it was made for");
   }
-  ++cache_.impl_->readers;
+  *seat = true;
+  number_ = static_cast<std::uint32_t>(seat - shared_.seats.begin());
 }
 
 PageReader::~PageReader() {
-  PageCache::Impl& shared = *cache_.impl_;
-  const std::lock_guard lock(shared.mutex);
-  for (std::uint32_t i = 0; i <= mask_; ++i) {
-    if (table_[i].page != kEmpty) shared.table.unpin(table_[i].frame);
-  }
-  shared.told.lookups += lookups_;
-  shared.told.local_hits += lookups_;
-  --shared.readers;
+  const std::lock_guard lock(shared_.mutex);
+  for (std::uint32_t slot = 0; slot <= mask_; ++slot) shared_.table.release(number_, slot);
+  shared_.told.lookups += lookups_;
+  shared_.told.shared_hits += shared_hits_;
+  shared_.told.local_hits += lookups_ - shared_hits_;
+  shared_.seats[number_] = false;
 }
 
-PageReader::Page PageReader::load(std::uint32_t page) {
-  if (page >= cache_.container().page_count()) {
+PageReader::Page PageReader::find(std::uint32_t page) {
+  if (page >= shared_.container.page_count()) {
     --lookups_;
     throw std::invalid_argument("page cache: there is no page " + std::to_string(page));
   }
   Slot& slot = table_[page & mask_];
-  // The slot is empty while its page is under way, and stays so when the page does not arrive.
-  const std::uint32_t released = slot.page == kEmpty ? kNoFrame : slot.frame;
-  slot.page = kEmpty;
-  const auto held = cache_.impl_->acquire(page, released, std::exchange(lookups_, 0), decoder_);
-  slot.frame = held.frame;
-  slot.view = held.view;
+  slot.page = kEmpty;  // and stays so when the page does not arrive
+  std::uint32_t frame = shared_.table.hold(number_, page);
+  if (frame != kNoFrame) {
+    ++shared_hits_;
+  } else {
+    frame = shared_.acquire(page, {number_, decoder_, *source_, std::exchange(lookups_, 0), std::exchange(shared_hits_, 0)});
+  }
+  slot.view = shared_.view(frame);
   slot.page = page;
   return slot.view;
 }

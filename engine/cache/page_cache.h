@@ -1,4 +1,4 @@
-// Pages in memory under a hard cap: a shared LRU level and a per-thread level in front of it.
+// Pages in memory under a hard cap: a shared level and a per-thread level in front of it.
 #pragma once
 
 #include <cstddef>
@@ -6,6 +6,8 @@
 #include <memory>
 #include <span>
 
+#include "engine/cache/page_source.h"
+#include "engine/cache/replacement.h"
 #include "engine/store/reader.h"
 
 namespace ptc {
@@ -13,8 +15,10 @@ namespace ptc {
 struct CacheOptions {
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;  ///< frames and tables together
   unsigned threads = 1;                                   ///< how many readers will exist at once
-  ContainerReader::Access access = ContainerReader::Access::pread;
-  /// Pages that a reader keeps pinned, a power of two up to 256; 0: as many as the frames allow.
+  BackEnd back_end = BackEnd::pread;
+  Replacement replacement = Replacement::clock;
+  bool read_ahead = true;  ///< tells the back end to expect the page after one that was missed
+  /// Pages that a reader holds on to, a power of two up to 256; 0: as many as the frames allow.
   std::uint32_t local_slots = 0;
 };
 
@@ -27,17 +31,17 @@ struct CacheStatistics {
   std::uint64_t bytes_read = 0;   ///< stored bytes of pages that arrived, headers included
   std::uint64_t frames = 0;       ///< frames there are: what the cap allows and the file can use
   std::uint64_t peak_frames = 0;  ///< most that were in use at once
+  double wait_seconds = 0;        ///< for bytes from the back end or for another thread's read, all readers together
   [[nodiscard]] double hit_rate() const noexcept;  ///< 1 - misses / lookups; 1 without lookups
 };
 
-/// The shared level. A page is read once even when several threads ask for it at the same time
-/// (single flight); reading and verifying happen outside the lock. Of the pages that no reader has
-/// pinned, the one unpinned longest ago leaves first.
+/// The shared level. A page that is there is found without a lock (engine/cache/frame_table.h). One that is not is
+/// read once even when several threads ask for it at the same time (single flight); reading and verifying happen
+/// outside the lock. Of the pages that no reader holds, one that was not asked for of late leaves first.
 ///
 /// A page that cannot be read fails for all who wait for it; who asks later tries again.
-/// Memory: frames of one page size each in one block, 4 bytes a page of the container, and for each
-/// reader its table, its decoder and a buffer for one stored page; all of it within the cap. The
-/// container's own directory is not counted.
+/// Memory: frames of one page size each in one block, 4 bytes a page of the container, and for each reader its table,
+/// its decoder and its back end's buffers; all of it within the cap. The container's own directory is not counted.
 /// Threads: a PageCache may be shared; each thread makes its own PageReader.
 class PageCache {
  public:
@@ -50,16 +54,16 @@ class PageCache {
   PageCache& operator=(const PageCache&) = delete;
 
   /// Least cap for so many threads: two frames each, and the tables.
-  [[nodiscard]] static std::uint64_t least_bytes(const ContainerReader& container,
-                                                 unsigned threads);
+  [[nodiscard]] static std::uint64_t least_bytes(const ContainerReader& container, unsigned threads,
+                                                 BackEnd back_end = BackEnd::pread);
   /// Least cap that gives so many frames.
-  [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads,
-                                               std::uint64_t frames);
+  [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads, std::uint64_t frames,
+                                               BackEnd back_end = BackEnd::pread);
   [[nodiscard]] const ContainerReader& container() const noexcept;
-  /// Sums over the shared level and all readers that have ended. Of a living reader, local hits
-  /// since it last went to the shared level are missing.
+  /// Sums over the shared level and all readers that have ended. Of a living reader, hits since its last miss are
+  /// missing.
   [[nodiscard]] CacheStatistics statistics() const;
-  /// Pages that each reader keeps pinned.
+  /// Pages that each reader holds on to.
   [[nodiscard]] std::uint32_t local_slots() const noexcept;
 
  private:
@@ -68,12 +72,13 @@ class PageCache {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A thread's way to pages: a direct-mapped table of pinned pages, so a repeated access takes no
-/// lock and writes nothing shared. Not thread-safe: one per thread.
+/// A thread's way to pages: a direct-mapped table of pages that it holds, so a repeated access takes no lock and writes
+/// nothing shared. Not thread-safe: one per thread.
 class PageReader {
  public:
   /// @param cache  outlives the reader
-  /// @throws std::invalid_argument when as many readers as CacheOptions::threads exist already
+  /// @throws std::invalid_argument when as many readers as CacheOptions::threads exist already; std::system_error
+  ///         when the system does not have the back end
   explicit PageReader(PageCache& cache);
   ~PageReader();
   PageReader(const PageReader&) = delete;
@@ -94,7 +99,7 @@ class PageReader {
     const Slot& slot = table_[page & mask_];
     ++lookups_;
     if (slot.page == page) return slot.view;
-    return load(page);
+    return find(page);
   }
 
  private:
@@ -102,14 +107,16 @@ class PageReader {
   struct Slot {
     std::uint64_t page = kEmpty;
     Page view;
-    std::uint32_t frame = 0;  ///< pinned while `page` is not kEmpty
   };
-  Page load(std::uint32_t page);
+  Page find(std::uint32_t page);
 
-  PageCache& cache_;
+  PageCache::Impl& shared_;
+  std::uint32_t number_;  ///< among the readers
   std::unique_ptr<Slot[]> table_;
   std::uint32_t mask_;
-  std::uint64_t lookups_ = 0;  ///< since the shared level was last told
+  std::uint64_t lookups_ = 0;      ///< since the shared level was last told
+  std::uint64_t shared_hits_ = 0;  ///< likewise
+  std::unique_ptr<PageSource> source_;
   PageDecoder decoder_;
 };
 

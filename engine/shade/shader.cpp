@@ -34,7 +34,7 @@ struct Shader::Impl {
                                                const Executor& e) {
     return std::make_unique<PageCache>(
         container,
-        CacheOptions{.memory_bytes = options.cache_bytes, .threads = e.threads(), .access = options.access});
+        CacheOptions{.memory_bytes = options.cache_bytes, .threads = e.threads(), .back_end = options.back_end});
   }
 
   Gather& gather(unsigned thread) {

@@ -14,7 +14,7 @@ namespace ptc {
 
 struct ShadeOptions {
   std::uint64_t cache_bytes = std::uint64_t{512} << 20;  ///< page cache, all threads together
-  ContainerReader::Access access = ContainerReader::Access::pread;
+  BackEnd back_end = BackEnd::pread;
   GatherOptions gather;
   /// Radiance that arrives from a direction (unit) where nothing covers it; empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;

@@ -1,15 +1,10 @@
 // From the commit record at the end of the file to verified pages (spec/container.md).
 #include "engine/store/reader.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <mutex>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 
 #include "engine/io/file.h"
 #include "engine/store/commit.h"
@@ -24,69 +19,11 @@ namespace {
 constexpr char kAgreement[] = "spec/container.md#page-agreement";
 constexpr char kPayload[] = "spec/container.md#page-payload";
 
-/// The file mapped whole on first use. A file that shrinks while it is mapped raises SIGBUS in the
-/// thread that touches what is gone, so pread is the default.
-class Mapping {
- public:
-  explicit Mapping(const InputFile& file) : file_(file) {}
-  ~Mapping() {
-    if (data_ != nullptr) ::munmap(data_, file_.size());
-  }
-  Mapping(const Mapping&) = delete;
-  Mapping& operator=(const Mapping&) = delete;
-
-  /// Part of the mapping that stops counting as resident when its user, who has copied it, is done.
-  class Lease {
-   public:
-    Lease(std::byte* file, std::uint64_t file_bytes, std::uint64_t offset, std::size_t bytes)
-        : file_(file), file_bytes_(file_bytes), offset_(offset), bytes_(bytes) {}
-    ~Lease() {
-      // The kernel maps up to 64 KiB around a fault. Others who read there only fault once more.
-      constexpr std::uint64_t kAround = 65536;
-      const std::uint64_t begin = offset_ / kAround * kAround;
-      const std::uint64_t end = (offset_ + bytes_ + kAround - 1) / kAround * kAround;
-      ::madvise(file_ + begin, std::min(end, file_bytes_) - begin, MADV_DONTNEED);
-    }
-    Lease(const Lease&) = delete;
-    Lease& operator=(const Lease&) = delete;
-    [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
-      return {file_ + offset_, bytes_};
-    }
-
-   private:
-    std::byte* file_;
-    std::uint64_t file_bytes_;
-    std::uint64_t offset_;
-    std::size_t bytes_;
-  };
-
-  [[nodiscard]] Lease lease(std::uint64_t offset, std::size_t bytes) {
-    return {map(), file_.size(), offset, bytes};
-  }
-
- private:
-  std::byte* map() {
-    const std::lock_guard lock(mutex_);
-    if (data_ != nullptr) return data_;
-    void* data = ::mmap(nullptr, file_.size(), PROT_READ, MAP_SHARED, file_.descriptor(), 0);
-    if (data == MAP_FAILED) {
-      throw std::system_error(errno, std::generic_category(), "mmap " + file_.path().string());
-    }
-    ::madvise(data, file_.size(), MADV_RANDOM);
-    return data_ = static_cast<std::byte*>(data);
-  }
-
-  const InputFile& file_;
-  std::mutex mutex_;
-  std::byte* data_ = nullptr;
-};
-
 }  // namespace
 
 struct ContainerReader::Impl {
   explicit Impl(const std::filesystem::path& path)
       : file(path),
-        mapping(file),
         header(read_file_header(file)),
         superblock(read_superblock(file, header)),
         entries(read_directory(file, superblock)),
@@ -132,34 +69,32 @@ struct ContainerReader::Impl {
     return found->second;
   }
 
-  PageHeader decode(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
-                    PageDecoder& decoder) const {
-    const PageHeader found = checked_header(page, image);
-    decode_payload(found, image.subspan(kPageHeaderBytes), {entries, superblock.points, &columns}, out, decoder);
-    return found;
+  PageRange range(std::uint32_t page) const {
+    const DirectoryEntry& where = entry(page);
+    return {where.offset, kPageHeaderBytes + std::size_t{where.stored_bytes}};
   }
 
-  PageHeader read(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder,
-                  Access access) const {
-    const DirectoryEntry& where = entry(page);
-    const std::size_t bytes = kPageHeaderBytes + std::size_t{where.stored_bytes};
-    const auto decoded = [&](std::span<const std::byte> image) {
-      return at_offset(file, where.offset, [&] { return decode(page, image, out, decoder); });
-    };
-    if (access == Access::mmap) {
-      const Mapping::Lease lease = mapping.lease(where.offset, bytes);
-      return decoded(lease.bytes());
-    }
-    const auto image = std::make_unique_for_overwrite<std::byte[]>(bytes);
-    file.read_at(where.offset, {image.get(), bytes});
-    return decoded({image.get(), bytes});
+  PageHeader decode(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
+                    PageDecoder& decoder) const {
+    return at_offset(file, entry(page).offset, [&] {
+      const PageHeader found = checked_header(page, image);
+      decode_payload(found, image.subspan(kPageHeaderBytes), {entries, superblock.points, &columns}, out, decoder);
+      return found;
+    });
+  }
+
+  PageHeader read(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder) const {
+    const PageRange where = range(page);
+    const auto image = std::make_unique_for_overwrite<std::byte[]>(where.bytes);
+    file.read_at(where.offset, {image.get(), where.bytes});
+    return decode(page, {image.get(), where.bytes}, out, decoder);
   }
 
   Meta read_meta() const {
     const DirectoryEntry& where = entries[superblock.meta_page];
     std::vector<std::byte> payload(where.raw_bytes);
     PageDecoder decoder;
-    const PageHeader found = read(superblock.meta_page, payload, decoder, Access::pread);
+    const PageHeader found = read(superblock.meta_page, payload, decoder);
     return at_offset(file, where.offset, [&] {
       try {
         return decode_meta(payload);
@@ -170,7 +105,6 @@ struct ContainerReader::Impl {
   }
 
   InputFile file;
-  mutable Mapping mapping;  ///< made on first use, which does not change what is read
   FileHeader header;
   Superblock superblock;
   std::vector<DirectoryEntry> entries;
@@ -241,12 +175,25 @@ PageHeader ContainerReader::read_page_header(std::uint32_t page) const {
   return at_offset(impl_->file, where.offset, [&] { return impl_->agreed_header(page, image); });
 }
 
+ContainerReader::PageRange ContainerReader::page_range(std::uint32_t page) const {
+  return impl_->range(page);
+}
+
+const InputFile& ContainerReader::file() const noexcept {
+  return impl_->file;
+}
+
 PageHeader ContainerReader::read_page(std::uint32_t page, std::span<std::byte> out,
-                                      PageDecoder& decoder, Access access) const {
+                                      PageDecoder& decoder) const {
   if (out.size() < page_payload_limit()) {
     throw std::invalid_argument("read_page: the buffer is smaller than a page's payload may be");
   }
-  return impl_->read(page, out, decoder, access);
+  return impl_->read(page, out, decoder);
+}
+
+PageHeader ContainerReader::decode_page(std::uint32_t page, std::span<const std::byte> image,
+                                        std::span<std::byte> out, PageDecoder& decoder) const {
+  return impl_->decode(page, image, out, decoder);
 }
 
 PageHeader ContainerReader::read_stored_page(std::uint32_t page,

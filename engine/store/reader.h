@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/io/file.h"
 #include "format/codec.h"
 #include "format/container.h"
 #include "format/schema.h"
@@ -41,18 +42,24 @@ class ContainerReader {
   /// Columns of a group's attribute pages, for ContainerWriter::write_page(); none where there is no such group.
   [[nodiscard]] std::span<const PackedColumn> attribute_columns(std::uint16_t group) const;
 
-  /// mmap decodes from a mapping of the file, and lets go of what was read, so that it stops
-  /// counting as resident. A file that shrinks, or a disk that fails, while it is mapped raises
-  /// SIGBUS instead of an exception: it is for local files that nobody changes.
-  enum class Access { pread, mmap };
   /// Reads, verifies and decodes a page's payload. Point and node pages also pass the checks of
   /// PointPage::verify() and NodePage, and each child that a node page refers to exists.
   /// @param out      at least page_payload_limit() bytes
   /// @param decoder  one per thread
   /// @return the page's header; the payload is the first raw_bytes of `out`
   /// @throws FormatError naming path and offset
-  PageHeader read_page(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder,
-                       Access access = Access::pread) const;
+  PageHeader read_page(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder) const;
+  /// The same of a page whose bytes are at hand.
+  /// @param image  page_range() of file()
+  PageHeader decode_page(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
+                         PageDecoder& decoder) const;
+  /// Where the header and the stored bytes of a page are.
+  struct PageRange {
+    std::uint64_t offset = 0;
+    std::size_t bytes = 0;
+  };
+  [[nodiscard]] PageRange page_range(std::uint32_t page) const;
+  [[nodiscard]] const InputFile& file() const noexcept;
   /// The header of a page, compared with the directory; its payload is not read.
   [[nodiscard]] PageHeader read_page_header(std::uint32_t page) const;
   /// The payload as it is stored, checksum verified, not decoded, for copying.

@@ -1,11 +1,12 @@
-// The bookkeeping of the cache against a textbook LRU.
+// The bookkeeping of the cache against textbook replacement.
 #include "engine/cache/frame_table.h"
 
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
 #include <deque>
-#include <map>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <vector>
@@ -17,106 +18,201 @@ using namespace ptc::test;
 
 namespace {
 
-/// Pages in the order in which they were last unpinned, and how often each is pinned.
+constexpr std::uint32_t kReaders = 3;
+constexpr std::uint32_t kSlots = 2;
+constexpr std::uint32_t kPages = 40;
+
+/// Frames in the order in which their pages were asked for.
 class TextbookLru {
  public:
-  explicit TextbookLru(std::size_t frames) : frames_(frames) {}
-
-  [[nodiscard]] bool holds(std::uint32_t page) const {
-    return pins_.contains(page) || std::ranges::count(unpinned_, page) > 0;
+  explicit TextbookLru(std::uint32_t /*frames*/) {}
+  void insert(std::uint32_t frame) { order_.push_back(frame); }
+  void touch(std::uint32_t frame) {
+    std::erase(order_, frame);
+    order_.push_back(frame);
   }
-  [[nodiscard]] bool can_claim() const {
-    return !unpinned_.empty() || pins_.size() + unpinned_.size() < frames_;
+  /// The frame that leaves; those that are held on the way count as asked for.
+  template <class Held>
+  std::uint32_t evict(const Held& held) {
+    while (held(order_.front())) touch(order_.front());
+    const std::uint32_t frame = order_.front();
+    order_.pop_front();
+    return frame;
   }
-  /// Pins a page. @return the page that left for it, or kNoFrame
-  std::uint32_t pin(std::uint32_t page) {
-    std::uint32_t left = kNoFrame;
-    if (!holds(page) && pins_.size() + unpinned_.size() == frames_) {
-      left = unpinned_.front();
-      unpinned_.pop_front();
-    }
-    std::erase(unpinned_, page);
-    ++pins_[page];
-    return left;
-  }
-  void unpin(std::uint32_t page) {
-    if (--pins_[page] > 0) return;
-    pins_.erase(page);
-    unpinned_.push_back(page);
-  }
-  /// The last pin of a page that did not arrive.
-  void drop(std::uint32_t page) { pins_.erase(page); }
-  [[nodiscard]] const std::map<std::uint32_t, int>& pinned() const { return pins_; }
 
  private:
-  std::size_t frames_;
-  std::deque<std::uint32_t> unpinned_;  // oldest first
-  std::map<std::uint32_t, int> pins_;
+  std::deque<std::uint32_t> order_;
 };
+
+/// Frames around a hand that gives those asked for a second chance.
+class TextbookClock {
+ public:
+  explicit TextbookClock(std::uint32_t frames) : asked_for_(frames) {}
+  void insert(std::uint32_t frame) { asked_for_[frame] = false; }
+  void touch(std::uint32_t frame) {
+    asked_for_[frame] = true;
+  }
+  template <class Held>
+  std::uint32_t evict(const Held& held) {
+    for (;; hand_ = (hand_ + 1) % asked_for_.size()) {
+      std::optional<bool>& asked_for = asked_for_[hand_];
+      if (!asked_for) continue;
+      const bool again = *asked_for;
+      asked_for = false;
+      if (again || held(static_cast<std::uint32_t>(hand_))) continue;
+      asked_for.reset();
+      const auto frame = static_cast<std::uint32_t>(hand_);
+      hand_ = (hand_ + 1) % asked_for_.size();
+      return frame;
+    }
+  }
+
+ private:
+  std::vector<std::optional<bool>> asked_for_;  // none: takes no part
+  std::size_t hand_ = 0;
+};
+
+/// Some readers that ask for pages, and what must come of it.
+template <class Order>
+class Session {
+ public:
+  Session(std::uint32_t frames, Replacement replacement)
+      : table_({kPages, frames, kReaders, kSlots}, replacement), page_in_(frames, kPages), order_(frames) {}
+
+  void step(std::mt19937& random) {
+    const std::uint32_t reader = below(kReaders, random);
+    if (waits_[reader]) return arrive(*waits_[reader], below(8, random) == 0);
+    const std::uint32_t page = below(kPages, random);
+    const std::optional<std::uint32_t> expected = frame_with(page);
+    const std::uint32_t held = table_.hold(reader, page);
+    holds_[reader][page % kSlots].reset();
+    if (expected && !loading(*expected)) {
+      REQUIRE(held == *expected);
+      REQUIRE(table_.page_bytes(held) == page * 10);
+      REQUIRE(table_.record_count(held) == page + 1);
+      order_.touch(held);
+      holds_[reader][page % kSlots] = held;
+      return;
+    }
+    REQUIRE(held == kNoFrame);
+    REQUIRE(table_.present(page) == expected.has_value());
+    std::uint32_t frame = table_.join(reader, page);
+    REQUIRE(frame == expected.value_or(kNoFrame));
+    if (frame == kNoFrame) frame = claim(reader, page);
+    waits_[reader] = frame;
+    holds_[reader][page % kSlots] = frame;
+  }
+
+  void check() const {
+    CHECK(table_.evictions() == evictions_);
+    CHECK(table_.evictions() > 100);
+    CHECK(table_.peak() == table_.size());
+  }
+
+ private:
+  [[nodiscard]] std::optional<std::uint32_t> frame_with(std::uint32_t page) const {
+    const auto found = std::ranges::find(page_in_, page);
+    if (found == page_in_.end()) return {};
+    return static_cast<std::uint32_t>(found - page_in_.begin());
+  }
+  [[nodiscard]] bool loading(std::uint32_t frame) const { return std::ranges::count(waits_, frame) > 0; }
+  [[nodiscard]] bool is_held(std::uint32_t frame) const {
+    return std::ranges::any_of(holds_, [&](const auto& slots) { return std::ranges::count(slots, frame) > 0; });
+  }
+
+  std::uint32_t claim(std::uint32_t reader, std::uint32_t page) {
+    const bool room = std::ranges::count(page_in_, kPages) > 0;
+    const std::uint32_t frame = table_.claim(reader, page);
+    if (!room) {
+      const std::uint32_t left = order_.evict([&](std::uint32_t f) { return is_held(f); });
+      REQUIRE(frame == left);
+      REQUIRE(!table_.present(page_in_[left]));
+      ++evictions_;
+    }
+    page_in_[frame] = page;
+    return frame;
+  }
+
+  void arrive(std::uint32_t frame, bool fails) {
+    const std::uint32_t page = page_in_[frame];
+    REQUIRE(table_.state(frame) == FrameTable::State::loading);
+    if (!fails) {
+      table_.ready(frame, page * 10, page + 1);
+      order_.insert(frame);
+    } else {
+      table_.fail(frame, std::make_exception_ptr(std::runtime_error("gone")));
+      page_in_[frame] = kPages;
+      REQUIRE(!table_.present(page));
+    }
+    for (std::uint32_t reader = 0; reader < kReaders; ++reader) {
+      if (waits_[reader] != frame) continue;
+      waits_[reader].reset();
+      if (!fails) continue;
+      REQUIRE(table_.state(frame) == FrameTable::State::failed);
+      REQUIRE(table_.error(frame) != nullptr);
+      table_.leave(reader, frame);
+      holds_[reader][page % kSlots].reset();
+    }
+    REQUIRE(table_.state(frame) == (fails ? FrameTable::State::empty : FrameTable::State::ready));
+  }
+
+  FrameTable table_;
+  std::vector<std::uint32_t> page_in_;  // by frame; kPages: none
+  Order order_;
+  std::array<std::array<std::optional<std::uint32_t>, kSlots>, kReaders> holds_;
+  std::array<std::optional<std::uint32_t>, kReaders> waits_;
+  std::uint64_t evictions_ = 0;
+};
+
+template <class Order>
+void check_order(Replacement replacement) {
+  for (const std::uint32_t frames : {kReaders * kSlots, kReaders * kSlots + 1, 20U, kPages - 1}) {
+    std::mt19937 random(frames);
+    Session<Order> session(frames, replacement);
+    for (int i = 0; i < 20'000; ++i) session.step(random);
+    session.check();
+  }
+}
 
 }  // namespace
 
 TEST_CASE("frame table: pages leave in the order of a textbook LRU", "[cache][frames]") {
-  constexpr std::uint32_t kPages = 40;
-  std::mt19937 random(1);
-  for (const std::uint32_t frames : {1u, 2u, 3u, 7u, 20u, 39u, 40u, 60u}) {
-    FrameTable table(kPages, frames);
-    TextbookLru oracle(frames);
-    std::uint64_t evictions = 0;
-    for (int step = 0; step < 20000; ++step) {
-      const std::uint32_t page = below(kPages, random);
-      const std::uint32_t frame = table.find(page);
-      REQUIRE((frame != kNoFrame) == oracle.holds(page));
-      const bool pinned = oracle.pinned().contains(page);
-      if (pinned && below(2, random) == 0) {
-        table.unpin(frame);
-        oracle.unpin(page);
-      } else if (frame != kNoFrame) {
-        table.pin(frame);
-        oracle.pin(page);
-      } else if (oracle.can_claim()) {
-        const std::uint32_t claimed = table.claim(page);
-        if (below(8, random) == 0) {
-          if (oracle.pin(page) != kNoFrame) ++evictions;
-          table.fail(claimed, std::make_exception_ptr(std::runtime_error("gone")));
-          table.unpin(claimed);
-          oracle.drop(page);
-          REQUIRE(table.find(page) == kNoFrame);
-          continue;
-        }
-        table.ready(claimed, page * 10, page + 1);
-        const std::uint32_t left = oracle.pin(page);
-        if (left != kNoFrame) {
-          ++evictions;
-          REQUIRE(table.find(left) == kNoFrame);
-        }
-      }
-      if (const std::uint32_t now = table.find(page); now != kNoFrame) {
-        REQUIRE(table.page_bytes(now) == page * 10);
-        REQUIRE(table.record_count(now) == page + 1);
-      }
-    }
-    CHECK(table.evictions() == evictions);
-    CHECK(table.peak() <= frames);
-    if (frames < kPages / 2) CHECK(table.peak() == frames);
-  }
+  check_order<TextbookLru>(Replacement::lru);
 }
 
-TEST_CASE("frame table: a failed page keeps its error until the last pin", "[cache][frames]") {
-  FrameTable table(4, 2);
-  const std::uint32_t frame = table.claim(3);
-  table.pin(frame);  // someone waits
+TEST_CASE("frame table: pages leave in the order of a textbook clock", "[cache][frames]") {
+  check_order<TextbookClock>(Replacement::clock);
+}
+
+TEST_CASE("frame table: what a reader let go of leaves, what it holds stays", "[cache][frames]") {
+  FrameTable table({.pages = 8, .frames = 2, .readers = 1, .slots = 2}, Replacement::clock);
+  for (const std::uint32_t page : {0U, 1U}) table.ready(table.claim(0, page), 1, 1);
+  CHECK(table.hold(0, 2) == kNoFrame);  // lets go of page 0, whose slot it has
+  table.ready(table.claim(0, 2), 1, 1);
+  CHECK_FALSE(table.present(0));
+  CHECK(table.present(1));
+  table.release(0, 1);
+  CHECK(table.hold(0, 4) == kNoFrame);  // and of page 2
+  table.ready(table.claim(0, 4), 1, 1);
+  CHECK(table.present(1) != table.present(2));
+  CHECK(table.evictions() == 2);
+}
+
+TEST_CASE("frame table: a failed page keeps its error until the last who waited has read it", "[cache][frames]") {
+  FrameTable table({.pages = 4, .frames = 2, .readers = 2, .slots = 1}, Replacement::clock);
+  const std::uint32_t frame = table.claim(0, 3);
+  CHECK(table.join(1, 3) == frame);
   table.fail(frame, std::make_exception_ptr(std::runtime_error("gone")));
-  CHECK(table.find(3) == kNoFrame);
-  table.unpin(frame);
+  CHECK_FALSE(table.present(3));
+  table.leave(0, frame);
   CHECK(table.state(frame) == FrameTable::State::failed);
   CHECK_THROWS_AS(std::rethrow_exception(table.error(frame)), std::runtime_error);
-  const std::uint32_t again = table.claim(3);  // a new try does not disturb who still waits
+  const std::uint32_t again = table.claim(0, 3);  // a new try does not disturb who still waits
   CHECK(again != frame);
-  table.unpin(frame);
+  table.leave(1, frame);
   CHECK(table.state(frame) == FrameTable::State::empty);
   CHECK(table.error(frame) == nullptr);
-  CHECK(table.claim(0) == frame);
+  CHECK(table.claim(1, 0) == frame);
   CHECK(table.evictions() == 0);
   CHECK(table.peak() == 2);
 }

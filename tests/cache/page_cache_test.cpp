@@ -124,7 +124,9 @@ TEST_CASE("cache: the shared level misses as often as a textbook LRU", "[cache][
   for (const auto& trace : {random_trace(n, 4000), looping_trace(n, 4 * n), looping_trace(20, 400),
                             walking_trace(n, 4000)}) {
     for (const std::uint64_t frames : {2u, 3u, 5u, 10u, 19u, 20u, 21u, 50u, n - 1, n}) {
-      PageCache cache(pages.container, pages.options(1, frames, 1));
+      CacheOptions options = pages.options(1, frames, 1);
+      options.replacement = Replacement::lru;
+      PageCache cache(pages.container, options);
       const CacheStatistics s = run(cache, pages, trace);
       INFO(frames << " frames");
       REQUIRE(s.frames == frames);
@@ -150,9 +152,8 @@ TEST_CASE("cache: a reader's own level changes who answers, not what", "[cache][
 
 TEST_CASE("cache: every page in its own frame is read once", "[cache]") {
   const Pages pages;
-  for (const auto access : {ContainerReader::Access::pread, ContainerReader::Access::mmap}) {
-    CacheOptions options = pages.options(1, pages.count());
-    options.access = access;
+  for (const BackEnd back_end : available_back_ends(pages.container.file())) {
+    const CacheOptions options = pages.options(1, pages.count(), 0, back_end);
     PageCache cache(pages.container, options);
     const CacheStatistics s = run(cache, pages, looping_trace(pages.count(), 3 * pages.count()));
     CHECK(s.misses == pages.count());
@@ -328,10 +329,10 @@ TEST_CASE("cache: resident memory stays within the cap", "[cache][cap]") {
   constexpr std::uint64_t kCap = std::uint64_t{4} << 20;
   constexpr std::uint64_t kNoise = std::uint64_t{256} << 10;  // of the test itself
   REQUIRE(std::filesystem::file_size(file.path()) > 3 * kCap);
-  for (const auto access : {ContainerReader::Access::pread, ContainerReader::Access::mmap}) {
+  for (const BackEnd back_end : available_back_ends(container.file())) {
     const std::uint64_t before = resident_bytes();
     std::uint64_t most = 0;
-    PageCache cache(container, {kCap, 1, access, 0});
+    PageCache cache(container, {.memory_bytes = kCap, .back_end = back_end});
     PageReader reader(cache);
     for (std::uint32_t round = 0; round < 2; ++round) {
       for (std::uint32_t page = 0; page < container.page_count(); ++page) {

@@ -1,12 +1,15 @@
 // A container for the tests of the cache, with what its pages hold.
 #pragma once
 
+#include <catch2/catch.hpp>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <random>
 #include <span>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -28,6 +31,20 @@ class SceneFile {
 /// A number from 0 to n - 1, the same for the same seed on every system.
 inline std::uint32_t below(std::uint32_t n, std::mt19937& random) {
   return static_cast<std::uint32_t>(random() % n);
+}
+
+/// The back ends that this system has for a file; that some are missing is told.
+inline std::vector<BackEnd> available_back_ends(const InputFile& file) {
+  std::vector<BackEnd> found{BackEnd::pread, BackEnd::mmap};
+  for (const BackEnd back_end : {BackEnd::direct, BackEnd::io_uring}) {
+    try {
+      static_cast<void>(make_page_source(back_end, file, 4096));
+      found.push_back(back_end);
+    } catch (const std::system_error& error) {
+      WARN("not tested: " << error.what());
+    }
+  }
+  return found;
 }
 
 inline SampleOptions many_pages() {
@@ -56,10 +73,11 @@ class Pages {
   }
   /// Options that give exactly so many frames.
   [[nodiscard]] CacheOptions options(unsigned threads, std::uint64_t frames,
-                                     std::uint32_t local_slots = 0) const {
+                                     std::uint32_t local_slots = 0, BackEnd back_end = BackEnd::pread) const {
     CacheOptions options;
-    options.memory_bytes = PageCache::bytes_for(container, threads, frames);
+    options.memory_bytes = PageCache::bytes_for(container, threads, frames, back_end);
     options.threads = threads;
+    options.back_end = back_end;
     options.local_slots = local_slots;
     return options;
   }

@@ -2,15 +2,18 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <barrier>
 #include <fstream>
 #include <functional>
+#include <mutex>
 #include <random>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "engine/cache/frame_table.h"
 #include "engine/cache/page_cache.h"
 #include "format/error.h"
 #include "tests/cache/pages.h"
@@ -61,14 +64,45 @@ void check_sums(const CacheStatistics& s, std::uint64_t lookups) {
 
 }  // namespace
 
+TEST_CASE("frame table: a frame that a reader holds keeps its page while others claim", "[cache][frames][threads]") {
+  constexpr std::uint32_t kReaders = 4, kPages = 6;
+  for (const Replacement replacement : {Replacement::clock, Replacement::lru}) {
+    FrameTable table({.pages = kPages, .frames = kReaders, .readers = kReaders, .slots = 1}, replacement);
+    std::array<std::atomic<std::uint32_t>, kReaders> page_in{};
+    std::mutex mutex;
+    std::atomic<std::size_t> wrong = 0;
+    on_threads(kReaders, [&](unsigned reader) {
+      std::mt19937 random(reader);
+      for (int i = 0; i < 300'000; ++i) {
+        const std::uint32_t page = below(kPages, random);
+        std::uint32_t frame = table.hold(reader, page);
+        if (frame == kNoFrame) {
+          const std::lock_guard lock(mutex);
+          frame = table.join(reader, page);
+          if (frame == kNoFrame) {
+            frame = table.claim(reader, page);
+            page_in[frame] = page;
+            table.ready(frame, 1, 1);
+          }
+        }
+        for (int look = 0; look < 4; ++look) {
+          if (page_in[frame] != page) ++wrong;
+        }
+      }
+    });
+    CHECK(wrong == 0);
+    CHECK(table.evictions() > 1000);
+  }
+}
+
 TEST_CASE("cache: threads that fight for frames get the right pages", "[cache][threads]") {
   const Pages pages;
   constexpr std::uint64_t kGets = 3000;
   for (const unsigned threads : {2u, 4u, 8u}) {
     for (const std::uint64_t frames : {2 * threads, 5 * threads, pages.count()}) {
-      for (const auto access : {ContainerReader::Access::pread, ContainerReader::Access::mmap}) {
-        CacheOptions options = pages.options(threads, frames);
-        options.access = access;
+      for (const BackEnd back_end : available_back_ends(pages.container.file())) {
+        CacheOptions options = pages.options(threads, frames, 0, back_end);
+        options.replacement = frames % 2 == 0 ? Replacement::clock : Replacement::lru;
         PageCache cache(pages.container, options);
         std::atomic<std::size_t> wrong = 0;
         on_threads(threads, [&](unsigned thread) {

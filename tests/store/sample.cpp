@@ -246,13 +246,13 @@ void write_file(const std::filesystem::path& path, std::span<const std::byte> by
   if (!out) throw std::runtime_error("cannot write " + path.string());
 }
 
-std::vector<std::byte> walk(const std::filesystem::path& path, ContainerReader::Access access) {
+std::vector<std::byte> walk(const std::filesystem::path& path) {
   const ContainerReader reader(path);
   PageDecoder decoder;
   std::vector<std::byte> all;
   std::vector<std::byte> buffer(reader.page_payload_limit());
   for (std::uint32_t page = 0; page < reader.page_count(); ++page) {
-    const PageHeader header = reader.read_page(page, buffer, decoder, access);
+    const PageHeader header = reader.read_page(page, buffer, decoder);
     all.insert(all.end(), buffer.begin(), buffer.begin() + header.raw_bytes);
   }
   return all;

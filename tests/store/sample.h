@@ -60,8 +60,6 @@ void write_unfinished(ContainerWriter& writer, const SampleOptions& options, Sam
 void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 /// Opens a container and reads every page. @return the payloads, one after another
-[[nodiscard]] std::vector<std::byte> walk(
-    const std::filesystem::path& path,
-    ContainerReader::Access access = ContainerReader::Access::pread);
+[[nodiscard]] std::vector<std::byte> walk(const std::filesystem::path& path);
 
 }  // namespace ptc::test

@@ -96,7 +96,7 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   const ContainerReader container(scene.path());
   const Executor executor(run.threads);
   errors.surfels = container.superblock().points;
-  const ShadeOptions settings{.cache_bytes = cache_bytes_left(run, kBufferBytes, container, executor.threads(), "the ladder")};
+  const ShadeOptions settings{.cache_bytes = cache_bytes_left(run, kBufferBytes, container, executor.threads(), BackEnd::pread, "the ladder")};
   const std::vector<Pilot> blocks = blocks_of(container, options.climbed, options.scene.lift);
   progress.begin(choice.name + ", the ladder", 0, "receivers");
   errors.rungs = climb(container, settings, blocks, options.rays / 2, executor, progress);

@@ -1,0 +1,117 @@
+#include "engine/cache/page_source.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <string>
+#include <system_error>
+
+#include "engine/cache/direct_range.h"
+#include "engine/cache/uring_source.h"
+
+namespace ptc {
+namespace {
+
+class PreadSource : public PageSource {
+ public:
+  PreadSource(const InputFile& file, std::size_t most_bytes) : file_(file), buffer_(most_bytes) {}
+
+  std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
+    const std::span<std::byte> out(buffer_.data(), bytes);
+    file_.read_at(offset, out);
+    return out;
+  }
+  // The system reads ahead by itself, as well as when it is told.
+  void expect(std::uint64_t /*offset*/, std::size_t /*bytes*/) override {}
+
+ private:
+  const InputFile& file_;
+  Arena buffer_;
+};
+
+class DirectSource : public PageSource {
+ public:
+  DirectSource(const InputFile& file, std::size_t most_bytes)
+      : file_(file), direct_(file), blocks_(DirectRange::room(most_bytes)) {}
+
+  std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
+    const DirectRange range(offset, bytes);
+    const ssize_t got = ::pread(direct_.get(), blocks_.data(), range.whole, static_cast<off_t>(range.begin));
+    return range.complete(blocks_.data(), got, file_);
+  }
+  void expect(std::uint64_t /*offset*/, std::size_t /*bytes*/) override {}  // a read lasts until its bytes are there
+
+ private:
+  const InputFile& file_;
+  DirectDescriptor direct_;
+  Arena blocks_;
+};
+
+/// The file mapped whole. What was read stops counting as resident with the next read.
+class MmapSource : public PageSource {
+ public:
+  explicit MmapSource(const InputFile& file) : bytes_(file.size()) {
+    void* data = ::mmap(nullptr, bytes_, PROT_READ, MAP_SHARED, file.descriptor(), 0);
+    if (data == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap " + file.path().string());
+    data_ = static_cast<std::byte*>(data);
+    ::madvise(data_, bytes_, MADV_RANDOM);
+  }
+  ~MmapSource() override { ::munmap(data_, bytes_); }
+  MmapSource(const MmapSource&) = delete;
+  MmapSource& operator=(const MmapSource&) = delete;
+
+  std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
+    constexpr std::uint64_t kAround = 65536;  // what the system may map around a fault
+    advise(last_offset_, last_bytes_, kAround, MADV_DONTNEED);
+    last_offset_ = offset;
+    last_bytes_ = bytes;
+    // All at once, not fault by fault; older systems refuse it.
+    advise(offset, bytes, DirectRange::kBlock, MADV_POPULATE_READ);
+    return {data_ + offset, bytes};
+  }
+  void expect(std::uint64_t /*offset*/, std::size_t /*bytes*/) override {}  // see PreadSource
+
+ private:
+  void advise(std::uint64_t offset, std::size_t bytes, std::uint64_t unit, int advice) noexcept {
+    const std::uint64_t begin = offset / unit * unit;
+    const std::uint64_t end = std::min<std::uint64_t>((offset + bytes + unit - 1) / unit * unit, bytes_);
+    ::madvise(data_ + begin, end - begin, advice);
+  }
+
+  std::byte* data_ = nullptr;
+  std::size_t bytes_;
+  std::uint64_t last_offset_ = 0;
+  std::size_t last_bytes_ = 0;
+};
+
+}  // namespace
+
+DirectDescriptor::DirectDescriptor(const InputFile& file) {
+  // By its descriptor, not its path, behind which there may be another file by now.
+  const std::string same = "/proc/self/fd/" + std::to_string(file.descriptor());
+  do fd_ = ::open(same.c_str(), O_RDONLY | O_DIRECT | O_CLOEXEC);
+  while (fd_ < 0 && errno == EINTR);
+  if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "open for direct transfers " + file.path().string());
+}
+
+DirectDescriptor::~DirectDescriptor() { ::close(fd_); }
+
+std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& file, std::size_t most_bytes) {
+  switch (back_end) {
+    case BackEnd::mmap: return std::make_unique<MmapSource>(file);
+    case BackEnd::direct: return std::make_unique<DirectSource>(file, most_bytes);
+    case BackEnd::io_uring: return std::make_unique<UringSource>(file, most_bytes);
+    case BackEnd::pread: break;
+  }
+  return std::make_unique<PreadSource>(file, most_bytes);
+}
+
+std::uint64_t page_source_bytes(BackEnd back_end, std::size_t most_bytes) noexcept {
+  const std::uint64_t room = DirectRange::room(most_bytes);
+  return back_end == BackEnd::io_uring ? UringSource::kSlots * room + UringSource::kRingBytes : room;
+}
+
+}  // namespace ptc
