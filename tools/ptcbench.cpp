@@ -9,6 +9,7 @@
 #include "tools/bench/accuracy.h"
 #include "tools/bench/accuracy_report.h"
 #include "tools/bench/build_report.h"
+#include "tools/bench/cache_report.h"
 #include "tools/bench/error_knob.h"
 #include "tools/bench/error_report.h"
 #include "tools/bench/growth.h"
@@ -16,6 +17,7 @@
 #include "tools/bench/model.h"
 #include "tools/bench/model_report.h"
 #include "tools/bench/sort_report.h"
+#include "tools/bench_options.h"
 #include "tools/common.h"
 #include "tools/values.h"
 
@@ -25,8 +27,8 @@ using namespace ptc::bench;
 
 constexpr char kPurpose[] =
     "Measures time and error together, against rays at the same scene in the same run, and draws charts\n"
-    "of one against the other, of how time grows, or of what each part of the model is worth; and sort and\n"
-    "build beside the disk. Scenes are held in memory whole; --memory caps sort and builds alone.";
+    "of one against the other, of how time grows, or of what each part of the model is worth; sort and build\n"
+    "beside the disk; and the page cache. Scenes are held in memory whole; --memory caps sort and builds alone.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
@@ -36,6 +38,7 @@ constexpr char kExamples[] =
     "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o charts\n"
     "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench build --points 1M --points 20M --points 200M --memory 1G --temp /scratch -o charts\n"
+    "  ptcbench cache --quick -o charts\n"
     "  ptcbench sort --quick -o charts\n"
     "  ptcbench sort --points 200M --panel disk --order city --memory 1G --temp /scratch -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
@@ -45,6 +48,7 @@ struct Arguments {
   std::filesystem::path directory;
   AccuracyOptions accuracy;
   BuildBenchOptions build;
+  CacheBenchOptions cache;
   ErrorOptions error;
   GrowthOptions growth;
   ModelOptions model;
@@ -52,52 +56,6 @@ struct Arguments {
   bool quick = false;
   const CLI::App* command = nullptr;  ///< that was chosen: knows which options were given
 };
-
-ptc::GatherOptions parse_setting(const std::string& text) {
-  constexpr char kExpected[] = "SR,RAD,R or SR,RAD,R,X: a solid angle from 1e-6 to 4 pi, a parallax from 0 to pi, "
-                               "16, 32, 48 or 64 pixels along a cube edge, an inflation from 0.01 to 100";
-  constexpr double kPi = std::numbers::pi;
-  const std::vector<double> n = ptc::parse_numbers("--setting", text, {3, 4}, kExpected);
-  const bool pixels = n[2] == 16 || n[2] == 32 || n[2] == 48 || n[2] == 64;
-  ptc::GatherOptions options{.solid_angle = static_cast<float>(n[0]),
-                             .parallax = static_cast<float>(n[1]),
-                             .resolution = static_cast<unsigned>(n[2])};
-  if (n.size() > 3) options.inflation = static_cast<float>(n[3]);
-  if (n[0] < 1e-6 || n[0] > 4 * kPi || n[1] < 0 || n[1] > kPi || !pixels || options.inflation < 0.01F || options.inflation > 100) {
-    ptc::refuse("--setting", text, kExpected);
-  }
-  return options;
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : "|") + word;
-  return text;
-}
-
-/// Refuses what is none of these words.
-CLI::Validator one_of(const std::vector<std::string>& known) {
-  const auto check = [known](const std::string& text) {
-    const bool found = std::ranges::find(known, text) != known.end();
-    return found ? std::string() : "expects " + joined(known) + ", not '" + text + "'";
-  };
-  return {check, ""};
-}
-
-/// Some of the words in `chosen`, repeatable. They must stay where they are.
-CLI::Option* add_words(CLI::App& command, const char* name, std::vector<std::string>& chosen, const char* description) {
-  return command.add_option(name, chosen, description)->type_name(joined(chosen))->allow_extra_args(false)->check(one_of(chosen));
-}
-
-/// --points, repeatable; sorted.
-void add_points_list(CLI::App& command, std::vector<std::uint64_t>& points, const char* description) {
-  const auto set = [&points](const std::vector<std::string>& values) {
-    points.clear();
-    for (const std::string& text : values) points.push_back(ptc::parse_count("--points", text));
-    std::ranges::sort(points);
-  };
-  command.add_option_function<std::vector<std::string>>("--points", set, description)->type_name("COUNT")->allow_extra_args(false);
-}
 
 void declare_choices(CLI::App& command, AccuracyOptions& options) {
   constexpr char kGroup[] = "Expert";
@@ -225,6 +183,21 @@ void declare_sort(CLI::App& app, Arguments& arguments) {
   add_words(command, "--panel", options.panels, "Sort there, not both; repeatable");
 }
 
+void declare_cache(CLI::App& app, Arguments& arguments) {
+  CLI::App& command = *app.add_subcommand("cache", "A page cache below the size of the scene: lookups, back ends, threads, order of "
+                                                   "receivers and of pages");
+  command.fallthrough();
+  command.add_option("-o,--output", arguments.directory, "Directory for cache.json, .csv, .svg and .png")->type_name("DIR")->required();
+  command.add_flag("--quick", arguments.quick,
+                   "Two minutes on two cores: 1M points, 8k receivers, 2 runs, no cap below 9 %, at most 4 threads; what other "
+                   "options say stays");
+  CacheBenchOptions& options = arguments.cache;
+  ptc::add_count(command, "--points", options.points, "Points of the city")->default_str("6M");
+  ptc::add_count(command, "--receivers", options.receivers, "Of them, in blocks of neighbours")->default_str("65536");
+  add_words(command, "--panel", options.panels, "Measure this, not all; repeatable");
+  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement of time");
+}
+
 void declare_model(CLI::App& app, Arguments& arguments) {
   CLI::App& command = declare(app, arguments, "model",
                               "Error against bytes and against time: what a node may hold (surfel, lobes, vector, cube, "
@@ -281,6 +254,16 @@ void shorten_growth(Arguments& arguments) {
   options.caps = {1, 0.29, 0.09};  // less of so few pages is nothing
   options.own_points = 8'192;
   options.reference_rays = 4096;
+}
+
+/// Likewise.
+void shorten_cache(Arguments& arguments) {
+  CacheBenchOptions& options = arguments.cache;
+  if (arguments.command->count("--points") == 0) options.points = 1'000'000;
+  if (arguments.command->count("--receivers") == 0) options.receivers = 8'192;
+  if (arguments.command->count("--repeats") == 0) options.repeats = 2;
+  options.caps = {1, 0.29, 0.09};
+  options.threads = {1, 2, 4};
 }
 
 /// Likewise, of what declare_timed() declares.
@@ -377,6 +360,13 @@ ptc::Outcome run_build(Arguments& arguments, const ptc::RunOptions& run, ptc::Pr
   });
 }
 
+ptc::Outcome run_cache(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten_cache(arguments);
+  return report_rows<CacheRow>(arguments, cache_text, [&](const auto& report) {
+    return measure_cache(arguments.cache, work_directory(arguments, run), run, progress, report);
+  });
+}
+
 ptc::Outcome run_sort(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten_timed(arguments, arguments.sort);
   return report_rows<SortRow>(arguments, sort_text, [&](const auto& report) {
@@ -406,6 +396,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   declare_accuracy(command.app(), arguments);
   declare_build(command.app(), arguments);
+  declare_cache(command.app(), arguments);
   declare_error(command.app(), arguments);
   declare_growth(command.app(), arguments);
   declare_model(command.app(), arguments);
@@ -415,7 +406,8 @@ int main(int argc, char** argv) {
     arguments.command = command.app().get_subcommands().front();
     const std::string name = arguments.command->get_name();
     static const std::map<std::string, decltype(&run_accuracy)> kRuns{
-        {"accuracy", run_accuracy}, {"build", run_build}, {"error", run_error}, {"growth", run_growth}, {"model", run_model}, {"sort", run_sort}};
+        {"accuracy", run_accuracy}, {"build", run_build}, {"cache", run_cache}, {"error", run_error},
+        {"growth", run_growth},     {"model", run_model}, {"sort", run_sort}};
     return kRuns.at(name)(arguments, command.run_options(), progress);
   });
 }

@@ -168,10 +168,35 @@ class Bench(ProgramTest):
                 self.assertLess(row["resident_bytes"], row["memory_bytes"])
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["build.csv", "build.json", "build.png", "build.svg"])
 
+    def test_caches_answer_alike_and_leave_their_files_alone(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "cache", "--quick", "--points", "120k", "--receivers", "4096", "--repeats", "1", "--threads", "2",
+                               "-o", charts, "--json")
+        rows = json.loads((charts / "cache.json").read_text())["rows"]
+        self.assertEqual(json.loads(printed.stdout)["rows"], rows)
+        self.assertEqual([r["panel"] for r in rows if r["threads"] == 2 and r["cap"] == 1].count("hits"), 4)
+        self.assertEqual({r["panel"] for r in rows}, {"hits", "back-end", "threads", "receivers", "pages"})
+        ways = {r["method"] for r in rows if r["panel"] == "back-end"}
+        self.assertTrue(ways >= {"pread", "mmap"})
+        self.assertEqual({r["method"]: r["bytes"] for r in rows if r["panel"] == "back-end" and r["cap"] == 1 and r["threads"] == 1},
+                         dict.fromkeys(ways, next(r["bytes"] for r in rows if r["panel"] == "back-end")))
+        for row in rows:
+            self.assertGreater(row["wall_seconds"], 0)
+            if row["panel"] != "hits":
+                self.assertGreater(row["bytes"], 0)
+                self.assertEqual(row["in_core_share"] is None, row["panel"] == "threads")
+            elif row["method"] != "pointers":
+                self.assertGreater(row["hit_rate"], 0.99)
+        for way in ways:  # less memory, more to read
+            read = [r["bytes"] for r in rows if r["panel"] == "back-end" and r["method"] == way and r["threads"] == 1]
+            self.assertEqual(read, sorted(read))
+            self.assertGreater(read[-1], read[0])
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["cache.csv", "cache.json", "cache.png", "cache.svg"])
+
     def test_growth_beyond_the_disk_is_the_machines_fault(self):
         message = self.fail_with(3, "ptcbench", "growth", "--points", "40000G", "--panel", "surfels", "-o", self.here)
         self.assertIn("GB free", message)
-        for command in (["build"], ["sort", "--panel", "disk"]):
+        for command in (["build"], ["cache"], ["sort", "--panel", "disk"]):
             message = self.fail_with(3, "ptcbench", *command, "--points", "40000G", "-o", self.here)
             self.assertIn("GB free", message)
 

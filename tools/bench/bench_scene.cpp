@@ -94,6 +94,7 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options, con
                      const RunOptions& run, Progress& progress) {
   BuildRequest request{.backdrop = choice.backdrop, .profile = options.profile, .run = run};
   request.sampling.count = options.points;
+  request.tree.levels_per_stream = options.levels_per_stream;
   LitScene lit;
   std::vector<MeshCamera> cameras;
   const bool procedural = choice.file.empty() && choice.name != "city";

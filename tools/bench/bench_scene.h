@@ -56,6 +56,7 @@ struct SceneOptions {
   float lift = 0.15F;                         ///< as ShadeRequest::lift
   bool rays = true;                           ///< surfels and mesh are loaded, which rays need
   Profile profile = Profile::compact;         ///< of the container
+  int levels_per_stream = 1;                  ///< as TreeOptions::levels_per_stream
 };
 
 /// Builds a scene's container.
