@@ -347,7 +347,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
 
   const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
   ShadeOptions options{
-      .cache_bytes = cache_bytes_left(request.run, kBufferBytes, scene,
+      .cache_bytes = cache_bytes_left(request.run, kBufferBytes + (other ? open_bytes(*other) : 0), scene,
                                       readers_of(executor, request.estimate), request.back_end,
                                       "shading"),
       .back_end = request.back_end,

@@ -50,7 +50,12 @@ std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint6
 std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
                                unsigned threads, BackEnd back_end, const char* what_for) {
   const std::uint64_t least = std::max(kLeastCache, PageCache::least_bytes(scene, threads, back_end));
-  return memory_left(run, taken + threads * kGatherBytes, least, what_for);
+  return memory_left(run, taken + open_bytes(scene) + threads * kGatherBytes, least, what_for);
+}
+
+std::uint64_t open_bytes(const ContainerReader& container) noexcept {
+  constexpr std::uint64_t kPageBytes = 36;  // of its directory and its place among the pages of its kind
+  return kPageBytes * container.page_count();
 }
 
 void check_damage_request(bool tolerate, unsigned bounces, const std::optional<double>& error, const CheckRequest& check) {

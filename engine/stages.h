@@ -31,7 +31,10 @@ class Stage {
 [[nodiscard]] std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least,
                                         const char* what_for);
 
-/// The same for the page cache of a gather, whose threads take kGatherBytes each.
+/// What an open container takes.
+[[nodiscard]] std::uint64_t open_bytes(const ContainerReader& container) noexcept;
+
+/// The same for the page cache of a gather, whose threads take kGatherBytes each, from an open scene.
 [[nodiscard]] std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
                                              unsigned threads, BackEnd back_end, const char* what_for);
 
