@@ -249,8 +249,10 @@ BuildReport build_container(const BuildRequest& request, const std::filesystem::
   // A given spacing does not say how many points it makes of a mesh.
   const bool by_spacing = inputs.lit && request.sampling.spacing > 0;
   const std::uint64_t expected = by_spacing ? 0 : known + (inputs.lit ? request.sampling.count : 0);
-  ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dir = temp_dir(request.run, target), .expected = expected},
+  ExternalSorter sorter({.memory_bytes = sort_bytes, .temp_dirs = temp_dirs(request.run, target), .expected = expected},
                         executor, keys_of(inputs.sample, frame));
+  report.space = require_build_space(expected, sorter.expected_spill(), request.profile, temp_dirs(request.run, target), target);
+  if (sorter.expected_spill() > 0) progress.note(space_text(report.space, temp_dirs(request.run, target), target));
   double spacing = 0;
   {
     const Stage stage(report.seconds, progress, inputs.lit ? "sample and light" : "partition", known, "points");

@@ -17,6 +17,7 @@
 #include "engine/base/progress.h"
 #include "engine/build/build.h"
 #include "engine/build/rounding.h"
+#include "engine/build_space.h"
 #include "engine/cache/page_cache.h"
 #include "engine/io/mesh.h"
 #include "engine/scene/camera.h"
@@ -31,7 +32,7 @@ namespace ptc {
 struct RunOptions {
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;  ///< cap on resident bytes, caches included
   unsigned threads = 0;                                 ///< 0: as many as cores
-  std::filesystem::path temp_dir;                       ///< empty: the output's directory
+  std::vector<std::filesystem::path> temp_dirs;         ///< temporary files are spread over them; none: the output's directory
 };
 
 /// Seconds of wall time by stage, in the order in which they ran.
@@ -53,12 +54,14 @@ struct BuildRequest {
 
 struct BuildReport {
   Superblock superblock;
+  BuildSpace space;
   SortStatistics sort;
   StageSeconds seconds;
 };
 
 /// Samples and lights meshes, reads clouds, sorts, builds the octree and publishes the container.
-/// The same request gives the same bytes for any number of threads and any cap.
+/// The same request gives the same bytes for any number of threads and any cap. Notes what it takes on the disk when it
+/// is known beforehand that memory will not hold the points, and refuses it when there is no room.
 /// @throws DataError for bad input, std::invalid_argument as check_mesh() for the mesh in memory and for
 ///         a cap that is too small (the text names the least that works), std::system_error
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,

@@ -306,7 +306,7 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   options.cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), request.back_end,
                                          "this picture");
   const std::unique_ptr<ContainerReader> bounced =
-      bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, targets.front().path)}, executor,
+      bounce_light(scene, {request.bounces, options, request.lift, roomiest_temp_dir(request.run, targets.front().path)}, executor,
                    report, progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
   ReceiverPlaces compared;

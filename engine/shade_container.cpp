@@ -264,7 +264,7 @@ std::unique_ptr<ContainerReader> open_receivers(const ShadeRequest& request, con
                                                 Progress& progress) {
   if (request.receivers.extension() == ".ptcx") return std::make_unique<ContainerReader>(request.receivers);
   BuildRequest build{.inputs = {request.receivers}, .lights = LightRig{}, .profile = Profile::raw, .run = request.run};  // they need no light
-  return make_temporary(temp_dir(request.run, target),
+  return make_temporary(roomiest_temp_dir(request.run, target),
                         [&](const std::filesystem::path& path) { build_container(build, path, progress); });
 }
 
@@ -356,7 +356,7 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
       .lost = lost.get()};
   options.gather.bleeding = request.bounces > 0;
   const std::unique_ptr<ContainerReader> bounced =
-      bounce_light(scene, {request.bounces, options, request.lift, temp_dir(request.run, target)}, executor, report,
+      bounce_light(scene, {request.bounces, options, request.lift, roomiest_temp_dir(request.run, target)}, executor, report,
                    progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
   ReceiverPlaces compared;

@@ -14,6 +14,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file.h"
+#include "engine/io/room.h"
 
 namespace ptc {
 namespace {
@@ -76,9 +77,17 @@ DamageReport damage_report(const ContainerReader& scene, const LostPages& lost, 
   return report;
 }
 
-std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target) {
-  if (!run.temp_dir.empty()) return run.temp_dir;
-  return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
+std::vector<std::filesystem::path> temp_dirs(const RunOptions& run, const std::filesystem::path& target) {
+  if (!run.temp_dirs.empty()) return run.temp_dirs;
+  return {directory_of(target)};
+}
+
+std::filesystem::path roomiest_temp_dir(const RunOptions& run, const std::filesystem::path& target) {
+  return roomiest(temp_dirs(run, target));
+}
+
+std::filesystem::path directory_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
 std::unique_ptr<ContainerReader> make_temporary(const std::filesystem::path& directory,

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "engine/pipeline.h"
 #include "engine/shade/lost_pages.h"
@@ -45,8 +46,13 @@ void check_damage_request(bool tolerate, unsigned bounces, const std::optional<d
 /// What there is to tell of lost pages.
 [[nodiscard]] DamageReport damage_report(const ContainerReader& scene, const LostPages& lost, const DamageCounts& stand_ins);
 
-/// Where temporary files go: the given directory, else the target's.
-[[nodiscard]] std::filesystem::path temp_dir(const RunOptions& run, const std::filesystem::path& target);
+/// Where temporary files go: the given directories, else the target's.
+[[nodiscard]] std::vector<std::filesystem::path> temp_dirs(const RunOptions& run, const std::filesystem::path& target);
+/// The one of them with most room, for a file that is not spread.
+[[nodiscard]] std::filesystem::path roomiest_temp_dir(const RunOptions& run, const std::filesystem::path& target);
+
+/// The directory that a file is in.
+[[nodiscard]] std::filesystem::path directory_of(const std::filesystem::path& file);
 
 /// A container for the time of one run. Its name goes as soon as it is open: however the run ends
 /// from then on, nothing is left.

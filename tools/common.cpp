@@ -124,9 +124,10 @@ void Command::add_common_options() {
       ->group(kGroup);
   add_integer(app_, "--threads", run_options_.threads, 0, 4096, "Threads; 0: as many as cores")
       ->group(kGroup);
-  app_.add_option("--temp", run_options_.temp_dir,
-                  "Directory for temporary files [default: the output's]")
+  app_.add_option("--temp", run_options_.temp_dirs,
+                  "Directory for temporary files, again for more [default: the output's]")
       ->type_name("DIR")
+      ->allow_extra_args(false)
       ->check(CLI::Validator(CLI::ExistingDirectory).description(""))
       ->group(kGroup);
   app_.add_flag("--progress", progress_, "Show stages on stderr: on a terminal a bar, else lines")
@@ -210,8 +211,7 @@ bool Command::parse(int argc, char** argv, int& exit_code) {
 
 int Command::perform(const std::function<Outcome(Progress&)>& body) const {
   check_files();
-  const auto progress =
-      progress_ && !quiet_ ? make_stderr_progress() : std::make_unique<Progress>();
+  const auto progress = quiet_ ? std::make_unique<Progress>() : progress_ ? make_stderr_progress() : make_stderr_notes();
   Outcome outcome = body(*progress);
   if (json_) {
     outcome.facts["peak_resident_bytes"] = peak_resident_bytes();

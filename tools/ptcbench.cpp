@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "engine/base/error.h"
+#include "engine/io/room.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/accuracy_report.h"
 #include "tools/bench/build_report.h"
@@ -301,8 +302,9 @@ std::vector<SceneChoice> choose_scenes(const Arguments& arguments) {
   return scenes;
 }
 
+/// Where files of the measurement go: one directory, with most room.
 std::filesystem::path work_directory(const Arguments& arguments, const ptc::RunOptions& run) {
-  return run.temp_dir.empty() ? arguments.directory : run.temp_dir;
+  return run.temp_dirs.empty() ? arguments.directory : ptc::roomiest(run.temp_dirs);
 }
 
 ptc::Outcome run_accuracy(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {

@@ -91,6 +91,7 @@ ptc::Outcome build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progre
   const ptc::Superblock& made = report.superblock;
   nlohmann::ordered_json facts{{"output", arguments.output.string()}};
   facts.update(ptc::container_facts(made));
+  facts["space"] = ptc::facts_of(report.space);
   facts["sort"] = ptc::facts_of(report.sort);
   facts["seconds"] = ptc::facts_of(report.seconds);
   return {facts, fmt::format("{}: {} points, {} nodes on {} levels, {} pages, {}, {:.2f} s\n{}",

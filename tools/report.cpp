@@ -96,6 +96,11 @@ ordered_json container_facts(const Superblock& superblock) {
           {"bytes", {{"file", superblock.file_bytes}}}};
 }
 
+ordered_json facts_of(const BuildSpace& space) {
+  return {{"temp_bytes", space.temp_bytes}, {"temp_free_bytes", space.temp_free_bytes},
+          {"output_bytes", space.output_bytes}, {"output_free_bytes", space.output_free_bytes}};
+}
+
 ordered_json facts_of(const SortStatistics& sort) {
   return {
       {"points", sort.points}, {"spilled_bytes", sort.spilled_bytes}, {"buckets", sort.buckets}};

@@ -11,6 +11,7 @@ namespace ptc {
 
 /// format_version, points, nodes, node_groups, levels, bounds, pages, page_size, bytes of the file.
 [[nodiscard]] nlohmann::ordered_json container_facts(const Superblock& superblock);
+[[nodiscard]] nlohmann::ordered_json facts_of(const BuildSpace& space);
 [[nodiscard]] nlohmann::ordered_json facts_of(const SortStatistics& sort);
 [[nodiscard]] nlohmann::ordered_json facts_of(const CacheStatistics& cache);
 [[nodiscard]] nlohmann::ordered_json facts_of(const GatherCounts& counts);

@@ -20,6 +20,23 @@ namespace {
 constexpr double kRedrawSeconds = 0.1;  // on a terminal
 constexpr double kLineSeconds = 10;     // elsewhere
 
+// A report that cannot be written is no reason to stop the work.
+void write_text(int fd, std::string_view text) noexcept {
+  while (!text.empty()) {
+    const ssize_t n = ::write(fd, text.data(), text.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;
+    text.remove_prefix(static_cast<std::size_t>(n));
+  }
+}
+
+std::string note_line(const std::string& text) { return std::string(program_invocation_short_name) + ": " + text + '\n'; }
+
+class StderrNotes final : public Progress {
+ public:
+  void note(const std::string& text) override { write_text(STDERR_FILENO, note_line(text)); }
+};
+
 class FileProgress final : public Progress {
  public:
   FileProgress(int fd, bool terminal, Clock clock)
@@ -41,6 +58,12 @@ class FileProgress final : public Progress {
         total == 0 ? unit : format_count(static_cast<double>(total)) + " " + unit;
     if (!terminal_) write(stage + ": " + count + "\n");
     next_report_ = start_ + interval();
+  }
+
+  void note(const std::string& text) override {
+    end();
+    const std::lock_guard lock(mutex_);
+    write(note_line(text));
   }
 
   // Cheap unless a report is due; then one thread writes it and the others go on.
@@ -91,15 +114,7 @@ class FileProgress final : public Progress {
     write(line);
   }
 
-  // A report that cannot be written is no reason to stop the work.
-  void write(std::string_view text) const noexcept {
-    while (!text.empty()) {
-      const ssize_t n = ::write(fd_, text.data(), text.size());
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) return;
-      text.remove_prefix(static_cast<std::size_t>(n));
-    }
-  }
+  void write(std::string_view text) const noexcept { write_text(fd_, text); }
 
   const int fd_;
   const bool terminal_;
@@ -126,5 +141,7 @@ std::unique_ptr<Progress> make_progress(int fd, bool terminal, Clock clock) {
 std::unique_ptr<Progress> make_stderr_progress() {
   return make_progress(STDERR_FILENO, isatty(STDERR_FILENO) == 1, steady_seconds);
 }
+
+std::unique_ptr<Progress> make_stderr_notes() { return std::make_unique<StderrNotes>(); }
 
 }  // namespace ptc

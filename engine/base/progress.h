@@ -18,10 +18,15 @@ class Progress {
                      const std::string& /*unit*/) {}
   virtual void advance(std::uint64_t /*count*/) {}
   virtual void end() {}
+  /// Something to know before long work, e.g. the room that it takes; between stages.
+  virtual void note(const std::string& /*text*/) {}
 };
 
 /// On a terminal a bar with rate and time left, redrawn at most 10 times a second; otherwise one
 /// plain line at the start and end of a stage and every 10 s between.
 [[nodiscard]] std::unique_ptr<Progress> make_stderr_progress();
+
+/// Nothing but notes, a line each that begins with the program's name.
+[[nodiscard]] std::unique_ptr<Progress> make_stderr_notes();
 
 }  // namespace ptc

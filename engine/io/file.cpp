@@ -15,8 +15,6 @@
 #include <system_error>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "engine/base/error.h"
 
 namespace ptc {
@@ -318,14 +316,5 @@ void TempFile::drop_cache() const noexcept {
 }
 
 void TempFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept { discard_blocks(fd_, offset, bytes); }
-
-void require_room(const std::filesystem::path& directory, std::uint64_t bytes, const std::string& what) {
-  const std::uint64_t free = std::filesystem::space(directory).available;
-  if (bytes <= free) return;
-  const auto giga = [](std::uint64_t n) { return fmt::format("{:.1f} GB", static_cast<double>(n) / 1e9); };
-  throw std::system_error(ENOSPC, std::generic_category(),
-                          fmt::format("{} take up to {} in {}, which has {} free; name another directory with --temp, or fewer points", what,
-                                      giga(bytes), directory.string(), giga(free)));
-}
 
 }  // namespace ptc

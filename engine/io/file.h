@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
-#include <string>
 
 namespace ptc {
 
@@ -87,10 +86,6 @@ class TemporaryName {
 
 /// Gives back the disk's blocks under these bytes of an open file, where the file system can.
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept;
-
-/// @param what  is going to be written there, e.g. "5 files": begins the message
-/// @throws std::system_error (ENOSPC) when the directory's disk has less than that free
-void require_room(const std::filesystem::path& directory, std::uint64_t bytes, const std::string& what);
 
 /// Removes all TemporaryNames and temporary names of OutputFiles, for a process that ends at once: who
 /// makes or drops one from now on waits for ever. Allocates nothing.

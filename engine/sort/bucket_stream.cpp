@@ -67,8 +67,8 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
   const auto partition = std::make_shared<Partition>(file_, std::move(splitters));
   while (const std::size_t count = bucket.read(out, reader_)) {
     const std::span<PointRecord> run = out.first(count), grouped = scratch.first(count);
-    const std::uint64_t offset = partition->add_run(run, grouped, executor_);
-    file_.write(offset, grouped);
+    partition->add_run(run, grouped, executor_);
+    partition->write_run(grouped);
   }
   push(partition);
 }

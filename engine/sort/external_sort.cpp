@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/base/memory.h"
-#include "engine/io/file.h"
+#include "engine/io/room.h"
 #include "engine/sort/bucket_stream.h"
 #include "engine/sort/radix_sort.h"
 #include "engine/sort/sort_plan.h"
@@ -75,16 +75,19 @@ struct ExternalSorter::Impl {
         arena(2 * plan.run_records * sizeof(PointRecord)) {
     const std::size_t stride = given_sample.size() / plan.sample_keys + 1;
     for (std::size_t i = 0; i < given_sample.size(); i += stride) sample.push_back(given_sample[i]);
-    const bool will_spill = options.expected > plan.run_records;
+    const bool will_spill = expected_spill() > 0;
     filling = will_spill ? part(0) : memory().first(plan.run_records);
     if (!will_spill) return;
     // Better now than after an hour of partitioning. What is expected may be a little more than comes.
-    require_room(options.temp_dir, options.expected / 100 * 95 * sizeof(PointRecord),
+    require_room(options.temp_dirs, expected_spill() / 100 * 95,
                  "some " + std::to_string(options.expected) + " points on their way through the sort");
   }
 
   [[nodiscard]] std::span<PointRecord> memory() noexcept {
     return {reinterpret_cast<PointRecord*>(arena.data()), 2 * plan.run_records};
+  }
+  [[nodiscard]] std::uint64_t expected_spill() const noexcept {
+    return options.expected > plan.run_records ? options.expected * sizeof(PointRecord) : 0;
   }
   [[nodiscard]] std::span<PointRecord> scratch() noexcept {
     return memory().last(plan.run_records);
@@ -136,7 +139,7 @@ void ExternalSorter::Impl::begin_partition() {
     for (std::size_t i = 0; i < filled; i += stride) sample.push_back(filling[i].key);
   }
   const std::size_t ranges = std::clamp<std::size_t>(sample.size() / kKeysPerRange, 3, plan.ranges);
-  file.emplace(options.temp_dir);
+  file.emplace(options.temp_dirs);
   partition = std::make_shared<Partition>(*file, Splitters(std::move(sample), ranges));
   sample = {};
 }
@@ -150,13 +153,17 @@ void ExternalSorter::Impl::spill() {
   const std::span<PointRecord> grouped = (whole_run ? scratch() : part(2)).first(filled);
   filling = whole_run || filling.data() != part(0).data() ? part(0) : part(1);
   filled = 0;
-  const auto group = [this, records, grouped] { return partition->add_run(records, grouped, executor); };
-  const auto write = [this, grouped](std::uint64_t offset) { file->write(offset, grouped); };
+  const auto group = [this, records, grouped] { partition->add_run(records, grouped, executor); };
+  const auto write = [this, grouped] { partition->write_run(grouped); };
   // Direct writes leave the processor free: another thread, even if the executor has only one.
   if (whole_run || executor.threads() == 1) {
-    spilling = std::async(std::launch::async, write, group());
+    group();
+    spilling = std::async(std::launch::async, write);
   } else {
-    spilling = std::async(std::launch::async, [group, write] { write(group()); });
+    spilling = std::async(std::launch::async, [group, write] {
+      group();
+      write();
+    });
   }
 }
 
@@ -181,6 +188,8 @@ ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& execu
     : impl_(std::make_unique<Impl>(options, executor, sample)) {}
 
 ExternalSorter::~ExternalSorter() = default;
+
+std::uint64_t ExternalSorter::expected_spill() const noexcept { return impl_->expected_spill(); }
 
 void ExternalSorter::add(std::span<const PointRecord> records) {
   if (impl_->finished) throw std::invalid_argument("ExternalSorter::add after finish");

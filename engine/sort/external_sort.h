@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "engine/base/executor.h"
 #include "format/point_record.h"
@@ -23,7 +24,7 @@ class PointStream {
 struct SortOptions {
   /// All that this stage holds at once; at least 256 KiB.
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
-  std::filesystem::path temp_dir = ".";
+  std::vector<std::filesystem::path> temp_dirs{"."};  ///< at least one; what is spilled is spread over them
   /// About how many records will come; 0: not known. Those that are known not to fit leave for the disk
   /// sooner and touch less memory.
   std::uint64_t expected = 0;
@@ -31,7 +32,7 @@ struct SortOptions {
 
 struct SortStatistics {
   std::uint64_t points = 0;
-  std::uint64_t spilled_bytes = 0;  ///< written to the temporary file, 0 when all fit in memory
+  std::uint64_t spilled_bytes = 0;  ///< written to temporary files, 0 when all fit in memory
   std::uint32_t buckets = 0;  ///< sorted one by one and handed out so far, 1 when all fit in memory
 };
 
@@ -41,7 +42,7 @@ struct SortStatistics {
 /// Records collect in memory until the cap; then they are partitioned on disk by splitters taken
 /// from the sample, and each bucket is radix-sorted in memory: while one is handed out the next is
 /// sorted and the one after it read. A bucket that turns out larger than memory is partitioned again.
-/// The temporary file has no name and vanishes with the sorter.
+/// The temporary files have no names and vanish with the sorter.
 /// Threads: add() and next() are called from outside the bodies of the executor's loops.
 class ExternalSorter {
  public:
@@ -49,11 +50,13 @@ class ExternalSorter {
   /// @param sample    keys drawn evenly from the input, any order; a few thousand are enough; with
   ///                  fewer than 64 the first records that fill the memory serve instead
   /// @throws std::invalid_argument when the cap is too small, std::bad_alloc; std::system_error (ENOSPC)
-  ///         when the directory has no room for what is expected
+  ///         when the directories have no room for what is expected
   ExternalSorter(const SortOptions& options, const Executor& executor,
                  std::span<const MortonKey> sample);
   ~ExternalSorter();
 
+  /// Bytes of temporary files that what is expected takes; 0 when it fits in memory.
+  [[nodiscard]] std::uint64_t expected_spill() const noexcept;
   /// @throws std::system_error naming the directory when what memory does not hold cannot be
   /// written, now or a moment ago: the sorter is of no use then
   void add(std::span<const PointRecord> records);

@@ -2,9 +2,12 @@
 #include "engine/sort/spill.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <future>
+#include <numeric>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "engine/sort/partition.h"
@@ -26,20 +29,64 @@ std::uint64_t sample_position(std::uint64_t i, std::uint64_t count, std::uint64_
   return begin + (mixed ^ mixed >> 31) % (end - begin);
 }
 
+/// A disk, a quota or what the file system allows a file is used up: another directory may have room.
+bool is_full(const std::error_code& code) noexcept {
+  return code.value() == ENOSPC || code.value() == EDQUOT || code.value() == EFBIG;
+}
+
 }  // namespace
 
-std::uint64_t SpillFile::reserve(std::size_t records) noexcept {
-  return end_.fetch_add(whole_blocks(records * sizeof(PointRecord)));
+SpillFile::SpillFile(std::span<const std::filesystem::path> directories) {
+  for (const std::filesystem::path& directory : directories) volumes_.push_back(std::make_unique<Volume>(directory));
 }
 
-void SpillFile::write(std::uint64_t offset, std::span<const PointRecord> records) {
-  file_.write_at(offset, {reinterpret_cast<const std::byte*>(records.data()),
-                          whole_blocks(records.size_bytes())});
+std::vector<std::uint32_t> SpillFile::by_room(std::uint64_t bytes) const {
+  std::vector<double> fill;
+  for (const auto& volume : volumes_) {
+    std::error_code unknown;  // a write tells what is wrong
+    const std::uint64_t free = std::filesystem::space(volume->directory, unknown).available;
+    const auto used = static_cast<double>(volume->end + bytes);
+    fill.push_back(unknown ? used : used / (static_cast<double>(volume->end) + static_cast<double>(free) + 1.0));
+  }
+  std::vector<std::uint32_t> order(volumes_.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::stable_sort(order, {}, [&](std::uint32_t v) { return fill[v]; });
+  return order;
 }
 
-void SpillFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept {
-  const std::uint64_t begin = offset / kDirectBytes * kDirectBytes, end = (offset + bytes) / kDirectBytes * kDirectBytes;
-  file_.discard(begin, end - begin);
+SpillPlace SpillFile::append(std::span<const PointRecord> records) {
+  const std::span bytes(reinterpret_cast<const std::byte*>(records.data()), whole_blocks(records.size_bytes()));
+  const std::vector<std::uint32_t> order = by_room(bytes.size());
+  for (const std::uint32_t v : order) {
+    Volume& volume = *volumes_[v];
+    const SpillPlace place{v, volume.end};
+    try {
+      volume.file.write_at(place.offset, bytes);
+    } catch (const std::system_error& error) {
+      if (v == order.back() || !is_full(error.code())) throw;
+      volume.file.discard(place.offset, bytes.size());  // the part that found room
+      continue;
+    }
+    volume.end += bytes.size();
+    return place;
+  }
+  throw std::invalid_argument("SpillFile: no directory");
+}
+
+void SpillFile::read_at(const SpillPlace& place, std::span<std::byte> bytes) const {
+  volumes_[place.volume]->file.read_at(place.offset, bytes);
+}
+
+void SpillFile::discard(const SpillPlace& place, std::uint64_t bytes) const noexcept {
+  const std::uint64_t begin = place.offset / kDirectBytes * kDirectBytes;
+  const std::uint64_t end = (place.offset + bytes) / kDirectBytes * kDirectBytes;
+  volumes_[place.volume]->file.discard(begin, end - begin);
+}
+
+std::uint64_t SpillFile::bytes() const noexcept {
+  std::uint64_t bytes = 0;
+  for (const auto& volume : volumes_) bytes += volume->end;
+  return bytes;
 }
 
 SpillReader::SpillReader(const SpillFile& file, std::size_t buffer_bytes)
@@ -62,28 +109,27 @@ void SpillReader::read(std::span<const Piece> pieces) {
 }
 
 void SpillReader::read(const Piece& piece, std::span<std::byte> buffer) const {
-  std::uint64_t offset = piece.offset;
+  SpillPlace place = piece.place;
   std::span<std::byte> bytes = std::as_writable_bytes(piece.out);
   while (!bytes.empty()) {
-    const std::size_t skip = offset % kDirectBytes;  // from the start of the first block
+    const std::size_t skip = place.offset % kDirectBytes;  // from the start of the first block
     const std::size_t count = std::min(bytes.size(), buffer.size() - skip);
-    file_.file_.read_at(offset - skip, buffer.first(whole_blocks(skip + count)));
+    file_.read_at({place.volume, place.offset - skip}, buffer.first(whole_blocks(skip + count)));
     std::memcpy(bytes.data(), buffer.data() + skip, count);
     bytes = bytes.subspan(count);
-    offset += count;
+    place.offset += count;
   }
 }
 
 void SpillReader::take(std::span<const Piece> pieces) {
   read(pieces);
-  for (const Piece& piece : pieces) file_.discard(piece.offset, piece.out.size_bytes());
+  for (const Piece& piece : pieces) file_.discard(piece.place, piece.out.size_bytes());
 }
 
 Partition::Partition(SpillFile& file, Splitters splitters)
     : file_(file), splitters_(std::move(splitters)) {}
 
-std::uint64_t Partition::add_run(std::span<const PointRecord> records,
-                                 std::span<PointRecord> grouped, const Executor& executor) {
+void Partition::add_run(std::span<const PointRecord> records, std::span<PointRecord> grouped, const Executor& executor) {
   const std::size_t blocks = partition_blocks(records.size(), ranges(), executor.threads());
   // Looking for a range takes longer than keeping its number.
   const auto range_of = std::make_unique_for_overwrite<std::uint16_t[]>(records.size());
@@ -98,12 +144,12 @@ std::uint64_t Partition::add_run(std::span<const PointRecord> records,
   const std::vector<std::size_t> starts = counts.starts();
 
   Run& run = runs_.emplace_back();
-  run.offset = file_.reserve(records.size());
   run.starts.resize(starts.size());
   std::ranges::transform(starts, run.starts.begin(),
                          [](std::size_t i) { return static_cast<std::uint32_t>(i); });
-  return run.offset;
 }
+
+void Partition::write_run(std::span<const PointRecord> grouped) { runs_.back().place = file_.append(grouped); }
 
 BucketReader::BucketReader(std::shared_ptr<const Partition> partition, std::size_t range)
     : partition_(std::move(partition)), range_(range) {
@@ -119,8 +165,8 @@ std::size_t BucketReader::size_in(const Partition::Run& run) const noexcept {
   return run.starts[range_ + 1] - run.starts[range_];
 }
 
-std::uint64_t BucketReader::offset_in(const Partition::Run& run, std::size_t i) const noexcept {
-  return run.offset + (run.starts[range_] + i) * sizeof(PointRecord);
+SpillPlace BucketReader::place_in(const Partition::Run& run, std::size_t i) const noexcept {
+  return {run.place.volume, run.place.offset + (run.starts[range_] + i) * sizeof(PointRecord)};
 }
 
 std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) {
@@ -129,7 +175,7 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
   while (filled < out.size() && left_ > 0) {
     const Partition::Run& run = partition_->runs_[run_];
     const std::size_t count = std::min(size_in(run) - at_, out.size() - filled);
-    if (count > 0) pieces.push_back({offset_in(run, at_), out.subspan(filled, count)});
+    if (count > 0) pieces.push_back({place_in(run, at_), out.subspan(filled, count)});
     filled += count;
     at_ += count;
     left_ -= count;
@@ -151,7 +197,7 @@ std::vector<MortonKey> BucketReader::sample(std::size_t count, SpillReader& read
     for (std::size_t i = pieces.size(); i < records.size(); ++i) {
       const std::uint64_t position = sample_position(i, records.size(), size_);
       if (position >= end) break;
-      pieces.push_back({offset_in(run, position - begin), {&records[i], 1}});
+      pieces.push_back({place_in(run, position - begin), {&records[i], 1}});
     }
     begin = end;
   }

@@ -17,28 +17,45 @@
 
 namespace ptc {
 
-/// A temporary file of records. Threads: all may be called concurrently.
+/// Where records lie.
+struct SpillPlace {
+  std::uint32_t volume = 0;
+  std::uint64_t offset = 0;  ///< bytes
+};
+
+/// Temporary files of records, one volume in each of several directories. Threads: one appends, others may read and
+/// discard what it has appended.
 class SpillFile {
  public:
+  /// @param directories  at least one
   /// @throws std::system_error naming the directory
-  explicit SpillFile(const std::filesystem::path& directory) : file_(directory) {}
+  explicit SpillFile(std::span<const std::filesystem::path> directories);
 
-  /// Takes the next room for so many records. @return its offset, a multiple of kDirectBytes
-  [[nodiscard]] std::uint64_t reserve(std::size_t records) noexcept;
-  /// @param offset   from reserve()
+  /// Writes records to the volume that this leaves least full, by its directory's room; when there is none left, to
+  /// the others.
   /// @param records  at an address that is a multiple of kDirectBytes, in memory that can be read
   ///                 up to the next such multiple behind them
-  void write(std::uint64_t offset, std::span<const PointRecord> records);
+  /// @return  their place, its offset a multiple of kDirectBytes
+  /// @throws std::system_error naming the directory
+  [[nodiscard]] SpillPlace append(std::span<const PointRecord> records);
+  void read_at(const SpillPlace& place, std::span<std::byte> bytes) const;
   /// Gives back the disk's blocks that end in these bytes, which are not read again, nor those in front of them in
   /// their first block.
-  void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
-  /// Bytes reserved so far.
-  [[nodiscard]] std::uint64_t bytes() const noexcept { return end_; }
+  void discard(const SpillPlace& place, std::uint64_t bytes) const noexcept;
+  /// Bytes appended so far.
+  [[nodiscard]] std::uint64_t bytes() const noexcept;
 
  private:
-  friend class SpillReader;
-  DirectFile file_;
-  std::atomic<std::uint64_t> end_{0};
+  struct Volume {
+    explicit Volume(const std::filesystem::path& where) : directory(where), file(where) {}
+    std::filesystem::path directory;
+    DirectFile file;
+    std::atomic<std::uint64_t> end{0};
+  };
+  /// Numbers of the volumes, those first that so many bytes leave least full.
+  [[nodiscard]] std::vector<std::uint32_t> by_room(std::uint64_t bytes) const;
+
+  std::vector<std::unique_ptr<Volume>> volumes_;
 };
 
 /// Reads from any offset of a SpillFile, several pieces at once, through memory of its own.
@@ -46,7 +63,7 @@ class SpillReader {
  public:
   /// Consecutive records in the file and where they go.
   struct Piece {
-    std::uint64_t offset = 0;
+    SpillPlace place;
     std::span<PointRecord> out;
   };
 
@@ -77,16 +94,17 @@ class Partition {
  public:
   Partition(SpillFile& file, Splitters splitters);
 
-  /// Groups a run into `grouped`, as long as `records`, stable. @return where it must be written
-  [[nodiscard]] std::uint64_t add_run(std::span<const PointRecord> records,
-                                      std::span<PointRecord> grouped, const Executor& executor);
+  /// Groups a run into `grouped`, as long as `records`, stable; write_run() must follow.
+  void add_run(std::span<const PointRecord> records, std::span<PointRecord> grouped, const Executor& executor);
+  /// Writes what add_run() has grouped, as SpillFile::append().
+  void write_run(std::span<const PointRecord> grouped);
 
   [[nodiscard]] std::size_t ranges() const noexcept { return splitters_.size(); }
 
  private:
   friend class BucketReader;
   struct Run {
-    std::uint64_t offset = 0;           // in the file, bytes
+    SpillPlace place;
     std::vector<std::uint32_t> starts;  // of each range in the run, and the end
   };
 
@@ -114,7 +132,7 @@ class BucketReader {
 
  private:
   [[nodiscard]] std::size_t size_in(const Partition::Run& run) const noexcept;
-  [[nodiscard]] std::uint64_t offset_in(const Partition::Run& run, std::size_t i) const noexcept;
+  [[nodiscard]] SpillPlace place_in(const Partition::Run& run, std::size_t i) const noexcept;
 
   std::shared_ptr<const Partition> partition_;
   std::size_t range_;

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -43,6 +44,20 @@ struct Desk {
 };
 
 }  // namespace
+
+TEST_CASE("progress: a note is a line of its own, on a terminal too", "[base][progress]") {
+  for (const bool terminal : {false, true}) {
+    Desk desk;
+    const auto progress = desk.progress(terminal);
+    progress->note("12.0 GB of temporary files");
+    CHECK(desk.take() == std::string(program_invocation_short_name) + ": 12.0 GB of temporary files\n");
+    progress->begin("sort", 10, "points");
+    desk.take();
+    progress->note("more");  // after what the stage has to say
+    const std::string told = desk.take();
+    CHECK(told.ends_with(std::string("\n") + program_invocation_short_name + ": more\n"));
+  }
+}
 
 TEST_CASE("progress: a count has three digits and a unit", "[base][progress]") {
   CHECK(format_count(0) == "0");

@@ -50,6 +50,34 @@ class Facts(ProgramTest):
         cache = shade["cache"]
         self.assertEqual(cache["lookups"], cache["local_hits"] + cache["shared_hits"] + cache["misses"])
 
+    def test_the_room_that_a_build_takes_is_told_before_it_begins(self):
+        first, second = self.here / "first", self.here / "second"
+        first.mkdir()
+        second.mkdir()
+        command = ["ptcbuild", "--city", "700k", "--memory", "80M", "--temp", first, "--temp", second, "-o", self.here / "o.ptcx"]
+        result = self.succeed(*command, "--json")
+        space = json.loads(result.stdout)["space"]
+        self.assertEqual(space["temp_bytes"], 700_000 * 40)
+        for key in ("temp_free_bytes", "output_bytes", "output_free_bytes"):
+            self.assertGreater(space[key], 1 << 20)
+        # On one disk, whose room is counted once.
+        self.assertLess(abs(space["temp_free_bytes"] - space["output_free_bytes"]), 0.5 * space["output_free_bytes"])
+        told = self.succeed(*command, "--progress").stderr
+        for text in (f"ptcbuild: 0.0 GB of temporary files in {first} and {second}, ", " GB free; about 0.0 GB for "):
+            self.assertIn(text, told)
+            self.assertIn(text, result.stderr)
+        self.assertLess(told.index("temporary files"), told.index("partition"))
+        self.assertEqual(self.succeed(*command, "--quiet").stderr, "")
+        self.assertFalse([*first.iterdir(), *second.iterdir()])
+        self.assertEqual(self.succeed("ptcbuild", self.cloud, "-o", self.here / "o.ptcx").stderr, "")
+
+    def test_what_the_disks_have_no_room_for_is_refused_with_both_figures(self):
+        for options in (["--city", "80G"], ["--city", "80G", "--temp", "/dev/shm"]):
+            message = run("ptcbuild", *options, "-o", self.here / "o.ptcx")
+            self.assertEqual(message.returncode, 3)
+            self.assertRegex(message.stderr, r"take (up to|about) \d+\.\d GB in .*, with \d+\.\d GB free")
+        self.assertFalse(list(self.here.iterdir()))
+
     def test_bounces_are_told_and_add_light(self):
         facts = {}
         for program, name in (("ptcshade", "o.ply"), ("ptcrender", "o.png")):

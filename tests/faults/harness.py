@@ -58,6 +58,8 @@ SCENARIOS = [
     Scenario("build mesh", "ptcbuild {in}/box.obj -o {out}/o.ptcx --points 500 --threads 2", "o.ptcx"),
     Scenario("build spilling", "ptcbuild --city 700K --memory 80M --threads 2 --page-size 1M --profile raw"
              " --temp {in}/temp -o {out}/o.ptcx", "o.ptcx", slow=True),
+    Scenario("build spread", "ptcbuild --city 700K --memory 80M --threads 2 --page-size 1M --profile raw"
+             " --temp {in}/temp --temp {in}/more -o {out}/o.ptcx", "o.ptcx", slow=True),
     Scenario("shade to container", "ptcshade {in}/ball.ptcx -o {out}/o.ptcx --threads 1", "o.ptcx"),
     Scenario("shade to cloud", "ptcshade {in}/ball.ptcx -o {out}/o.ply --threads 2", "o.ply"),
     Scenario("shade mapped", "ptcshade {in}/ball.ptcx -o {out}/o.ply --threads 1 --io mmap", "o.ply"),
@@ -95,7 +97,9 @@ class Place:
         self.home = Path(home)
         self.out = self.home / "out"
         self.out.mkdir(parents=True)
-        (self.home / "temp").mkdir()
+        self.temps = [self.home / "temp", self.home / "more"]
+        for temp in self.temps:
+            temp.mkdir()
         make_inputs(self.home)
         self.target = self.out / scenario.target if scenario.target else None
         self.report = Path(f"{home}.report")
@@ -111,11 +115,14 @@ class Place:
 
     def reset(self, old=OLD):
         self.old = old
-        for path in (*self.out.iterdir(), *(self.home / "temp").iterdir()):
+        for path in self.files():
             path.unlink()
         if self.target and old:
             self.target.write_bytes(old)
         self.report.unlink(missing_ok=True)
+
+    def files(self):
+        return [path for folder in (self.out, *self.temps) for path in folder.iterdir()]
 
     def environment(self, how="", at=0, on=False, trace=None):
         asked = {"LD_PRELOAD": CALLS, "PTC_FAULTS_DIR": str(self.home), "PTC_FAULTS_HOW": how,
@@ -156,7 +163,7 @@ class Place:
         return Run(process.returncode, errors, report)
 
     def leftovers(self):
-        return sorted(p.name for p in (*self.out.iterdir(), *(self.home / "temp").iterdir()) if p != self.target)
+        return sorted(path.name for path in self.files() if path != self.target)
 
     def complaints(self, run, may_leave=False):
         """What is wrong after any fault: a hang, a death, a half file, a temporary file."""

@@ -60,6 +60,8 @@ def fill(place, arguments, tally):
         for text in wrong:
             tally.fail(f"{place.scenario}: {size} bytes for {directory.name}: {text}: {run.errors.strip()}")
         subprocess.run(["umount", directory], check=True)
+    if place.scenario.name == "build spread" and set(codes[len(sizes):]) != {"0"}:
+        tally.fail(f"{place.scenario}: the other directory has room: {codes}")
     if codes[len(sizes) - 1] != "0" or codes[-1] != "0" or "3" not in codes:
         tally.fail(f"{place.scenario}: no size was too small, or none large enough: {codes}")
     print(f"  {place.scenario}: exit codes by growing size: {' '.join(codes)}", flush=True)

@@ -112,6 +112,18 @@ TEST_CASE("pipeline: a mesh in memory is built as its file is", "[integration][b
   CHECK_FALSE(std::filesystem::exists(dir / "broken.ptcx"));
 }
 
+TEST_CASE("pipeline: an output that its disk has no room for is refused before work begins", "[integration][build]") {
+  const TemporaryDirectory dir;
+  const std::vector<std::filesystem::path> temps{dir.path(), dir.path()};
+  CHECK_THROWS_WITH(require_build_space(std::uint64_t{1} << 45, 0, Profile::raw, temps, dir / "a.ptcx"),
+                    Catch::Contains("take about 1618481.1 GB in " + dir.path().string()) && Catch::Contains(" GB free"));
+  const BuildSpace space = require_build_space(1000, 40'000, Profile::raw, temps, dir / "a.ptcx");
+  CHECK(space.temp_bytes == 40'000);
+  CHECK(space.output_bytes == 46'000);
+  CHECK(space.temp_free_bytes < space.output_free_bytes * 3 / 2);  // twice the same disk
+  CHECK(require_build_space(0, 0, Profile::raw, temps, dir / "a.ptcx").output_free_bytes == 0);  // not known
+}
+
 TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integration][build]") {
   const TemporaryDirectory dir;
   Progress silent;

@@ -61,7 +61,7 @@ Outcome sort(std::span<const PointRecord> input, std::uint64_t cap, unsigned thr
              std::span<const MortonKey> sample, std::uint64_t expected = 0) {
   const TempDirectory directory;
   const Executor executor(threads);
-  ExternalSorter sorter({cap, directory.path, expected}, executor, sample);
+  ExternalSorter sorter({cap, {directory.path}, expected}, executor, sample);
   add_in_blocks(sorter, input, 3001);
   Outcome outcome;
   outcome.records = drain(*sorter.finish(), 2222);
@@ -130,7 +130,7 @@ TEST_CASE("external sort: what the disk has no room for is refused before it beg
   const TempDirectory directory;
   const Executor executor(1);
   try {
-    const ExternalSorter sorter({kLeastCap, directory.path, std::uint64_t{1} << 50}, executor, {});
+    const ExternalSorter sorter({kLeastCap, {directory.path}, std::uint64_t{1} << 50}, executor, {});
     FAIL("begun");
   } catch (const std::system_error& error) {
     CHECK(error.code() == std::errc::no_space_on_device);
@@ -212,7 +212,7 @@ TEST_CASE("external sort: blocks of any size come out the same", "[sort][externa
   const std::vector<PointRecord> expected = stable_sorted(input);
   for (const std::uint64_t cap : {kLeastCap, 16 * kMiB})
     for (const std::size_t block : {1u, 13u, 4096u, 100000u}) {
-      ExternalSorter sorter({cap, directory.path}, two, {});
+      ExternalSorter sorter({cap, {directory.path}}, two, {});
       add_in_blocks(sorter, input, block);
       const std::unique_ptr<PointStream> stream = sorter.finish();
       CHECK(same_bytes(drain(*stream, block), expected));
@@ -228,7 +228,7 @@ TEST_CASE("external sort: a block that is offered is filled as long as there are
   const TempDirectory directory;
   const Executor two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
-  ExternalSorter sorter({kLeastCap, directory.path}, two, {});
+  ExternalSorter sorter({kLeastCap, {directory.path}}, two, {});
   sorter.add(input);
   const std::unique_ptr<PointStream> stream = sorter.finish();
   std::vector<PointRecord> out(15000);
@@ -241,7 +241,7 @@ TEST_CASE("external sort: the digest is that of the set, however it came", "[sor
   const Executor one(1), two(2);
   const auto digest = [&](std::span<const PointRecord> records, const Executor& executor,
                           std::size_t block) {
-    ExternalSorter sorter({64 * kMiB, directory.path}, executor, {});
+    ExternalSorter sorter({64 * kMiB, {directory.path}}, executor, {});
     add_in_blocks(sorter, records, block);
     return sorter.digest();
   };
@@ -275,13 +275,13 @@ TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);
   const std::size_t files = open_files();
   {
-    ExternalSorter sorter({kLeastCap, directory.path}, two, {});
+    ExternalSorter sorter({kLeastCap, {directory.path}}, two, {});
     sorter.add(input);
     CHECK(open_files() == files + 1);
   }
   CHECK(open_files() == files);
   for (const std::size_t taken : {0u, 1u, 30000u}) {
-    ExternalSorter sorter({kLeastCap, directory.path}, two, {});
+    ExternalSorter sorter({kLeastCap, {directory.path}}, two, {});
     sorter.add(input);
     const std::unique_ptr<PointStream> stream = sorter.finish();
     std::vector<PointRecord> out(taken);
@@ -294,24 +294,24 @@ TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops
 TEST_CASE("external sort: adding after the end and ending twice are refused", "[sort][external]") {
   const TempDirectory directory;
   const Executor one(1);
-  ExternalSorter sorter({kMiB, directory.path}, one, {});
+  ExternalSorter sorter({kMiB, {directory.path}}, one, {});
   const std::unique_ptr<PointStream> stream = sorter.finish();
   CHECK_THROWS_AS(sorter.add({}), std::invalid_argument);
   CHECK_THROWS_AS(sorter.finish(), std::invalid_argument);
-  CHECK_THROWS_AS(ExternalSorter({1000, directory.path}, one, {}), std::invalid_argument);
+  CHECK_THROWS_AS(ExternalSorter({1000, {directory.path}}, one, {}), std::invalid_argument);
 }
 
 TEST_CASE("external sort: a directory that cannot be written to is named once it is needed",
           "[sort][external]") {
   const Executor two(2);
   const std::vector<PointRecord> input = make_records(Keys::lattice, 50000);
-  ExternalSorter small({64 * kMiB, "/nonexistent/spill"}, two, {});
+  ExternalSorter small({64 * kMiB, {"/nonexistent/spill"}}, two, {});
   small.add(input);
   CHECK(drain(*small.finish(), 1000).size() == input.size());
 
-  ExternalSorter large({kLeastCap, "/nonexistent/spill"}, two, {});
+  ExternalSorter large({kLeastCap, {"/nonexistent/spill"}}, two, {});
   CHECK_THROWS_AS(large.add(input), std::system_error);
-  ExternalSorter again({kLeastCap, "/nonexistent/spill"}, two, {});
+  ExternalSorter again({kLeastCap, {"/nonexistent/spill"}}, two, {});
   CHECK_THROWS_WITH(again.add(input), Catch::Contains("/nonexistent/spill"));
 }
 
@@ -327,7 +327,7 @@ TEST_CASE("external sort: a disk that fills up is reported and leaves nothing be
     {
       const FileSizeLimit limit(room);
       try {
-        ExternalSorter sorter({kMiB, directory.path}, two, {});
+        ExternalSorter sorter({kMiB, {directory.path}}, two, {});
         add_in_blocks(sorter, input, 1000);
         static_cast<void>(sorter.finish());
       } catch (const std::system_error& error) {
@@ -340,13 +340,35 @@ TEST_CASE("external sort: a disk that fills up is reported and leaves nothing be
   }
 }
 
+TEST_CASE("external sort: what one directory does not take goes to the others", "[sort][external]") {
+  const TempDirectory directory;
+  const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
+  const std::vector<MortonKey> sample = sample_of(input, 1000);
+  const Executor two(2);
+  std::vector<std::filesystem::path> directories(2, directory.path);
+  if (std::filesystem::exists("/dev/shm")) directories[1] = "/dev/shm";  // on a disk of its own, with other room
+  const FileSizeLimit limit(input.size() * sizeof(PointRecord) * 7 / 10);
+  {
+    ExternalSorter sorter({kMiB, directories}, two, sample);
+    sorter.add(input);
+    CHECK(same_bytes(drain(*sorter.finish(), 2222), stable_sorted(input)));
+  }
+  ExternalSorter sorter({kMiB, {directories[0]}}, two, sample);
+  CHECK_THROWS_AS(
+      [&] {
+        sorter.add(input);
+        static_cast<void>(sorter.finish());
+      }(),
+      std::system_error);
+}
+
 TEST_CASE("external sort: a stream that failed does not look as if it ended", "[sort][external]") {
   const TempDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);  // 2 MB
   const std::vector<MortonKey> one_key(1000, input.front().key);
   for (const unsigned threads : {1u, 2u}) {
     const Executor executor(threads);
-    ExternalSorter sorter({kLeastCap, directory.path}, executor, one_key);
+    ExternalSorter sorter({kLeastCap, {directory.path}}, executor, one_key);
     sorter.add(input);
     // The first spill fits, the partition of the bucket that is too large does not.
     const FileSizeLimit limit(input.size() * sizeof(PointRecord) + kMiB);
@@ -374,7 +396,7 @@ bool sort_random(std::size_t count, std::uint64_t cap, const Executor& executor,
   if (fair_sample)
     for (MortonKey& key : sample) key = key_of(Keys::lattice, 0, 1, random);
   std::vector<PointRecord> block(4096);
-  ExternalSorter sorter({cap, directory.path}, executor, sample);
+  ExternalSorter sorter({cap, {directory.path}}, executor, sample);
   for (std::size_t i = 0; i < count; i += block.size()) {
     for (PointRecord& r : block) r.key = key_of(Keys::lattice, 0, 1, random);
     sorter.add(block);

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <filesystem>
+#include <numeric>
 #include <stdexcept>
 #include <system_error>
 
@@ -37,22 +38,27 @@ std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord>
   while (!records.empty()) {
     const std::size_t count = std::min(run, records.size());
     const std::span<PointRecord> grouped = records_in(memory).first(count);
-    const std::uint64_t offset = partition->add_run(records.first(count), grouped, two);
-    file.write(offset, grouped);
+    partition->add_run(records.first(count), grouped, two);
+    partition->write_run(grouped);
     records = records.subspan(count);
   }
   return partition;
 }
 
-// Bytes on the disk of the files that this process has open and that have no name.
-std::uint64_t nameless_bytes() {
-  std::uint64_t bytes = 0;
+// Bytes on the disk of each file that this process has open and that has no name.
+std::vector<std::uint64_t> nameless_files() {
+  std::vector<std::uint64_t> files;
   for (const auto& fd : std::filesystem::directory_iterator("/proc/self/fd")) {
     struct stat status {};
     const bool known = ::stat(fd.path().c_str(), &status) == 0;
-    if (known && S_ISREG(status.st_mode) && status.st_nlink == 0) bytes += static_cast<std::uint64_t>(status.st_blocks) * 512;
+    if (known && S_ISREG(status.st_mode) && status.st_nlink == 0) files.push_back(static_cast<std::uint64_t>(status.st_blocks) * 512);
   }
-  return bytes;
+  return files;
+}
+
+std::uint64_t nameless_bytes() {
+  const std::vector<std::uint64_t> files = nameless_files();
+  return std::accumulate(files.begin(), files.end(), std::uint64_t{0});
 }
 
 }  // namespace
@@ -99,7 +105,7 @@ TEST_CASE("spill: each range gives its records back in the order of the input", 
   const Splitters splitters(sample_of(input, 1000), 10);
   for (const std::size_t run : {512u, 1000u, 5000u}) {
     for (const std::size_t step : {1u, 7u, 5000u}) {
-      SpillFile file(kDirectory);
+      SpillFile file({&kDirectory, 1});
       const auto partition = spilled(file, input, run, 10);
       SpillReader reader(file, SpillReader::kLeastBytes);
       REQUIRE(partition->ranges() == splitters.size());
@@ -120,13 +126,13 @@ TEST_CASE("spill: each range gives its records back in the order of the input", 
 }
 
 TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
-  SpillFile file(kDirectory);
+  SpillFile file({&kDirectory, 1});
   const std::uint64_t others = nameless_bytes();
   const std::vector<PointRecord> records = make_records(Keys::surface, 60'000);
   const auto partition = spilled(file, records, 7'000, 20);
   const std::uint64_t all = nameless_bytes() - others;
   CHECK(all >= records.size() * sizeof(PointRecord));
-  file.discard(0, 0);  // no more than what it is asked for
+  file.discard({}, 0);  // no more than what it is asked for
   CHECK(nameless_bytes() - others == all);
 
   SpillReader reader(file, SpillReader::kLeastBytes);
@@ -145,9 +151,36 @@ TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
   CHECK(nameless_bytes() - others <= (runs + 4) * kDirectBytes);  // the last block of each, and what says where they are
 }
 
+TEST_CASE("spill: records are spread over directories and come back from all", "[sort][spill]") {
+  const std::vector<PointRecord> input = make_records(Keys::surface, 32100);
+  const std::vector<std::filesystem::path> directories(3, kDirectory);
+  const std::vector<std::uint64_t> others = nameless_files();
+  SpillFile file(directories);
+  const auto partition = spilled(file, input, 1024, 10);
+  std::vector<std::uint64_t> sizes = nameless_files();
+  REQUIRE(sizes.size() == others.size() + 3);
+  std::uint64_t all = 0;
+  for (const std::uint64_t size : sizes) {
+    if (std::ranges::find(others, size) != others.end()) continue;
+    CHECK(size >= 10 * 1024 * sizeof(PointRecord));  // of 32 runs
+    all += size;
+  }
+  CHECK(all == file.bytes());
+
+  SpillReader reader(file, SpillReader::kLeastBytes);
+  std::vector<PointRecord> sorted, block(input.size());
+  for (std::size_t range = 0; range < partition->ranges(); ++range) {
+    BucketReader bucket(partition, range);
+    const std::size_t count = bucket.read(block, reader);
+    const std::vector<PointRecord> records = stable_sorted({block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count)});
+    sorted.insert(sorted.end(), records.begin(), records.end());
+  }
+  CHECK(same_bytes(sorted, stable_sorted(input)));
+}
+
 TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
   const std::vector<PointRecord> input = make_records(Keys::ascending, 5000);
-  SpillFile file(kDirectory);
+  SpillFile file({&kDirectory, 1});
   const auto partition = spilled(file, input, 600, 3);
   SpillReader reader(file, SpillReader::kLeastBytes);
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
@@ -170,7 +203,7 @@ TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
 }
 
 TEST_CASE("spill: a read buffer below its least is refused", "[sort][spill]") {
-  const SpillFile file(kDirectory);
+  const SpillFile file({&kDirectory, 1});
   CHECK_THROWS_AS(SpillReader(file, SpillReader::kLeastBytes - 1), std::invalid_argument);
 }
 

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/file.h"
+#include "engine/io/room.h"
 #include "engine/stages.h"
 #include "engine/store/reader.h"
 #include "engine/store/structure.h"
@@ -58,7 +58,7 @@ class BuildRun {
  private:
   [[nodiscard]] Input make_input(std::uint64_t points) {
     constexpr std::uint64_t kFiles = 3;  // input, what is spilled, container; a city has up to 5 % more points
-    require_room(work_, kFiles * points * sizeof(PointRecord) * 21 / 20, fmt::format("{} records", points));
+    require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20, fmt::format("{} records", points));
     Input input{.file = RecordFile(work_), .frame = {}, .sample = {}};
     RecordWriter writer(input.file);
     progress_.begin("write input", points, "records");
@@ -122,7 +122,7 @@ class BuildRun {
     Built built;
     RunOptions run = run_;
     run.memory_bytes = cap;
-    ExternalSorter sorter({.memory_bytes = memory_left(run, kBufferBytes, kLeastSort, "this build"), .temp_dir = work_, .expected = input.file.records()},
+    ExternalSorter sorter({.memory_bytes = memory_left(run, kBufferBytes, kLeastSort, "this build"), .temp_dirs = {work_}, .expected = input.file.records()},
                           executor_, input.sample);
     {
       RecordReader reader(input.file);

@@ -15,7 +15,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/file.h"
+#include "engine/io/room.h"
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
 #include "tools/bench/bench_scene.h"
@@ -240,7 +240,7 @@ class CacheRun {
   [[nodiscard]] bool wants(const char* panel) const { return std::ranges::find(options_.panels, panel) != options_.panels.end(); }
 
   [[nodiscard]] BenchScene make_scene(int levels_per_stream) {
-    require_room(work_, build_disk_bytes(options_.points), fmt::format("{} surfels", options_.points));
+    require_room({&work_, 1}, build_disk_bytes(options_.points), fmt::format("{} surfels", options_.points));
     const SceneOptions scene{.points = options_.points,
                              .shaded_width = 0,
                              .own_points = options_.receivers,

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/memory.h"
-#include "engine/io/file.h"
+#include "engine/io/room.h"
 #include "engine/shade/brute_force.h"
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
@@ -143,8 +143,8 @@ class GrowthRun {
   [[nodiscard]] bool in_reach(std::uint64_t points) const { return points <= options_.ray_reach; }
 
   [[nodiscard]] BenchScene make_scene(const SceneChoice& choice, std::uint64_t points) {
-    const std::filesystem::path directory = run_.temp_dir.empty() ? work_ : run_.temp_dir;
-    require_room(directory, build_disk_bytes(points), fmt::format("{} surfels", points));
+    const std::filesystem::path directory = run_.temp_dirs.empty() ? work_ : roomiest(run_.temp_dirs);
+    require_room({&directory, 1}, build_disk_bytes(points), fmt::format("{} surfels", points));
     const SceneOptions options{.points = points, .shaded_width = 0, .own_points = options_.own_points, .rays = in_reach(points)};
     return {choice, options, work_, run_, progress_};
   }

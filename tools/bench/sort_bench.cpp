@@ -10,7 +10,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
-#include "engine/io/file.h"
+#include "engine/io/room.h"
 #include "tools/bench/record_file.h"
 #include "tools/bench/timed_runs.h"
 
@@ -159,7 +159,7 @@ class SortRun {
 
   void on_disk(const std::string& order, std::uint64_t points) {
     constexpr std::uint64_t kFiles = 3;  // input, what is spilled or between copies, and output; a city has up to 5 % more points
-    require_room(work_, kFiles * points * sizeof(PointRecord) * 21 / 20, fmt::format("{} records", points));
+    require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20, fmt::format("{} records", points));
     RecordFile input(work_);
     RecordWriter writer(input);
     Check expected;
@@ -198,7 +198,7 @@ class SortRun {
   /// @param check  of what comes out, or null
   /// @return bytes spilled
   std::uint64_t sort_file(const RecordFile& input, std::span<const MortonKey> sample, Check* check) {
-    ExternalSorter sorter({.memory_bytes = run_.memory_bytes, .temp_dir = work_, .expected = input.records()}, executor_, sample);
+    ExternalSorter sorter({.memory_bytes = run_.memory_bytes, .temp_dirs = {work_}, .expected = input.records()}, executor_, sample);
     {
       RecordReader reader(input);
       for (std::span<const PointRecord> block = reader.next(); !block.empty(); block = reader.next()) sorter.add(block);
