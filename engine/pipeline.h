@@ -49,11 +49,18 @@ struct BuildRequest {
   BuildOptions tree;
   std::uint8_t page_shift = 16;
   Profile profile = Profile::compact;
+  /// Goes on where a build of the same request ended, however it did, and leaves what another needs to do so unless it
+  /// comes to its end. Once the points are sorted, no more than `checkpoint_points` of them and what is taken at once is
+  /// built again; a sort that did not come to its end begins anew. All points go to temporary files, even if memory
+  /// would hold them.
+  bool resume = false;
+  std::uint64_t checkpoint_points = std::uint64_t{1} << 22;
   RunOptions run;
 };
 
 struct BuildReport {
   Superblock superblock;
+  std::uint64_t resumed_points = 0;  ///< of an earlier build
   BuildSpace space;
   SortStatistics sort;
   StageSeconds seconds;
@@ -62,7 +69,7 @@ struct BuildReport {
 /// Samples and lights meshes, reads clouds, sorts, builds the octree and publishes the container.
 /// The same request gives the same bytes for any number of threads and any cap. Notes what it takes on the disk when it
 /// is known beforehand that memory will not hold the points, and refuses it when there is no room.
-/// @throws DataError for bad input, std::invalid_argument as check_mesh() for the mesh in memory and for
+/// @throws DataError for bad input and for what an earlier build left when it is damaged or of another request, std::invalid_argument as check_mesh() for the mesh in memory and for
 ///         a cap that is too small (the text names the least that works), std::system_error
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
                             Progress& progress);

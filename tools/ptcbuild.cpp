@@ -17,6 +17,7 @@ constexpr char kExamples[] =
     "  ptcbuild dragon.ply --backdrop -o dragon.ptcx\n"
     "  ptcbuild sponza.obj --points 20M --sun 30,60,4 --sky 0.5,0.6,0.8 -o sponza.ptcx\n"
     "  ptcbuild scan.ply --memory 512M --progress -o scan.ptcx\n"
+    "  ptcbuild huge.ply --resume --temp . --temp /scratch -o huge.ptcx\n"
     "  ptcbuild --city 100M --memory 1G --temp /scratch -o city.ptcx\n";
 
 /// What the command line says beyond the request itself.
@@ -77,6 +78,12 @@ void declare_container(CLI::App& app, ptc::BuildRequest& request) {
       ->group("Expert");
 }
 
+void declare_resume(CLI::App& app, ptc::BuildRequest& request) {
+  constexpr char kGroup[] = "Resume";
+  CLI::Option* resume = app.add_flag("--resume", request.resume, "Leave what it takes to go on, and go on with what there is")->group(kGroup);
+  ptc::add_count(app, "--checkpoint", request.checkpoint_points, "Points that are built again at most, about")->needs(resume)->group(kGroup);
+}
+
 ptc::Outcome build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   ptc::BuildRequest& request = arguments.request;
   if (request.inputs.empty() && request.city_points == 0) {
@@ -91,6 +98,7 @@ ptc::Outcome build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progre
   const ptc::Superblock& made = report.superblock;
   nlohmann::ordered_json facts{{"output", arguments.output.string()}};
   facts.update(ptc::container_facts(made));
+  if (request.resume) facts["resumed_points"] = report.resumed_points;
   facts["space"] = ptc::facts_of(report.space);
   facts["sort"] = ptc::facts_of(report.sort);
   facts["seconds"] = ptc::facts_of(report.seconds);
@@ -109,6 +117,7 @@ int main(int argc, char** argv) {
   declare_sampling(command.app(), arguments);
   declare_lights(command.app(), arguments);
   declare_container(command.app(), arguments.request);
+  declare_resume(command.app(), arguments.request);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     return build(arguments, command.run_options(), progress);
   });

@@ -1,13 +1,12 @@
 #include "engine/build/build.h"
 
 #include <algorithm>
-#include <deque>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "engine/build/octree.h"
-#include "format/node_page.h"
+#include "engine/build/page_order.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
 
@@ -55,96 +54,6 @@ void include(Superblock& superblock, const Totals& page, std::uint64_t points) {
   superblock.points += points;
 }
 
-using Page = ContainerWriter::Page;
-
-Page point_page(std::span<const PointRecord> points) {
-  return {.facts = {.type = PageType::point,
-                    .record_count = static_cast<std::uint32_t>(points.size()),
-                    .first_key = points.front().key.high,
-                    .last_key = points.back().key.high},
-          .payload = encode_point_page(points)};
-}
-
-/// Pages of points and nodes in the order of the file. A node page is there when it is full, one open page per
-/// stream of levels; it gets its number when it is opened, so that parents can refer to groups that are not on the
-/// disk yet. A point page comes before the groups that end in it.
-class PageOrder : public GroupSink {
- public:
-  PageOrder(ContainerWriter& writer, std::uint32_t points_per_page, int levels_per_stream)
-      : writer_(writer),
-        points_per_page_(points_per_page),
-        levels_per_stream_(levels_per_stream),
-        payload_limit_((std::size_t{1} << writer.header().page_shift) - kPageHeaderBytes),
-        streams_(static_cast<std::size_t>(kMaxLevel / levels_per_stream + 1)) {}
-
-  /// The next page of points; its number is given later.
-  void add(Page points) { points_.push_back(std::move(points)); }
-
-  ChildRef add(const GroupView& group, std::uint64_t end) override {
-    while (!points_.empty() && next_point_ <= end) take_points();
-    std::optional<Stream>& stream = streams_[static_cast<std::size_t>(group.level() / levels_per_stream_)];
-    if (stream && !stream->encoder.fits(static_cast<std::size_t>(group.size()))) flush(stream);
-    if (!stream) stream.emplace(Stream{writer_.reserve_page(), NodePageEncoder(payload_limit_)});
-    stream->keys.include(group);
-    return {.interior = true, .page = stream->page, .slot = stream->encoder.add(group)};
-  }
-
-  /// The pages that are whole.
-  [[nodiscard]] std::vector<Page> take() noexcept { return std::exchange(whole_, {}); }
-
-  /// Adds all others; of nodes those still open, deepest first: the coarse levels end up last in the file.
-  void finish() {
-    while (!points_.empty()) take_points();
-    for (auto stream = streams_.rbegin(); stream != streams_.rend(); ++stream) {
-      if (*stream) flush(*stream);
-    }
-  }
-
- private:
-  struct Range {
-    std::uint64_t first = ~std::uint64_t{0};
-    std::uint64_t last = 0;
-    std::uint16_t least_level = 0xffff;
-    void include(const GroupView& group) {
-      first = std::min(first, group.cell().high);
-      last = std::max(last, group.cell().high);
-      least_level = std::min(least_level, static_cast<std::uint16_t>(group.level()));
-    }
-  };
-  struct Stream {
-    std::uint32_t page;
-    NodePageEncoder encoder;
-    Range keys{};
-  };
-
-  void take_points() {
-    whole_.push_back(std::move(points_.front()));
-    whole_.back().id = writer_.reserve_page();
-    points_.pop_front();
-    next_point_ += points_per_page_;
-  }
-
-  void flush(std::optional<Stream>& stream) {
-    whole_.push_back({.id = stream->page,
-                      .facts = {.type = PageType::node,
-                                .level = stream->keys.least_level,
-                                .record_count = stream->encoder.size(),
-                                .first_key = stream->keys.first,
-                                .last_key = stream->keys.last},
-                      .payload = stream->encoder.take()});
-    stream.reset();
-  }
-
-  ContainerWriter& writer_;
-  std::uint32_t points_per_page_;
-  int levels_per_stream_;
-  std::size_t payload_limit_;
-  std::vector<std::optional<Stream>> streams_;
-  std::deque<Page> points_;       ///< not yet taken
-  std::uint64_t next_point_ = 0;  ///< first of these
-  std::vector<Page> whole_;
-};
-
 /// Waits for pages on their way when a build ends, however it does: they use its executor.
 class Settled {
  public:
@@ -173,10 +82,41 @@ std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
   return filled;
 }
 
+/// The points of one call of OctreeBuilder::add(), and what they add to the superblock.
+void add_block(std::span<const PointRecord> block, const Frame& frame, const Executor& executor, Superblock& superblock,
+               PageOrder& order) {
+  const std::size_t per_page = superblock.points_per_page;
+  std::vector<ContainerWriter::Page> pages((block.size() - 1) / per_page + 1);
+  std::vector<Totals> totals(pages.size());
+  executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
+    const auto page = block.subspan(i * per_page, std::min(per_page, block.size() - i * per_page));
+    pages[i] = point_page(page);
+    totals[i] = totals_of(PointPage(pages[i].payload.data(), pages[i].facts.record_count), frame);
+  });
+  for (std::size_t i = 0; i < pages.size(); ++i) {
+    include(superblock, totals[i], pages[i].facts.record_count);
+    order.add(std::move(pages[i]));
+  }
+}
+
+void save_totals(const Superblock& superblock, StateWriter& state) {
+  state.put(superblock.points);
+  state.put(superblock.area);
+  for (const auto& numbers : {superblock.bounds_low, superblock.bounds_high, superblock.flux}) state.put(numbers);
+}
+
+void load_totals(StateReader& state, Superblock& superblock) {
+  superblock.points = state.get<std::uint64_t>();
+  superblock.area = state.get<double>();
+  for (auto* numbers : {&superblock.bounds_low, &superblock.bounds_high, &superblock.flux}) {
+    *numbers = state.get<std::array<double, 3>>();
+  }
+}
+
 }  // namespace
 
 Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
-                       const Executor& executor, Progress& progress) {
+                       const Executor& executor, Progress& progress, const Checkpoints& checkpoints) {
   const Frame& frame = writer.header().frame;
   Superblock superblock;
   superblock.leaf_points = options.leaf_points;
@@ -186,22 +126,25 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
   const Settled settled(writer);
   PageOrder order(writer, superblock.points_per_page, options.levels_per_stream);
   OctreeBuilder octree(order, options.leaf_points, frame.unit(), executor);
+  if (checkpoints.from != nullptr) {
+    load_totals(*checkpoints.from, superblock);
+    order.load(*checkpoints.from, superblock.points);
+    octree.load(*checkpoints.from, writer.state().pages);
+  }
+  std::uint64_t saved = superblock.points;
   std::vector<PointRecord> block(std::max<std::size_t>(kPointsAtOnce / per_page, 1) * per_page);
   while (const std::size_t count = read_full(points, block)) {
-    std::vector<Page> pages((count - 1) / per_page + 1);
-    std::vector<Totals> totals(pages.size());
-    executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
-      const auto page = std::span(block).subspan(i * per_page, std::min(per_page, count - i * per_page));
-      pages[i] = point_page(page);
-      totals[i] = totals_of(PointPage(pages[i].payload.data(), pages[i].facts.record_count), frame);
-    });
-    for (std::size_t i = 0; i < pages.size(); ++i) {
-      include(superblock, totals[i], pages[i].facts.record_count);
-      order.add(std::move(pages[i]));
-    }
+    add_block(std::span(block).first(count), frame, executor, superblock, order);
     octree.add(std::span(block).first(count));
     writer.write_pages(order.take(), executor);
     progress.advance(count);
+    if (!checkpoints.save || superblock.points - saved < checkpoints.interval || count < block.size()) continue;
+    saved = superblock.points;
+    StateWriter state;
+    save_totals(superblock, state);
+    order.save(state);
+    octree.save(state);
+    checkpoints.save({superblock.points, block.back().key}, state.take());
   }
   const OctreeBuilder::Result tree = octree.finish();
   order.finish();

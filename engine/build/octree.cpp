@@ -2,9 +2,54 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <type_traits>
 #include <utility>
 
+#include "engine/build/page_order.h"
+
 namespace ptc {
+namespace {
+
+void save_child(const NodeChild& child, StateWriter& state) {
+  state.put(static_cast<std::uint8_t>(child.ref.interior));
+  state.put(child.ref.page);
+  state.put(child.ref.slot);
+  state.put(child.ref.first_point);
+  state.put(child.ref.point_count);
+  const NodeSummary& node = child.node;
+  for (const double value : node.mean) state.put(value);
+  for (const double value : {node.radius, node.area, node.thickness}) state.put(value);
+  for (const double value : node.facing) state.put(value);
+  for (const auto& flux : node.flux) state.put(flux);
+  for (const float value : node.cone_axis) state.put(value);
+  state.put(node.cone_cos);
+}
+
+NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t points) {
+  NodeChild child;
+  child.ref.interior = state.get<std::uint8_t>() != 0;
+  child.ref.page = state.get<std::uint32_t>();
+  child.ref.slot = state.get<std::uint16_t>();
+  child.ref.first_point = state.get_count(points);
+  child.ref.point_count = state.get<std::uint32_t>();
+  state.require(child.ref.interior ? child.ref.page < pages : child.ref.point_count <= points - child.ref.first_point,
+                "a closed cell of the tree's state lies nowhere");
+  const auto load_number = [&](auto& value) {
+    value = state.get<std::remove_reference_t<decltype(value)>>();
+    state.require(std::isfinite(value), "a sum of the tree's state is not finite");
+  };
+  NodeSummary& node = child.node;
+  std::ranges::for_each(node.mean, load_number);
+  for (double* value : {&node.radius, &node.area, &node.thickness}) load_number(*value);
+  std::ranges::for_each(node.facing, load_number);
+  for (auto& flux : node.flux) std::ranges::for_each(flux, load_number);
+  std::ranges::for_each(node.cone_axis, load_number);
+  load_number(node.cone_cos);
+  return child;
+}
+
+}  // namespace
 
 OctreeBuilder::OctreeBuilder(GroupSink& sink, std::uint32_t leaf_points, double unit, const Executor& executor)
     : sink_(sink),
@@ -125,6 +170,45 @@ NodeChild OctreeBuilder::close(std::uint64_t end) {
   encoded_.clear();
   append_group(group, encoded_);
   return {emit(encoded_, end), summarise_children(group.children)};
+}
+
+void OctreeBuilder::save(StateWriter& state) const {
+  save_points(window_, state);
+  for (const std::uint64_t number : {window_first_, last_key_.high, last_key_.low, last_rank_, result_.points, result_.nodes,
+                                     result_.groups, static_cast<std::uint64_t>(result_.levels)}) {
+    state.put(number);
+  }
+  save_child(current_, state);
+  state.put(std::uint64_t{path_.size()});
+  for (const NodeGroup& cell : path_) {
+    state.put(cell.cell.high);
+    state.put(cell.cell.low);
+    state.put(std::uint64_t{static_cast<unsigned>(cell.level)});
+    state.put(std::uint64_t{cell.children.size()});
+    for (const NodeChild& child : cell.children) save_child(child, state);
+  }
+}
+
+void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
+  window_ = load_points(state);
+  for (std::uint64_t* number : {&window_first_, &last_key_.high, &last_key_.low, &last_rank_, &result_.points, &result_.nodes,
+                                &result_.groups}) {
+    *number = state.get<std::uint64_t>();
+  }
+  result_.levels = static_cast<int>(state.get_count(kMaxLevel + 1));
+  state.require(result_.points == window_first_ && (window_.empty() || last_key_ <= window_.front().key),
+                "the points of the tree's state do not follow each other");
+  current_ = load_child(state, pages, window_first_);
+  path_.resize(static_cast<std::size_t>(state.get_count(kMaxLevel + 1)));
+  int above = -1;
+  for (NodeGroup& cell : path_) {
+    cell.cell = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
+    cell.level = static_cast<int>(state.get_count(kMaxLevel));
+    state.require(cell.level > above, "the open cells of the tree's state do not lie in each other");
+    above = cell.level;
+    cell.children.resize(static_cast<std::size_t>(state.get_count(kMaxChildren - 1)));
+    for (NodeChild& child : cell.children) child = load_child(state, pages, window_first_);
+  }
 }
 
 OctreeBuilder::Result OctreeBuilder::finish() {

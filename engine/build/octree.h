@@ -7,6 +7,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/build/subtree.h"
+#include "engine/io/state_file.h"
 #include "format/node_page.h"
 #include "format/point_record.h"
 
@@ -43,6 +44,12 @@ class OctreeBuilder {
 
   /// @param points  their keys ascending, none below those before
   void add(std::span<const PointRecord> points);
+
+  /// What there is between two calls of add(), for a builder with the same arguments that goes on.
+  void save(StateWriter& state) const;
+  /// Takes it up before the first call of add(). @param pages  given so far, that groups may lie in
+  /// @throws DataError, FormatError
+  void load(StateReader& state, std::uint32_t pages);
 
   struct Result {
     ChildRef root;            ///< of the root group; not interior when there are no points

@@ -28,7 +28,16 @@ using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<do
 
 class RadiusStream : public PointStream {
  public:
-  RadiusStream(PointStream& sorted, double unit) : sorted_(sorted), unit_(unit) {}
+  RadiusStream(PointStream& sorted, double unit, std::uint64_t first) : sorted_(sorted), unit_(unit) {
+    at_ = chunk_end_ = static_cast<std::size_t>(first / kChunk * kChunk - first_for_radii(first));
+    fill(chunk_end_);
+    for (std::size_t left = first % kChunk; left > 0;) {
+      std::vector<PointRecord> passed(left);
+      const std::size_t count = next(passed);
+      if (count == 0) break;
+      left -= count;
+    }
+  }
 
   std::size_t next(std::span<PointRecord> out) override {
     if (at_ == chunk_end_) advance();
@@ -44,17 +53,22 @@ class RadiusStream : public PointStream {
     const std::size_t keep_from = chunk_end_ - std::min(chunk_end_, kHalo);
     window_.erase(window_.begin(), window_.begin() + static_cast<std::ptrdiff_t>(keep_from));
     const std::size_t chunk_begin = chunk_end_ - keep_from;
+    fill(chunk_begin + kChunk + kHalo);
+    at_ = chunk_begin;
+    chunk_end_ = std::min(window_.size(), chunk_begin + kChunk);
+    estimate(chunk_begin, chunk_end_);
+  }
+
+  /// Reads up to so many points in the window.
+  void fill(std::size_t size) {
     std::size_t filled = window_.size();
-    window_.resize(chunk_begin + kChunk + kHalo);
-    while (filled < window_.size()) {
+    window_.resize(size);
+    while (filled < size) {
       const std::size_t count = sorted_.next(std::span(window_).subspan(filled));
       if (count == 0) break;
       filled += count;
     }
     window_.resize(filled);
-    at_ = chunk_begin;
-    chunk_end_ = std::min(filled, chunk_begin + kChunk);
-    estimate(chunk_begin, chunk_end_);
   }
 
   void estimate(std::size_t begin, std::size_t end) {
@@ -99,8 +113,13 @@ class RadiusStream : public PointStream {
 
 }  // namespace
 
-std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit) {
-  return std::make_unique<RadiusStream>(sorted, unit);
+std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit, std::uint64_t first) {
+  return std::make_unique<RadiusStream>(sorted, unit, first);
+}
+
+std::uint64_t first_for_radii(std::uint64_t first) noexcept {
+  const std::uint64_t chunk = first / kChunk * kChunk;
+  return chunk - std::min<std::uint64_t>(chunk, kHalo);
 }
 
 }  // namespace ptc

@@ -1,6 +1,7 @@
 // Radii for clouds that come without.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "engine/sort/external_sort.h"
@@ -15,6 +16,10 @@ namespace ptc {
 /// counted from the first point, so the result does not depend on memory or threads.
 /// @param sorted  must outlive the result
 /// @param unit    lattice unit in scene units
-[[nodiscard]] std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit);
+/// @param first   number of the point to begin with; then `sorted` begins with that of first_for_radii()
+[[nodiscard]] std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit, std::uint64_t first = 0);
+
+/// The first of the points that bear on the radii of those from `first` on.
+[[nodiscard]] std::uint64_t first_for_radii(std::uint64_t first) noexcept;
 
 }  // namespace ptc

@@ -29,8 +29,8 @@ std::uint16_t rounded_radiance(std::uint16_t half) noexcept {
 
 class RoundedStream : public PointStream {
  public:
-  RoundedStream(PointStream& sorted, double unit, const Executor& executor)
-      : sorted_(sorted), unit_(unit), executor_(executor) {}
+  RoundedStream(PointStream& sorted, double unit, const Executor& executor, const MortonKey& before)
+      : sorted_(sorted), unit_(unit), executor_(executor), last_(before) {}
 
   std::size_t next(std::span<PointRecord> out) override {
     const std::size_t count = sorted_.next(out);
@@ -93,8 +93,8 @@ bool is_rounded(Profile profile) noexcept {
   return profile == Profile::fast || profile == Profile::compact;
 }
 
-std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit, const Executor& executor) {
-  return std::make_unique<RoundedStream>(sorted, unit, executor);
+std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit, const Executor& executor, const MortonKey& before) {
+  return std::make_unique<RoundedStream>(sorted, unit, executor, before);
 }
 
 }  // namespace ptc

@@ -31,6 +31,8 @@ inline constexpr const char* kRounding = "position 0.001 radius, radius 1/512, n
 /// their position.
 /// @param sorted, executor  must outlive the result
 /// @param unit              lattice unit in scene units
-[[nodiscard]] std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit, const Executor& executor);
+/// @param before            key of the rounded point before the first; none: zero
+[[nodiscard]] std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit, const Executor& executor,
+                                                        const MortonKey& before = {});
 
 }  // namespace ptc

@@ -11,6 +11,7 @@
 #include <limits>
 #include <list>
 #include <new>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -150,6 +151,18 @@ std::filesystem::path temporary_name(const std::filesystem::path& target) {
                                  std::to_string(counter.fetch_add(1)));
 }
 
+/// Permissions of a file that is to be replaced, nothing where there is none. @throws std::system_error where none can be
+std::optional<mode_t> mode_of(const std::filesystem::path& target) {
+  struct stat old {};
+  const bool exists = ::stat(target.c_str(), &old) == 0;
+  if (!exists && errno != ENOENT) fail(errno, "stat", target);
+  if ((exists && S_ISDIR(old.st_mode)) || target.filename().empty()) fail(EISDIR, "open", target);
+  if (exists && !S_ISREG(old.st_mode)) fail(EINVAL, "open", target);
+  return exists ? std::optional(old.st_mode & 0777) : std::nullopt;
+}
+
+}  // namespace
+
 void sync_directory(const std::filesystem::path& file) {
   const std::filesystem::path parent = file.parent_path();
   const std::filesystem::path directory = parent.empty() ? std::filesystem::path(".") : parent;
@@ -160,8 +173,6 @@ void sync_directory(const std::filesystem::path& file) {
   // Some file systems cannot sync a directory and say EINVAL.
   if (error != 0 && error != EINVAL) fail(error, "fsync", directory);
 }
-
-}  // namespace
 
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept {
   if (bytes == 0) return;
@@ -202,23 +213,27 @@ void InputFile::read_ahead(std::uint64_t offset, std::uint64_t bytes) const noex
 }
 
 OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
-  struct stat old {};
-  const bool exists = ::stat(target.c_str(), &old) == 0;
-  if (!exists && errno != ENOENT) fail(errno, "stat", target);
-  if ((exists && S_ISDIR(old.st_mode)) || target.filename().empty()) fail(EISDIR, "open", target);
-  if (exists && !S_ISREG(old.st_mode)) fail(EINVAL, "open", target);
-  if (exists && std::filesystem::is_symlink(target)) target_ = std::filesystem::canonical(target);
+  const std::optional<mode_t> old = mode_of(target);
+  if (old && std::filesystem::is_symlink(target)) target_ = std::filesystem::canonical(target);
   do {
     temporary_ = temporary_name(target_);
     fd_ = create_temporary(this, temporary_);
   } while (fd_ < 0 && errno == EEXIST);  // left behind by an earlier process of the same number
   if (fd_ < 0) fail(errno, "open", temporary_);
-  if (exists) static_cast<void>(::fchmod(fd_, old.st_mode & 0777));
+  if (old) static_cast<void>(::fchmod(fd_, *old));
+}
+
+OutputFile::OutputFile(const std::filesystem::path& target, const std::filesystem::path& partial)
+    : target_(target), temporary_(partial), stays_(true) {
+  const std::optional<mode_t> old = mode_of(target);
+  fd_ = open_retrying(partial, O_RDWR | O_CREAT, 0666);
+  if (fd_ < 0) fail(errno, "open", partial);
+  if (old) static_cast<void>(::fchmod(fd_, *old));
 }
 
 OutputFile::~OutputFile() {
   if (fd_ >= 0) ::close(fd_);
-  if (published_) return;
+  if (published_ || stays_) return;
   ::unlink(temporary_.c_str());
   forget_temporary(this);
 }
@@ -233,6 +248,11 @@ void OutputFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes
 
 void OutputFile::append(std::span<const std::byte> bytes) {
   write_at(size(), bytes);
+}
+
+void OutputFile::truncate(std::uint64_t bytes) {
+  if (retrying([&] { return ::ftruncate(fd_, static_cast<off_t>(bytes)); }) != 0) fail(errno, "ftruncate", temporary_);
+  size_ = bytes;
 }
 
 void OutputFile::sync() {
@@ -257,7 +277,13 @@ TemporaryName::TemporaryName(const std::filesystem::path& path) : path_(path) {
 }
 
 TemporaryName::~TemporaryName() {
+  if (path_.empty()) return;
   ::unlink(path_.c_str());
+  forget_temporary(this);
+}
+
+void TemporaryName::release() noexcept {
+  path_.clear();
   forget_temporary(this);
 }
 

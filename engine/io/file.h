@@ -44,6 +44,9 @@ class OutputFile {
  public:
   /// @throws std::system_error; a directory (EISDIR) or device (EINVAL) as target is refused
   explicit OutputFile(const std::filesystem::path& target);
+  /// The same under a given name instead of a temporary one: a file of that name is gone on with, and stays unless it is
+  /// published. @param partial  in the directory of the target
+  OutputFile(const std::filesystem::path& target, const std::filesystem::path& partial);
   /// Removes the temporary file unless it was published.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
@@ -59,7 +62,9 @@ class OutputFile {
   [[nodiscard]] std::uint64_t size() const noexcept {
     return size_.load(std::memory_order_relaxed);
   }
-  /// fdatasync: what was written so far is on the disk when it returns.
+  /// Cuts what lies behind.
+  void truncate(std::uint64_t bytes);
+  /// fdatasync: what was written so far is on the disk when it returns. Threads: while others write, too.
   void sync();
   /// fsync, rename over the target, fsync of the directory. The file is closed afterwards.
   void publish();
@@ -69,6 +74,7 @@ class OutputFile {
   std::filesystem::path temporary_;
   int fd_ = -1;
   std::atomic<std::uint64_t> size_ = 0;
+  bool stays_ = false;  ///< under the temporary name
   bool published_ = false;
 };
 
@@ -79,10 +85,15 @@ class TemporaryName {
   ~TemporaryName();
   TemporaryName(const TemporaryName&) = delete;
   TemporaryName& operator=(const TemporaryName&) = delete;
+  /// Lets the file stay.
+  void release() noexcept;
 
  private:
   std::filesystem::path path_;
 };
+
+/// fsync of the directory that a file is in: its name is on the disk.
+void sync_directory(const std::filesystem::path& file);
 
 /// Gives back the disk's blocks under these bytes of an open file, where the file system can.
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept;

@@ -20,19 +20,19 @@ std::size_t BlockStream::next(std::span<PointRecord> out) {
   return filled;
 }
 
-BucketLoader::BucketLoader(std::shared_ptr<const Partition> partition, SpillFile& file,
+BucketLoader::BucketLoader(std::shared_ptr<const Partition> partition, std::size_t first, SpillFile& file,
                            const SortPlan& plan, const Executor& executor,
                            std::atomic<std::uint32_t>& leaves)
     : file_(file),
-      reader_(file, plan.read_bytes),
+      reader_(plan.read_bytes),
       ranges_(plan.ranges),
       executor_(executor),
       leaves_(leaves) {
-  push(std::move(partition));
+  push(std::move(partition), first);
 }
 
-void BucketLoader::push(std::shared_ptr<const Partition> partition) {
-  for (std::size_t range = partition->ranges(); range-- > 0;) {
+void BucketLoader::push(std::shared_ptr<const Partition> partition, std::size_t first) {
+  for (std::size_t range = partition->ranges(); range-- > first;) {
     BucketReader bucket(partition, range);
     if (bucket.size() > 0) buckets_.push_back(std::move(bucket));
   }
@@ -70,7 +70,7 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
     partition->add_run(run, grouped, executor_);
     partition->write_run(grouped);
   }
-  push(partition);
+  push(partition, 0);
 }
 
 BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory, const Executor& executor,

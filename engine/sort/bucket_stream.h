@@ -35,8 +35,10 @@ class BlockStream : public PointStream {
 /// Loads a partition bucket by bucket, in the order of the keys.
 class BucketLoader {
  public:
+  /// @param first   range to begin with
+  /// @param file    for ranges that are partitioned again
   /// @param leaves  counts the buckets that were loaded
-  BucketLoader(std::shared_ptr<const Partition> partition, SpillFile& file, const SortPlan& plan,
+  BucketLoader(std::shared_ptr<const Partition> partition, std::size_t first, SpillFile& file, const SortPlan& plan,
                const Executor& executor, std::atomic<std::uint32_t>& leaves);
 
   /// Records of one range, all of it unless their keys are equal.
@@ -50,7 +52,7 @@ class BucketLoader {
   [[nodiscard]] Block read(std::span<PointRecord> out, const std::function<std::span<PointRecord>()>& scratch);
 
  private:
-  void push(std::shared_ptr<const Partition> partition);
+  void push(std::shared_ptr<const Partition> partition, std::size_t first);
   void split(BucketReader bucket, std::span<PointRecord> out, std::span<PointRecord> scratch);
 
   SpillFile& file_;

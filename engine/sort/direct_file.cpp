@@ -1,4 +1,4 @@
-// A nameless temporary file past the page cache.
+// A temporary file past the page cache.
 #include "engine/sort/direct_file.h"
 
 #include <fcntl.h>
@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <string>
 #include <system_error>
 
 #include "engine/base/error.h"
@@ -15,17 +16,30 @@ namespace {
 
 constexpr std::size_t kMostBytes = std::size_t{8} << 20;  // of one call
 
-[[noreturn]] void fail(const char* call, const std::filesystem::path& directory) {
-  throw std::system_error(errno, std::generic_category(),
-                          call + (" temporary file in " + directory.string()));
+[[noreturn]] void fail(const char* call, const std::string& name) {
+  throw std::system_error(errno, std::generic_category(), std::string(call) + " " + name);
+}
+
+// @return the descriptor, or -1 as open()
+int open_retrying(const std::filesystem::path& path, int flags) {
+  int fd = -1;
+  do fd = ::open(path.c_str(), flags | O_RDWR | O_CLOEXEC, 0600);
+  while (fd < 0 && errno == EINTR);
+  return fd;
 }
 
 }  // namespace
 
-DirectFile::DirectFile(const std::filesystem::path& directory) : directory_(directory) {
-  do fd_ = ::open(directory.c_str(), O_TMPFILE | O_RDWR | O_DIRECT | O_CLOEXEC, 0600);
-  while (fd_ < 0 && errno == EINTR);
+DirectFile::DirectFile(const std::filesystem::path& directory)
+    : name_("temporary file in " + directory.string()), fd_(open_retrying(directory, O_TMPFILE | O_DIRECT)) {
   if (fd_ < 0) buffered_.emplace(directory);  // no direct transfers here, or an error to report
+}
+
+DirectFile::DirectFile(const std::filesystem::path& file, Kept how) : name_(file.string()) {
+  const int flags = how == Kept::made ? O_CREAT | O_TRUNC : 0;
+  fd_ = open_retrying(file, flags | O_DIRECT);
+  if (fd_ < 0 && errno == EINVAL) fd_ = open_retrying(file, flags);  // no direct transfers here
+  if (fd_ < 0) fail("open", name_);
 }
 
 DirectFile::~DirectFile() {
@@ -46,8 +60,8 @@ void DirectFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const
     const bool direct = direct_;
     const ssize_t n =
         ::pread(fd_, bytes.data(), std::min(bytes.size(), kMostBytes), static_cast<off_t>(offset));
-    if (n < 0 && errno != EINTR && !give_up_direct(direct)) fail("pread", directory_);
-    if (n == 0) throw DataError(directory_.string() + ": a temporary file ends too early");
+    if (n < 0 && errno != EINTR && !give_up_direct(direct)) fail("pread", name_);
+    if (n == 0) throw DataError(name_ + ": the file ends too early");
     if (n < 0) continue;
     offset += static_cast<std::uint64_t>(n);
     bytes = bytes.subspan(static_cast<std::size_t>(n));
@@ -61,10 +75,16 @@ void DirectFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes
     const ssize_t n =
         ::pwrite(fd_, bytes.data(), std::min(bytes.size(), kMostBytes), static_cast<off_t>(offset));
     if (n == 0) errno = EIO;
-    if (n == 0 || (n < 0 && errno != EINTR && !give_up_direct(direct))) fail("pwrite", directory_);
+    if (n == 0 || (n < 0 && errno != EINTR && !give_up_direct(direct))) fail("pwrite", name_);
     if (n < 0) continue;
     offset += static_cast<std::uint64_t>(n);
     bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+}
+
+void DirectFile::sync() {
+  while (::fsync(fd_) != 0) {
+    if (errno != EINTR) fail("fsync", name_);
   }
 }
 

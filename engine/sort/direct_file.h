@@ -1,4 +1,4 @@
-// A nameless temporary file past the page cache.
+// A temporary file past the page cache.
 #pragma once
 
 #include <atomic>
@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "engine/io/file.h"
 
@@ -15,7 +16,7 @@ namespace ptc {
 /// Memory and offsets of direct transfers are multiples of this.
 inline constexpr std::size_t kDirectBytes = 4096;
 
-/// A file in `directory` that vanishes when it is closed, read and written without the page cache
+/// A file in a directory that vanishes when it is closed unless it has a name, read and written without the page cache
 /// (O_DIRECT) where the file system can do so: what is spilled is read once, long after, and the
 /// cache would cost a copy, a fresh page for every 4 KiB and the memory that the cap is to save.
 /// Elsewhere it is a TempFile.
@@ -24,6 +25,9 @@ class DirectFile {
  public:
   /// @throws std::system_error naming the directory
   explicit DirectFile(const std::filesystem::path& directory);
+  /// A file with a name, which stays: made anew, or the one that is there.
+  enum class Kept { made, found };
+  DirectFile(const std::filesystem::path& file, Kept how);
   ~DirectFile();
   DirectFile(const DirectFile&) = delete;
   DirectFile& operator=(const DirectFile&) = delete;
@@ -33,6 +37,8 @@ class DirectFile {
   /// @throws std::system_error naming the directory; DataError when the file ends before
   void read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
+  /// Of a file with a name: what was written is on the disk when it returns.
+  void sync();
   /// As TempFile::discard().
   void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
@@ -40,7 +46,7 @@ class DirectFile {
   // True when a transfer that failed is worth another try, now through the page cache.
   bool give_up_direct(bool was_direct) const noexcept;
 
-  std::filesystem::path directory_;
+  std::string name_;  ///< for errors
   int fd_ = -1;  // -1: buffered_ instead
   mutable std::atomic<bool> direct_{true};
   std::optional<TempFile> buffered_;

@@ -72,7 +72,9 @@ struct ExternalSorter::Impl {
       : options(sort_options),
         executor(sort_executor),
         plan(plan_sort(options.memory_bytes, executor.threads())),
-        arena(2 * plan.run_records * sizeof(PointRecord)) {
+        arena(2 * plan.run_records * sizeof(PointRecord)),
+        kept(!options.kept_files.empty()) {
+    if (kept) file = SpillFile::named(options.kept_files);
     const std::size_t stride = given_sample.size() / plan.sample_keys + 1;
     for (std::size_t i = 0; i < given_sample.size(); i += stride) sample.push_back(given_sample[i]);
     const bool will_spill = expected_spill() > 0;
@@ -83,11 +85,27 @@ struct ExternalSorter::Impl {
                  "some " + std::to_string(options.expected) + " points on their way through the sort");
   }
 
+  Impl(const SortOptions& sort_options, const Executor& sort_executor, StateReader& state)
+      : options(sort_options),
+        executor(sort_executor),
+        plan(plan_sort(options.memory_bytes, executor.threads())),
+        arena(2 * plan.run_records * sizeof(PointRecord)),
+        kept(true) {
+    digest = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
+    points = state.get<std::uint64_t>();
+    file = SpillFile::reopened(state);
+    partition = std::make_shared<Partition>(*file, state);
+    std::uint64_t found = 0;
+    for (std::size_t range = 0; range < partition->ranges(); ++range) found += partition->size(range);
+    state.require(found == points, "the temporary files do not hold as many points as were added");
+  }
+
   [[nodiscard]] std::span<PointRecord> memory() noexcept {
     return {reinterpret_cast<PointRecord*>(arena.data()), 2 * plan.run_records};
   }
   [[nodiscard]] std::uint64_t expected_spill() const noexcept {
-    return options.expected > plan.run_records ? options.expected * sizeof(PointRecord) : 0;
+    const bool spills = options.expected > plan.run_records || kept;
+    return spills ? options.expected * sizeof(PointRecord) : 0;
   }
   [[nodiscard]] std::span<PointRecord> scratch() noexcept {
     return memory().last(plan.run_records);
@@ -96,11 +114,14 @@ struct ExternalSorter::Impl {
   void add(std::span<const PointRecord> records);
   void begin_partition();
   void spill();
+  void spill_all();
+  void keep(StateWriter& state);
+  void discard_before(std::uint64_t record);
   /// Memory in three: while one part is filled, another is grouped into the third, which is written.
   [[nodiscard]] std::span<PointRecord> part(std::size_t k) noexcept { return memory().subspan(k * part_records(), part_records()); }
   [[nodiscard]] std::size_t part_records() noexcept { return std::min(kPartRecords, memory().size() / 3); }
   [[nodiscard]] std::unique_ptr<PointStream> stream_memory();
-  [[nodiscard]] std::unique_ptr<PointStream> stream_buckets();
+  [[nodiscard]] std::unique_ptr<PointStream> stream_buckets(std::uint64_t first);
 
   SortOptions options;
   const Executor& executor;
@@ -109,11 +130,15 @@ struct ExternalSorter::Impl {
   Arena arena;             // two runs
   std::span<PointRecord> filling;  // a run, or a part() once it is known that not all will fit
   std::size_t filled = 0;          // records there
+  bool kept = false;               // files have names, and stay
   std::uint64_t points = 0;
   Digest digest{};
   bool finished = false;
-  std::optional<SpillFile> file;  // these two from the first spill on
+  std::optional<SpillFile> file;  // from the first spill on, or with kept files
   std::shared_ptr<Partition> partition;
+  std::optional<SpillFile> nested;  // for buckets of kept files that are partitioned again: nobody needs them later
+  std::size_t discarded = 0;           // ranges, of kept files
+  std::uint64_t discarded_points = 0;  // there
   std::atomic<std::uint32_t> buckets{0};
   std::future<void> spilling;  // of what was filled before; last, so that it is waited for first
 };
@@ -139,8 +164,9 @@ void ExternalSorter::Impl::begin_partition() {
     for (std::size_t i = 0; i < filled; i += stride) sample.push_back(filling[i].key);
   }
   const std::size_t ranges = std::clamp<std::size_t>(sample.size() / kKeysPerRange, 3, plan.ranges);
-  file.emplace(options.temp_dirs);
-  partition = std::make_shared<Partition>(*file, Splitters(std::move(sample), ranges));
+  if (sample.empty()) sample.emplace_back();  // of nothing that is to be kept
+  if (!file) file.emplace(options.temp_dirs);
+  partition = std::make_shared<Partition>(*file, Splitters(std::move(sample), ranges), kept);
   sample = {};
 }
 
@@ -175,17 +201,52 @@ std::unique_ptr<PointStream> ExternalSorter::Impl::stream_memory() {
   return std::make_unique<MemoryStream>(records, [this] { arena = Arena(); });
 }
 
-std::unique_ptr<PointStream> ExternalSorter::Impl::stream_buckets() {
+void ExternalSorter::Impl::spill_all() {
+  if (!partition) begin_partition();
   if (filled > 0) spill();
   if (spilling.valid()) spilling.get();
-  return std::make_unique<BucketStream>(
-      BucketLoader(std::move(partition), *file, plan, executor, buckets), memory(), executor,
+}
+
+void ExternalSorter::Impl::keep(StateWriter& state) {
+  spill_all();
+  state.put(digest[0]);
+  state.put(digest[1]);
+  state.put(points);
+  file->save(state);
+  partition->save(state);
+}
+
+void ExternalSorter::Impl::discard_before(std::uint64_t record) {
+  for (; discarded < partition->ranges(); ++discarded) {
+    const std::uint64_t end = discarded_points + partition->size(discarded);
+    if (end > record) return;
+    partition->discard(discarded);
+    discarded_points = end;
+  }
+}
+
+std::unique_ptr<PointStream> ExternalSorter::Impl::stream_buckets(std::uint64_t first) {
+  if (kept) nested.emplace(options.temp_dirs);
+  std::size_t range = 0;
+  for (; range < partition->ranges() && partition->size(range) <= first; ++range) first -= partition->size(range);
+  auto stream = std::make_unique<BucketStream>(
+      BucketLoader(partition, range, kept ? *nested : *file, plan, executor, buckets), memory(), executor,
       [this] { arena = Arena(); });
+  std::vector<PointRecord> passed(std::min<std::uint64_t>(first, 1 << 14));
+  while (first > 0) {
+    const std::size_t count = stream->next(std::span(passed).first(std::min<std::uint64_t>(first, passed.size())));
+    if (count == 0) break;
+    first -= count;
+  }
+  return stream;
 }
 
 ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& executor,
                                std::span<const MortonKey> sample)
     : impl_(std::make_unique<Impl>(options, executor, sample)) {}
+
+ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& executor, StateReader& kept)
+    : impl_(std::make_unique<Impl>(options, executor, kept)) {}
 
 ExternalSorter::~ExternalSorter() = default;
 
@@ -200,14 +261,21 @@ std::array<std::uint64_t, 2> ExternalSorter::digest() const noexcept {
   return impl_->digest;
 }
 
-std::unique_ptr<PointStream> ExternalSorter::finish() {
+void ExternalSorter::keep(StateWriter& state) { impl_->keep(state); }
+
+void ExternalSorter::discard_before(std::uint64_t record) { impl_->discard_before(record); }
+
+std::unique_ptr<PointStream> ExternalSorter::finish(std::uint64_t first) {
   if (std::exchange(impl_->finished, true))
     throw std::invalid_argument("ExternalSorter::finish called twice");
-  return impl_->partition ? impl_->stream_buckets() : impl_->stream_memory();
+  if (!impl_->partition && !impl_->kept) return impl_->stream_memory();
+  impl_->spill_all();
+  return impl_->stream_buckets(first);
 }
 
 SortStatistics ExternalSorter::statistics() const noexcept {
-  return {impl_->points, impl_->file ? impl_->file->bytes() : 0, impl_->buckets};
+  const auto bytes_of = [](const std::optional<SpillFile>& file) { return file ? file->bytes() : 0; };
+  return {impl_->points, bytes_of(impl_->file) + bytes_of(impl_->nested), impl_->buckets};
 }
 
 }  // namespace ptc

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/base/executor.h"
+#include "engine/io/state_file.h"
 #include "format/point_record.h"
 
 namespace ptc {
@@ -28,6 +29,8 @@ struct SortOptions {
   /// About how many records will come; 0: not known. Those that are known not to fit leave for the disk
   /// sooner and touch less memory.
   std::uint64_t expected = 0;
+  /// Names of the temporary files, which then stay and hold all records, whatever fits in memory; empty: they have none.
+  std::vector<std::filesystem::path> kept_files;
 };
 
 struct SortStatistics {
@@ -53,6 +56,10 @@ class ExternalSorter {
   ///         when the directories have no room for what is expected
   ExternalSorter(const SortOptions& options, const Executor& executor,
                  std::span<const MortonKey> sample);
+  /// Goes on with the files of a sorter that was kept; nothing can be added. Its digest and statistics are known.
+  /// @param kept  from keep(), read to its end
+  /// @throws DataError when files or table are not what they were, std::system_error
+  ExternalSorter(const SortOptions& options, const Executor& executor, StateReader& kept);
   ~ExternalSorter();
 
   /// Bytes of temporary files that what is expected takes; 0 when it fits in memory.
@@ -62,9 +69,16 @@ class ExternalSorter {
   void add(std::span<const PointRecord> records);
   /// Order-independent digest of all records so far: the same set gives the same value.
   [[nodiscard]] std::array<std::uint64_t, 2> digest() const noexcept;
+  /// Of a sorter with kept_files: puts all records on the disk, and adds to `state` what another process needs to go on
+  /// with them. Nothing may be added afterwards. @throws as add()
+  void keep(StateWriter& state);
+  /// Gives back the disk of kept records before the one of this number in sorted order, as far as the buckets go that
+  /// lie whole before it. Threads: while others read the stream, too.
+  void discard_before(std::uint64_t record);
   /// The sorted stream; this must outlive it. Nothing may be added afterwards. Its memory is given
   /// back when it has handed out all. @throws as add(); so does the stream's next()
-  [[nodiscard]] std::unique_ptr<PointStream> finish();
+  /// @param first  record to begin with; more than 0 when what is before was kept
+  [[nodiscard]] std::unique_ptr<PointStream> finish(std::uint64_t first = 0);
   [[nodiscard]] SortStatistics statistics() const noexcept;
 
  private:

@@ -10,10 +10,13 @@
 #include <system_error>
 #include <utility>
 
+#include "engine/io/file.h"
 #include "engine/sort/partition.h"
 
 namespace ptc {
 namespace {
+
+constexpr std::uint64_t kMostVolumes = 1 << 10;
 
 constexpr std::size_t whole_blocks(std::size_t bytes) noexcept {
   return (bytes + kDirectBytes - 1) / kDirectBytes * kDirectBytes;
@@ -34,17 +37,57 @@ bool is_full(const std::error_code& code) noexcept {
   return code.value() == ENOSPC || code.value() == EDQUOT || code.value() == EFBIG;
 }
 
+void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::span<std::byte> buffer) {
+  SpillPlace place = piece.place;
+  std::span<std::byte> bytes = std::as_writable_bytes(piece.out);
+  while (!bytes.empty()) {
+    const std::size_t skip = place.offset % kDirectBytes;  // from the start of the first block
+    const std::size_t count = std::min(bytes.size(), buffer.size() - skip);
+    file.read_at({place.volume, place.offset - skip}, buffer.first(whole_blocks(skip + count)));
+    std::memcpy(bytes.data(), buffer.data() + skip, count);
+    bytes = bytes.subspan(count);
+    place.offset += count;
+  }
+}
+
 }  // namespace
 
 SpillFile::SpillFile(std::span<const std::filesystem::path> directories) {
-  for (const std::filesystem::path& directory : directories) volumes_.push_back(std::make_unique<Volume>(directory));
+  for (const auto& directory : directories) volumes_.push_back(std::make_unique<Volume>(directory));
+}
+
+SpillFile SpillFile::named(std::span<const std::filesystem::path> names) {
+  SpillFile file;
+  for (const auto& name : names) file.volumes_.push_back(std::make_unique<Volume>(name, DirectFile::Kept::made, 0));
+  return file;
+}
+
+SpillFile SpillFile::reopened(StateReader& state) {
+  SpillFile file;
+  for (std::uint64_t count = state.get_count(kMostVolumes); count > 0; --count) {
+    const std::filesystem::path name = state.get_text();
+    const auto end = state.get<std::uint64_t>();
+    file.volumes_.push_back(std::make_unique<Volume>(name, DirectFile::Kept::found, end));
+    state.require(std::filesystem::file_size(name) == end, "a temporary file has another length");
+  }
+  return file;
+}
+
+void SpillFile::save(StateWriter& state) {
+  state.put(std::uint64_t{volumes_.size()});
+  for (const auto& volume : volumes_) {
+    volume->file.sync();
+    sync_directory(volume->place);
+    state.put_text(volume->place.string());
+    state.put(volume->end.load());
+  }
 }
 
 std::vector<std::uint32_t> SpillFile::by_room(std::uint64_t bytes) const {
   std::vector<double> fill;
   for (const auto& volume : volumes_) {
     std::error_code unknown;  // a write tells what is wrong
-    const std::uint64_t free = std::filesystem::space(volume->directory, unknown).available;
+    const std::uint64_t free = std::filesystem::space(volume->place, unknown).available;
     const auto used = static_cast<double>(volume->end + bytes);
     fill.push_back(unknown ? used : used / (static_cast<double>(volume->end) + static_cast<double>(free) + 1.0));
   }
@@ -73,6 +116,12 @@ SpillPlace SpillFile::append(std::span<const PointRecord> records) {
   throw std::invalid_argument("SpillFile: no directory");
 }
 
+bool SpillFile::holds(const SpillPlace& place, std::uint64_t bytes) const noexcept {
+  if (place.volume >= volumes_.size() || place.offset % kDirectBytes != 0) return false;
+  const std::uint64_t end = volumes_[place.volume]->end;
+  return place.offset <= end && bytes <= end - place.offset;
+}
+
 void SpillFile::read_at(const SpillPlace& place, std::span<std::byte> bytes) const {
   volumes_[place.volume]->file.read_at(place.offset, bytes);
 }
@@ -89,17 +138,17 @@ std::uint64_t SpillFile::bytes() const noexcept {
   return bytes;
 }
 
-SpillReader::SpillReader(const SpillFile& file, std::size_t buffer_bytes)
-    : file_(file), buffer_(buffer_bytes / (kReads * kDirectBytes) * (kReads * kDirectBytes)) {
+SpillReader::SpillReader(std::size_t buffer_bytes)
+    : buffer_(buffer_bytes / (kReads * kDirectBytes) * (kReads * kDirectBytes)) {
   if (buffer_.size() < kLeastBytes) throw std::invalid_argument("SpillReader: buffer too small");
 }
 
-void SpillReader::read(std::span<const Piece> pieces) {
+void SpillReader::read(const SpillFile& file, std::span<const Piece> pieces) {
   const std::size_t share = buffer_.size() / kReads;
   std::atomic<std::size_t> next = 0;
   const auto work = [&](std::size_t reader) {
     const std::span<std::byte> buffer(buffer_.data() + reader * share, share);
-    for (std::size_t i = next++; i < pieces.size(); i = next++) read(pieces[i], buffer);
+    for (std::size_t i = next++; i < pieces.size(); i = next++) read_piece(file, pieces[i], buffer);
   };
   std::vector<std::future<void>> others;
   for (std::size_t reader = 1; reader < std::min(kReads, pieces.size()); ++reader)
@@ -108,26 +157,41 @@ void SpillReader::read(std::span<const Piece> pieces) {
   for (auto& other : others) other.get();
 }
 
-void SpillReader::read(const Piece& piece, std::span<std::byte> buffer) const {
-  SpillPlace place = piece.place;
-  std::span<std::byte> bytes = std::as_writable_bytes(piece.out);
-  while (!bytes.empty()) {
-    const std::size_t skip = place.offset % kDirectBytes;  // from the start of the first block
-    const std::size_t count = std::min(bytes.size(), buffer.size() - skip);
-    file_.read_at({place.volume, place.offset - skip}, buffer.first(whole_blocks(skip + count)));
-    std::memcpy(bytes.data(), buffer.data() + skip, count);
-    bytes = bytes.subspan(count);
-    place.offset += count;
+Partition::Partition(SpillFile& file, Splitters splitters, bool kept)
+    : file_(file), splitters_(std::move(splitters)), kept_(kept) {}
+
+Partition::Partition(SpillFile& file, StateReader& state) : file_(file), splitters_(state), kept_(true) {
+  const std::uint64_t ends = ranges() + 1;
+  for (std::uint64_t count = state.get<std::uint64_t>(); count > 0; --count) {
+    Run& run = runs_.emplace_back();
+    run.place = {state.get<std::uint32_t>(), state.get<std::uint64_t>()};
+    for (std::uint64_t i = 0; i < ends; ++i) {
+      run.starts.push_back(state.get<std::uint32_t>());
+      state.require(i == 0 ? run.starts[i] == 0 : run.starts[i - 1] <= run.starts[i], "ranges of a run do not ascend");
+    }
+    state.require(file_.holds(run.place, run.starts.back() * sizeof(PointRecord)), "a run past the end of its file");
   }
 }
 
-void SpillReader::take(std::span<const Piece> pieces) {
-  read(pieces);
-  for (const Piece& piece : pieces) file_.discard(piece.place, piece.out.size_bytes());
+void Partition::save(StateWriter& state) const {
+  splitters_.save(state);
+  state.put(std::uint64_t{runs_.size()});
+  for (const Run& run : runs_) {
+    state.put(run.place.volume);
+    state.put(run.place.offset);
+    for (const std::uint32_t start : run.starts) state.put(start);
+  }
 }
 
-Partition::Partition(SpillFile& file, Splitters splitters)
-    : file_(file), splitters_(std::move(splitters)) {}
+std::uint64_t Partition::size(std::size_t range) const noexcept {
+  std::uint64_t size = 0;
+  for (const Run& run : runs_) size += run.size(range);
+  return size;
+}
+
+void Partition::discard(std::size_t range) const noexcept {
+  for (const Run& run : runs_) file_.discard(run.place_of(range, 0), run.size(range) * sizeof(PointRecord));
+}
 
 void Partition::add_run(std::span<const PointRecord> records, std::span<PointRecord> grouped, const Executor& executor) {
   const std::size_t blocks = partition_blocks(records.size(), ranges(), executor.threads());
@@ -153,20 +217,11 @@ void Partition::write_run(std::span<const PointRecord> grouped) { runs_.back().p
 
 BucketReader::BucketReader(std::shared_ptr<const Partition> partition, std::size_t range)
     : partition_(std::move(partition)), range_(range) {
-  for (const Partition::Run& run : partition_->runs_) size_ += size_in(run);
-  left_ = size_;
+  size_ = left_ = partition_->size(range);
 }
 
 bool BucketReader::single_key() const noexcept {
   return partition_->splitters_.single_key(range_);
-}
-
-std::size_t BucketReader::size_in(const Partition::Run& run) const noexcept {
-  return run.starts[range_ + 1] - run.starts[range_];
-}
-
-SpillPlace BucketReader::place_in(const Partition::Run& run, std::size_t i) const noexcept {
-  return {run.place.volume, run.place.offset + (run.starts[range_] + i) * sizeof(PointRecord)};
 }
 
 std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) {
@@ -174,17 +229,19 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
   std::size_t filled = 0;
   while (filled < out.size() && left_ > 0) {
     const Partition::Run& run = partition_->runs_[run_];
-    const std::size_t count = std::min(size_in(run) - at_, out.size() - filled);
-    if (count > 0) pieces.push_back({place_in(run, at_), out.subspan(filled, count)});
+    const std::size_t count = std::min(run.size(range_) - at_, out.size() - filled);
+    if (count > 0) pieces.push_back({run.place_of(range_, at_), out.subspan(filled, count)});
     filled += count;
     at_ += count;
     left_ -= count;
-    if (at_ == size_in(run)) {
+    if (at_ == run.size(range_)) {
       ++run_;
       at_ = 0;
     }
   }
-  reader.take(pieces);
+  reader.read(partition_->file_, pieces);
+  if (partition_->kept_) return filled;
+  for (const SpillReader::Piece& piece : pieces) partition_->file_.discard(piece.place, piece.out.size_bytes());
   return filled;
 }
 
@@ -193,15 +250,15 @@ std::vector<MortonKey> BucketReader::sample(std::size_t count, SpillReader& read
   std::vector<SpillReader::Piece> pieces;
   std::uint64_t begin = 0;  // of the run's part among all records of the range
   for (const Partition::Run& run : partition_->runs_) {
-    const std::uint64_t end = begin + size_in(run);
+    const std::uint64_t end = begin + run.size(range_);
     for (std::size_t i = pieces.size(); i < records.size(); ++i) {
       const std::uint64_t position = sample_position(i, records.size(), size_);
       if (position >= end) break;
-      pieces.push_back({place_in(run, position - begin), {&records[i], 1}});
+      pieces.push_back({run.place_of(range_, position - begin), {&records[i], 1}});
     }
     begin = end;
   }
-  reader.read(pieces);
+  reader.read(partition_->file_, pieces);
 
   std::vector<MortonKey> keys;
   for (const PointRecord& record : records) keys.push_back(record.key);

@@ -11,6 +11,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/memory.h"
+#include "engine/io/state_file.h"
 #include "engine/sort/direct_file.h"
 #include "engine/sort/splitters.h"
 #include "format/point_record.h"
@@ -30,6 +31,12 @@ class SpillFile {
   /// @param directories  at least one
   /// @throws std::system_error naming the directory
   explicit SpillFile(std::span<const std::filesystem::path> directories);
+  /// Volumes with names, which stay; one that is there already is overwritten.
+  [[nodiscard]] static SpillFile named(std::span<const std::filesystem::path> names);
+  /// Those of which save() told. @throws DataError when they are not what they were, std::system_error
+  [[nodiscard]] static SpillFile reopened(StateReader& state);
+  /// Puts volumes with names on the disk, and tells what there is in them.
+  void save(StateWriter& state);
 
   /// Writes records to the volume that this leaves least full, by its directory's room; when there is none left, to
   /// the others.
@@ -38,6 +45,8 @@ class SpillFile {
   /// @return  their place, its offset a multiple of kDirectBytes
   /// @throws std::system_error naming the directory
   [[nodiscard]] SpillPlace append(std::span<const PointRecord> records);
+  /// True when what was appended has so many bytes there.
+  [[nodiscard]] bool holds(const SpillPlace& place, std::uint64_t bytes) const noexcept;
   void read_at(const SpillPlace& place, std::span<std::byte> bytes) const;
   /// Gives back the disk's blocks that end in these bytes, which are not read again, nor those in front of them in
   /// their first block.
@@ -47,18 +56,20 @@ class SpillFile {
 
  private:
   struct Volume {
-    explicit Volume(const std::filesystem::path& where) : directory(where), file(where) {}
-    std::filesystem::path directory;
+    explicit Volume(const std::filesystem::path& directory) : place(directory), file(directory) {}
+    Volume(const std::filesystem::path& name, DirectFile::Kept how, std::uint64_t bytes) : place(name), file(name, how), end(bytes) {}
+    std::filesystem::path place;  ///< the directory, or the file when it has a name
     DirectFile file;
     std::atomic<std::uint64_t> end{0};
   };
+  SpillFile() = default;
   /// Numbers of the volumes, those first that so many bytes leave least full.
   [[nodiscard]] std::vector<std::uint32_t> by_room(std::uint64_t bytes) const;
 
   std::vector<std::unique_ptr<Volume>> volumes_;
 };
 
-/// Reads from any offset of a SpillFile, several pieces at once, through memory of its own.
+/// Reads from any offset of SpillFiles, several pieces at once, through memory of its own.
 class SpillReader {
  public:
   /// Consecutive records in the file and where they go.
@@ -68,19 +79,14 @@ class SpillReader {
   };
 
   /// @param buffer_bytes  of all reads that run at once, at least kLeastBytes
-  SpillReader(const SpillFile& file, std::size_t buffer_bytes);
-  void read(std::span<const Piece> pieces);
-  /// The same for the last time: the disk's blocks are given back.
-  void take(std::span<const Piece> pieces);
+  explicit SpillReader(std::size_t buffer_bytes);
+  void read(const SpillFile& file, std::span<const Piece> pieces);
 
   /// A disk gives its full rate to several requests at once.
   static constexpr std::size_t kReads = 4;
   static constexpr std::size_t kLeastBytes = kReads * 2 * kDirectBytes;
 
  private:
-  void read(const Piece& piece, std::span<std::byte> buffer) const;
-
-  const SpillFile& file_;
   Arena buffer_;
 };
 
@@ -92,7 +98,11 @@ class SpillReader {
 /// The runs' parts of one range, one after another, are its records in the order of the input.
 class Partition {
  public:
-  Partition(SpillFile& file, Splitters splitters);
+  /// @param kept  what is read stays on the disk until it is discarded
+  Partition(SpillFile& file, Splitters splitters, bool kept = false);
+  /// As save() wrote it, kept. @throws DataError
+  Partition(SpillFile& file, StateReader& state);
+  void save(StateWriter& state) const;
 
   /// Groups a run into `grouped`, as long as `records`, stable; write_run() must follow.
   void add_run(std::span<const PointRecord> records, std::span<PointRecord> grouped, const Executor& executor);
@@ -100,21 +110,31 @@ class Partition {
   void write_run(std::span<const PointRecord> grouped);
 
   [[nodiscard]] std::size_t ranges() const noexcept { return splitters_.size(); }
+  /// Records of a range.
+  [[nodiscard]] std::uint64_t size(std::size_t range) const noexcept;
+  /// Gives back the disk of a range; ranges go by ascending number.
+  void discard(std::size_t range) const noexcept;
 
  private:
   friend class BucketReader;
   struct Run {
     SpillPlace place;
     std::vector<std::uint32_t> starts;  // of each range in the run, and the end
+
+    [[nodiscard]] std::size_t size(std::size_t range) const noexcept { return starts[range + 1] - starts[range]; }
+    [[nodiscard]] SpillPlace place_of(std::size_t range, std::size_t i) const noexcept {
+      return {place.volume, place.offset + (starts[range] + i) * sizeof(PointRecord)};
+    }
   };
 
   SpillFile& file_;
   Splitters splitters_;
+  bool kept_;
   std::vector<Run> runs_;
 };
 
-/// Reads the records of one range in the order of the input. What was read leaves the disk: ranges of a partition
-/// are read by ascending number.
+/// Reads the records of one range in the order of the input. What was read leaves the disk unless it is kept: ranges
+/// of a partition are read by ascending number.
 class BucketReader {
  public:
   BucketReader(std::shared_ptr<const Partition> partition, std::size_t range);
@@ -131,9 +151,6 @@ class BucketReader {
   [[nodiscard]] std::vector<MortonKey> sample(std::size_t count, SpillReader& reader) const;
 
  private:
-  [[nodiscard]] std::size_t size_in(const Partition::Run& run) const noexcept;
-  [[nodiscard]] SpillPlace place_in(const Partition::Run& run, std::size_t i) const noexcept;
-
   std::shared_ptr<const Partition> partition_;
   std::size_t range_;
   std::uint64_t size_ = 0;

@@ -19,6 +19,25 @@ Splitters::Splitters(std::vector<MortonKey> sample, std::size_t ranges) {
   index();
 }
 
+Splitters::Splitters(StateReader& state) {
+  const std::uint64_t count = state.get_count(0xfffe);
+  state.require(count > 0, "a partition without ranges");
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto high = state.get<std::uint64_t>(), low = state.get<std::uint64_t>();
+    keys_.push_back(whole({high, low}));
+    state.require(i == 0 || keys_[i - 1] < keys_[i], "ranges of a partition do not ascend");
+  }
+  index();
+}
+
+void Splitters::save(StateWriter& state) const {
+  state.put(std::uint64_t{keys_.size()});
+  for (const Whole& key : keys_) {
+    state.put(static_cast<std::uint64_t>(key >> 64));
+    state.put(static_cast<std::uint64_t>(key));
+  }
+}
+
 void Splitters::index() {
   constexpr std::size_t kCellsPerRange = 8;
   const std::size_t most_cells = kCellsPerRange * size();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/io/state_file.h"
 #include "format/morton.h"
 
 namespace ptc {
@@ -24,6 +25,10 @@ class Splitters {
   /// @param ranges  3 to 65535
   /// @throws std::invalid_argument
   Splitters(std::vector<MortonKey> sample, std::size_t ranges);
+
+  /// As save() wrote them. @throws DataError
+  explicit Splitters(StateReader& state);
+  void save(StateWriter& state) const;
 
   [[nodiscard]] std::size_t size() const noexcept { return keys_.size() + 1; }
 

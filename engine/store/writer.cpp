@@ -5,13 +5,16 @@
 #include "engine/store/writer.h"
 
 #include <algorithm>
+#include <array>
 #include <future>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "engine/base/error.h"
 #include "engine/io/file.h"
+#include "engine/store/commit.h"
 #include "engine/store/structure.h"
 #include "format/checksum.h"
 #include "format/error.h"
@@ -49,8 +52,47 @@ FileHeader make_header(const WriterOptions& options) {
 
 struct ContainerWriter::Impl {
   Impl(const std::filesystem::path& target, const WriterOptions& options)
-      : header(make_header(options)), codec(options.codec), level(options.level), file(target) {
-    file.write_at(0, encode_file_header(header));
+      : header(make_header(options)), codec(options.codec), level(options.level) {
+    if (options.partial.empty()) {
+      file.emplace(target);
+    } else {
+      file.emplace(target, options.partial);
+      file->truncate(0);
+    }
+    file->write_at(0, encode_file_header(header));
+  }
+
+  Impl(const std::filesystem::path& target, const WriterOptions& options, const WriterState& state)
+      : header(make_header(options)), codec(options.codec), level(options.level), entries(state.pages), end(state.end) {
+    file.emplace(target, options.partial);
+    find_pages(options.partial);
+    file->truncate(end);
+  }
+
+  /// Fills the entries from the page headers.
+  void find_pages(const std::filesystem::path& partial) {
+    const InputFile in(partial);
+    const auto check = [&](bool holds, const char* text) {
+      if (!holds) throw DataError(partial.string() + ": " + text);
+    };
+    check(in.size() >= end && end >= kBlockBytes, "the unfinished container is shorter than it was");
+    Block block;
+    in.read_at(0, block);
+    check(block == encode_file_header(header), "it is no unfinished container of this scene");
+    std::uint64_t at = kBlockBytes;
+    while (at < end) {
+      std::array<std::byte, kPageHeaderBytes> bytes;
+      in.read_at(at, bytes);
+      const PageHeader page = at_offset(in, at, [&] { return decode_page_header(bytes, header); });
+      check(page.page_id < entries.size() && entries[page.page_id].offset == 0, "a page that was not written");
+      entries[page.page_id] = entry_of(page, at);
+      at += extent_bytes(page.stored_bytes);
+    }
+    check(at == end, "the unfinished container's last page is cut");
+  }
+
+  static DirectoryEntry entry_of(const PageHeader& page, std::uint64_t offset) {
+    return {offset, page.stored_bytes, page.raw_bytes, page.payload_xxh3, page.type, page.group, page.record_count};
   }
 
   [[nodiscard]] std::size_t payload_limit() const {
@@ -61,7 +103,7 @@ struct ContainerWriter::Impl {
     require(!finished, "a page after finish()");
     const std::lock_guard lock(entries_mutex);
     if (entries.size() >= kMaxPages) {
-      throw DataError(file.target().string() + ": needs more than 2^32 - 2 pages");
+      throw DataError(file->target().string() + ": needs more than 2^32 - 2 pages");
     }
     entries.emplace_back();
     return static_cast<std::uint32_t>(entries.size() - 1);
@@ -97,7 +139,7 @@ struct ContainerWriter::Impl {
 
   /// At the end of the file, in one write.
   void append(const Image& image) {
-    file.write_at(end, image.bytes);
+    file->write_at(end, image.bytes);
     end += image.bytes.size();
   }
 
@@ -111,8 +153,7 @@ struct ContainerWriter::Impl {
     }
     append(image);
     const std::lock_guard lock(entries_mutex);
-    entries[page.page_id] = {offset,    page.stored_bytes, page.raw_bytes,   page.payload_xxh3,
-                             page.type, page.group,        page.record_count};
+    entries[page.page_id] = entry_of(page, offset);
   }
 
   /// An encoder and what it fills, for one thread; kept between calls.
@@ -237,18 +278,18 @@ struct ContainerWriter::Impl {
     const Block block = encode_superblock(superblock);
     check(block, superblock, meta);
     write_directory(directory);
-    file.sync();  // what is committed reaches the disk before the commit record
-    file.write_at(end, block);
-    file.write_at(end + kBlockBytes, block);
-    file.sync();
-    file.publish();
+    file->sync();  // what is committed reaches the disk before the commit record
+    file->write_at(end, block);
+    file->write_at(end + kBlockBytes, block);
+    file->sync();
+    file->publish();
     return superblock;
   }
 
   FileHeader header;
   Codec codec;
   int level;
-  OutputFile file;
+  std::optional<OutputFile> file;
   std::mutex entries_mutex;             ///< pages are reserved while others are written
   std::vector<DirectoryEntry> entries;  ///< offset 0: reserved, not yet written
   std::uint64_t end = kBlockBytes;      ///< where the next page goes
@@ -263,6 +304,16 @@ ContainerWriter::ContainerWriter(const std::filesystem::path& target, const Writ
     : impl_(std::make_unique<Impl>(target, options)) {}
 
 ContainerWriter::~ContainerWriter() = default;
+
+ContainerWriter::ContainerWriter(const std::filesystem::path& target, const WriterOptions& options, const WriterState& state)
+    : impl_(std::make_unique<Impl>(target, options, state)) {}
+
+WriterState ContainerWriter::state() {
+  impl_->wait();
+  return {static_cast<std::uint32_t>(impl_->entries.size()), impl_->end};
+}
+
+void ContainerWriter::sync() { impl_->file->sync(); }
 
 const FileHeader& ContainerWriter::header() const noexcept {
   return impl_->header;

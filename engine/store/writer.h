@@ -21,6 +21,14 @@ struct WriterOptions {
   int level = 1;  ///< of zstd, clamped to its range
   Uuid uuid{};
   Frame frame;
+  /// Name of the file until it is published, under which it stays when it is not; empty: a temporary one.
+  std::filesystem::path partial;
+};
+
+/// How far a writer got.
+struct WriterState {
+  std::uint32_t pages = 0;  ///< reserved
+  std::uint64_t end = kBlockBytes;  ///< of those written
 };
 
 /// What superblocks say of who wrote them, unless they are told otherwise: program and version.
@@ -38,6 +46,9 @@ class ContainerWriter {
  public:
   /// @throws std::invalid_argument when page_shift is not 12 to 20 or the frame breaks a rule of spec/morton.md#frame
   ContainerWriter(const std::filesystem::path& target, const WriterOptions& options);
+  /// Goes on with the partial file of a writer with the same options, whose state() this was; what lies behind is cut.
+  /// @throws DataError when the file does not hold these pages
+  ContainerWriter(const std::filesystem::path& target, const WriterOptions& options, const WriterState& state);
   ~ContainerWriter();
 
   [[nodiscard]] const FileHeader& header() const noexcept;
@@ -71,6 +82,10 @@ class ContainerWriter {
   void write_pages(std::vector<Page> pages, const Executor& executor);
   /// Returns when all pages are in the file. @throws what went wrong with them
   void flush();
+  /// State once all pages are in the file.
+  [[nodiscard]] WriterState state();
+  /// What is in the file is on the disk when it returns. Threads: while another thread writes, too.
+  void sync();
   /// Writes a page whose payload is already in its stored form (copied from another container).
   void write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
                          std::uint32_t raw_bytes, std::span<const std::byte> stored);

@@ -7,7 +7,7 @@ import subprocess
 import time
 import unittest
 
-from programs import BIN, SMALL_PICTURE, ProgramTest, ball, write_ply
+from programs import BIN, SMALL_PICTURE, ProgramTest, ball, run, write_ply
 
 
 class SystemFailure(ProgramTest):
@@ -37,6 +37,44 @@ class SystemFailure(ProgramTest):
                                   ("ptcconvert", [self.scene, self.here / "o.xyz"]),
                                   ("ptcconvert", [self.scene, self.here / "o.ptcx"])):
             self.fail_with(3, program, *operands, preexec_fn=limit)
+
+    def test_a_build_that_was_killed_goes_on_to_the_same_bytes(self):
+        command = ["ptcbuild", "--city", "600k", "--memory", "100M", "-o", self.here / "o.ptcx"]
+        self.succeed(*command)
+        whole = (self.here / "o.ptcx").read_bytes()
+        (self.here / "o.ptcx").unlink()
+        command += ["--resume", "--checkpoint", "50k"]
+        died = gone_on = 0
+        for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT) * 4:
+            process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.PIPE, text=True)
+            time.sleep(0.05 + 0.03 * died)
+            process.send_signal(number)
+            told = process.communicate(timeout=60)[1]
+            died += process.returncode == -number
+            gone_on += "going on with" in told
+        self.assertGreater(died, 4)
+        self.assertGreater(gone_on, 0)
+        self.succeed(*command)
+        self.assertEqual((self.here / "o.ptcx").read_bytes(), whole)
+        self.assertEqual(os.listdir(self.here), ["o.ptcx"])
+
+    def test_two_builds_do_not_go_on_with_the_same_files(self):
+        command = [str(BIN / "ptcbuild"), "--city", "2M", "--resume", "-o", str(self.here / "o.ptcx")]
+        first = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while not (self.here / "o.ptcx.resume").exists():
+            time.sleep(0.01)
+        second = run(*command[:1], *command[1:])
+        self.assertEqual(second.returncode, 3)
+        self.assertIn("another program is at work on it", second.stderr)
+        self.assertEqual(first.wait(60), 0)
+
+    def test_what_is_left_of_another_build_is_refused(self):
+        command = ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx", "--resume"]
+        self.succeed(*command)
+        (self.here / "o.ptcx.resume").write_bytes(b"PTXSTATE and what is torn")
+        message = self.fail_with(1, *command)
+        self.assertIn("o.ptcx.resume: the state is cut short; to start anew, remove ", message)
 
     def test_results_that_cannot_be_printed(self):
         with open("/dev/full", "w") as full:

@@ -59,7 +59,7 @@ class Usage(ProgramTest):
                          "--sky-scale=-1", "--camera=1,2,3", "--camera=1,2,3,1,2,3", "--fov=40",
                          "--leaf=0", "--leaf=65536", "--levels-per-stream=0", "--codec=lzma",
                          "--page-size=3K", "--page-size=2M", "--sun-rays=0", "--finest=0",
-                         "--city=5", "--output="],
+                         "--city=5", "--output=", "--checkpoint=1M", "--resume=x"],
             "ptcshade": ["--solid-angle=0", "--parallax=-1", "--inflation=nan",
                          "--inflation=0", "--resolution=7", "--resolution=65", "--sides=back",
                          "--lift=-1", "--bounces=-1", "--bounces=1.5", "--bounces=1001", "--io=mail", "--check=-1", "--check-rays=0",

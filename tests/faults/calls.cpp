@@ -306,6 +306,31 @@ ssize_t pwrite(int fd, const void* data, std::size_t bytes, off_t offset) {
 ssize_t pwrite64(int fd, const void* data, std::size_t bytes, off64_t offset)
     __attribute__((alias("pwrite")));
 
+int ftruncate(int fd, off_t bytes) noexcept {
+  static const auto real = next_of(&::ftruncate, "ftruncate");
+  if (strikes("ftruncate", Kind::other, path_of(fd))) return -1;
+  const TraceGuard guard;
+  const int result = real(fd, bytes);
+  if (result == 0) record("cut", path_of(fd), "", bytes);
+  return result;
+}
+
+int ftruncate64(int fd, off64_t bytes) noexcept __attribute__((alias("ftruncate")));
+
+// Of holes.
+int fallocate(int fd, int mode, off_t offset, off_t bytes) {
+  static const auto real = next_of(&::fallocate, "fallocate");
+  if (strikes("fallocate", Kind::other, path_of(fd))) return -1;
+  char length[24];
+  std::snprintf(length, sizeof length, "%lld", static_cast<long long>(bytes));
+  const TraceGuard guard;
+  const int result = real(fd, mode, offset, bytes);
+  if (result == 0) record("hole", path_of(fd), length, offset);
+  return result;
+}
+
+int fallocate64(int fd, int mode, off64_t offset, off64_t bytes) __attribute__((alias("fallocate")));
+
 int fsync(int fd) {
   static const auto real = next_of(&::fsync, "fsync");
   return sync_watched("fsync", fd, real);

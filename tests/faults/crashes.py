@@ -5,9 +5,11 @@ its last sync is on the disk whole, in part, in any order or not at all, and so 
 last sync of their directory.
 """
 
+import os
 import random
 import signal
 import time
+from pathlib import Path
 
 from harness import OLD
 
@@ -34,7 +36,10 @@ class File:
 
     def sync(self):
         for offset, data in self.pending:
-            put(self.synced, offset, data)
+            if data is None:
+                del self.synced[offset:]
+            else:
+                put(self.synced, offset, data)
         self.pending = []
 
     def after_crash(self, draw):
@@ -43,6 +48,9 @@ class File:
         pieces = list(self.pending)
         draw.shuffle(pieces)
         for offset, data in pieces:
+            if data is None:  # cut there
+                del content[offset if fate != "none" else len(content):]
+                continue
             kept = {"all": "whole", "none": "lost"}.get(fate) or draw.choice(["whole", "lost", "torn", "zeros"])
             if kept == "whole":
                 put(content, offset, data)
@@ -65,31 +73,37 @@ class Disk:
     def __init__(self, target):
         self.synced = {target: File(OLD)}  # names whose directory was synced
         self.names = dict(self.synced)     # as the running program sees them
-        self.pending = []                  # changes of names since, as functions of a dictionary
+        self.pending = []                  # changes of names since: directory, function of a dictionary
 
-    def change(self, names):
-        self.pending.append(names)
+    def change(self, path, names):
+        self.pending.append((os.path.dirname(path), names))
         names(self.names)
 
     def perform(self, call, path, second, offset, data):
         if call == "create":
             file = File()
-            self.change(lambda names: names.update({path: file}))
+            self.change(path, lambda names: names.update({path: file}))
         elif call == "rename":
             file = self.names[path]
-            self.change(lambda names: (names.pop(path, None), names.update({second: file})))
+            self.change(path, lambda names: (names.pop(path, None), names.update({second: file})))
         elif call == "unlink":
-            self.change(lambda names: names.pop(path, None))
+            self.change(path, lambda names: names.pop(path, None))
         elif path in self.names:
             file = self.names[path]
-            file.sync() if call == "sync" else file.pending.append((offset, data))
-        elif call == "sync":  # of a directory
-            self.synced, self.pending = dict(self.names), []
+            if call == "sync":
+                file.sync()
+            else:
+                file.pending.append((offset, {"cut": None, "hole": bytes(int(second or 0))}.get(call, data)))
+        elif call == "sync":  # of a directory: changes of names in it
+            for where, names in self.pending:
+                if where == path:
+                    names(self.synced)
+            self.pending = [change for change in self.pending if change[0] != path]
 
     def after_crash(self, draw):
         names = dict(self.synced)
         fate = draw.choice(["all", "none", "some"])
-        for change in self.pending:
+        for _, change in self.pending:
             if fate == "all" or (fate == "some" and draw.random() < 0.5):
                 change(names)
         return {name: file.after_crash(draw) for name, file in names.items()}
@@ -126,12 +140,27 @@ def replay(place, arguments, tally):
             if done and left.get(target) != place.new:
                 tally.fail(f"{where}: exit {run.code}, but the new file is gone")
             for name, content in left.items():
-                if ".o.ptcx.tmp" in name and broken_promise(content, place.new):
+                if (".o.ptcx.tmp" in name or name.endswith(".resume-pages")) and broken_promise(content, place.new):
                     tally.fail(f"{where}: a superblock is on the disk, what it commits is not")
+            if place.scenario.keeps and left.get(target) in (OLD, place.new):
+                go_on(place, left, where, tally)
         if not done:
             disk.perform(*calls[point])
     print(f"  {place.scenario}: {len(calls)} calls that change files, {states} states of the disk:"
           f" {old} with the old file, {new} with the new one", flush=True)
+
+
+def go_on(place, left, where, tally):
+    """A run among what a crash left comes to the new file."""
+    place.reset()
+    place.target.unlink()
+    for name, content in left.items():
+        Path(name).write_bytes(content)
+    run = place.run(reset=False)
+    for wrong in place.complaints_alone(run, may_leave=True):
+        tally.fail(f"{where}: going on: {wrong}")
+    if place.target.read_bytes() != place.new:
+        tally.fail(f"{where}: going on did not come to the new file: exit {run.code}: {run.errors}")
 
 
 def judge_killed(place, run, where, tally):

@@ -15,7 +15,7 @@ from harness import CALLS, OLD, Tally, each_scenario
 KINDS = {"eio": "Input/output error", "enospc": "No space left on device", "emfile": "Too many open files",
          "eintr": "", "short": "", "none": "Input/output error"}
 # What these say changes nothing of what was done.
-HARMLESS = {"close", "unlink"}
+HARMLESS = {"close", "unlink", "fallocate"}
 
 
 def steps(count, most):

@@ -43,10 +43,11 @@ def write_ply(path, points):
 
 
 class Scenario:
-    """One command. `{in}` in an argument is the directory of inputs, `{out}` that of the target."""
+    """One command. `{in}` in an argument is the directory of inputs, `{out}` that of the target. What `keeps` leaves
+    files from which the same command goes on."""
 
-    def __init__(self, name, command, target="", slow=False):
-        self.name, self.command, self.target, self.slow = name, command.split(), target, slow
+    def __init__(self, name, command, target="", slow=False, keeps=False):
+        self.name, self.command, self.target, self.slow, self.keeps = name, command.split(), target, slow, keeps
 
     def __str__(self):
         return self.name
@@ -60,6 +61,8 @@ SCENARIOS = [
              " --temp {in}/temp -o {out}/o.ptcx", "o.ptcx", slow=True),
     Scenario("build spread", "ptcbuild --city 700K --memory 80M --threads 2 --page-size 1M --profile raw"
              " --temp {in}/temp --temp {in}/more -o {out}/o.ptcx", "o.ptcx", slow=True),
+    Scenario("build resumed", "ptcbuild --city 150K --memory 100M --threads 2 --resume --checkpoint 50K"
+             " --temp {in}/temp --temp {in}/more -o {out}/o.ptcx", "o.ptcx", slow=True, keeps=True),
     Scenario("shade to container", "ptcshade {in}/ball.ptcx -o {out}/o.ptcx --threads 1", "o.ptcx"),
     Scenario("shade to cloud", "ptcshade {in}/ball.ptcx -o {out}/o.ply --threads 2", "o.ply"),
     Scenario("shade mapped", "ptcshade {in}/ball.ptcx -o {out}/o.ply --threads 1 --io mmap", "o.ply"),
@@ -166,7 +169,15 @@ class Place:
         return sorted(path.name for path in self.files() if path != self.target)
 
     def complaints(self, run, may_leave=False):
-        """What is wrong after any fault: a hang, a death, a half file, a temporary file."""
+        """What is wrong after any fault: a hang, a death, a half file, a temporary file. What was kept is gone on with."""
+        wrong = self.complaints_alone(run, may_leave)
+        if self.scenario.keeps and run.code is not None:
+            again = self.run(reset=False)
+            wrong += [f"going on: {text}" for text in self.complaints_alone(again, may_leave)]
+            wrong += [f"going on: exit {again.code}: {again.errors.strip()[:300]}"] * (again.code != 0)
+        return wrong
+
+    def complaints_alone(self, run, may_leave=False):
         if run.code is None:
             return ["it hangs"]
         wrong = []
@@ -181,7 +192,9 @@ class Place:
         if run.code > 0 and not re.search(f"^{self.scenario.command[0]}: ", run.errors, re.M):
             wrong.append("no message")
         names = r"\.(.+\.tmp-\d+-\d+|ptcx-\d+-\d+\.ptcx)"
-        left = [name for name in self.leftovers() if not (may_leave and re.fullmatch(names, name))]
+        kept = r"o\.ptcx\.resume(-.+)?" if self.scenario.keeps and run.code != 0 else "$^"
+        left = [name for name in self.leftovers()
+                if not (may_leave and re.fullmatch(names, name)) and not re.fullmatch(kept, name)]
         if left:
             wrong.append(f"left behind: {' '.join(left)}")
         return wrong

@@ -107,7 +107,7 @@ TEST_CASE("spill: each range gives its records back in the order of the input", 
     for (const std::size_t step : {1u, 7u, 5000u}) {
       SpillFile file({&kDirectory, 1});
       const auto partition = spilled(file, input, run, 10);
-      SpillReader reader(file, SpillReader::kLeastBytes);
+      SpillReader reader(SpillReader::kLeastBytes);
       REQUIRE(partition->ranges() == splitters.size());
       for (std::size_t range = 0; range < partition->ranges(); ++range) {
         std::vector<PointRecord> expected, actual, block(step);
@@ -135,7 +135,7 @@ TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
   file.discard({}, 0);  // no more than what it is asked for
   CHECK(nameless_bytes() - others == all);
 
-  SpillReader reader(file, SpillReader::kLeastBytes);
+  SpillReader reader(SpillReader::kLeastBytes);
   std::vector<PointRecord> out(records.size());
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
@@ -167,7 +167,7 @@ TEST_CASE("spill: records are spread over directories and come back from all", "
   }
   CHECK(all == file.bytes());
 
-  SpillReader reader(file, SpillReader::kLeastBytes);
+  SpillReader reader(SpillReader::kLeastBytes);
   std::vector<PointRecord> sorted, block(input.size());
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
@@ -182,7 +182,7 @@ TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
   const std::vector<PointRecord> input = make_records(Keys::ascending, 5000);
   SpillFile file({&kDirectory, 1});
   const auto partition = spilled(file, input, 600, 3);
-  SpillReader reader(file, SpillReader::kLeastBytes);
+  SpillReader reader(SpillReader::kLeastBytes);
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
     std::vector<PointRecord> all(static_cast<std::size_t>(bucket.size()));
@@ -203,8 +203,7 @@ TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
 }
 
 TEST_CASE("spill: a read buffer below its least is refused", "[sort][spill]") {
-  const SpillFile file({&kDirectory, 1});
-  CHECK_THROWS_AS(SpillReader(file, SpillReader::kLeastBytes - 1), std::invalid_argument);
+  CHECK_THROWS_AS(SpillReader(SpillReader::kLeastBytes - 1), std::invalid_argument);
 }
 
 TEST_CASE("sort plan: it uses most of the cap and never more", "[sort][plan]") {

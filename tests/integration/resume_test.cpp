@@ -1,0 +1,176 @@
+// Builds that are interrupted and go on.
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <fstream>
+
+#include "engine/base/error.h"
+#include "engine/pipeline.h"
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+struct Interrupted {};
+
+/// Ends the build when so many points were reported in all stages.
+class Interrupt : public Progress {
+ public:
+  explicit Interrupt(std::uint64_t after) : left_(static_cast<std::int64_t>(after)) {}
+  void advance(std::uint64_t count) override {
+    if ((left_ -= static_cast<std::int64_t>(count)) < 0) throw Interrupted();
+  }
+
+ private:
+  std::int64_t left_;
+};
+
+std::size_t entries(const std::filesystem::path& directory) {
+  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(directory), {}));
+}
+
+void write_cloud(const std::filesystem::path& path, std::size_t count, bool radii) {
+  std::ofstream out(path);
+  out << "# x y z nx ny nz" << (radii ? " radius" : "") << "\n";
+  std::size_t i = 0;
+  for (const Surfel& s : random_surfels(count, 5)) {
+    out << s.position.x << ' ' << s.position.y << ' ' << s.position.z << " 0 0 1";
+    if (radii) out << ' ' << 0.001 * static_cast<double>(++i % 7 + 1);
+    out << '\n';
+  }
+}
+
+/// A city, or a cloud of the same size whose radii are estimated, with temporary files in two directories.
+struct Place {
+  TemporaryDirectory dir;
+  BuildRequest request;
+  std::filesystem::path out = dir / "o.ptcx";
+  std::vector<char> whole;
+  std::uint64_t points = 0;
+  std::size_t before = 0;  // files
+
+  explicit Place(bool cloud) {
+    std::filesystem::create_directory(dir / "t1");
+    std::filesystem::create_directory(dir / "t2");
+    if (cloud) {
+      write_cloud(dir / "c.xyz", 300'000, false);
+      request.inputs = {dir / "c.xyz"};
+    } else {
+      request.city_points = 300'000;
+    }
+    request.run = {.memory_bytes = std::uint64_t{200} << 20, .threads = 2, .temp_dirs = {dir / "t1", dir / "t2"}};
+    Progress silent;
+    points = build_container(request, dir / "whole.ptcx", silent).superblock.points;
+    before = entries(dir.path());
+    whole = bytes_of(dir / "whole.ptcx");
+    request.resume = true;
+    request.checkpoint_points = 1;
+  }
+
+  [[nodiscard]] bool clean() const {
+    const std::size_t made = std::filesystem::exists(out) ? 1 : 0;
+    return entries(dir / "t1") + entries(dir / "t2") == 0 && entries(dir.path()) == before + made;
+  }
+  void interrupt(std::uint64_t after) {
+    Interrupt progress(after);
+    CHECK_THROWS_AS(build_container(request, out, progress), Interrupted);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("resume: a build that is interrupted anywhere comes to the same bytes", "[integration][resume]") {
+  for (const bool cloud : {false, true}) {
+    Place place(cloud);
+    const std::uint64_t passes = (cloud ? 2 : 1) * place.points;  // points reported before the sorted ones
+    Progress silent;
+    for (const std::uint64_t after : {100'000u, 299'000u}) {  // nothing is kept of a sort that did not end
+      place.interrupt(after);
+      CHECK(place.clean());
+    }
+    for (const std::uint64_t after : {10'000u, 140'000u, 230'000u}) {
+      place.request.run.threads = 2;
+      place.interrupt(passes + 1000 + after);
+      CHECK_FALSE(place.clean());
+      place.request.run.threads = 1;
+      place.request.run.memory_bytes ^= std::uint64_t{100} << 20;
+      const BuildReport report = build_container(place.request, place.out, silent);
+      CHECK(report.resumed_points == after / 65'280 * 65'280);
+      CHECK(bytes_of(place.out) == place.whole);
+      CHECK(place.clean());
+      std::filesystem::remove(place.out);
+    }
+    place.interrupt(passes + 101'000);
+    for (unsigned k = 0; k < 3; ++k) place.interrupt(65'280 * (k + 2) + 10'000);  // what was built before counts, too
+    CHECK(build_container(place.request, place.out, silent).resumed_points == 4 * 65'280);
+    CHECK(bytes_of(place.out) == place.whole);
+  }
+}
+
+TEST_CASE("resume: what is left of another request or of changed inputs is refused by name", "[integration][resume]") {
+  Place place(true);
+  place.interrupt(2 * place.points + 200'000);
+  Progress silent;
+  BuildRequest other = place.request;
+  other.tree.leaf_points = 9;
+  CHECK_THROWS_WITH(build_container(other, place.out, silent), Catch::Contains("--leaf: 16") && Catch::Contains("--leaf: 9") &&
+                                                                   Catch::Contains("to start anew, remove"));
+  other = place.request;
+  other.profile = Profile::raw;
+  CHECK_THROWS_WITH(build_container(other, place.out, silent), Catch::Contains("--profile"));
+  other = place.request;
+  other.inputs.push_back(place.dir / "c.xyz");
+  CHECK_THROWS_AS(build_container(other, place.out, silent), DataError);
+  const auto cloud = place.dir / "c.xyz";
+  const auto changed = std::filesystem::last_write_time(cloud);
+  std::filesystem::last_write_time(cloud, changed + std::chrono::seconds(1));
+  CHECK_THROWS_WITH(build_container(place.request, place.out, silent), Catch::Contains("c.xyz"));
+  std::filesystem::last_write_time(cloud, changed);
+  other = place.request;
+  other.checkpoint_points = 100'000;  // these change no byte
+  other.run.threads = 1;
+  other.run.temp_dirs = {place.dir / "t2"};
+  CHECK(build_container(other, place.out, silent).resumed_points > 0);
+  CHECK(bytes_of(place.out) == place.whole);
+  CHECK(place.clean());
+}
+
+TEST_CASE("resume: torn states are refused with what to remove", "[integration][resume]") {
+  Place place(false);
+  place.interrupt(place.points + 200'000);
+  Progress silent;
+  for (const char* name : {"o.ptcx.resume", "o.ptcx.resume-at"}) {
+    const std::vector<char> whole = bytes_of(place.dir / name);
+    for (const std::size_t keep : {std::size_t{0}, std::size_t{20}, whole.size() / 2, whole.size() - 1}) {
+      std::filesystem::resize_file(place.dir / name, keep);
+      CHECK_THROWS_WITH(build_container(place.request, place.out, silent), Catch::Contains(name));
+      std::ofstream(place.dir / name, std::ios::binary).write(whole.data(), static_cast<std::streamsize>(whole.size()));
+    }
+  }
+  CHECK(build_container(place.request, place.out, silent).resumed_points > 0);
+  CHECK(bytes_of(place.out) == place.whole);
+}
+
+TEST_CASE("resume: before its first page a build goes on beside an old file of any kind", "[integration][resume]") {
+  Place place(false);
+  place.interrupt(place.points + 100);
+  std::filesystem::resize_file(place.dir / "o.ptcx.resume-pages", 0);  // as a power cut may leave it
+  std::ofstream(place.out) << "what was there before";
+  Progress silent;
+  CHECK(build_container(place.request, place.out, silent).resumed_points == 0);
+  CHECK(bytes_of(place.out) == place.whole);
+  CHECK(place.clean());
+}
+
+TEST_CASE("resume: a build that was published before what it had kept was removed is done", "[integration][resume]") {
+  Place place(false);
+  place.interrupt(place.points + 200'000);
+  std::filesystem::copy_file(place.dir / "whole.ptcx", place.out);
+  std::filesystem::remove(place.dir / "o.ptcx.resume-pages");
+  Progress silent;
+  const BuildReport report = build_container(place.request, place.out, silent);
+  CHECK(report.resumed_points == report.superblock.points);
+  CHECK(bytes_of(place.out) == place.whole);
+  CHECK(place.clean());
+}
