@@ -1,10 +1,16 @@
 // Scene to container (engine/pipeline.h).
+#include <array>
 #include <cstring>
 #include <memory>
+#include <stdexcept>
+#include <system_error>
 
 #include <fmt/format.h>
 
+#include "engine/append.h"
 #include "engine/base/error.h"
+#include "engine/build/container_points.h"
+#include "engine/build/merge.h"
 #include "engine/build/radius.h"
 #include "engine/build_inputs.h"
 #include "engine/pipeline.h"
@@ -19,6 +25,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kCheckpointBytes = 8 << 20;  // of a checkpoint on its way, beside open pages
+constexpr std::uint64_t kReaderBytes = 100;          // a page of a scene that is added to, while it opens
 constexpr std::uint64_t kOpenPages = 48;             // in it and in its copies
 
 std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Frame& frame) {
@@ -46,12 +53,14 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double sp
 }
 
 /// Equal points, settings and record give an equal file, so its name in the world is made of them.
-Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildRequest& request, const Meta& meta) {
+/// @param scene  that they are added to, or zeros
+Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildRequest& request, const Meta& meta, const Uuid& scene) {
   std::string text = fmt::format("{:x} {:x} {} {} {} {} {} {} {} {}", sorter.digest()[0], sorter.digest()[1],
                                  frame.origin[0], frame.origin[1], frame.origin[2], frame.edge,
                                  request.tree.leaf_points, request.tree.levels_per_stream, request.page_shift,
                                  static_cast<int>(request.profile));
   for (const auto& [key, value] : meta.text) text.append("\n").append(key).append("=").append(value);
+  if (scene != Uuid{}) text.append("\n").append(reinterpret_cast<const char*>(scene.data()), scene.size());
   const std::array<std::uint64_t, 2> hash = xxh3_128(std::as_bytes(std::span(text)));
   Uuid uuid;
   std::memcpy(uuid.data(), hash.data(), uuid.size());
@@ -71,6 +80,7 @@ class Build {
       : request_(request), target_(target), progress_(progress), executor_(request.run.threads) {}
 
   BuildReport run() {
+    if (!request_.append.empty()) open_scene();
     if (request_.resume) resumption_ = std::make_unique<Resumption>(request_, target_);
     if (resumption_ && resumption_->plan() && was_published()) return std::move(report_);
     SortedPoints points = resumption_ && resumption_->plan() ? take_up() : sort();
@@ -81,9 +91,30 @@ class Build {
   }
 
  private:
+  /// The scene that is added to.
+  void open_scene() {
+    std::error_code absent;
+    if (request_.resume && std::filesystem::equivalent(request_.append, target_, absent)) {
+      throw std::invalid_argument("what can be resumed is appended to another file than " + target_.string());
+    }
+    if (request_.city_points > 0) throw std::invalid_argument("the city cannot be appended to a scene");
+    scene_ = std::make_unique<ContainerReader>(request_.append);
+    check_extensible(*scene_);
+    if (scene_->meta().text.contains(kLightsKey)) request_.lights = recorded_lights(*scene_);
+  }
+
+  [[nodiscard]] std::uint64_t scene_points() const { return scene_ ? scene_->superblock().points : 0; }
+
+  [[nodiscard]] Frame frame_of(const Bounds& bounds) const {
+    if (bounds.empty()) return scene_->header().frame;
+    const std::array<double, 3> low = to_array(bounds.low), high = to_array(bounds.high);
+    return scene_points() > 0 ? grow_frame(scene_->header().frame, low, high) : frame_around(low, high);
+  }
+
   /// What the cap leaves for the sort.
   [[nodiscard]] SortOptions sort_options(std::uint64_t taken, std::uint64_t expected) const {
     taken += kBufferBytes;
+    if (scene_) taken += kReaderBytes * scene_->page_count();
     if (resumption_) taken += kCheckpointBytes + (kOpenPages << request_.page_shift);
     SortOptions options{.memory_bytes = memory_left(request_.run, taken, kLeastSort, "this scene's build"),
                         .temp_dirs = temp_dirs(request_.run, target_),
@@ -94,9 +125,8 @@ class Build {
 
   SortedPoints sort() {
     BuildInputs inputs = read_inputs(request_, report_.seconds, progress_);
-    if (inputs.bounds.empty()) throw DataError("the input has no points and no triangles");
-    SortedPoints points{.plan = {.frame = frame_around(to_array(inputs.bounds.low), to_array(inputs.bounds.high)),
-                                 .estimate_radii = inputs.clouds.estimate_radii}};
+    if (inputs.bounds.empty() && !scene_) throw DataError("the input has no points and no triangles");
+    SortedPoints points{.plan = {.frame = frame_of(inputs.bounds), .estimate_radii = inputs.clouds.estimate_radii}};
     const Frame& frame = points.plan.frame;
     std::uint64_t taken = request_.mesh ? mesh_bytes(*request_.mesh, nullptr) : 0;
     if (const LitMesh* lit = inputs.lit.get()) {
@@ -116,13 +146,14 @@ class Build {
       spacing = feed_inputs(inputs, request_, frame, *points.sorter, executor_, progress_);
     }
     points.plan.meta = make_meta(request_, inputs, spacing);
-    points.plan.uuid = content_uuid(*points.sorter, frame, request_, points.plan.meta);
+    if (scene_) points.plan.meta = extended_meta(scene_->meta(), points.plan.meta);
+    points.plan.uuid = content_uuid(*points.sorter, frame, request_, points.plan.meta, scene_ ? scene_->header().uuid : Uuid{});
     if (resumption_) resumption_->keep(points.plan, *points.sorter);
     return points;
   }
 
   void tell_space(std::uint64_t expected, std::uint64_t spilled, std::span<const std::filesystem::path> temps) {
-    report_.space = require_build_space(expected, spilled, request_.profile, temps, target_);
+    report_.space = require_build_space(expected + scene_points(), spilled, request_.profile, temps, target_);
     if (spilled > 0) progress_.note(space_text(report_.space, temps, target_));
   }
 
@@ -133,7 +164,7 @@ class Build {
     points.sorter = std::make_unique<ExternalSorter>(sort_options(0, 0), executor_, state);
     state.end();
     if (const auto& checkpoint = resumption_->checkpoint()) report_.resumed_points = checkpoint->place.points;
-    progress_.note(fmt::format("going on with {} of {} points in {}", report_.resumed_points, points.sorter->statistics().points,
+    progress_.note(fmt::format("going on with {} of {} points in {}", report_.resumed_points, scene_points() + points.sorter->statistics().points,
                                resumption_->partial().string()));
     return points;
   }
@@ -155,7 +186,7 @@ class Build {
 
   void build(SortedPoints& points) {
     const BuildPlan& plan = points.plan;
-    const Stage stage(report_.seconds, progress_, "sort and build", points.sorter->statistics().points, "points");
+    const Stage stage(report_.seconds, progress_, "sort and build", scene_points() + points.sorter->statistics().points, "points");
     WriterOptions options{.page_shift = request_.page_shift, .codec = codec_of(request_.profile), .uuid = plan.uuid, .frame = plan.frame};
     if (resumption_) options.partial = resumption_->partial();
     const Checkpoint* const from = resumption_ && resumption_->checkpoint() ? &*resumption_->checkpoint() : nullptr;
@@ -163,11 +194,19 @@ class Build {
     const BuildPlace place = from ? from->place : BuildPlace{};
     progress_.advance(place.points);
 
-    std::uint64_t (*const needed)(std::uint64_t) = plan.estimate_radii ? first_for_radii : first_for_itself;
-    std::unique_ptr<PointStream> sorted = points.sorter->finish(needed(place.points));
-    std::unique_ptr<PointStream> with_radii, rounded;
+    // Of an extended scene a build goes on where it ended by merging once more what was merged.
+    const std::uint64_t first = scene_ ? 0 : place.points;
+    const auto needed = scene_ ? first_of_all : plan.estimate_radii ? first_for_radii : first_for_itself;
+    const std::unique_ptr<PointStream> sorted = points.sorter->finish(needed(first));
+    std::unique_ptr<PointStream> with_radii, old, moved, merged, rounded;
     PointStream* stream = sorted.get();
-    if (plan.estimate_radii) stream = (with_radii = estimate_radii(*stream, plan.frame.unit(), place.points)).get();
+    if (plan.estimate_radii) stream = (with_radii = estimate_radii(*stream, plan.frame.unit(), first)).get();
+    if (scene_) {
+      old = std::make_unique<ContainerPoints>(*scene_);
+      moved = move_points(*old, LatticeMove(scene_points() > 0 ? scene_->header().frame : plan.frame, plan.frame));
+      stream = (merged = merge_points(*moved, *stream)).get();
+      pass_over(*stream, place.points);
+    }
     if (is_rounded(request_.profile)) {
       stream = (rounded = round_points(*stream, plan.frame.unit(), executor_, place.last_key)).get();
     }
@@ -187,12 +226,14 @@ class Build {
   }
 
   static std::uint64_t first_for_itself(std::uint64_t point) { return point; }
+  static std::uint64_t first_of_all(std::uint64_t /*point*/) { return 0; }
 
-  const BuildRequest& request_;
+  BuildRequest request_;
   const std::filesystem::path& target_;
   Progress& progress_;
   const Executor executor_;
   BuildReport report_;
+  std::unique_ptr<ContainerReader> scene_;  ///< that the points are added to; null: none
   std::unique_ptr<Resumption> resumption_;
 };
 

@@ -42,6 +42,9 @@ struct BuildRequest {
   std::vector<std::filesystem::path> inputs;  ///< meshes and clouds
   std::shared_ptr<const Mesh> mesh;           ///< a mesh in memory, beside those of the inputs
   std::uint64_t city_points = 0;              ///< the procedural city instead of inputs
+  /// A container to which the inputs are added: its points keep what they are, their order and their lights, and are not
+  /// sorted again. The cube doubles until it holds all; then its points move by less than a unit of the new lattice.
+  std::filesystem::path append;
   bool backdrop = false;                      ///< sets the meshes on a ground before a red wall
   std::optional<LightRig> lights;             ///< of the meshes (clouds come lit); empty: a default_rig()
                                               ///< unless a mesh emits light

@@ -23,11 +23,12 @@ std::string text_of(const BuildRequest& request) {
   std::string text;
   const auto line = [&](const char* name, const auto& value) { text += fmt::format("{}: {}\n", name, value); };
   line("the program", writer_name());
-  for (const std::filesystem::path& input : request.inputs) {
-    const auto changed = std::filesystem::last_write_time(input).time_since_epoch().count();
-    line("an input", fmt::format("{}, {} bytes, changed {}", std::filesystem::absolute(input).string(),
-                                 std::filesystem::file_size(input), changed));
-  }
+  const auto file = [&](const char* name, const std::filesystem::path& path) {
+    const auto changed = std::filesystem::last_write_time(path).time_since_epoch().count();
+    line(name, fmt::format("{}, {} bytes, changed {}", std::filesystem::absolute(path).string(), std::filesystem::file_size(path), changed));
+  };
+  for (const std::filesystem::path& input : request.inputs) file("an input", input);
+  if (!request.append.empty()) file("--append", request.append);
   const SamplingOptions& sampling = request.sampling;
   line("--city", request.city_points);
   line("--backdrop", request.backdrop);

@@ -1,6 +1,7 @@
 // ptcbuild: meshes and clouds to a lit, sorted, hierarchical container.
 #include <fmt/format.h>
 
+#include "engine/append.h"
 #include "format/node_page.h"
 #include "tools/common.h"
 #include "tools/options.h"
@@ -18,6 +19,7 @@ constexpr char kExamples[] =
     "  ptcbuild sponza.obj --points 20M --sun 30,60,4 --sky 0.5,0.6,0.8 -o sponza.ptcx\n"
     "  ptcbuild scan.ply --memory 512M --progress -o scan.ptcx\n"
     "  ptcbuild huge.ply --resume --temp . --temp /scratch -o huge.ptcx\n"
+    "  ptcbuild annex.ply --append scan.ptcx -o scan.ptcx\n"
     "  ptcbuild --city 100M --memory 1G --temp /scratch -o city.ptcx\n";
 
 /// What the command line says beyond the request itself.
@@ -38,6 +40,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
   command.add_output("-o,--output", arguments.output, {".ptcx"}, "The container to write");
   ptc::add_count(app, "--city", request.city_points, "A procedural city of about so many points, no inputs")
       ->excludes(inputs);
+  command.add_input("--append", request.append, "A container whose points, lights and profile go before the inputs")->excludes("--city");
   app.add_flag("--backdrop", request.backdrop, "Set the meshes on a ground before a red wall");
 }
 
@@ -84,15 +87,26 @@ void declare_resume(CLI::App& app, ptc::BuildRequest& request) {
   ptc::add_count(app, "--checkpoint", request.checkpoint_points, "Points that are built again at most, about")->needs(resume)->group(kGroup);
 }
 
-ptc::Outcome build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+/// What is not given is that of the scene which is added to.
+void adopt_settings(Arguments& arguments, ptc::Command& command) {
+  if (arguments.lights.given() || arguments.no_default_lights) throw CLI::ExcludesError("--append", "lights: the scene has its own");
+  const auto given = [&](const char* option) { return command.app().count(option) > 0; };
+  const ptc::ContainerReader scene(arguments.request.append);
+  if (!given("--profile")) ptc::adopt_profile(arguments.request, scene);
+  if (!given("--page-size")) ptc::adopt_page_size(arguments.request, scene);
+  if (!given("--leaf")) ptc::adopt_leaves(arguments.request, scene);
+}
+
+ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
   ptc::BuildRequest& request = arguments.request;
   if (request.inputs.empty() && request.city_points == 0) {
     throw CLI::RequiredError("a mesh, a cloud or --city");
   }
-  request.run = run;
+  request.run = command.run_options();
   request.sampling.camera = arguments.camera.camera();
   if (arguments.lights.given() || arguments.no_default_lights) request.lights = arguments.lights.rig();
   if (request.city_points > 0 && arguments.lights.given()) throw CLI::ExcludesError("--city", "lights: it has its own");
+  if (!request.append.empty()) adopt_settings(arguments, command);
   const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
 
   const ptc::Superblock& made = report.superblock;
@@ -119,6 +133,6 @@ int main(int argc, char** argv) {
   declare_container(command.app(), arguments.request);
   declare_resume(command.app(), arguments.request);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
-    return build(arguments, command.run_options(), progress);
+    return build(arguments, command, progress);
   });
 }

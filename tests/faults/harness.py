@@ -63,6 +63,7 @@ SCENARIOS = [
              " --temp {in}/temp --temp {in}/more -o {out}/o.ptcx", "o.ptcx", slow=True),
     Scenario("build resumed", "ptcbuild --city 150K --memory 100M --threads 2 --resume --checkpoint 50K"
              " --temp {in}/temp --temp {in}/more -o {out}/o.ptcx", "o.ptcx", slow=True, keeps=True),
+    Scenario("append", "ptcbuild {in}/ball.ply --append {in}/ball.ptcx -o {out}/o.ptcx --threads 1", "o.ptcx"),
     Scenario("shade to container", "ptcshade {in}/ball.ptcx -o {out}/o.ptcx --threads 1", "o.ptcx"),
     Scenario("shade to cloud", "ptcshade {in}/ball.ptcx -o {out}/o.ply --threads 2", "o.ply"),
     Scenario("shade mapped", "ptcshade {in}/ball.ptcx -o {out}/o.ply --threads 1 --io mmap", "o.ply"),
