@@ -54,7 +54,8 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double sp
 
 /// Equal points, settings and record give an equal file, so its name in the world is made of them.
 /// @param scene  that they are added to, or zeros
-Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildRequest& request, const Meta& meta, const Uuid& scene) {
+Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildRequest& request, const Meta& meta,
+                  const Uuid& scene) {
   std::string text = fmt::format("{:x} {:x} {} {} {} {} {} {} {} {}", sorter.digest()[0], sorter.digest()[1],
                                  frame.origin[0], frame.origin[1], frame.origin[2], frame.edge,
                                  request.tree.leaf_points, request.tree.levels_per_stream, request.page_shift,
@@ -164,8 +165,8 @@ class Build {
     points.sorter = std::make_unique<ExternalSorter>(sort_options(0, 0), executor_, state);
     state.end();
     if (const auto& checkpoint = resumption_->checkpoint()) report_.resumed_points = checkpoint->place.points;
-    progress_.note(fmt::format("going on with {} of {} points in {}", report_.resumed_points, scene_points() + points.sorter->statistics().points,
-                               resumption_->partial().string()));
+    progress_.note(fmt::format("going on with {} of {} points in {}", report_.resumed_points,
+                               scene_points() + points.sorter->statistics().points, resumption_->partial().string()));
     return points;
   }
 
@@ -174,8 +175,8 @@ class Build {
     if (std::filesystem::file_size(resumption_->partial()) > 0 || !std::filesystem::exists(target_)) return false;
     try {
       const ContainerReader published(target_);
-      if (published.header().uuid != resumption_->plan()->uuid || published.superblock().writer != writer_name()) return false;
       report_.superblock = published.superblock();
+      if (published.header().uuid != resumption_->plan()->uuid || report_.superblock.writer != writer_name()) return false;
     } catch (const FormatError&) {
       return false;  // what was there before
     }
@@ -186,8 +187,10 @@ class Build {
 
   void build(SortedPoints& points) {
     const BuildPlan& plan = points.plan;
-    const Stage stage(report_.seconds, progress_, "sort and build", scene_points() + points.sorter->statistics().points, "points");
-    WriterOptions options{.page_shift = request_.page_shift, .codec = codec_of(request_.profile), .uuid = plan.uuid, .frame = plan.frame};
+    const std::uint64_t all = scene_points() + points.sorter->statistics().points;
+    const Stage stage(report_.seconds, progress_, "sort and build", all, "points");
+    WriterOptions options{
+        .page_shift = request_.page_shift, .codec = codec_of(request_.profile), .uuid = plan.uuid, .frame = plan.frame};
     if (resumption_) options.partial = resumption_->partial();
     const Checkpoint* const from = resumption_ && resumption_->checkpoint() ? &*resumption_->checkpoint() : nullptr;
     ContainerWriter writer = from ? ContainerWriter(target_, options, from->writer) : ContainerWriter(target_, options);
@@ -218,7 +221,9 @@ class Build {
     if (!resumption_) return build_pages(points, writer, request_.tree, executor_, progress_);
     CheckpointSaver saver(*resumption_, writer, sorter, needed);
     Checkpoints checkpoints{.interval = request_.checkpoint_points,
-                            .save = [&](const BuildPlace& at, std::vector<std::byte> state) { saver.save(at, std::move(state)); }};
+                            .save = [&](const BuildPlace& at, std::vector<std::byte> state) {
+                              saver.save(at, std::move(state));
+                            }};
     if (!resumption_->checkpoint()) return build_pages(points, writer, request_.tree, executor_, progress_, checkpoints);
     StateReader state = resumption_->build_state();
     checkpoints.from = &state;

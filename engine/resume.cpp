@@ -25,7 +25,8 @@ std::string text_of(const BuildRequest& request) {
   line("the program", writer_name());
   const auto file = [&](const char* name, const std::filesystem::path& path) {
     const auto changed = std::filesystem::last_write_time(path).time_since_epoch().count();
-    line(name, fmt::format("{}, {} bytes, changed {}", std::filesystem::absolute(path).string(), std::filesystem::file_size(path), changed));
+    const std::string whole = std::filesystem::absolute(path).string();
+    line(name, fmt::format("{}, {} bytes, changed {}", whole, std::filesystem::file_size(path), changed));
   };
   for (const std::filesystem::path& input : request.inputs) file("an input", input);
   if (!request.append.empty()) file("--append", request.append);
@@ -38,7 +39,8 @@ std::string text_of(const BuildRequest& request) {
   line("the camera", sampling.camera ? to_json(*sampling.camera) : "none");
   line("--pixels-per-surfel", sampling.pixels_per_surfel);
   line("--finest", sampling.finest);
-  line("the rays to lights", fmt::format("{} {} {}", sampling.lights.sun_rays, sampling.lights.area_rays, sampling.lights.sky_rays));
+  const LightSampling& rays = sampling.lights;
+  line("the rays to lights", fmt::format("{} {} {}", rays.sun_rays, rays.area_rays, rays.sky_rays));
   line("--leaf", request.tree.leaf_points);
   line("--levels-per-stream", request.tree.levels_per_stream);
   line("--page-size", 1U << request.page_shift);

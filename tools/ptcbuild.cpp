@@ -40,7 +40,8 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
   command.add_output("-o,--output", arguments.output, {".ptcx"}, "The container to write");
   ptc::add_count(app, "--city", request.city_points, "A procedural city of about so many points, no inputs")
       ->excludes(inputs);
-  command.add_input("--append", request.append, "A container whose points, lights and profile go before the inputs")->excludes("--city");
+  command.add_input("--append", request.append, "A container whose points, lights and profile go before the inputs")
+      ->excludes("--city");
   app.add_flag("--backdrop", request.backdrop, "Set the meshes on a ground before a red wall");
 }
 
@@ -83,13 +84,18 @@ void declare_container(CLI::App& app, ptc::BuildRequest& request) {
 
 void declare_resume(CLI::App& app, ptc::BuildRequest& request) {
   constexpr char kGroup[] = "Resume";
-  CLI::Option* resume = app.add_flag("--resume", request.resume, "Leave what it takes to go on, and go on with what there is")->group(kGroup);
-  ptc::add_count(app, "--checkpoint", request.checkpoint_points, "Points that are built again at most, about")->needs(resume)->group(kGroup);
+  CLI::Option* resume =
+      app.add_flag("--resume", request.resume, "Leave what it takes to go on, and go on with what there is")->group(kGroup);
+  ptc::add_count(app, "--checkpoint", request.checkpoint_points, "Points that are built again at most, about")
+      ->needs(resume)
+      ->group(kGroup);
 }
 
 /// What is not given is that of the scene which is added to.
 void adopt_settings(Arguments& arguments, ptc::Command& command) {
-  if (arguments.lights.given() || arguments.no_default_lights) throw CLI::ExcludesError("--append", "lights: the scene has its own");
+  if (arguments.lights.given() || arguments.no_default_lights) {
+    throw CLI::ExcludesError("--append", "lights: the scene has its own");
+  }
   const auto given = [&](const char* option) { return command.app().count(option) > 0; };
   const ptc::ContainerReader scene(arguments.request.append);
   if (!given("--profile")) ptc::adopt_profile(arguments.request, scene);

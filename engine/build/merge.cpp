@@ -119,9 +119,10 @@ std::unique_ptr<PointStream> merge_points(PointStream& first, PointStream& secon
 void pass_over(PointStream& points, std::uint64_t count) {
   std::vector<PointRecord> passed(static_cast<std::size_t>(std::min<std::uint64_t>(count, kBlock)));
   while (count > 0) {
-    const std::size_t passed_now = points.next(std::span(passed).first(static_cast<std::size_t>(std::min<std::uint64_t>(count, passed.size()))));
-    if (passed_now == 0) return;
-    count -= passed_now;
+    const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(count, passed.size()));
+    const std::size_t now = points.next(std::span(passed).first(most));
+    if (now == 0) return;
+    count -= now;
   }
 }
 

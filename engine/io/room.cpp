@@ -46,7 +46,8 @@ void require_room(std::span<const std::filesystem::path> directories, std::uint6
   const std::uint64_t free = free_bytes(directories);
   if (bytes <= free) return;
   throw std::system_error(ENOSPC, std::generic_category(),
-                          fmt::format("{} take up to {} in {}, with {} free; name other or more directories with --temp, or fewer points",
+                          fmt::format("{} take up to {} in {}, with {} free; "
+                                      "name other or more directories with --temp, or fewer points",
                                       what, giga_text(bytes), names_text(directories), giga_text(free)));
 }
 

@@ -57,7 +57,8 @@ class SpillFile {
  private:
   struct Volume {
     explicit Volume(const std::filesystem::path& directory) : place(directory), file(directory) {}
-    Volume(const std::filesystem::path& name, DirectFile::Kept how, std::uint64_t bytes) : place(name), file(name, how), end(bytes) {}
+    Volume(const std::filesystem::path& name, DirectFile::Kept how, std::uint64_t bytes)
+        : place(name), file(name, how), end(bytes) {}
     std::filesystem::path place;  ///< the directory, or the file when it has a name
     DirectFile file;
     std::atomic<std::uint64_t> end{0};

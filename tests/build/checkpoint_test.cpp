@@ -135,7 +135,9 @@ TEST_CASE("checkpoint: an unfinished container that is not what it was is refuse
   CHECK_THROWS(first.run(dir / "a.ptcx", dir / "pages", {}, 2));
   const Saved saved = first.saved.back();
   const WriterOptions options{.page_shift = 12, .frame = scene.frame, .partial = dir / "pages"};
-  const auto open = [&](const WriterOptions& with, const WriterState& state) { const ContainerWriter writer(dir / "a.ptcx", with, state); };
+  const auto open = [&](const WriterOptions& with, const WriterState& state) {
+    const ContainerWriter writer(dir / "a.ptcx", with, state);
+  };
   CHECK_NOTHROW(open(options, saved.writer));
   WriterOptions other = options;
   other.uuid[0] = std::byte{1};

@@ -25,7 +25,8 @@ void write_cloud(const std::filesystem::path& path, const std::vector<Surfel>& s
   out << "# x y z nx ny nz radius\n";
   for (const Surfel& s : surfels) {
     const glm::dvec3 p = glm::dvec3(glm::vec3(s.position + moved));
-    out << p.x << ' ' << p.y << ' ' << p.z << ' ' << s.normal.x << ' ' << s.normal.y << ' ' << s.normal.z << ' ' << s.radius << '\n';
+    out << p.x << ' ' << p.y << ' ' << p.z << ' ' << s.normal.x << ' ' << s.normal.y << ' ' << s.normal.z << ' ' << s.radius
+        << '\n';
   }
 }
 
@@ -65,7 +66,8 @@ struct Place {
   Progress silent;
   std::vector<Surfel> first = random_surfels(9000, 1), second = random_surfels(7000, 2);
 
-  BuildReport build(const char* target, const std::vector<std::filesystem::path>& inputs, Profile profile, const char* append = nullptr) {
+  BuildReport build(const char* target, const std::vector<std::filesystem::path>& inputs, Profile profile,
+                    const char* append = nullptr) {
     BuildRequest request{.inputs = inputs, .profile = profile};
     if (append) request.append = dir / append;
     BuildReport report = build_container(request, dir / target, silent);
@@ -86,7 +88,8 @@ TEST_CASE("append: a scene and more have the points of both built at once", "[in
       const std::vector<char> old = bytes_of(place.dir / "a.ptcx");
       place.build("ab.ptcx", {place.dir / "b.xyz"}, profile, "a.ptcx");
       place.build("both.ptcx", {place.dir / "a.xyz", place.dir / "b.xyz"}, profile);
-      check_same(points_of(place.dir / "ab.ptcx"), points_of(place.dir / "both.ptcx"), profile == Profile::exact ? 1e-6 : 2 * kRoundedPosition);
+      const double rounding = profile == Profile::exact ? 1e-6 : 2 * kRoundedPosition;
+      check_same(points_of(place.dir / "ab.ptcx"), points_of(place.dir / "both.ptcx"), rounding);
       CHECK(bytes_of(place.dir / "a.ptcx") == old);
       const ContainerReader ab(place.dir / "ab.ptcx"), both(place.dir / "both.ptcx");
       CHECK(ab.superblock().area == Approx(both.superblock().area));
@@ -99,8 +102,11 @@ TEST_CASE("append: a scene and more have the points of both built at once", "[in
 TEST_CASE("append: with all in the cube old points keep their bytes, and nothing new changes none", "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
-  std::ofstream(place.dir / "none.ply") << "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n"
-                                           "property float nx\nproperty float ny\nproperty float nz\nend_header\n";
+  std::ofstream none(place.dir / "none.ply");
+  none << "ply\nformat ascii 1.0\nelement vertex 0\n";
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) none << "property float " << name << "\n";
+  none << "end_header\n";
+  none.close();
   place.build("a.ptcx", {place.dir / "a.xyz"}, Profile::compact);
   place.build("same.ptcx", {place.dir / "none.ply"}, Profile::compact, "a.ptcx");
   CHECK(ContainerReader(place.dir / "same.ptcx").superblock().points == 9000);
@@ -148,9 +154,11 @@ TEST_CASE("append: what is damaged, shaded or too far away is refused, and the o
   CHECK(bytes_of(place.dir / "a.ptcx") == damaged);
 
   std::ofstream(place.dir / "a.ptcx", std::ios::binary).write(old.data(), static_cast<std::streamsize>(old.size()));
-  shade_container({.scene = place.dir / "a.ptcx", .run = {.memory_bytes = std::uint64_t{256} << 20, .threads = 2}}, place.dir / "lit.ptcx", place.silent);
+  const RunOptions run{.memory_bytes = std::uint64_t{256} << 20, .threads = 2};
+  shade_container({.scene = place.dir / "a.ptcx", .run = run}, place.dir / "lit.ptcx", place.silent);
   request.append = place.dir / "lit.ptcx";
-  CHECK_THROWS_WITH(build_container(request, place.dir / "b.ptcx", place.silent), Catch::Contains("lit.ptcx: new points would have no occlusion"));
+  CHECK_THROWS_WITH(build_container(request, place.dir / "b.ptcx", place.silent),
+                    Catch::Contains("lit.ptcx: new points would have no occlusion"));
   CHECK(std::distance(std::filesystem::directory_iterator(place.dir.path()), {}) == 4);
 }
 
