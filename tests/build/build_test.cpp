@@ -56,6 +56,27 @@ TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
   CHECK(bytes_of(dir / "one.ptcx") == bytes_of(dir / "all.ptcx"));
 }
 
+TEST_CASE("build: radii of points from any one on are those of all", "[build][checkpoint]") {
+  SortedScene scene = sort_scene(random_surfels(140'000, 6));
+  for (PointRecord& record : scene.records) record.radius = 0;
+  const auto radii = [&](std::uint64_t first) {
+    VectorStream points({scene.records.begin() + static_cast<std::ptrdiff_t>(first_for_radii(first)), scene.records.end()});
+    const auto stream = estimate_radii(points, scene.frame.unit(), first);
+    std::vector<float> all;
+    std::vector<PointRecord> block(10'000);
+    while (const std::size_t count = stream->next(block)) {
+      for (const PointRecord& record : std::span(block).first(count)) all.push_back(record.radius);
+    }
+    return all;
+  };
+  const std::vector<float> whole = radii(0);
+  REQUIRE(whole.size() == scene.records.size());
+  for (const std::size_t first : {1u, 65'535u, 65'536u, 65'540u, 100'000u, 131'072u, 139'999u, 140'000u}) {
+    const bool same = radii(first) == std::vector<float>(whole.begin() + static_cast<std::ptrdiff_t>(first), whole.end());
+    CHECK(same);
+  }
+}
+
 TEST_CASE("build: when the stream fails no page is on its way any more", "[build]") {
   const TemporaryDirectory dir;
   const SortedScene scene = sort_scene(random_surfels(200'000, 9));

@@ -68,6 +68,15 @@ SortedScene scene_without_radii() {
   for (std::size_t i = 0; i < 3000; ++i) scene.records[100'000 + i].key = scene.records[100'000].key;  // split by rank
   std::ranges::stable_sort(scene.records, {}, &PointRecord::key);
   for (PointRecord& record : scene.records) record.radius = 0;
+  // Behind a point that is not rounded lies one that may not go in front of it: the key before counts in every block.
+  for (std::size_t i = 2; i < kPoints; i += 2) {
+    PointRecord &before = scene.records[i - 1], &record = scene.records[i];
+    if (before.key == record.key) continue;
+    before.radius = 1e-30F;
+    before.key.low |= 1;
+    record.key = {before.key.high, before.key.low + 1};
+  }
+  std::ranges::stable_sort(scene.records, {}, &PointRecord::key);
   return scene;
 }
 
@@ -86,12 +95,14 @@ TEST_CASE("checkpoint: a build goes on from each to the same bytes", "[build][ch
       Rebuild first(scene, setting);
       CHECK_THROWS_WITH(first.run(dir / "again.ptcx", dir / "pages", {}, k), "killed");
       CHECK_FALSE(std::filesystem::exists(dir / "again.ptcx"));
+      std::filesystem::resize_file(dir / "pages", 100 << 20);  // what lies behind is cut
       Setting other = setting;
       other.threads = 3 - setting.threads;
       Rebuild second(scene, other);
       second.run(dir / "again.ptcx", dir / "pages", first.saved.back());
       CHECK(second.saved.size() == 3 - k);
-      CHECK(bytes_of(dir / "again.ptcx") == bytes_of(dir / "whole.ptcx"));
+      const bool same = bytes_of(dir / "again.ptcx") == bytes_of(dir / "whole.ptcx");
+      CHECK(same);
       CHECK_FALSE(std::filesystem::exists(dir / "pages"));
       std::filesystem::remove(dir / "again.ptcx");
     }

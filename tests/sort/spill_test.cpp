@@ -178,6 +178,23 @@ TEST_CASE("spill: records are spread over directories and come back from all", "
   CHECK(same_bytes(sorted, stable_sorted(input)));
 }
 
+TEST_CASE("spill: a place is held when its bytes were appended", "[sort][spill]") {
+  SpillFile file({&kDirectory, 1});
+  const Arena memory(8 * kDirectBytes);
+  const std::size_t bytes = 3 * kDirectBytes;
+  static_cast<void>(file.append(records_in(memory).first(bytes / sizeof(PointRecord))));
+  CHECK(file.bytes() == bytes);
+  CHECK(file.holds({0, 0}, bytes));
+  CHECK(file.holds({0, kDirectBytes}, bytes - kDirectBytes));
+  CHECK(file.holds({0, bytes}, 0));
+  CHECK_FALSE(file.holds({0, 0}, bytes + 1));
+  CHECK_FALSE(file.holds({0, kDirectBytes}, bytes));
+  CHECK_FALSE(file.holds({0, 1}, 1));
+  CHECK_FALSE(file.holds({0, bytes + kDirectBytes}, 0));
+  CHECK_FALSE(file.holds({0, ~std::uint64_t{0} - kDirectBytes + 1}, bytes));
+  CHECK_FALSE(file.holds({1, 0}, 1));
+}
+
 TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
   const std::vector<PointRecord> input = make_records(Keys::ascending, 5000);
   SpillFile file({&kDirectory, 1});
