@@ -143,7 +143,7 @@ TEST_CASE("tuning: neither threads nor the cap change the choice or a byte", "[i
   const Scene scene(lit_balls());
   const auto bytes = [&](const char* name) { return bytes_of(scene.dir / name); };
   const ShadeReport one = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ptcx");
-  const ShadeReport two = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{80} << 20, .threads = 2}, "two.ptcx");
+  const ShadeReport two = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{81} << 20, .threads = 2}, "two.ptcx");
   CHECK(one.tuning->setting == two.tuning->setting);
   CHECK(one.tuning->measured.relative() == two.tuning->measured.relative());
   CHECK(bytes("one.ptcx") == bytes("two.ptcx"));
