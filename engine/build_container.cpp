@@ -1,6 +1,5 @@
 // Scene to container (engine/pipeline.h).
 #include <array>
-#include <cstring>
 #include <memory>
 #include <stdexcept>
 #include <system_error>
@@ -18,14 +17,12 @@
 #include "engine/stages.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
-#include "format/checksum.h"
 #include "format/error.h"
 
 namespace ptc {
 namespace {
 
 constexpr std::uint64_t kCheckpointBytes = 8 << 20;  // of a checkpoint on its way, beside open pages
-constexpr std::uint64_t kReaderBytes = 100;          // a page of a scene that is added to, while it opens
 constexpr std::uint64_t kOpenPages = 48;             // in it and in its copies
 
 std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Frame& frame) {
@@ -62,10 +59,7 @@ Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildR
                                  static_cast<int>(request.profile));
   for (const auto& [key, value] : meta.text) text.append("\n").append(key).append("=").append(value);
   if (scene != Uuid{}) text.append("\n").append(reinterpret_cast<const char*>(scene.data()), scene.size());
-  const std::array<std::uint64_t, 2> hash = xxh3_128(std::as_bytes(std::span(text)));
-  Uuid uuid;
-  std::memcpy(uuid.data(), hash.data(), uuid.size());
-  return uuid;
+  return uuid_of(std::as_bytes(std::span(text)));
 }
 
 /// All points on their way through the sort, and what the container is made with.
@@ -115,7 +109,7 @@ class Build {
   /// What the cap leaves for the sort.
   [[nodiscard]] SortOptions sort_options(std::uint64_t taken, std::uint64_t expected) const {
     taken += kBufferBytes;
-    if (scene_) taken += kReaderBytes * scene_->page_count();
+    if (scene_) taken += ContainerReader::kMostPageBytes * scene_->page_count();
     if (resumption_) taken += kCheckpointBytes + (kOpenPages << request_.page_shift);
     SortOptions options{.memory_bytes = memory_left(request_.run, taken, kLeastSort, "this scene's build"),
                         .temp_dirs = temp_dirs(request_.run, target_),

@@ -20,7 +20,6 @@
 #include "engine/io/record.h"
 #include "engine/stages.h"
 #include "engine/store/writer.h"
-#include "format/checksum.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
 
@@ -149,10 +148,7 @@ Uuid derived_uuid(const ContainerReader& container, Profile profile, std::uint8_
   std::ranges::copy(container.header().uuid, text.begin());
   text[sizeof(Uuid)] = static_cast<std::byte>(profile);
   text[sizeof(Uuid) + 1] = static_cast<std::byte>(page_shift);
-  const std::array<std::uint64_t, 2> hash = xxh3_128(text);
-  Uuid uuid;
-  std::memcpy(uuid.data(), hash.data(), uuid.size());
-  return uuid;
+  return uuid_of(text);
 }
 
 /// All pages but the meta page under their numbers, in the order in which they lie in the file.

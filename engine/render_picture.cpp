@@ -299,9 +299,10 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
                        .lost = lost.get(),
                        .variants = std::min(request.samples, kMostVariants)};
   options.gather.bleeding = request.bounces > 0;
-  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * (kReceiverBytes + (request.estimate ? kEstimateBytes : 0)) +
-                              std::uint64_t{camera.width} * camera.height *
-                                  (Film::kBytes + (request.estimate ? Film::kEstimateBytes : 0)) +
+  const std::uint64_t receiver_bytes = kReceiverBytes + (request.estimate ? kEstimateBytes : 0);
+  const std::uint64_t pixel_bytes = Film::kBytes + (request.estimate ? Film::kEstimateBytes : 0);
+  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * receiver_bytes +
+                              std::uint64_t{camera.width} * camera.height * pixel_bytes +
                               (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24);
   options.cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), request.back_end,
                                          "this picture");

@@ -55,15 +55,17 @@ std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const
 }
 
 std::uint64_t open_bytes(const ContainerReader& container) noexcept {
-  constexpr std::uint64_t kPageBytes = 36;  // of its directory and its place among the pages of its kind
-  return kPageBytes * container.page_count();
+  return ContainerReader::kPageBytes * container.page_count();
 }
 
 void check_damage_request(bool tolerate, unsigned bounces, const std::optional<double>& error, const CheckRequest& check) {
   if (!tolerate) return;
-  if (bounces > 1) throw std::invalid_argument("--tolerate-damage goes with one bounce: more need every point, so salvage the scene first");
+  if (bounces > 1) {
+    throw std::invalid_argument("--tolerate-damage goes with one bounce: more need every point, so salvage the scene first");
+  }
   if (error || check.receivers > 0) {
-    throw std::invalid_argument("--tolerate-damage goes without --error and --check: rays need every point, so salvage the scene first");
+    throw std::invalid_argument(
+        "--tolerate-damage goes without --error and --check: rays need every point, so salvage the scene first");
   }
 }
 

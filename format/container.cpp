@@ -67,6 +67,8 @@ void check_zero(std::span<const std::byte> block, std::size_t first, std::size_t
 
 }  // namespace
 
+Uuid uuid_of(std::span<const std::byte> text) noexcept { return std::bit_cast<Uuid>(xxh3_128(text)); }
+
 void encode_identity(const FileHeader& header, std::span<std::byte, kBlockBytes> block) noexcept {
   std::byte* const p = block.data();
   store(p, 8, header.major);

@@ -36,6 +36,8 @@ struct Coding {
 };
 
 using Uuid = std::array<std::byte, 16>;
+/// One that follows from what `text` says.
+[[nodiscard]] Uuid uuid_of(std::span<const std::byte> text) noexcept;
 
 /// Bytes 0 to 4095 of a file: who it is. Written once, before anything else.
 struct FileHeader {
@@ -75,6 +77,11 @@ struct DirectoryEntry {
   std::uint32_t record_count = 0;
   friend bool operator==(const DirectoryEntry&, const DirectoryEntry&) = default;
 };
+
+/// What the directory says of a page with this header.
+[[nodiscard]] inline DirectoryEntry entry_of(const PageHeader& page, std::uint64_t offset) noexcept {
+  return {offset, page.stored_bytes, page.raw_bytes, page.payload_xxh3, page.type, page.group, page.record_count};
+}
 
 /// The commit record, twice at the end of the file: a file without one is unfinished.
 struct Superblock {

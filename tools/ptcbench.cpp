@@ -123,42 +123,41 @@ void declare_error(CLI::App& app, Arguments& arguments) {
   ptc::add_integer(command, "--check-rays", options.rays, 16, 1 << 20, "Rays for each of them");
 }
 
-void declare_growth(CLI::App& app, Arguments& arguments) {
-  CLI::App& command = *app.add_subcommand("growth", "Time per receiver against surfels, solid angle, depth complexity and memory, "
-                                                    "with its error");
-  command.fallthrough();
-  command.add_option("-o,--output", arguments.directory, "Directory for growth.json, .csv, .svg and .png")
-      ->type_name("DIR")
-      ->required();
-  command.add_flag("--quick", arguments.quick,
-                   "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them checked, 3 runs, no cap below "
-                   "9 %; what other options say stays");
-  GrowthOptions& options = arguments.growth;
-  add_points_list(command, options.points,
-                  "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the greatest is also shaded under caps. Above "
-                  "40M without a check by rays");
-  add_words(command, "--panel", options.panels, "Measure against this, not all; repeatable");
-  ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers whose error is measured");
-  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
-}
-
-/// A subcommand that times work on records, without scenes.
-CLI::App& declare_timed(CLI::App& app, Arguments& arguments, const std::string& name, const char* description, unsigned& repeats) {
+/// A subcommand that makes what it measures.
+/// @param quick  what --quick does
+CLI::App& declare_timed(CLI::App& app, Arguments& arguments, const std::string& name, const char* description,
+                        const std::string& quick, unsigned& repeats) {
   CLI::App& command = *app.add_subcommand(name, description);
   command.fallthrough();
   command.add_option("-o,--output", arguments.directory, "Directory for " + name + ".json, .csv, .svg and .png")
       ->type_name("DIR")
       ->required();
-  command.add_flag("--quick", arguments.quick, "Under a minute on two cores: 200k and 1M points, 3 runs; what other options say stays");
+  command.add_flag("--quick", arguments.quick, quick + "; what other options say stays");
   ptc::add_integer(command, "--repeats", repeats, 1, 1000, "Runs of every measurement");
   return command;
+}
+
+constexpr char kQuickRecords[] = "Under a minute on two cores: 200k and 1M points, 3 runs";
+
+void declare_growth(CLI::App& app, Arguments& arguments) {
+  GrowthOptions& options = arguments.growth;
+  CLI::App& command = declare_timed(app, arguments, "growth",
+                                    "Time per receiver against surfels, solid angle, depth complexity and memory, with its error",
+                                    "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them checked, 3 runs, "
+                                    "no cap below 9 %",
+                                    options.repeats);
+  add_points_list(command, options.points,
+                  "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the greatest is also shaded under caps. Above "
+                  "40M without a check by rays");
+  add_words(command, "--panel", options.panels, "Measure against this, not all; repeatable");
+  ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers whose error is measured");
 }
 
 void declare_build(CLI::App& app, Arguments& arguments) {
   CLI::App& command = declare_timed(app, arguments, "build",
                                     "Time, bytes and memory of sort and build, over points and over the cap, beside a disk that moves the "
                                     "same bytes",
-                                    arguments.build.repeats);
+                                    kQuickRecords, arguments.build.repeats);
   BuildBenchOptions& options = arguments.build;
   add_points_list(command, options.points, "Points of the city, in place of 1M, 5M and 20M; repeatable");
   const auto set = [&options](const std::vector<std::string>& values) {
@@ -177,7 +176,7 @@ void declare_sort(CLI::App& app, Arguments& arguments) {
   CLI::App& command = declare_timed(app, arguments, "sort",
                                     "Time and bytes of the external sort beside those of the disk alone, and of its core beside std::sort "
                                     "and oneTBB",
-                                    arguments.sort.repeats);
+                                    kQuickRecords, arguments.sort.repeats);
   SortBenchOptions& options = arguments.sort;
   add_points_list(command, options.points, "Records, in place of 1M, 5M and 20M; repeatable; above 20M on disk alone");
   add_words(command, "--order", options.orders, "Sort records that come in this order, not all; repeatable");
@@ -185,18 +184,14 @@ void declare_sort(CLI::App& app, Arguments& arguments) {
 }
 
 void declare_cache(CLI::App& app, Arguments& arguments) {
-  CLI::App& command = *app.add_subcommand("cache", "A page cache below the size of the scene: lookups, back ends, threads, order of "
-                                                   "receivers and of pages");
-  command.fallthrough();
-  command.add_option("-o,--output", arguments.directory, "Directory for cache.json, .csv, .svg and .png")->type_name("DIR")->required();
-  command.add_flag("--quick", arguments.quick,
-                   "Two minutes on two cores: 1M points, 8k receivers, 2 runs, no cap below 9 %, at most 4 threads; what other "
-                   "options say stays");
   CacheBenchOptions& options = arguments.cache;
+  CLI::App& command = declare_timed(app, arguments, "cache",
+                                    "A page cache below the size of the scene: lookups, back ends, threads, order of receivers and of pages",
+                                    "Two minutes on two cores: 1M points, 8k receivers, 2 runs, no cap below 9 %, at most 4 threads",
+                                    options.repeats);
   ptc::add_count(command, "--points", options.points, "Points of the city")->default_str("6M");
   ptc::add_count(command, "--receivers", options.receivers, "Of them, in blocks of neighbours")->default_str("65536");
   add_words(command, "--panel", options.panels, "Measure this, not all; repeatable");
-  ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement of time");
 }
 
 void declare_model(CLI::App& app, Arguments& arguments) {
@@ -267,7 +262,7 @@ void shorten_cache(Arguments& arguments) {
   options.threads = {1, 2, 4};
 }
 
-/// Likewise, of what declare_timed() declares.
+/// Likewise, of sort and build.
 template <class Options>
 void shorten_timed(const Arguments& arguments, Options& options) {
   if (arguments.command->count("--points") == 0) options.points = {200'000, 1'000'000};

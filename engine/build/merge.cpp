@@ -116,14 +116,4 @@ std::unique_ptr<PointStream> merge_points(PointStream& first, PointStream& secon
   return std::make_unique<MergedStream>(first, second);
 }
 
-void pass_over(PointStream& points, std::uint64_t count) {
-  std::vector<PointRecord> passed(static_cast<std::size_t>(std::min<std::uint64_t>(count, kBlock)));
-  while (count > 0) {
-    const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(count, passed.size()));
-    const std::size_t now = points.next(std::span(passed).first(most));
-    if (now == 0) return;
-    count -= now;
-  }
-}
-
 }  // namespace ptc

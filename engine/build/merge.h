@@ -38,7 +38,4 @@ class LatticeMove {
 /// @param first, second  sorted; must outlive the result
 [[nodiscard]] std::unique_ptr<PointStream> merge_points(PointStream& first, PointStream& second);
 
-/// Reads past points of a stream.
-void pass_over(PointStream& points, std::uint64_t count);
-
 }  // namespace ptc

@@ -98,7 +98,7 @@ void PageOrder::load_stream(StateReader& state, std::optional<Stream>& stream, s
   const auto groups = state.get<std::uint32_t>();
   if (groups == 0) return;
   const std::uint32_t pages = writer_.state().pages;
-  const auto number = static_cast<std::uint32_t>(state.get<std::uint32_t>());
+  const auto number = state.get<std::uint32_t>();
   state.require(number < pages, "an open page that has no number");
   stream.emplace(Stream{number, NodePageEncoder(payload_limit_)});
   const std::vector<std::byte> payload = aligned(state.get_bytes());

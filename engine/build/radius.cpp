@@ -31,12 +31,7 @@ class RadiusStream : public PointStream {
   RadiusStream(PointStream& sorted, double unit, std::uint64_t first) : sorted_(sorted), unit_(unit) {
     at_ = chunk_end_ = static_cast<std::size_t>(first / kChunk * kChunk - first_for_radii(first));
     fill(chunk_end_);
-    for (std::size_t left = first % kChunk; left > 0;) {
-      std::vector<PointRecord> passed(left);
-      const std::size_t count = next(passed);
-      if (count == 0) break;
-      left -= count;
-    }
+    pass_over(*this, first % kChunk);
   }
 
   std::size_t next(std::span<PointRecord> out) override {

@@ -77,6 +77,7 @@ struct PageCache::Impl {
   Impl(const ContainerReader& from, const CacheOptions& with, std::uint32_t frames)
       : container(from),
         options(with),
+        reads_ahead(with.read_ahead && with.back_end == BackEnd::io_uring),
         slots(choose_slots(with, frames)),
         table({from.page_count(), frames, with.threads, slots}, with.replacement),
         frame_stride(frame_bytes(from)),
@@ -143,7 +144,7 @@ struct PageCache::Impl {
   // Pages of a kind follow the Z-curve, and so do receivers: the next one is wanted soon more often than not.
   std::span<const std::byte> fetch(std::uint32_t page, PageSource& source, double& waited) const {
     const auto begin = Clock::now();
-    const std::uint32_t next = options.read_ahead ? next_of_kind(page) : kNoPage;
+    const std::uint32_t next = reads_ahead ? next_of_kind(page) : kNoPage;
     if (next != kNoPage && !table.present(next)) {
       const ContainerReader::PageRange range = container.page_range(next);
       source.expect(range.offset, range.bytes);
@@ -169,6 +170,7 @@ struct PageCache::Impl {
 
   const ContainerReader& container;
   const CacheOptions options;
+  const bool reads_ahead;
   const std::uint32_t slots;
   mutable std::mutex mutex;  ///< guards told, seats and what of the table is not for readers alone
   std::condition_variable loaded;

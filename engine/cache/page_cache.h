@@ -17,7 +17,7 @@ struct CacheOptions {
   unsigned threads = 1;                                   ///< how many readers will exist at once
   BackEnd back_end = BackEnd::pread;
   Replacement replacement = Replacement::clock;
-  bool read_ahead = true;  ///< tells the back end to expect the page after one that was missed
+  bool read_ahead = true;  ///< io_uring alone: the page after one that was missed is expected
   /// Pages that a reader holds on to, a power of two up to 256; 0: as many as the frames allow.
   std::uint32_t local_slots = 0;
 };

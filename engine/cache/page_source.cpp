@@ -9,8 +9,10 @@
 #include <string>
 #include <system_error>
 
-#include "engine/cache/direct_range.h"
+#include "engine/base/memory.h"
+#include "engine/cache/direct_descriptor.h"
 #include "engine/cache/uring_source.h"
+#include "engine/io/direct_range.h"
 
 namespace ptc {
 namespace {
@@ -24,8 +26,6 @@ class PreadSource : public PageSource {
     file_.read_at(offset, out);
     return out;
   }
-  // The system reads ahead by itself, as well as when it is told.
-  void expect(std::uint64_t /*offset*/, std::size_t /*bytes*/) override {}
 
  private:
   const InputFile& file_;
@@ -35,14 +35,13 @@ class PreadSource : public PageSource {
 class DirectSource : public PageSource {
  public:
   DirectSource(const InputFile& file, std::size_t most_bytes)
-      : file_(file), direct_(file), blocks_(DirectRange::room(most_bytes)) {}
+      : file_(file), direct_(file), blocks_(direct_room(most_bytes)) {}
 
   std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
     const DirectRange range(offset, bytes);
     const ssize_t got = ::pread(direct_.get(), blocks_.data(), range.whole, static_cast<off_t>(range.begin));
-    return range.complete(blocks_.data(), got, file_);
+    return complete(range, blocks_.data(), got, file_);
   }
-  void expect(std::uint64_t /*offset*/, std::size_t /*bytes*/) override {}  // a read lasts until its bytes are there
 
  private:
   const InputFile& file_;
@@ -69,10 +68,9 @@ class MmapSource : public PageSource {
     last_offset_ = offset;
     last_bytes_ = bytes;
     // All at once, not fault by fault; older systems refuse it.
-    advise(offset, bytes, DirectRange::kBlock, MADV_POPULATE_READ);
+    advise(offset, bytes, kDirectBytes, MADV_POPULATE_READ);
     return {data_ + offset, bytes};
   }
-  void expect(std::uint64_t /*offset*/, std::size_t /*bytes*/) override {}  // see PreadSource
 
  private:
   void advise(std::uint64_t offset, std::size_t bytes, std::uint64_t unit, int advice) noexcept {
@@ -91,9 +89,7 @@ class MmapSource : public PageSource {
 
 DirectDescriptor::DirectDescriptor(const InputFile& file) {
   // By its descriptor, not its path, behind which there may be another file by now.
-  const std::string same = "/proc/self/fd/" + std::to_string(file.descriptor());
-  do fd_ = ::open(same.c_str(), O_RDONLY | O_DIRECT | O_CLOEXEC);
-  while (fd_ < 0 && errno == EINTR);
+  fd_ = open_retrying("/proc/self/fd/" + std::to_string(file.descriptor()), O_RDONLY | O_DIRECT);
   if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "open for direct transfers " + file.path().string());
 }
 
@@ -110,7 +106,7 @@ std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& 
 }
 
 std::uint64_t page_source_bytes(BackEnd back_end, std::size_t most_bytes) noexcept {
-  const std::uint64_t room = DirectRange::room(most_bytes);
+  const std::uint64_t room = direct_room(most_bytes);
   return back_end == BackEnd::io_uring ? UringSource::kSlots * room + UringSource::kRingBytes : room;
 }
 

@@ -23,8 +23,9 @@ class PageSource {
   /// @return  the bytes, valid until the next call of this source
   /// @throws DataError when the file ends before, std::system_error when it cannot be read
   [[nodiscard]] virtual std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) = 0;
-  /// This range will be read soon, it seems. Nothing goes wrong when it is not.
-  virtual void expect(std::uint64_t offset, std::size_t bytes) = 0;
+  /// This range will be read soon, it seems. Nothing goes wrong when it is not. Only io_uring makes use of it: the system
+  /// reads ahead for pread and mmap by itself, as well as when it is told, and a direct read lasts until its bytes are there.
+  virtual void expect(std::uint64_t /*offset*/, std::size_t /*bytes*/) {}
 };
 
 /// @param file        outlives the source

@@ -16,7 +16,7 @@ void check(int result, const char* call, const InputFile& file) {
 }  // namespace
 
 UringSource::UringSource(const InputFile& file, std::size_t most_bytes)
-    : file_(file), direct_(file), slot_bytes_(DirectRange::room(most_bytes)), blocks_(kSlots * slot_bytes_) {
+    : file_(file), direct_(file), slot_bytes_(direct_room(most_bytes)), blocks_(kSlots * slot_bytes_) {
   check(io_uring_queue_init(kSlots, &ring_, 0), "io_uring_setup", file);
 }
 
@@ -35,7 +35,7 @@ std::span<const std::byte> UringSource::read(std::uint64_t offset, std::size_t b
   submit();
   land(slot);
   slot.wanted = false;
-  return slot.range.complete(blocks_of(slot), slot.got, file_);
+  return complete(slot.range, blocks_of(slot), slot.got, file_);
 }
 
 void UringSource::expect(std::uint64_t offset, std::size_t bytes) {

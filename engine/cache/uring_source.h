@@ -6,7 +6,7 @@
 #include <array>
 
 #include "engine/base/memory.h"
-#include "engine/cache/direct_range.h"
+#include "engine/cache/direct_descriptor.h"
 #include "engine/cache/page_source.h"
 
 namespace ptc {

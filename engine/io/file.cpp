@@ -36,10 +36,6 @@ int retrying(Call&& call) {
   return result;
 }
 
-int open_retrying(const std::filesystem::path& path, int flags, mode_t mode = 0) {
-  return retrying([&] { return ::open(path.c_str(), flags | O_CLOEXEC, mode); });
-}
-
 void read_whole(int fd, const std::filesystem::path& path, std::uint64_t offset,
                 std::span<std::byte> out) {
   std::size_t done = 0;
@@ -162,6 +158,10 @@ std::optional<mode_t> mode_of(const std::filesystem::path& target) {
 }
 
 }  // namespace
+
+int open_retrying(const std::filesystem::path& path, int flags, mode_t mode) noexcept {
+  return retrying([&] { return ::open(path.c_str(), flags | O_CLOEXEC, mode); });
+}
 
 void sync_directory(const std::filesystem::path& file) {
   const std::filesystem::path parent = file.parent_path();

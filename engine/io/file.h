@@ -1,6 +1,8 @@
 // Files: positioned reads and writes that are whole or throw, and publication by rename.
 #pragma once
 
+#include <sys/types.h>
+
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -94,6 +96,9 @@ class TemporaryName {
 
 /// fsync of the directory that a file is in: its name is on the disk.
 void sync_directory(const std::filesystem::path& file);
+
+/// open() of a descriptor that programs begun from this one do not get, EINTR retried. @return -1 and errno as open()
+[[nodiscard]] int open_retrying(const std::filesystem::path& path, int flags, mode_t mode = 0) noexcept;
 
 /// Gives back the disk's blocks under these bytes of an open file, where the file system can.
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept;

@@ -91,8 +91,7 @@ FileLock::FileLock(const std::filesystem::path& path) {
     throw std::system_error(error, std::generic_category(), call + (" " + path.string()) + held);
   };
   while (true) {
-    do fd_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    while (fd_ < 0 && errno == EINTR);
+    fd_ = open_retrying(path, O_RDWR | O_CREAT, 0666);
     if (fd_ < 0) fail("open");
     while (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
       if (errno != EINTR) fail("flock");

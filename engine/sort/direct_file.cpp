@@ -14,31 +14,24 @@
 namespace ptc {
 namespace {
 
+constexpr int kFlags = O_RDWR | O_DIRECT;
 constexpr std::size_t kMostBytes = std::size_t{8} << 20;  // of one call
 
 [[noreturn]] void fail(const char* call, const std::string& name) {
   throw std::system_error(errno, std::generic_category(), std::string(call) + " " + name);
 }
 
-// @return the descriptor, or -1 as open()
-int open_retrying(const std::filesystem::path& path, int flags) {
-  int fd = -1;
-  do fd = ::open(path.c_str(), flags | O_RDWR | O_CLOEXEC, 0600);
-  while (fd < 0 && errno == EINTR);
-  return fd;
-}
-
 }  // namespace
 
 DirectFile::DirectFile(const std::filesystem::path& directory)
-    : name_("temporary file in " + directory.string()), fd_(open_retrying(directory, O_TMPFILE | O_DIRECT)) {
+    : name_("temporary file in " + directory.string()), fd_(open_retrying(directory, kFlags | O_TMPFILE, 0600)) {
   if (fd_ < 0) buffered_.emplace(directory);  // no direct transfers here, or an error to report
 }
 
 DirectFile::DirectFile(const std::filesystem::path& file, Kept how) : name_(file.string()) {
-  const int flags = how == Kept::made ? O_CREAT | O_TRUNC : 0;
-  fd_ = open_retrying(file, flags | O_DIRECT);
-  if (fd_ < 0 && errno == EINVAL) fd_ = open_retrying(file, flags);  // no direct transfers here
+  const int flags = kFlags | (how == Kept::made ? O_CREAT | O_TRUNC : 0);
+  fd_ = open_retrying(file, flags, 0600);
+  if (fd_ < 0 && errno == EINVAL) fd_ = open_retrying(file, flags & ~O_DIRECT, 0600);  // no direct transfers here
   if (fd_ < 0) fail("open", name_);
 }
 

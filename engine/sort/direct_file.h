@@ -9,12 +9,10 @@
 #include <span>
 #include <string>
 
+#include "engine/io/direct_range.h"
 #include "engine/io/file.h"
 
 namespace ptc {
-
-/// Memory and offsets of direct transfers are multiples of this.
-inline constexpr std::size_t kDirectBytes = 4096;
 
 /// A file in a directory that vanishes when it is closed unless it has a name, read and written without the page cache
 /// (O_DIRECT) where the file system can do so: what is spilled is read once, long after, and the

@@ -20,6 +20,7 @@
 namespace ptc {
 namespace {
 
+constexpr std::uint64_t kPassed = 1 << 14;  // records that are passed over at once
 using Digest = std::array<std::uint64_t, 2>;
 
 Digest sum(const Digest& a, const Digest& b) noexcept {
@@ -65,6 +66,16 @@ class MemoryStream final : public BlockStream {
 };
 
 }  // namespace
+
+void pass_over(PointStream& points, std::uint64_t count) {
+  std::vector<PointRecord> passed(static_cast<std::size_t>(std::min<std::uint64_t>(count, kPassed)));
+  while (count > 0) {
+    const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(count, passed.size()));
+    const std::size_t now = points.next(std::span(passed).first(most));
+    if (now == 0) return;
+    count -= now;
+  }
+}
 
 struct ExternalSorter::Impl {
   Impl(const SortOptions& sort_options, const Executor& sort_executor,
@@ -232,12 +243,7 @@ std::unique_ptr<PointStream> ExternalSorter::Impl::stream_buckets(std::uint64_t 
   auto stream = std::make_unique<BucketStream>(
       BucketLoader(partition, range, kept ? *nested : *file, plan, executor, buckets), memory(), executor,
       [this] { arena = Arena(); });
-  std::vector<PointRecord> passed(std::min<std::uint64_t>(first, 1 << 14));
-  while (first > 0) {
-    const std::size_t count = stream->next(std::span(passed).first(std::min<std::uint64_t>(first, passed.size())));
-    if (count == 0) break;
-    first -= count;
-  }
+  pass_over(*stream, first);
   return stream;
 }
 

@@ -22,6 +22,9 @@ class PointStream {
   virtual std::size_t next(std::span<PointRecord> out) = 0;
 };
 
+/// Reads past so many points of a stream, or to its end.
+void pass_over(PointStream& points, std::uint64_t count);
+
 struct SortOptions {
   /// All that this stage holds at once; at least 256 KiB.
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;

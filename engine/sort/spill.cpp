@@ -18,10 +18,6 @@ namespace {
 
 constexpr std::uint64_t kMostVolumes = 1 << 10;
 
-constexpr std::size_t whole_blocks(std::size_t bytes) noexcept {
-  return (bytes + kDirectBytes - 1) / kDirectBytes * kDirectBytes;
-}
-
 // The i-th of `count` positions in [0, size), one in each of as many equal strides, anywhere in it:
 // records that repeat with a period must not fool the sample. The same for the same arguments.
 std::uint64_t sample_position(std::uint64_t i, std::uint64_t count, std::uint64_t size) noexcept {
@@ -41,12 +37,11 @@ void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::spa
   SpillPlace place = piece.place;
   std::span<std::byte> bytes = std::as_writable_bytes(piece.out);
   while (!bytes.empty()) {
-    const std::size_t skip = place.offset % kDirectBytes;  // from the start of the first block
-    const std::size_t count = std::min(bytes.size(), buffer.size() - skip);
-    file.read_at({place.volume, place.offset - skip}, buffer.first(whole_blocks(skip + count)));
-    std::memcpy(bytes.data(), buffer.data() + skip, count);
-    bytes = bytes.subspan(count);
-    place.offset += count;
+    const DirectRange range(place.offset, std::min(bytes.size(), buffer.size() - place.offset % kDirectBytes));
+    file.read_at({place.volume, range.begin}, buffer.first(range.whole));
+    std::memcpy(bytes.data(), buffer.data() + range.lead, range.bytes);
+    bytes = bytes.subspan(range.bytes);
+    place.offset += range.bytes;
   }
 }
 
@@ -98,7 +93,7 @@ std::vector<std::uint32_t> SpillFile::by_room(std::uint64_t bytes) const {
 }
 
 SpillPlace SpillFile::append(std::span<const PointRecord> records) {
-  const std::span bytes(reinterpret_cast<const std::byte*>(records.data()), whole_blocks(records.size_bytes()));
+  const std::span bytes(reinterpret_cast<const std::byte*>(records.data()), direct_blocks(records.size_bytes()));
   const std::vector<std::uint32_t> order = by_room(bytes.size());
   for (const std::uint32_t v : order) {
     Volume& volume = *volumes_[v];

@@ -43,10 +43,7 @@ struct ContainerReader::Impl {
   /// The header of the page whose image begins so, when the directory agrees with it.
   PageHeader agreed_header(std::uint32_t page, std::span<const std::byte> image) const {
     const PageHeader found = decode_page_header(image.first(kPageHeaderBytes), header);
-    const DirectoryEntry facts{entries[page].offset, found.stored_bytes, found.raw_bytes,
-                               found.payload_xxh3,   found.type,         found.group,
-                               found.record_count};
-    if (found.page_id != page || facts != entries[page]) {
+    if (found.page_id != page || entry_of(found, entries[page].offset) != entries[page]) {
       throw FormatError(
           0, kAgreement,
           "the page header is not what the directory says of page " + std::to_string(page));

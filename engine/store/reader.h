@@ -17,14 +17,17 @@ namespace ptc {
 /// A container open for reading. Opening checks header, superblocks (the second when the first is
 /// damaged), directory, meta page, and that the directory's pages make up one scene; a page's
 /// checksum is checked each time it is read. Padding between pages is not looked at.
-/// Threads: reading may be called concurrently.   Memory: 36 bytes a page, at most 100
-/// while it opens.
+/// Threads: reading may be called concurrently.   Memory: kPageBytes a page, at
+/// most kMostPageBytes while it opens.
 class ContainerReader {
  public:
   /// @throws FormatError whose text begins with the path and whose offset is that in the file, as
   /// for every function here; std::system_error; DataError when the file shrinks meanwhile
   explicit ContainerReader(const std::filesystem::path& path);
   ~ContainerReader();
+
+  static constexpr std::uint64_t kPageBytes = 36;      ///< of memory a page
+  static constexpr std::uint64_t kMostPageBytes = 100;  ///< while it opens
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
   [[nodiscard]] const FileHeader& header() const noexcept;

@@ -91,10 +91,6 @@ struct ContainerWriter::Impl {
     check(at == end, "the unfinished container's last page is cut");
   }
 
-  static DirectoryEntry entry_of(const PageHeader& page, std::uint64_t offset) {
-    return {offset, page.stored_bytes, page.raw_bytes, page.payload_xxh3, page.type, page.group, page.record_count};
-  }
-
   [[nodiscard]] std::size_t payload_limit() const {
     return (std::size_t{1} << header.page_shift) - kPageHeaderBytes;
   }

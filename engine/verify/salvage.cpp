@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <set>
@@ -258,10 +256,7 @@ class Salvage {
       text.resize(text.size() + 8);
       store(text.data(), text.size() - 8, site->entry.payload_xxh3);
     }
-    const std::array<std::uint64_t, 2> hash = xxh3_128(text);
-    Uuid uuid;
-    std::memcpy(uuid.data(), hash.data(), uuid.size());
-    return uuid;
+    return uuid_of(text);
   }
 
   InputFile file_;

@@ -251,7 +251,7 @@ class Surveyor {
       if (header.type == PageType::directory) {
         directory_end_ = offset + kPageHeaderBytes + header.stored_bytes;
       } else if (header.page_id >= listed_.size() || !listed_[header.page_id]) {
-        survey_.sites.push_back({facts_of(header, offset), header.page_id});
+        survey_.sites.push_back({entry_of(header, offset), header.page_id});
       }
     });
   }
@@ -305,7 +305,7 @@ Survey survey_file(const InputFile& file, Findings& findings, FlipBudget& flips,
 std::vector<PageSite> find_pages(const InputFile& file, const FileHeader& header, Progress& progress) {
   std::vector<PageSite> sites;
   for_each_page(file, header, progress, [&](const PageHeader& page, std::uint64_t offset) {
-    if (page.type != PageType::directory) sites.push_back({facts_of(page, offset), page.page_id});
+    if (page.type != PageType::directory) sites.push_back({entry_of(page, offset), page.page_id});
   });
   return sites;
 }

@@ -66,10 +66,6 @@ Finding finding_in(const PageSite& site, int level, const FormatError& error) {
 
 }  // namespace
 
-DirectoryEntry facts_of(const PageHeader& header, std::uint64_t offset) {
-  return {offset, header.stored_bytes, header.raw_bytes, header.payload_xxh3, header.type, header.group, header.record_count};
-}
-
 std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, FlipBudget& budget) {
   const std::uint64_t offset = site.entry.offset;
   if (site.end() > file_.size()) {
@@ -134,7 +130,7 @@ std::optional<Finding> SurveyedPage::check_header(const PageSite& site, FlipBudg
 }
 
 std::optional<Finding> SurveyedPage::check_agreement(const PageSite& site) const {
-  if (header_.page_id == site.page && facts_of(header_, site.entry.offset) == site.entry) return std::nullopt;
+  if (header_.page_id == site.page && entry_of(header_, site.entry.offset) == site.entry) return std::nullopt;
   Finding finding = finding_in(site, 1, {0, kAgreement, fmt::format("the page header is not what the directory says of page {}", site.page)});
   finding.cause = header_.page_id != site.page ? Cause::swapped : Cause::stale;
   finding.bytes = kPageHeaderBytes + header_.stored_bytes;

@@ -10,9 +10,6 @@
 
 namespace ptc {
 
-/// What a page header has in common with a directory entry, at an offset.
-[[nodiscard]] DirectoryEntry facts_of(const PageHeader& header, std::uint64_t offset);
-
 /// Reads pages. One per thread.   Memory: two pages and what their decoder takes.
 class SurveyedPage {
  public:

@@ -255,8 +255,8 @@ class CacheRun {
   }
 
   void measure_hits(const ContainerReader& container) {
-    progress_.begin("hits", 4 * options_.repeats * thread_counts().size(), "runs");
-    for (const unsigned threads : thread_counts()) {
+    progress_.begin("hits", 4 * options_.repeats * thread_counts(threads_).size(), "runs");
+    for (const unsigned threads : thread_counts(threads_)) {
       HitRun pointers(container, "pointers", Replacement::clock, HitRun::kPages, threads);
       HitRun first(container, "first level", Replacement::clock, HitRun::kPages, threads);
       HitRun clock(container, "second level, clock", Replacement::clock, 1, threads);
@@ -283,7 +283,7 @@ class CacheRun {
       ways.push_back({.name = "io_uring, no read-ahead", .back_end = BackEnd::io_uring, .read_ahead = false});
     } catch (const std::system_error&) {  // then there is no row of it
     }
-    shade_under_caps("back-end", scene, ways, thread_counts(), options_.repeats);
+    shade_under_caps("back-end", scene, ways, thread_counts(threads_), options_.repeats);
   }
 
   void measure_threads(const BenchScene& scene) {
@@ -324,12 +324,6 @@ class CacheRun {
       }
       add(run->row(panel));
     }
-  }
-
-  /// One thread, and all of them where there are more.
-  [[nodiscard]] std::vector<unsigned> thread_counts() const {
-    if (threads_ == 1) return {1};
-    return {1, threads_};
   }
 
   const CacheBenchOptions& options_;

@@ -16,6 +16,7 @@
 #include "tools/bench/accuracy.h"
 #include "tools/bench/methods.h"
 #include "tools/bench/reference.h"
+#include "tools/bench/timed_runs.h"
 
 namespace ptc::bench {
 namespace {
@@ -210,7 +211,7 @@ class GrowthRun {
     std::optional<Truth> truth;
     if (in_reach(points)) truth.emplace(scene, options_, executor_);
     std::vector<std::unique_ptr<CapRun>> runs;
-    for (const unsigned threads : thread_counts()) {
+    for (const unsigned threads : thread_counts(executor_.threads())) {
       for (const double cap : options_.caps) runs.push_back(std::make_unique<CapRun>(scene, cap, threads));
     }
     progress_.begin("city, caps", options_.repeats * runs.size(), "runs");
@@ -227,12 +228,6 @@ class GrowthRun {
       if (truth) truth->compare(runs[i]->results(), row);
       rows_.push_back(row);
     }
-  }
-
-  /// One thread, and all of them where there are more.
-  [[nodiscard]] std::vector<unsigned> thread_counts() const {
-    if (executor_.threads() == 1) return {1};
-    return {1, executor_.threads()};
   }
 
   const GrowthOptions& options_;

@@ -18,7 +18,7 @@ std::uint64_t blocks_of(const RecordFile& file) noexcept { return (file.records(
 
 std::size_t RecordFile::block_bytes(std::uint64_t block) const noexcept {
   const std::uint64_t left = bytes() - block * kBlockBytes;
-  return static_cast<std::size_t>((std::min<std::uint64_t>(left, kBlockBytes) + kDirectBytes - 1) / kDirectBytes * kDirectBytes);
+  return direct_blocks(static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlockBytes)));
 }
 
 void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
@@ -53,7 +53,7 @@ void RecordWriter::write(std::span<const PointRecord> records) {
 
 void RecordWriter::flush() {
   if (writing_.valid()) writing_.get();
-  const std::size_t bytes = (filled_ * sizeof(PointRecord) + kDirectBytes - 1) / kDirectBytes * kDirectBytes;
+  const std::size_t bytes = direct_blocks(filled_ * sizeof(PointRecord));
   const std::span<const std::byte> block(buffers_.data() + half_ * kBlockBytes, bytes);
   writing_ = std::async(std::launch::async, [this, block, at = offset_] { file_.file_->write_at(at, block); });
   file_.records_ += filled_;

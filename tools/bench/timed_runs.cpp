@@ -6,6 +6,11 @@
 
 namespace ptc::bench {
 
+std::vector<unsigned> thread_counts(unsigned threads) {
+  if (threads == 1) return {1};
+  return {1, threads};
+}
+
 TimedRuns::Start TimedRuns::begin() {
   return_freed_memory();
   std::ofstream("/proc/self/clear_refs") << "5";  // the peak begins anew; where that is not allowed, it is that of all so far

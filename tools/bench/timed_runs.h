@@ -8,6 +8,9 @@
 
 namespace ptc::bench {
 
+/// One thread, and all of them where there are more.
+[[nodiscard]] std::vector<unsigned> thread_counts(unsigned threads);
+
 /// Times of the runs of one method, and the most memory that one of them took.
 struct TimedRuns {
   std::vector<double> wall, cpu;  ///< seconds; CPU of all threads, user and system
