@@ -78,8 +78,15 @@ class Build {
     if (!request_.append.empty()) open_scene();
     if (request_.resume) resumption_ = std::make_unique<Resumption>(request_, target_);
     if (resumption_ && resumption_->plan() && was_published()) return std::move(report_);
-    SortedPoints points = resumption_ && resumption_->plan() ? take_up() : sort();
-    build(points);
+    const bool goes_on = resumption_ && resumption_->plan();
+    SortedPoints points = goes_on ? SortedPoints{} : sort();
+    try {
+      if (goes_on) points = take_up();
+      build(points);
+    } catch (const DataError& error) {  // what was kept is not what it was
+      if (resumption_) resumption_->refuse(error);
+      throw;
+    }
     report_.sort = points.sorter->statistics();
     if (resumption_) resumption_->remove();
     return std::move(report_);

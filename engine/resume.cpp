@@ -103,11 +103,15 @@ Resumption::Resumption(const BuildRequest& request, const std::filesystem::path&
     if (plan_ && std::filesystem::exists(at_)) load_checkpoint();
   } catch (const DataError& error) {
     if (std::filesystem::file_size(pages_) == 0) remove_file(pages_);  // perhaps the lock's own
-    std::vector<std::filesystem::path> files{manifest_, at_, pages_};
-    files.insert(files.end(), spills_.begin(), spills_.end());
-    throw DataError(fmt::format("{}; to start anew, remove {}", error.what(), names_text(files)));
+    refuse(error);
   }
   if (!plan_) begin();
+}
+
+void Resumption::refuse(const DataError& error) const {
+  std::vector<std::filesystem::path> files{manifest_, at_, pages_};
+  files.insert(files.end(), spills_.begin(), spills_.end());
+  throw DataError(fmt::format("{}; to start anew, remove {}", error.what(), names_text(files)));
 }
 
 void Resumption::load_manifest() {

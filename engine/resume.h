@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/error.h"
 #include "engine/build/build.h"
 #include "engine/io/file.h"
 #include "engine/io/state_file.h"
@@ -68,6 +69,8 @@ class Resumption {
   /// From now on, all points sorted, what there is stays.
   void keep(const BuildPlan& plan, ExternalSorter& sorter);
   void save(const Checkpoint& checkpoint) const;
+  /// Tells what to remove to start anew. @throws DataError with it behind what `error` says
+  [[noreturn]] void refuse(const DataError& error) const;
   /// Removes all, once the container is published.
   void remove() noexcept;
 

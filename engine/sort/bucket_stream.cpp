@@ -47,6 +47,10 @@ BucketLoader::Block BucketLoader::read(std::span<PointRecord> out, const std::fu
       split(std::move(large), out, scratch());
       continue;
     }
+    // All that is kept of it must be found whole before a piece of it goes out.
+    if (bucket.kept() && bucket.left() == bucket.size() && bucket.left() > out.size()) {
+      for (BucketReader ahead = bucket; ahead.read(out, reader_) > 0;) continue;
+    }
     // Records of one key are sorted as they came: they are the input's order.
     const Block block{out.first(bucket.read(out, reader_)), bucket.single_key()};
     if (bucket.left() == 0) {

@@ -61,7 +61,7 @@ class ExternalSorter {
                  std::span<const MortonKey> sample);
   /// Goes on with the files of a sorter that was kept; nothing can be added. Its digest and statistics are known.
   /// @param kept  from keep(), read to its end
-  /// @throws DataError when files or table are not what they were, std::system_error
+  /// @throws DataError when files or table are not what they were, also later by what finish() gives; std::system_error
   ExternalSorter(const SortOptions& options, const Executor& executor, StateReader& kept);
   ~ExternalSorter();
 

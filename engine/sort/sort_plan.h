@@ -20,7 +20,7 @@ struct SortPlan {
 
 /// Bytes held at once by a sort that follows the plan: runs, what grouping and sorting them takes,
 /// the sample and what is read at once. The table of runs is beside it, 4 bytes for each run and
-/// range: 1/16000 of what is spilled under a cap of 2 MiB or more.
+/// range, 12 of kept files: 1/16000 of what is spilled, 1/5000, under a cap of 2 MiB or more.
 [[nodiscard]] std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept;
 
 /// The plan with the largest runs whose plan_bytes() is at most `memory_bytes`.

@@ -10,8 +10,10 @@
 #include <system_error>
 #include <utility>
 
+#include "engine/base/error.h"
 #include "engine/io/file.h"
 #include "engine/sort/partition.h"
+#include "format/checksum.h"
 
 namespace ptc {
 namespace {
@@ -31,6 +33,13 @@ std::uint64_t sample_position(std::uint64_t i, std::uint64_t count, std::uint64_
 /// A disk, a quota or what the file system allows a file is used up: another directory may have room.
 bool is_full(const std::error_code& code) noexcept {
   return code.value() == ENOSPC || code.value() == EDQUOT || code.value() == EFBIG;
+}
+
+/// Of records from the i-th of a run's part on. Those of its pieces add up to that of the part.
+std::uint64_t digest_of(std::span<const PointRecord> records, std::uint64_t i) noexcept {
+  std::uint64_t sum = 0;
+  for (const PointRecord& record : records) sum += xxh3_64(std::as_bytes(std::span(&record, 1)), i++);
+  return sum;
 }
 
 void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::span<std::byte> buffer) {
@@ -121,6 +130,11 @@ void SpillFile::read_at(const SpillPlace& place, std::span<std::byte> bytes) con
   volumes_[place.volume]->file.read_at(place.offset, bytes);
 }
 
+void SpillFile::refuse(const SpillPlace& place, std::size_t points) const {
+  throw DataError(volumes_[place.volume]->place.string() + ": offset " + std::to_string(place.offset) + ": the " +
+                  std::to_string(points) + " points there are not what was written");
+}
+
 void SpillFile::discard(const SpillPlace& place, std::uint64_t bytes) const noexcept {
   const std::uint64_t begin = place.offset / kDirectBytes * kDirectBytes;
   const std::uint64_t end = (place.offset + bytes) / kDirectBytes * kDirectBytes;
@@ -164,6 +178,7 @@ Partition::Partition(SpillFile& file, StateReader& state) : file_(file), splitte
       run.starts.push_back(state.get<std::uint32_t>());
       state.require(i == 0 ? run.starts[i] == 0 : run.starts[i - 1] <= run.starts[i], "ranges of a run do not ascend");
     }
+    for (std::uint64_t i = 0; i < ranges(); ++i) run.digests.push_back(state.get<std::uint64_t>());
     state.require(file_.holds(run.place, run.starts.back() * sizeof(PointRecord)), "a run past the end of its file");
   }
 }
@@ -175,6 +190,7 @@ void Partition::save(StateWriter& state) const {
     state.put(run.place.volume);
     state.put(run.place.offset);
     for (const std::uint32_t start : run.starts) state.put(start);
+    for (const std::uint64_t digest : run.digests) state.put(digest);
   }
 }
 
@@ -208,7 +224,13 @@ void Partition::add_run(std::span<const PointRecord> records, std::span<PointRec
                          [](std::size_t i) { return static_cast<std::uint32_t>(i); });
 }
 
-void Partition::write_run(std::span<const PointRecord> grouped) { runs_.back().place = file_.append(grouped); }
+void Partition::write_run(std::span<const PointRecord> grouped) {
+  Run& run = runs_.back();
+  run.place = file_.append(grouped);
+  for (std::size_t range = 0; kept_ && range < ranges(); ++range) {
+    run.digests.push_back(digest_of(grouped.subspan(run.starts[range], run.size(range)), 0));
+  }
+}
 
 BucketReader::BucketReader(std::shared_ptr<const Partition> partition, std::size_t range)
     : partition_(std::move(partition)), range_(range) {
@@ -222,6 +244,7 @@ bool BucketReader::single_key() const noexcept {
 std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) {
   std::vector<SpillReader::Piece> pieces;
   std::size_t filled = 0;
+  const std::size_t first_run = run_, first_at = at_;
   while (filled < out.size() && left_ > 0) {
     const Partition::Run& run = partition_->runs_[run_];
     const std::size_t count = std::min(run.size(range_) - at_, out.size() - filled);
@@ -235,9 +258,24 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
     }
   }
   reader.read(partition_->file_, pieces);
-  if (partition_->kept_) return filled;
+  if (kept()) {
+    verify(first_run, first_at, out.first(filled));
+    return filled;
+  }
   for (const SpillReader::Piece& piece : pieces) partition_->file_.discard(piece.place, piece.out.size_bytes());
   return filled;
+}
+
+/// @param records  read from the at-th of the run's part on
+void BucketReader::verify(std::size_t run, std::size_t at, std::span<const PointRecord> records) {
+  for (; !records.empty(); ++run, at = 0) {
+    const Partition::Run& from = partition_->runs_[run];
+    const std::size_t size = from.size(range_), count = std::min(size - at, records.size());
+    digest_ += digest_of(records.first(count), at);
+    records = records.subspan(count);
+    if (at + count < size) return;
+    if (std::exchange(digest_, 0) != from.digests[range_]) partition_->file_.refuse(from.place_of(range_, 0), size);
+  }
 }
 
 std::vector<MortonKey> BucketReader::sample(std::size_t count, SpillReader& reader) const {

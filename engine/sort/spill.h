@@ -48,6 +48,8 @@ class SpillFile {
   /// True when what was appended has so many bytes there.
   [[nodiscard]] bool holds(const SpillPlace& place, std::uint64_t bytes) const noexcept;
   void read_at(const SpillPlace& place, std::span<std::byte> bytes) const;
+  /// @throws DataError: so many points there are not what was written
+  [[noreturn]] void refuse(const SpillPlace& place, std::size_t points) const;
   /// Gives back the disk's blocks that end in these bytes, which are not read again, nor those in front of them in
   /// their first block.
   void discard(const SpillPlace& place, std::uint64_t bytes) const noexcept;
@@ -120,7 +122,8 @@ class Partition {
   friend class BucketReader;
   struct Run {
     SpillPlace place;
-    std::vector<std::uint32_t> starts;  // of each range in the run, and the end
+    std::vector<std::uint32_t> starts;   // of each range in the run, and the end
+    std::vector<std::uint64_t> digests;  // of each range in the run, when kept: a power cut may tear what is to be on the disk
 
     [[nodiscard]] std::size_t size(std::size_t range) const noexcept { return starts[range + 1] - starts[range]; }
     [[nodiscard]] SpillPlace place_of(std::size_t range, std::size_t i) const noexcept {
@@ -135,7 +138,8 @@ class Partition {
 };
 
 /// Reads the records of one range in the order of the input. What was read leaves the disk unless it is kept: ranges
-/// of a partition are read by ascending number.
+/// of a partition are read by ascending number. What is kept is compared with what was written, run by run, when all of
+/// the range there was read.
 class BucketReader {
  public:
   BucketReader(std::shared_ptr<const Partition> partition, std::size_t range);
@@ -146,18 +150,22 @@ class BucketReader {
   [[nodiscard]] std::uint64_t left() const noexcept { return left_; }
   /// True when all have the same key.
   [[nodiscard]] bool single_key() const noexcept;
-  /// Fills the front of `out`. @return how many
+  [[nodiscard]] bool kept() const noexcept { return partition_->kept_; }
+  /// Fills the front of `out`. @return how many. @throws DataError when what is kept is not what was written
   [[nodiscard]] std::size_t read(std::span<PointRecord> out, SpillReader& reader);
   /// `count` keys, at least 1, from all parts of the range.
   [[nodiscard]] std::vector<MortonKey> sample(std::size_t count, SpillReader& reader) const;
 
  private:
+  void verify(std::size_t run, std::size_t at, std::span<const PointRecord> records);
+
   std::shared_ptr<const Partition> partition_;
   std::size_t range_;
   std::uint64_t size_ = 0;
   std::uint64_t left_ = 0;
   std::size_t run_ = 0;  // where to read on
   std::size_t at_ = 0;   // in that run's part
+  std::uint64_t digest_ = 0;  // of what was read of that part
 };
 
 }  // namespace ptc

@@ -69,6 +69,30 @@ class SystemFailure(ProgramTest):
         self.assertIn("another program is at work on it", second.stderr)
         self.assertEqual(first.wait(60), 0)
 
+    def test_points_on_the_disk_that_are_not_what_was_written_are_refused(self):
+        command = ["ptcbuild", "--city", "2M", "--memory", "128M", "-o", self.here / "o.ptcx", "--resume", "--checkpoint", "1"]
+        process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
+        while not (self.here / "o.ptcx.resume-at").exists():
+            time.sleep(0.001)
+        process.kill()
+        self.assertEqual(process.wait(60), -signal.SIGKILL)
+        spill, = self.here.glob("o.ptcx.resume-spill-*")
+        with open(spill, "r+b") as file:
+            file.seek(-10_000, os.SEEK_END)  # among the last points
+            byte = file.read(1)[0]
+            file.seek(-10_000, os.SEEK_END)
+            file.write(bytes([byte ^ 1]))
+        for _ in range(2):
+            message = self.fail_with(1, *command)
+            self.assertRegex(message, r"ptcbuild: .*/o\.ptcx\.resume-spill-\w+-0: offset \d+: the \d+ points there are not "
+                                      r"what was written; to start anew, remove .*/o\.ptcx\.resume, .*" + spill.name)
+        for path in self.here.iterdir():
+            self.assertIn(str(path), message)
+            path.unlink()
+        self.succeed(*command)
+        self.assertEqual(os.listdir(self.here), ["o.ptcx"])
+
     def test_what_is_left_of_another_build_is_refused(self):
         command = ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx", "--resume"]
         self.succeed(*command)

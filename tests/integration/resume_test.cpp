@@ -164,6 +164,42 @@ TEST_CASE("resume: torn states are refused with what to remove", "[integration][
   CHECK(place.made_whole());
 }
 
+TEST_CASE("resume: points on the disk that are not what was written are refused with what to remove", "[integration][resume]") {
+  for (const Kind kind : {Kind::city, Kind::cloud}) {
+    Place place(kind);
+    place.interrupt((kind == Kind::city ? 1 : 2) * place.points + 200'000);
+    std::filesystem::path spill;
+    for (const auto& file : std::filesystem::directory_iterator(place.dir / "t1")) spill = file.path();
+    REQUIRE(!spill.empty());
+    const std::vector<char> whole = bytes_of(spill);
+    REQUIRE(whole.size() > 100'000);
+    const std::size_t files = entries(place.dir.path());
+    Progress silent;
+    const auto flip = [&](std::size_t offset, char bits) {
+      std::fstream file(spill, std::ios::binary | std::ios::in | std::ios::out);
+      file.seekp(static_cast<std::streamoff>(offset));
+      file.put(static_cast<char>(whole[offset] ^ bits));
+    };
+    const std::size_t record = (whole.size() - 50'000) / sizeof(PointRecord) * sizeof(PointRecord);  // not yet read
+    for (const std::size_t offset : {record + 3, record + 20}) {  // of a key, of what is behind it
+      flip(offset, 0x40);
+      for (int again = 0; again < 2; ++again) {
+        CHECK_THROWS_WITH(build_container(place.request, place.out, silent),
+                          Catch::StartsWith(spill.string() + ": offset ") &&
+                              Catch::Contains("points there are not what was written; to start anew, remove ") &&
+                              Catch::Contains("o.ptcx.resume-pages"));
+      }
+      CHECK_FALSE(std::filesystem::exists(place.out));
+      CHECK(entries(place.dir.path()) == files);
+      flip(offset, 0);
+    }
+    std::filesystem::resize_file(spill, whole.size() - 4096);
+    CHECK_THROWS_WITH(build_container(place.request, place.out, silent),
+                      Catch::Contains("another length; to start anew, remove"));
+    CHECK_FALSE(std::filesystem::exists(place.out));
+  }
+}
+
 TEST_CASE("resume: before its first page a build goes on beside an old file of any kind", "[integration][resume]") {
   Place place(Kind::city);
   place.interrupt(place.points + 100);

@@ -3,8 +3,11 @@
 
 #include <catch2/catch.hpp>
 #include <filesystem>
+#include <fstream>
 
 #include "engine/base/error.h"
+#include "engine/io/direct_range.h"
+#include "engine/sort/sort_plan.h"
 #include "tests/sort/records.h"
 #include "tests/support/scenes.h"
 
@@ -20,8 +23,9 @@ struct Kept {
   SortOptions options{.memory_bytes = kCap, .temp_dirs = {directory.path()}, .kept_files = {directory / "a", directory / "b"}};
   std::vector<std::byte> state;
 
-  Kept(std::span<const PointRecord> input, std::span<const MortonKey> sample) {
+  Kept(std::span<const PointRecord> input, std::span<const MortonKey> sample, std::uint64_t cap = kCap) {
     const Executor two(2);
+    options.memory_bytes = cap;
     ExternalSorter sorter(options, two, sample);
     if (!input.empty()) sorter.add(input);
     StateWriter writer;
@@ -45,6 +49,46 @@ struct Kept {
     return all;
   }
 };
+
+std::vector<std::byte> read_file(const std::filesystem::path& path) {
+  std::vector<std::byte> bytes(std::filesystem::file_size(path));
+  std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  return bytes;
+}
+
+void write_at(const std::filesystem::path& path, std::size_t offset, std::span<const std::byte> bytes) {
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(static_cast<std::streamoff>(offset));
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+/// Sorts what is kept with such bytes in the place of what was written to one file, which must be refused by name, after
+/// nothing but the first of the sorted records was handed out.
+void check_torn(const Kept& kept, std::span<const PointRecord> expected, const std::filesystem::path& file, std::size_t offset,
+                std::span<const std::byte> torn) {
+  const std::vector<std::byte> whole = read_file(file);
+  write_at(file, offset, torn);
+  StateReader reader(kept.state, "state");
+  const Executor two(2);
+  SortOptions options = kept.options;
+  options.memory_bytes = kCap;
+  ExternalSorter sorter(options, two, reader);
+  std::vector<PointRecord> all;
+  std::string told;
+  try {
+    const auto stream = sorter.finish();
+    std::vector<PointRecord> block(100);
+    while (const std::size_t count = stream->next(block)) {
+      all.insert(all.end(), block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+  } catch (const DataError& error) {
+    told = error.what();
+  }
+  CAPTURE(offset, all.size());
+  CHECK_THAT(told, Catch::StartsWith(file.string() + ": offset ") && Catch::EndsWith(" points there are not what was written"));
+  CHECK((all.size() < expected.size() && same_bytes(all, expected.first(all.size()))));
+  write_at(file, offset, std::span(whole).subspan(offset, torn.size()));
+}
 
 }  // namespace
 
@@ -124,4 +168,43 @@ TEST_CASE("kept sort: files and tables that are not what they were are refused",
   CHECK_THROWS_WITH(open(kept.state), Catch::Contains("another length"));
   std::filesystem::remove(kept.options.kept_files[0]);
   CHECK_THROWS_WITH(open(kept.state), Catch::Contains(kept.options.kept_files[0].string()));
+}
+
+TEST_CASE("kept sort: records that are not what was written are refused by name before they go out", "[sort][kept]") {
+  constexpr std::size_t kCount = 20 * kPageRecords;  // runs are whole blocks: no byte of the files belongs to no record
+  for (const Keys keys : {Keys::surface, Keys::equal, Keys::heavy}) {
+    const std::vector<PointRecord> input = make_records(keys, kCount);
+    const std::vector<PointRecord> expected = stable_sorted(input);
+    for (const bool fair : {true, false}) {  // else buckets are partitioned again
+      const Kept kept(input, fair ? sample_of(input, 2000) : std::vector<MortonKey>(100, MortonKey{~std::uint64_t{0}, 0}),
+                      4 * kCap);  // what a run holds of a range is larger than the blocks that are handed out
+      CAPTURE(keys, fair);
+      std::uint64_t bytes = 0;
+      for (const auto& file : kept.options.kept_files) {
+        const std::vector<std::byte> whole = read_file(file);
+        bytes += whole.size();
+        REQUIRE(whole.size() >= 3 * kDirectBytes);
+        constexpr std::size_t kSteps = 23;
+        for (std::size_t step = 0; step < kSteps; ++step) {
+          // A byte: of the key, of what is behind it, of each in turn.
+          const std::size_t record = step * (whole.size() / sizeof(PointRecord) - 1) / (kSteps - 1) * sizeof(PointRecord);
+          for (const std::size_t offset : {record + step % sizeof(MortonKey), record + 16 + step}) {
+            const std::byte flipped = whole[offset] ^ std::byte{0x10};
+            check_torn(kept, expected, file, offset, {&flipped, 1});
+          }
+          // A block that was not written, or is another.
+          const std::size_t block = step * (whole.size() / kDirectBytes - 1) / (kSteps - 1) * kDirectBytes;
+          check_torn(kept, expected, file, block, std::vector<std::byte>(kDirectBytes));
+          const std::size_t other = block == 0 ? kDirectBytes : 0;
+          check_torn(kept, expected, file, block, std::span(whole).subspan(other, kDirectBytes));
+        }
+        // Two records of a range that are whole, in each other's place.
+        std::vector<std::byte> exchanged(whole.begin() + sizeof(PointRecord), whole.begin() + 2 * sizeof(PointRecord));
+        exchanged.insert(exchanged.end(), whole.begin(), whole.begin() + sizeof(PointRecord));
+        check_torn(kept, expected, file, 0, exchanged);
+      }
+      CHECK(bytes == kCount * sizeof(PointRecord));
+      CHECK(same_bytes(kept.from(0), expected));  // all is as it was again
+    }
+  }
 }
