@@ -7,7 +7,6 @@
 #include "engine/sort/radix_sort.h"
 
 namespace ptc {
-
 std::size_t BlockStream::next(std::span<PointRecord> out) {
   std::size_t filled = 0;
   while (filled < out.size()) {
@@ -71,8 +70,7 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
   const auto partition = std::make_shared<Partition>(file_, std::move(splitters));
   while (const std::size_t count = bucket.read(out, reader_)) {
     const std::span<PointRecord> run = out.first(count), grouped = scratch.first(count);
-    partition->add_run(run, grouped, executor_);
-    partition->write_run(grouped);
+    partition->write_run(grouped, partition->group_run(run, grouped, executor_));
   }
   push(partition, 0);
 }

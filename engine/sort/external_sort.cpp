@@ -47,7 +47,7 @@ Digest digest_of(std::span<const PointRecord> records, const Executor& executor)
 }
 
 // Of a part: enough for long pieces of each range, little enough that touching its memory takes no time worth naming.
-constexpr std::size_t kPartRecords = kPageRecords * 6 * 1024;  // 126 MB
+constexpr std::size_t kPartRecords = kPageRecords * 4608;  // 94 MB
 
 // All in memory: one block.
 class MemoryStream final : public BlockStream {
@@ -128,9 +128,11 @@ struct ExternalSorter::Impl {
   void spill_all();
   void keep(StateWriter& state);
   void discard_before(std::uint64_t record);
-  /// Memory in three: while one part is filled, another is grouped into the third, which is written.
-  [[nodiscard]] std::span<PointRecord> part(std::size_t k) noexcept { return memory().subspan(k * part_records(), part_records()); }
-  [[nodiscard]] std::size_t part_records() noexcept { return std::min(kPartRecords, memory().size() / 3); }
+  /// Memory in four: while one part is filled, another is grouped into the third, and the fourth is written.
+  [[nodiscard]] std::span<PointRecord> part(std::size_t k) noexcept {
+    return memory().subspan(k * part_records(), part_records());
+  }
+  [[nodiscard]] std::size_t part_records() noexcept { return std::min(kPartRecords, memory().size() / 4); }
   [[nodiscard]] std::unique_ptr<PointStream> stream_memory();
   [[nodiscard]] std::unique_ptr<PointStream> stream_buckets(std::uint64_t first);
 
@@ -151,7 +153,10 @@ struct ExternalSorter::Impl {
   std::size_t discarded = 0;           // ranges, of kept files
   std::uint64_t discarded_points = 0;  // there
   std::atomic<std::uint32_t> buckets{0};
-  std::future<void> spilling;  // of what was filled before; last, so that it is waited for first
+  std::size_t turn = 0;  // which of two parts is grouped into next
+  // Of what was filled before, and of what was grouped into either part; last, so that they are waited for first.
+  std::shared_future<Partition::Starts> grouping;
+  std::array<std::shared_future<void>, 2> writing;
 };
 
 void ExternalSorter::Impl::add(std::span<const PointRecord> records) {
@@ -181,27 +186,29 @@ void ExternalSorter::Impl::begin_partition() {
   sample = {};
 }
 
-// Groups what was filled and writes it while more is filled.
+// Groups what was filled while more is filled, and writes it while that is grouped.
 void ExternalSorter::Impl::spill() {
   if (!partition) begin_partition();
-  if (spilling.valid()) spilling.get();
+  if (grouping.valid()) grouping.wait();  // out of the part that is filled next
   const std::span<PointRecord> records = filling.first(filled);
   const bool whole_run = filling.size() > part_records();  // the first one, where it was not known that more would come
-  const std::span<PointRecord> grouped = (whole_run ? scratch() : part(2)).first(filled);
+  const std::span<PointRecord> grouped = (whole_run ? scratch() : part(2 + turn)).first(filled);
+  const auto group = [this, records, grouped, free = writing[turn]] {
+    if (free.valid()) free.get();
+    return partition->group_run(records, grouped, executor);
+  };
+  const bool at_once = whole_run || executor.threads() == 1;
+  grouping = std::async(at_once ? std::launch::deferred : std::launch::async, group).share();
+  if (at_once) grouping.wait();
+  // Direct writes leave the processor free: another thread, even if the executor has only one.
+  writing[turn] = std::async(std::launch::async, [this, grouped, grouping = grouping, before = writing[1 - turn]] {
+                    if (before.valid()) before.get();
+                    partition->write_run(grouped, grouping.get());
+                  }).share();
+  if (whole_run) writing[1 - turn] = writing[turn];
+  turn = 1 - turn;
   filling = whole_run || filling.data() != part(0).data() ? part(0) : part(1);
   filled = 0;
-  const auto group = [this, records, grouped] { partition->add_run(records, grouped, executor); };
-  const auto write = [this, grouped] { partition->write_run(grouped); };
-  // Direct writes leave the processor free: another thread, even if the executor has only one.
-  if (whole_run || executor.threads() == 1) {
-    group();
-    spilling = std::async(std::launch::async, write);
-  } else {
-    spilling = std::async(std::launch::async, [group, write] {
-      group();
-      write();
-    });
-  }
 }
 
 std::unique_ptr<PointStream> ExternalSorter::Impl::stream_memory() {
@@ -215,7 +222,9 @@ std::unique_ptr<PointStream> ExternalSorter::Impl::stream_memory() {
 void ExternalSorter::Impl::spill_all() {
   if (!partition) begin_partition();
   if (filled > 0) spill();
-  if (spilling.valid()) spilling.get();
+  for (const auto& write : writing) {
+    if (write.valid()) write.get();
+  }
 }
 
 void ExternalSorter::Impl::keep(StateWriter& state) {

@@ -20,8 +20,8 @@ constexpr std::size_t kLeastRanges = 48, kMostRanges = 512;
 constexpr std::size_t kSampleKeysPerRange = 16;
 constexpr std::uint64_t kLeastReadBytes = SpillReader::kLeastBytes, kMostReadBytes = 4 << 20;
 
-// Three parts in two runs, each on a page boundary.
-constexpr std::size_t kRunStep = 3 * kPageRecords;
+// Four parts in two runs, each on a page boundary.
+constexpr std::size_t kRunStep = 2 * kPageRecords;
 static_assert(kPageRecords * sizeof(PointRecord) % kDirectBytes == 0);
 
 }  // namespace

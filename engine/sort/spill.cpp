@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <functional>
 #include <future>
 #include <numeric>
 #include <stdexcept>
@@ -19,6 +20,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMostVolumes = 1 << 10;
+constexpr std::size_t kPieceBytes = std::size_t{2} << 20;  // of a write
 
 // The i-th of `count` positions in [0, size), one in each of as many equal strides, anywhere in it:
 // records that repeat with a period must not fool the sample. The same for the same arguments.
@@ -52,6 +54,26 @@ void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::spa
     bytes = bytes.subspan(range.bytes);
     place.offset += range.bytes;
   }
+}
+
+/// Runs work(k) for every k below `count` in threads of their own, the first in the caller's. What one throws is thrown
+/// when all have ended.
+void run_beside(std::size_t count, const std::function<void(std::size_t)>& work) {
+  std::vector<std::future<void>> others;
+  for (std::size_t k = 1; k < count; ++k) others.push_back(std::async(std::launch::async, work, k));
+  work(0);
+  for (auto& other : others) other.get();
+}
+
+void write_pieces(DirectFile& file, std::uint64_t offset, std::span<const std::byte> bytes) {
+  const std::size_t pieces = (bytes.size() + kPieceBytes - 1) / kPieceBytes;
+  std::atomic<std::size_t> next = 0;
+  run_beside(std::min(kTransfers, pieces), [&](std::size_t) {
+    for (std::size_t i = next++; i < pieces; i = next++) {
+      const std::size_t begin = i * kPieceBytes;
+      file.write_at(offset + begin, bytes.subspan(begin, std::min(kPieceBytes, bytes.size() - begin)));
+    }
+  });
 }
 
 }  // namespace
@@ -108,7 +130,7 @@ SpillPlace SpillFile::append(std::span<const PointRecord> records) {
     Volume& volume = *volumes_[v];
     const SpillPlace place{v, volume.end};
     try {
-      volume.file.write_at(place.offset, bytes);
+      write_pieces(volume.file, place.offset, bytes);
     } catch (const std::system_error& error) {
       if (v == order.back() || !is_full(error.code())) throw;
       volume.file.discard(place.offset, bytes.size());  // the part that found room
@@ -148,22 +170,18 @@ std::uint64_t SpillFile::bytes() const noexcept {
 }
 
 SpillReader::SpillReader(std::size_t buffer_bytes)
-    : buffer_(buffer_bytes / (kReads * kDirectBytes) * (kReads * kDirectBytes)) {
+    : buffer_(buffer_bytes / (kTransfers * kDirectBytes) * (kTransfers * kDirectBytes)) {
   if (buffer_.size() < kLeastBytes) throw std::invalid_argument("SpillReader: buffer too small");
 }
 
 void SpillReader::read(const SpillFile& file, std::span<const Piece> pieces) {
-  const std::size_t share = buffer_.size() / kReads;
+  const std::size_t share = buffer_.size() / kTransfers;
   std::atomic<std::size_t> next = 0;
   const auto work = [&](std::size_t reader) {
     const std::span<std::byte> buffer(buffer_.data() + reader * share, share);
     for (std::size_t i = next++; i < pieces.size(); i = next++) read_piece(file, pieces[i], buffer);
   };
-  std::vector<std::future<void>> others;
-  for (std::size_t reader = 1; reader < std::min(kReads, pieces.size()); ++reader)
-    others.push_back(std::async(std::launch::async, work, reader));
-  work(0);
-  for (auto& other : others) other.get();
+  run_beside(std::min(kTransfers, pieces.size()), work);
 }
 
 Partition::Partition(SpillFile& file, Splitters splitters, bool kept)
@@ -204,7 +222,8 @@ void Partition::discard(std::size_t range) const noexcept {
   for (const Run& run : runs_) file_.discard(run.place_of(range, 0), run.size(range) * sizeof(PointRecord));
 }
 
-void Partition::add_run(std::span<const PointRecord> records, std::span<PointRecord> grouped, const Executor& executor) {
+Partition::Starts Partition::group_run(std::span<const PointRecord> records, std::span<PointRecord> grouped,
+                                       const Executor& executor) const {
   const std::size_t blocks = partition_blocks(records.size(), ranges(), executor.threads());
   // Looking for a range takes longer than keeping its number.
   const auto range_of = std::make_unique_for_overwrite<std::uint16_t[]>(records.size());
@@ -217,19 +236,17 @@ void Partition::add_run(std::span<const PointRecord> records, std::span<PointRec
   const ClassCounts counts(records, ranges(), blocks, find, executor);
   counts.scatter(grouped.data(), kept, executor);
   const std::vector<std::size_t> starts = counts.starts();
-
-  Run& run = runs_.emplace_back();
-  run.starts.resize(starts.size());
-  std::ranges::transform(starts, run.starts.begin(),
-                         [](std::size_t i) { return static_cast<std::uint32_t>(i); });
+  Starts ends(starts.size());
+  std::ranges::transform(starts, ends.begin(), [](std::size_t i) { return static_cast<std::uint32_t>(i); });
+  return ends;
 }
 
-void Partition::write_run(std::span<const PointRecord> grouped) {
-  Run& run = runs_.back();
-  run.place = file_.append(grouped);
+void Partition::write_run(std::span<const PointRecord> grouped, Starts starts) {
+  Run run{.place = file_.append(grouped), .starts = std::move(starts), .digests = {}};
   for (std::size_t range = 0; kept_ && range < ranges(); ++range) {
     run.digests.push_back(digest_of(grouped.subspan(run.starts[range], run.size(range)), 0));
   }
+  runs_.push_back(std::move(run));
 }
 
 BucketReader::BucketReader(std::shared_ptr<const Partition> partition, std::size_t range)

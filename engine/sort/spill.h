@@ -18,6 +18,9 @@
 
 namespace ptc {
 
+/// A disk gives its full rate to several requests at once.
+inline constexpr std::size_t kTransfers = 4;
+
 /// Where records lie.
 struct SpillPlace {
   std::uint32_t volume = 0;
@@ -85,9 +88,7 @@ class SpillReader {
   explicit SpillReader(std::size_t buffer_bytes);
   void read(const SpillFile& file, std::span<const Piece> pieces);
 
-  /// A disk gives its full rate to several requests at once.
-  static constexpr std::size_t kReads = 4;
-  static constexpr std::size_t kLeastBytes = kReads * 2 * kDirectBytes;
+  static constexpr std::size_t kLeastBytes = kTransfers * 2 * kDirectBytes;
 
  private:
   Arena buffer_;
@@ -107,10 +108,14 @@ class Partition {
   Partition(SpillFile& file, StateReader& state);
   void save(StateWriter& state) const;
 
-  /// Groups a run into `grouped`, as long as `records`, stable; write_run() must follow.
-  void add_run(std::span<const PointRecord> records, std::span<PointRecord> grouped, const Executor& executor);
-  /// Writes what add_run() has grouped, as SpillFile::append().
-  void write_run(std::span<const PointRecord> grouped);
+  /// Where each range begins in a run, and the end.
+  using Starts = std::vector<std::uint32_t>;
+
+  /// Groups a run into `grouped`, as long as `records`, stable. Threads: while another run is written, too.
+  [[nodiscard]] Starts group_run(std::span<const PointRecord> records, std::span<PointRecord> grouped,
+                                 const Executor& executor) const;
+  /// Writes what group_run() has grouped, as SpillFile::append(). Runs come in the order of the input.
+  void write_run(std::span<const PointRecord> grouped, Starts starts);
 
   [[nodiscard]] std::size_t ranges() const noexcept { return splitters_.size(); }
   /// Records of a range.
@@ -122,7 +127,7 @@ class Partition {
   friend class BucketReader;
   struct Run {
     SpillPlace place;
-    std::vector<std::uint32_t> starts;   // of each range in the run, and the end
+    Starts starts;
     std::vector<std::uint64_t> digests;  // of each range in the run, when kept: a power cut may tear what is to be on the disk
 
     [[nodiscard]] std::size_t size(std::size_t range) const noexcept { return starts[range + 1] - starts[range]; }

@@ -38,8 +38,7 @@ std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord>
   while (!records.empty()) {
     const std::size_t count = std::min(run, records.size());
     const std::span<PointRecord> grouped = records_in(memory).first(count);
-    partition->add_run(records.first(count), grouped, two);
-    partition->write_run(grouped);
+    partition->write_run(grouped, partition->group_run(records.first(count), grouped, two));
     records = records.subspan(count);
   }
   return partition;
@@ -230,11 +229,11 @@ TEST_CASE("sort plan: it uses most of the cap and never more", "[sort][plan]") {
       const SortPlan plan = plan_sort(cap, threads);
       CHECK(plan_bytes(plan, threads) <= cap);
       CHECK(2 * plan.run_records * sizeof(PointRecord) >=
-            std::min(cap, std::uint64_t{1} << 38) / 3);
+            std::min(cap, std::uint64_t{1} << 38) / 10 * 3);
       if (cap > 64 << 20 && threads < 64 && cap < std::uint64_t{1} << 38)
         CHECK(2 * plan.run_records * sizeof(PointRecord) > cap / 10 * 9);
       CHECK(plan.run_records * sizeof(PointRecord) % kDirectBytes == 0);
-      CHECK(2 * plan.run_records / 3 * sizeof(PointRecord) % kDirectBytes == 0);
+      CHECK(2 * plan.run_records / 4 * sizeof(PointRecord) % kDirectBytes == 0);
       CHECK(plan.ranges >= 48);
       CHECK(plan.read_bytes >= SpillReader::kLeastBytes);
     }

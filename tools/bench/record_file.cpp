@@ -10,7 +10,6 @@ namespace ptc::bench {
 namespace {
 
 constexpr std::size_t kBlockBytes = RecordFile::kBlock * sizeof(PointRecord);
-constexpr std::size_t kCopies = 4;  // blocks under way at once: what this kind of disk needs for its full rate
 
 std::uint64_t blocks_of(const RecordFile& file) noexcept { return (file.records() + RecordFile::kBlock - 1) / RecordFile::kBlock; }
 
@@ -22,7 +21,7 @@ std::size_t RecordFile::block_bytes(std::uint64_t block) const noexcept {
 }
 
 void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
-  const Arena buffers(kCopies * kBlockBytes);
+  const Arena buffers(kBlocks * kBlockBytes);
   std::atomic<std::uint64_t> next = 0;
   const auto work = [&](std::size_t copy) {
     std::byte* const buffer = buffers.data() + copy * kBlockBytes;
@@ -32,19 +31,20 @@ void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
     }
   };
   std::vector<std::future<void>> others;
-  for (std::size_t copy = 1; copy < kCopies; ++copy) others.push_back(std::async(std::launch::async, work, copy));
+  for (std::size_t copy = 1; copy < kBlocks; ++copy) others.push_back(std::async(std::launch::async, work, copy));
   work(0);
   for (auto& future : others) future.get();
   other.records_ = records_;
 }
 
-RecordWriter::RecordWriter(RecordFile& file) : file_(file), buffers_(2 * kBlockBytes) {}
+RecordWriter::RecordWriter(RecordFile& file) : file_(file), buffers_(RecordFile::kBlocks * kBlockBytes) {}
 
 void RecordWriter::write(std::span<const PointRecord> records) {
   while (!records.empty()) {
+    const std::size_t slot = next_ % writing_.size();
+    if (filled_ == 0 && writing_[slot].valid()) writing_[slot].get();
     const std::size_t count = std::min(records.size(), RecordFile::kBlock - filled_);
-    auto* const to = reinterpret_cast<PointRecord*>(buffers_.data() + half_ * kBlockBytes) + filled_;
-    std::ranges::copy(records.first(count), to);
+    std::ranges::copy(records.first(count), reinterpret_cast<PointRecord*>(buffers_.data() + slot * kBlockBytes) + filled_);
     filled_ += count;
     records = records.subspan(count);
     if (filled_ == RecordFile::kBlock) flush();
@@ -52,43 +52,45 @@ void RecordWriter::write(std::span<const PointRecord> records) {
 }
 
 void RecordWriter::flush() {
-  if (writing_.valid()) writing_.get();
-  const std::size_t bytes = direct_blocks(filled_ * sizeof(PointRecord));
-  const std::span<const std::byte> block(buffers_.data() + half_ * kBlockBytes, bytes);
-  writing_ = std::async(std::launch::async, [this, block, at = offset_] { file_.file_->write_at(at, block); });
+  const std::size_t slot = next_ % writing_.size();
+  const std::span<const std::byte> block(buffers_.data() + slot * kBlockBytes, direct_blocks(filled_ * sizeof(PointRecord)));
+  writing_[slot] = std::async(std::launch::async, [this, block, at = next_ * kBlockBytes] { file_.file_->write_at(at, block); });
   file_.records_ += filled_;
-  offset_ += kBlockBytes;
-  half_ = 1 - half_;
+  ++next_;
   filled_ = 0;
 }
 
 void RecordWriter::finish() {
   if (filled_ > 0) flush();
-  if (writing_.valid()) writing_.get();
+  for (auto& writing : writing_) {
+    if (writing.valid()) writing.get();
+  }
 }
 
-RecordReader::RecordReader(const RecordFile& file) : file_(file), buffers_(2 * kBlockBytes) { read_ahead(); }
+RecordReader::RecordReader(const RecordFile& file) : file_(file), buffers_(RecordFile::kBlocks * kBlockBytes) {
+  while (ahead_ < RecordFile::kBlocks) read_ahead();
+}
 
 RecordReader::~RecordReader() = default;
 
-PointRecord* RecordReader::half(std::uint64_t block) const noexcept {
-  return reinterpret_cast<PointRecord*>(buffers_.data() + block % 2 * kBlockBytes);
-}
-
 void RecordReader::read_ahead() {
-  if (next_ == blocks_of(file_)) return;
-  reading_ = std::async(std::launch::async, [this, block = next_] {
-    file_.file_->read_at(block * kBlockBytes, {reinterpret_cast<std::byte*>(half(block)), file_.block_bytes(block)});
+  const std::uint64_t block = ahead_++;
+  if (block >= blocks_of(file_)) return;
+  const std::size_t slot = block % reading_.size();
+  reading_[slot] = std::async(std::launch::async, [this, block, slot] {
+    file_.file_->read_at(block * kBlockBytes, {buffers_.data() + slot * kBlockBytes, file_.block_bytes(block)});
   });
 }
 
 std::span<const PointRecord> RecordReader::next() {
-  if (!reading_.valid()) return {};
-  reading_.get();
+  if (next_ > 0) read_ahead();  // where the block was that the caller has no more use for
+  if (next_ == blocks_of(file_)) return {};
   const std::uint64_t block = next_++;
-  read_ahead();
+  const std::size_t slot = block % reading_.size();
+  reading_[slot].get();
   const std::uint64_t left = file_.records() - block * RecordFile::kBlock;
-  return {half(block), static_cast<std::size_t>(std::min<std::uint64_t>(left, RecordFile::kBlock))};
+  return {reinterpret_cast<const PointRecord*>(buffers_.data() + slot * kBlockBytes),
+          static_cast<std::size_t>(std::min<std::uint64_t>(left, RecordFile::kBlock))};
 }
 
 std::vector<MortonKey> sample_of(const RecordFile& input) {

@@ -1,6 +1,7 @@
 // Point records on the disk, read and written from end to end past the page cache.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -24,6 +25,8 @@ class RecordFile {
   /// Records that are transferred at once: whole blocks of the disk.
   static constexpr std::size_t kBlock = 200 * kPageRecords;
   static_assert(kBlock * sizeof(PointRecord) % kDirectBytes == 0);
+  /// Blocks under way at once: what this kind of disk needs for its full rate.
+  static constexpr std::size_t kBlocks = 4;
 
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }
   [[nodiscard]] std::uint64_t bytes() const noexcept { return records_ * sizeof(PointRecord); }
@@ -40,7 +43,7 @@ class RecordFile {
   std::uint64_t records_ = 0;
 };
 
-/// Appends to a file, a block being written while the next is filled.
+/// Appends to a file, blocks being written while the next is filled.
 class RecordWriter {
  public:
   explicit RecordWriter(RecordFile& file);
@@ -52,12 +55,12 @@ class RecordWriter {
   void flush();
   RecordFile& file_;
   Arena buffers_;
-  std::size_t filled_ = 0, half_ = 0;
-  std::uint64_t offset_ = 0;
-  std::future<void> writing_;
+  std::size_t filled_ = 0;  ///< records of the block that is next
+  std::uint64_t next_ = 0;  ///< block
+  std::array<std::future<void>, RecordFile::kBlocks> writing_;
 };
 
-/// Reads a file in order, the next block while one is in use.
+/// Reads a file in order, the next blocks while one is in use.
 class RecordReader {
  public:
   explicit RecordReader(const RecordFile& file);
@@ -67,11 +70,10 @@ class RecordReader {
 
  private:
   void read_ahead();
-  [[nodiscard]] PointRecord* half(std::uint64_t block) const noexcept;
   const RecordFile& file_;
   Arena buffers_;
-  std::uint64_t next_ = 0;  ///< block
-  std::future<void> reading_;
+  std::uint64_t next_ = 0, ahead_ = 0;  ///< blocks: to be handed out, to be read
+  std::array<std::future<void>, RecordFile::kBlocks> reading_;
 };
 
 /// Keys spread evenly over a file, as a build takes them of its input.
