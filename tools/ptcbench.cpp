@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <numbers>
 
 #include "engine/base/error.h"
 #include "engine/io/room.h"
@@ -19,6 +18,7 @@
 #include "tools/bench/model_report.h"
 #include "tools/bench/sort_report.h"
 #include "tools/bench_options.h"
+#include "tools/bench_quick.h"
 #include "tools/common.h"
 #include "tools/values.h"
 
@@ -143,20 +143,20 @@ void declare_growth(CLI::App& app, Arguments& arguments) {
   GrowthOptions& options = arguments.growth;
   CLI::App& command = declare_timed(app, arguments, "growth",
                                     "Time per receiver against surfels, solid angle, depth complexity and memory, with its error",
-                                    "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them checked, 3 runs, "
-                                    "no cap below 9 %",
+                                    "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them checked, 3 "
+                                    "runs, no cap below 9 %",
                                     options.repeats);
   add_points_list(command, options.points,
-                  "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the greatest is also shaded under caps. Above "
-                  "40M without a check by rays");
+                  "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the greatest is also shaded under caps. "
+                  "Above 40M without a check by rays");
   add_words(command, "--panel", options.panels, "Measure against this, not all; repeatable");
   ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers whose error is measured");
 }
 
 void declare_build(CLI::App& app, Arguments& arguments) {
   CLI::App& command = declare_timed(app, arguments, "build",
-                                    "Time, bytes and memory of sort and build, over points and over the cap, beside a disk that moves the "
-                                    "same bytes",
+                                    "Time, bytes and memory of sort and build, over points and over the cap, beside a disk that "
+                                    "moves the same bytes",
                                     kQuickRecords, arguments.build.repeats);
   BuildBenchOptions& options = arguments.build;
   add_points_list(command, options.points, "Points of the city, in place of 1M, 5M and 20M; repeatable");
@@ -165,7 +165,9 @@ void declare_build(CLI::App& app, Arguments& arguments) {
     for (const std::string& text : values) options.caps.push_back(ptc::parse_size("--cap", text));
     std::ranges::sort(options.caps);
   };
-  command.add_option_function<std::vector<std::string>>("--cap", set, "Build the most points under this cap, not under 128M to 2G; repeatable")
+  command
+      .add_option_function<std::vector<std::string>>("--cap", set,
+                                                    "Build the most points under this cap, not under 128M to 2G; repeatable")
       ->type_name("SIZE")
       ->allow_extra_args(false);
   add_words(command, "--profile", options.profiles, "Build in this profile, not both; repeatable");
@@ -174,8 +176,8 @@ void declare_build(CLI::App& app, Arguments& arguments) {
 
 void declare_sort(CLI::App& app, Arguments& arguments) {
   CLI::App& command = declare_timed(app, arguments, "sort",
-                                    "Time and bytes of the external sort beside those of the disk alone, and of its core beside std::sort "
-                                    "and oneTBB",
+                                    "Time and bytes of the external sort beside those of the disk alone, and of its core beside "
+                                    "std::sort and oneTBB",
                                     kQuickRecords, arguments.sort.repeats);
   SortBenchOptions& options = arguments.sort;
   add_points_list(command, options.points, "Records, in place of 1M, 5M and 20M; repeatable; above 20M on disk alone");
@@ -186,8 +188,10 @@ void declare_sort(CLI::App& app, Arguments& arguments) {
 void declare_cache(CLI::App& app, Arguments& arguments) {
   CacheBenchOptions& options = arguments.cache;
   CLI::App& command = declare_timed(app, arguments, "cache",
-                                    "A page cache below the size of the scene: lookups, back ends, threads, order of receivers and of pages",
-                                    "Two minutes on two cores: 1M points, 8k receivers, 2 runs, no cap below 9 %, at most 4 threads",
+                                    "A page cache below the size of the scene: lookups, back ends, threads, order of receivers and "
+                                    "of pages",
+                                    "Two minutes on two cores: 1M points, 8k receivers, 2 runs, no cap below 9 %, at most 4 "
+                                    "threads",
                                     options.repeats);
   ptc::add_count(command, "--points", options.points, "Points of the city")->default_str("6M");
   ptc::add_count(command, "--receivers", options.receivers, "Of them, in blocks of neighbours")->default_str("65536");
@@ -205,80 +209,6 @@ void declare_model(CLI::App& app, Arguments& arguments) {
       ->default_str("500k");
   ptc::add_integer(command, "--checked", options.checked, 10, 1'000'000, "Receivers whose error is measured");
   ptc::add_integer(command, "--repeats", options.repeats, 1, 1000, "Runs of every measurement");
-}
-
-/// What --quick sets, unless another option did. The references stay as good: they take little time.
-void shorten_error(Arguments& arguments) {
-  ErrorOptions& options = arguments.error;
-  if (arguments.command->count("--points") == 0) options.scene.points = 50'000;
-  if (arguments.command->count("--checked") == 0) options.checked = 400;
-  options.scene.width = 320;
-  options.scene.height = 180;
-}
-
-/// Likewise.
-void shorten_accuracy(Arguments& arguments) {
-  const auto unless_given = [&](const char* name, auto& value, auto quick) {
-    if (arguments.command->count(name) == 0) value = quick;
-  };
-  AccuracyOptions& options = arguments.accuracy;
-  unless_given("--points", options.scene.points, 200'000U);
-  unless_given("--checked", options.checked, 200U);
-  unless_given("--repeats", options.repeats, 3U);
-  options.scene.shaded_width = 192;  // in the middle: as dense as the whole picture, or less would be shared
-  options.scene.shaded_height = 108;
-  options.scene.window_width = 48;
-  options.scene.window_height = 27;
-  options.scene.own_points = 8'192;
-  options.rays = {64, 256, 1024, 4096};
-  options.plain_solid_angles = {0.01F};
-  if (arguments.command->count("--setting") > 0) return;
-  const std::vector<ptc::GatherOptions> all = AccuracyOptions::default_settings();
-  options.settings = {all[0], all[2], all[3], all[5]};
-}
-
-/// Likewise.
-void shorten_growth(Arguments& arguments) {
-  GrowthOptions& options = arguments.growth;
-  const auto given = [&](const char* name) { return arguments.command->count(name) > 0; };
-  if (!given("--points")) options.points = {50'000, 150'000, 500'000};
-  if (!given("--checked")) options.checked = 100;
-  if (!given("--repeats")) options.repeats = 3;
-  options.middle_points = 50'000;
-  options.solid_angles = {0.1F, 0.01F, 0.001F};
-  options.layers = {1, 4, 16};
-  options.caps = {1, 0.29, 0.09};  // less of so few pages is nothing
-  options.own_points = 8'192;
-  options.reference_rays = 4096;
-}
-
-/// Likewise.
-void shorten_cache(Arguments& arguments) {
-  CacheBenchOptions& options = arguments.cache;
-  if (arguments.command->count("--points") == 0) options.points = 1'000'000;
-  if (arguments.command->count("--receivers") == 0) options.receivers = 8'192;
-  if (arguments.command->count("--repeats") == 0) options.repeats = 2;
-  options.caps = {1, 0.29, 0.09};
-  options.threads = {1, 2, 4};
-}
-
-/// Likewise, of sort and build.
-template <class Options>
-void shorten_timed(const Arguments& arguments, Options& options) {
-  if (arguments.command->count("--points") == 0) options.points = {200'000, 1'000'000};
-  if (arguments.command->count("--repeats") == 0) options.repeats = 3;
-}
-
-/// Likewise.
-void shorten_model(Arguments& arguments) {
-  ModelOptions& options = arguments.model;
-  const auto given = [&](const char* name) { return arguments.command->count(name) > 0; };
-  if (!given("--points")) options.scene.points = 100'000;
-  if (!given("--checked")) options.checked = 150;
-  if (!given("--repeats")) options.repeats = 2;
-  options.scene.shaded_width = 192;
-  options.scene.shaded_height = 108;
-  options.reference_rays = 4096;
 }
 
 /// The scenes asked for, whose files can be read.
@@ -303,7 +233,7 @@ std::filesystem::path work_directory(const Arguments& arguments, const ptc::RunO
 }
 
 ptc::Outcome run_accuracy(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_accuracy(arguments);
+  if (arguments.quick) shorten(arguments.accuracy, *arguments.command);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
   const std::filesystem::path work = work_directory(arguments, run);
@@ -318,7 +248,7 @@ ptc::Outcome run_accuracy(Arguments& arguments, const ptc::RunOptions& run, ptc:
 }
 
 ptc::Outcome run_error(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_error(arguments);
+  if (arguments.quick) shorten(arguments.error, *arguments.command);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
   const std::filesystem::path work = work_directory(arguments, run);
@@ -341,38 +271,35 @@ ptc::Outcome report_rows(const Arguments& arguments, std::string (*text)(const s
 }
 
 ptc::Outcome run_growth(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_growth(arguments);
+  if (arguments.quick) shorten(arguments.growth, *arguments.command);
   return report_rows<GrowthRow>(arguments, growth_text, [&](const auto& report) {
     return measure_growth(arguments.growth, arguments.directory, run, progress, report);
   });
 }
 
 ptc::Outcome run_build(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) {
-    shorten_timed(arguments, arguments.build);
-    if (arguments.command->count("--cap") == 0) arguments.build.caps = {std::uint64_t{96} << 20, std::uint64_t{192} << 20};
-  }
+  if (arguments.quick) shorten(arguments.build, *arguments.command);
   return report_rows<BuildRow>(arguments, build_text, [&](const auto& report) {
     return measure_build(arguments.build, work_directory(arguments, run), run, progress, report);
   });
 }
 
 ptc::Outcome run_cache(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_cache(arguments);
+  if (arguments.quick) shorten(arguments.cache, *arguments.command);
   return report_rows<CacheRow>(arguments, cache_text, [&](const auto& report) {
     return measure_cache(arguments.cache, work_directory(arguments, run), run, progress, report);
   });
 }
 
 ptc::Outcome run_sort(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_timed(arguments, arguments.sort);
+  if (arguments.quick) shorten(arguments.sort, *arguments.command);
   return report_rows<SortRow>(arguments, sort_text, [&](const auto& report) {
     return measure_sort(arguments.sort, work_directory(arguments, run), run, progress, report);
   });
 }
 
 ptc::Outcome run_model(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
-  if (arguments.quick) shorten_model(arguments);
+  if (arguments.quick) shorten(arguments.model, *arguments.command);
   const std::vector<SceneChoice> choices = choose_scenes(arguments);
   std::filesystem::create_directories(arguments.directory);
   const std::filesystem::path work = work_directory(arguments, run);
