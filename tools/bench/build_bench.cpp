@@ -12,10 +12,10 @@
 #include "engine/io/room.h"
 #include "engine/stages.h"
 #include "engine/store/reader.h"
-#include "engine/store/structure.h"
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"
 #include "tools/bench/record_file.h"
+#include "tools/bench/stored_bytes.h"
 #include "tools/bench/timed_runs.h"
 
 namespace ptc::bench {
@@ -34,7 +34,7 @@ struct Input {
 struct Built {
   std::uint64_t spilled = 0, file_bytes = 0, nodes = 0;
   std::array<std::uint64_t, 2> content{};  ///< digest
-  double bytes_per_point = 0, bytes_per_node = 0;
+  StoredBytes stored;
 };
 
 class BuildRun {
@@ -99,8 +99,8 @@ class BuildRun {
       row.memory_bytes = cap;
       row.moved_bytes = input.file.bytes() + 2 * built.spilled + built.file_bytes;
       row.nodes = built.nodes;
-      row.bytes_per_point = built.bytes_per_point;
-      row.bytes_per_node = built.bytes_per_node;
+      row.bytes_per_point = built.stored.per_point;
+      row.bytes_per_node = built.stored.per_node;
     }
     const Built& moved = methods.begin()->second.second;
     add_row(panel, "floor", input, floor).moved_bytes = input.file.bytes() + 2 * moved.spilled + moved.file_bytes;
@@ -150,15 +150,7 @@ class BuildRun {
     const auto [known, is_new] = contents_.try_emplace({input.file.records(), profile}, built.content);
     if (known->second != built.content) throw DataError(fmt::format("{}: another cap gave another container", profile));
 
-    const ContainerReader reader(target_);
-    std::uint64_t points = 0, nodes = 0;
-    for (std::uint32_t page = 0; page < reader.page_count(); ++page) {
-      const DirectoryEntry& entry = reader.entry(page);
-      if (entry.type == PageType::point) points += extent_bytes(entry.stored_bytes);
-      if (entry.type == PageType::node) nodes += extent_bytes(entry.stored_bytes);
-    }
-    built.bytes_per_point = static_cast<double>(points) / static_cast<double>(report.points);
-    built.bytes_per_node = static_cast<double>(nodes) / static_cast<double>(built.nodes);
+    built.stored = stored_bytes(ContainerReader(target_));
   }
 
   const BuildBenchOptions& options_;

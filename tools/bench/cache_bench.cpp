@@ -1,11 +1,8 @@
 #include "tools/bench/cache_bench.h"
 
-#include <fcntl.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <memory>
 #include <random>
@@ -19,6 +16,7 @@
 #include "engine/shade/shader.h"
 #include "engine/stages.h"
 #include "tools/bench/bench_scene.h"
+#include "tools/bench/disk_reads.h"
 #include "tools/bench/growth.h"
 #include "tools/bench/timed_runs.h"
 
@@ -26,19 +24,6 @@ namespace ptc::bench {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-/// Bytes that disks gave to this process so far.
-std::uint64_t disk_bytes() {
-  std::ifstream facts("/proc/self/io");
-  std::string key;
-  for (std::uint64_t value = 0; facts >> key >> value;) {
-    if (key == "read_bytes:") return value;
-  }
-  return 0;
-}
-
-/// Takes what the system keeps of a file out of its cache.
-void forget(const InputFile& file) { ::posix_fadvise(file.descriptor(), 0, 0, POSIX_FADV_DONTNEED); }
 
 bool same(const std::vector<Shading>& a, const std::vector<Shading>& b) {
   static_assert(std::is_trivially_copyable_v<Shading>);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <random>
 
 #include "engine/io/record.h"
 #include "engine/scene/city.h"
@@ -11,7 +12,22 @@ namespace {
 
 constexpr std::size_t kBlockBytes = RecordFile::kBlock * sizeof(PointRecord);
 
-std::uint64_t blocks_of(const RecordFile& file) noexcept { return (file.records() + RecordFile::kBlock - 1) / RecordFile::kBlock; }
+std::uint64_t blocks_of(const RecordFile& file) noexcept {
+  return (file.records() + RecordFile::kBlock - 1) / RecordFile::kBlock;
+}
+
+/// Calls body(copy, block) for the blocks of a file in their order, `copy` unique among the kBlocks under way.
+template <class Body>
+void for_each_block(const RecordFile& file, const Body& body) {
+  std::atomic<std::uint64_t> next = 0;
+  const auto work = [&](unsigned copy) {
+    for (std::uint64_t block = next++; block < blocks_of(file); block = next++) body(copy, block);
+  };
+  std::vector<std::future<void>> others;
+  for (unsigned copy = 1; copy < RecordFile::kBlocks; ++copy) others.push_back(std::async(std::launch::async, work, copy));
+  work(0);
+  for (auto& future : others) future.get();
+}
 
 }  // namespace
 
@@ -20,21 +36,27 @@ std::size_t RecordFile::block_bytes(std::uint64_t block) const noexcept {
   return direct_blocks(static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlockBytes)));
 }
 
+void RecordFile::fill(std::uint64_t records) {
+  const Arena noise(kBlockBytes);
+  std::mt19937_64 random(1);
+  const std::span words(reinterpret_cast<std::uint64_t*>(noise.data()), kBlockBytes / sizeof(std::uint64_t));
+  std::ranges::generate(words, random);
+  records_ = records;
+  for_each_block(*this, [&](unsigned, std::uint64_t block) {
+    file_->write_at(block * kBlockBytes, {noise.data(), block_bytes(block)});
+  });
+}
+
 void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
+  most = std::min(most, bytes());
   const Arena buffers(kBlocks * kBlockBytes);
-  std::atomic<std::uint64_t> next = 0;
-  const auto work = [&](std::size_t copy) {
-    std::byte* const buffer = buffers.data() + copy * kBlockBytes;
-    for (std::uint64_t block = next++; block < blocks_of(*this); block = next++) {
-      file_->read_at(block * kBlockBytes, {buffer, block_bytes(block)});
-      if (block * kBlockBytes < most) other.file_->write_at(block * kBlockBytes, {buffer, block_bytes(block)});
-    }
-  };
-  std::vector<std::future<void>> others;
-  for (std::size_t copy = 1; copy < kBlocks; ++copy) others.push_back(std::async(std::launch::async, work, copy));
-  work(0);
-  for (auto& future : others) future.get();
-  other.records_ = records_;
+  for_each_block(*this, [&](unsigned copy, std::uint64_t block) {
+    const std::span<std::byte> buffer(buffers.data() + copy * kBlockBytes, block_bytes(block));
+    const std::uint64_t begin = block * kBlockBytes;
+    file_->read_at(begin, buffer);
+    if (begin < most) other.file_->write_at(begin, buffer.first(std::min(buffer.size(), direct_blocks(most - begin))));
+  });
+  other.records_ = most / sizeof(PointRecord);
 }
 
 RecordWriter::RecordWriter(RecordFile& file) : file_(file), buffers_(RecordFile::kBlocks * kBlockBytes) {}

@@ -26,12 +26,14 @@ class RecordFile {
   static constexpr std::size_t kBlock = 200 * kPageRecords;
   static_assert(kBlock * sizeof(PointRecord) % kDirectBytes == 0);
   /// Blocks under way at once: what this kind of disk needs for its full rate.
-  static constexpr std::size_t kBlocks = 4;
+  static constexpr unsigned kBlocks = 4;
 
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }
   [[nodiscard]] std::uint64_t bytes() const noexcept { return records_ * sizeof(PointRecord); }
-  /// Reads all and writes as many bytes again to another file, several blocks under way at once.
-  /// @param most  bytes to write, about, when that is less
+  /// Writes so many records of noise from the file's beginning.
+  void fill(std::uint64_t records);
+  /// Reads all and writes as many bytes again to another file, or in its own place, which then holds no more.
+  /// @param most  bytes to write when that is less; the other file's records are those that are whole in them
   void copy_to(RecordFile& other, std::uint64_t most = ~std::uint64_t{0}) const;
 
  private:
