@@ -76,6 +76,12 @@ void shorten(ModelOptions& options, const CLI::App& command) {
   options.reference_rays = 4096;
 }
 
+void shorten(ScaleOptions& options, const CLI::App& command) {
+  set_unless_given(command, "--points", options.points, std::vector<std::uint64_t>{200'000, 1'000'000});
+  set_unless_given(command, "--receivers", options.receivers, 8'000U);
+  set_unless_given(command, "--repeats", options.repeats, 2U);
+}
+
 void shorten(SortBenchOptions& options, const CLI::App& command) { shorten_records(options, command); }
 
 }  // namespace ptc::bench

@@ -9,6 +9,7 @@
 #include "tools/bench/error_knob.h"
 #include "tools/bench/growth.h"
 #include "tools/bench/model.h"
+#include "tools/bench/scale_bench.h"
 #include "tools/bench/sort_bench.h"
 
 namespace ptc::bench {
@@ -21,6 +22,7 @@ void shorten(CacheBenchOptions& options, const CLI::App& command);
 void shorten(ErrorOptions& options, const CLI::App& command);
 void shorten(GrowthOptions& options, const CLI::App& command);
 void shorten(ModelOptions& options, const CLI::App& command);
+void shorten(ScaleOptions& options, const CLI::App& command);
 void shorten(SortBenchOptions& options, const CLI::App& command);
 
 }  // namespace ptc::bench

@@ -16,6 +16,7 @@
 #include "tools/bench/growth_report.h"
 #include "tools/bench/model.h"
 #include "tools/bench/model_report.h"
+#include "tools/bench/scale_report.h"
 #include "tools/bench/sort_report.h"
 #include "tools/bench_options.h"
 #include "tools/bench_quick.h"
@@ -29,7 +30,8 @@ using namespace ptc::bench;
 constexpr char kPurpose[] =
     "Measures time and error together, against rays at the same scene in the same run, and draws charts\n"
     "of one against the other, of how time grows, or of what each part of the model is worth; sort and build\n"
-    "beside the disk; and the page cache. Scenes are held in memory whole; --memory caps sort and builds alone.";
+    "beside the disk; the page cache; and all of it at growing sizes. Scenes are held in memory whole; --memory caps\n"
+    "sort, build and scale alone.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
@@ -40,6 +42,8 @@ constexpr char kExamples[] =
     "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench build --points 1M --points 20M --points 200M --memory 1G --temp /scratch -o charts\n"
     "  ptcbench cache --quick -o charts\n"
+    "  ptcbench scale --quick -o charts\n"
+    "  ptcbench scale --points 1700M --repeats 1 --memory 2G --temp /scratch -o charts\n"
     "  ptcbench sort --quick -o charts\n"
     "  ptcbench sort --points 200M --panel disk --order city --memory 1G --temp /scratch -o charts\n";
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
@@ -53,6 +57,7 @@ struct Arguments {
   ErrorOptions error;
   GrowthOptions growth;
   ModelOptions model;
+  ScaleOptions scale;
   SortBenchOptions sort;
   bool quick = false;
   const CLI::App* command = nullptr;  ///< that was chosen: knows which options were given
@@ -188,14 +193,24 @@ void declare_sort(CLI::App& app, Arguments& arguments) {
 void declare_cache(CLI::App& app, Arguments& arguments) {
   CacheBenchOptions& options = arguments.cache;
   CLI::App& command = declare_timed(app, arguments, "cache",
-                                    "A page cache below the size of the scene: lookups, back ends, threads, order of receivers and "
-                                    "of pages",
+                                    "A page cache below the size of the scene: lookups, back ends, threads, order of receivers "
+                                    "and of pages",
                                     "Two minutes on two cores: 1M points, 8k receivers, 2 runs, no cap below 9 %, at most 4 "
                                     "threads",
                                     options.repeats);
   ptc::add_count(command, "--points", options.points, "Points of the city")->default_str("6M");
   ptc::add_count(command, "--receivers", options.receivers, "Of them, in blocks of neighbours")->default_str("65536");
   add_words(command, "--panel", options.panels, "Measure this, not all; repeatable");
+}
+
+void declare_scale(CLI::App& app, Arguments& arguments) {
+  ScaleOptions& options = arguments.scale;
+  CLI::App& command = declare_timed(app, arguments, "scale",
+                                    "From a procedural city to shaded receivers, end to end under the cap: time, bytes, memory "
+                                    "and cache hits of build, verification and shading at growing sizes, and their law",
+                                    "Under a minute on two cores: 200k and 1M points, 8k receivers, 2 runs", options.repeats);
+  add_points_list(command, options.points, "Points of the city, in place of 1M, 5M and 20M; repeatable; 1000 or more");
+  ptc::add_count(command, "--receivers", options.receivers, "Of them, spread evenly")->default_str("100k");
 }
 
 void declare_model(CLI::App& app, Arguments& arguments) {
@@ -291,6 +306,15 @@ ptc::Outcome run_cache(Arguments& arguments, const ptc::RunOptions& run, ptc::Pr
   });
 }
 
+ptc::Outcome run_scale(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  if (arguments.quick) shorten(arguments.scale, *arguments.command);
+  const std::uint64_t least = arguments.scale.points.front();
+  if (least < 1000) ptc::refuse("--points", std::to_string(least), "1000 or more");
+  return report_rows<ScaleRow>(arguments, scale_text, [&](const auto& report) {
+    return measure_scale(arguments.scale, work_directory(arguments, run), run, progress, report);
+  });
+}
+
 ptc::Outcome run_sort(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   if (arguments.quick) shorten(arguments.sort, *arguments.command);
   return report_rows<SortRow>(arguments, sort_text, [&](const auto& report) {
@@ -324,6 +348,7 @@ int main(int argc, char** argv) {
   declare_error(command.app(), arguments);
   declare_growth(command.app(), arguments);
   declare_model(command.app(), arguments);
+  declare_scale(command.app(), arguments);
   declare_sort(command.app(), arguments);
   command.app().require_subcommand(1);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
@@ -331,7 +356,7 @@ int main(int argc, char** argv) {
     const std::string name = arguments.command->get_name();
     static const std::map<std::string, decltype(&run_accuracy)> kRuns{
         {"accuracy", run_accuracy}, {"build", run_build}, {"cache", run_cache}, {"error", run_error},
-        {"growth", run_growth},     {"model", run_model}, {"sort", run_sort}};
+        {"growth", run_growth},     {"model", run_model}, {"scale", run_scale}, {"sort", run_sort}};
     return kRuns.at(name)(arguments, command.run_options(), progress);
   });
 }

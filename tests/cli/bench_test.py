@@ -193,10 +193,33 @@ class Bench(ProgramTest):
             self.assertGreater(read[-1], read[0])
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["cache.csv", "cache.json", "cache.png", "cache.svg"])
 
+    def test_scale_goes_end_to_end_and_leaves_its_files_alone(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "scale", "--quick", "--points", "20k", "--points", "900k", "--receivers", "300",
+                               "--memory", "96M", "--threads", "2", "-o", charts, "--json")
+        self.assertIn("GB of temporary files in", printed.stderr)
+        facts = json.loads((charts / "scale.json").read_text())
+        said = json.loads(printed.stdout)
+        self.assertEqual([said["rows"], said["laws"]], [facts["rows"], facts["laws"]])
+        stages = ["build", "verify", "shade", "build floor", "verify floor", "memcpy"]
+        self.assertEqual([r["stage"] for r in facts["rows"]], 2 * stages)
+        self.assertEqual([law["stage"] for law in facts["laws"]], stages[:3])
+        for row in facts["rows"]:
+            self.assertGreater(row["wall_low"], 0)
+            self.assertEqual(row["hit_rate"] is None, row["stage"] != "shade")
+            self.assertEqual(row["floor_share"] is None, row["stage"] not in ("build", "verify"))
+            if row["memory_bytes"] > 0:
+                self.assertLess(row["resident_bytes"], 96 << 20)
+        small, large = (r for r in facts["rows"] if r["stage"] == "build")
+        self.assertEqual(small["spilled_bytes"], 0)
+        self.assertGreaterEqual(large["spilled_bytes"], 40 * large["points"])
+        self.assertTrue(all(law["predicted_seconds"] > 0 for law in facts["laws"]))
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["scale.csv", "scale.json", "scale.png", "scale.svg"])
+
     def test_growth_beyond_the_disk_is_the_machines_fault(self):
         message = self.fail_with(3, "ptcbench", "growth", "--points", "40000G", "--panel", "surfels", "-o", self.here)
         self.assertIn("GB free", message)
-        for command in (["build"], ["cache"], ["sort", "--panel", "disk"]):
+        for command in (["build"], ["cache"], ["scale"], ["sort", "--panel", "disk"]):
             message = self.fail_with(3, "ptcbench", *command, "--points", "40000G", "-o", self.here)
             self.assertIn("GB free", message)
 

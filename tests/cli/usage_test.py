@@ -19,7 +19,7 @@ class Usage(ProgramTest):
         # would run for long.
         for program in PROGRAMS:
             for line in self.succeed(program, "--help").stdout.split("Examples:\n")[1].splitlines():
-                long = any(word in line for word in ("--city", "--quick", " build ", " growth ", " sort "))
+                long = any(word in line for word in ("--city", "--quick", " build ", " growth ", " scale ", " sort "))
                 if not line.startswith("  " + program) or long:
                     continue
                 words = line.split("|")[0].replace("/scratch", str(self.here)).split()
@@ -85,6 +85,8 @@ class Usage(ProgramTest):
                 self.fail_with(2, program, *operands[program], option)
         for option in ("--points=0", "--points=1.5", "--points=x", "--panel=time", "--panel=", "--checked=9", "--repeats=0"):
             self.fail_with(2, "ptcbench", "growth", "-o", self.here / "o", option)
+        for option in ("--points=999", "--points=x", "--receivers=0", "--receivers=1.5", "--repeats=0", "--panel=points"):
+            self.fail_with(2, "ptcbench", "scale", "-o", self.here / "o", option)
 
     def test_an_error_stands_for_the_settings_that_trade_time_for_it(self):
         for program, output in (("ptcshade", "o.ply"), ("ptcrender", "o.png")):
