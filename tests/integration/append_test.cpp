@@ -4,13 +4,17 @@
 #include <cmath>
 #include <fstream>
 
+#include <fmt/format.h>
+
 #include "engine/append.h"
 #include "engine/base/error.h"
 #include "engine/build/container_points.h"
 #include "engine/build/merge.h"
+#include "engine/convert.h"
 #include "engine/io/record.h"
 #include "engine/verify/verify.h"
 #include "format/error.h"
+#include "tests/store/forge.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -160,6 +164,33 @@ TEST_CASE("append: what is damaged, shaded or too far away is refused, and the o
   CHECK_THROWS_WITH(build_container(request, place.dir / "b.ptcx", place.silent),
                     Catch::Contains("lit.ptcx: new points would have no occlusion"));
   CHECK(std::distance(std::filesystem::directory_iterator(place.dir.path()), {}) == 4);
+}
+
+TEST_CASE("append: a scene whose points descend from page to page is refused", "[integration][append]") {
+  Place place;
+  write_cloud(place.dir / "a.xyz", place.first);
+  BuildRequest request{.inputs = {place.dir / "a.xyz"}, .page_shift = 14, .profile = Profile::raw};
+  build_container(request, place.dir / "a.ptcx", place.silent);
+  Forgery forged(place.dir / "a.ptcx");
+  const ContainerReader scene(place.dir / "a.ptcx");
+  const auto pages = scene.point_pages();
+  REQUIRE(pages.size() > 3);
+  std::swap(forged.pages[pages[1]].stored, forged.pages[pages[2]].stored);
+  const std::vector<std::byte> bytes = forged.bytes();
+  std::ofstream(place.dir / "a.ptcx", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  const auto refused = [&](auto&& make) {
+    const std::string place_of_it = fmt::format("a.ptcx: offset {}: ", forged.pages[pages[2]].offset + kPageHeaderBytes);
+    CHECK_THROWS_WITH(make(), Catch::Contains(place_of_it) && Catch::Contains("spec/points.md#point-order"));
+    CHECK_FALSE(std::filesystem::exists(place.dir / "b.ptcx"));
+  };
+  for (const Profile profile : {Profile::exact, Profile::compact}) {
+    request.append = place.dir / "a.ptcx";
+    request.profile = profile;
+    refused([&] { build_container(request, place.dir / "b.ptcx", place.silent); });
+    const ContainerReader descending(place.dir / "a.ptcx");
+    refused([&] { recode_container(descending, place.dir / "b.ptcx", {.profile = profile, .page_shift = 12}, place.silent); });
+  }
 }
 
 TEST_CASE("append: what is not asked for is kept", "[integration][append]") {

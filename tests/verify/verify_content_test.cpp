@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "engine/verify/verify.h"
 #include "format/node_page.h"
 #include "format/scalar.h"
 #include "tests/verify/damage.h"
@@ -232,6 +233,24 @@ TEST_CASE("verify: wrong totals in the superblock are found though checksums are
   CHECK(fault([](Superblock& s) { ++s.root_slot; }) != "");
   CHECK(fault([](Superblock& s) { s.header.frame.edge *= 2; }) != "");
   CHECK(fault([](Superblock& s) { s.header.frame.origin[0] += s.header.frame.unit(); }) != "");
+}
+
+TEST_CASE("verify: points that descend from page to page are found, and no tree is made of them", "[verify]") {
+  Specimen specimen(random_surfels(500, 4));
+  OpenContainer& container = specimen.container;
+  std::vector<std::size_t> pages;
+  for (std::size_t page = 0; page < container.pages(); ++page) {
+    if (container.header(page).type == PageType::point) pages.push_back(page);
+  }
+  REQUIRE(pages.size() > 3);
+  std::ranges::swap_ranges(container.payload(pages[1]), container.payload(pages[2]));
+  std::swap(container.header(pages[1]).first_key, container.header(pages[2]).first_key);
+  std::swap(container.header(pages[1]).last_key, container.header(pages[2]).last_key);
+  CHECK_THAT(specimen.fault(), Catch::Matchers::Contains("spec/points.md#point-order"));
+  Progress silent;
+  const VerifyReport report = verify_container(specimen.directory / "wrong.ptcx", {.level = VerifyLevel::rebuild}, silent);
+  CHECK(report.tree_checked);
+  CHECK_FALSE(report.tree_digest);
 }
 
 TEST_CASE("verify: a point that moved is found though checksums are right", "[verify]") {
