@@ -1,0 +1,63 @@
+// What a memory cap must hold.
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <functional>
+#include <ranges>
+
+#include "engine/base/error.h"
+#include "engine/pipeline.h"
+#include "engine/stages.h"
+#include "engine/store/reader.h"
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// Least number of bytes under which a run is not refused.
+std::uint64_t least_cap(const std::function<void(std::uint64_t)>& run) {
+  const auto refused = [&](std::uint64_t bytes) {
+    try {
+      run(bytes);
+      return false;
+    } catch (const LimitError&) {
+      return true;
+    }
+  };
+  const auto bytes = std::views::iota(std::uint64_t{1}, std::uint64_t{256} << 20);
+  return *std::ranges::partition_point(bytes, refused);
+}
+
+}  // namespace
+
+TEST_CASE("memory: a cap for shading holds the directory of each container that is open", "[integration][memory]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "few.ptcx", random_surfels(100, 1));
+  write_scene(dir / "many.ptcx", random_surfels(9000, 1));
+  const std::uint64_t few = ContainerReader(dir / "few.ptcx").page_count();
+  const std::uint64_t many = ContainerReader(dir / "many.ptcx").page_count();
+  REQUIRE(many > few + 100);
+  Progress silent;
+  const auto shading = [&](const char* scene, const char* receivers) {
+    return least_cap([&](std::uint64_t bytes) {
+      ShadeRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}};
+      request.count = 1;
+      if (*receivers != 0) request.receivers = dir / receivers;
+      shade_container(request, dir / "o.ply", silent);
+    });
+  };
+  const std::uint64_t least = shading("few.ptcx", "");
+  CHECK(shading("many.ptcx", "") == least + 36 * (many - few));
+  CHECK(shading("few.ptcx", "few.ptcx") == least + 36 * few);
+  CHECK(shading("few.ptcx", "many.ptcx") == least + 36 * many);
+  const auto picture = [&](const char* scene) {
+    return least_cap([&](std::uint64_t bytes) {
+      RenderRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}};
+      request.camera = Camera{.width = 2, .height = 2};
+      render_picture(request, std::array{PictureTarget{dir / "o.png"}}, silent);
+    });
+  };
+  CHECK(picture("many.ptcx") == picture("few.ptcx") + 36 * (many - few));
+}
