@@ -3,7 +3,9 @@
 
 #include <map>
 
+#include "engine/io/file.h"
 #include "engine/stages.h"
+#include "engine/store/commit.h"
 #include "engine/store/reader.h"
 #include "tools/common.h"
 #include "tools/report.h"
@@ -108,6 +110,15 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   return facts;
 }
 
+/// Refuses a cap that does not hold the file's directory and the texts of its meta page, before they are read.
+void require_memory(const std::filesystem::path& path, const ptc::RunOptions& run) {
+  constexpr std::uint64_t kTexts = 16;  // page, decoded, as JSON, printed: there control characters take six bytes
+  const ptc::InputFile file(path);
+  const ptc::Superblock superblock = ptc::read_superblock(file, ptc::read_file_header(file));
+  const std::uint64_t texts = kTexts << superblock.header.page_shift;
+  static_cast<void>(ptc::memory_left(run, texts, ptc::ContainerReader::kMostPageBytes * superblock.page_count, "this file"));
+}
+
 /// Text of a file as people may see it: in quotes, with no character that a terminal would obey.
 std::string quoted(const ordered_json& text) { return text.dump(-1, ' ', true); }
 
@@ -147,6 +158,7 @@ int main(int argc, char** argv) {
   std::filesystem::path file;
   command.add_input("file", file, "The container to look at")->required();
   return command.run(argc, argv, [&](ptc::Progress&) -> ptc::Outcome {
+    require_memory(file, command.run_options());
     const ptc::ContainerReader container(file);
     const ordered_json facts = facts_of(container);
     return {facts, summary_of(facts)};

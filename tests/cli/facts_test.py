@@ -27,6 +27,25 @@ class Facts(ProgramTest):
             self.assertAlmostEqual(low, -1, places=2)
             self.assertAlmostEqual(high, 1, places=2)
 
+    def test_ptcinfo_under_a_cap_that_does_not_hold_the_directory_is_refused(self):
+        def least_and_pages(points):
+            scene = self.here / "scene.ptcx"
+            self.succeed("ptcbuild", self.mesh, "--points", points, "--page-size", "4K", "-o", scene)
+            pages = json.loads(self.succeed("ptcinfo", scene, "--json").stdout)["page_counts"]
+            refused, enough = 0, 1 << 20
+            while enough - refused > 1:
+                cap = (refused + enough) // 2
+                code = run("ptcinfo", scene, "--memory", cap).returncode
+                self.assertIn(code, (0, 5))
+                refused, enough = (cap, enough) if code == 5 else (refused, cap)
+            self.assertIn("the least that works is 1M", self.fail_with(5, "ptcinfo", scene, "--memory", refused))
+            return enough, sum(pages.values())
+
+        few, few_pages = least_and_pages("100")
+        many, many_pages = least_and_pages("20k")
+        self.assertGreater(many_pages, few_pages + 50)
+        self.assertEqual(many - few, 100 * (many_pages - few_pages))  # bytes of a page while the file opens
+
     def test_texts_of_a_file_cannot_command_the_terminal(self):
         vector = Path(__file__).resolve().parents[2] / "spec/vectors/good/texts.ptcx"
         told = self.succeed("ptcinfo", vector).stdout
