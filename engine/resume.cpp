@@ -153,7 +153,9 @@ void Resumption::load_checkpoint() {
 
 void Resumption::begin() {
   remove_file(at_);
-  for (const auto& path : {manifest_, pages_, at_}) unsorted_.push_back(std::make_unique<TemporaryName>(path));
+  for (const auto& path : {manifest_, pages_, at_, state_temporary(manifest_)}) {
+    unsorted_.push_back(std::make_unique<TemporaryName>(path));
+  }
   for (const auto& path : spills_) unsorted_.push_back(std::make_unique<TemporaryName>(path));
   write_manifest({});
 }
@@ -193,6 +195,8 @@ void Resumption::save(const Checkpoint& checkpoint) const {
 // The manifest last: what is left of a removal that was cut short is known by it.
 void Resumption::remove() noexcept {
   std::ranges::for_each(spills_, remove_file);
+  remove_file(state_temporary(at_));
+  remove_file(state_temporary(manifest_));
   remove_file(at_);
   remove_file(pages_);
   remove_file(manifest_);

@@ -18,7 +18,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x4554'4154'5358'5450;  // "PTXSTATE"
-constexpr std::uint64_t kVersion = 1;
+constexpr std::uint64_t kVersion = 2;
 constexpr std::size_t kHeadBytes = 32;
 
 }  // namespace
@@ -54,13 +54,16 @@ void StateReader::end() const {
   if (!bytes_.empty()) fail("the state is longer than it should be");
 }
 
+std::filesystem::path state_temporary(const std::filesystem::path& path) { return path.string() + ".new"; }
+
 void write_state(const std::filesystem::path& path, std::span<const std::byte> state) {
   std::array<std::byte, kHeadBytes> head{};
   store(head.data(), 0, kMagic);
   store(head.data(), 8, kVersion);
   store(head.data(), 16, std::uint64_t{state.size()});
   store(head.data(), 24, xxh3_64(state, kVersion));
-  OutputFile file(path);
+  OutputFile file(path, state_temporary(path));
+  file.truncate(0);
   file.append(head);
   file.append(state);
   file.publish();

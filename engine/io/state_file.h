@@ -59,6 +59,8 @@ class StateReader {
   std::string name_;
 };
 
+/// Under which write_state() writes: one that a process which was killed has left is overwritten by the next.
+[[nodiscard]] std::filesystem::path state_temporary(const std::filesystem::path& path);
 /// Writes a state under a temporary name, syncs it and renames it over the old one: at any moment the one or the
 /// other is there, whole.
 void write_state(const std::filesystem::path& path, std::span<const std::byte> state);

@@ -116,7 +116,7 @@ struct ExternalSorter::Impl {
   }
   [[nodiscard]] std::uint64_t expected_spill() const noexcept {
     const bool spills = options.expected > plan.run_records || kept;
-    return spills ? options.expected * sizeof(PointRecord) : 0;
+    return spills ? options.expected * kSpilledBytes : 0;
   }
   [[nodiscard]] std::span<PointRecord> scratch() noexcept {
     return memory().last(plan.run_records);

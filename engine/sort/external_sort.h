@@ -67,6 +67,7 @@ class ExternalSorter {
 
   /// Bytes of temporary files that what is expected takes; 0 when it fits in memory.
   [[nodiscard]] std::uint64_t expected_spill() const noexcept;
+  /// @param records  their reserved bytes 0
   /// @throws std::system_error naming the directory when what memory does not hold cannot be
   /// written, now or a moment ago: the sorter is of no use then
   void add(std::span<const PointRecord> records);

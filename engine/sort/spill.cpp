@@ -44,14 +44,32 @@ std::uint64_t digest_of(std::span<const PointRecord> records, std::uint64_t i) n
   return sum;
 }
 
+/// Moves what goes to the disk of each record to the front. @return its bytes
+std::size_t pack(std::span<PointRecord> records) noexcept {
+  auto* const bytes = reinterpret_cast<std::byte*>(records.data());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const PointRecord record = records[i];
+    std::memcpy(bytes + i * kSpilledBytes, &record, kSpilledBytes);
+  }
+  return records.size() * kSpilledBytes;
+}
+
+void unpack(const std::byte* bytes, std::span<PointRecord> out) noexcept {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    PointRecord record;
+    std::memcpy(static_cast<void*>(&record), bytes + i * kSpilledBytes, kSpilledBytes);
+    out[i] = record;
+  }
+}
+
 void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::span<std::byte> buffer) {
   SpillPlace place = piece.place;
-  std::span<std::byte> bytes = std::as_writable_bytes(piece.out);
-  while (!bytes.empty()) {
-    const DirectRange range(place.offset, std::min(bytes.size(), buffer.size() - place.offset % kDirectBytes));
+  for (std::span<PointRecord> out = piece.out; !out.empty();) {
+    const std::size_t count = std::min(out.size(), (buffer.size() - place.offset % kDirectBytes) / kSpilledBytes);
+    const DirectRange range(place.offset, count * kSpilledBytes);
     file.read_at({place.volume, range.begin}, buffer.first(range.whole));
-    std::memcpy(bytes.data(), buffer.data() + range.lead, range.bytes);
-    bytes = bytes.subspan(range.bytes);
+    unpack(buffer.data() + range.lead, out.first(count));
+    out = out.subspan(count);
     place.offset += range.bytes;
   }
 }
@@ -123,8 +141,8 @@ std::vector<std::uint32_t> SpillFile::by_room(std::uint64_t bytes) const {
   return order;
 }
 
-SpillPlace SpillFile::append(std::span<const PointRecord> records) {
-  const std::span bytes(reinterpret_cast<const std::byte*>(records.data()), direct_blocks(records.size_bytes()));
+SpillPlace SpillFile::append(std::span<PointRecord> records) {
+  const std::span bytes(reinterpret_cast<const std::byte*>(records.data()), direct_blocks(pack(records)));
   const std::vector<std::uint32_t> order = by_room(bytes.size());
   for (const std::uint32_t v : order) {
     Volume& volume = *volumes_[v];
@@ -197,7 +215,7 @@ Partition::Partition(SpillFile& file, StateReader& state) : file_(file), splitte
       state.require(i == 0 ? run.starts[i] == 0 : run.starts[i - 1] <= run.starts[i], "ranges of a run do not ascend");
     }
     for (std::uint64_t i = 0; i < ranges(); ++i) run.digests.push_back(state.get<std::uint64_t>());
-    state.require(file_.holds(run.place, run.starts.back() * sizeof(PointRecord)), "a run past the end of its file");
+    state.require(file_.holds(run.place, run.starts.back() * kSpilledBytes), "a run past the end of its file");
   }
 }
 
@@ -219,7 +237,7 @@ std::uint64_t Partition::size(std::size_t range) const noexcept {
 }
 
 void Partition::discard(std::size_t range) const noexcept {
-  for (const Run& run : runs_) file_.discard(run.place_of(range, 0), run.size(range) * sizeof(PointRecord));
+  for (const Run& run : runs_) file_.discard(run.place_of(range, 0), run.size(range) * kSpilledBytes);
 }
 
 Partition::Starts Partition::group_run(std::span<const PointRecord> records, std::span<PointRecord> grouped,
@@ -241,11 +259,12 @@ Partition::Starts Partition::group_run(std::span<const PointRecord> records, std
   return ends;
 }
 
-void Partition::write_run(std::span<const PointRecord> grouped, Starts starts) {
-  Run run{.place = file_.append(grouped), .starts = std::move(starts), .digests = {}};
+void Partition::write_run(std::span<PointRecord> grouped, Starts starts) {
+  Run run{.place = {}, .starts = std::move(starts), .digests = {}};
   for (std::size_t range = 0; kept_ && range < ranges(); ++range) {
     run.digests.push_back(digest_of(grouped.subspan(run.starts[range], run.size(range)), 0));
   }
+  run.place = file_.append(grouped);
   runs_.push_back(std::move(run));
 }
 
@@ -279,7 +298,7 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
     verify(first_run, first_at, out.first(filled));
     return filled;
   }
-  for (const SpillReader::Piece& piece : pieces) partition_->file_.discard(piece.place, piece.out.size_bytes());
+  for (const SpillReader::Piece& piece : pieces) partition_->file_.discard(piece.place, piece.out.size() * kSpilledBytes);
   return filled;
 }
 

@@ -21,6 +21,9 @@ namespace ptc {
 /// A disk gives its full rate to several requests at once.
 inline constexpr std::size_t kTransfers = 4;
 
+/// Bytes of a record on the disk: all that are not reserved.
+inline constexpr std::size_t kSpilledBytes = offsetof(PointRecord, reserved);
+
 /// Where records lie.
 struct SpillPlace {
   std::uint32_t volume = 0;
@@ -44,10 +47,10 @@ class SpillFile {
   /// Writes records to the volume that this leaves least full, by its directory's room; when there is none left, to
   /// the others.
   /// @param records  at an address that is a multiple of kDirectBytes, in memory that can be read
-  ///                 up to the next such multiple behind them
+  ///                 up to the next such multiple behind them; what they hold afterwards is of no use
   /// @return  their place, its offset a multiple of kDirectBytes
   /// @throws std::system_error naming the directory
-  [[nodiscard]] SpillPlace append(std::span<const PointRecord> records);
+  [[nodiscard]] SpillPlace append(std::span<PointRecord> records);
   /// True when what was appended has so many bytes there.
   [[nodiscard]] bool holds(const SpillPlace& place, std::uint64_t bytes) const noexcept;
   void read_at(const SpillPlace& place, std::span<std::byte> bytes) const;
@@ -115,7 +118,7 @@ class Partition {
   [[nodiscard]] Starts group_run(std::span<const PointRecord> records, std::span<PointRecord> grouped,
                                  const Executor& executor) const;
   /// Writes what group_run() has grouped, as SpillFile::append(). Runs come in the order of the input.
-  void write_run(std::span<const PointRecord> grouped, Starts starts);
+  void write_run(std::span<PointRecord> grouped, Starts starts);
 
   [[nodiscard]] std::size_t ranges() const noexcept { return splitters_.size(); }
   /// Records of a range.
@@ -132,7 +135,7 @@ class Partition {
 
     [[nodiscard]] std::size_t size(std::size_t range) const noexcept { return starts[range + 1] - starts[range]; }
     [[nodiscard]] SpillPlace place_of(std::size_t range, std::size_t i) const noexcept {
-      return {place.volume, place.offset + (starts[range] + i) * sizeof(PointRecord)};
+      return {place.volume, place.offset + (starts[range] + i) * kSpilledBytes};
     }
   };
 

@@ -10,6 +10,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/points.h"
+#include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
 #include "tools/bench/scale_answers.h"
 
@@ -159,8 +160,8 @@ TEST_CASE("scale: what the cap does not hold is spilled, and every stage keeps b
   const RunOptions run{.memory_bytes = std::uint64_t{96} << 20, .threads = 2};
   const std::vector<ScaleRow> rows = measure_scale(options, dir.path(), run, silent);
   REQUIRE(rows.size() == 6);
-  CHECK(rows[0].spilled_bytes >= 40 * rows[0].points);  // and what fills the last blocks of the disk
-  CHECK(rows[0].spilled_bytes == Approx(40 * rows[0].points).epsilon(0.001));
+  CHECK(rows[0].spilled_bytes >= kSpilledBytes * rows[0].points);  // and what fills the last blocks of the disk
+  CHECK(rows[0].spilled_bytes == Approx(kSpilledBytes * rows[0].points).epsilon(0.001));
   CHECK(rows[0].moved_bytes == 2 * rows[0].spilled_bytes + rows[0].file_bytes);
   CHECK(rows[3].moved_bytes == rows[0].moved_bytes);
   if (rows[3].disk_bytes > 0) CHECK(rows[3].disk_bytes == Approx(rows[0].spilled_bytes).epsilon(0.02));

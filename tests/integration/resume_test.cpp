@@ -6,6 +6,7 @@
 
 #include "engine/base/error.h"
 #include "engine/pipeline.h"
+#include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -180,7 +181,7 @@ TEST_CASE("resume: points on the disk that are not what was written are refused 
       file.seekp(static_cast<std::streamoff>(offset));
       file.put(static_cast<char>(whole[offset] ^ bits));
     };
-    const std::size_t record = (whole.size() - 50'000) / sizeof(PointRecord) * sizeof(PointRecord);  // not yet read
+    const std::size_t record = (whole.size() - 50'000) / kSpilledBytes * kSpilledBytes;  // not yet read
     for (const std::size_t offset : {record + 3, record + 20}) {  // of a key, of what is behind it
       flip(offset, 0x40);
       for (int again = 0; again < 2; ++again) {

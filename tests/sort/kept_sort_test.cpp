@@ -8,6 +8,7 @@
 #include "engine/base/error.h"
 #include "engine/io/direct_range.h"
 #include "engine/sort/sort_plan.h"
+#include "engine/sort/spill.h"
 #include "tests/sort/records.h"
 #include "tests/support/scenes.h"
 
@@ -127,7 +128,7 @@ TEST_CASE("kept sort: records stay on the disk until they are given back", "[sor
     return bytes;
   };
   const std::uint64_t all = blocks();
-  CHECK(all >= input.size() * sizeof(PointRecord));
+  CHECK(all >= input.size() * kSpilledBytes);
   CHECK(kept.from(0).size() == input.size());
   CHECK(blocks() == all);
   StateReader reader(kept.state, "state");
@@ -137,7 +138,7 @@ TEST_CASE("kept sort: records stay on the disk until they are given back", "[sor
   for (const std::uint64_t record : {0u, 100'000u, 100'000u, 150'000u}) {
     sorter.discard_before(record);
     CHECK(blocks() <= before);
-    CHECK(blocks() >= all - record * sizeof(PointRecord) - (1 << 16));
+    CHECK(blocks() >= all - record * kSpilledBytes - (1 << 16));
     before = blocks();
     CHECK(same_bytes(kept.from(record), std::span(expected).subspan(record)));
   }
@@ -171,24 +172,26 @@ TEST_CASE("kept sort: files and tables that are not what they were are refused",
 }
 
 TEST_CASE("kept sort: records that are not what was written are refused by name before they go out", "[sort][kept]") {
-  constexpr std::size_t kCount = 20 * kPageRecords;  // runs are whole blocks: no byte of the files belongs to no record
+  constexpr std::size_t kCount = 40 * kPageRecords, kWholeBlocks = 4 * kPageRecords;
+  static_assert(kCount % kWholeBlocks == 0 && kWholeBlocks * kSpilledBytes % kDirectBytes == 0);
+  std::uint64_t cap = 4 * kCap;  // what a run holds of a range is larger than the blocks that are handed out
+  while (plan_sort(cap, 2).run_records / 2 % kWholeBlocks != 0) cap += kDirectBytes;  // no byte of the files belongs to no record
   for (const Keys keys : {Keys::surface, Keys::equal, Keys::heavy}) {
     const std::vector<PointRecord> input = make_records(keys, kCount);
     const std::vector<PointRecord> expected = stable_sorted(input);
     for (const bool fair : {true, false}) {  // else buckets are partitioned again
-      const Kept kept(input, fair ? sample_of(input, 2000) : std::vector<MortonKey>(100, MortonKey{~std::uint64_t{0}, 0}),
-                      4 * kCap);  // what a run holds of a range is larger than the blocks that are handed out
+      const Kept kept(input, fair ? sample_of(input, 2000) : std::vector<MortonKey>(100, MortonKey{~std::uint64_t{0}, 0}), cap);
       CAPTURE(keys, fair);
       std::uint64_t bytes = 0;
       for (const auto& file : kept.options.kept_files) {
         const std::vector<std::byte> whole = read_file(file);
         bytes += whole.size();
         REQUIRE(whole.size() >= 3 * kDirectBytes);
-        constexpr std::size_t kSteps = 23;
+        constexpr std::size_t kSteps = 19;
         for (std::size_t step = 0; step < kSteps; ++step) {
           // A byte: of the key, of what is behind it, of each in turn.
-          const std::size_t record = step * (whole.size() / sizeof(PointRecord) - 1) / (kSteps - 1) * sizeof(PointRecord);
-          for (const std::size_t offset : {record + step % sizeof(MortonKey), record + 16 + step}) {
+          const std::size_t record = step * (whole.size() / kSpilledBytes - 1) / (kSteps - 1) * kSpilledBytes;
+          for (const std::size_t offset : {record + step % sizeof(MortonKey), record + 16 + step % (kSpilledBytes - 16)}) {
             const std::byte flipped = whole[offset] ^ std::byte{0x10};
             check_torn(kept, expected, file, offset, {&flipped, 1});
           }
@@ -199,11 +202,11 @@ TEST_CASE("kept sort: records that are not what was written are refused by name 
           check_torn(kept, expected, file, block, std::span(whole).subspan(other, kDirectBytes));
         }
         // Two records of a range that are whole, in each other's place.
-        std::vector<std::byte> exchanged(whole.begin() + sizeof(PointRecord), whole.begin() + 2 * sizeof(PointRecord));
-        exchanged.insert(exchanged.end(), whole.begin(), whole.begin() + sizeof(PointRecord));
+        std::vector<std::byte> exchanged(whole.begin() + kSpilledBytes, whole.begin() + 2 * kSpilledBytes);
+        exchanged.insert(exchanged.end(), whole.begin(), whole.begin() + kSpilledBytes);
         check_torn(kept, expected, file, 0, exchanged);
       }
-      CHECK(bytes == kCount * sizeof(PointRecord));
+      CHECK(bytes == kCount * kSpilledBytes);
       CHECK(same_bytes(kept.from(0), expected));  // all is as it was again
     }
   }

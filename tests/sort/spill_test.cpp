@@ -130,7 +130,7 @@ TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
   const std::vector<PointRecord> records = make_records(Keys::surface, 60'000);
   const auto partition = spilled(file, records, 7'000, 20);
   const std::uint64_t all = nameless_bytes() - others;
-  CHECK(all >= records.size() * sizeof(PointRecord));
+  CHECK(all >= records.size() * kSpilledBytes);
   file.discard({}, 0);  // no more than what it is asked for
   CHECK(nameless_bytes() - others == all);
 
@@ -161,7 +161,7 @@ TEST_CASE("spill: records are spread over directories and come back from all", "
   std::uint64_t all = 0;
   for (const std::uint64_t size : sizes) {
     if (std::ranges::find(others, size) != others.end()) continue;
-    CHECK(size >= 10 * 1024 * sizeof(PointRecord));  // of 32 runs
+    CHECK(size >= 10 * 1024 * kSpilledBytes);  // of 32 runs
     all += size;
   }
   CHECK(all == file.bytes());

@@ -12,6 +12,7 @@
 #include "engine/io/room.h"
 #include "engine/shade/brute_force.h"
 #include "engine/shade/shader.h"
+#include "engine/sort/spill.h"
 #include "engine/stages.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/methods.h"
@@ -242,7 +243,7 @@ class GrowthRun {
 }  // namespace
 
 std::uint64_t build_disk_bytes(std::uint64_t points) noexcept {
-  constexpr std::uint64_t kRecord = sizeof(PointRecord), kContainer = 64;  // of a point: spilled by the sort; pages
+  constexpr std::uint64_t kRecord = kSpilledBytes, kContainer = 64;  // of a point: spilled by the sort; pages
   return points * (kRecord + kContainer);
 }
 

@@ -11,6 +11,7 @@
 #include "engine/base/memory.h"
 #include "engine/build_space.h"
 #include "engine/io/room.h"
+#include "engine/sort/spill.h"
 #include "engine/verify/verify.h"
 #include "tools/bench/disk_reads.h"
 #include "tools/bench/record_file.h"
@@ -76,7 +77,7 @@ class ScaleRun {
  private:
   /// What a build spills goes as the container grows, so that the larger of both is the most there is at once.
   void tell_space(std::uint64_t points) {
-    const std::uint64_t spilled = points * sizeof(PointRecord) * 21 / 20;  // a city has up to 5 % more points
+    const std::uint64_t spilled = points * kSpilledBytes * 21 / 20;  // a city has up to 5 % more points
     require_room({&work_, 1}, spilled, fmt::format("{} points", points));
     progress_.note(space_text(require_build_space(points, spilled, Profile::compact, {&work_, 1}, scene_), {&work_, 1}, scene_));
   }
@@ -167,8 +168,8 @@ class ScaleRun {
     shade.hits = cache.lookups - cache.misses;
     shade.misses = cache.misses;
     shade.cap_share = static_cast<double>(cache.frames) / made.page_count;
-    add_row("build floor", runs, runs.build_floor, RecordFile::kCopies).moved_bytes = moved;
-    add_row("verify floor", runs, runs.verify_floor, RecordFile::kCopies).moved_bytes = made.file_bytes;
+    add_row("build floor", runs, runs.build_floor, RecordFile::kBlocks).moved_bytes = moved;
+    add_row("verify floor", runs, runs.verify_floor, RecordFile::kBlocks).moved_bytes = made.file_bytes;
     add_row("memcpy", runs, runs.copy, 1).moved_bytes = 2 * runs.answers.points * sizeof(PointRecord);
   }
 
