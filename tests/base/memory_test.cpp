@@ -11,21 +11,17 @@
 #include <new>
 #include <utility>
 
+#include "tests/support/sanitizers.h"
+
 using namespace ptc;
+using namespace ptc::test;
 
 namespace {
 
 constexpr std::uint64_t kMiB = 1 << 20;
 
-// Sanitizers keep shadow memory of what a program touches: resident sizes say less there.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kResidentIsExact = false;
-#else
-constexpr bool kResidentIsExact = true;
-#endif
-
 bool near(std::uint64_t actual, std::uint64_t expected) {
-  return !kResidentIsExact || (actual + 4 * kMiB > expected && actual < expected + 4 * kMiB);
+  return kSanitized || (actual + 4 * kMiB > expected && actual < expected + 4 * kMiB);
 }
 
 // Whether `holds` is true in a child process, whose peak is its own.

@@ -17,19 +17,12 @@
 #include "engine/base/memory.h"
 #include "format/error.h"
 #include "tests/cache/pages.h"
+#include "tests/support/sanitizers.h"
 
 using namespace ptc;
 using namespace ptc::test;
 
 namespace {
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
-#else
-constexpr bool kSanitized = false;
-#endif
 
 using Trace = std::vector<std::uint32_t>;
 
