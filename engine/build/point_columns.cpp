@@ -51,8 +51,8 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < n; ++i) columns[axis * stride + first + i] = to_double(positions[axis][i]);
     }
-    double* const lattice_radius = out(PointColumns::kRadius);
-    double* const area = out(PointColumns::kArea);
+    double* const lattice_radius = out(PointColumns::kDiscRadius);
+    double* const area = out(PointColumns::kDiscArea);
     for (std::size_t i = 0; i < n; ++i) {
       const double r = radius[i];
       const double scaled = r / unit;
@@ -114,7 +114,7 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
     const Lanes point(points, i, end);
     const V away[3] = {hn::Sub(point[PointColumns::kX], mean[0]), hn::Sub(point[PointColumns::kY], mean[1]),
                        hn::Sub(point[PointColumns::kZ], mean[2])};
-    const V wide = point[PointColumns::kRadius];
+    const V wide = point[PointColumns::kDiscRadius];
     radius = hn::Max(radius, point.only(hn::Add(hn::Sqrt(dot(away, away)), wide), zero));
     if (!has_axis) continue;
     const V n[3] = {point[PointColumns::kNormalX], point[PointColumns::kNormalY], point[PointColumns::kNormalZ]};
@@ -137,10 +137,10 @@ NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t
   const std::array<double, 3> origin{value(PointColumns::kX, begin), value(PointColumns::kY, begin), value(PointColumns::kZ, begin)};
   double weight = 0;
   bool has_area = false;
-  for (std::size_t i = begin; i < end; ++i) has_area |= value(PointColumns::kArea, i) > 0;
+  for (std::size_t i = begin; i < end; ++i) has_area |= value(PointColumns::kDiscArea, i) > 0;
   std::array<std::array<double, 4>, 6> towards{};  // an axis: facing, flux
   for (std::size_t i = begin; i < end; ++i) {
-    const double area = value(PointColumns::kArea, i);
+    const double area = value(PointColumns::kDiscArea, i);
     const double w = has_area ? area : 1.0;  // points without extent still have a middle
     node.mean[0] += w * (value(PointColumns::kX, i) - origin[0]);
     node.mean[1] += w * (value(PointColumns::kY, i) - origin[1]);

@@ -13,7 +13,7 @@ namespace ptc {
 /// The numbers of surfels, decoded once; in lattice units where nothing else is said.   Memory: 88 bytes a point.
 class PointColumns {
  public:
-  enum Column : std::size_t { kX, kY, kZ, kRadius, kNormalX, kNormalY, kNormalZ, kArea, kRed, kGreen, kBlue, kColumns };
+  enum Column : std::size_t { kX, kY, kZ, kDiscRadius, kNormalX, kNormalY, kNormalZ, kDiscArea, kRed, kGreen, kBlue, kColumns };
 
   /// Decodes points in place of what was here.
   /// @param unit  lattice unit in scene units

@@ -96,8 +96,7 @@ class TreeWalk {
  public:
   TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged, std::size_t cached_pages,
            Findings& findings, Progress& progress)
-      : container_(container),
-        superblock_(container.superblock()),
+      : superblock_(container.superblock()),
         damaged_(damaged),
         report_(container, findings),
         progress_(progress),
@@ -280,7 +279,6 @@ class TreeWalk {
     close_child(path_.back(), summarise_nodes(std::span(parts).first(count)), open.points, true);
   }
 
-  const ContainerReader& container_;
   const Superblock& superblock_;
   const std::vector<bool>& damaged_;
   TreeReport report_;

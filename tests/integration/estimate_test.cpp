@@ -32,7 +32,7 @@ std::vector<std::string> channels_of(const std::filesystem::path& path) {
 
 bool names(const std::filesystem::path& path, const std::string& text) {
   const std::vector<char> bytes = bytes_of(path);
-  return !std::ranges::search(bytes, text).empty();
+  return std::search(bytes.begin(), bytes.end(), text.begin(), text.end()) != bytes.end();
 }
 
 void check_worth(const EstimateWorth& worth) {

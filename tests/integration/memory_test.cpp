@@ -1,9 +1,7 @@
 // What a memory cap must hold.
-#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <functional>
-#include <ranges>
 
 #include "engine/base/error.h"
 #include "engine/pipeline.h"
@@ -26,8 +24,12 @@ std::uint64_t least_cap(const std::function<void(std::uint64_t)>& run) {
       return true;
     }
   };
-  const auto bytes = std::views::iota(std::uint64_t{1}, std::uint64_t{256} << 20);
-  return *std::ranges::partition_point(bytes, refused);
+  std::uint64_t below = 0, enough = std::uint64_t{256} << 20;
+  while (enough - below > 1) {
+    const std::uint64_t middle = below + (enough - below) / 2;
+    (refused(middle) ? below : enough) = middle;
+  }
+  return enough;
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TEST_CASE("diagnosis: a flipped bit is named wherever it is", "[verify]") {
       {size - kBlockBytes + 4090, "superblock-checksum"},
   }};
   for (const auto& [place, code] : places) {
-    const VerifyReport report = subject.after([&](Bytes& b) { b[place] ^= std::byte{0x20}; });
+    const VerifyReport report = subject.after([at = place](Bytes& b) { b[at] ^= std::byte{0x20}; });
     check_one(report, Cause::bit_flip, code);
     CHECK(report.findings[0].offset == place);
     CHECK(report.findings[0].bytes == 1);
