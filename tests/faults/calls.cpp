@@ -205,10 +205,12 @@ int open_watched(int base, const char* path, int flags, mode_t mode) {
   const bool creates = (flags & (O_CREAT | __O_TMPFILE)) != 0;
   if (strikes("open", creates ? Kind::create : Kind::open, where)) return -1;
   const TraceGuard guard;
+  const bool is_there = where[0] != '\0' && ::access(where, F_OK) == 0;  // then its name does not change
   const int fd = real(base, path, flags, mode);
   if (fd < 0 || fd >= kMostFiles || where[0] == '\0') return fd;
   std::strcpy(paths[fd], where);
-  if ((flags & O_CREAT) != 0) record("create", where);
+  if (is_there && (flags & O_TRUNC) != 0) record("cut", where);
+  if (!is_there && (flags & O_CREAT) != 0) record("create", where);
   return fd;
 }
 
