@@ -162,14 +162,7 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   std::vector<std::byte> payload(container.page_payload_limit());
   for (const std::uint32_t page : order) {
     const PageHeader header = container.read_page(page, payload, decoder);
-    writer.write_page(page,
-                      {.type = header.type,
-                       .group = header.group,
-                       .level = header.level,
-                       .record_count = header.record_count,
-                       .first_key = header.first_key,
-                       .last_key = header.last_key},
-                      std::span(payload).first(header.raw_bytes), container.attribute_columns(header.group));
+    writer.write_page(page, ContainerWriter::facts_of(header), std::span(payload).first(header.raw_bytes), container.attribute_columns(header.group));
     if (header.type == PageType::point) progress.advance(header.record_count);
   }
 }

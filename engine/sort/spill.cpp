@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <functional>
-#include <future>
 #include <numeric>
 #include <stdexcept>
 #include <system_error>
@@ -74,23 +72,10 @@ void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::spa
   }
 }
 
-/// Runs work(k) for every k below `count` in threads of their own, the first in the caller's. What one throws is thrown
-/// when all have ended.
-void run_beside(std::size_t count, const std::function<void(std::size_t)>& work) {
-  std::vector<std::future<void>> others;
-  for (std::size_t k = 1; k < count; ++k) others.push_back(std::async(std::launch::async, work, k));
-  work(0);
-  for (auto& other : others) other.get();
-}
-
 void write_pieces(DirectFile& file, std::uint64_t offset, std::span<const std::byte> bytes) {
-  const std::size_t pieces = (bytes.size() + kPieceBytes - 1) / kPieceBytes;
-  std::atomic<std::size_t> next = 0;
-  run_beside(std::min(kTransfers, pieces), [&](std::size_t) {
-    for (std::size_t i = next++; i < pieces; i = next++) {
-      const std::size_t begin = i * kPieceBytes;
-      file.write_at(offset + begin, bytes.subspan(begin, std::min(kPieceBytes, bytes.size() - begin)));
-    }
+  for_each_transfer((bytes.size() + kPieceBytes - 1) / kPieceBytes, [&](std::size_t i, std::size_t) {
+    const std::size_t begin = i * kPieceBytes;
+    file.write_at(offset + begin, bytes.subspan(begin, std::min(kPieceBytes, bytes.size() - begin)));
   });
 }
 
@@ -194,12 +179,9 @@ SpillReader::SpillReader(std::size_t buffer_bytes)
 
 void SpillReader::read(const SpillFile& file, std::span<const Piece> pieces) {
   const std::size_t share = buffer_.size() / kTransfers;
-  std::atomic<std::size_t> next = 0;
-  const auto work = [&](std::size_t reader) {
-    const std::span<std::byte> buffer(buffer_.data() + reader * share, share);
-    for (std::size_t i = next++; i < pieces.size(); i = next++) read_piece(file, pieces[i], buffer);
-  };
-  run_beside(std::min(kTransfers, pieces.size()), work);
+  for_each_transfer(pieces.size(), [&](std::size_t i, std::size_t worker) {
+    read_piece(file, pieces[i], {buffer_.data() + worker * share, share});
+  });
 }
 
 Partition::Partition(SpillFile& file, Splitters splitters, bool kept)

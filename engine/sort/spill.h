@@ -14,12 +14,10 @@
 #include "engine/io/state_file.h"
 #include "engine/sort/direct_file.h"
 #include "engine/sort/splitters.h"
+#include "engine/sort/transfers.h"
 #include "format/point_record.h"
 
 namespace ptc {
-
-/// A disk gives its full rate to several requests at once.
-inline constexpr std::size_t kTransfers = 4;
 
 /// Bytes of a record on the disk: all that are not reserved.
 inline constexpr std::size_t kSpilledBytes = offsetof(PointRecord, reserved);

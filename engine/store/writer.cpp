@@ -315,6 +315,10 @@ const FileHeader& ContainerWriter::header() const noexcept {
   return impl_->header;
 }
 
+ContainerWriter::PageFacts ContainerWriter::facts_of(const PageHeader& page) noexcept {
+  return {page.type, page.group, page.level, page.record_count, page.first_key, page.last_key};
+}
+
 std::uint32_t ContainerWriter::reserve_page() {
   return impl_->reserve();
 }

@@ -64,6 +64,8 @@ class ContainerWriter {
     std::uint64_t first_key = 0;
     std::uint64_t last_key = 0;
   };
+  /// Those of a page that is there.
+  [[nodiscard]] static PageFacts facts_of(const PageHeader& page) noexcept;
   /// Compresses, checksums and writes the page. Each reserved page must be written once.
   /// @param payload  1 to page size - 64 bytes
   /// @param columns  of an attribute page, from packed_group_columns(); without them it is not packed

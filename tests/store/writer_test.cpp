@@ -101,8 +101,7 @@ TEST_CASE("writer: pages copied in their stored form give the same container", "
   std::vector<std::byte> stored;
   for (std::uint32_t page = copied; page-- > 0;) {
     const PageHeader h = from.read_stored_page(page, stored);
-    const Facts facts{h.type, h.group, h.level, h.record_count, h.first_key, h.last_key};
-    to.write_stored_page(page, facts, h.coding, h.raw_bytes, stored);
+    to.write_stored_page(page, ContainerWriter::facts_of(h), h.coding, h.raw_bytes, stored);
   }
   to.finish(from.meta(), from.superblock());
   CHECK((read_file(scratch / "a.ptcx") == read_file(scratch / "b.ptcx")));

@@ -1,7 +1,6 @@
 #include "tools/bench/record_file.h"
 
 #include <algorithm>
-#include <atomic>
 #include <random>
 
 #include "engine/io/record.h"
@@ -14,19 +13,6 @@ constexpr std::size_t kBlockBytes = RecordFile::kBlock * sizeof(PointRecord);
 
 std::uint64_t blocks_of(const RecordFile& file) noexcept {
   return (file.records() + RecordFile::kBlock - 1) / RecordFile::kBlock;
-}
-
-/// Calls body(copy, block) for the blocks of a file in their order, `copy` unique among the kBlocks under way.
-template <class Body>
-void for_each_block(const RecordFile& file, const Body& body) {
-  std::atomic<std::uint64_t> next = 0;
-  const auto work = [&](unsigned copy) {
-    for (std::uint64_t block = next++; block < blocks_of(file); block = next++) body(copy, block);
-  };
-  std::vector<std::future<void>> others;
-  for (unsigned copy = 1; copy < RecordFile::kBlocks; ++copy) others.push_back(std::async(std::launch::async, work, copy));
-  work(0);
-  for (auto& future : others) future.get();
 }
 
 }  // namespace
@@ -42,15 +28,15 @@ void RecordFile::fill(std::uint64_t records) {
   const std::span words(reinterpret_cast<std::uint64_t*>(noise.data()), kBlockBytes / sizeof(std::uint64_t));
   std::ranges::generate(words, random);
   records_ = records;
-  for_each_block(*this, [&](unsigned, std::uint64_t block) {
+  for_each_transfer(blocks_of(*this), [&](std::uint64_t block, std::size_t) {
     file_->write_at(block * kBlockBytes, {noise.data(), block_bytes(block)});
   });
 }
 
 void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
   most = std::min(most, bytes());
-  const Arena buffers(kBlocks * kBlockBytes);
-  for_each_block(*this, [&](unsigned copy, std::uint64_t block) {
+  const Arena buffers(kTransfers * kBlockBytes);
+  for_each_transfer(blocks_of(*this), [&](std::uint64_t block, std::size_t copy) {
     const std::span<std::byte> buffer(buffers.data() + copy * kBlockBytes, block_bytes(block));
     const std::uint64_t begin = block * kBlockBytes;
     file_->read_at(begin, buffer);
@@ -59,7 +45,7 @@ void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
   other.records_ = most / sizeof(PointRecord);
 }
 
-RecordWriter::RecordWriter(RecordFile& file) : file_(file), buffers_(RecordFile::kBlocks * kBlockBytes) {}
+RecordWriter::RecordWriter(RecordFile& file) : file_(file), buffers_(kTransfers * kBlockBytes) {}
 
 void RecordWriter::write(std::span<const PointRecord> records) {
   while (!records.empty()) {
@@ -89,8 +75,8 @@ void RecordWriter::finish() {
   }
 }
 
-RecordReader::RecordReader(const RecordFile& file) : file_(file), buffers_(RecordFile::kBlocks * kBlockBytes) {
-  while (ahead_ < RecordFile::kBlocks) read_ahead();
+RecordReader::RecordReader(const RecordFile& file) : file_(file), buffers_(kTransfers * kBlockBytes) {
+  while (ahead_ < kTransfers) read_ahead();
 }
 
 RecordReader::~RecordReader() = default;

@@ -13,6 +13,7 @@
 #include "engine/base/memory.h"
 #include "engine/sort/direct_file.h"
 #include "engine/sort/sort_plan.h"
+#include "engine/sort/transfers.h"
 #include "format/point_record.h"
 
 namespace ptc::bench {
@@ -25,8 +26,6 @@ class RecordFile {
   /// Records that are transferred at once: whole blocks of the disk.
   static constexpr std::size_t kBlock = 200 * kPageRecords;
   static_assert(kBlock * sizeof(PointRecord) % kDirectBytes == 0);
-  /// Blocks under way at once: what this kind of disk needs for its full rate.
-  static constexpr unsigned kBlocks = 4;
 
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }
   [[nodiscard]] std::uint64_t bytes() const noexcept { return records_ * sizeof(PointRecord); }
@@ -59,7 +58,7 @@ class RecordWriter {
   Arena buffers_;
   std::size_t filled_ = 0;  ///< records of the block that is next
   std::uint64_t next_ = 0;  ///< block
-  std::array<std::future<void>, RecordFile::kBlocks> writing_;
+  std::array<std::future<void>, kTransfers> writing_;
 };
 
 /// Reads a file in order, the next blocks while one is in use.
@@ -75,7 +74,7 @@ class RecordReader {
   const RecordFile& file_;
   Arena buffers_;
   std::uint64_t next_ = 0, ahead_ = 0;  ///< blocks: to be handed out, to be read
-  std::array<std::future<void>, RecordFile::kBlocks> reading_;
+  std::array<std::future<void>, kTransfers> reading_;
 };
 
 /// Keys spread evenly over a file, as a build takes them of its input.

@@ -168,8 +168,8 @@ class ScaleRun {
     shade.hits = cache.lookups - cache.misses;
     shade.misses = cache.misses;
     shade.cap_share = static_cast<double>(cache.frames) / made.page_count;
-    add_row("build floor", runs, runs.build_floor, RecordFile::kBlocks).moved_bytes = moved;
-    add_row("verify floor", runs, runs.verify_floor, RecordFile::kBlocks).moved_bytes = made.file_bytes;
+    add_row("build floor", runs, runs.build_floor, kTransfers).moved_bytes = moved;
+    add_row("verify floor", runs, runs.verify_floor, kTransfers).moved_bytes = made.file_bytes;
     add_row("memcpy", runs, runs.copy, 1).moved_bytes = 2 * runs.answers.points * sizeof(PointRecord);
   }
 

@@ -1,0 +1,23 @@
+#include "engine/sort/transfers.h"
+
+#include <algorithm>
+#include <atomic>
+#include <future>
+#include <vector>
+
+namespace ptc {
+
+void for_each_transfer(std::size_t count, const std::function<void(std::size_t i, std::size_t worker)>& body) {
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&](std::size_t worker) {
+    for (std::size_t i = next++; i < count; i = next++) body(i, worker);
+  };
+  std::vector<std::future<void>> others;
+  for (std::size_t worker = 1; worker < std::min(kTransfers, count); ++worker) {
+    others.push_back(std::async(std::launch::async, work, worker));
+  }
+  work(0);
+  for (auto& other : others) other.get();
+}
+
+}  // namespace ptc
