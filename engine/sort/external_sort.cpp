@@ -46,9 +46,6 @@ Digest digest_of(std::span<const PointRecord> records, const Executor& executor)
   return total;
 }
 
-// Of a part: enough for long pieces of each range, little enough that touching its memory takes no time worth naming.
-constexpr std::size_t kPartRecords = kPageRecords * 4608;  // 94 MB
-
 // All in memory: one block.
 class MemoryStream final : public BlockStream {
  public:
@@ -82,7 +79,7 @@ struct ExternalSorter::Impl {
        std::span<const MortonKey> given_sample)
       : options(sort_options),
         executor(sort_executor),
-        plan(plan_sort(options.memory_bytes, executor.threads())),
+        plan(plan_sort(options.memory_bytes, executor.threads(), options.expected)),
         arena(2 * plan.run_records * sizeof(PointRecord)),
         kept(!options.kept_files.empty()) {
     if (kept) file = SpillFile::named(options.kept_files);
@@ -99,11 +96,11 @@ struct ExternalSorter::Impl {
   Impl(const SortOptions& sort_options, const Executor& sort_executor, StateReader& state)
       : options(sort_options),
         executor(sort_executor),
-        plan(plan_sort(options.memory_bytes, executor.threads())),
-        arena(2 * plan.run_records * sizeof(PointRecord)),
         kept(true) {
     digest = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
     points = state.get<std::uint64_t>();
+    plan = plan_sort(options.memory_bytes, executor.threads(), points);
+    arena = Arena(2 * plan.run_records * sizeof(PointRecord));
     file = SpillFile::reopened(state);
     partition = std::make_shared<Partition>(*file, state);
     std::uint64_t found = 0;
@@ -132,7 +129,7 @@ struct ExternalSorter::Impl {
   [[nodiscard]] std::span<PointRecord> part(std::size_t k) noexcept {
     return memory().subspan(k * part_records(), part_records());
   }
-  [[nodiscard]] std::size_t part_records() noexcept { return std::min(kPartRecords, memory().size() / 4); }
+  [[nodiscard]] std::size_t part_records() noexcept { return memory().size() / 4; }
   [[nodiscard]] std::unique_ptr<PointStream> stream_memory();
   [[nodiscard]] std::unique_ptr<PointStream> stream_buckets(std::uint64_t first);
 

@@ -26,11 +26,11 @@ class PointStream {
 void pass_over(PointStream& points, std::uint64_t count);
 
 struct SortOptions {
-  /// All that this stage holds at once; at least 256 KiB.
+  /// All that this stage holds at once; at least 256 KiB. What is of no use is not touched: see plan_sort().
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
   std::vector<std::filesystem::path> temp_dirs{"."};  ///< at least one; what is spilled is spread over them
-  /// About how many records will come; 0: not known. Those that are known not to fit leave for the disk
-  /// sooner and touch less memory.
+  /// About how many records will come; 0: not known. Those that are known not to fit leave for the disk sooner, in as many
+  /// ranges as let each fit.
   std::uint64_t expected = 0;
   /// Names of the temporary files, which then stay and hold all records, whatever fits in memory; empty: they have none.
   std::vector<std::filesystem::path> kept_files;
@@ -45,7 +45,7 @@ struct SortStatistics {
 /// Sorts records by key; equal keys stay in the order in which they came, so the result depends on
 /// neither cap nor threads.
 ///
-/// Records collect in memory until the cap; then they are partitioned on disk by splitters taken
+/// Records collect in memory while there is little of them; more are partitioned on disk by splitters taken
 /// from the sample, and each bucket is radix-sorted in memory: while one is handed out the next is
 /// sorted and the one after it read. A bucket that turns out larger than memory is partitioned again.
 /// The temporary files have no names and vanish with the sorter.

@@ -16,13 +16,20 @@ constexpr std::uint64_t kMostRecords = 0xffffffff;  // a run's index has 32 bits
 
 // What a run holds of a range is read in one piece: make it worth the disk's while.
 constexpr std::uint64_t kPieceBytes = 64 << 10;
-constexpr std::size_t kLeastRanges = 48, kMostRanges = 512;
-constexpr std::size_t kSampleKeysPerRange = 16;
+constexpr std::uint64_t kLeastRanges = 48, kUsualRanges = 512, kMostRanges = 2048;
+// The more keys, the less ranges differ in size: by an eighth (standard deviation) with the most.
+constexpr std::uint64_t kLeastSampleKeys = 16, kMostSampleKeys = 64;  // of each range
 constexpr std::uint64_t kLeastReadBytes = SpillReader::kLeastBytes, kMostReadBytes = 4 << 20;
 
 // Four parts in two runs, each on a page boundary.
 constexpr std::size_t kRunStep = 2 * kPageRecords;
 static_assert(kPageRecords * sizeof(PointRecord) % kDirectBytes == 0);
+
+// Parts of 94 MB hold pieces of each range that are long enough.
+constexpr std::uint64_t kPartRecords = kPageRecords * 4608;
+
+// A range is one bucket: it should fit into a quarter of the memory although ranges differ.
+constexpr std::uint64_t kRangeRecords = kPartRecords / 8 * 5;
 
 }  // namespace
 
@@ -34,21 +41,23 @@ std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept {
   return runs + work + 2 * plan.sample_keys * sizeof(MortonKey) + plan.read_bytes;
 }
 
-SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads) {
+SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads, std::uint64_t expected) {
   if (memory_bytes < kLeastBytes)
     throw std::invalid_argument("SortOptions::memory_bytes: less than 256 KiB");
   SortPlan plan;
-  plan.ranges = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(memory_bytes / 2 / kPieceBytes, kLeastRanges, kMostRanges));
-  plan.sample_keys = kSampleKeysPerRange * plan.ranges;
+  const std::uint64_t wanted = std::clamp(expected / kRangeRecords + 1, kUsualRanges, kMostRanges);
+  plan.ranges = static_cast<std::size_t>(std::clamp(memory_bytes / 2 / kPieceBytes, kLeastRanges, wanted));
+  const std::uint64_t keys_of_cap = memory_bytes / 64 / sizeof(MortonKey) / plan.ranges;
+  plan.sample_keys = static_cast<std::size_t>(std::clamp(keys_of_cap, kLeastSampleKeys, kMostSampleKeys)) * plan.ranges;
 
   plan.read_bytes =
       static_cast<std::size_t>(std::clamp(memory_bytes / 64, kLeastReadBytes, kMostReadBytes));
 
   // plan_bytes() grows with the runs: the largest that stays below the cap.
+  const std::uint64_t of_use = 2 * std::max(kPartRecords, expected / plan.ranges * 8 / 5);
   std::uint64_t fits = 0;
   std::uint64_t exceeds =
-      std::min(memory_bytes / (2 * sizeof(PointRecord)), kMostRecords) / kRunStep + 1;
+      std::min({memory_bytes / (2 * sizeof(PointRecord)), of_use, kMostRecords}) / kRunStep + 1;
   while (exceeds - fits > 1) {
     const std::uint64_t steps = fits + (exceeds - fits) / 2;
     plan.run_records = static_cast<std::size_t>(steps * kRunStep);

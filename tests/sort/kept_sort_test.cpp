@@ -175,7 +175,7 @@ TEST_CASE("kept sort: records that are not what was written are refused by name 
   constexpr std::size_t kCount = 40 * kPageRecords, kWholeBlocks = 4 * kPageRecords;
   static_assert(kCount % kWholeBlocks == 0 && kWholeBlocks * kSpilledBytes % kDirectBytes == 0);
   std::uint64_t cap = 4 * kCap;  // what a run holds of a range is larger than the blocks that are handed out
-  while (plan_sort(cap, 2).run_records / 2 % kWholeBlocks != 0) cap += kDirectBytes;  // no byte of the files belongs to no record
+  while (plan_sort(cap, 2, kCount).run_records / 2 % kWholeBlocks != 0) cap += kDirectBytes;  // no byte of the files belongs to no record
   for (const Keys keys : {Keys::surface, Keys::equal, Keys::heavy}) {
     const std::vector<PointRecord> input = make_records(keys, kCount);
     const std::vector<PointRecord> expected = stable_sorted(input);

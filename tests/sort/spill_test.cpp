@@ -222,11 +222,11 @@ TEST_CASE("spill: a read buffer below its least is refused", "[sort][spill]") {
   CHECK_THROWS_AS(SpillReader(SpillReader::kLeastBytes - 1), std::invalid_argument);
 }
 
-TEST_CASE("sort plan: it uses most of the cap and never more", "[sort][plan]") {
+TEST_CASE("sort plan: for very many records it uses most of the cap and never more", "[sort][plan]") {
   for (std::uint64_t cap = 256 << 10; cap < std::uint64_t{1} << 40; cap += cap / 7)
     for (const unsigned threads : {1u, 2u, 64u}) {
       CAPTURE(cap, threads);
-      const SortPlan plan = plan_sort(cap, threads);
+      const SortPlan plan = plan_sort(cap, threads, std::uint64_t{1} << 50);
       CHECK(plan_bytes(plan, threads) <= cap);
       CHECK(2 * plan.run_records * sizeof(PointRecord) >=
             std::min(cap, std::uint64_t{1} << 38) / 10 * 3);
@@ -237,6 +237,23 @@ TEST_CASE("sort plan: it uses most of the cap and never more", "[sort][plan]") {
       CHECK(plan.ranges >= 48);
       CHECK(plan.read_bytes >= SpillReader::kLeastBytes);
     }
-  CHECK_THROWS_AS(plan_sort((256 << 10) - 1, 1), std::invalid_argument);
-  CHECK_NOTHROW(plan_sort(~std::uint64_t{0}, 1));
+  CHECK_THROWS_AS(plan_sort((256 << 10) - 1, 1, 0), std::invalid_argument);
+  CHECK_NOTHROW(plan_sort(~std::uint64_t{0}, 1, ~std::uint64_t{0}));
+}
+
+TEST_CASE("sort plan: it takes no more memory than lets a range of what comes fit", "[sort][plan]") {
+  constexpr std::uint64_t kRoom = std::uint64_t{64} << 30;
+  const SortPlan least = plan_sort(kRoom, 2, 0);
+  CHECK(2 * least.run_records * sizeof(PointRecord) < std::uint64_t{400} << 20);
+  for (std::uint64_t expected = 1; expected < std::uint64_t{1} << 35; expected *= 3) {
+    CAPTURE(expected);
+    const SortPlan plan = plan_sort(kRoom, 2, expected);
+    const std::uint64_t block = plan.run_records / 2, average = expected / plan.ranges;  // what is sorted at once
+    CHECK(block >= average * 3 / 2);
+    if (expected < 2'900'000'000) {
+      CHECK(plan.run_records == least.run_records);
+    } else {
+      CHECK(block < average * 7 / 4);
+    }
+  }
 }
