@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstring>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -29,6 +30,7 @@ constexpr std::size_t kParallelRecords = std::size_t{1} << 17;  // fewer are not
 constexpr int kWindowBits = 32;
 constexpr int kIndexBits = 32;
 constexpr std::uint64_t kIndexMask = 0xffffffff;
+constexpr std::size_t kDigitBits = 8, kDigits = std::size_t{1} << kDigitBits;
 constexpr std::size_t kInsertionWords = 24;
 
 using WordBuffer = std::unique_ptr<std::uint64_t[]>;
@@ -65,44 +67,31 @@ void move_to_target(const Piece& p) noexcept {
 
 // In the cache ------------------------------------------------------------------------------------
 
-void insertion_sort(std::uint64_t* out, const std::uint64_t* in, std::size_t count) noexcept {
+void insertion_sort(std::uint64_t* words, std::size_t count) noexcept {
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t word = in[i];
+    const std::uint64_t word = words[i];
     std::size_t j = i;
-    for (; j > 0 && word < out[j - 1]; --j) out[j] = out[j - 1];
-    out[j] = word;
+    for (; j > 0 && word < words[j - 1]; --j) words[j] = words[j - 1];
+    words[j] = word;
   }
 }
 
-// Sorts words whose upper bits agree but for the lowest `bits`, into `at` or `other`. Words that
-// differ in their indices only are in order already.
-void sort_words(std::uint64_t* at, std::uint64_t* other, std::size_t count, int bits,
-                bool stay) noexcept {
-  if (count <= kInsertionWords) return insertion_sort(stay ? at : other, at, count);
-  if (bits == kIndexBits) {
-    if (!stay) std::memcpy(other, at, count * sizeof(std::uint64_t));
-    return;
+// Sorts words by their windows, into `at`: a stable pass for each digit that is not the same in all, the lowest first.
+void sort_words(std::uint64_t* at, std::uint64_t* other, std::size_t count) noexcept {
+  if (count <= kInsertionWords) return insertion_sort(at, count);
+  std::array<std::array<std::uint16_t, kDigits>, kWindowBits / kDigitBits> starts{};
+  const auto digit = [](std::uint64_t word, std::size_t k) { return word >> (kIndexBits + k * kDigitBits) & (kDigits - 1); };
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t k = 0; k < starts.size(); ++k) ++starts[k][digit(at[i], k)];
   }
-  // About four words to a class if they are spread evenly.
-  const int digit_bits = std::min(static_cast<int>(std::bit_width(count)) - 3, bits - kIndexBits);
-  const int shift = bits - digit_bits;
-  const std::size_t classes = std::size_t{1} << digit_bits;
-  const auto digit = [=](std::uint64_t word) { return (word >> shift) & (classes - 1); };
-
-  std::array<std::uint16_t, kCacheRecords / 4 + 1> starts;
-  std::fill_n(starts.begin(), classes + 1, std::uint16_t{0});
-  for (std::size_t i = 0; i < count; ++i) ++starts[digit(at[i]) + 1];
-  for (std::size_t c = 0; c < classes; ++c)
-    starts[c + 1] = static_cast<std::uint16_t>(starts[c + 1] + starts[c]);
-  // Each class's start moves on to its end, which is where the next one began.
-  for (std::size_t i = 0; i < count; ++i) other[starts[digit(at[i])]++] = at[i];
-
-  std::size_t begin = 0;
-  for (std::size_t c = 0; c < classes; ++c) {
-    const std::size_t end = starts[c];
-    if (begin < end) sort_words(other + begin, at + begin, end - begin, shift, !stay);
-    begin = end;
+  std::uint64_t *from = at, *to = other;
+  for (std::size_t k = 0; k < starts.size(); ++k) {
+    if (starts[k][digit(at[0], k)] == count) continue;
+    std::exclusive_scan(starts[k].begin(), starts[k].end(), starts[k].begin(), std::uint16_t{0});
+    for (std::size_t i = 0; i < count; ++i) to[starts[k][digit(from[i], k)]++] = from[i];
+    std::swap(from, to);
   }
+  if (from != at) std::memcpy(at, from, count * sizeof(std::uint64_t));
 }
 
 // 32 bits of a key from `bit` on, zeros behind its end.
@@ -130,7 +119,7 @@ void sort_in_cache(const Piece& p, std::uint64_t* words) noexcept {
   if (bit >= kKeyBits) return move_to_target(p);
 
   for (std::size_t i = 0; i < p.count; ++i) words[i] = window(p.at[i].key, bit) << kIndexBits | i;
-  sort_words(words, words + p.count, p.count, 64, true);
+  sort_words(words, words + p.count, p.count);
 
   PointRecord* const sorted = p.other;
   bool equal_windows = false;
