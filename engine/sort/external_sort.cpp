@@ -28,10 +28,7 @@ Digest sum(const Digest& a, const Digest& b) noexcept {
 }
 
 Digest digest_of(std::span<const PointRecord> records) noexcept {
-  Digest total{};
-  for (const PointRecord& record : records)
-    total = sum(total, xxh3_128(std::as_bytes(std::span(&record, 1))));
-  return total;
+  return xxh3_128_sum(std::as_bytes(records), sizeof(PointRecord));
 }
 
 Digest digest_of(std::span<const PointRecord> records, const Executor& executor) {

@@ -37,9 +37,7 @@ bool is_full(const std::error_code& code) noexcept {
 
 /// Of records from the i-th of a run's part on. Those of its pieces add up to that of the part.
 std::uint64_t digest_of(std::span<const PointRecord> records, std::uint64_t i) noexcept {
-  std::uint64_t sum = 0;
-  for (const PointRecord& record : records) sum += xxh3_64(std::as_bytes(std::span(&record, 1)), i++);
-  return sum;
+  return xxh3_64_sum(std::as_bytes(records), sizeof(PointRecord), i);
 }
 
 /// Moves what goes to the disk of each record to the front. @return its bytes

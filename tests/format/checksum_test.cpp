@@ -67,6 +67,23 @@ TEST_CASE("checksum: every length class agrees with the table of the spec", "[fo
   CHECK(rows >= 100);
 }
 
+TEST_CASE("checksum: sums over records are those of their hashes", "[format][checksum]") {
+  for (const std::size_t size : {1u, 16u, 40u, 200u, 1000u}) {
+    const std::vector<std::byte> bytes = sequence(7 * size);
+    std::array<std::uint64_t, 2> wide{};
+    std::uint64_t seeded = 0;
+    for (std::size_t i = 0; i < 7; ++i) {
+      const auto record = std::span(bytes).subspan(i * size, size);
+      const auto [low, high] = xxh3_128(record);
+      wide = {wide[0] + low, wide[1] + high};
+      seeded += xxh3_64(record, 3 + i);
+    }
+    CHECK(xxh3_128_sum(bytes, size) == wide);
+    CHECK(xxh3_64_sum(bytes, size, 3) == seeded);
+  }
+  CHECK(xxh3_128_sum({}, 40) == std::array<std::uint64_t, 2>{});
+}
+
 TEST_CASE("digest: it is XXH3-128 over 16 bytes a page, in page order", "[format][checksum]") {
   ContentDigest digest;
   std::vector<std::byte> all;
