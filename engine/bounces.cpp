@@ -78,6 +78,11 @@ class BouncedPoints : public PointStream {
 
 }  // namespace
 
+std::uint64_t bounce_bytes(const ContainerReader& scene, unsigned bounces, unsigned threads) noexcept {
+  if (bounces < 2) return 0;
+  return open_bytes(scene) + ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads);
+}
+
 std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene, const BounceOptions& options,
                                               const Executor& executor, ShadeReport& report, Progress& progress) {
   if (options.bounces > 1 && lit_by_emitters(scene)) {

@@ -17,6 +17,9 @@ struct BounceOptions {
   std::filesystem::path temp_dir;
 };
 
+/// What two temporary containers take while one is read and the next written.
+[[nodiscard]] std::uint64_t bounce_bytes(const ContainerReader& scene, unsigned bounces, unsigned threads) noexcept;
+
 /// What receivers look at to see light of `bounces` bounces: the points and the tree of `scene`, with the
 /// radiance of every point as first lit plus albedo / pi times its irradiance of a bounce less.
 ///
@@ -26,7 +29,7 @@ struct BounceOptions {
 /// @return        null for one bounce or none: the scene itself
 /// @throws std::invalid_argument when the surfels are lit by emissive triangles that are surfels too;
 ///         FormatError, std::system_error
-/// Memory: the cache of `shade`, and within kBufferBytes.
+/// Memory: the cache of `shade`, bounce_bytes(), and within kBufferBytes.
 [[nodiscard]] std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene, const BounceOptions& options,
                                                             const Executor& executor, ShadeReport& report,
                                                             Progress& progress);

@@ -14,10 +14,12 @@
 #include "engine/build_inputs.h"
 #include "engine/pipeline.h"
 #include "engine/resume.h"
+#include "engine/sort/spill.h"
 #include "engine/stages.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "format/error.h"
+#include "format/point_page.h"
 
 namespace ptc {
 namespace {
@@ -113,9 +115,14 @@ class Build {
     return scene_points() > 0 ? grow_frame(scene_->header().frame, low, high) : frame_around(low, high);
   }
 
+  /// Of points and nodes, whose pages are some 4 to each 10 of points where the scene is a city.
+  [[nodiscard]] std::uint64_t pages_of(std::uint64_t points) const {
+    return points / points_per_page({.page_shift = request_.page_shift}) * 3 / 2;
+  }
+
   /// What the cap leaves for the sort.
   [[nodiscard]] SortOptions sort_options(std::uint64_t taken, std::uint64_t expected) const {
-    taken += kBufferBytes;
+    taken += kBufferBytes + ContainerWriter::memory_bytes(pages_of(expected + scene_points()), request_.page_shift, executor_.threads());
     if (scene_) taken += ContainerReader::kMostPageBytes * scene_->page_count();
     if (resumption_) taken += kCheckpointBytes + (kOpenPages << request_.page_shift);
     SortOptions options{.memory_bytes = memory_left(request_.run, taken, kLeastSort, "this scene's build"),
@@ -163,7 +170,9 @@ class Build {
   SortedPoints take_up() {
     SortedPoints points{.plan = *resumption_->plan()};
     StateReader state = resumption_->sorter_state();
-    points.sorter = std::make_unique<ExternalSorter>(sort_options(0, 0), executor_, state);
+    std::uint64_t spilled = 0;
+    for (const auto& file : resumption_->spills()) spilled += std::filesystem::file_size(file);
+    points.sorter = std::make_unique<ExternalSorter>(sort_options(0, spilled / kSpilledBytes), executor_, state);
     state.end();
     if (const auto& checkpoint = resumption_->checkpoint()) report_.resumed_points = checkpoint->place.points;
     progress_.note(fmt::format("going on with {} of {} points in {}", report_.resumed_points,

@@ -188,10 +188,10 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   }
 }
 
-Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round, unsigned threads, Progress& progress) {
+Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round, const Executor& executor,
+                         Progress& progress) {
   const Superblock& from = container.superblock();
   ContainerPoints points(container);
-  const Executor executor(threads);
   const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
   const std::unique_ptr<PointStream> rounded = round ? round_points(points, container.header().frame.unit(), executor) : nullptr;
   const Superblock superblock = build_pages(rounded ? *rounded : points, writer, tree, executor, progress);
@@ -233,6 +233,10 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
                            const RecodeOptions& options, Progress& progress) {
   const FileHeader& from = container.header();
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
+  const Executor executor(options.run.threads);
+  const std::uint64_t pages = (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) + container.page_count();
+  const std::uint64_t taken = open_bytes(container) + ContainerWriter::memory_bytes(pages, page_shift, executor.threads());
+  static_cast<void>(memory_left(options.run, kBufferBytes + taken, 0, "this conversion"));
   ContainerWriter writer(target, {.page_shift = page_shift,
                                   .codec = codec_of(options.profile),
                                   .uuid = derived_uuid(container, options.profile, page_shift),
@@ -246,7 +250,7 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   if (same_pages) {
     copy_pages(container, writer, progress);
   } else {
-    superblock = rebuild_pages(container, writer, round, options.threads, progress);
+    superblock = rebuild_pages(container, writer, round, executor, progress);
   }
   superblock.writer.clear();
   return writer.finish(meta, superblock);

@@ -17,7 +17,7 @@ namespace ptc {
 struct RecodeOptions {
   Profile profile = Profile::exact;
   std::optional<std::uint8_t> page_shift;  ///< empty: as it was
-  unsigned threads = 0;                    ///< 0: as many as cores
+  RunOptions run;
 };
 
 /// What a conversion moved.
@@ -28,7 +28,7 @@ struct ConvertReport {
 };
 
 /// Writes the points of a container with all its channels as columns of a PLY.
-/// @throws FormatError, std::system_error   Memory: a few pages.
+/// @throws FormatError, std::system_error   Memory: the open container and a few pages, within kBufferBytes.
 ConvertReport container_to_ply(const ContainerReader& container,
                                const std::filesystem::path& target, Progress& progress);
 
@@ -40,7 +40,7 @@ ConvertReport container_to_xyz(const ContainerReader& container,
 /// Writes a container anew: the same points, channels and record in another profile or page size. What was rounded
 /// stays so. While the page size stays and points are not rounded, pages keep their order and numbers; else the
 /// octree is built again from the points. The same input gives the same bytes.
-/// @throws FormatError, std::system_error   Memory: a few pages, and what build_pages() takes.
+/// @throws FormatError, std::system_error, LimitError for a cap that is too small
 ConvertReport recode_container(const ContainerReader& container,
                                const std::filesystem::path& target, const RecodeOptions& options,
                                Progress& progress);

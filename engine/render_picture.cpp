@@ -303,7 +303,8 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   const std::uint64_t pixel_bytes = Film::kBytes + (request.estimate ? Film::kEstimateBytes : 0);
   const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * receiver_bytes +
                               std::uint64_t{camera.width} * camera.height * pixel_bytes +
-                              (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24);
+                              (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24) +
+                              bounce_bytes(scene, request.bounces, executor.threads());
   options.cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), request.back_end,
                                          "this picture");
   const std::unique_ptr<ContainerReader> bounced =

@@ -183,9 +183,10 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   }
 
   const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
+  const std::uint64_t taken = kBufferBytes + (other ? open_bytes(*other) : 0) + sink_bytes(target, receivers) +
+                              bounce_bytes(scene, request.bounces, executor.threads());
   ShadeOptions options{
-      .cache_bytes = cache_bytes_left(request.run, kBufferBytes + (other ? open_bytes(*other) : 0), scene,
-                                      readers_of(executor, request.estimate), request.back_end,
+      .cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), request.back_end,
                                       "shading"),
       .back_end = request.back_end,
       .gather = request.gather,

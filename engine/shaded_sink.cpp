@@ -155,6 +155,12 @@ class ContainerSink : public ShadedSink {
 
 }  // namespace
 
+std::uint64_t sink_bytes(const std::filesystem::path& target, const ContainerReader& receivers) noexcept {
+  if (target.extension() == ".ply") return 0;
+  // An attribute page for each page at the most.
+  return ContainerWriter::memory_bytes(2 * std::uint64_t{receivers.page_count()}, receivers.header().page_shift, 1);
+}
+
 std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
                                              std::uint64_t points, const std::string& settings, bool estimates) {
   if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points, estimates);

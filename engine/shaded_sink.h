@@ -31,4 +31,7 @@ class ShadedSink {
 [[nodiscard]] std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
                                                            std::uint64_t points, const std::string& settings, bool estimates);
 
+/// What it takes of the directory that it writes.
+[[nodiscard]] std::uint64_t sink_bytes(const std::filesystem::path& target, const ContainerReader& receivers) noexcept;
+
 }  // namespace ptc

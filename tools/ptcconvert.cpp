@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "engine/convert.h"
+#include "engine/stages.h"
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"
@@ -49,15 +50,14 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
                                              arguments.output.string() + "' is no such name");
   }
   const ptc::ContainerReader container(arguments.input);
-  if (ptc::has_ending(arguments.output, ".ply")) {
-    return ptc::container_to_ply(container, arguments.output, progress);
+  if (to_container) {
+    ptc::RecodeOptions options{.profile = arguments.profile, .run = run};
+    if (arguments.page_size_given) options.page_shift = arguments.page_shift;
+    return ptc::recode_container(container, arguments.output, options, progress);
   }
-  if (ptc::has_ending(arguments.output, ".xyz")) {
-    return ptc::container_to_xyz(container, arguments.output, progress);
-  }
-  ptc::RecodeOptions options{.profile = arguments.profile, .threads = run.threads};
-  if (arguments.page_size_given) options.page_shift = arguments.page_shift;
-  return ptc::recode_container(container, arguments.output, options, progress);
+  static_cast<void>(ptc::memory_left(run, ptc::kBufferBytes + ptc::open_bytes(container), 0, "this conversion"));
+  const auto to_cloud = ptc::has_ending(arguments.output, ".ply") ? ptc::container_to_ply : ptc::container_to_xyz;
+  return to_cloud(container, arguments.output, progress);
 }
 
 }  // namespace

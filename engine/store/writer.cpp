@@ -24,6 +24,8 @@ namespace ptc {
 namespace {
 
 constexpr std::uint16_t kNoLevel = 0xffff;
+constexpr std::uint64_t kPageBytes = 80;              // of memory a page
+constexpr std::uint64_t kEncoderBytes = 768 << 10;    // and two pages
 
 void require(bool holds, const char* text) {
   if (!holds) throw std::invalid_argument(std::string("container writer: ") + text);
@@ -310,6 +312,10 @@ WriterState ContainerWriter::state() {
 }
 
 void ContainerWriter::sync() { impl_->file->sync(); }
+
+std::uint64_t ContainerWriter::memory_bytes(std::uint64_t pages, std::uint8_t page_shift, unsigned threads) noexcept {
+  return pages * kPageBytes + threads * (kEncoderBytes + (std::uint64_t{2} << page_shift));
+}
 
 const FileHeader& ContainerWriter::header() const noexcept {
   return impl_->header;

@@ -41,9 +41,13 @@ struct WriterState {
 /// Until finish() has returned, the target is what it was before; a writer that ends before leaves
 /// nothing behind. What a reader would refuse is not written but thrown as std::invalid_argument,
 /// after which the writer is of no more use. Every call may throw std::system_error.
-/// Memory: 32 bytes a page, 80 in finish().   Threads: one at a time.
+/// Memory: memory_bytes().   Threads: one at a time.
 class ContainerWriter {
  public:
+  /// Most that a writer of so many pages of a size holds, beside those that it is given: a page's entry, twice in finish(),
+  /// and an encoder for each thread of write_pages().
+  [[nodiscard]] static std::uint64_t memory_bytes(std::uint64_t pages, std::uint8_t page_shift, unsigned threads) noexcept;
+
   /// @throws std::invalid_argument when page_shift is not 12 to 20 or the frame breaks a rule of spec/morton.md#frame
   ContainerWriter(const std::filesystem::path& target, const WriterOptions& options);
   /// Goes on with the partial file of a writer with the same options, whose state() this was; what lies behind is cut.
@@ -80,7 +84,7 @@ class ContainerWriter {
   /// The same of several, compressed side by side; they lie in the file in their order here. Not of attribute pages.
   /// With more than one thread they are on their way when this returns, and what goes wrong is thrown by a later call.
   /// @param executor  must outlive the next call of flush() or finish()
-  /// Memory: the pages and their stored bytes, and an encoder for each thread.
+  /// Memory: the pages and their stored bytes.
   void write_pages(std::vector<Page> pages, const Executor& executor);
   /// Returns when all pages are in the file. @throws what went wrong with them
   void flush();

@@ -73,7 +73,7 @@ class Facts(ProgramTest):
         first, second = self.here / "first", self.here / "second"
         first.mkdir()
         second.mkdir()
-        command = ["ptcbuild", "--city", "700k", "--memory", "80M", "--temp", first, "--temp", second, "-o", self.here / "o.ptcx"]
+        command = ["ptcbuild", "--city", "700k", "--memory", "82M", "--temp", first, "--temp", second, "-o", self.here / "o.ptcx"]
         result = self.succeed(*command, "--json")
         space = json.loads(result.stdout)["space"]
         self.assertEqual(space["temp_bytes"], 700_000 * 34)
@@ -92,7 +92,7 @@ class Facts(ProgramTest):
 
     def test_what_the_disks_have_no_room_for_is_refused_with_both_figures(self):
         for options in (["--city", "80G"], ["--city", "80G", "--temp", "/dev/shm"]):
-            message = run("ptcbuild", *options, "-o", self.here / "o.ptcx")
+            message = run("ptcbuild", *options, "--memory", "16G", "-o", self.here / "o.ptcx")
             self.assertEqual(message.returncode, 3)
             self.assertRegex(message.stderr, r"take (up to|about) \d+\.\d GB in .*, with \d+\.\d GB free")
         self.assertFalse(list(self.here.iterdir()))

@@ -118,7 +118,8 @@ class Usage(ProgramTest):
         for program, operands in (("ptcbuild", [self.mesh, "--points", "1k", "-o", self.here / "o.ptcx"]),
                                   ("ptcshade", [self.scene, "-o", self.here / "o.ply"]),
                                   ("ptcrender", [self.scene, "-o", self.here / "o.png"]),
-                                  ("ptcverify", [self.scene]), ("ptcinfo", [self.scene])):
+                                  ("ptcverify", [self.scene]), ("ptcinfo", [self.scene]),
+                                  ("ptcconvert", [self.scene, self.here / "o.ply"]), ("ptcconvert", [self.scene, self.here / "p.ptcx"])):
             message = self.fail_with(5, program, *operands, "--memory", "1M")
             least = message.split("the least that works is ")[1].split()[0]
             self.succeed(program, *operands, "--memory", least,

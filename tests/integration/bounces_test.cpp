@@ -263,7 +263,7 @@ TEST_CASE("bounces: threads and cap change no byte, and nothing is left behind",
   std::vector<char> first;
   for (const unsigned threads : {1U, 2U, 5U}) {
     ShadeRequest request{.scene = dir / "box.ptcx", .bounces = 3};
-    request.run = {.memory_bytes = std::uint64_t{49 + 16 * threads} << 20, .threads = threads};
+    request.run = {.memory_bytes = std::uint64_t{50 + 17 * threads} << 20, .threads = threads};
     const ShadeReport report = shade_container(request, dir / "lit.ptcx", silent);
     CHECK(report.bounces == 3);
     if (first.empty()) first = bytes_of(dir / "lit.ptcx");

@@ -34,6 +34,26 @@ std::uint64_t least_cap(const std::function<void(std::uint64_t)>& run) {
 
 }  // namespace
 
+TEST_CASE("memory: a cap for a build holds an encoder for each thread and the directory", "[integration][memory]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  const auto building = [&](std::uint64_t points, std::uint8_t page_shift, unsigned threads) {
+    return least_cap([&](std::uint64_t bytes) {
+      BuildRequest request;
+      request.city_points = points;
+      request.page_shift = page_shift;
+      request.run = {.memory_bytes = bytes, .threads = threads};
+      build_container(request, dir / "o.ptcx", silent);
+    });
+  };
+  const std::uint64_t least = building(100, 12, 1);
+  CHECK(building(100, 16, 9) - least == 9 * ((768 << 10) + (2 << 16)) - ((768 << 10) + (2 << 12)));
+  const std::uint64_t directory = building(50'000, 12, 1) - least;
+  const ContainerReader made(dir / "o.ptcx");
+  CHECK(directory >= 80 * (made.page_count() - 20));
+  CHECK(directory < 80 * made.page_count() * 5 / 4);
+}
+
 TEST_CASE("memory: a cap for shading holds the directory of each container that is open", "[integration][memory]") {
   const TemporaryDirectory dir;
   write_scene(dir / "few.ptcx", random_surfels(100, 1));
@@ -54,6 +74,15 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
   CHECK(shading("many.ptcx", "") == least + 36 * (many - few));
   CHECK(shading("few.ptcx", "few.ptcx") == least + 36 * few);
   CHECK(shading("few.ptcx", "many.ptcx") == least + 36 * many);
+  const auto lit = [&](const char* scene, unsigned bounces, unsigned threads) {
+    return least_cap([&](std::uint64_t bytes) {
+      ShadeRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = threads}};
+      request.bounces = bounces;
+      shade_container(request, dir / "o.ptcx", silent);
+    });
+  };
+  CHECK(lit("many.ptcx", 1, 1) - lit("few.ptcx", 1, 1) == (36 + 2 * 80) * (many - few));  // with that of what is written
+  CHECK(lit("few.ptcx", 2, 1) - lit("few.ptcx", 1, 1) > (512 << 10) + (36 + 80) * few);  // and an encoder
   const auto picture = [&](const char* scene) {
     return least_cap([&](std::uint64_t bytes) {
       RenderRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}};

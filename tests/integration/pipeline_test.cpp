@@ -215,9 +215,9 @@ TEST_CASE("pipeline: a cap that is too small is refused with the least that work
   Progress silent;
   BuildRequest request;
   request.city_points = 10'000;
-  request.run.memory_bytes = std::uint64_t{60} << 20;
-  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent), Catch::Contains("least that works is 80M"));
-  request.run.memory_bytes = std::uint64_t{80} << 20;
+  request.run = {.memory_bytes = std::uint64_t{60} << 20, .threads = 2};
+  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent), Catch::Contains("least that works is 82M"));
+  request.run.memory_bytes = std::uint64_t{82} << 20;
   CHECK_NOTHROW(build_container(request, dir / "a.ptcx", silent));
 }
 
