@@ -71,7 +71,7 @@ struct BuildReport {
 
 /// Samples and lights meshes, reads clouds, sorts, builds the octree and publishes the container.
 /// The same request gives the same bytes for any number of threads and any cap. Notes what it takes on the disk when it
-/// is known beforehand that memory will not hold the points, and refuses it when there is no room.
+/// is known beforehand that the points go through temporary files, and refuses it when there is no room.
 /// @throws DataError for bad input and for what an earlier build left when it is damaged or of another request,
 ///         std::invalid_argument as check_mesh() for the mesh in memory and for a cap that is too small (the text names
 ///         the least that works), std::system_error

@@ -175,7 +175,7 @@ class Bench(ProgramTest):
         rows = json.loads((charts / "cache.json").read_text())["rows"]
         self.assertEqual(json.loads(printed.stdout)["rows"], rows)
         self.assertEqual([r["panel"] for r in rows if r["threads"] == 2 and r["cap"] == 1].count("hits"), 4)
-        self.assertEqual({r["panel"] for r in rows}, {"hits", "back-end", "threads", "receivers", "pages"})
+        self.assertEqual({r["panel"] for r in rows}, {"hits", "back-end", "threads", "receivers", "pages", "sizes"})
         ways = {r["method"] for r in rows if r["panel"] == "back-end"}
         self.assertTrue(ways >= {"pread", "mmap"})
         self.assertEqual({r["method"]: r["bytes"] for r in rows if r["panel"] == "back-end" and r["cap"] == 1 and r["threads"] == 1},

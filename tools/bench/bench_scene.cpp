@@ -95,6 +95,7 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options, con
   BuildRequest request{.backdrop = choice.backdrop, .profile = options.profile, .run = run};
   request.sampling.count = options.points;
   request.tree.levels_per_stream = options.levels_per_stream;
+  request.page_shift = options.page_shift;
   LitScene lit;
   std::vector<MeshCamera> cameras;
   const bool procedural = choice.file.empty() && choice.name != "city";

@@ -57,6 +57,7 @@ struct SceneOptions {
   bool rays = true;                           ///< surfels and mesh are loaded, which rays need
   Profile profile = Profile::compact;         ///< of the container
   int levels_per_stream = 1;                  ///< as TreeOptions::levels_per_stream
+  std::uint8_t page_shift = 16;               ///< as BuildRequest::page_shift
 };
 
 /// Builds a scene's container.

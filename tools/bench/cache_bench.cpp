@@ -205,7 +205,7 @@ class CacheRun {
 
   std::vector<CacheRow> measure() {
     {
-      const BenchScene scene = make_scene(1);
+      const BenchScene scene = make_scene(1, 16);
       if (wants("hits")) measure_hits(scene.container());
       if (wants("back-end")) measure_back_ends(scene);
       if (wants("threads")) measure_threads(scene);
@@ -215,7 +215,12 @@ class CacheRun {
     }
     if (wants("pages")) {
       for (const auto& [name, levels] : {std::pair("a stream a level", 1), {"subtrees", 3}, {"depth-first", kLatticeBits}}) {
-        shade_under_caps("pages", make_scene(levels), {{.name = name}}, {1}, 1);
+        shade_under_caps("pages", make_scene(levels, 16), {{.name = name}}, {1}, 1);
+      }
+    }
+    if (wants("sizes")) {
+      for (const auto& [name, shift] : {std::pair("16 KiB", 14), {"64 KiB", 16}, {"256 KiB", 18}, {"1 MiB", 20}}) {
+        shade_under_caps("sizes", make_scene(1, static_cast<std::uint8_t>(shift)), {{.name = name}}, {1}, 1);
       }
     }
     return std::move(rows_);
@@ -224,13 +229,14 @@ class CacheRun {
  private:
   [[nodiscard]] bool wants(const char* panel) const { return std::ranges::find(options_.panels, panel) != options_.panels.end(); }
 
-  [[nodiscard]] BenchScene make_scene(int levels_per_stream) {
+  [[nodiscard]] BenchScene make_scene(int levels_per_stream, std::uint8_t page_shift) {
     require_room({&work_, 1}, build_disk_bytes(options_.points), fmt::format("{} surfels", options_.points));
     const SceneOptions scene{.points = options_.points,
                              .shaded_width = 0,
                              .own_points = options_.receivers,
                              .rays = false,
-                             .levels_per_stream = levels_per_stream};
+                             .levels_per_stream = levels_per_stream,
+                             .page_shift = page_shift};
     return {{.name = "city"}, scene, work_, run_, progress_};
   }
 

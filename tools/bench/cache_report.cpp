@@ -80,6 +80,7 @@ Chart chart_of(const std::vector<CacheRow>& rows) {
   add("threads", "Threads, at a cap of 9 %", "bytes read per receiver", bytes);
   add("receivers", "Order of receivers", "bytes read per receiver", bytes);
   add("pages", "Order of node pages", "bytes read per receiver", bytes);
+  add("sizes", "Size of pages", "wall time per receiver, us", wall);
   return chart;
 }
 
