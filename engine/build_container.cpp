@@ -122,7 +122,8 @@ class Build {
 
   /// What the cap leaves for the sort.
   [[nodiscard]] SortOptions sort_options(std::uint64_t taken, std::uint64_t expected) const {
-    taken += kBufferBytes + ContainerWriter::memory_bytes(pages_of(expected + scene_points()), request_.page_shift, executor_.threads());
+    const std::uint64_t pages = pages_of(expected + scene_points());
+    taken += kBufferBytes + ContainerWriter::memory_bytes(pages, request_.page_shift, executor_.threads());
     if (scene_) taken += ContainerReader::kMostPageBytes * scene_->page_count();
     if (resumption_) taken += kCheckpointBytes + (kOpenPages << request_.page_shift);
     SortOptions options{.memory_bytes = memory_left(request_.run, taken, kLeastSort, "this scene's build"),

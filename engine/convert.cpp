@@ -162,7 +162,8 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   std::vector<std::byte> payload(container.page_payload_limit());
   for (const std::uint32_t page : order) {
     const PageHeader header = container.read_page(page, payload, decoder);
-    writer.write_page(page, ContainerWriter::facts_of(header), std::span(payload).first(header.raw_bytes), container.attribute_columns(header.group));
+    writer.write_page(page, ContainerWriter::facts_of(header), std::span(payload).first(header.raw_bytes),
+                      container.attribute_columns(header.group));
     if (header.type == PageType::point) progress.advance(header.record_count);
   }
 }

@@ -16,7 +16,7 @@ namespace ptc::bench {
 
 /// hits: a lookup of a page that is there. back-end: shading under caps, pages read in each way. threads: shading at
 /// CacheBenchOptions::middle_cap, by replacement. receivers: under caps, in the order of the Z-curve and in none.
-/// pages: under caps, node pages filled in another order.
+/// pages: under caps, node pages filled in another order. sizes: under caps, pages of other sizes.
 inline constexpr std::array kCachePanels{"hits", "back-end", "threads", "receivers", "pages", "sizes"};
 
 struct CacheBenchOptions {
