@@ -1,4 +1,5 @@
 // Scene to container (engine/pipeline.h).
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <stdexcept>
@@ -120,13 +121,14 @@ class Build {
     return points / points_per_page({.page_shift = request_.page_shift}) * 3 / 2;
   }
 
-  /// What the cap leaves for the sort.
+  /// What the cap leaves for the sort, and, when that is done, for the directory.
   [[nodiscard]] SortOptions sort_options(std::uint64_t taken, std::uint64_t expected) const {
     const std::uint64_t pages = pages_of(expected + scene_points());
-    taken += kBufferBytes + ContainerWriter::memory_bytes(pages, request_.page_shift, executor_.threads());
+    taken += kBufferBytes + ContainerWriter::writing_bytes(request_.page_shift, executor_.threads());
     if (scene_) taken += ContainerReader::kMostPageBytes * scene_->page_count();
     if (resumption_) taken += kCheckpointBytes + (kOpenPages << request_.page_shift);
-    SortOptions options{.memory_bytes = memory_left(request_.run, taken, kLeastSort, "this scene's build"),
+    const std::uint64_t least = std::max(kLeastSort, ContainerWriter::finish_bytes(pages));
+    SortOptions options{.memory_bytes = memory_left(request_.run, taken, least, "this scene's build"),
                         .temp_dirs = temp_dirs(request_.run, target_),
                         .expected = expected};
     if (resumption_) options.kept_files = resumption_->spills();

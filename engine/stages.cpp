@@ -88,10 +88,6 @@ std::filesystem::path roomiest_temp_dir(const RunOptions& run, const std::filesy
   return roomiest(temp_dirs(run, target));
 }
 
-std::filesystem::path directory_of(const std::filesystem::path& file) {
-  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-}
-
 std::unique_ptr<ContainerReader> make_temporary(const std::filesystem::path& directory,
                                                 const std::function<void(const std::filesystem::path&)>& write) {
   static std::atomic<unsigned> made = 0;

@@ -51,8 +51,6 @@ void check_damage_request(bool tolerate, unsigned bounces, const std::optional<d
 /// The one of them with most room, for a file that is not spread.
 [[nodiscard]] std::filesystem::path roomiest_temp_dir(const RunOptions& run, const std::filesystem::path& target);
 
-/// The directory that a file is in.
-[[nodiscard]] std::filesystem::path directory_of(const std::filesystem::path& file);
 
 /// A container for the time of one run. Its name goes as soon as it is open: however the run ends
 /// from then on, nothing is left.

@@ -163,9 +163,12 @@ int open_retrying(const std::filesystem::path& path, int flags, mode_t mode) noe
   return retrying([&] { return ::open(path.c_str(), flags | O_CLOEXEC, mode); });
 }
 
+std::filesystem::path directory_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
 void sync_directory(const std::filesystem::path& file) {
-  const std::filesystem::path parent = file.parent_path();
-  const std::filesystem::path directory = parent.empty() ? std::filesystem::path(".") : parent;
+  const std::filesystem::path directory = directory_of(file);
   const int fd = open_retrying(directory, O_RDONLY | O_DIRECTORY);
   if (fd < 0) fail(errno, "open", directory);
   const int error = retrying([&] { return ::fsync(fd); }) == 0 ? 0 : errno;

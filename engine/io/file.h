@@ -94,6 +94,9 @@ class TemporaryName {
   std::filesystem::path path_;
 };
 
+/// The directory that a file is in.
+[[nodiscard]] std::filesystem::path directory_of(const std::filesystem::path& file);
+
 /// fsync of the directory that a file is in: its name is on the disk.
 void sync_directory(const std::filesystem::path& file);
 

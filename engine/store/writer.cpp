@@ -7,14 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <future>
-#include <mutex>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "engine/base/error.h"
 #include "engine/io/file.h"
 #include "engine/store/commit.h"
+#include "engine/store/entry_table.h"
 #include "engine/store/structure.h"
 #include "format/checksum.h"
 #include "format/error.h"
@@ -24,7 +23,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint16_t kNoLevel = 0xffff;
-constexpr std::uint64_t kPageBytes = 80;              // of memory a page
+constexpr std::uint64_t kPageBytes = 80;              // of memory in finish()
 constexpr std::uint64_t kEncoderBytes = 768 << 10;    // and two pages
 
 void require(bool holds, const char* text) {
@@ -54,21 +53,25 @@ FileHeader make_header(const WriterOptions& options) {
 
 struct ContainerWriter::Impl {
   Impl(const std::filesystem::path& target, const WriterOptions& options)
-      : header(make_header(options)), codec(options.codec), level(options.level) {
-    if (options.partial.empty()) {
-      file.emplace(target);
-    } else {
-      file.emplace(target, options.partial);
-      file->truncate(0);
-    }
-    file->write_at(0, encode_file_header(header));
+      : header(make_header(options)),
+        codec(options.codec),
+        level(options.level),
+        file(options.partial.empty() ? OutputFile(target) : OutputFile(target, options.partial)),
+        entries(directory_of(file.temporary())) {
+    if (!options.partial.empty()) file.truncate(0);
+    file.write_at(0, encode_file_header(header));
   }
 
   Impl(const std::filesystem::path& target, const WriterOptions& options, const WriterState& state)
-      : header(make_header(options)), codec(options.codec), level(options.level), entries(state.pages), end(state.end) {
-    file.emplace(target, options.partial);
+      : header(make_header(options)),
+        codec(options.codec),
+        level(options.level),
+        file(target, options.partial),
+        entries(directory_of(options.partial)),
+        end(state.end) {
+    static_cast<void>(entries.add(state.pages));
     find_pages(options.partial);
-    file->truncate(end);
+    file.truncate(end);
   }
 
   /// Fills the entries from the page headers.
@@ -86,8 +89,8 @@ struct ContainerWriter::Impl {
       std::array<std::byte, kPageHeaderBytes> bytes;
       in.read_at(at, bytes);
       const PageHeader page = at_offset(in, at, [&] { return decode_page_header(bytes, header); });
-      check(page.page_id < entries.size() && entries[page.page_id].offset == 0, "a page that was not written");
-      entries[page.page_id] = entry_of(page, at);
+      check(page.page_id < entries.size() && !entries.has(page.page_id), "a page that was not written");
+      entries.set(page.page_id, entry_of(page, at));
       at += extent_bytes(page.stored_bytes);
     }
     check(at == end, "the unfinished container's last page is cut");
@@ -99,12 +102,10 @@ struct ContainerWriter::Impl {
 
   std::uint32_t reserve() {
     require(!finished, "a page after finish()");
-    const std::lock_guard lock(entries_mutex);
     if (entries.size() >= kMaxPages) {
-      throw DataError(file->target().string() + ": needs more than 2^32 - 2 pages");
+      throw DataError(file.target().string() + ": needs more than 2^32 - 2 pages");
     }
-    entries.emplace_back();
-    return static_cast<std::uint32_t>(entries.size() - 1);
+    return entries.add(1);
   }
 
   PageHeader page_header(std::uint32_t page_id, const PageFacts& facts) const {
@@ -137,21 +138,17 @@ struct ContainerWriter::Impl {
 
   /// At the end of the file, in one write.
   void append(const Image& image) {
-    file->write_at(end, image.bytes);
+    file.write_at(end, image.bytes);
     end += image.bytes.size();
   }
 
   void append_page(const Image& image) {
     const PageHeader& page = image.page;
     const std::uint64_t offset = end;
-    {
-      const std::lock_guard lock(entries_mutex);
-      require(page.page_id < entries.size(), "a page that was not reserved");
-      require(entries[page.page_id].offset == 0, "a page written twice");
-    }
+    require(page.page_id < entries.size(), "a page that was not reserved");
+    require(!entries.has(page.page_id), "a page written twice");
     append(image);
-    const std::lock_guard lock(entries_mutex);
-    entries[page.page_id] = entry_of(page, offset);
+    entries.set(page.page_id, entry_of(page, offset));
   }
 
   /// An encoder and what it fills, for one thread; kept between calls.
@@ -213,21 +210,11 @@ struct ContainerWriter::Impl {
     return page;
   }
 
-  std::vector<std::byte> encode_directory() const {
-    std::vector<std::byte> all(entries.size() * kDirectoryEntryBytes);
-    for (std::size_t i = 0; i < entries.size(); ++i) {
-      encode_directory_entry(
-          entries[i],
-          std::span(all).subspan(i * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
-    }
-    return all;
-  }
-
   /// Directory pages are numbered on from the last page and not compressed: they can be told apart
   /// and read without one another.
   void write_directory(std::span<const std::byte> all) {
     const std::size_t full = directory_entries_per_page(header) * kDirectoryEntryBytes;
-    auto page_id = static_cast<std::uint32_t>(entries.size());
+    std::uint32_t page_id = entries.size();
     for (std::size_t at = 0; at < all.size(); at += full, ++page_id) {
       const auto part = all.subspan(at, std::min(full, all.size() - at));
       const auto count = static_cast<std::uint32_t>(part.size() / kDirectoryEntryBytes);
@@ -240,7 +227,7 @@ struct ContainerWriter::Impl {
   }
 
   void complete(Superblock& superblock, std::span<const std::byte> directory) const {
-    const auto pages = static_cast<std::uint32_t>(entries.size());
+    const std::uint32_t pages = entries.size();
     superblock.header = header;
     superblock.page_count = pages;
     superblock.directory_pages = (pages - 1) / directory_entries_per_page(header) + 1;
@@ -248,48 +235,61 @@ struct ContainerWriter::Impl {
     superblock.directory_xxh3 = xxh3_64(directory);
     superblock.file_bytes = end + directory_bytes(header, pages) + 2 * kBlockBytes;
     superblock.points_per_page = points_per_page(header);
-    ContentDigest digest;
-    for (const DirectoryEntry& entry : entries) digest.add(entry);
-    superblock.content_xxh3 = digest.value();
     if (superblock.writer.empty()) superblock.writer = writer_name();
   }
 
-  void check(const Block& block, const Superblock& superblock, const Meta& meta) const {
+  static std::array<std::uint64_t, 2> digest_of(std::span<const DirectoryEntry> pages) {
+    ContentDigest digest;
+    for (const DirectoryEntry& entry : pages) digest.add(entry);
+    return digest.value();
+  }
+
+  std::vector<DirectoryEntry> decode_directory(std::span<const std::byte> all, std::uint64_t file_bytes) const {
+    std::vector<DirectoryEntry> pages;
+    pages.reserve(entries.size());
+    for (; !all.empty(); all = all.subspan(kDirectoryEntryBytes)) pages.push_back(decode_directory_entry(all, header, file_bytes));
+    return pages;
+  }
+
+  /// The commit record, once it and the pages are what a reader takes.
+  Block encode_checked(Superblock& superblock, std::span<const std::byte> directory, const Meta& meta) const {
+    Block block{};
     refuse_what_readers_refuse([&] {
+      const std::vector<DirectoryEntry> pages = decode_directory(directory, superblock.file_bytes);
+      superblock.content_xxh3 = digest_of(pages);
+      block = encode_superblock(superblock);
       static_cast<void>(decode_superblock(block, header, superblock.file_bytes));
-      const PageIndex index = index_pages(entries);
-      verify_pages(superblock, entries, index);
-      verify_attributes(superblock, entries, index, meta);
+      const PageIndex index = index_pages(pages);
+      verify_pages(superblock, pages, index);
+      verify_attributes(superblock, pages, index, meta);
     });
+    return block;
   }
 
   Superblock finish(const Meta& meta, Superblock superblock) {
     require(!finished, "finish() twice");
     wait();
-    require(std::ranges::none_of(entries, [](const auto& entry) { return entry.offset == 0; }),
-            "a reserved page that was never written");
+    require(entries.complete(), "a reserved page that was never written");
     superblock.meta_page = write_meta(meta);
     finished = true;
-    const std::vector<std::byte> directory = encode_directory();
+    const std::vector<std::byte> directory = entries.encoded();
     end = round_up(end, kBlockBytes);
     complete(superblock, directory);
-    const Block block = encode_superblock(superblock);
-    check(block, superblock, meta);
+    const Block block = encode_checked(superblock, directory, meta);
     write_directory(directory);
-    file->sync();  // what is committed reaches the disk before the commit record
-    file->write_at(end, block);
-    file->write_at(end + kBlockBytes, block);
-    file->sync();
-    file->publish();
+    file.sync();  // what is committed reaches the disk before the commit record
+    file.write_at(end, block);
+    file.write_at(end + kBlockBytes, block);
+    file.sync();
+    file.publish();
     return superblock;
   }
 
   FileHeader header;
   Codec codec;
   int level;
-  std::optional<OutputFile> file;
-  std::mutex entries_mutex;             ///< pages are reserved while others are written
-  std::vector<DirectoryEntry> entries;  ///< offset 0: reserved, not yet written
+  OutputFile file;
+  EntryTable entries;  ///< pages are reserved while others are written
   std::uint64_t end = kBlockBytes;      ///< where the next page goes
   bool finished = false;
   std::vector<std::unique_ptr<Encoding>> encodings;
@@ -308,13 +308,19 @@ ContainerWriter::ContainerWriter(const std::filesystem::path& target, const Writ
 
 WriterState ContainerWriter::state() {
   impl_->wait();
-  return {static_cast<std::uint32_t>(impl_->entries.size()), impl_->end};
+  return {impl_->entries.size(), impl_->end};
 }
 
-void ContainerWriter::sync() { impl_->file->sync(); }
+void ContainerWriter::sync() { impl_->file.sync(); }
+
+std::uint64_t ContainerWriter::writing_bytes(std::uint8_t page_shift, unsigned threads) noexcept {
+  return threads * (kEncoderBytes + (std::uint64_t{2} << page_shift));
+}
+
+std::uint64_t ContainerWriter::finish_bytes(std::uint64_t pages) noexcept { return pages * kPageBytes; }
 
 std::uint64_t ContainerWriter::memory_bytes(std::uint64_t pages, std::uint8_t page_shift, unsigned threads) noexcept {
-  return pages * kPageBytes + threads * (kEncoderBytes + (std::uint64_t{2} << page_shift));
+  return finish_bytes(pages) + writing_bytes(page_shift, threads);
 }
 
 const FileHeader& ContainerWriter::header() const noexcept {

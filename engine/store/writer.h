@@ -44,8 +44,11 @@ struct WriterState {
 /// Memory: memory_bytes().   Threads: one at a time.
 class ContainerWriter {
  public:
-  /// Most that a writer of so many pages of a size holds, beside those that it is given: a page's entry, twice in finish(),
-  /// and an encoder for each thread of write_pages().
+  /// Most that a writer holds while pages are written, beside those that it is given: an encoder for each thread of write_pages().
+  [[nodiscard]] static std::uint64_t writing_bytes(std::uint8_t page_shift, unsigned threads) noexcept;
+  /// What finish() of so many pages takes: the directory, encoded and not, and its order. Until then it is on the disk.
+  [[nodiscard]] static std::uint64_t finish_bytes(std::uint64_t pages) noexcept;
+  /// Both.
   [[nodiscard]] static std::uint64_t memory_bytes(std::uint64_t pages, std::uint8_t page_shift, unsigned threads) noexcept;
 
   /// @throws std::invalid_argument when page_shift is not 12 to 20 or the frame breaks a rule of spec/morton.md#frame
