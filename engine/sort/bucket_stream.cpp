@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "engine/sort/radix_sort.h"
 
@@ -68,9 +69,11 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
   constexpr std::size_t kSamplesPerRange = 4;  // each is a read of its own
   Splitters splitters(bucket.sample(kSamplesPerRange * ranges_, reader_), ranges_);
   const auto partition = std::make_shared<Partition>(file_, std::move(splitters));
+  std::vector<std::uint16_t> range_of(out.size());
   while (const std::size_t count = bucket.read(out, reader_)) {
     const std::span<PointRecord> run = out.first(count), grouped = scratch.first(count);
-    partition->write_run(grouped, partition->group_run(run, grouped, executor_));
+    partition->find_ranges(run, range_of, executor_);
+    partition->write_run(grouped, partition->group_run(run, range_of, grouped, executor_));
   }
   push(partition, 0);
 }

@@ -31,18 +31,6 @@ Digest digest_of(std::span<const PointRecord> records) noexcept {
   return xxh3_128_sum(std::as_bytes(records), sizeof(PointRecord));
 }
 
-Digest digest_of(std::span<const PointRecord> records, const Executor& executor) {
-  constexpr std::size_t kGrain = 1 << 14;
-  if (records.size() <= kGrain) return digest_of(records);
-  std::vector<Digest> parts(records.size() / kGrain + 1);
-  executor.for_ranges(records.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    parts[begin / kGrain] = digest_of(records.subspan(begin, end - begin));
-  });
-  Digest total{};
-  for (const Digest& part : parts) total = sum(total, part);
-  return total;
-}
-
 // All in memory: one block.
 class MemoryStream final : public BlockStream {
  public:
@@ -117,6 +105,7 @@ struct ExternalSorter::Impl {
   }
 
   void add(std::span<const PointRecord> records);
+  void take(std::span<const PointRecord> records);
   void begin_partition();
   void spill();
   void spill_all();
@@ -137,6 +126,7 @@ struct ExternalSorter::Impl {
   Arena arena;             // two runs
   std::span<PointRecord> filling;  // a run, or a part() once it is known that not all will fit
   std::size_t filled = 0;          // records there
+  std::vector<std::uint16_t> range_of;  // where there is a partition: of what was filled, each record of the first run
   bool kept = false;               // files have names, and stay
   std::uint64_t points = 0;
   Digest digest{};
@@ -154,15 +144,31 @@ struct ExternalSorter::Impl {
 };
 
 void ExternalSorter::Impl::add(std::span<const PointRecord> records) {
-  digest = sum(digest, digest_of(records, executor));
   points += records.size();
   while (!records.empty()) {
     if (filled == filling.size()) spill();
     const std::size_t count = std::min(records.size(), filling.size() - filled);
-    std::ranges::copy(records.first(count), filling.begin() + static_cast<std::ptrdiff_t>(filled));
-    filled += count;
+    take(records.first(count));
     records = records.subspan(count);
   }
+}
+
+// All that looks at a record does so while it is in the cache: before it is grouped it has left it.
+void ExternalSorter::Impl::take(std::span<const PointRecord> records) {
+  constexpr std::size_t kGrain = 1 << 14, kInCache = 1 << 9;
+  const std::span<PointRecord> to = filling.subspan(filled, records.size());
+  const auto offset = static_cast<std::size_t>(to.data() - memory().data());
+  std::vector<Digest> digests(records.size() / kGrain + 1);
+  executor.for_ranges(records.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t at = begin; at < end; at += kInCache) {
+      const auto some = records.subspan(at, std::min(kInCache, end - at));
+      digests[begin / kGrain] = sum(digests[begin / kGrain], digest_of(some));
+      if (partition) partition->find_ranges(some, std::span(range_of).subspan(offset + at));
+      std::ranges::copy(some, to.begin() + static_cast<std::ptrdiff_t>(at));
+    }
+  });
+  for (const Digest& part : digests) digest = sum(digest, part);
+  filled += records.size();
 }
 
 // Only the first run is known: without a sample it stands for what will come.
@@ -178,6 +184,8 @@ void ExternalSorter::Impl::begin_partition() {
   if (!file) file.emplace(options.temp_dirs);
   partition = std::make_shared<Partition>(*file, Splitters(std::move(sample), ranges), kept);
   sample = {};
+  range_of.resize(plan.run_records);
+  partition->find_ranges(filling.first(filled), range_of, executor);
 }
 
 // Groups what was filled while more is filled, and writes it while that is grouped.
@@ -189,7 +197,8 @@ void ExternalSorter::Impl::spill() {
   const std::span<PointRecord> grouped = (whole_run ? scratch() : part(2 + turn)).first(filled);
   const auto group = [this, records, grouped, free = writing[turn]] {
     if (free.valid()) free.get();
-    return partition->group_run(records, grouped, executor);
+    const auto offset = static_cast<std::size_t>(records.data() - memory().data());
+    return partition->group_run(records, std::span(range_of).subspan(offset, records.size()), grouped, executor);
   };
   const bool at_once = whole_run || executor.threads() == 1;
   grouping = std::async(at_once ? std::launch::deferred : std::launch::async, group).share();
@@ -219,6 +228,7 @@ void ExternalSorter::Impl::spill_all() {
   for (const auto& write : writing) {
     if (write.valid()) write.get();
   }
+  range_of = {};
 }
 
 void ExternalSorter::Impl::keep(StateWriter& state) {

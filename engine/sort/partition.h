@@ -135,7 +135,19 @@ class ClassCounts {
     });
   }
 
-  /// The bits that are not the same in all keys.
+  /// Of classes that are known, without a look at the records. @param class_of  each record's, in the same order
+  ClassCounts(std::span<const PointRecord> from, std::span<const std::uint16_t> class_of, std::size_t classes, std::size_t blocks,
+              const Executor& executor)
+      : from_(from), classes_(classes), counts_(blocks, std::vector<std::size_t>(classes, 0)) {
+    each_block(executor, [&](std::size_t b) {
+      const std::span<std::size_t> counts = counts_[b];
+      const auto records = block(b);
+      const auto first = static_cast<std::size_t>(records.data() - from_.data());
+      for (const std::uint16_t c : class_of.subspan(first, records.size())) ++counts[c];
+    });
+  }
+
+  /// The bits that are not the same in all keys; not known when classes were given.
   [[nodiscard]] MortonKey differences() const noexcept {
     MortonKey all;
     for (const MortonKey& d : differences_) all = {all.high | d.high, all.low | d.low};

@@ -220,19 +220,23 @@ void Partition::discard(std::size_t range) const noexcept {
   for (const Run& run : runs_) file_.discard(run.place_of(range, 0), run.size(range) * kSpilledBytes);
 }
 
-Partition::Starts Partition::group_run(std::span<const PointRecord> records, std::span<PointRecord> grouped,
-                                       const Executor& executor) const {
+void Partition::find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of) const noexcept {
+  for (std::size_t i = 0; i < records.size(); ++i) range_of[i] = static_cast<std::uint16_t>(splitters_(records[i].key));
+}
+
+void Partition::find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of, const Executor& executor) const {
+  constexpr std::size_t kGrain = 1 << 14;
+  executor.for_ranges(records.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    find_ranges(records.subspan(begin, end - begin), range_of.subspan(begin));
+  });
+}
+
+Partition::Starts Partition::group_run(std::span<const PointRecord> records, std::span<const std::uint16_t> range_of,
+                                       std::span<PointRecord> grouped, const Executor& executor) const {
   const std::size_t blocks = partition_blocks(records.size(), ranges(), executor.threads());
-  // Looking for a range takes longer than keeping its number.
-  const auto range_of = std::make_unique_for_overwrite<std::uint16_t[]>(records.size());
-  const auto kept = [&](const PointRecord& record) -> std::uint16_t& {
-    return range_of[static_cast<std::size_t>(&record - records.data())];
-  };
-  const auto find = [&](const PointRecord& record) {
-    return kept(record) = static_cast<std::uint16_t>(splitters_(record.key));
-  };
-  const ClassCounts counts(records, ranges(), blocks, find, executor);
-  counts.scatter(grouped.data(), kept, executor);
+  const ClassCounts counts(records, range_of, ranges(), blocks, executor);
+  const auto known = [&](const PointRecord& record) { return range_of[static_cast<std::size_t>(&record - records.data())]; };
+  counts.scatter(grouped.data(), known, executor);
   const std::vector<std::size_t> starts = counts.starts();
   Starts ends(starts.size());
   std::ranges::transform(starts, ends.begin(), [](std::size_t i) { return static_cast<std::uint32_t>(i); });

@@ -112,9 +112,13 @@ class Partition {
   /// Where each range begins in a run, and the end.
   using Starts = std::vector<std::uint32_t>;
 
+  /// Fills the front of `range_of` with the numbers of the ranges that records lie in. Threads: any time.
+  void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of) const noexcept;
+  void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of, const Executor& executor) const;
   /// Groups a run into `grouped`, as long as `records`, stable. Threads: while another run is written, too.
-  [[nodiscard]] Starts group_run(std::span<const PointRecord> records, std::span<PointRecord> grouped,
-                                 const Executor& executor) const;
+  /// @param range_of  each record's range
+  [[nodiscard]] Starts group_run(std::span<const PointRecord> records, std::span<const std::uint16_t> range_of,
+                                 std::span<PointRecord> grouped, const Executor& executor) const;
   /// Writes what group_run() has grouped, as SpillFile::append(). Runs come in the order of the input.
   void write_run(std::span<PointRecord> grouped, Starts starts);
 

@@ -39,7 +39,7 @@ void Splitters::save(StateWriter& state) const {
 }
 
 void Splitters::index() {
-  constexpr std::size_t kCellsPerRange = 8;
+  constexpr std::size_t kCellsPerRange = 32;
   const std::size_t most_cells = kCellsPerRange * size();
   const Whole extent = keys_.back() - keys_.front();
   while (extent >> shift_ >= most_cells) ++shift_;

@@ -38,9 +38,12 @@ class Splitters {
     if (k < keys_.front()) return 0;
     if (k >= keys_.back()) return keys_.size();
     const auto cell = static_cast<std::size_t>((k - keys_.front()) >> shift_);
-    const auto first = keys_.begin() + below_cell_[cell],
-               last = keys_.begin() + below_cell_[cell + 1];
-    return static_cast<std::size_t>(std::upper_bound(first, last, k) - keys_.begin());
+    const std::size_t first = below_cell_[cell], last = below_cell_[cell + 1];
+    // Seldom more than one splitter: then without a branch, which keys in no order would mislead.
+    if (last - first < 2) return first + (static_cast<std::size_t>(first < last) & static_cast<std::size_t>(keys_[first] <= k));
+    const auto begin = keys_.begin();
+    return static_cast<std::size_t>(
+        std::upper_bound(begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(last), k) - begin);
   }
 
   /// True when a range can hold one key only.

@@ -27,6 +27,9 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
 
         const ClassCounts counts(input, classes, blocks, classify, three);
         CHECK(counts.starts() == starts);
+        std::vector<std::uint16_t> class_of;
+        for (const PointRecord& r : input) class_of.push_back(static_cast<std::uint16_t>(classify(r)));
+        CHECK(ClassCounts(input, class_of, classes, blocks, three).starts() == starts);
         for (std::size_t shift = 0; shift < 8; ++shift) {  // places in a cache line
           std::vector<PointRecord> out(count + 8);
           counts.scatter(out.data() + shift, classify, three);

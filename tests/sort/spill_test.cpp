@@ -35,10 +35,12 @@ std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord>
   Arena memory(run * sizeof(PointRecord) + kDirectBytes);
   const auto partition =
       std::make_shared<Partition>(file, Splitters(sample_of(records, 1000), ranges));
+  std::vector<std::uint16_t> range_of(run);
   while (!records.empty()) {
     const std::size_t count = std::min(run, records.size());
     const std::span<PointRecord> grouped = records_in(memory).first(count);
-    partition->write_run(grouped, partition->group_run(records.first(count), grouped, two));
+    partition->find_ranges(records.first(count), range_of, two);
+    partition->write_run(grouped, partition->group_run(records.first(count), range_of, grouped, two));
     records = records.subspan(count);
   }
   return partition;
