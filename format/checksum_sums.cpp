@@ -15,9 +15,9 @@ std::array<std::uint64_t, 2> xxh3_128_sum(std::span<const std::byte> bytes, std:
   return sum;
 }
 
-std::uint64_t xxh3_64_sum(std::span<const std::byte> bytes, std::size_t size, std::uint64_t seed) noexcept {
+std::uint64_t xxh3_64_sum(std::span<const std::byte> bytes, std::size_t size, std::size_t stride, std::uint64_t seed) noexcept {
   std::uint64_t sum = 0;
-  for (std::size_t at = 0; at < bytes.size(); at += size) sum += XXH3_64bits_withSeed(bytes.data() + at, size, seed++);
+  for (std::size_t at = 0; at < bytes.size(); at += stride) sum += XXH3_64bits_withSeed(bytes.data() + at, size, seed++);
   return sum;
 }
 

@@ -71,7 +71,8 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
   const auto partition = std::make_shared<Partition>(file_, std::move(splitters));
   std::vector<std::uint16_t> range_of(out.size());
   while (const std::size_t count = bucket.read(out, reader_)) {
-    const std::span<PointRecord> run = out.first(count), grouped = scratch.first(count);
+    const std::span<const PointRecord> run = out.first(count);
+    const auto grouped = std::as_writable_bytes(scratch);
     partition->find_ranges(run, range_of, executor_);
     partition->write_run(grouped, partition->group_run(run, range_of, grouped, executor_));
   }

@@ -194,7 +194,7 @@ void ExternalSorter::Impl::spill() {
   if (grouping.valid()) grouping.wait();  // out of the part that is filled next
   const std::span<PointRecord> records = filling.first(filled);
   const bool whole_run = filling.size() > part_records();  // the first one, where it was not known that more would come
-  const std::span<PointRecord> grouped = (whole_run ? scratch() : part(2 + turn)).first(filled);
+  const auto grouped = std::as_writable_bytes(whole_run ? scratch() : part(2 + turn));
   const auto group = [this, records, grouped, free = writing[turn]] {
     if (free.valid()) free.get();
     const auto offset = static_cast<std::size_t>(records.data() - memory().data());

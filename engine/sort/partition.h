@@ -7,7 +7,6 @@
 #include <cstring>
 #include <memory>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "engine/base/executor.h"
@@ -19,86 +18,87 @@
 
 namespace ptc {
 
-/// Eight records are five cache lines: what a WriteCombiner hands to memory at once.
-inline constexpr std::size_t kGroupRecords = 8;
 inline constexpr std::size_t kCacheLineBytes = 64;
-static_assert(kGroupRecords * sizeof(PointRecord) % kCacheLineBytes == 0);
+/// What a WriteCombiner hands to memory at once.
+inline constexpr std::size_t kBurstBytes = 4 * kCacheLineBytes;
 
-/// Writes records to many places at once, a group at a time. A record stored on its own would fetch
-/// the cache line it goes to and, with more places than the TLB has entries, its page as well.
+/// Writes the first bytes of records to many places at once, a burst of cache lines at a time. A record stored on its own
+/// would fetch the cache line it goes to and, with more places than the TLB has entries, its page as well.
 ///
-///   destination   | ......## | ######## | ####.... |   groups of 8 from a line's start
-///                        ^ begin of the class        a first and a last group may be partial
+///   destination   | ......## | ######## | ####.... |   bursts from a line's start
+///                        ^ begin of the class          a first and a last one may be partial
+template <std::size_t kBytes>
 class WriteCombiner {
  public:
-  /// @param begin  for every class the index of `to` where its first record goes
-  WriteCombiner(PointRecord* to, std::vector<std::size_t> begin)
-      : to_(to),
-        begin_(std::move(begin)),
-        next_(begin_),
-        groups_(std::make_unique_for_overwrite<Group[]>(begin_.size())) {
-    const auto address = reinterpret_cast<std::uintptr_t>(to);
-    while ((address + phase_ * sizeof(PointRecord)) % kCacheLineBytes != 0) ++phase_;
+  /// @param begin  for every class the number of the record at `to` where its first goes
+  WriteCombiner(std::byte* to, std::span<const std::size_t> begin)
+      : places_(begin.size()), bursts_(std::make_unique_for_overwrite<Burst[]>(begin.size())) {
+    for (std::size_t c = 0; c < begin.size(); ++c) {
+      std::byte* const first = to + begin[c] * kBytes;
+      const std::size_t in_line = reinterpret_cast<std::uintptr_t>(first) % kCacheLineBytes;
+      places_[c] = {first - in_line, in_line, in_line};
+    }
   }
 
   void put(std::size_t c, const PointRecord& record) noexcept {
-    const std::size_t slot = slot_of(next_[c]);
-    groups_[c].records[slot] = record;
-    ++next_[c];
-    if (slot == kGroupRecords - 1) flush(c);
+    Place& place = places_[c];
+    std::memcpy(bursts_[c].bytes + place.filled, &record, sizeof(PointRecord));
+    place.filled += kBytes;
+    if (place.filled >= kBurstBytes) flush(c);
   }
 
-  /// Writes what is left in the groups.
+  /// Writes what is left.
   void finish() noexcept {
-    for (std::size_t c = 0; c < begin_.size(); ++c) {
-      const std::size_t end = next_[c], in_group = slot_of(end);
-      const std::size_t first = std::max(begin_[c], end - std::min(end, in_group));
-      if (in_group != 0 && first < end) copy(c, first, end);
-    }
+    for (std::size_t c = 0; c < places_.size(); ++c) copy(c, places_[c].filled);
 #if defined(__SSE2__)
     _mm_sfence();  // streamed lines are seen by the other threads from here on
 #endif
   }
 
  private:
-  struct alignas(kCacheLineBytes) Group {
-    PointRecord records[kGroupRecords];
+  // A record that a burst ends in goes on behind it.
+  struct alignas(kCacheLineBytes) Burst {
+    std::byte bytes[kBurstBytes + kCacheLineBytes];
   };
-
-  // Index of a record in its group: 0 where `to` + index lies on a cache line.
-  [[nodiscard]] std::size_t slot_of(std::size_t index) const noexcept {
-    return (index - phase_) % kGroupRecords;
-  }
+  struct Place {
+    std::byte* line = nullptr;  // where the burst goes
+    std::size_t skipped = 0;    // of it: what is another's, before the first record
+    std::size_t filled = 0;
+  };
+  static_assert(kBytes <= sizeof(PointRecord) && sizeof(PointRecord) <= kCacheLineBytes);
 
   void flush(std::size_t c) noexcept {
-    const std::size_t end = next_[c];
-    if (end < begin_[c] + kGroupRecords) return copy(c, begin_[c], end);
-    PointRecord* const to = to_ + (end - kGroupRecords);
+    Place& place = places_[c];
+    if (place.skipped > 0) {
+      copy(c, kBurstBytes);
+      place.skipped = 0;
+    } else {
 #if defined(__SSE2__)
-    const auto* lines = reinterpret_cast<const __m128i*>(groups_[c].records);
-    auto* out = reinterpret_cast<__m128i*>(to);
-    for (std::size_t i = 0; i < sizeof(Group) / sizeof(__m128i); ++i)
-      _mm_stream_si128(out + i, _mm_load_si128(lines + i));
+      const auto* from = reinterpret_cast<const __m128i*>(bursts_[c].bytes);
+      auto* to = reinterpret_cast<__m128i*>(place.line);
+      for (std::size_t i = 0; i < kBurstBytes / sizeof(__m128i); ++i) _mm_stream_si128(to + i, _mm_load_si128(from + i));
 #else
-    std::memcpy(to, groups_[c].records, sizeof(Group));
+      std::memcpy(place.line, bursts_[c].bytes, kBurstBytes);
 #endif
+    }
+    std::memcpy(bursts_[c].bytes, bursts_[c].bytes + kBurstBytes, kCacheLineBytes);
+    place.line += kBurstBytes;
+    place.filled -= kBurstBytes;
   }
 
-  void copy(std::size_t c, std::size_t first, std::size_t end) noexcept {
-    std::memcpy(to_ + first, groups_[c].records + slot_of(first),
-                (end - first) * sizeof(PointRecord));
+  // The burst's own bytes before `end`.
+  void copy(std::size_t c, std::size_t end) noexcept {
+    const Place& place = places_[c];
+    std::memcpy(place.line + place.skipped, bursts_[c].bytes + place.skipped, end - place.skipped);
   }
 
-  PointRecord* to_;
-  std::size_t phase_ = 0;  // least index of `to` on a cache line
-  std::vector<std::size_t> begin_;
-  std::vector<std::size_t> next_;
-  std::unique_ptr<Group[]> groups_;
+  std::vector<Place> places_;
+  std::unique_ptr<Burst[]> bursts_;
 };
 
 /// Bytes that partition_records() allocates for each block.
 [[nodiscard]] constexpr std::size_t partition_bytes(std::size_t classes) noexcept {
-  return classes * (kGroupRecords * sizeof(PointRecord) + 3 * sizeof(std::size_t));
+  return classes * (kBurstBytes + kCacheLineBytes + 4 * sizeof(std::size_t));
 }
 
 /// Into how many blocks a partition is cut: one for each thread, but no more than keep their groups
@@ -167,8 +167,14 @@ class ClassCounts {
   /// Moves the records to `to`, class by class, each in the order in which they were.
   template <class Classify>
   void scatter(PointRecord* to, const Classify& classify, const Executor& executor) const {
+    scatter_packed<sizeof(PointRecord)>(reinterpret_cast<std::byte*>(to), classify, executor);
+  }
+
+  /// The same of the first bytes of each record, without gaps.
+  template <std::size_t kBytes, class Classify>
+  void scatter_packed(std::byte* to, const Classify& classify, const Executor& executor) const {
     each_block(executor, [&](std::size_t b) {
-      WriteCombiner out(to, begins(b));
+      WriteCombiner<kBytes> out(to, begins(b));
       for (const PointRecord& record : block(b)) out.put(classify(record), record);
       out.finish();
     });

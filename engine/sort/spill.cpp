@@ -35,19 +35,10 @@ bool is_full(const std::error_code& code) noexcept {
   return code.value() == ENOSPC || code.value() == EDQUOT || code.value() == EFBIG;
 }
 
-/// Of records from the i-th of a run's part on. Those of its pieces add up to that of the part.
-std::uint64_t digest_of(std::span<const PointRecord> records, std::uint64_t i) noexcept {
-  return xxh3_64_sum(std::as_bytes(records), sizeof(PointRecord), i);
-}
-
-/// Moves what goes to the disk of each record to the front. @return its bytes
-std::size_t pack(std::span<PointRecord> records) noexcept {
-  auto* const bytes = reinterpret_cast<std::byte*>(records.data());
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const PointRecord record = records[i];
-    std::memcpy(bytes + i * kSpilledBytes, &record, kSpilledBytes);
-  }
-  return records.size() * kSpilledBytes;
+/// Of what goes to the disk of records from the i-th of a run's part on. Those of its pieces add up to that of the part.
+/// @param stride  bytes from record to record
+std::uint64_t digest_of(std::span<const std::byte> records, std::size_t stride, std::uint64_t i) noexcept {
+  return xxh3_64_sum(records, kSpilledBytes, stride, i);
 }
 
 void unpack(const std::byte* bytes, std::span<PointRecord> out) noexcept {
@@ -124,8 +115,8 @@ std::vector<std::uint32_t> SpillFile::by_room(std::uint64_t bytes) const {
   return order;
 }
 
-SpillPlace SpillFile::append(std::span<PointRecord> records) {
-  const std::span bytes(reinterpret_cast<const std::byte*>(records.data()), direct_blocks(pack(records)));
+SpillPlace SpillFile::append(std::span<const std::byte> packed) {
+  const std::span bytes(packed.data(), direct_blocks(packed.size()));
   const std::vector<std::uint32_t> order = by_room(bytes.size());
   for (const std::uint32_t v : order) {
     Volume& volume = *volumes_[v];
@@ -232,23 +223,24 @@ void Partition::find_ranges(std::span<const PointRecord> records, std::span<std:
 }
 
 Partition::Starts Partition::group_run(std::span<const PointRecord> records, std::span<const std::uint16_t> range_of,
-                                       std::span<PointRecord> grouped, const Executor& executor) const {
+                                       std::span<std::byte> grouped, const Executor& executor) const {
   const std::size_t blocks = partition_blocks(records.size(), ranges(), executor.threads());
   const ClassCounts counts(records, range_of, ranges(), blocks, executor);
   const auto known = [&](const PointRecord& record) { return range_of[static_cast<std::size_t>(&record - records.data())]; };
-  counts.scatter(grouped.data(), known, executor);
+  counts.scatter_packed<kSpilledBytes>(grouped.data(), known, executor);
   const std::vector<std::size_t> starts = counts.starts();
   Starts ends(starts.size());
   std::ranges::transform(starts, ends.begin(), [](std::size_t i) { return static_cast<std::uint32_t>(i); });
   return ends;
 }
 
-void Partition::write_run(std::span<PointRecord> grouped, Starts starts) {
+void Partition::write_run(std::span<const std::byte> grouped, Starts starts) {
   Run run{.place = {}, .starts = std::move(starts), .digests = {}};
   for (std::size_t range = 0; kept_ && range < ranges(); ++range) {
-    run.digests.push_back(digest_of(grouped.subspan(run.starts[range], run.size(range)), 0));
+    const auto part = grouped.subspan(run.starts[range] * kSpilledBytes, run.size(range) * kSpilledBytes);
+    run.digests.push_back(digest_of(part, kSpilledBytes, 0));
   }
-  run.place = file_.append(grouped);
+  run.place = file_.append(grouped.first(run.starts.back() * kSpilledBytes));
   runs_.push_back(std::move(run));
 }
 
@@ -291,7 +283,7 @@ void BucketReader::verify(std::size_t run, std::size_t at, std::span<const Point
   for (; !records.empty(); ++run, at = 0) {
     const Partition::Run& from = partition_->runs_[run];
     const std::size_t size = from.size(range_), count = std::min(size - at, records.size());
-    digest_ += digest_of(records.first(count), at);
+    digest_ += digest_of(std::as_bytes(records.first(count)), sizeof(PointRecord), at);
     records = records.subspan(count);
     if (at + count < size) return;
     if (std::exchange(digest_, 0) != from.digests[range_]) partition_->file_.refuse(from.place_of(range_, 0), size);

@@ -44,11 +44,11 @@ class SpillFile {
 
   /// Writes records to the volume that this leaves least full, by its directory's room; when there is none left, to
   /// the others.
-  /// @param records  at an address that is a multiple of kDirectBytes, in memory that can be read
-  ///                 up to the next such multiple behind them; what they hold afterwards is of no use
+  /// @param packed  kSpilledBytes of each, at an address that is a multiple of kDirectBytes, in memory that can be read up
+  ///                to the next such multiple behind them
   /// @return  their place, its offset a multiple of kDirectBytes
   /// @throws std::system_error naming the directory
-  [[nodiscard]] SpillPlace append(std::span<PointRecord> records);
+  [[nodiscard]] SpillPlace append(std::span<const std::byte> packed);
   /// True when what was appended has so many bytes there.
   [[nodiscard]] bool holds(const SpillPlace& place, std::uint64_t bytes) const noexcept;
   void read_at(const SpillPlace& place, std::span<std::byte> bytes) const;
@@ -115,12 +115,13 @@ class Partition {
   /// Fills the front of `range_of` with the numbers of the ranges that records lie in. Threads: any time.
   void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of) const noexcept;
   void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of, const Executor& executor) const;
-  /// Groups a run into `grouped`, as long as `records`, stable. Threads: while another run is written, too.
+  /// Groups what goes to the disk of a run, stable. Threads: while another run is written, too.
   /// @param range_of  each record's range
+  /// @param grouped   for kSpilledBytes of each
   [[nodiscard]] Starts group_run(std::span<const PointRecord> records, std::span<const std::uint16_t> range_of,
-                                 std::span<PointRecord> grouped, const Executor& executor) const;
+                                 std::span<std::byte> grouped, const Executor& executor) const;
   /// Writes what group_run() has grouped, as SpillFile::append(). Runs come in the order of the input.
-  void write_run(std::span<PointRecord> grouped, Starts starts);
+  void write_run(std::span<const std::byte> grouped, Starts starts);
 
   [[nodiscard]] std::size_t ranges() const noexcept { return splitters_.size(); }
   /// Records of a range.

@@ -79,7 +79,14 @@ TEST_CASE("checksum: sums over records are those of their hashes", "[format][che
       seeded += xxh3_64(record, 3 + i);
     }
     CHECK(xxh3_128_sum(bytes, size) == wide);
-    CHECK(xxh3_64_sum(bytes, size, 3) == seeded);
+    CHECK(xxh3_64_sum(bytes, size, size, 3) == seeded);
+    std::vector<std::byte> apart;  // with a byte behind each that does not count
+    for (std::size_t i = 0; i < 7; ++i) {
+      const auto record = std::span(bytes).subspan(i * size, size);
+      apart.insert(apart.end(), record.begin(), record.end());
+      apart.push_back(std::byte(i + 1));
+    }
+    CHECK(xxh3_64_sum(apart, size, size + 1, 3) == seeded);
   }
   CHECK(xxh3_128_sum({}, 40) == std::array<std::uint64_t, 2>{});
 }

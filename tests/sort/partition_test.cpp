@@ -8,6 +8,13 @@
 using namespace ptc;
 using namespace ptc::test;
 
+namespace {
+
+constexpr std::size_t kPacked = 34;  // bytes of a record
+constexpr std::byte kUntouched{0xa5};
+
+}  // namespace
+
 TEST_CASE("partition: classes ascend and keep their order for any number of blocks",
           "[sort][partition]") {
   const Executor three(3);
@@ -34,6 +41,19 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
           std::vector<PointRecord> out(count + 8);
           counts.scatter(out.data() + shift, classify, three);
           REQUIRE(same_bytes(std::span(out).subspan(shift, count), expected));
+        }
+        std::vector<std::byte> packed;
+        for (const PointRecord& r : expected) {
+          const auto bytes = std::as_bytes(std::span(&r, 1)).first(kPacked);
+          packed.insert(packed.end(), bytes.begin(), bytes.end());
+        }
+        for (std::size_t shift = 0; shift < 70; shift += 23) {
+          std::vector<std::byte> out(packed.size() + 70, kUntouched);
+          counts.scatter_packed<kPacked>(out.data() + shift, classify, three);
+          const auto begin = out.begin() + static_cast<std::ptrdiff_t>(shift), end = begin + static_cast<std::ptrdiff_t>(packed.size());
+          REQUIRE(std::equal(begin, end, packed.begin()));
+          CHECK(std::count(out.begin(), begin, kUntouched) == begin - out.begin());
+          CHECK(std::count(end, out.end(), kUntouched) == out.end() - end);
         }
       }
 }

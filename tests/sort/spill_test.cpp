@@ -24,10 +24,6 @@ namespace {
 
 const std::filesystem::path kDirectory = std::filesystem::temp_directory_path();
 
-std::span<PointRecord> records_in(const Arena& arena) {
-  return {reinterpret_cast<PointRecord*>(arena.data()), arena.size() / sizeof(PointRecord)};
-}
-
 // `count` records in runs of at most `run`, partitioned by splitters of all of them.
 std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord> records,
                                    std::size_t run, std::size_t ranges) {
@@ -38,7 +34,7 @@ std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord>
   std::vector<std::uint16_t> range_of(run);
   while (!records.empty()) {
     const std::size_t count = std::min(run, records.size());
-    const std::span<PointRecord> grouped = records_in(memory).first(count);
+    const std::span grouped(memory.data(), memory.size());
     partition->find_ranges(records.first(count), range_of, two);
     partition->write_run(grouped, partition->group_run(records.first(count), range_of, grouped, two));
     records = records.subspan(count);
@@ -183,7 +179,7 @@ TEST_CASE("spill: a place is held when its bytes were appended", "[sort][spill]"
   SpillFile file({&kDirectory, 1});
   const Arena memory(8 * kDirectBytes);
   const std::size_t bytes = 3 * kDirectBytes;
-  static_cast<void>(file.append(records_in(memory).first(bytes / sizeof(PointRecord))));
+  static_cast<void>(file.append({memory.data(), bytes / kSpilledBytes * kSpilledBytes}));
   CHECK(file.bytes() == bytes);
   CHECK(file.holds({0, 0}, bytes));
   CHECK(file.holds({0, kDirectBytes}, bytes - kDirectBytes));
