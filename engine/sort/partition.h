@@ -96,12 +96,12 @@ class WriteCombiner {
   std::unique_ptr<Burst[]> bursts_;
 };
 
-/// Bytes that partition_records() allocates for each block.
+/// Bytes that ClassCounts::scatter() allocates for each block.
 [[nodiscard]] constexpr std::size_t partition_bytes(std::size_t classes) noexcept {
   return classes * (kBurstBytes + kCacheLineBytes + 4 * sizeof(std::size_t));
 }
 
-/// Into how many blocks a partition is cut: one for each thread, but no more than keep their groups
+/// Into how many blocks a partition is cut: one for each thread, but no more than keep their bursts
 /// below a 32nd of the records, nor smaller than is worth a thread.
 [[nodiscard]] inline std::size_t partition_blocks(std::size_t records, std::size_t classes,
                                                   unsigned threads) noexcept {
