@@ -170,4 +170,7 @@ class ContentDigest {
   void* state_;
 };
 
+/// That of all pages. @param pages  in page order
+[[nodiscard]] std::array<std::uint64_t, 2> content_digest(std::span<const DirectoryEntry> pages);
+
 }  // namespace ptc

@@ -51,4 +51,10 @@ std::array<std::uint64_t, 2> ContentDigest::value() const {
   return {hash.low64, hash.high64};
 }
 
+std::array<std::uint64_t, 2> content_digest(std::span<const DirectoryEntry> pages) {
+  ContentDigest digest;
+  for (const DirectoryEntry& page : pages) digest.add(page);
+  return digest.value();
+}
+
 }  // namespace ptc

@@ -116,6 +116,10 @@ struct ExternalSorter::Impl {
     return memory().subspan(k * part_records(), part_records());
   }
   [[nodiscard]] std::size_t part_records() noexcept { return memory().size() / 4; }
+  /// Where there is a partition: the ranges of records of the first run.
+  [[nodiscard]] std::span<std::uint16_t> ranges_of(std::span<const PointRecord> records) noexcept {
+    return std::span(range_of).subspan(static_cast<std::size_t>(records.data() - memory().data()), records.size());
+  }
   [[nodiscard]] std::unique_ptr<PointStream> stream_memory();
   [[nodiscard]] std::unique_ptr<PointStream> stream_buckets(std::uint64_t first);
 
@@ -126,7 +130,7 @@ struct ExternalSorter::Impl {
   Arena arena;             // two runs
   std::span<PointRecord> filling;  // a run, or a part() once it is known that not all will fit
   std::size_t filled = 0;          // records there
-  std::vector<std::uint16_t> range_of;  // where there is a partition: of what was filled, each record of the first run
+  std::vector<std::uint16_t> range_of;  // see ranges_of()
   bool kept = false;               // files have names, and stay
   std::uint64_t points = 0;
   Digest digest{};
@@ -157,13 +161,12 @@ void ExternalSorter::Impl::add(std::span<const PointRecord> records) {
 void ExternalSorter::Impl::take(std::span<const PointRecord> records) {
   constexpr std::size_t kGrain = 1 << 14, kInCache = 1 << 9;
   const std::span<PointRecord> to = filling.subspan(filled, records.size());
-  const auto offset = static_cast<std::size_t>(to.data() - memory().data());
   std::vector<Digest> digests(records.size() / kGrain + 1);
   executor.for_ranges(records.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t at = begin; at < end; at += kInCache) {
       const auto some = records.subspan(at, std::min(kInCache, end - at));
       digests[begin / kGrain] = sum(digests[begin / kGrain], digest_of(some));
-      if (partition) partition->find_ranges(some, std::span(range_of).subspan(offset + at));
+      if (partition) partition->find_ranges(some, ranges_of(to.subspan(at, some.size())));
       std::ranges::copy(some, to.begin() + static_cast<std::ptrdiff_t>(at));
     }
   });
@@ -185,7 +188,7 @@ void ExternalSorter::Impl::begin_partition() {
   partition = std::make_shared<Partition>(*file, Splitters(std::move(sample), ranges), kept);
   sample = {};
   range_of.resize(plan.run_records);
-  partition->find_ranges(filling.first(filled), range_of, executor);
+  partition->find_ranges(filling.first(filled), ranges_of(filling.first(filled)), executor);
 }
 
 // Groups what was filled while more is filled, and writes it while that is grouped.
@@ -197,8 +200,7 @@ void ExternalSorter::Impl::spill() {
   const auto grouped = std::as_writable_bytes(whole_run ? scratch() : part(2 + turn));
   const auto group = [this, records, grouped, free = writing[turn]] {
     if (free.valid()) free.get();
-    const auto offset = static_cast<std::size_t>(records.data() - memory().data());
-    return partition->group_run(records, std::span(range_of).subspan(offset, records.size()), grouped, executor);
+    return partition->group_run(records, ranges_of(records), grouped, executor);
   };
   const bool at_once = whole_run || executor.threads() == 1;
   grouping = std::async(at_once ? std::launch::deferred : std::launch::async, group).share();

@@ -41,9 +41,8 @@ class Splitters {
     const std::size_t first = below_cell_[cell], last = below_cell_[cell + 1];
     // Seldom more than one splitter: then without a branch, which keys in no order would mislead.
     if (last - first < 2) return first + (static_cast<std::size_t>(first < last) & static_cast<std::size_t>(keys_[first] <= k));
-    const auto begin = keys_.begin();
-    return static_cast<std::size_t>(
-        std::upper_bound(begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(last), k) - begin);
+    const Whole* const keys = keys_.data();
+    return static_cast<std::size_t>(std::upper_bound(keys + first, keys + last, k) - keys);
   }
 
   /// True when a range can hold one key only.

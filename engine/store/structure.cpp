@@ -102,9 +102,7 @@ void verify_root(const Superblock& superblock, std::span<const DirectoryEntry> e
 
 void verify_digest(const Superblock& superblock, std::span<const DirectoryEntry> entries,
                    const Blame& blame) {
-  ContentDigest digest;
-  for (const DirectoryEntry& entry : entries) digest.add(entry);
-  if (digest.value() != superblock.content_xxh3) {
+  if (content_digest(entries) != superblock.content_xxh3) {
     blame.superblock(kDigest, "content digest is not that of the directory");
   }
 }

@@ -23,8 +23,8 @@ namespace ptc {
 namespace {
 
 constexpr std::uint16_t kNoLevel = 0xffff;
-constexpr std::uint64_t kPageBytes = 80;              // of memory in finish()
-constexpr std::uint64_t kEncoderBytes = 768 << 10;    // and two pages
+constexpr std::uint64_t kPageBytes = 80;            // of memory a page, in finish()
+constexpr std::uint64_t kEncoderBytes = 768 << 10;  // and two pages
 
 void require(bool holds, const char* text) {
   if (!holds) throw std::invalid_argument(std::string("container writer: ") + text);
@@ -238,12 +238,6 @@ struct ContainerWriter::Impl {
     if (superblock.writer.empty()) superblock.writer = writer_name();
   }
 
-  static std::array<std::uint64_t, 2> digest_of(std::span<const DirectoryEntry> pages) {
-    ContentDigest digest;
-    for (const DirectoryEntry& entry : pages) digest.add(entry);
-    return digest.value();
-  }
-
   std::vector<DirectoryEntry> decode_directory(std::span<const std::byte> all, std::uint64_t file_bytes) const {
     std::vector<DirectoryEntry> pages;
     pages.reserve(entries.size());
@@ -256,7 +250,7 @@ struct ContainerWriter::Impl {
     Block block{};
     refuse_what_readers_refuse([&] {
       const std::vector<DirectoryEntry> pages = decode_directory(directory, superblock.file_bytes);
-      superblock.content_xxh3 = digest_of(pages);
+      superblock.content_xxh3 = content_digest(pages);
       block = encode_superblock(superblock);
       static_cast<void>(decode_superblock(block, header, superblock.file_bytes));
       const PageIndex index = index_pages(pages);
@@ -289,8 +283,8 @@ struct ContainerWriter::Impl {
   Codec codec;
   int level;
   OutputFile file;
-  EntryTable entries;  ///< pages are reserved while others are written
-  std::uint64_t end = kBlockBytes;      ///< where the next page goes
+  EntryTable entries;               ///< pages are reserved while others are written
+  std::uint64_t end = kBlockBytes;  ///< where the next page goes
   bool finished = false;
   std::vector<std::unique_ptr<Encoding>> encodings;
   Image single;               ///< these two kept between calls

@@ -80,9 +80,7 @@ std::vector<std::byte> Forgery::bytes() const {
   Superblock first = superblock;
   first.header = header;
   if (rehash_directory) {
-    ContentDigest digest;
-    for (const DirectoryEntry& entry : listed) digest.add(entry);
-    first.content_xxh3 = digest.value();
+    first.content_xxh3 = content_digest(listed);
     first.directory_xxh3 = xxh3_64(all);
   }
   Superblock second = first;
