@@ -9,12 +9,14 @@
 namespace ptc {
 namespace {
 
-/// Of the scene's point pages: raw when the first ones are, as single pages may be that do not compress.
+/// Of the scene's point pages: raw when the first ones are, as single pages may be that do not
+/// compress.
 Codec codec_of(const ContainerReader& scene) {
   constexpr std::size_t kPages = 16;
   const auto pages = scene.point_pages();
   for (const std::uint32_t page : pages.first(std::min(pages.size(), kPages))) {
-    if (const Codec codec = scene.read_page_header(page).coding.codec; codec != Codec::raw) return codec;
+    if (const Codec codec = scene.read_page_header(page).coding.codec; codec != Codec::raw)
+      return codec;
   }
   return Codec::raw;
 }
@@ -40,7 +42,9 @@ void adopt_profile(BuildRequest& request, const ContainerReader& scene) {
   }
 }
 
-void adopt_page_size(BuildRequest& request, const ContainerReader& scene) { request.page_shift = scene.header().page_shift; }
+void adopt_page_size(BuildRequest& request, const ContainerReader& scene) {
+  request.page_shift = scene.header().page_shift;
+}
 
 void adopt_leaves(BuildRequest& request, const ContainerReader& scene) {
   request.tree.leaf_points = std::max(1U, scene.superblock().leaf_points);

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "engine/pipeline.h"
 #include "engine/io/points.h"
+#include "engine/pipeline.h"
 
 namespace ptc {
 namespace {
@@ -15,7 +15,8 @@ void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Ma
   box.materials.push_back(material);
   const glm::vec3 size(high - low);
   for (int corner = 0; corner < 8; ++corner) {
-    box.positions.emplace_back(corner & 1 ? size.x : 0, corner & 2 ? size.y : 0, corner & 4 ? size.z : 0);
+    box.positions.emplace_back(corner & 1 ? size.x : 0, corner & 2 ? size.y : 0,
+                               corner & 4 ? size.z : 0);
   }
   constexpr std::uint32_t kQuads[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                           {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
@@ -35,8 +36,10 @@ void add_backdrop(Mesh& mesh) {
   const double floor = bounds.low.y;
   const double wall = bounds.low.x - 0.15 * size;
   add_box(mesh, {middle.x - 1.6 * size, floor - 0.04 * size, middle.z - 1.6 * size},
-          {middle.x + 1.6 * size, floor, middle.z + 1.6 * size}, {.name = "ground", .albedo = glm::vec3(0.6F)});
-  add_box(mesh, {wall - 0.05 * size, floor, middle.z - 0.8 * size}, {wall, floor + 0.9 * size, middle.z + 0.8 * size},
+          {middle.x + 1.6 * size, floor, middle.z + 1.6 * size},
+          {.name = "ground", .albedo = glm::vec3(0.6F)});
+  add_box(mesh, {wall - 0.05 * size, floor, middle.z - 0.8 * size},
+          {wall, floor + 0.9 * size, middle.z + 0.8 * size},
           {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)});
 }
 

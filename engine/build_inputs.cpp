@@ -51,7 +51,8 @@ std::vector<glm::dvec3> sample_triangles(const Mesh& mesh) {
 /// Points spread over the ground of the city.
 std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
   const glm::dvec3 extent = bounds.high - bounds.low;
-  const int up = extent.x < extent.y ? (extent.x < extent.z ? 0 : 2) : (extent.y < extent.z ? 1 : 2);
+  const int up =
+      extent.x < extent.y ? (extent.x < extent.z ? 0 : 2) : (extent.y < extent.z ? 1 : 2);
   std::vector<glm::dvec3> sample;
   for (int j = 0; j < 256; ++j) {
     for (int i = 0; i < 256; ++i) {
@@ -65,8 +66,8 @@ std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
 }
 
 /// Moves everything a source gives into the sort. @return how many points
-std::uint64_t feed(PointSource& source, const Frame& frame, ExternalSorter& sorter, const Executor& executor,
-                   Progress& progress) {
+std::uint64_t feed(PointSource& source, const Frame& frame, ExternalSorter& sorter,
+                   const Executor& executor, Progress& progress) {
   std::vector<Surfel> surfels(kBlock);
   std::vector<PointRecord> records(kBlock);
   std::uint64_t points = 0;
@@ -107,7 +108,8 @@ BuildInputs lay_city(std::uint64_t points) {
 }
 
 bool has_emitters(const Mesh& mesh) {
-  return std::ranges::any_of(mesh.materials, [](const Material& m) { return m.emission != glm::vec3(0); });
+  return std::ranges::any_of(mesh.materials,
+                             [](const Material& m) { return m.emission != glm::vec3(0); });
 }
 
 BuildInputs read_files(const BuildRequest& request, Progress& progress) {
@@ -156,17 +158,20 @@ BuildInputs read_inputs(const BuildRequest& request, StageSeconds& seconds, Prog
   return read_files(request, progress);
 }
 
-double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame, ExternalSorter& sorter,
-                   const Executor& executor, Progress& progress) {
-  if (request.city_points > 0) feed(*make_city(request.city_points), frame, sorter, executor, progress);
+double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
+                   ExternalSorter& sorter, const Executor& executor, Progress& progress) {
+  if (request.city_points > 0)
+    feed(*make_city(request.city_points), frame, sorter, executor, progress);
   for (const auto& [path, points] : inputs.clouds.files) {
     if (feed(*open_lit(path), frame, sorter, executor, progress) == points) continue;
     throw DataError(path.string() + ": the file changed while it was read");
   }
   double spacing = 0;
   if (const LitMesh* lit = inputs.lit.get()) {
-    spacing = request.sampling.spacing > 0 ? request.sampling.spacing : spacing_for(lit->mesh, request.sampling.count);
-    feed(*sample_mesh(lit->light, lit->rays, request.sampling, executor), frame, sorter, executor, progress);
+    spacing = request.sampling.spacing > 0 ? request.sampling.spacing
+                                           : spacing_for(lit->mesh, request.sampling.count);
+    feed(*sample_mesh(lit->light, lit->rays, request.sampling, executor), frame, sorter, executor,
+         progress);
   }
   inputs.lit.reset();
   return spacing;

@@ -54,13 +54,17 @@ struct BuildInputs {
 };
 
 /// Reads and measures what is asked for. @throws DataError, std::system_error
-[[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, StageSeconds& seconds, Progress& progress);
+[[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, StageSeconds& seconds,
+                                      Progress& progress);
 
 /// Moves all surfels into the sort; meshes are sampled and lit, and gone afterwards.
-/// @return  the spacing of those on meshes, 0 without @throws DataError when a file changed since it was read
-double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame, ExternalSorter& sorter,
-                   const Executor& executor, Progress& progress);
+/// @return  the spacing of those on meshes, 0 without @throws DataError when a file changed since
+/// it was read
+double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
+                   ExternalSorter& sorter, const Executor& executor, Progress& progress);
 
-[[nodiscard]] inline std::array<double, 3> to_array(const glm::dvec3& p) { return {p.x, p.y, p.z}; }
+[[nodiscard]] inline std::array<double, 3> to_array(const glm::dvec3& p) {
+  return {p.x, p.y, p.z};
+}
 
 }  // namespace ptc

@@ -46,8 +46,9 @@ void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shadi
   }
 }
 
-CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const Sky& sky, const DirectLight* light,
-                                 const RayScene* mesh, const LightPaths& paths, std::uint64_t memory_bytes,
+CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const Sky& sky,
+                                 const DirectLight* light, const RayScene* mesh,
+                                 const LightPaths& paths, std::uint64_t memory_bytes,
                                  const Executor& executor, Progress& progress) const {
   CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
   if (receivers_.empty()) return report;
@@ -65,7 +66,8 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
   if (!light || !mesh) return report;
   report.mesh_microseconds = timed(receivers_.size(), [&] {
     executor.for_each(twice.size(), [&](std::size_t i, unsigned) {
-      const RayTraced seen = trace_mesh(*mesh, *light, twice[i].position, twice[i].normal, half, paths, i);
+      const RayTraced seen =
+          trace_mesh(*mesh, *light, twice[i].position, twice[i].normal, half, paths, i);
       traced[i] = {.occlusion = seen.occlusion, .irradiance = seen.irradiance, .sky = seen.sky};
       progress.advance(1);
     });

@@ -18,7 +18,9 @@ namespace ptc {
 class ReceiverPlaces {
  public:
   void add(const Receiver& receiver) { places_.insert(place(receiver)); }
-  [[nodiscard]] bool contains(const Receiver& receiver) const { return places_.contains(place(receiver)); }
+  [[nodiscard]] bool contains(const Receiver& receiver) const {
+    return places_.contains(place(receiver));
+  }
 
  private:
   using Place = std::array<double, 3>;
@@ -49,8 +51,9 @@ class CheckSample {
   /// @param memory_bytes  cap of what rays at the surfels need, StreamedRays::kLeastBytes at least
   /// @param progress  advances by one a receiver, twice for each reference
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides, const Sky& sky,
-                                    const DirectLight* light, const RayScene* mesh, const LightPaths& paths,
-                                    std::uint64_t memory_bytes, const Executor& executor, Progress& progress) const;
+                                    const DirectLight* light, const RayScene* mesh,
+                                    const LightPaths& paths, std::uint64_t memory_bytes,
+                                    const Executor& executor, Progress& progress) const;
 
  private:
   CheckRequest request_;

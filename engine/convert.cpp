@@ -162,7 +162,8 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   std::vector<std::byte> payload(container.page_payload_limit());
   for (const std::uint32_t page : order) {
     const PageHeader header = container.read_page(page, payload, decoder);
-    writer.write_page(page, ContainerWriter::facts_of(header), std::span(payload).first(header.raw_bytes),
+    writer.write_page(page, ContainerWriter::facts_of(header),
+                      std::span(payload).first(header.raw_bytes),
                       container.attribute_columns(header.group));
     if (header.type == PageType::point) progress.advance(header.record_count);
   }
@@ -178,7 +179,8 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
       pages = pages.subspan(1);
       return container.read_page(page, payload, decoder).record_count;
     };
-    ChannelPager pager(container.attribute_columns(group), container.page_payload_limit(), next_page);
+    ChannelPager pager(container.attribute_columns(group), container.page_payload_limit(),
+                       next_page);
     for (std::uint64_t left = container.superblock().points; left > 0;) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
       writer.write_page(writer.reserve_page(),
@@ -189,13 +191,15 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   }
 }
 
-Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round, const Executor& executor,
-                         Progress& progress) {
+Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round,
+                         const Executor& executor, Progress& progress) {
   const Superblock& from = container.superblock();
   ContainerPoints points(container);
   const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
-  const std::unique_ptr<PointStream> rounded = round ? round_points(points, container.header().frame.unit(), executor) : nullptr;
-  const Superblock superblock = build_pages(rounded ? *rounded : points, writer, tree, executor, progress);
+  const std::unique_ptr<PointStream> rounded =
+      round ? round_points(points, container.header().frame.unit(), executor) : nullptr;
+  const Superblock superblock =
+      build_pages(rounded ? *rounded : points, writer, tree, executor, progress);
   repage_channels(container, writer);
   return superblock;
 }
@@ -235,15 +239,19 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   const FileHeader& from = container.header();
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
   const Executor executor(options.run.threads);
-  const std::uint64_t pages = (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) + container.page_count();
-  const std::uint64_t taken = open_bytes(container) + ContainerWriter::memory_bytes(pages, page_shift, executor.threads());
+  const std::uint64_t pages =
+      (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) +
+      container.page_count();
+  const std::uint64_t taken =
+      open_bytes(container) + ContainerWriter::memory_bytes(pages, page_shift, executor.threads());
   static_cast<void>(memory_left(options.run, kBufferBytes + taken, 0, "this conversion"));
   ContainerWriter writer(target, {.page_shift = page_shift,
                                   .codec = codec_of(options.profile),
                                   .uuid = derived_uuid(container, options.profile, page_shift),
                                   .frame = from.frame});
   Meta meta = container.meta();
-  const bool round = is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
+  const bool round =
+      is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
   // finish() numbers the meta page last: where it was not, the others cannot keep their numbers.
   const bool same_pages = page_shift == from.page_shift && !round &&
                           container.superblock().meta_page == container.page_count() - 1;

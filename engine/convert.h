@@ -28,7 +28,8 @@ struct ConvertReport {
 };
 
 /// Writes the points of a container with all its channels as columns of a PLY.
-/// @throws FormatError, std::system_error   Memory: the open container and a few pages, within kBufferBytes.
+/// @throws FormatError, std::system_error   Memory: the open container and a few pages, within
+/// kBufferBytes.
 ConvertReport container_to_ply(const ContainerReader& container,
                                const std::filesystem::path& target, Progress& progress);
 
@@ -37,9 +38,10 @@ ConvertReport container_to_ply(const ContainerReader& container,
 ConvertReport container_to_xyz(const ContainerReader& container,
                                const std::filesystem::path& target, Progress& progress);
 
-/// Writes a container anew: the same points, channels and record in another profile or page size. What was rounded
-/// stays so. While the page size stays and points are not rounded, pages keep their order and numbers; else the
-/// octree is built again from the points. The same input gives the same bytes.
+/// Writes a container anew: the same points, channels and record in another profile or page size.
+/// What was rounded stays so. While the page size stays and points are not rounded, pages keep
+/// their order and numbers; else the octree is built again from the points. The same input gives
+/// the same bytes.
 /// @throws FormatError, std::system_error, LimitError for a cap that is too small
 ConvertReport recode_container(const ContainerReader& container,
                                const std::filesystem::path& target, const RecodeOptions& options,

@@ -34,7 +34,8 @@ void ErrorSums::add(const Shading& ours, const Shading& a, const Shading& b) {
   receivers_ += 1;
   occlusion_.add(value(ours.occlusion), value(a.occlusion), value(b.occlusion), 1);
   for (int c = 0; c < 3; ++c) {
-    irradiance_.add(value(ours.irradiance[c]), value(a.irradiance[c]), value(b.irradiance[c]), 1.0 / 3);
+    irradiance_.add(value(ours.irradiance[c]), value(a.irradiance[c]), value(b.irradiance[c]),
+                    1.0 / 3);
   }
 }
 

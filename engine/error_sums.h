@@ -17,8 +17,8 @@ void leave_out_bleeding(std::span<Shading> traced);
 
 /// Sums over receivers, each shaded by us and twice by rays.
 ///
-/// With a and b independent and right in the mean, (ours - a) (ours - b) is in the mean the square of
-/// our error alone, and (a - b)^2 / 4 that of (a + b) / 2.
+/// With a and b independent and right in the mean, (ours - a) (ours - b) is in the mean the square
+/// of our error alone, and (a - b)^2 / 4 that of (a + b) / 2.
 class ErrorSums {
  public:
   /// @param a, b  by rays, of different seeds

@@ -22,9 +22,11 @@
 namespace ptc {
 namespace {
 
-constexpr unsigned kTileSide = 256;               // pixels
-constexpr std::uint64_t kReceiverBytes = 320;     // of one pixel of a tile: hit, receiver, result, order
-constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);  // more, with estimates
+constexpr unsigned kTileSide = 256;  // pixels
+constexpr std::uint64_t kReceiverBytes =
+    320;  // of one pixel of a tile: hit, receiver, result, order
+constexpr std::uint64_t kEstimateBytes =
+    sizeof(Shading) + sizeof(ErrorEstimate);  // more, with estimates
 constexpr unsigned kMostVariants = 16;
 
 /// Sums over the samples of every pixel.
@@ -32,11 +34,13 @@ struct Film {
   unsigned width, height;
   std::vector<glm::vec3> beauty, direct, indirect, bent_normal, albedo;
   std::vector<float> occlusion, alpha;
-  std::vector<float> occlusion_error, irradiance_error;  // squares until finish(); empty without estimates
+  std::vector<float> occlusion_error,
+      irradiance_error;  // squares until finish(); empty without estimates
 
   Film(unsigned w, unsigned h, bool estimates) : width(w), height(h) {
     const std::size_t pixels = std::size_t{w} * h;
-    for (auto* layer : {&beauty, &direct, &indirect, &bent_normal, &albedo}) layer->resize(pixels, glm::vec3(0));
+    for (auto* layer : {&beauty, &direct, &indirect, &bent_normal, &albedo})
+      layer->resize(pixels, glm::vec3(0));
     for (auto* layer : {&occlusion, &alpha}) layer->resize(pixels, 0);
     if (!estimates) return;
     for (auto* layer : {&occlusion_error, &irradiance_error}) layer->resize(pixels, 0);
@@ -96,7 +100,8 @@ void write_layers(const std::filesystem::path& target, const Film& film) {
 void write_layer_png(const PictureTarget& target, const Film& film, float exposure) {
   Image image{.width = film.width, .height = film.height};
   if (target.layer == "occlusion") {
-    for (std::size_t i = 0; i < film.occlusion.size(); ++i) image.pixels.emplace_back(1 - film.occlusion[i]);
+    for (std::size_t i = 0; i < film.occlusion.size(); ++i)
+      image.pixels.emplace_back(1 - film.occlusion[i]);
   } else {
     image.pixels = target.layer == "direct"     ? film.direct
                    : target.layer == "indirect" ? film.indirect
@@ -127,8 +132,8 @@ struct Subject {
 };
 
 /// Makes the rays of a subject that has a mesh.
-void view_mesh_of(Subject& subject, const RenderRequest& request, const ContainerReader& scene, const LightRig& lights,
-                  const Camera& camera, unsigned side) {
+void view_mesh_of(Subject& subject, const RenderRequest& request, const ContainerReader& scene,
+                  const LightRig& lights, const Camera& camera, unsigned side) {
   const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
   subject.rays = std::make_unique<RayScene>(subject.mesh);
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
@@ -147,12 +152,16 @@ std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample, unsig
 }
 
 /// Windows of samples that stand for a picture's, where they see something.
-std::vector<Pilot> pilots_of(const PrimaryView& view, const Camera& camera, unsigned side, const Executor& executor) {
-  constexpr double kGolden[2] = {0.7548776662466927, 0.5698402909980532};  // plane covered evenly (Roberts 2018)
+std::vector<Pilot> pilots_of(const PrimaryView& view, const Camera& camera, unsigned side,
+                             const Executor& executor) {
+  constexpr double kGolden[2] = {0.7548776662466927,
+                                 0.5698402909980532};  // plane covered evenly (Roberts 2018)
   constexpr std::uint64_t kWidth = 16;
   const PilotPlan plan = plan_pilots(std::uint64_t{camera.width} * camera.height * side * side);
-  const auto width = static_cast<unsigned>(std::min<std::uint64_t>({kWidth, camera.width, plan.receivers}));
-  const auto height = static_cast<unsigned>(std::min<std::uint64_t>(camera.height, plan.receivers / width));
+  const auto width =
+      static_cast<unsigned>(std::min<std::uint64_t>({kWidth, camera.width, plan.receivers}));
+  const auto height =
+      static_cast<unsigned>(std::min<std::uint64_t>(camera.height, plan.receivers / width));
   std::vector<Pilot> pilots(2 * plan.count);  // some see nothing
   executor.for_each(pilots.size(), [&](std::size_t i, unsigned) {
     const auto place = [&](int axis, unsigned room) {
@@ -173,22 +182,33 @@ std::vector<Pilot> pilots_of(const PrimaryView& view, const Camera& camera, unsi
   return pilots;
 }
 
-/// Renders one sample of every pixel of a tile into the film. Each of a pixel's samples is shaded with
-/// a variant of its own, so that what one of them resolves too coarsely the others average out.
+/// Renders one sample of every pixel of a tile into the film. Each of a pixel's samples is shaded
+/// with a variant of its own, so that what one of them resolves too coarsely the others average
+/// out.
 class TileRenderer {
  public:
   /// @param estimator  or null
-  TileRenderer(const PrimaryView& view, Shader& shader, Estimator* estimator, Film& film, const Camera& camera, unsigned side,
-               const Sky& sky, CheckSample& check, const Executor& executor)
-      : view_(view), shader_(shader), estimator_(estimator), film_(film), camera_(camera), side_(side), sky_(sky), check_(check),
+  TileRenderer(const PrimaryView& view, Shader& shader, Estimator* estimator, Film& film,
+               const Camera& camera, unsigned side, const Sky& sky, CheckSample& check,
+               const Executor& executor)
+      : view_(view),
+        shader_(shader),
+        estimator_(estimator),
+        film_(film),
+        camera_(camera),
+        side_(side),
+        sky_(sky),
+        check_(check),
         executor_(executor) {}
 
   /// The picture, tile by tile.
   void render_all(Progress& progress) {
     for (unsigned y = 0; y < camera_.height; y += kTileSide) {
       for (unsigned x = 0; x < camera_.width; x += kTileSide) {
-        const unsigned x1 = std::min(camera_.width, x + kTileSide), y1 = std::min(camera_.height, y + kTileSide);
-        for (unsigned sample = 0; sample < side_ * side_; ++sample) render(x, y, x1, y1, sample, progress);
+        const unsigned x1 = std::min(camera_.width, x + kTileSide),
+                       y1 = std::min(camera_.height, y + kTileSide);
+        for (unsigned sample = 0; sample < side_ * side_; ++sample)
+          render(x, y, x1, y1, sample, progress);
       }
     }
   }
@@ -198,7 +218,8 @@ class TileRenderer {
  private:
   /// @param x0, y0, x1, y1  pixels
   /// @param sample  0 to side^2 - 1
-  void render(unsigned x0, unsigned y0, unsigned x1, unsigned y1, unsigned sample, Progress& progress) {
+  void render(unsigned x0, unsigned y0, unsigned x1, unsigned y1, unsigned sample,
+              Progress& progress) {
     find_hits(x0, y0, x1, y1, sample);
     receivers_.clear();
     for (const auto& hit : hits_) {
@@ -220,7 +241,8 @@ class TileRenderer {
     hits_.assign(columns * (y1 - y0), std::nullopt);
     executor_.for_each(y1 - y0, [&](std::size_t row, unsigned) {
       for (std::size_t i = 0; i < columns; ++i) {
-        const auto [x, y] = sample_at(x0 + static_cast<unsigned>(i), y0 + static_cast<unsigned>(row), sample, side_);
+        const auto [x, y] = sample_at(x0 + static_cast<unsigned>(i),
+                                      y0 + static_cast<unsigned>(row), sample, side_);
         hits_[row * columns + i] = view_.at(x, y);
       }
     });
@@ -239,8 +261,9 @@ class TileRenderer {
       } else {
         const float scale = 1.0F / static_cast<float>(side_);
         const auto [sx, sy] = sample_at(x, y, sample, side_);
-        film_.beauty[pixel] += weight * sky_.at(camera_.direction((static_cast<float>(sx) + 0.5F) * scale,
-                                                                  (static_cast<float>(sy) + 0.5F) * scale));
+        film_.beauty[pixel] +=
+            weight * sky_.at(camera_.direction((static_cast<float>(sx) + 0.5F) * scale,
+                                               (static_cast<float>(sy) + 0.5F) * scale));
       }
     }
   }
@@ -263,24 +286,29 @@ class TileRenderer {
 
 }  // namespace
 
-ShadeReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets, Progress& progress) {
+ShadeReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
+                           Progress& progress) {
   ShadeReport report;
   check_estimate_request(request.estimate, request.error, request.check);
   check_damage_request(request.tolerate_damage, request.bounces, request.error, request.check);
-  if (request.estimate && std::ranges::none_of(targets, [](const auto& t) { return t.path.extension() == ".exr"; })) {
+  if (request.estimate &&
+      std::ranges::none_of(targets, [](const auto& t) { return t.path.extension() == ".exr"; })) {
     throw std::invalid_argument("estimates are layers of an .exr: name one to write");
   }
   const Executor executor(request.run.threads);
   const ContainerReader scene(request.scene);
   const LightRig lights = request.lights ? *request.lights : recorded_lights(scene);
   const auto side = static_cast<unsigned>(std::lround(std::sqrt(request.samples)));
-  if (side * side != request.samples) throw std::invalid_argument("samples per pixel must be a square number");
+  if (side * side != request.samples)
+    throw std::invalid_argument("samples per pixel must be a square number");
 
-  const std::unique_ptr<LostPages> lost = request.tolerate_damage ? std::make_unique<LostPages>(scene) : nullptr;
+  const std::unique_ptr<LostPages> lost =
+      request.tolerate_damage ? std::make_unique<LostPages>(scene) : nullptr;
   std::vector<MeshCamera> cameras;
   Subject subject;
   subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, &cameras);
-  Camera camera = request.camera ? *request.camera : default_camera(scene, cameras, request.backdrop, request.size);
+  Camera camera = request.camera ? *request.camera
+                                 : default_camera(scene, cameras, request.backdrop, request.size);
   if (request.size) {
     camera.width = (*request.size)[0];
     camera.height = (*request.size)[1];
@@ -301,15 +329,19 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   options.gather.bleeding = request.bounces > 0;
   const std::uint64_t receiver_bytes = kReceiverBytes + (request.estimate ? kEstimateBytes : 0);
   const std::uint64_t pixel_bytes = Film::kBytes + (request.estimate ? Film::kEstimateBytes : 0);
-  const std::uint64_t taken = kBufferBytes + std::uint64_t{kTileSide} * kTileSide * receiver_bytes +
-                              std::uint64_t{camera.width} * camera.height * pixel_bytes +
-                              (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24) +
-                              bounce_bytes(scene, request.bounces, executor.threads());
-  options.cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), request.back_end,
-                                         "this picture");
+  const std::uint64_t taken =
+      kBufferBytes + std::uint64_t{kTileSide} * kTileSide * receiver_bytes +
+      std::uint64_t{camera.width} * camera.height * pixel_bytes +
+      (subject.rays ? mesh_bytes(subject.mesh, subject.rays.get()) : samples * 24) +
+      bounce_bytes(scene, request.bounces, executor.threads());
+  options.cache_bytes =
+      cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate),
+                       request.back_end, "this picture");
   const std::unique_ptr<ContainerReader> bounced =
-      bounce_light(scene, {request.bounces, options, request.lift, roomiest_temp_dir(request.run, targets.front().path)}, executor,
-                   report, progress);
+      bounce_light(scene,
+                   {request.bounces, options, request.lift,
+                    roomiest_temp_dir(request.run, targets.front().path)},
+                   executor, report, progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
   ReceiverPlaces compared;
   std::vector<Pilot> pilots;
@@ -317,7 +349,8 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   std::vector<Shading> traced;  // by rays, of the pilots
   if (request.error) {
     const Stage stage(report.seconds, progress, "tune", 0, "receivers");
-    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared, traced);
+    report.tuning =
+        tune(lit, options, *request.error, pilots, executor, progress, compared, traced);
     options.gather = report.tuning->gather;
   }
   std::unique_ptr<Estimator> estimator;
@@ -333,7 +366,8 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   CheckSample check(request.check, std::move(compared));
   {
     const Stage stage(report.seconds, progress, "render", samples, "samples");
-    TileRenderer tiles(*subject.view, *shader, estimator.get(), film, camera, side, lights.sky, check, executor);
+    TileRenderer tiles(*subject.view, *shader, estimator.get(), film, camera, side, lights.sky,
+                       check, executor);
     tiles.render_all(progress);
     report.shade_cpu_seconds = tiles.shade_cpu_seconds();
   }
@@ -352,10 +386,13 @@ ShadeReport render_picture(const RenderRequest& request, std::span<const Picture
   write_targets(targets, film, request.exposure);
   if (request.check.receivers > 0) {
     const std::uint64_t references = subject.rays ? 4 : 2;
-    const Stage stage(report.seconds, progress, "check", references * request.check.receivers, "references");
-    const LightSampling sampling{.sun_rays = 1, .area_rays = lit_by_emitters(scene) ? 1U : 0U, .sky_rays = 1};
-    report.check = check.compare(lit, request.gather.sides, lights.sky, subject.light.get(), subject.rays.get(),
-                                 {sampling, request.bounces}, options.cache_bytes, executor, progress);
+    const Stage stage(report.seconds, progress, "check", references * request.check.receivers,
+                      "references");
+    const LightSampling sampling{
+        .sun_rays = 1, .area_rays = lit_by_emitters(scene) ? 1U : 0U, .sky_rays = 1};
+    report.check = check.compare(lit, request.gather.sides, lights.sky, subject.light.get(),
+                                 subject.rays.get(), {sampling, request.bounces},
+                                 options.cache_bytes, executor, progress);
   }
   return report;
 }

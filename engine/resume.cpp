@@ -21,12 +21,15 @@ namespace {
 /// A line for each thing that the bytes of the container follow from.
 std::string text_of(const BuildRequest& request) {
   std::string text;
-  const auto line = [&](const char* name, const auto& value) { text += fmt::format("{}: {}\n", name, value); };
+  const auto line = [&](const char* name, const auto& value) {
+    text += fmt::format("{}: {}\n", name, value);
+  };
   line("the program", writer_name());
   const auto file = [&](const char* name, const std::filesystem::path& path) {
     const auto changed = std::filesystem::last_write_time(path).time_since_epoch().count();
     const std::string whole = std::filesystem::absolute(path).string();
-    line(name, fmt::format("{}, {} bytes, changed {}", whole, std::filesystem::file_size(path), changed));
+    line(name,
+         fmt::format("{}, {} bytes, changed {}", whole, std::filesystem::file_size(path), changed));
   };
   for (const std::filesystem::path& input : request.inputs) file("an input", input);
   if (!request.append.empty()) file("--append", request.append);
@@ -62,7 +65,9 @@ std::filesystem::path with_ending(const std::filesystem::path& path, const char*
   return path.parent_path() / (path.filename().string() + ending);
 }
 
-void remove_file(const std::filesystem::path& path) noexcept { ::unlink(path.c_str()); }
+void remove_file(const std::filesystem::path& path) noexcept {
+  ::unlink(path.c_str());
+}
 
 void put_plan(const BuildPlan& plan, StateWriter& state) {
   state.put(plan.frame.origin);
@@ -93,9 +98,11 @@ Resumption::Resumption(const BuildRequest& request, const std::filesystem::path&
       request_(text_of(request)) {
   if (request.mesh) throw std::invalid_argument("a build from a mesh in memory cannot be resumed");
   const std::string whole = std::filesystem::absolute(target).lexically_normal().string();
-  const std::uint64_t name = xxh3_64(std::as_bytes(std::span(whole)));  // two outputs may share a directory for temporary files
+  const std::uint64_t name = xxh3_64(
+      std::as_bytes(std::span(whole)));  // two outputs may share a directory for temporary files
   for (const std::filesystem::path& directory : temp_dirs(request.run, target)) {
-    spills_.push_back(directory / fmt::format("{}.resume-spill-{:016x}-{}", target.filename().string(), name, spills_.size()));
+    spills_.push_back(directory / fmt::format("{}.resume-spill-{:016x}-{}",
+                                              target.filename().string(), name, spills_.size()));
   }
   lock_ = std::make_unique<FileLock>(pages_);
   try {
@@ -119,10 +126,12 @@ void Resumption::load_manifest() {
   StateReader state(bytes, manifest_.string());
   const std::string request = state.get_text();
   if (request != request_) {
-    throw DataError(fmt::format("{}: it is of another build: {}", manifest_.string(), difference(request, request_)));
+    throw DataError(fmt::format("{}: it is of another build: {}", manifest_.string(),
+                                difference(request, request_)));
   }
   std::vector<std::filesystem::path> spills;
-  for (std::uint64_t count = state.get_count(1 << 10); count > 0; --count) spills.emplace_back(state.get_text());
+  for (std::uint64_t count = state.get_count(1 << 10); count > 0; --count)
+    spills.emplace_back(state.get_text());
   const std::span<const std::byte> sorted = state.get_bytes();
   state.end();
   if (sorted.empty()) {  // killed in the sort
@@ -164,7 +173,8 @@ void Resumption::write_manifest(const std::vector<std::byte>& sorted) const {
   StateWriter state;
   state.put_text(request_);
   state.put(std::uint64_t{spills_.size()});
-  for (const std::filesystem::path& spill : spills_) state.put_text(std::filesystem::absolute(spill).string());
+  for (const std::filesystem::path& spill : spills_)
+    state.put_text(std::filesystem::absolute(spill).string());
   state.put_bytes(sorted);
   write_state(manifest_, state.take());
 }
@@ -202,7 +212,8 @@ void Resumption::remove() noexcept {
   remove_file(manifest_);
 }
 
-CheckpointSaver::CheckpointSaver(const Resumption& resumption, ContainerWriter& writer, ExternalSorter& sorter,
+CheckpointSaver::CheckpointSaver(const Resumption& resumption, ContainerWriter& writer,
+                                 ExternalSorter& sorter,
                                  std::uint64_t (*first_needed)(std::uint64_t))
     : resumption_(resumption), writer_(writer), sorter_(sorter), first_needed_(first_needed) {}
 

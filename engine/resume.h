@@ -1,12 +1,11 @@
 // A build that goes on where another ended (engine/pipeline.h, BuildRequest::resume).
 //
-//   OUT.resume        what is built from what; once all points are sorted by range, also the table of the temporary files
-//   OUT.resume-pages  the container as far as it got
-//   OUT.resume-at     the last checkpoint
-//   TEMP/OUT.resume-spill-*  the sorted ranges, in every --temp directory
+//   OUT.resume        what is built from what; once all points are sorted by range, also the table
+//   of the temporary files OUT.resume-pages  the container as far as it got OUT.resume-at     the
+//   last checkpoint TEMP/OUT.resume-spill-*  the sorted ranges, in every --temp directory
 //
-// Each is on the disk, whole, before the next stands on it: the ranges before the table, the pages before the checkpoint,
-// the checkpoint before the ranges that it no longer needs are given back.
+// Each is on the disk, whole, before the next stands on it: the ranges before the table, the pages
+// before the checkpoint, the checkpoint before the ranges that it no longer needs are given back.
 #pragma once
 
 #include <cstdint>
@@ -43,11 +42,14 @@ struct Checkpoint {
   std::vector<std::byte> build;  ///< for Checkpoints::from
 };
 
-/// What is kept of a build, and for whom. Until the points are sorted nothing outlives it, unless the process is killed.
+/// What is kept of a build, and for whom. Until the points are sorted nothing outlives it, unless
+/// the process is killed.
 class Resumption {
  public:
-  /// Takes up what an earlier build of the same request left; what that did not bring to the end of the sort goes.
-  /// @throws DataError when what is there is damaged, or of another request: the text names what differs;
+  /// Takes up what an earlier build of the same request left; what that did not bring to the end of
+  /// the sort goes.
+  /// @throws DataError when what is there is damaged, or of another request: the text names what
+  /// differs;
   ///         std::system_error, also when another process is at it
   Resumption(const BuildRequest& request, const std::filesystem::path& target);
   Resumption(const Resumption&) = delete;
@@ -56,7 +58,9 @@ class Resumption {
   /// The container's name while it is unfinished.
   [[nodiscard]] const std::filesystem::path& partial() const noexcept { return pages_; }
   /// Names for SortOptions::kept_files.
-  [[nodiscard]] const std::vector<std::filesystem::path>& spills() const noexcept { return spills_; }
+  [[nodiscard]] const std::vector<std::filesystem::path>& spills() const noexcept {
+    return spills_;
+  }
 
   /// What was kept once the points were sorted; empty: they must be sorted.
   [[nodiscard]] const std::optional<BuildPlan>& plan() const noexcept { return plan_; }
@@ -88,7 +92,8 @@ class Resumption {
   std::optional<Checkpoint> checkpoint_;
   std::uint64_t id_ = 0;  ///< of what was sorted: a checkpoint belongs to it
   std::unique_ptr<FileLock> lock_;
-  std::vector<std::unique_ptr<TemporaryName>> unsorted_;  ///< all files, until what is in them is worth keeping
+  std::vector<std::unique_ptr<TemporaryName>>
+      unsorted_;  ///< all files, until what is in them is worth keeping
 };
 
 /// Saves checkpoints of a build while it goes on.

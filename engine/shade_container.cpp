@@ -1,8 +1,8 @@
 // Container to shaded points (engine/pipeline.h).
 #include <algorithm>
 #include <cstring>
-#include <numbers>
 #include <memory>
+#include <numbers>
 #include <optional>
 
 #include <fmt/format.h>
@@ -32,9 +32,14 @@ class PointCursor {
  public:
   /// @param wanted  how many, evenly spread; at most as many as there are
   /// @param from    the first of those wanted that next() gives, below `wanted`
-  /// @param lost    where damaged pages are told, whose points are passed over; null: they are errors
-  PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0, LostPages* lost = nullptr)
-      : container_(container), wanted_(wanted), lost_(lost), payload_(container.page_payload_limit()) {
+  /// @param lost    where damaged pages are told, whose points are passed over; null: they are
+  /// errors
+  PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0,
+              LostPages* lost = nullptr)
+      : container_(container),
+        wanted_(wanted),
+        lost_(lost),
+        payload_(container.page_payload_limit()) {
     if (from == 0) return;
     const std::uint64_t points = container.superblock().points;
     const std::uint64_t passed = (from * points + wanted - 1) / wanted;  // so far `from` were taken
@@ -67,7 +72,8 @@ class PointCursor {
   /// Goes by pages without a point that is wanted.
   void pass_pages() {
     for (; page_ < container_.point_pages().size(); ++page_) {
-      const std::uint64_t share = share_ + wanted_ * container_.entry(container_.point_pages()[page_]).record_count;
+      const std::uint64_t share =
+          share_ + wanted_ * container_.entry(container_.point_pages()[page_]).record_count;
       if (share >= container_.superblock().points) return;
       share_ = share;
     }
@@ -83,7 +89,7 @@ class PointCursor {
   const ContainerReader& container_;
   std::uint64_t wanted_;
   LostPages* lost_;
-  bool whole_ = true;  // the page at hand
+  bool whole_ = true;        // the page at hand
   std::uint64_t share_ = 0;  // wanted_ for each point passed, less the points for each one taken
   std::vector<std::byte> payload_;
   PageDecoder decoder_;
@@ -93,29 +99,36 @@ class PointCursor {
 };
 
 std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
-  std::string text = fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
-                                 g.solid_angle, g.parallax, g.inflation, g.resolution,
-                                 g.sides == Sides::both ? "both" : "front", request.lift);
+  std::string text =
+      fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
+                  g.solid_angle, g.parallax, g.inflation, g.resolution,
+                  g.sides == Sides::both ? "both" : "front", request.lift);
   if (request.bounces != 1) text += fmt::format(" bounces {}", request.bounces);
   if (request.estimate) text += " estimates";
   return text;
 }
 
 /// The container of the receivers of a request; a cloud is built into one for the time of the run.
-std::unique_ptr<ContainerReader> open_receivers(const ShadeRequest& request, const std::filesystem::path& target,
+std::unique_ptr<ContainerReader> open_receivers(const ShadeRequest& request,
+                                                const std::filesystem::path& target,
                                                 Progress& progress) {
-  if (request.receivers.extension() == ".ptcx") return std::make_unique<ContainerReader>(request.receivers);
+  if (request.receivers.extension() == ".ptcx")
+    return std::make_unique<ContainerReader>(request.receivers);
   // They need no light.
-  BuildRequest build{.inputs = {request.receivers}, .lights = LightRig{}, .profile = Profile::raw, .run = request.run};
-  return make_temporary(roomiest_temp_dir(request.run, target),
-                        [&](const std::filesystem::path& path) { build_container(build, path, progress); });
+  BuildRequest build{.inputs = {request.receivers},
+                     .lights = LightRig{},
+                     .profile = Profile::raw,
+                     .run = request.run};
+  return make_temporary(
+      roomiest_temp_dir(request.run, target),
+      [&](const std::filesystem::path& path) { build_container(build, path, progress); });
 }
 
 /// Shades what a cursor gives, batch by batch.
 /// @param estimator  or null
 /// @return CPU seconds of the gather
-double shade_all(PointCursor& cursor, Shader& shader, Estimator* estimator, float lift, ShadedSink& sink,
-                 CheckSample& check, Progress& progress) {
+double shade_all(PointCursor& cursor, Shader& shader, Estimator* estimator, float lift,
+                 ShadedSink& sink, CheckSample& check, Progress& progress) {
   double cpu = 0;
   std::vector<Surfel> surfels(kBatch);
   std::vector<Receiver> batch(kBatch);
@@ -161,12 +174,14 @@ std::uint64_t count_whole(const ContainerReader& container, std::uint64_t wanted
 
 }  // namespace
 
-ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target, Progress& progress) {
+ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
+                            Progress& progress) {
   ShadeReport report;
   check_estimate_request(request.estimate, request.error, request.check);
   check_damage_request(request.tolerate_damage, request.bounces, request.error, request.check);
   if (request.tolerate_damage && request.receivers.empty() && target.extension() != ".ply") {
-    throw std::invalid_argument("a container would keep what is damaged: name a .ply, or salvage the scene first");
+    throw std::invalid_argument(
+        "a container would keep what is damaged: name a .ply, or salvage the scene first");
   }
   const Executor executor(request.run.threads);
   const ContainerReader scene(request.scene);
@@ -175,27 +190,31 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   const ContainerReader& receivers = other ? *other : scene;
   const std::uint64_t all = receivers.superblock().points;
   const std::uint64_t wanted = request.count == 0 ? all : std::min(request.count, all);
-  const std::unique_ptr<LostPages> lost = request.tolerate_damage ? std::make_unique<LostPages>(scene) : nullptr;
+  const std::unique_ptr<LostPages> lost =
+      request.tolerate_damage ? std::make_unique<LostPages>(scene) : nullptr;
   LostPages* const receivers_lost = other ? nullptr : lost.get();
-  const std::uint64_t points = receivers_lost ? count_whole(receivers, wanted, *receivers_lost) : wanted;
+  const std::uint64_t points =
+      receivers_lost ? count_whole(receivers, wanted, *receivers_lost) : wanted;
   if (wanted < all && target.extension() != ".ply") {
-    throw std::invalid_argument("a container of some of the points cannot be written: name a .ply, or shade them all");
+    throw std::invalid_argument(
+        "a container of some of the points cannot be written: name a .ply, or shade them all");
   }
 
   const Sky sky = request.sky ? *request.sky : recorded_lights(scene).sky;
-  const std::uint64_t taken = kBufferBytes + (other ? open_bytes(*other) : 0) + sink_bytes(target, receivers) +
+  const std::uint64_t taken = kBufferBytes + (other ? open_bytes(*other) : 0) +
+                              sink_bytes(target, receivers) +
                               bounce_bytes(scene, request.bounces, executor.threads());
-  ShadeOptions options{
-      .cache_bytes = cache_bytes_left(request.run, taken, scene, readers_of(executor, request.estimate), request.back_end,
-                                      "shading"),
-      .back_end = request.back_end,
-      .gather = request.gather,
-      .sky = sky_function(sky),
-      .lost = lost.get()};
+  ShadeOptions options{.cache_bytes = cache_bytes_left(request.run, taken, scene,
+                                                       readers_of(executor, request.estimate),
+                                                       request.back_end, "shading"),
+                       .back_end = request.back_end,
+                       .gather = request.gather,
+                       .sky = sky_function(sky),
+                       .lost = lost.get()};
   options.gather.bleeding = request.bounces > 0;
-  const std::unique_ptr<ContainerReader> bounced =
-      bounce_light(scene, {request.bounces, options, request.lift, roomiest_temp_dir(request.run, target)}, executor, report,
-                   progress);
+  const std::unique_ptr<ContainerReader> bounced = bounce_light(
+      scene, {request.bounces, options, request.lift, roomiest_temp_dir(request.run, target)},
+      executor, report, progress);
   const ContainerReader& lit = bounced ? *bounced : scene;
   ReceiverPlaces compared;
   std::vector<Pilot> pilots;
@@ -203,7 +222,8 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   std::vector<Shading> traced;  // by rays, of the pilots
   if (request.error) {
     const Stage stage(report.seconds, progress, "tune", 0, "receivers");
-    report.tuning = tune(lit, options, *request.error, pilots, executor, progress, compared, traced);
+    report.tuning =
+        tune(lit, options, *request.error, pilots, executor, progress, compared, traced);
     options.gather = report.tuning->gather;
   }
   std::unique_ptr<Estimator> estimator;
@@ -215,14 +235,15 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
     estimator = std::make_unique<Estimator>(lit, options, pilots, traced, executor);
     options.cache = &estimator->cache();
   }
-  const std::unique_ptr<ShadedSink> sink =
-      make_shaded_sink(target, receivers, points, settings_text(request, options.gather), request.estimate);
+  const std::unique_ptr<ShadedSink> sink = make_shaded_sink(
+      target, receivers, points, settings_text(request, options.gather), request.estimate);
   CheckSample check(request.check, std::move(compared));
   {
     const Stage stage(report.seconds, progress, "shade", points, "points");
     Shader shader(lit, options, executor);
     PointCursor cursor(receivers, wanted, 0, receivers_lost);
-    report.shade_cpu_seconds = shade_all(cursor, shader, estimator.get(), request.lift, *sink, check, progress);
+    report.shade_cpu_seconds =
+        shade_all(cursor, shader, estimator.get(), request.lift, *sink, check, progress);
     report.gather = shader.counts();
     report.cache = shader.cache_statistics();
   }
@@ -236,9 +257,10 @@ ShadeReport shade_container(const ShadeRequest& request, const std::filesystem::
   report.receivers = points;
   if (lost) report.damage = damage_report(scene, *lost, report.gather.damage);
   if (request.check.receivers > 0) {
-    const Stage stage(report.seconds, progress, "check", std::uint64_t{2} * request.check.receivers, "references");
-    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr, {{}, request.bounces},
-                                 options.cache_bytes, executor, progress);
+    const Stage stage(report.seconds, progress, "check", std::uint64_t{2} * request.check.receivers,
+                      "references");
+    report.check = check.compare(lit, request.gather.sides, sky, nullptr, nullptr,
+                                 {{}, request.bounces}, options.cache_bytes, executor, progress);
   }
   return report;
 }

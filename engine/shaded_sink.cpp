@@ -45,22 +45,35 @@ using ShadedValues = std::array<float, ShadedChannels::kFloats>;
 /// Values of a shaded surfel: outgoing radiance is albedo / pi times what arrives.
 ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEstimate& estimate) {
   const glm::vec3 out = albedo * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float>;
-  return {s.occlusion,    s.bent_normal.x, s.bent_normal.y, s.bent_normal.z, s.irradiance.r,     s.irradiance.g,
-          s.irradiance.b, s.sky.r,         s.sky.g,         s.sky.b,         out.r,              out.g,
-          out.b,          estimate.occlusion, estimate.irradiance};
+  return {s.occlusion,
+          s.bent_normal.x,
+          s.bent_normal.y,
+          s.bent_normal.z,
+          s.irradiance.r,
+          s.irradiance.g,
+          s.irradiance.b,
+          s.sky.r,
+          s.sky.g,
+          s.sky.b,
+          out.r,
+          out.g,
+          out.b,
+          estimate.occlusion,
+          estimate.irradiance};
 }
 
 class PlySink : public ShadedSink {
  public:
   PlySink(const std::filesystem::path& target, std::uint64_t count, bool estimates)
-      : floats_(ShadedChannels::count(estimates)), writer_(target, count, ShadedChannels::columns(estimates)) {}
+      : floats_(ShadedChannels::count(estimates)),
+        writer_(target, count, ShadedChannels::columns(estimates)) {}
   void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
              std::span<const ErrorEstimate> estimates) override {
     std::vector<float> values;
     values.reserve(surfels.size() * floats_);
     for (std::size_t i = 0; i < surfels.size(); ++i) {
-      const ShadedValues v =
-          values_of(shading[i], surfels[i].albedo, estimates.empty() ? ErrorEstimate{} : estimates[i]);
+      const ShadedValues v = values_of(shading[i], surfels[i].albedo,
+                                       estimates.empty() ? ErrorEstimate{} : estimates[i]);
       values.insert(values.end(), v.begin(), v.begin() + static_cast<std::ptrdiff_t>(floats_));
     }
     writer_.write(surfels, values);
@@ -76,12 +89,14 @@ class PlySink : public ShadedSink {
 /// an earlier shading are left out.
 class ContainerSink : public ShadedSink {
  public:
-  ContainerSink(const std::filesystem::path& target, const ContainerReader& from, const std::string& settings,
-                bool estimates)
+  ContainerSink(const std::filesystem::path& target, const ContainerReader& from,
+                const std::string& settings, bool estimates)
       : from_(from),
         floats_(ShadedChannels::count(estimates)),
         meta_(from.meta()),
-        writer_(target, {.page_shift = from.header().page_shift, .uuid = uuid_for(from, settings), .frame = from.header().frame}) {
+        writer_(target, {.page_shift = from.header().page_shift,
+                         .uuid = uuid_for(from, settings),
+                         .frame = from.header().frame}) {
     std::erase_if(meta_.channels, [](const Channel& c) { return c.group == kGroup; });
     const std::vector<Channel> added = ShadedChannels::channels(estimates);
     meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());
@@ -93,8 +108,8 @@ class ContainerSink : public ShadedSink {
   void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
              std::span<const ErrorEstimate> estimates) override {
     for (std::size_t i = 0; i < surfels.size(); ++i) {
-      values_.push_back(
-          values_of(shading[i], surfels[i].albedo, estimates.empty() ? ErrorEstimate{} : estimates[i]));
+      values_.push_back(values_of(shading[i], surfels[i].albedo,
+                                  estimates.empty() ? ErrorEstimate{} : estimates[i]));
       if (values_.size() == page_points()) flush();
     }
   }
@@ -113,7 +128,8 @@ class ContainerSink : public ShadedSink {
 
   [[nodiscard]] std::size_t page_points() const {
     const std::uint64_t left = from_.superblock().points - written_;
-    return static_cast<std::size_t>(std::min<std::uint64_t>(from_.superblock().points_per_page, left));
+    return static_cast<std::size_t>(
+        std::min<std::uint64_t>(from_.superblock().points_per_page, left));
   }
 
   /// Point and node pages keep their numbers, so that references hold: they precede all others.
@@ -124,8 +140,8 @@ class ContainerSink : public ShadedSink {
       const bool earlier = entry.type == PageType::attribute && entry.group == kGroup;
       if (entry.type == PageType::meta || earlier) continue;
       const PageHeader header = from_.read_stored_page(page, stored);
-      writer_.write_stored_page(writer_.reserve_page(), ContainerWriter::facts_of(header), header.coding, header.raw_bytes,
-                                stored);
+      writer_.write_stored_page(writer_.reserve_page(), ContainerWriter::facts_of(header),
+                                header.coding, header.raw_bytes, stored);
     }
   }
 
@@ -139,7 +155,9 @@ class ContainerSink : public ShadedSink {
       }
     }
     writer_.write_page(writer_.reserve_page(),
-                       {.type = PageType::attribute, .group = kGroup, .record_count = static_cast<std::uint32_t>(count)},
+                       {.type = PageType::attribute,
+                        .group = kGroup,
+                        .record_count = static_cast<std::uint32_t>(count)},
                        payload, columns_);
     written_ += count;
     values_.clear();
@@ -156,14 +174,17 @@ class ContainerSink : public ShadedSink {
 
 }  // namespace
 
-std::uint64_t sink_bytes(const std::filesystem::path& target, const ContainerReader& receivers) noexcept {
+std::uint64_t sink_bytes(const std::filesystem::path& target,
+                         const ContainerReader& receivers) noexcept {
   if (target.extension() == ".ply") return 0;
   // An attribute page for each page at the most.
-  return ContainerWriter::memory_bytes(2 * std::uint64_t{receivers.page_count()}, receivers.header().page_shift, 1);
+  return ContainerWriter::memory_bytes(2 * std::uint64_t{receivers.page_count()},
+                                       receivers.header().page_shift, 1);
 }
 
-std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
-                                             std::uint64_t points, const std::string& settings, bool estimates) {
+std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
+                                             const ContainerReader& receivers, std::uint64_t points,
+                                             const std::string& settings, bool estimates) {
   if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points, estimates);
   return std::make_unique<ContainerSink>(target, receivers, settings, estimates);
 }

@@ -28,10 +28,14 @@ class ShadedSink {
 /// @param receivers  whose points are shaded: a container's are copied with them
 /// @param points     how many will come
 /// @param settings   of the shading, for the container's record
-[[nodiscard]] std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
-                                                           std::uint64_t points, const std::string& settings, bool estimates);
+[[nodiscard]] std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
+                                                           const ContainerReader& receivers,
+                                                           std::uint64_t points,
+                                                           const std::string& settings,
+                                                           bool estimates);
 
 /// What it takes of the directory that it writes.
-[[nodiscard]] std::uint64_t sink_bytes(const std::filesystem::path& target, const ContainerReader& receivers) noexcept;
+[[nodiscard]] std::uint64_t sink_bytes(const std::filesystem::path& target,
+                                       const ContainerReader& receivers) noexcept;
 
 }  // namespace ptc

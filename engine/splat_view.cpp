@@ -37,8 +37,8 @@ struct Projected {
 
 class SurfelView : public PrimaryView {
  public:
-  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift, LostPages* lost, const Executor& executor,
-             Progress& progress)
+  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift,
+             LostPages* lost, const Executor& executor, Progress& progress)
       : position_(camera.position),
         width_(camera.width * side),
         height_(camera.height * side),
@@ -49,7 +49,8 @@ class SurfelView : public PrimaryView {
     focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
     const std::span<const std::uint32_t> pages = scene.point_pages();
     for (std::size_t first = 0; first < pages.size(); first += kPagesAtOnce) {
-      draw(scene, pages.subspan(first, std::min(kPagesAtOnce, pages.size() - first)), lost, executor, progress);
+      draw(scene, pages.subspan(first, std::min(kPagesAtOnce, pages.size() - first)), lost,
+           executor, progress);
     }
   }
 
@@ -86,9 +87,10 @@ class SurfelView : public PrimaryView {
             (static_cast<float>(y) + 0.5F - 0.5F * static_cast<float>(height_)) / focal_, 1};
   }
 
-  /// Pages are projected side by side, then bands of rows drawn side by side, in the order of points.
-  void draw(const ContainerReader& scene, std::span<const std::uint32_t> pages, LostPages* lost, const Executor& executor,
-            Progress& progress) {
+  /// Pages are projected side by side, then bands of rows drawn side by side, in the order of
+  /// points.
+  void draw(const ContainerReader& scene, std::span<const std::uint32_t> pages, LostPages* lost,
+            const Executor& executor, Progress& progress) {
     std::vector<std::vector<Projected>> discs(pages.size());
     executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
       std::vector<std::byte> payload(scene.page_payload_limit());
@@ -105,31 +107,35 @@ class SurfelView : public PrimaryView {
       const unsigned last = std::min(height_, first + kBandRows);
       for (const auto& page : discs) {
         for (const Projected& disc : page) {
-          if (disc.y0 < last && disc.y1 > first) cover(disc, std::max(disc.y0, first), std::min(disc.y1, last));
+          if (disc.y0 < last && disc.y1 > first)
+            cover(disc, std::max(disc.y0, first), std::min(disc.y1, last));
         }
       }
     });
   }
 
   void project(const Surfel& surfel, std::vector<Projected>& discs) const {
-    Projected disc{.centre = glm::vec3(surfel.position - position_) * axes_,  // times the transpose
-                   .normal = surfel.normal * axes_,
-                   .radius = surfel.radius,
-                   .payload = {.radiance = encode_rgbe({surfel.radiance.r, surfel.radiance.g, surfel.radiance.b}),
-                               .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
-                               .radius = encode_ufloat16(surfel.radius)}};
+    Projected disc{
+        .centre = glm::vec3(surfel.position - position_) * axes_,  // times the transpose
+        .normal = surfel.normal * axes_,
+        .radius = surfel.radius,
+        .payload = {
+            .radiance = encode_rgbe({surfel.radiance.r, surfel.radiance.g, surfel.radiance.b}),
+            .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
+            .radius = encode_ufloat16(surfel.radius)}};
     if (!(disc.radius > 0) || disc.centre.z + disc.radius <= 0) return;
     span(disc, 0, width_, disc.x0, disc.x1);
     span(disc, 1, height_, disc.y0, disc.y1);
     if (disc.x0 >= disc.x1 || disc.y0 >= disc.y1) return;
     for (int c = 0; c < 3; ++c) {
-      disc.payload.albedo[static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(std::lround(surfel.albedo[c] * 255));
+      disc.payload.albedo[static_cast<std::size_t>(c)] =
+          static_cast<std::uint8_t>(std::lround(surfel.albedo[c] * 255));
     }
     discs.push_back(disc);
   }
 
-  /// Samples along an axis whose centres lie within the disc's projection, exactly; all of them when it
-  /// reaches behind the camera.
+  /// Samples along an axis whose centres lie within the disc's projection, exactly; all of them
+  /// when it reaches behind the camera.
   void span(const Projected& disc, int axis, unsigned size, unsigned& first, unsigned& last) const {
     const float r2 = disc.radius * disc.radius;
     const glm::vec3& c = disc.centre;
@@ -179,8 +185,9 @@ class SurfelView : public PrimaryView {
 
 }  // namespace
 
-std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera, unsigned side, float lift,
-                                          LostPages* lost, const Executor& executor, Progress& progress) {
+std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
+                                          unsigned side, float lift, LostPages* lost,
+                                          const Executor& executor, Progress& progress) {
   return std::make_unique<SurfelView>(scene, camera, side, lift, lost, executor, progress);
 }
 

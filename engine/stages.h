@@ -1,4 +1,5 @@
-// What the calls of pipeline.h share: stage clocks, memory left, temporaries, the record in the meta page.
+// What the calls of pipeline.h share: stage clocks, memory left, temporaries, the record in the
+// meta page.
 #pragma once
 
 #include <chrono>
@@ -16,7 +17,8 @@ namespace ptc {
 /// Times one stage and tells its progress, from construction to destruction.
 class Stage {
  public:
-  Stage(StageSeconds& seconds, Progress& progress, std::string name, std::uint64_t total, const char* unit);
+  Stage(StageSeconds& seconds, Progress& progress, std::string name, std::uint64_t total,
+        const char* unit);
   ~Stage();
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
@@ -29,34 +31,41 @@ class Stage {
 };
 
 /// What is left of a cap for a stage. @throws std::invalid_argument naming the least cap that works
-[[nodiscard]] std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken, std::uint64_t least,
-                                        const char* what_for);
+[[nodiscard]] std::uint64_t memory_left(const RunOptions& run, std::uint64_t taken,
+                                        std::uint64_t least, const char* what_for);
 
 /// What an open container takes.
 [[nodiscard]] std::uint64_t open_bytes(const ContainerReader& container) noexcept;
 
-/// The same for the page cache of a gather, whose threads take kGatherBytes each, from an open scene.
-[[nodiscard]] std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken, const ContainerReader& scene,
-                                             unsigned threads, BackEnd back_end, const char* what_for);
+/// The same for the page cache of a gather, whose threads take kGatherBytes each, from an open
+/// scene.
+[[nodiscard]] std::uint64_t cache_bytes_left(const RunOptions& run, std::uint64_t taken,
+                                             const ContainerReader& scene, unsigned threads,
+                                             BackEnd back_end, const char* what_for);
 
-/// Damage is tolerated by a gather from the scene itself, for which no ray and no earlier bounce reads every point.
+/// Damage is tolerated by a gather from the scene itself, for which no ray and no earlier bounce
+/// reads every point.
 /// @throws std::invalid_argument when it is to be tolerated and something else is asked for
-void check_damage_request(bool tolerate, unsigned bounces, const std::optional<double>& error, const CheckRequest& check);
+void check_damage_request(bool tolerate, unsigned bounces, const std::optional<double>& error,
+                          const CheckRequest& check);
 
 /// What there is to tell of lost pages.
-[[nodiscard]] DamageReport damage_report(const ContainerReader& scene, const LostPages& lost, const DamageCounts& stand_ins);
+[[nodiscard]] DamageReport damage_report(const ContainerReader& scene, const LostPages& lost,
+                                         const DamageCounts& stand_ins);
 
 /// Where temporary files go: the given directories, else the target's.
-[[nodiscard]] std::vector<std::filesystem::path> temp_dirs(const RunOptions& run, const std::filesystem::path& target);
+[[nodiscard]] std::vector<std::filesystem::path> temp_dirs(const RunOptions& run,
+                                                           const std::filesystem::path& target);
 /// The one of them with most room, for a file that is not spread.
-[[nodiscard]] std::filesystem::path roomiest_temp_dir(const RunOptions& run, const std::filesystem::path& target);
-
+[[nodiscard]] std::filesystem::path roomiest_temp_dir(const RunOptions& run,
+                                                      const std::filesystem::path& target);
 
 /// A container for the time of one run. Its name goes as soon as it is open: however the run ends
 /// from then on, nothing is left.
 /// @param write  writes the container to the path that it is given, or throws and leaves nothing
 [[nodiscard]] std::unique_ptr<ContainerReader> make_temporary(
-    const std::filesystem::path& directory, const std::function<void(const std::filesystem::path&)>& write);
+    const std::filesystem::path& directory,
+    const std::function<void(const std::filesystem::path&)>& write);
 
 /// The lights that a container was built with; none when it does not say.
 [[nodiscard]] LightRig recorded_lights(const ContainerReader& container);
@@ -81,14 +90,15 @@ inline constexpr const char* kEmittersKey = "emitters";
 inline constexpr const char* kCameraKey = "camera";
 inline constexpr const char* kSpacingKey = "spacing";
 inline constexpr const char* kInputsKey = "inputs";
-inline constexpr const char* kRoundingKey = "rounding";  ///< its text is kRounding when points were rounded
+inline constexpr const char* kRoundingKey =
+    "rounding";  ///< its text is kRounding when points were rounded
 
 /// Part of a cap that buffers outside the large budgets take: open pages, blocks, receivers.
 inline constexpr std::uint64_t kBufferBytes = std::uint64_t{32} << 20;
 /// Least that the sort of a build is given.
 inline constexpr std::uint64_t kLeastSort = std::uint64_t{48} << 20;
-/// What a thread that gathers takes besides: direction buffers and lists of its receiver cells, 14 MiB at the most
-/// seen (receivers 80 surfels apart in a city of 20 million).
+/// What a thread that gathers takes besides: direction buffers and lists of its receiver cells, 14
+/// MiB at the most seen (receivers 80 surfels apart in a city of 20 million).
 inline constexpr std::uint64_t kGatherBytes = std::uint64_t{16} << 20;
 
 }  // namespace ptc

@@ -13,13 +13,17 @@
 namespace ptc {
 namespace {
 
-/// None of them is slower and less exact than another on most scenes. Usual errors: means over terrain, city and dragon.
+/// None of them is slower and less exact than another on most scenes. Usual errors: means over
+/// terrain, city and dragon.
 constexpr std::array kLadder{
-    Rung{0.4F, 0.8F, 16, 0.114},    Rung{0.2F, 0.4F, 16, 0.075},     Rung{0.1F, 0.4F, 16, 0.074},
-    Rung{0.06F, 0.3F, 16, 0.063},   Rung{0.06F, 0.3F, 32, 0.051},    Rung{0.03F, 0.2F, 32, 0.036},
-    Rung{0.02F, 0.15F, 32, 0.027},  Rung{0.014F, 0.12F, 32, 0.024},  Rung{0.014F, 0.12F, 48, 0.020},
-    Rung{0.01F, 0.1F, 48, 0.019},   Rung{0.007F, 0.085F, 48, 0.017}, Rung{0.005F, 0.07F, 48, 0.015},
-    Rung{0.003F, 0.06F, 48, 0.0134}, Rung{0.002F, 0.05F, 64, 0.0117}, Rung{0.001F, 0.03F, 64, 0.010},
+    Rung{0.4F, 0.8F, 16, 0.114},     Rung{0.2F, 0.4F, 16, 0.075},
+    Rung{0.1F, 0.4F, 16, 0.074},     Rung{0.06F, 0.3F, 16, 0.063},
+    Rung{0.06F, 0.3F, 32, 0.051},    Rung{0.03F, 0.2F, 32, 0.036},
+    Rung{0.02F, 0.15F, 32, 0.027},   Rung{0.014F, 0.12F, 32, 0.024},
+    Rung{0.014F, 0.12F, 48, 0.020},  Rung{0.01F, 0.1F, 48, 0.019},
+    Rung{0.007F, 0.085F, 48, 0.017}, Rung{0.005F, 0.07F, 48, 0.015},
+    Rung{0.003F, 0.06F, 48, 0.0134}, Rung{0.002F, 0.05F, 64, 0.0117},
+    Rung{0.001F, 0.03F, 64, 0.010},
 };
 
 constexpr unsigned kResamples = 200;
@@ -31,10 +35,16 @@ constexpr double kNoise = 0.7;  // of a half, over what is asked
 
 class Tuner {
  public:
-  Tuner(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots, const Executor& executor)
-      : scene_(scene), options_(options), pilots_(pilots), executor_(executor), errors_(ladder().size()) {
+  Tuner(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots,
+        const Executor& executor)
+      : scene_(scene),
+        options_(options),
+        pilots_(pilots),
+        executor_(executor),
+        errors_(ladder().size()) {
     for (const Pilot& pilot : pilots) {
-      for (std::size_t k = 0; k < pilot.compared(); ++k) compared_.push_back(pilot.receivers[pilot.compared_at(k)]);
+      for (std::size_t k = 0; k < pilot.compared(); ++k)
+        compared_.push_back(pilot.receivers[pilot.compared_at(k)]);
     }
   }
 
@@ -47,7 +57,8 @@ class Tuner {
     trace(discs, side, progress);
     const double noise = noise_of_half();
     if (noise > kNoise * asked) {
-      side = static_cast<unsigned>(std::min<double>(kMostSide, std::ceil(side * noise / (kNoise * asked))));
+      side = static_cast<unsigned>(
+          std::min<double>(kMostSide, std::ceil(side * noise / (kNoise * asked))));
       trace(discs, side, progress);
     }
     return side * side;
@@ -93,10 +104,11 @@ class Tuner {
  private:
   static constexpr std::size_t kChoosing = 0, kConfirming = 1;  // even and odd pilots
 
-  /// The cheapest rung that the choosing pilots hold for good enough, if errors fall along the ladder; its
-  /// size when none is.
+  /// The cheapest rung that the choosing pilots hold for good enough, if errors fall along the
+  /// ladder; its size when none is.
   std::size_t cheapest(double asked) {
-    std::size_t low = 0, high = ladder().size();  // below low: too coarse; from high on: good enough
+    std::size_t low = 0,
+                high = ladder().size();  // below low: too coarse; from high on: good enough
     std::size_t at = rung_of(asked);
     while (low < high) {
       at = std::clamp(at, low, high - 1);
@@ -114,18 +126,20 @@ class Tuner {
   /// What one half of a reference is off, as CheckError::relative().
   [[nodiscard]] double noise_of_half() const {
     ErrorSums sums;
-    for (std::size_t i = 0; i < compared_.size(); ++i) sums.add(traced_[2 * i], traced_[2 * i], traced_[2 * i + 1]);
+    for (std::size_t i = 0; i < compared_.size(); ++i)
+      sums.add(traced_[2 * i], traced_[2 * i], traced_[2 * i + 1]);
     return std::sqrt(2) * sums.error().relative_noise();
   }
 
   /// The first rung whose usual error is at most so much.
   static std::size_t rung_of(double error) {
-    const auto found = std::ranges::find_if(ladder(), [&](const Rung& rung) { return rung.usual_error <= error; });
+    const auto found =
+        std::ranges::find_if(ladder(), [&](const Rung& rung) { return rung.usual_error <= error; });
     return static_cast<std::size_t>(found - ladder().begin());
   }
 
-  /// An error that the run's is below with some confidence: a quantile over samples of the pilots with
-  /// replacement (Efron 1979).
+  /// An error that the run's is below with some confidence: a quantile over samples of the pilots
+  /// with replacement (Efron 1979).
   double bound(std::size_t rung, std::size_t part) {
     const std::vector<ErrorSums>& errors = errors_of(rung, part);
     if (errors.empty()) return 0;
@@ -185,22 +199,27 @@ class Tuner {
   std::unique_ptr<PageCache> cache_;
   std::vector<Receiver> compared_;  // of all pilots, in order
   std::vector<Shading> traced_;     // two of each
-  std::vector<std::array<std::vector<ErrorSums>, 2>> errors_;  // by rung and part; empty: not yet shaded
+  std::vector<std::array<std::vector<ErrorSums>, 2>>
+      errors_;  // by rung and part; empty: not yet shaded
   std::uint64_t shaded_ = 0;
 };
 
 }  // namespace
 
-std::span<const Rung> ladder() { return kLadder; }
+std::span<const Rung> ladder() {
+  return kLadder;
+}
 
 PilotPlan plan_pilots(std::uint64_t receivers) {
-  constexpr std::uint64_t kFewest = 64, kMost = 128;        // pilots
-  constexpr std::uint64_t kShortest = 64, kLongest = 256;   // receivers of each
-  constexpr std::uint64_t kLeastStride = 16;                // fewer pilots sooner than shorter ones
-  constexpr std::uint64_t kShare = 16;                      // of a run's: one in so many is a pilot's
+  constexpr std::uint64_t kFewest = 64, kMost = 128;       // pilots
+  constexpr std::uint64_t kShortest = 64, kLongest = 256;  // receivers of each
+  constexpr std::uint64_t kLeastStride = 16;               // fewer pilots sooner than shorter ones
+  constexpr std::uint64_t kShare = 16;  // of a run's: one in so many is a pilot's
   if (receivers == 0) return {};
-  const std::uint64_t room = std::max(std::min<std::uint64_t>(receivers, 2), receivers / kLeastStride);
-  const std::uint64_t count = std::min(std::clamp(receivers / (kShare * kLongest), kFewest, kMost), room);
+  const std::uint64_t room =
+      std::max(std::min<std::uint64_t>(receivers, 2), receivers / kLeastStride);
+  const std::uint64_t count =
+      std::min(std::clamp(receivers / (kShare * kLongest), kFewest, kMost), room);
   const std::uint64_t stride = receivers / count;
   const std::uint64_t length = std::clamp(stride / kShare, kShortest, kLongest);
   return {.count = static_cast<std::size_t>(count),
@@ -208,9 +227,9 @@ PilotPlan plan_pilots(std::uint64_t receivers) {
           .receivers = static_cast<std::size_t>(std::min(stride, length))};
 }
 
-TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked, std::span<const Pilot> pilots,
-                  const Executor& executor, Progress& progress, ReceiverPlaces& compared,
-                  std::vector<Shading>& traced) {
+TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
+                  std::span<const Pilot> pilots, const Executor& executor, Progress& progress,
+                  ReceiverPlaces& compared, std::vector<Shading>& traced) {
   Tuner tuner(scene, options, pilots, executor);
   for (const Receiver& receiver : tuner.compared()) compared.add(receiver);
   const double before = cpu_seconds();
@@ -235,8 +254,9 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
   return report;
 }
 
-std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots,
-                             unsigned rays, const Executor& executor, Progress& progress) {
+std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& options,
+                             std::span<const Pilot> pilots, unsigned rays, const Executor& executor,
+                             Progress& progress) {
   Tuner tuner(scene, options, pilots, executor);
   {
     StreamedRays discs(scene, options.gather.sides, {}, options.cache_bytes);

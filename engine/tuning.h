@@ -38,7 +38,9 @@ struct Pilot {
   unsigned variant = 0;  ///< as Shader::shade()
 
   /// How many are compared.
-  [[nodiscard]] std::size_t compared() const noexcept { return std::min(kCompared, receivers.size()); }
+  [[nodiscard]] std::size_t compared() const noexcept {
+    return std::min(kCompared, receivers.size());
+  }
   /// Place of the k-th of those.
   [[nodiscard]] std::size_t compared_at(std::size_t k) const noexcept {
     return (2 * k + 1) * receivers.size() / (2 * compared());
@@ -55,12 +57,14 @@ struct PilotPlan {
 [[nodiscard]] PilotPlan plan_pilots(std::uint64_t receivers);
 
 /// Compares pilots with rays at the same surfels, finds the cheapest setting.
-/// @param options  but for its gather, of which only the sides count; its cache_bytes are the cap of the
+/// @param options  but for its gather, of which only the sides count; its cache_bytes are the cap
+/// of the
 ///                 rays too, StreamedRays::kLeastBytes at least
 /// @param compared  the pilots' receivers that were, appended
 /// @param traced    gets two by rays of each of them, side by side and pilot by pilot
-[[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
-                                std::span<const Pilot> pilots, const Executor& executor, Progress& progress,
+[[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options,
+                                double asked, std::span<const Pilot> pilots,
+                                const Executor& executor, Progress& progress,
                                 ReceiverPlaces& compared, std::vector<Shading>& traced);
 
 /// What a setting of the ladder gives and costs.
@@ -72,8 +76,9 @@ struct RungError {
 /// Compares pilots with rays at every setting of the ladder.
 /// @param options  as tune()
 /// @param rays     for each half of a reference, a square number
-[[nodiscard]] std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& options,
-                                           std::span<const Pilot> pilots, unsigned rays, const Executor& executor,
-                                           Progress& progress);
+[[nodiscard]] std::vector<RungError> climb(const ContainerReader& scene,
+                                           const ShadeOptions& options,
+                                           std::span<const Pilot> pilots, unsigned rays,
+                                           const Executor& executor, Progress& progress);
 
 }  // namespace ptc

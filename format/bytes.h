@@ -18,7 +18,8 @@ static_assert(std::endian::native == std::endian::little,
 
 /// What load() and store() take: numbers, and points of three.
 template <class T>
-inline constexpr bool kIsStored = std::is_arithmetic_v<T> || std::is_same_v<T, std::array<double, 3>>;
+inline constexpr bool kIsStored =
+    std::is_arithmetic_v<T> || std::is_same_v<T, std::array<double, 3>>;
 
 /// The number at `at`, which the caller has checked to lie inside.
 template <class T>

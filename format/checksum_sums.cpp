@@ -1,4 +1,5 @@
-// XXH3 of many short records: the library's functions compiled in, a call for each takes as long as its hash.
+// XXH3 of many short records: the library's functions compiled in, a call for each takes as long as
+// its hash.
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
@@ -6,7 +7,8 @@
 
 namespace ptc {
 
-std::array<std::uint64_t, 2> xxh3_128_sum(std::span<const std::byte> bytes, std::size_t size) noexcept {
+std::array<std::uint64_t, 2> xxh3_128_sum(std::span<const std::byte> bytes,
+                                          std::size_t size) noexcept {
   std::array<std::uint64_t, 2> sum{};
   for (std::size_t at = 0; at < bytes.size(); at += size) {
     const XXH128_hash_t hash = XXH3_128bits(bytes.data() + at, size);
@@ -15,9 +17,11 @@ std::array<std::uint64_t, 2> xxh3_128_sum(std::span<const std::byte> bytes, std:
   return sum;
 }
 
-std::uint64_t xxh3_64_sum(std::span<const std::byte> bytes, std::size_t size, std::size_t stride, std::uint64_t seed) noexcept {
+std::uint64_t xxh3_64_sum(std::span<const std::byte> bytes, std::size_t size, std::size_t stride,
+                          std::uint64_t seed) noexcept {
   std::uint64_t sum = 0;
-  for (std::size_t at = 0; at < bytes.size(); at += stride) sum += XXH3_64bits_withSeed(bytes.data() + at, size, seed++);
+  for (std::size_t at = 0; at < bytes.size(); at += stride)
+    sum += XXH3_64bits_withSeed(bytes.data() + at, size, seed++);
   return sum;
 }
 

@@ -1,15 +1,15 @@
 // Page compression with zstd and LZ4, one frame or block a page (spec/container.md#codecs).
 #include "format/codec.h"
 
-#include <lz4.h>
-#include <zstd.h>
-#include <zstd_errors.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <new>
 #include <stdexcept>
 #include <string>
+
+#include <lz4.h>
+#include <zstd.h>
+#include <zstd_errors.h>
 
 #include "format/bytes.h"
 #include "format/error.h"
@@ -19,7 +19,7 @@ namespace {
 
 constexpr char kFrameClause[] = "spec/container.md#codec-frame";
 constexpr char kBlockClause[] = "spec/container.md#codec-block";
-constexpr int kWindowLog = 20;  // the greatest page: every frame is a single segment
+constexpr int kWindowLog = 20;           // the greatest page: every frame is a single segment
 constexpr std::size_t kLengthBytes = 4;  // in front of an LZ4 block
 
 // Bytes that a frame decodes to, when it is whole and needs no dictionary or window beyond them:
@@ -66,11 +66,12 @@ PageEncoder::~PageEncoder() {
 }
 
 // Into at most `limit` bytes; false when they do not suffice.
-bool PageEncoder::compress(std::span<const std::byte> from, std::size_t limit, std::vector<std::byte>& out) {
+bool PageEncoder::compress(std::span<const std::byte> from, std::size_t limit,
+                           std::vector<std::byte>& out) {
   out.resize(limit);
   if (codec_ == Codec::zstd) {
-    const std::size_t size =
-        ZSTD_compress2(static_cast<ZSTD_CCtx*>(context_), out.data(), out.size(), from.data(), from.size());
+    const std::size_t size = ZSTD_compress2(static_cast<ZSTD_CCtx*>(context_), out.data(),
+                                            out.size(), from.data(), from.size());
     if (ZSTD_getErrorCode(size) == ZSTD_error_dstSize_tooSmall) return false;
     check(size);
     out.resize(size);
@@ -78,9 +79,10 @@ bool PageEncoder::compress(std::span<const std::byte> from, std::size_t limit, s
   }
   if (limit <= kLengthBytes) return false;
   store(out.data(), 0, static_cast<std::uint32_t>(from.size()));
-  const int size = LZ4_compress_default(reinterpret_cast<const char*>(from.data()),
-                                        reinterpret_cast<char*>(out.data() + kLengthBytes),
-                                        static_cast<int>(from.size()), static_cast<int>(limit - kLengthBytes));
+  const int size =
+      LZ4_compress_default(reinterpret_cast<const char*>(from.data()),
+                           reinterpret_cast<char*>(out.data() + kLengthBytes),
+                           static_cast<int>(from.size()), static_cast<int>(limit - kLengthBytes));
   out.resize(kLengthBytes + static_cast<std::size_t>(std::max(size, 0)));
   return size > 0;
 }
@@ -111,28 +113,33 @@ PageDecoder::~PageDecoder() {
   ZSTD_freeDCtx(static_cast<ZSTD_DCtx*>(context_));
 }
 
-std::span<const std::byte> PageDecoder::expand(Codec codec, std::span<const std::byte> stored, std::size_t least,
-                                               std::size_t limit, std::span<std::byte> room) {
+std::span<const std::byte> PageDecoder::expand(Codec codec, std::span<const std::byte> stored,
+                                               std::size_t least, std::size_t limit,
+                                               std::span<std::byte> room) {
   if (codec == Codec::zstd) {
     const unsigned long long bytes = check_frame(stored);
     if (bytes < least || bytes > limit) {
       throw FormatError(5, kFrameClause, "zstd frame declares another size than the page's");
     }
-    const std::size_t size = ZSTD_decompressDCtx(static_cast<ZSTD_DCtx*>(context_), room.data(), bytes,
-                                                 stored.data(), stored.size());
-    if (ZSTD_isError(size) || size != bytes) throw FormatError(0, kFrameClause, "zstd frame does not decode");
+    const std::size_t size = ZSTD_decompressDCtx(static_cast<ZSTD_DCtx*>(context_), room.data(),
+                                                 bytes, stored.data(), stored.size());
+    if (ZSTD_isError(size) || size != bytes)
+      throw FormatError(0, kFrameClause, "zstd frame does not decode");
     return room.first(size);
   }
-  if (stored.size() <= kLengthBytes) throw FormatError(0, kBlockClause, "payload is too short for an LZ4 block");
+  if (stored.size() <= kLengthBytes)
+    throw FormatError(0, kBlockClause, "payload is too short for an LZ4 block");
   const auto bytes = load<std::uint32_t>(stored.data(), 0);
   if (bytes < least || bytes > limit) {
     throw FormatError(0, kBlockClause, "LZ4 block declares another size than the page's");
   }
-  const int size = LZ4_decompress_safe(reinterpret_cast<const char*>(stored.data() + kLengthBytes),
-                                       reinterpret_cast<char*>(room.data()),
-                                       static_cast<int>(stored.size() - kLengthBytes), static_cast<int>(bytes));
+  const int size =
+      LZ4_decompress_safe(reinterpret_cast<const char*>(stored.data() + kLengthBytes),
+                          reinterpret_cast<char*>(room.data()),
+                          static_cast<int>(stored.size() - kLengthBytes), static_cast<int>(bytes));
   if (size < 0 || static_cast<std::uint32_t>(size) != bytes) {
-    throw FormatError(kLengthBytes, kBlockClause, "LZ4 block does not decode to the size it declares");
+    throw FormatError(kLengthBytes, kBlockClause,
+                      "LZ4 block does not decode to the size it declares");
   }
   return room.first(bytes);
 }
@@ -155,7 +162,8 @@ void PageDecoder::decode(Coding coding, std::span<const std::byte> stored, std::
   try {
     unpack_columns(packed, columns.count, columns.columns, out);
   } catch (const FormatError& error) {
-    throw FormatError(0, error.clause(), "packed byte " + std::to_string(error.offset()) + ": " + error.text());
+    throw FormatError(0, error.clause(),
+                      "packed byte " + std::to_string(error.offset()) + ": " + error.text());
   }
 }
 

@@ -27,10 +27,12 @@ class PageEncoder {
 
   /// Stored form of `raw` into `out` and how it was coded: not at all when that does not save at
   /// least a sixteenth. Columns that are given are packed first, where that does not lengthen them.
-  Coding encode(std::span<const std::byte> raw, std::vector<std::byte>& out, const PayloadColumns& columns = {});
+  Coding encode(std::span<const std::byte> raw, std::vector<std::byte>& out,
+                const PayloadColumns& columns = {});
 
  private:
-  [[nodiscard]] bool compress(std::span<const std::byte> from, std::size_t limit, std::vector<std::byte>& out);
+  [[nodiscard]] bool compress(std::span<const std::byte> from, std::size_t limit,
+                              std::vector<std::byte>& out);
 
   Codec codec_;
   int level_;
@@ -54,9 +56,11 @@ class PageDecoder {
               const PayloadColumns& columns = {});
 
  private:
-  /// Undoes a codec that is not raw. @param least, limit  how many bytes there may be. @return what was decoded, in `room`
-  std::span<const std::byte> expand(Codec codec, std::span<const std::byte> stored, std::size_t least,
-                                    std::size_t limit, std::span<std::byte> room);
+  /// Undoes a codec that is not raw. @param least, limit  how many bytes there may be. @return what
+  /// was decoded, in `room`
+  std::span<const std::byte> expand(Codec codec, std::span<const std::byte> stored,
+                                    std::size_t least, std::size_t limit,
+                                    std::span<std::byte> room);
 
   void* context_;
   std::vector<std::byte> packed_;  ///< kept between calls

@@ -52,8 +52,10 @@ void check_frame(const Frame& frame) {
   }
   for (const double origin : frame.origin) {
     const double steps = origin / frame.unit();
-    if (!(steps >= -kGreatestWhole && steps <= kGreatestWhole - 0x1p42) || std::rint(steps) != steps) {
-      throw FormatError(kOriginAt, kFrame, "origin is not a multiple of the unit, or beyond 2^53 units");
+    if (!(steps >= -kGreatestWhole && steps <= kGreatestWhole - 0x1p42) ||
+        std::rint(steps) != steps) {
+      throw FormatError(kOriginAt, kFrame,
+                        "origin is not a multiple of the unit, or beyond 2^53 units");
     }
   }
 }
@@ -67,7 +69,9 @@ void check_zero(std::span<const std::byte> block, std::size_t first, std::size_t
 
 }  // namespace
 
-Uuid uuid_of(std::span<const std::byte> text) noexcept { return std::bit_cast<Uuid>(xxh3_128(text)); }
+Uuid uuid_of(std::span<const std::byte> text) noexcept {
+  return std::bit_cast<Uuid>(xxh3_128(text));
+}
 
 void encode_identity(const FileHeader& header, std::span<std::byte, kBlockBytes> block) noexcept {
   std::byte* const p = block.data();

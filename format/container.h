@@ -12,7 +12,8 @@
 
 namespace ptc {
 
-inline constexpr std::size_t kBlockBytes = 4096;  ///< header, superblocks; the directory starts on it
+inline constexpr std::size_t kBlockBytes =
+    4096;  ///< header, superblocks; the directory starts on it
 inline constexpr std::size_t kSectorBytes = 512;  ///< pages start on it
 /// @param unit  kSectorBytes for pages, kBlockBytes for the directory
 [[nodiscard]] constexpr std::uint64_t round_up(std::uint64_t bytes, std::uint64_t unit) noexcept {
@@ -79,8 +80,10 @@ struct DirectoryEntry {
 };
 
 /// What the directory says of a page with this header.
-[[nodiscard]] inline DirectoryEntry entry_of(const PageHeader& page, std::uint64_t offset) noexcept {
-  return {offset, page.stored_bytes, page.raw_bytes, page.payload_xxh3, page.type, page.group, page.record_count};
+[[nodiscard]] inline DirectoryEntry entry_of(const PageHeader& page,
+                                             std::uint64_t offset) noexcept {
+  return {offset,    page.stored_bytes, page.raw_bytes,   page.payload_xxh3,
+          page.type, page.group,        page.record_count};
 }
 
 /// The commit record, twice at the end of the file: a file without one is unfinished.

@@ -39,7 +39,8 @@ namespace detail {
 }
 
 /// Coordinate of an axis, 0 to 2, of a key.
-[[nodiscard]] inline std::uint64_t coordinate(std::uint64_t high, std::uint64_t low, std::size_t axis) noexcept {
+[[nodiscard]] inline std::uint64_t coordinate(std::uint64_t high, std::uint64_t low,
+                                              std::size_t axis) noexcept {
   return every_third_bit(high >> axis) << kHalfBits | every_third_bit(low >> axis);
 }
 

@@ -14,7 +14,16 @@ inline constexpr std::size_t kSlotUnit = 8;
 inline constexpr int kFirstPointBits = 48;
 
 // Columns of u16 after the children, in the order of GroupView's picture.
-enum Column : std::size_t { kMeanX, kMeanY, kMeanZ, kRadius, kConeAxis, kConeCos, kArea, kThickness };
+enum Column : std::size_t {
+  kMeanX,
+  kMeanY,
+  kMeanZ,
+  kRadius,
+  kConeAxis,
+  kConeCos,
+  kArea,
+  kThickness
+};
 inline constexpr std::size_t kFacing = 8;     // 6 columns, one an axis
 inline constexpr std::size_t kRadiance = 14;  // 6 columns of u32, one an axis
 

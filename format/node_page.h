@@ -28,7 +28,8 @@ struct ChildRef {
   friend bool operator==(const ChildRef&, const ChildRef&) = default;
 };
 
-/// A child reference as it lies in a group: interior page | slot << 32, leaf first point | count << 48.
+/// A child reference as it lies in a group: interior page | slot << 32, leaf first point | count
+/// << 48.
 [[nodiscard]] constexpr ChildRef decode_reference(std::uint64_t word, bool interior) noexcept {
   ChildRef ref;
   ref.interior = interior;
@@ -73,8 +74,8 @@ struct NodeGroup {
 /// a multiple of 8 is not.
 [[nodiscard]] std::size_t node_group_bytes(std::size_t children) noexcept;
 
-/// Appends a group as it lies in a page, padded, whose numbers must be finite and not negative. The sphere
-/// and the cone are widened by what rounding moves their centre and axis.
+/// Appends a group as it lies in a page, padded, whose numbers must be finite and not negative. The
+/// sphere and the cone are widened by what rounding moves their centre and axis.
 /// @throws std::invalid_argument when it has no or more than 8 children
 void append_group(const NodeGroup& group, std::vector<std::byte>& out);
 
@@ -168,7 +169,8 @@ class NodePageEncoder {
   [[nodiscard]] std::vector<std::byte> take();
 
  private:
-  /// @return the new group's slot @throws std::invalid_argument when a group of n children does not fit
+  /// @return the new group's slot @throws std::invalid_argument when a group of n children does not
+  /// fit
   std::uint16_t new_slot(std::size_t children);
 
   std::size_t limit_;

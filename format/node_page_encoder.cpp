@@ -39,7 +39,8 @@ bool sane(double x) noexcept {
 
 [[maybe_unused]] bool storable(const NodeSummary& node) noexcept {
   return std::ranges::all_of(node.mean, [](double x) { return std::isfinite(x); }) &&
-         sane(node.radius) && sane(node.area) && sane(node.thickness) && std::ranges::all_of(node.facing, sane) &&
+         sane(node.radius) && sane(node.area) && sane(node.thickness) &&
+         std::ranges::all_of(node.facing, sane) &&
          std::ranges::all_of(node.flux,
                              [](const auto& f) { return std::ranges::all_of(f, sane); }) &&
          std::ranges::all_of(node.cone_axis, [](float x) { return std::isfinite(x); }) &&
@@ -121,8 +122,8 @@ class ChildEncoder {
     put(kThickness, encode_ufloat16_up(float_above(std::min(thickness, radius))));
   }
 
-  // Distance between the unit normals of the slab as it is and as the stored shares give it; 1 where
-  // there is none, so that the slab is as thick as the sphere.
+  // Distance between the unit normals of the slab as it is and as the stored shares give it; 1
+  // where there is none, so that the slab is as thick as the sphere.
   [[nodiscard]] double turn_of_slab(const NodeSummary& node) const noexcept {
     std::array<double, 3> exact;
     std::array<double, 3> stored;
@@ -130,7 +131,8 @@ class ChildEncoder {
     double stored_squared = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto share = [&](std::size_t k) {
-        return static_cast<double>(load<std::uint16_t>(group_, column_at(n_, kFacing + k) + 2 * i_));
+        return static_cast<double>(
+            load<std::uint16_t>(group_, column_at(n_, kFacing + k) + 2 * i_));
       };
       exact[axis] = node.facing[2 * axis] - node.facing[2 * axis + 1];
       stored[axis] = share(2 * axis) - share(2 * axis + 1);
@@ -140,7 +142,8 @@ class ChildEncoder {
     if (!(exact_squared > 0 && stored_squared > 0)) return 1;
     double apart = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double d = exact[axis] / std::sqrt(exact_squared) - stored[axis] / std::sqrt(stored_squared);
+      const double d =
+          exact[axis] / std::sqrt(exact_squared) - stored[axis] / std::sqrt(stored_squared);
       apart += d * d;
     }
     return std::sqrt(apart);
@@ -173,7 +176,8 @@ class ChildEncoder {
 
 void append_group(const NodeGroup& group, std::vector<std::byte>& out) {
   const std::size_t n = group.children.size();
-  if (n < 1 || n > kMaxChildren) throw std::invalid_argument("append_group: no or too many children");
+  if (n < 1 || n > kMaxChildren)
+    throw std::invalid_argument("append_group: no or too many children");
   assert(group.level >= 0 && group.level <= kMaxLevel);
   assert(cell_of(group.cell, std::min(group.level, kLatticeBits)) == group.cell);
   const std::size_t at = out.size();
@@ -214,7 +218,8 @@ std::uint16_t NodePageEncoder::new_slot(std::size_t children) {
   if (children < 1 || children > kMaxChildren || !fits(children)) {
     throw std::invalid_argument("NodePageEncoder: no or too many children, or no room for them");
   }
-  slots_.push_back(static_cast<std::uint16_t>(groups_.size() / kSlotUnit));  // take() adds the table's size
+  slots_.push_back(
+      static_cast<std::uint16_t>(groups_.size() / kSlotUnit));  // take() adds the table's size
   return static_cast<std::uint16_t>(slots_.size() - 1);
 }
 

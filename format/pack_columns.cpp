@@ -19,19 +19,22 @@ void load_all(const std::byte* column, std::vector<Value>& values) noexcept {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = load<T>(column, i * sizeof(T));
 }
 
-void load_column(const std::byte* payload, const PackedColumn& column, std::vector<std::uint32_t>& values) noexcept {
+void load_column(const std::byte* payload, const PackedColumn& column,
+                 std::vector<std::uint32_t>& values) noexcept {
   const std::byte* const from = payload + column.before * values.size();
   if (column.bits == 8) return load_all<std::uint8_t>(from, values);
   if (column.bits == 16) return load_all<std::uint16_t>(from, values);
   load_all<std::uint32_t>(from, values);
 }
 
-void load_coordinates(const std::byte* payload, const PackedColumn& column, std::vector<std::uint64_t>& values) noexcept {
+void load_coordinates(const std::byte* payload, const PackedColumn& column,
+                      std::vector<std::uint64_t>& values) noexcept {
   load_all<std::uint32_t>(payload + column.before * values.size(), values);
   const std::byte* const high = payload + kHigh * values.size();
   const unsigned shift = high_shift(column);
   for (std::size_t i = 0; i < values.size(); ++i) {
-    values[i] |= std::uint64_t{load<std::uint32_t>(high, 4 * i) >> shift & ((1U << kHighBits) - 1)} << 32;
+    values[i] |= std::uint64_t{load<std::uint32_t>(high, 4 * i) >> shift & ((1U << kHighBits) - 1)}
+                 << 32;
   }
 }
 
@@ -44,7 +47,8 @@ Value bits_of(const std::vector<Value>& values) noexcept {
 
 // Differences to the value before, as zigzag numbers without the zero bits that all values end in.
 template <class Value>
-void difference(const std::vector<Value>& values, unsigned bits, unsigned shift, std::vector<Value>& codes) noexcept {
+void difference(const std::vector<Value>& values, unsigned bits, unsigned shift,
+                std::vector<Value>& codes) noexcept {
   const unsigned width = bits - shift;  // of what is left
   const auto all = static_cast<Value>(mask(width));
   codes[0] = 0;
@@ -56,7 +60,8 @@ void difference(const std::vector<Value>& values, unsigned bits, unsigned shift,
 }
 
 template <class Value>
-void pack(const std::vector<Value>& values, unsigned bits, std::vector<Value>& codes, std::vector<std::byte>& packed) {
+void pack(const std::vector<Value>& values, unsigned bits, std::vector<Value>& codes,
+          std::vector<std::byte>& packed) {
   const Value seen = bits_of(values);
   const unsigned shift = seen == 0 ? 0 : static_cast<unsigned>(std::countr_zero(seen));
   difference(values, bits, shift, codes);
@@ -74,8 +79,8 @@ void pack(const std::vector<Value>& values, unsigned bits, std::vector<Value>& c
   }
 }
 
-void pack_all(std::span<const std::byte> payload, std::uint32_t count, std::span<const PackedColumn> columns,
-              std::vector<std::byte>& packed) {
+void pack_all(std::span<const std::byte> payload, std::uint32_t count,
+              std::span<const PackedColumn> columns, std::vector<std::byte>& packed) {
   std::vector<std::uint32_t> values(count), others(count);
   std::vector<std::uint64_t> coordinates, codes;
   for (const PackedColumn& column : columns) {
@@ -105,8 +110,8 @@ namespace ptc {
 
 HWY_EXPORT(pack_all);
 
-void pack_columns(std::span<const std::byte> payload, std::uint32_t count, std::span<const PackedColumn> columns,
-                  std::vector<std::byte>& packed) {
+void pack_columns(std::span<const std::byte> payload, std::uint32_t count,
+                  std::span<const PackedColumn> columns, std::vector<std::byte>& packed) {
   check_packed_size(payload.size(), count, columns);
   packed.clear();
   HWY_DYNAMIC_DISPATCH(pack_all)(payload, count, columns, packed);

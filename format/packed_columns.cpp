@@ -1,4 +1,5 @@
-// Differences from value to value, zigzagged, one byte plane after another (spec/points.md#packed-columns).
+// Differences from value to value, zigzagged, one byte plane after another
+// (spec/points.md#packed-columns).
 #include "format/packed_columns.h"
 
 #include <algorithm>
@@ -15,12 +16,19 @@ namespace {
 
 constexpr char kPacked[] = "spec/points.md#packed-columns";
 constexpr std::array<PackedColumn, 13> kPointColumns{{
-    {0, kCoordinateBits}, {4, kCoordinateBits}, {8, kCoordinateBits},  // x y z
-    {16, 32},                                                          // radius
-    {20, 16}, {22, 16},                                                // normal
-    {26, 16}, {24, 16, 6}, {28, 16, 6},                                // radiance: g, r - g, b - g
-    {31, 8}, {30, 8, 9}, {32, 8, 9},                                   // albedo likewise
-    {33, 8},                                                           // flags
+    {0, kCoordinateBits},
+    {4, kCoordinateBits},
+    {8, kCoordinateBits},  // x y z
+    {16, 32},              // radius
+    {20, 16},
+    {22, 16},  // normal
+    {26, 16},
+    {24, 16, 6},
+    {28, 16, 6},  // radiance: g, r - g, b - g
+    {31, 8},
+    {30, 8, 9},
+    {32, 8, 9},  // albedo likewise
+    {33, 8},     // flags
 }};
 
 /// A column as it is packed, its head checked.
@@ -32,12 +40,17 @@ struct Head {
 };
 
 Head read_head(std::span<const std::byte> packed, std::size_t at, unsigned bits, std::size_t n) {
-  if (packed.size() - at < kHeadBytes) throw FormatError(at, kPacked, "packed columns end in a column's head");
+  if (packed.size() - at < kHeadBytes)
+    throw FormatError(at, kPacked, "packed columns end in a column's head");
   const std::byte* const p = packed.data() + at;
-  const Head head{load<std::uint8_t>(p, 0), load<std::uint8_t>(p, 1), load<std::uint64_t>(p, 2), p + kHeadBytes};
-  if (head.shift >= bits) throw FormatError(at, kPacked, "shift is not below the bits of the column");
-  if (head.planes > (bits + 7) / 8) throw FormatError(at + 1, kPacked, "more planes than the column has bytes");
-  if (head.base > mask(bits)) throw FormatError(at + 2, kPacked, "base has more bits than the column");
+  const Head head{load<std::uint8_t>(p, 0), load<std::uint8_t>(p, 1), load<std::uint64_t>(p, 2),
+                  p + kHeadBytes};
+  if (head.shift >= bits)
+    throw FormatError(at, kPacked, "shift is not below the bits of the column");
+  if (head.planes > (bits + 7) / 8)
+    throw FormatError(at + 1, kPacked, "more planes than the column has bytes");
+  if (head.base > mask(bits))
+    throw FormatError(at + 2, kPacked, "base has more bits than the column");
   if ((packed.size() - at - kHeadBytes) / n < head.planes) {
     throw FormatError(packed.size(), kPacked, "packed columns end in a plane");
   }
@@ -49,7 +62,8 @@ void sum_planes(const Head& head, std::size_t n, const Put& put) {
   std::uint64_t value = head.base;
   for (std::size_t i = 0; i < n; ++i) {
     std::uint64_t code = 0;
-    for (unsigned k = 0; k < kPlanes; ++k) code |= load<std::uint8_t>(head.codes, k * n + i) * (std::uint64_t{1} << 8 * k);
+    for (unsigned k = 0; k < kPlanes; ++k)
+      code |= load<std::uint8_t>(head.codes, k * n + i) * (std::uint64_t{1} << 8 * k);
     value += (code >> 1 ^ (0 - (code & 1))) << head.shift;
     put(i, value);
   }
@@ -59,39 +73,50 @@ void sum_planes(const Head& head, std::size_t n, const Put& put) {
 template <class Put>
 void sum_up(const Head& head, std::size_t n, const Put& put) {
   switch (head.planes) {
-    case 0: return sum_planes<0>(head, n, put);
-    case 1: return sum_planes<1>(head, n, put);
-    case 2: return sum_planes<2>(head, n, put);
-    case 3: return sum_planes<3>(head, n, put);
-    case 4: return sum_planes<4>(head, n, put);
-    case 5: return sum_planes<5>(head, n, put);
-    default: return sum_planes<6>(head, n, put);
+    case 0:
+      return sum_planes<0>(head, n, put);
+    case 1:
+      return sum_planes<1>(head, n, put);
+    case 2:
+      return sum_planes<2>(head, n, put);
+    case 3:
+      return sum_planes<3>(head, n, put);
+    case 4:
+      return sum_planes<4>(head, n, put);
+    case 5:
+      return sum_planes<5>(head, n, put);
+    default:
+      return sum_planes<6>(head, n, put);
   }
 }
 
 template <class T>
 void unpack_values(const Head& head, std::size_t n, const std::byte* minus, std::byte* to) {
   if (minus == nullptr) {
-    return sum_up(head, n, [&](std::size_t i, std::uint64_t value) { store(to, i * sizeof(T), static_cast<T>(value)); });
+    return sum_up(head, n, [&](std::size_t i, std::uint64_t value) {
+      store(to, i * sizeof(T), static_cast<T>(value));
+    });
   }
   sum_up(head, n, [&](std::size_t i, std::uint64_t value) {
     store(to, i * sizeof(T), static_cast<T>(value + load<T>(minus, i * sizeof(T))));
   });
 }
 
-void unpack_coordinates(const Head& head, std::size_t n, const PackedColumn& column, std::byte* payload) {
+void unpack_coordinates(const Head& head, std::size_t n, const PackedColumn& column,
+                        std::byte* payload) {
   std::byte* const low = payload + column.before * n;
   std::byte* const high = payload + kHigh * n;
   const unsigned shift = high_shift(column);
   sum_up(head, n, [&](std::size_t i, std::uint64_t value) {
     const std::uint32_t others = shift == 0 ? 0 : load<std::uint32_t>(high, 4 * i);
     store(low, 4 * i, static_cast<std::uint32_t>(value));
-    store(high, 4 * i, others | static_cast<std::uint32_t>((value & mask(kCoordinateBits)) >> 32) << shift);
+    store(high, 4 * i,
+          others | static_cast<std::uint32_t>((value & mask(kCoordinateBits)) >> 32) << shift);
   });
 }
 
-void unpack(const Head& head, std::size_t n, std::span<const PackedColumn> columns, const PackedColumn& column,
-            std::byte* payload) {
+void unpack(const Head& head, std::size_t n, std::span<const PackedColumn> columns,
+            const PackedColumn& column, std::byte* payload) {
   if (column.bits == kCoordinateBits) return unpack_coordinates(head, n, column, payload);
   const std::byte* const minus =
       column.minus == PackedColumn::kNone ? nullptr : payload + columns[column.minus].before * n;
@@ -103,18 +128,23 @@ void unpack(const Head& head, std::size_t n, std::span<const PackedColumn> colum
 
 }  // namespace
 
-void check_packed_size(std::size_t bytes, std::uint32_t count, std::span<const PackedColumn> columns) {
+void check_packed_size(std::size_t bytes, std::uint32_t count,
+                       std::span<const PackedColumn> columns) {
   std::size_t row = 0;
   for (const PackedColumn& column : columns) {
     const std::size_t width = column.bits == kCoordinateBits ? 4 : column.bits / 8;
     row = std::max(row, column.before + width);
   }
-  if (count == 0 || bytes != row * count) throw std::invalid_argument("packed columns: a payload of another size");
+  if (count == 0 || bytes != row * count)
+    throw std::invalid_argument("packed columns: a payload of another size");
 }
 
-std::span<const PackedColumn> packed_point_columns() noexcept { return kPointColumns; }
+std::span<const PackedColumn> packed_point_columns() noexcept {
+  return kPointColumns;
+}
 
-std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels, std::uint16_t group) {
+std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels,
+                                               std::uint16_t group) {
   std::vector<PackedColumn> columns;
   std::uint32_t before = 0;
   for (const Channel& channel : channels) {
@@ -127,8 +157,8 @@ std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels
   return columns;
 }
 
-void unpack_columns(std::span<const std::byte> packed, std::uint32_t count, std::span<const PackedColumn> columns,
-                    std::span<std::byte> payload) {
+void unpack_columns(std::span<const std::byte> packed, std::uint32_t count,
+                    std::span<const PackedColumn> columns, std::span<std::byte> payload) {
   check_packed_size(payload.size(), count, columns);
   std::size_t at = 0;
   for (const PackedColumn& column : columns) {
@@ -136,7 +166,8 @@ void unpack_columns(std::span<const std::byte> packed, std::uint32_t count, std:
     unpack(head, count, columns, column, payload.data());
     at += kHeadBytes + std::size_t{head.planes} * count;
   }
-  if (at != packed.size()) throw FormatError(at, kPacked, "bytes are left over after the packed columns");
+  if (at != packed.size())
+    throw FormatError(at, kPacked, "bytes are left over after the packed columns");
 }
 
 }  // namespace ptc

@@ -49,9 +49,11 @@ Coding decode_coding(const std::byte* p, PageType type) {
   const auto codec = load<std::uint8_t>(p, 6), filter = load<std::uint8_t>(p, 7);
   constexpr char kCodec[] = "spec/container.md#page-codec";
   if (codec > static_cast<std::uint8_t>(Codec::lz4)) throw FormatError(6, kCodec, "unknown codec");
-  if (type == PageType::directory && codec != 0) throw FormatError(6, kCodec, "directory page is compressed");
+  if (type == PageType::directory && codec != 0)
+    throw FormatError(6, kCodec, "directory page is compressed");
   constexpr char kFilter[] = "spec/container.md#page-filter";
-  if (filter > static_cast<std::uint8_t>(Filter::columns)) throw FormatError(7, kFilter, "unknown filter");
+  if (filter > static_cast<std::uint8_t>(Filter::columns))
+    throw FormatError(7, kFilter, "unknown filter");
   if (filter != 0 && codec == 0) throw FormatError(7, kFilter, "a raw page is filtered");
   if (filter != 0 && type != PageType::point && type != PageType::attribute) {
     throw FormatError(7, kFilter, "a page of this type has no columns to filter");

@@ -169,7 +169,8 @@ std::uint64_t point_page_bytes(std::uint32_t points) noexcept {
 
 std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
   if (points.empty()) throw std::invalid_argument("encode_point_page: no points");
-  assert(std::ranges::is_sorted(points, {}, &PointRecord::key) && std::ranges::all_of(points, storable));
+  assert(std::ranges::is_sorted(points, {}, &PointRecord::key) &&
+         std::ranges::all_of(points, storable));
   Columns columns(static_cast<std::uint32_t>(points.size()));
   PositionBlock q;
   for (std::size_t first = 0; first < points.size(); first += kPositionBlock) {
@@ -187,7 +188,8 @@ std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
       fill(kAlbedo + k, [&](std::size_t i) { return block[i].albedo[k]; });
     }
     fill(kHigh, [&](std::size_t i) {
-      return static_cast<std::uint32_t>(q[0][i] >> 32 | q[1][i] >> 32 << kHighBits | q[2][i] >> 32 << (2 * kHighBits));
+      return static_cast<std::uint32_t>(q[0][i] >> 32 | q[1][i] >> 32 << kHighBits |
+                                        q[2][i] >> 32 << (2 * kHighBits));
     });
     fill(kRadius, [&](std::size_t i) { return block[i].radius + 0.0f; });  // -0 becomes 0
     for (std::size_t k = 0; k < 2; ++k) {

@@ -58,9 +58,10 @@ namespace detail {
 /// A unit vector folded onto the octahedron, two signed 16-bit numbers (Cigolle et al. 2014);
 /// angle error at most 1e-4 rad. The zero vector encodes as +z.
 [[nodiscard]] std::array<std::int16_t, 2> encode_octahedral(const std::array<float, 3>& n) noexcept;
-[[nodiscard]] inline std::array<float, 3> decode_octahedral(std::int16_t u, std::int16_t v) noexcept {
+[[nodiscard]] inline std::array<float, 3> decode_octahedral(std::int16_t u,
+                                                            std::int16_t v) noexcept {
   return detail::unfold_octahedron(static_cast<float>(std::max<int>(u, -32767)) / 32767,
-                static_cast<float>(std::max<int>(v, -32767)) / 32767);
+                                   static_cast<float>(std::max<int>(v, -32767)) / 32767);
 }
 /// The same in two bytes, u | v << 8 as signed bytes; angle error at most 0.017 rad.
 [[nodiscard]] std::uint16_t encode_octahedral8(const std::array<float, 3>& n) noexcept;

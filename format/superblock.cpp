@@ -22,7 +22,8 @@ constexpr std::size_t kIdentityAt = 8;  // bytes 8 to 119 are those of the file 
 constexpr std::size_t kIdentityBytes = 112;
 constexpr std::size_t kWriterAt = 328;
 constexpr std::size_t kWriterBytes = 64;
-constexpr std::array<std::array<std::size_t, 2>, 3> kReserved{{{172, 176}, {200, 232}, {kWriterAt + kWriterBytes, kHashAt}}};
+constexpr std::array<std::array<std::size_t, 2>, 3> kReserved{
+    {{172, 176}, {200, 232}, {kWriterAt + kWriterBytes, kHashAt}}};
 constexpr std::uint64_t kGreatestCount = std::uint64_t{1} << 48;
 
 void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
@@ -187,7 +188,8 @@ Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader&
   check_totals(s);
   for (const auto& [first, last] : kReserved) {
     const std::size_t found = first + first_nonzero(bytes.subspan(first, last - first));
-    if (found != last) throw FormatError(found, "spec/container.md#superblock-zero", "reserved byte is not zero");
+    if (found != last)
+      throw FormatError(found, "spec/container.md#superblock-zero", "reserved byte is not zero");
   }
   return s;
 }

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/verify/verify.h"
 #include "engine/store/reader.h"
+#include "engine/verify/verify.h"
 #include "format/error.h"
 #include "format/node_page.h"
 #include "format/point_page.h"
@@ -79,7 +79,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool read = read_all(file.path());
   ptc::Progress silent;
   const ptc::VerifyReport report = verify_container(
-      file.path(), {.memory_bytes = std::uint64_t{1} << 30, .threads = 1, .flip_budget = 1 << 20}, silent);
+      file.path(), {.memory_bytes = std::uint64_t{1} << 30, .threads = 1, .flip_budget = 1 << 20},
+      silent);
   require(read || !report.sound());
   return 0;
 }

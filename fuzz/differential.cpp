@@ -18,8 +18,8 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/verify/verify.h"
 #include "engine/store/reader.h"
+#include "engine/verify/verify.h"
 #include "fuzz/memory_file.h"
 #include "fuzz/require.h"
 
@@ -72,11 +72,12 @@ class SecondReader {
   int verdicts_ = -1;
 };
 
-/// What the verifier says, as reader_server.py says it of the first rule: "valid DIGEST", or "broken RULE" of each.
+/// What the verifier says, as reader_server.py says it of the first rule: "valid DIGEST", or
+/// "broken RULE" of each.
 std::vector<std::string> judge(const std::filesystem::path& path) {
   ptc::Progress silent;
-  const ptc::VerifyReport report =
-      verify_container(path, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1, .flip_budget = 0}, silent);
+  const ptc::VerifyReport report = verify_container(
+      path, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1, .flip_budget = 0}, silent);
   std::vector<std::string> verdicts;
   for (const ptc::Finding& finding : report.findings) verdicts.push_back("broken " + finding.rule);
   if (!verdicts.empty()) return verdicts;
@@ -92,11 +93,13 @@ bool is_of_summaries(std::string_view verdict) {
 }
 
 bool agree(const std::vector<std::string>& first, std::string_view second) {
-  const auto is_header = [](std::string_view verdict) { return verdict.starts_with("broken spec/container.md#header-"); };
+  const auto is_header = [](std::string_view verdict) {
+    return verdict.starts_with("broken spec/container.md#header-");
+  };
   if (std::ranges::find(first, second) != first.end()) return true;
   if (second.starts_with("valid ")) return std::ranges::all_of(first, is_of_summaries);
-  return second.starts_with("broken ") && !first.front().starts_with("valid ") && !is_header(second) &&
-         std::ranges::none_of(first, is_header);
+  return second.starts_with("broken ") && !first.front().starts_with("valid ") &&
+         !is_header(second) && std::ranges::none_of(first, is_header);
 }
 
 }  // namespace
@@ -107,7 +110,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::vector<std::string> first = judge(file.path());
   const std::string second = second_reader.ask(file.path());
   if (agree(first, second)) return 0;
-  for (const std::string& verdict : first) std::fprintf(stderr, "the verifier: %s\n", verdict.c_str());
+  for (const std::string& verdict : first)
+    std::fprintf(stderr, "the verifier: %s\n", verdict.c_str());
   std::fprintf(stderr, "reader.py:    %s\n", second.c_str());
   std::abort();
 }

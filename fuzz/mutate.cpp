@@ -2,8 +2,6 @@
 // compressed ones included, and then, seven times in eight, repairs all checksums, so that rules
 // are what is reached. Half the time it starts from a good vector: most files of a corpus are
 // refused, and what comes behind the refusal is not reached.
-#include <zstd.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -12,6 +10,8 @@
 #include <iterator>
 #include <limits>
 #include <random>
+
+#include <zstd.h>
 
 #include "format/bytes.h"
 #include "format/codec.h"
@@ -62,11 +62,10 @@ constexpr std::array<Field, 7> kEntryFields{
 /// Where a page header repeats the fields of its entry.
 constexpr std::array<std::size_t, 7> kRepeats{0, 12, 16, 48, 4, 20, 24};
 constexpr std::array<Field, 34> kSuperFields{
-    {{0, 8},   {8, 8},   {56, 1},  {120, 8}, {128, 4}, {132, 4}, {136, 8}, {144, 8},
-     {152, 4}, {156, 4}, {160, 2}, {162, 2}, {164, 4}, {168, 4}, {172, 4}, {176, 8},
-     {184, 8}, {192, 8}, {200, 8}, {232, 8}, {240, 8},
-     {248, 8}, {256, 8}, {264, 8}, {272, 8}, {280, 8}, {288, 8}, {296, 8}, {304, 8},
-     {312, 8}, {320, 8}, {328, 8}, {384, 8}, {392, 8}}};
+    {{0, 8},   {8, 8},   {56, 1},  {120, 8}, {128, 4}, {132, 4}, {136, 8}, {144, 8}, {152, 4},
+     {156, 4}, {160, 2}, {162, 2}, {164, 4}, {168, 4}, {172, 4}, {176, 8}, {184, 8}, {192, 8},
+     {200, 8}, {232, 8}, {240, 8}, {248, 8}, {256, 8}, {264, 8}, {272, 8}, {280, 8}, {288, 8},
+     {296, 8}, {304, 8}, {312, 8}, {320, 8}, {328, 8}, {384, 8}, {392, 8}}};
 
 class Mutation {
  public:

@@ -1,5 +1,5 @@
-// Any bytes: the decoders of header, superblock, page header, meta, point and node pages, codecs and
-// packed columns return values that can be read whole, or throw FormatError.
+// Any bytes: the decoders of header, superblock, page header, meta, point and node pages, codecs
+// and packed columns return values that can be read whole, or throw FormatError.
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -50,7 +50,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   expect_format_error([&] { (void)ptc::decode_meta(body); });
   expect_format_error([&] { read_nodes(body, count); });
   expect_format_error([&] { read_points(body, count); });
-  const ptc::Coding coding{static_cast<ptc::Codec>(data[2] % 3), static_cast<ptc::Filter>(data[3] % 2)};
+  const ptc::Coding coding{static_cast<ptc::Codec>(data[2] % 3),
+                           static_cast<ptc::Filter>(data[3] % 2)};
   if (count > 0 && coding.codec != ptc::Codec::raw) {
     expect_format_error([&] { decode_payload(body, count, coding); });
   }

@@ -1,8 +1,9 @@
-// Any bytes as a damaged container: what is salvaged passes the verifier at every level, or nothing is written and
-// FormatError says why.
+// Any bytes as a damaged container: what is salvaged passes the verifier at every level, or nothing
+// is written and FormatError says why.
+#include "engine/verify/salvage.h"
+
 #include <cstdint>
 
-#include "engine/verify/salvage.h"
 #include "engine/verify/verify.h"
 #include "format/error.h"
 #include "fuzz/memory_file.h"
@@ -15,13 +16,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::filesystem::remove(kept);
   ptc::Progress silent;
   try {
-    static_cast<void>(salvage_container(file.path(), kept, {.memory_bytes = std::uint64_t{1} << 30, .flip_budget = 1 << 20}, silent));
+    static_cast<void>(salvage_container(
+        file.path(), kept, {.memory_bytes = std::uint64_t{1} << 30, .flip_budget = 1 << 20},
+        silent));
   } catch (const ptc::FormatError&) {
     require(!std::filesystem::exists(kept));
     return 0;
   }
   const ptc::VerifyReport report = verify_container(
-      kept, {.level = ptc::VerifyLevel::rebuild, .memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent);
+      kept,
+      {.level = ptc::VerifyLevel::rebuild, .memory_bytes = std::uint64_t{1} << 30, .threads = 1},
+      silent);
   require(report.findings.empty());
   return 0;
 }

@@ -10,9 +10,9 @@
 
 #include "engine/build/build.h"
 #include "engine/build/container_points.h"
-#include "engine/verify/verify.h"
 #include "engine/io/image.h"
 #include "engine/io/points.h"
+#include "engine/verify/verify.h"
 #include "format/codec.h"
 #include "format/node_page.h"
 #include "format/point_page.h"
@@ -181,7 +181,10 @@ void container(ByteSource& from) {
   write_attributes(from, writer, meta, points.size(), attributes);
   const Superblock written = writer.finish(meta, superblock);
 
-  require(verify_container(path, {.level = VerifyLevel::rebuild, .memory_bytes = std::uint64_t{1} << 30, .threads = 1}, silent)
+  require(verify_container(
+              path,
+              {.level = VerifyLevel::rebuild, .memory_bytes = std::uint64_t{1} << 30, .threads = 1},
+              silent)
               .findings.empty());
   const ContainerReader reader(path);
   require(reader.superblock().content_xxh3 == written.content_xxh3 &&

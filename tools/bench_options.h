@@ -11,13 +11,16 @@
 
 namespace ptc::bench {
 
-/// "SR,RAD,R[,X]": solid angle, parallax, resolution, inflation. Refuses what a gather does not take.
+/// "SR,RAD,R[,X]": solid angle, parallax, resolution, inflation. Refuses what a gather does not
+/// take.
 [[nodiscard]] GatherOptions parse_setting(const std::string& text);
 
 /// Some of the words in `chosen`, repeatable. They must stay where they are.
-CLI::Option* add_words(CLI::App& command, const char* name, std::vector<std::string>& chosen, const char* description);
+CLI::Option* add_words(CLI::App& command, const char* name, std::vector<std::string>& chosen,
+                       const char* description);
 
 /// --points, repeatable; sorted.
-void add_points_list(CLI::App& command, std::vector<std::uint64_t>& points, const char* description);
+void add_points_list(CLI::App& command, std::vector<std::uint64_t>& points,
+                     const char* description);
 
 }  // namespace ptc::bench

@@ -14,7 +14,8 @@
 
 namespace ptc::bench {
 
-/// Sets less to measure, but for what was given on the command line. References stay as good where they take little time.
+/// Sets less to measure, but for what was given on the command line. References stay as good where
+/// they take little time.
 /// @param command  that was parsed
 void shorten(AccuracyOptions& options, const CLI::App& command);
 void shorten(BuildBenchOptions& options, const CLI::App& command);

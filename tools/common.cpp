@@ -1,8 +1,6 @@
 // One place for parsing, checks of files, errors and output of all programs.
 #include "tools/common.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
@@ -13,6 +11,8 @@
 #include <new>
 #include <stdexcept>
 #include <system_error>
+
+#include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
@@ -26,7 +26,8 @@ namespace {
 
 /// A version or feature that is too new is another thing than damage.
 ExitCode exit_code_of(const FormatError& error) {
-  const bool newer = error.clause().ends_with("#header-version") || error.clause().ends_with("#header-features");
+  const bool newer =
+      error.clause().ends_with("#header-version") || error.clause().ends_with("#header-features");
   return newer ? kUnsupported : kInvalidData;
 }
 
@@ -211,7 +212,9 @@ bool Command::parse(int argc, char** argv, int& exit_code) {
 
 int Command::perform(const std::function<Outcome(Progress&)>& body) const {
   check_files();
-  const auto progress = quiet_ ? std::make_unique<Progress>() : progress_ ? make_stderr_progress() : make_stderr_notes();
+  const auto progress = quiet_      ? std::make_unique<Progress>()
+                        : progress_ ? make_stderr_progress()
+                                    : make_stderr_notes();
   Outcome outcome = body(*progress);
   if (json_) {
     outcome.facts["peak_resident_bytes"] = peak_resident_bytes();
@@ -220,7 +223,8 @@ int Command::perform(const std::function<Outcome(Progress&)>& body) const {
     const int indent = outcome.lines ? -1 : 2;
     std::string text;
     if (outcome.lines) {
-      for (const auto& line : *outcome.lines) text += line.dump(indent, ' ', false, kReplace) + "\n";
+      for (const auto& line : *outcome.lines)
+        text += line.dump(indent, ' ', false, kReplace) + "\n";
     }
     print(text + outcome.facts.dump(indent, ' ', false, kReplace) + "\n");
   } else if (!quiet_ && outcome.exit_code == kDone) {

@@ -31,14 +31,16 @@ enum ExitCode : int {
 struct Outcome {
   nlohmann::ordered_json facts;  ///< for machines, printed with --json
   std::string summary;           ///< for people, printed otherwise; lines end with '\n'
-  ExitCode exit_code = kDone;    ///< any other: the summary goes to standard error, whatever was asked for
+  ExitCode exit_code =
+      kDone;  ///< any other: the summary goes to standard error, whatever was asked for
   /// Printed with --json, a line each, before the facts, which then take one line too.
   std::optional<std::vector<nlohmann::ordered_json>> lines = std::nullopt;
 };
 
 /// What the exit codes mean, for --help.
 inline constexpr char kExitCodes[] =
-    "0 done, 1 data invalid or different, 2 usage, 3 system, 4 format not supported, 5 limit too small.";
+    "0 done, 1 data invalid or different, 2 usage, 3 system, 4 format not supported, 5 limit too "
+    "small.";
 
 /// A command line program: declare options on app(), then run().
 class Command {
@@ -58,8 +60,8 @@ class Command {
   /// The same, any number of times; an option takes one path each time.
   CLI::Option* add_inputs(const std::string& name, std::vector<std::filesystem::path>& paths,
                           const std::string& description);
-  /// Declares what is written, "-o,--output" or positional, required unless that is taken back. Its directory must
-  /// exist when the body runs.
+  /// Declares what is written, "-o,--output" or positional, required unless that is taken back. Its
+  /// directory must exist when the body runs.
   /// @param endings  those allowed, e.g. ".exr"; what belongs to none is a usage error
   CLI::Option* add_output(const std::string& name, std::filesystem::path& path,
                           const std::vector<std::string>& endings, const std::string& description);

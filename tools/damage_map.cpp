@@ -1,11 +1,11 @@
 // The map of ptcverify --map.
 #include "tools/damage_map.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "engine/measure/picture.h"
 #include "tools/report.h"
@@ -21,9 +21,12 @@ struct KindStyle {
 };
 
 constexpr std::array kStyles{
-    KindStyle{"padding, or nothing known", {0.88, 0.88, 0.88}}, KindStyle{"points", {0.45, 0.67, 0.85}},
-    KindStyle{"nodes", {0.55, 0.76, 0.55}},                     KindStyle{"attributes", {0.75, 0.65, 0.85}},
-    KindStyle{"meta page", {0.95, 0.80, 0.45}},                 KindStyle{"header, directory, superblocks", {0.35, 0.40, 0.50}},
+    KindStyle{"padding, or nothing known", {0.88, 0.88, 0.88}},
+    KindStyle{"points", {0.45, 0.67, 0.85}},
+    KindStyle{"nodes", {0.55, 0.76, 0.55}},
+    KindStyle{"attributes", {0.75, 0.65, 0.85}},
+    KindStyle{"meta page", {0.95, 0.80, 0.45}},
+    KindStyle{"header, directory, superblocks", {0.35, 0.40, 0.50}},
     KindStyle{"damaged", {0.85, 0.10, 0.12}},
 };
 
@@ -35,11 +38,16 @@ constexpr std::size_t kMostLetters = 150;
 
 Kind kind_of(PageType type) {
   switch (type) {
-    case PageType::point: return Kind::points;
-    case PageType::node: return Kind::nodes;
-    case PageType::attribute: return Kind::attributes;
-    case PageType::meta: return Kind::meta;
-    case PageType::directory: return Kind::structure;
+    case PageType::point:
+      return Kind::points;
+    case PageType::node:
+      return Kind::nodes;
+    case PageType::attribute:
+      return Kind::attributes;
+    case PageType::meta:
+      return Kind::meta;
+    case PageType::directory:
+      return Kind::structure;
   }
   return Kind::nothing;
 }
@@ -51,27 +59,34 @@ class Parts {
     const std::uint64_t sectors = file_bytes_ / kSectorBytes + 1;
     bytes_ = (sectors + kColumns * kMostRows - 1) / (kColumns * kMostRows) * kSectorBytes;
     kinds_.resize((file_bytes_ + bytes_ - 1) / bytes_, Kind::nothing);
-    for (const PageSite& site : report.sites) mark(site.entry.offset, site.end(), kind_of(site.entry.type));
+    for (const PageSite& site : report.sites)
+      mark(site.entry.offset, site.end(), kind_of(site.entry.type));
     mark(0, kBlockBytes, Kind::structure);
-    if (report.superblock) mark(report.superblock->directory_offset, report.superblock->file_bytes, Kind::structure);
+    if (report.superblock)
+      mark(report.superblock->directory_offset, report.superblock->file_bytes, Kind::structure);
     for (const PageSite& site : report.sites) {
       if (!site.sound) mark(site.entry.offset, site.end(), Kind::damage);
     }
     for (const Finding& finding : report.findings) {
-      if (finding.severity == Severity::damage) mark(finding.offset, finding.offset + std::max<std::uint64_t>(1, finding.bytes), Kind::damage);
+      if (finding.severity == Severity::damage)
+        mark(finding.offset, finding.offset + std::max<std::uint64_t>(1, finding.bytes),
+             Kind::damage);
     }
   }
 
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
   [[nodiscard]] const std::vector<Kind>& kinds() const noexcept { return kinds_; }
-  [[nodiscard]] std::uint64_t rows() const noexcept { return (kinds_.size() + kColumns - 1) / kColumns; }
+  [[nodiscard]] std::uint64_t rows() const noexcept {
+    return (kinds_.size() + kColumns - 1) / kColumns;
+  }
 
  private:
   void mark(std::uint64_t begin, std::uint64_t end, Kind kind) {
     // What is wrong with the end of a file lies behind its last byte.
     begin = std::min(begin, file_bytes_ > 0 ? file_bytes_ - 1 : 0);
     end = std::clamp(end, begin + 1, std::max(begin + 1, file_bytes_));
-    for (std::uint64_t part = begin / bytes_; part <= (end - 1) / bytes_ && part < kinds_.size(); ++part) {
+    for (std::uint64_t part = begin / bytes_; part <= (end - 1) / bytes_ && part < kinds_.size();
+         ++part) {
       kinds_[part] = std::max(kinds_[part], kind);
     }
   }
@@ -84,7 +99,8 @@ class Parts {
 std::string shortened(std::string text) {
   if (text.size() <= kMostLetters) return text;
   std::size_t end = kMostLetters;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;  // no half of a letter
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80)
+    --end;  // no half of a letter
   return text.substr(0, end) + "...";
 }
 
@@ -108,7 +124,8 @@ void draw_cells(Canvas& canvas, const Parts& parts) {
   }
   for (std::uint64_t row = 0; row < parts.rows(); row += 4) {
     canvas.text({kLeft - 6, kTop + kCell * static_cast<double>(row + 1) - 1},
-                fmt::format("{:#x}", row * kColumns * parts.bytes()), {.size = 9, .align = Align::right});
+                fmt::format("{:#x}", row * kColumns * parts.bytes()),
+                {.size = 9, .align = Align::right});
   }
 }
 
@@ -123,7 +140,8 @@ void draw_legend(Canvas& canvas, double top) {
 
 }  // namespace
 
-void write_damage_map(const std::filesystem::path& target, const std::string& name, const VerifyReport& report) {
+void write_damage_map(const std::filesystem::path& target, const std::string& name,
+                      const VerifyReport& report) {
   const Parts parts(report);
   const std::vector<std::string> lines = lines_of(report);
   const double legend = kTop + kCell * static_cast<double>(parts.rows()) + 22;
@@ -136,13 +154,15 @@ void write_damage_map(const std::filesystem::path& target, const std::string& na
     canvas.fill({0, 0, picture.width, picture.height}, {1, 1, 1});
     canvas.text({kMargin, 22}, shortened(picture.title), {.size = 13, .bold = true});
     canvas.text({kMargin, 40},
-                fmt::format("{} in {} pages, {} of them damaged; a square is {} bytes", bytes_text(report.file_bytes),
-                            report.pages, report.damaged_pages, parts.bytes()),
+                fmt::format("{} in {} pages, {} of them damaged; a square is {} bytes",
+                            bytes_text(report.file_bytes), report.pages, report.damaged_pages,
+                            parts.bytes()),
                 {.size = 10});
     draw_cells(canvas, parts);
     draw_legend(canvas, legend);
     for (std::size_t i = 0; i < lines.size(); ++i) {
-      canvas.text({kMargin, legend + 8 + kLine * static_cast<double>(i + 1)}, lines[i], {.size = 10});
+      canvas.text({kMargin, legend + 8 + kLine * static_cast<double>(i + 1)}, lines[i],
+                  {.size = 10});
     }
   };
   write_picture(target, picture);

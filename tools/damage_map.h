@@ -8,10 +8,11 @@
 
 namespace ptc {
 
-/// Draws the file from its first byte to its last, row by row, each cell the kind of what lies there, red where it
-/// is damaged, and the first findings under it.
+/// Draws the file from its first byte to its last, row by row, each cell the kind of what lies
+/// there, red where it is damaged, and the first findings under it.
 /// @param target  .svg or .png
 /// @param name    of the file
-void write_damage_map(const std::filesystem::path& target, const std::string& name, const VerifyReport& report);
+void write_damage_map(const std::filesystem::path& target, const std::string& name,
+                      const VerifyReport& report);
 
 }  // namespace ptc

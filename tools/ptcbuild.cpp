@@ -38,9 +38,12 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
       command.add_inputs("inputs", request.inputs,
                          "Meshes (OBJ, PLY, OFF, glTF, GLB) and clouds (PLY, XYZ), also .gz");
   command.add_output("-o,--output", arguments.output, {".ptcx"}, "The container to write");
-  ptc::add_count(app, "--city", request.city_points, "A procedural city of about so many points, no inputs")
+  ptc::add_count(app, "--city", request.city_points,
+                 "A procedural city of about so many points, no inputs")
       ->excludes(inputs);
-  command.add_input("--append", request.append, "A container whose points, lights and profile go before the inputs")
+  command
+      .add_input("--append", request.append,
+                 "A container whose points, lights and profile go before the inputs")
       ->excludes("--city");
   app.add_flag("--backdrop", request.backdrop, "Set the meshes on a ground before a red wall");
 }
@@ -84,9 +87,11 @@ void declare_container(CLI::App& app, ptc::BuildRequest& request) {
 
 void declare_resume(CLI::App& app, ptc::BuildRequest& request) {
   constexpr char kGroup[] = "Resume";
-  CLI::Option* resume =
-      app.add_flag("--resume", request.resume, "Leave what it takes to go on, and go on with what there is")->group(kGroup);
-  ptc::add_count(app, "--checkpoint", request.checkpoint_points, "Points that are built again at most, about")
+  CLI::Option* resume = app.add_flag("--resume", request.resume,
+                                     "Leave what it takes to go on, and go on with what there is")
+                            ->group(kGroup);
+  ptc::add_count(app, "--checkpoint", request.checkpoint_points,
+                 "Points that are built again at most, about")
       ->needs(resume)
       ->group(kGroup);
 }
@@ -110,8 +115,10 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   }
   request.run = command.run_options();
   request.sampling.camera = arguments.camera.camera();
-  if (arguments.lights.given() || arguments.no_default_lights) request.lights = arguments.lights.rig();
-  if (request.city_points > 0 && arguments.lights.given()) throw CLI::ExcludesError("--city", "lights: it has its own");
+  if (arguments.lights.given() || arguments.no_default_lights)
+    request.lights = arguments.lights.rig();
+  if (request.city_points > 0 && arguments.lights.given())
+    throw CLI::ExcludesError("--city", "lights: it has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);
   const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
 
@@ -138,7 +145,6 @@ int main(int argc, char** argv) {
   declare_lights(command.app(), arguments);
   declare_container(command.app(), arguments.request);
   declare_resume(command.app(), arguments.request);
-  return command.run(argc, argv, [&](ptc::Progress& progress) {
-    return build(arguments, command, progress);
-  });
+  return command.run(argc, argv,
+                     [&](ptc::Progress& progress) { return build(arguments, command, progress); });
 }

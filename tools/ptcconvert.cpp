@@ -55,8 +55,10 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
     if (arguments.page_size_given) options.page_shift = arguments.page_shift;
     return ptc::recode_container(container, arguments.output, options, progress);
   }
-  static_cast<void>(ptc::memory_left(run, ptc::kBufferBytes + ptc::open_bytes(container), 0, "this conversion"));
-  const auto to_cloud = ptc::has_ending(arguments.output, ".ply") ? ptc::container_to_ply : ptc::container_to_xyz;
+  static_cast<void>(
+      ptc::memory_left(run, ptc::kBufferBytes + ptc::open_bytes(container), 0, "this conversion"));
+  const auto to_cloud =
+      ptc::has_ending(arguments.output, ".ply") ? ptc::container_to_ply : ptc::container_to_xyz;
   return to_cloud(container, arguments.output, progress);
 }
 

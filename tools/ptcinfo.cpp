@@ -1,7 +1,7 @@
 // ptcinfo: what a container holds, from its header, superblock, directory and meta page.
-#include <fmt/format.h>
-
 #include <map>
+
+#include <fmt/format.h>
 
 #include "engine/io/file.h"
 #include "engine/stages.h"
@@ -99,7 +99,8 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   facts["channels"] = channels_of(container.meta());
   facts["leaf_points"] = superblock.leaf_points;
   facts["points_per_page"] = superblock.points_per_page;
-  facts["frame"] = {{"origin", superblock.header.frame.origin}, {"edge", superblock.header.frame.edge}};
+  facts["frame"] = {{"origin", superblock.header.frame.origin},
+                    {"edge", superblock.header.frame.edge}};
   facts["area"] = superblock.area;
   facts["flux"] = superblock.flux;
   facts["uuid"] = hex(container.header().uuid);
@@ -110,17 +111,22 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   return facts;
 }
 
-/// Refuses a cap that does not hold the file's directory and the texts of its meta page, before they are read.
+/// Refuses a cap that does not hold the file's directory and the texts of its meta page, before
+/// they are read.
 void require_memory(const std::filesystem::path& path, const ptc::RunOptions& run) {
-  constexpr std::uint64_t kTexts = 16;  // page, decoded, as JSON, printed: there control characters take six bytes
+  constexpr std::uint64_t kTexts =
+      16;  // page, decoded, as JSON, printed: there control characters take six bytes
   const ptc::InputFile file(path);
   const ptc::Superblock superblock = ptc::read_superblock(file, ptc::read_file_header(file));
   const std::uint64_t texts = kTexts << superblock.header.page_shift;
-  static_cast<void>(ptc::memory_left(run, texts, ptc::ContainerReader::kMostPageBytes * superblock.page_count, "this file"));
+  static_cast<void>(ptc::memory_left(
+      run, texts, ptc::ContainerReader::kMostPageBytes * superblock.page_count, "this file"));
 }
 
 /// Text of a file as people may see it: in quotes, with no character that a terminal would obey.
-std::string quoted(const ordered_json& text) { return text.dump(-1, ' ', true); }
+std::string quoted(const ordered_json& text) {
+  return text.dump(-1, ' ', true);
+}
 
 std::string summary_of(const ordered_json& facts) {
   const auto& low = facts["bounds"]["low"];
@@ -141,7 +147,8 @@ std::string summary_of(const ordered_json& facts) {
       low[2].dump(), high[0].dump(), high[1].dump(), high[2].dump(), bytes("file"),
       bytes("point_pages"), bytes("node_pages"), bytes("attribute_pages"),
       facts["codec"].get<std::string>());
-  if (const auto rounding = facts["text"].find(ptc::kRoundingKey); rounding != facts["text"].end()) {
+  if (const auto rounding = facts["text"].find(ptc::kRoundingKey);
+      rounding != facts["text"].end()) {
     text += fmt::format("  rounded   {}\n", quoted(*rounding));
   }
   for (const auto& channel : facts["channels"]) {

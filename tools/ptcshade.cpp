@@ -30,7 +30,8 @@ int main(int argc, char** argv) {
   command.add_input("--receivers", request.receivers,
                     "Cloud or container to shade [default: the scene's own points]");
   ptc::add_count(app, "--count", request.count,
-                 "Shade only so many of the points, evenly spread, into a .ply; k, M, G count by 1000 [default: all]");
+                 "Shade only so many of the points, evenly spread, into a .ply; k, M, G count by "
+                 "1000 [default: all]");
   lights.declare_sky(app);
   app.get_option("--sky")->description(
       "Radiance from everywhere, or a latitude-longitude picture of it [default: as built]");

@@ -1,8 +1,9 @@
-// ptcverify: is every byte of a container what the specification says, and if not, what happened to it?
-#include <fmt/format.h>
-
+// ptcverify: is every byte of a container what the specification says, and if not, what happened to
+// it?
 #include <algorithm>
 #include <chrono>
+
+#include <fmt/format.h>
 
 #include "engine/verify/salvage.h"
 #include "engine/verify/verify.h"
@@ -15,9 +16,12 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr char kPurpose[] =
-    "Goes over a container and tells of every fault where it is, which rule it breaks and what may have\n"
-    "caused it. Levels: 0 header, superblocks, length; 1 directory and page headers; 2 payload checksums\n"
-    "and padding; 3 what pages hold, the tree against its points, totals; 4 the tree built again and\n"
+    "Goes over a container and tells of every fault where it is, which rule it breaks and what may "
+    "have\n"
+    "caused it. Levels: 0 header, superblocks, length; 1 directory and page headers; 2 payload "
+    "checksums\n"
+    "and padding; 3 what pages hold, the tree against its points, totals; 4 the tree built again "
+    "and\n"
     "compared.";
 constexpr char kExamples[] =
     "  ptcverify scene.ptcx\n"
@@ -32,7 +36,8 @@ constexpr std::size_t kMostLines = 20;
 /// Of several the one that a script has to know first.
 ptc::ExitCode exit_code_of(const ptc::VerifyReport& report) {
   const auto any = [&](auto... causes) {
-    return std::ranges::any_of(report.findings, [&](const ptc::Finding& f) { return ((f.cause == causes) || ...); });
+    return std::ranges::any_of(report.findings,
+                               [&](const ptc::Finding& f) { return ((f.cause == causes) || ...); });
   };
   if (any(ptc::Cause::newer)) return ptc::kUnsupported;
   if (any(ptc::Cause::unreadable)) return ptc::kSystem;
@@ -59,22 +64,30 @@ ordered_json line_for(const ptc::Finding& finding) {
 std::string findings_text(const std::string& name, const ptc::VerifyReport& report) {
   std::string text;
   const std::size_t shown = std::min(kMostLines, report.findings.size());
-  for (std::size_t i = 0; i < shown; ++i) text += fmt::format("ptcverify: {}: {}\n", name, line_of(report.findings[i]));
+  for (std::size_t i = 0; i < shown; ++i)
+    text += fmt::format("ptcverify: {}: {}\n", name, line_of(report.findings[i]));
   const std::uint64_t rest = report.damage + report.warnings - shown;
-  if (rest > 0) text += fmt::format("ptcverify: {}: and {} more (--json lists {})\n", name, rest, report.findings.size());
+  if (rest > 0)
+    text += fmt::format("ptcverify: {}: and {} more (--json lists {})\n", name, rest,
+                        report.findings.size());
   return text;
 }
 
-std::string verdict_text(const std::string& name, const ptc::VerifyReport& report, int level, double seconds) {
-  const std::string over = fmt::format("{} pages, {} points, {} nodes in {} groups, {}, {:.2f} s", report.pages, report.points,
-                                       report.nodes, report.groups, ptc::bytes_text(report.file_bytes), seconds);
+std::string verdict_text(const std::string& name, const ptc::VerifyReport& report, int level,
+                         double seconds) {
+  const std::string over = fmt::format("{} pages, {} points, {} nodes in {} groups, {}, {:.2f} s",
+                                       report.pages, report.points, report.nodes, report.groups,
+                                       ptc::bytes_text(report.file_bytes), seconds);
   if (report.sound()) return fmt::format("{}: valid at level {}: {}\n", name, level, over);
-  return fmt::format("ptcverify: {}: damaged: {} faults in {} of {} pages at level {}: {}\n", name, report.damage,
-                     report.damaged_pages, report.pages, level, ptc::hint_of(report.findings.front().cause));
+  return fmt::format("ptcverify: {}: damaged: {} faults in {} of {} pages at level {}: {}\n", name,
+                     report.damage, report.damaged_pages, report.pages, level,
+                     ptc::hint_of(report.findings.front().cause));
 }
 
 ordered_json facts_of(const ptc::SalvageReport& kept) {
-  const auto or_null = [](const auto& value) { return value ? ordered_json(*value) : ordered_json(); };
+  const auto or_null = [](const auto& value) {
+    return value ? ordered_json(*value) : ordered_json();
+  };
   return {{"points", kept.points},
           {"points_before", or_null(kept.points_before)},
           {"point_pages", kept.point_pages},
@@ -87,25 +100,32 @@ ordered_json facts_of(const ptc::SalvageReport& kept) {
 }
 
 std::string salvage_text(const std::string& name, const ptc::SalvageReport& kept) {
-  const auto of = [](std::uint64_t part, std::uint64_t whole) { return fmt::format("{} of {}", part, whole); };
+  const auto of = [](std::uint64_t part, std::uint64_t whole) {
+    return fmt::format("{} of {}", part, whole);
+  };
   std::string text = fmt::format("{}: salvaged ", name);
   if (const auto before = kept.points_before) {
-    const double share = static_cast<double>(kept.points) / static_cast<double>(std::max<std::uint64_t>(1, *before));
-    text += fmt::format("{} points ({:.2f} %), {:.2f} % of area and {:.2f} % of energy", of(kept.points, *before), 100 * share,
-                        100 * *kept.area_share, 100 * *kept.flux_share);
+    const double share =
+        static_cast<double>(kept.points) / static_cast<double>(std::max<std::uint64_t>(1, *before));
+    text += fmt::format("{} points ({:.2f} %), {:.2f} % of area and {:.2f} % of energy",
+                        of(kept.points, *before), 100 * share, 100 * *kept.area_share,
+                        100 * *kept.flux_share);
   } else {
     text += fmt::format("{} points in {} pages; how many there were is not known", kept.points,
                         of(kept.point_pages, kept.point_pages_before));
   }
-  if (kept.attribute_pages_before > 0) text += fmt::format(", {} pages of channels", of(kept.attribute_pages, kept.attribute_pages_before));
+  if (kept.attribute_pages_before > 0)
+    text += fmt::format(", {} pages of channels",
+                        of(kept.attribute_pages, kept.attribute_pages_before));
   return text + (kept.meta ? "\n" : "; names of channels and texts are lost\n");
 }
 
 /// What can be kept, or why nothing can: the findings are told in either case.
-void add_salvage(const std::filesystem::path& file, const std::filesystem::path& target, const ptc::RunOptions& run,
-                 ptc::Progress& progress, ptc::Outcome& outcome) {
+void add_salvage(const std::filesystem::path& file, const std::filesystem::path& target,
+                 const ptc::RunOptions& run, ptc::Progress& progress, ptc::Outcome& outcome) {
   try {
-    const ptc::SalvageReport kept = ptc::salvage_container(file, target, {.memory_bytes = run.memory_bytes, .threads = run.threads}, progress);
+    const ptc::SalvageReport kept = ptc::salvage_container(
+        file, target, {.memory_bytes = run.memory_bytes, .threads = run.threads}, progress);
     outcome.facts["salvage"] = facts_of(kept);
     outcome.summary += salvage_text(ptc::printable(target.string()), kept);
   } catch (const ptc::FormatError& error) {
@@ -123,20 +143,26 @@ int main(int argc, char** argv) {
   int level = 3;
   bool fail_fast = false;
   command.add_input("file", file, "The container to check")->required();
-  command.app().add_option("--level", level, "How far to go, 0 to 4")->check(CLI::Range(0, 4))->capture_default_str();
+  command.app()
+      .add_option("--level", level, "How far to go, 0 to 4")
+      ->check(CLI::Range(0, 4))
+      ->capture_default_str();
   command.app().add_flag("--fail-fast", fail_fast, "Stop at the first fault");
   command.add_output("--map", map, {".svg", ".png"}, "Draw where the damage lies")->required(false);
-  command.add_output("--salvage", salvage, {".ptcx"}, "Write what is whole to a new container")->required(false);
+  command.add_output("--salvage", salvage, {".ptcx"}, "Write what is whole to a new container")
+      ->required(false);
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     const ptc::RunOptions& run = command.run_options();
     const auto start = std::chrono::steady_clock::now();
-    const ptc::VerifyReport report = ptc::verify_container(file,
-                                                           {.level = static_cast<ptc::VerifyLevel>(level),
-                                                            .memory_bytes = run.memory_bytes,
-                                                            .threads = run.threads,
-                                                            .fail_fast = fail_fast},
-                                                           progress);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const ptc::VerifyReport report =
+        ptc::verify_container(file,
+                              {.level = static_cast<ptc::VerifyLevel>(level),
+                               .memory_bytes = run.memory_bytes,
+                               .threads = run.threads,
+                               .fail_fast = fail_fast},
+                              progress);
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const std::string name = ptc::printable(file.string());
     if (!map.empty()) ptc::write_damage_map(map, name, report);
     ptc::Outcome outcome;
@@ -157,7 +183,9 @@ int main(int argc, char** argv) {
                      {"tree_checked", report.tree_checked},
                      {"bytes", report.file_bytes},
                      {"seconds", seconds}};
-    if (report.tree_digest) outcome.facts["tree_digest"] = ptc::hex((*report.tree_digest)[1]) + ptc::hex((*report.tree_digest)[0]);
+    if (report.tree_digest)
+      outcome.facts["tree_digest"] =
+          ptc::hex((*report.tree_digest)[1]) + ptc::hex((*report.tree_digest)[0]);
     outcome.summary = findings_text(name, report) + verdict_text(name, report, level, seconds);
     if (!salvage.empty()) add_salvage(file, salvage, run, progress, outcome);
     return outcome;

@@ -1,9 +1,9 @@
 // What runs counted, as JSON and as lines.
 #include "tools/report.h"
 
-#include <fmt/format.h>
-
 #include <numeric>
+
+#include <fmt/format.h>
 
 #include "engine/base/progress_text.h"
 #include "tools/common.h"
@@ -15,10 +15,14 @@ using nlohmann::ordered_json;
 namespace {
 
 ordered_json facts_of(const CheckError& error) {
-  return {{"occlusion_rms", error.occlusion_rms},     {"occlusion_bias", error.occlusion_bias},
-          {"occlusion_mean", error.occlusion_mean},   {"occlusion_noise", error.occlusion_noise},
-          {"irradiance_rms", error.irradiance_rms},   {"irradiance_bias", error.irradiance_bias},
-          {"irradiance_mean", error.irradiance_mean}, {"irradiance_noise", error.irradiance_noise},
+  return {{"occlusion_rms", error.occlusion_rms},
+          {"occlusion_bias", error.occlusion_bias},
+          {"occlusion_mean", error.occlusion_mean},
+          {"occlusion_noise", error.occlusion_noise},
+          {"irradiance_rms", error.irradiance_rms},
+          {"irradiance_bias", error.irradiance_bias},
+          {"irradiance_mean", error.irradiance_mean},
+          {"irradiance_noise", error.irradiance_noise},
           {"relative", error.relative()}};
 }
 
@@ -33,8 +37,7 @@ ordered_json facts_of(const EstimateWorth& worth) {
 }
 
 ordered_json facts_of(const EstimateReport& estimate) {
-  return {{"pilots", estimate.pilots},
-          {"cpu_seconds", estimate.cpu_seconds}};
+  return {{"pilots", estimate.pilots}, {"cpu_seconds", estimate.cpu_seconds}};
 }
 
 ordered_json facts_of(const TuningReport& tuning) {
@@ -56,21 +59,27 @@ ordered_json facts_of(const TuningReport& tuning) {
 
 std::string tuning_text(const TuningReport& tuning) {
   const GatherOptions& g = tuning.gather;
-  const std::string setting = fmt::format("{} sr, {} rad, {} pixels", g.solid_angle, g.parallax, g.resolution);
+  const std::string setting =
+      fmt::format("{} sr, {} rad, {} pixels", g.solid_angle, g.parallax, g.resolution);
   const double measured = 100 * tuning.measured.relative();
   if (tuning.met) {
-    return fmt::format("  error {:.4g} % asked: {} (setting {} of {}), {:.2f} % at {} pilots\n", 100 * tuning.asked,
-                       setting, tuning.setting + 1, tuning.settings, measured, tuning.pilots);
+    return fmt::format("  error {:.4g} % asked: {} (setting {} of {}), {:.2f} % at {} pilots\n",
+                       100 * tuning.asked, setting, tuning.setting + 1, tuning.settings, measured,
+                       tuning.pilots);
   }
-  return fmt::format("  error {:.4g} % asked is below the floor: the finest setting ({}) has {:.2f} % at {} pilots, "
-                     "whose rays are off by {:.2f} %\n",
-                     100 * tuning.asked, setting, measured, tuning.pilots, 100 * tuning.measured.relative_noise());
+  return fmt::format(
+      "  error {:.4g} % asked is below the floor: the finest setting ({}) has {:.2f} % at {} "
+      "pilots, "
+      "whose rays are off by {:.2f} %\n",
+      100 * tuning.asked, setting, measured, tuning.pilots, 100 * tuning.measured.relative_noise());
 }
 
 std::string worth_line(const char* of, const EstimateWorth& worth) {
-  return fmt::format("  estimates of {}: rank correlation {:.2f}, their RMS {:.2f} of the error's; RMS error {:.2f} of it in "
-                     "their top tenth, {:.2f} in the bottom one; {:.1f} % within twice\n",
-                     of, worth.rank, worth.rms, worth.top_tenth, worth.bottom_tenth, 100 * worth.within_twice);
+  return fmt::format(
+      "  estimates of {}: rank correlation {:.2f}, their RMS {:.2f} of the error's; RMS error "
+      "{:.2f} of it in "
+      "their top tenth, {:.2f} in the bottom one; {:.1f} % within twice\n",
+      of, worth.rank, worth.rms, worth.top_tenth, worth.bottom_tenth, 100 * worth.within_twice);
 }
 
 std::string check_line(const char* against, const CheckError& error) {
@@ -97,8 +106,10 @@ ordered_json container_facts(const Superblock& superblock) {
 }
 
 ordered_json facts_of(const BuildSpace& space) {
-  return {{"temp_bytes", space.temp_bytes}, {"temp_free_bytes", space.temp_free_bytes},
-          {"output_bytes", space.output_bytes}, {"output_free_bytes", space.output_free_bytes}};
+  return {{"temp_bytes", space.temp_bytes},
+          {"temp_free_bytes", space.temp_free_bytes},
+          {"output_bytes", space.output_bytes},
+          {"output_free_bytes", space.output_free_bytes}};
 }
 
 ordered_json facts_of(const SortStatistics& sort) {
@@ -111,14 +122,14 @@ ordered_json facts_of(const CacheStatistics& cache) {
           {"shared_hits", cache.shared_hits}, {"misses", cache.misses},
           {"hit_rate", cache.hit_rate()},     {"evictions", cache.evictions},
           {"bytes_read", cache.bytes_read},   {"frames", cache.frames},
-          {"peak_frames", cache.peak_frames},
-          {"wait_seconds", cache.wait_seconds}};
+          {"peak_frames", cache.peak_frames}, {"wait_seconds", cache.wait_seconds}};
 }
 
 ordered_json facts_of(const GatherCounts& counts) {
   return {{"receivers", counts.receivers}, {"cells", counts.cells},
           {"groups", counts.groups},       {"surfel_blocks", counts.surfel_blocks},
-          {"clusters", counts.clusters},   {"surfels", counts.surfels},   {"retests", counts.retests}};
+          {"clusters", counts.clusters},   {"surfels", counts.surfels},
+          {"retests", counts.retests}};
 }
 
 ordered_json facts_of(const StageSeconds& seconds) {
@@ -146,7 +157,8 @@ ordered_json facts_of(const CheckReport& check) {
 
 /// Over all receivers of a run.
 double mean_bound(const ShadeReport& report) {
-  const double sum = static_cast<double>(report.damage->stand_ins.bounds) * DamageCounts::kBoundUnit;
+  const double sum =
+      static_cast<double>(report.damage->stand_ins.bounds) * DamageCounts::kBoundUnit;
   return report.receivers == 0 ? 0 : sum / static_cast<double>(report.receivers);
 }
 
@@ -167,12 +179,16 @@ std::string damage_text(const ShadeReport& report) {
   const DamageReport& damage = *report.damage;
   if (damage.pages.empty()) return "  no page that was needed is damaged\n";
   const auto& [page, why] = *damage.pages.begin();
-  std::string text = fmt::format("  damaged: {} pages, the first {}: {}; {} points left out\n"
-                                 "  {} receivers see what stands in for them: occlusion changed by at most {:.4f}, by at most {:.6f} in the mean of all\n",
-                                 damage.pages.size(), page, printable(why), damage.points, damage.stand_ins.receivers,
-                                 damage.stand_ins.greatest_bound, mean_bound(report));
+  std::string text = fmt::format(
+      "  damaged: {} pages, the first {}: {}; {} points left out\n"
+      "  {} receivers see what stands in for them: occlusion changed by at most {:.4f}, by at most "
+      "{:.6f} in the mean of all\n",
+      damage.pages.size(), page, printable(why), damage.points, damage.stand_ins.receivers,
+      damage.stand_ins.greatest_bound, mean_bound(report));
   if (damage.node_pages > 0) {
-    text += fmt::format("  {} of them hold nodes, which ptcverify --salvage builds again from the points\n", damage.node_pages);
+    text += fmt::format(
+        "  {} of them hold nodes, which ptcverify --salvage builds again from the points\n",
+        damage.node_pages);
   }
   return text;
 }
@@ -201,7 +217,8 @@ std::string shade_text(const std::string& output, const ShadeReport& report) {
   if (!report.check) return text;
   text += check_line("surfels", report.check->discs);
   if (const auto& estimate = report.check->estimate) {
-    text += worth_line("occlusion", estimate->occlusion) + worth_line("irradiance", estimate->irradiance);
+    text += worth_line("occlusion", estimate->occlusion) +
+            worth_line("irradiance", estimate->irradiance);
   }
   if (report.check->mesh) text += check_line("mesh", *report.check->mesh);
   return text;

@@ -13,7 +13,8 @@ class DataError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A limit that the user set is too small for the job; what() names the least that works. Programs exit with 5.
+/// A limit that the user set is too small for the job; what() names the least that works. Programs
+/// exit with 5.
 class LimitError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;

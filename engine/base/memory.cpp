@@ -48,7 +48,9 @@ std::uint64_t resident_bytes() {
   return status_bytes("VmRSS:");
 }
 
-void return_freed_memory() noexcept { malloc_trim(0); }
+void return_freed_memory() noexcept {
+  malloc_trim(0);
+}
 
 double cpu_seconds() {
   timespec t{};

@@ -12,8 +12,8 @@ namespace ptc {
 /// Resident set now, bytes (VmRSS).
 /// @throws std::system_error when the system does not say
 [[nodiscard]] std::uint64_t resident_bytes();
-/// Gives memory that was freed back to the system, which would else count as resident: after a stage
-/// that took much for a while.
+/// Gives memory that was freed back to the system, which would else count as resident: after a
+/// stage that took much for a while.
 void return_freed_memory() noexcept;
 /// CPU time of this process so far, all threads, user and system, seconds.
 [[nodiscard]] double cpu_seconds();

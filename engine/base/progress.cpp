@@ -30,7 +30,9 @@ void write_text(int fd, std::string_view text) noexcept {
   }
 }
 
-std::string note_line(const std::string& text) { return std::string(program_invocation_short_name) + ": " + text + '\n'; }
+std::string note_line(const std::string& text) {
+  return std::string(program_invocation_short_name) + ": " + text + '\n';
+}
 
 class StderrNotes final : public Progress {
  public:
@@ -142,6 +144,8 @@ std::unique_ptr<Progress> make_stderr_progress() {
   return make_progress(STDERR_FILENO, isatty(STDERR_FILENO) == 1, steady_seconds);
 }
 
-std::unique_ptr<Progress> make_stderr_notes() { return std::make_unique<StderrNotes>(); }
+std::unique_ptr<Progress> make_stderr_notes() {
+  return std::make_unique<StderrNotes>();
+}
 
 }  // namespace ptc

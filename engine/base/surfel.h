@@ -9,9 +9,9 @@ namespace ptc {
 struct Surfel {
   glm::dvec3 position{0};  ///< scene units
   glm::vec3 normal{0};     ///< unit
-  float radius = 0;        ///< scene units; circumscribes the square cell it stands for: area = 2 r^2
-  glm::vec3 radiance{0};   ///< outgoing, linear RGB, W / (m^2 sr)
-  glm::vec3 albedo{0};     ///< diffuse reflectance, linear RGB in [0, 1]
+  float radius = 0;  ///< scene units; circumscribes the square cell it stands for: area = 2 r^2
+  glm::vec3 radiance{0};  ///< outgoing, linear RGB, W / (m^2 sr)
+  glm::vec3 albedo{0};    ///< diffuse reflectance, linear RGB in [0, 1]
 };
 
 /// Axis-aligned box; empty while low > high.

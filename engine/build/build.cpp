@@ -35,19 +35,23 @@ Totals totals_of(const PointPage& points, const Frame& frame) {
     const double area = 2.0 * radius * radius;
     totals.area += area;
     const std::array<std::uint16_t, 3> radiance = points.radiance(i);
-    for (std::size_t c = 0; c < 3; ++c) totals.flux[c] += area * static_cast<double>(decode_half(radiance[c]));
+    for (std::size_t c = 0; c < 3; ++c)
+      totals.flux[c] += area * static_cast<double>(decode_half(radiance[c]));
   }
   totals.low = frame.to_position(low);
   totals.high = frame.to_position(high);
   return totals;
 }
 
-/// Adds the sums of one page after another, so that they depend on the page size and on nothing else.
+/// Adds the sums of one page after another, so that they depend on the page size and on nothing
+/// else.
 void include(Superblock& superblock, const Totals& page, std::uint64_t points) {
   const bool first = superblock.points == 0;
   for (std::size_t k = 0; k < 3; ++k) {
-    superblock.bounds_low[k] = first ? page.low[k] : std::min(superblock.bounds_low[k], page.low[k]);
-    superblock.bounds_high[k] = first ? page.high[k] : std::max(superblock.bounds_high[k], page.high[k]);
+    superblock.bounds_low[k] =
+        first ? page.low[k] : std::min(superblock.bounds_low[k], page.low[k]);
+    superblock.bounds_high[k] =
+        first ? page.high[k] : std::max(superblock.bounds_high[k], page.high[k]);
     superblock.flux[k] += page.flux[k];
   }
   superblock.area += page.area;
@@ -63,7 +67,8 @@ class Settled {
   ~Settled() {
     try {
       writer_.flush();
-    } catch (...) {  // after flush() there are none; else what ended the build is on its way to the caller
+    } catch (...) {  // after flush() there are none; else what ended the build is on its way to the
+                     // caller
     }
   }
 
@@ -83,8 +88,8 @@ std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
 }
 
 /// The points of one call of OctreeBuilder::add(), and what they add to the superblock.
-void add_block(std::span<const PointRecord> block, const Frame& frame, const Executor& executor, Superblock& superblock,
-               PageOrder& order) {
+void add_block(std::span<const PointRecord> block, const Frame& frame, const Executor& executor,
+               Superblock& superblock, PageOrder& order) {
   const std::size_t per_page = superblock.points_per_page;
   std::vector<ContainerWriter::Page> pages((block.size() - 1) / per_page + 1);
   std::vector<Totals> totals(pages.size());
@@ -102,7 +107,8 @@ void add_block(std::span<const PointRecord> block, const Frame& frame, const Exe
 void save_totals(const Superblock& superblock, StateWriter& state) {
   state.put(superblock.points);
   state.put(superblock.area);
-  for (const auto& numbers : {superblock.bounds_low, superblock.bounds_high, superblock.flux}) state.put(numbers);
+  for (const auto& numbers : {superblock.bounds_low, superblock.bounds_high, superblock.flux})
+    state.put(numbers);
 }
 
 void load_totals(StateReader& state, Superblock& superblock) {
@@ -116,7 +122,8 @@ void load_totals(StateReader& state, Superblock& superblock) {
 }  // namespace
 
 Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
-                       const Executor& executor, Progress& progress, const Checkpoints& checkpoints) {
+                       const Executor& executor, Progress& progress,
+                       const Checkpoints& checkpoints) {
   const Frame& frame = writer.header().frame;
   Superblock superblock;
   superblock.leaf_points = options.leaf_points;
@@ -138,7 +145,9 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
     octree.add(std::span(block).first(count));
     writer.write_pages(order.take(), executor);
     progress.advance(count);
-    if (!checkpoints.save || superblock.points - saved < checkpoints.interval || count < block.size()) continue;
+    if (!checkpoints.save || superblock.points - saved < checkpoints.interval ||
+        count < block.size())
+      continue;
     saved = superblock.points;
     StateWriter state;
     save_totals(superblock, state);

@@ -27,11 +27,14 @@ struct BuildPlace {
 
 /// For a build that can be interrupted.
 struct Checkpoints {
-  /// Points between two checkpoints at the least, and at most those that build_pages() takes at once more.
+  /// Points between two checkpoints at the least, and at most those that build_pages() takes at
+  /// once more.
   std::uint64_t interval = std::uint64_t{1} << 22;
-  /// Takes what another build needs to go on from there, beside ContainerWriter::state(); null: there are no checkpoints.
+  /// Takes what another build needs to go on from there, beside ContainerWriter::state(); null:
+  /// there are no checkpoints.
   std::function<void(const BuildPlace& at, std::vector<std::byte> state)> save;
-  /// Such a state to begin with; the stream and the writer have gone on from there, too. Null: from the first point on.
+  /// Such a state to begin with; the stream and the writer have gone on from there, too. Null: from
+  /// the first point on.
   StateReader* from = nullptr;
 };
 
@@ -39,9 +42,11 @@ struct Checkpoints {
 /// @param points  ascending keys in the lattice of the writer's frame
 /// @throws DataError, FormatError for a state that is none
 /// @return  the superblock for ContainerWriter::finish(), its counts, bounds and totals filled
-/// Memory: one open page per stream; of 65,536 points, or a page of them if that is more, the records twice, and their
-/// pages and nodes three times, some 20 MB in all.   Deterministic for any number of threads.
-[[nodiscard]] Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
-                                     const Executor& executor, Progress& progress, const Checkpoints& checkpoints = {});
+/// Memory: one open page per stream; of 65,536 points, or a page of them if that is more, the
+/// records twice, and their pages and nodes three times, some 20 MB in all.   Deterministic for any
+/// number of threads.
+[[nodiscard]] Superblock build_pages(PointStream& points, ContainerWriter& writer,
+                                     const BuildOptions& options, const Executor& executor,
+                                     Progress& progress, const Checkpoints& checkpoints = {});
 
 }  // namespace ptc

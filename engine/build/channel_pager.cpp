@@ -7,7 +7,8 @@
 
 namespace ptc {
 
-ChannelPager::ChannelPager(std::span<const PackedColumn> columns, std::size_t payload_limit, Source source)
+ChannelPager::ChannelPager(std::span<const PackedColumn> columns, std::size_t payload_limit,
+                           Source source)
     : columns_(columns), payload_(payload_limit), source_(std::move(source)) {
   for (const PackedColumn& column : columns_) point_bytes_ += column.bits / 8;
 }

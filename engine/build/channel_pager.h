@@ -11,7 +11,8 @@
 
 namespace ptc {
 
-/// Moves the columns of one channel group from pages of one size to pages of another.   Memory: a page.
+/// Moves the columns of one channel group from pages of one size to pages of another.   Memory: a
+/// page.
 class ChannelPager {
  public:
   /// Fills the payload of the next page that there is. @return how many points it has

@@ -26,9 +26,11 @@ std::size_t ContainerPoints::next(std::span<PointRecord> out) {
   return filled;
 }
 
-// Within a page the reader has checked the order; what is built from the stream relies on all of it.
+// Within a page the reader has checked the order; what is built from the stream relies on all of
+// it.
 void ContainerPoints::refuse(std::uint32_t page) const {
-  throw FormatError(kPageHeaderBytes, "spec/points.md#point-order", "the first point of the page precedes the one before")
+  throw FormatError(kPageHeaderBytes, "spec/points.md#point-order",
+                    "the first point of the page precedes the one before")
       .rebased(container_.entry(page).offset, container_.path().string());
 }
 

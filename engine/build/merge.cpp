@@ -12,11 +12,14 @@ namespace {
 constexpr std::size_t kBlock = 1 << 14;
 
 /// The origin as a number of lattice units: whole, and exact.
-double origin_units(const Frame& frame, std::size_t axis) { return frame.origin[axis] / frame.unit(); }
+double origin_units(const Frame& frame, std::size_t axis) {
+  return frame.origin[axis] / frame.unit();
+}
 
 bool holds(const Frame& frame, std::size_t axis, double low, double high) {
   const double half = 0.5 * frame.unit();
-  return low >= frame.origin[axis] - half && high <= frame.origin[axis] + (frame.edge - frame.unit()) + half;
+  return low >= frame.origin[axis] - half &&
+         high <= frame.origin[axis] + (frame.edge - frame.unit()) + half;
 }
 
 class MovedStream : public PointStream {
@@ -41,7 +44,8 @@ class MergedStream : public PointStream {
     for (std::size_t i = 0; i < out.size(); ++i) {
       const bool more_first = first_.fill(), more_second = second_.fill();
       if (!more_first && !more_second) return i;
-      const bool from_second = more_second && (!more_first || second_.front().key < first_.front().key);
+      const bool from_second =
+          more_second && (!more_first || second_.front().key < first_.front().key);
       out[i] = (from_second ? second_ : first_).take();
     }
     return out.size();
@@ -72,24 +76,31 @@ class MergedStream : public PointStream {
 
 }  // namespace
 
-Frame grow_frame(const Frame& old, const std::array<double, 3>& low, const std::array<double, 3>& high) {
+Frame grow_frame(const Frame& old, const std::array<double, 3>& low,
+                 const std::array<double, 3>& high) {
   static_cast<void>(frame_around(low, high));  // bounds that are none
   Frame grown = old;
   std::array<double, 3> offset{};
   for (int doublings = 1;; ++doublings) {
     std::array<bool, 3> fits{};
-    for (std::size_t axis = 0; axis < 3; ++axis) fits[axis] = holds(grown, axis, low[axis], high[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      fits[axis] = holds(grown, axis, low[axis], high[axis]);
     if (std::ranges::all_of(fits, [](bool fit) { return fit; })) return grown;
     if (doublings > kMostDoublings) {
-      throw LimitError("the new points lie so far from the scene that its cube would grow more than 65536 times: build all anew");
+      throw LimitError(
+          "the new points lie so far from the scene that its cube would grow more than 65536 "
+          "times: build all anew");
     }
     const Frame before = grown;
     grown.edge = 2 * before.edge;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const bool below = low[axis] < before.origin[axis] - 0.5 * before.unit();
       offset[axis] = offset[axis] / 2 + (below ? std::ldexp(1.0, kLatticeBits - 1) : 0);
-      // A unit of the grown lattice may not divide the old origin: up to the next, as halved coordinates go down.
-      grown.origin[axis] = (std::ceil(std::ldexp(origin_units(old, axis), -doublings)) - offset[axis]) * grown.unit();
+      // A unit of the grown lattice may not divide the old origin: up to the next, as halved
+      // coordinates go down.
+      grown.origin[axis] =
+          (std::ceil(std::ldexp(origin_units(old, axis), -doublings)) - offset[axis]) *
+          grown.unit();
     }
   }
 }
@@ -104,7 +115,8 @@ LatticeMove::LatticeMove(const Frame& old, const Frame& grown) noexcept
 
 MortonKey LatticeMove::operator()(const MortonKey& key) const noexcept {
   LatticePoint point = decode_morton(key);
-  for (std::size_t axis = 0; axis < 3; ++axis) point[axis] = (point[axis] >> doublings_) + offset_[axis];
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    point[axis] = (point[axis] >> doublings_) + offset_[axis];
   return encode_morton(point);
 }
 

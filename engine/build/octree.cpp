@@ -33,7 +33,8 @@ NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t poin
   child.ref.slot = state.get<std::uint16_t>();
   child.ref.first_point = state.get_count(points);
   child.ref.point_count = state.get<std::uint32_t>();
-  state.require(child.ref.interior ? child.ref.page < pages : child.ref.point_count <= points - child.ref.first_point,
+  state.require(child.ref.interior ? child.ref.page < pages
+                                   : child.ref.point_count <= points - child.ref.first_point,
                 "a closed cell of the tree's state lies nowhere");
   const auto load_number = [&](auto& value) {
     value = state.get<std::remove_reference_t<decltype(value)>>();
@@ -51,7 +52,8 @@ NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t poin
 
 }  // namespace
 
-OctreeBuilder::OctreeBuilder(GroupSink& sink, std::uint32_t leaf_points, double unit, const Executor& executor)
+OctreeBuilder::OctreeBuilder(GroupSink& sink, std::uint32_t leaf_points, double unit,
+                             const Executor& executor)
     : sink_(sink),
       executor_(executor),
       leaf_points_(leaf_points),
@@ -66,7 +68,8 @@ void OctreeBuilder::add(std::span<const PointRecord> points) {
   build(false);
 }
 
-/// Level of the smallest cell that holds the window's point `at`, whose rank is rank_, and a later one.
+/// Level of the smallest cell that holds the window's point `at`, whose rank is rank_, and a later
+/// one.
 int OctreeBuilder::common(std::size_t at, std::size_t other) const {
   const int level = common_level(window_[at].key, window_[other].key);
   return level < kLatticeBits ? level : level + common_rank_level(rank_, rank_ + (other - at));
@@ -83,8 +86,9 @@ OctreeBuilder::Piece& OctreeBuilder::new_piece() {
   return pieces_[piece_count_++];
 }
 
-/// Cuts the window's front into pieces: from each point on the largest cell that has no more than piece_points_
-/// points and does not hold the point before. As a cell around it has more points than a leaf, it is a node.
+/// Cuts the window's front into pieces: from each point on the largest cell that has no more than
+/// piece_points_ points and does not hold the point before. As a cell around it has more points
+/// than a leaf, it is a node.
 void OctreeBuilder::cut(bool last) {
   piece_count_ = 0;
   for (std::size_t at = 0; at < window_.size();) {
@@ -93,7 +97,8 @@ void OctreeBuilder::cut(bool last) {
     const bool begins = window_first_ + at == 0;
     rank_ = begins || window_[at].key != last_key_ ? 0 : last_rank_ + 1;
     const int before = begins ? -1 : level_before(at);
-    const int level = 1 + (reach > piece_points_ ? std::max(before, common(at, at + piece_points_)) : before);
+    const int level =
+        1 + (reach > piece_points_ ? std::max(before, common(at, at + piece_points_)) : before);
     std::size_t inside = at;
     for (std::size_t outside = at + std::min(reach, piece_points_); outside - inside > 1;) {
       const std::size_t middle = inside + (outside - inside) / 2;
@@ -106,7 +111,8 @@ void OctreeBuilder::cut(bool last) {
     piece.shared = before;
     piece.before = last_key_;
     last_key_ = window_[inside].key;
-    last_rank_ = rank_ + piece.count - 1;  // of use only where this key goes on, and then the piece has no other
+    last_rank_ = rank_ + piece.count -
+                 1;  // of use only where this key goes on, and then the piece has no other
     at = inside + 1;
   }
 }
@@ -116,7 +122,8 @@ void OctreeBuilder::build(bool last) {
   executor_.for_each(piece_count_, [this](std::size_t i, unsigned thread) {
     Piece& piece = pieces_[i];
     piece.groups.clear();
-    const auto points = std::span(window_).subspan(static_cast<std::size_t>(piece.first - window_first_), piece.count);
+    const auto points = std::span(window_).subspan(
+        static_cast<std::size_t>(piece.first - window_first_), piece.count);
     piece.top = builders_[thread].build(points, piece.first, piece.rank, piece.groups);
   });
   std::size_t done = 0;
@@ -136,12 +143,15 @@ void OctreeBuilder::join(Piece& piece) {
       current_ = close(piece.first);
     }
     if (path_.empty() || path_.back().level < piece.shared) {
-      path_.push_back({.cell = cell_of(piece.before, std::min(piece.shared, kLatticeBits)), .level = piece.shared});
+      path_.push_back({.cell = cell_of(piece.before, std::min(piece.shared, kLatticeBits)),
+                       .level = piece.shared});
     }
     path_.back().children.push_back(current_);
   }
   places_.clear();
-  const auto placed = [this](const ChildRef& ref) { return ref.interior ? places_[ref.page] : ref; };
+  const auto placed = [this](const ChildRef& ref) {
+    return ref.interior ? places_[ref.page] : ref;
+  };
   for (const SubtreeGroups::Group& at : piece.groups.groups) {
     const std::span<std::byte> group = std::span(piece.groups.bytes).subspan(at.begin, at.size);
     const GroupView view(group.data());
@@ -174,8 +184,9 @@ NodeChild OctreeBuilder::close(std::uint64_t end) {
 
 void OctreeBuilder::save(StateWriter& state) const {
   save_points(window_, state);
-  for (const std::uint64_t number : {window_first_, last_key_.high, last_key_.low, last_rank_, result_.points, result_.nodes,
-                                     result_.groups, static_cast<std::uint64_t>(result_.levels)}) {
+  for (const std::uint64_t number :
+       {window_first_, last_key_.high, last_key_.low, last_rank_, result_.points, result_.nodes,
+        result_.groups, static_cast<std::uint64_t>(result_.levels)}) {
     state.put(number);
   }
   save_child(current_, state);
@@ -191,20 +202,22 @@ void OctreeBuilder::save(StateWriter& state) const {
 
 void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
   window_ = load_points(state);
-  for (std::uint64_t* number : {&window_first_, &last_key_.high, &last_key_.low, &last_rank_, &result_.points, &result_.nodes,
-                                &result_.groups}) {
+  for (std::uint64_t* number : {&window_first_, &last_key_.high, &last_key_.low, &last_rank_,
+                                &result_.points, &result_.nodes, &result_.groups}) {
     *number = state.get<std::uint64_t>();
   }
   result_.levels = static_cast<int>(state.get_count(kMaxLevel + 1));
-  state.require(result_.points == window_first_ && (window_.empty() || last_key_ <= window_.front().key),
-                "the points of the tree's state do not follow each other");
+  state.require(
+      result_.points == window_first_ && (window_.empty() || last_key_ <= window_.front().key),
+      "the points of the tree's state do not follow each other");
   current_ = load_child(state, pages, window_first_);
   path_.resize(static_cast<std::size_t>(state.get_count(kMaxLevel + 1)));
   int above = -1;
   for (NodeGroup& cell : path_) {
     cell.cell = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
     cell.level = static_cast<int>(state.get_count(kMaxLevel));
-    state.require(cell.level > above, "the open cells of the tree's state do not lie in each other");
+    state.require(cell.level > above,
+                  "the open cells of the tree's state do not lie in each other");
     above = cell.level;
     cell.children.resize(static_cast<std::size_t>(state.get_count(kMaxChildren - 1)));
     for (NodeChild& child : cell.children) child = load_child(state, pages, window_first_);

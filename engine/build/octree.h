@@ -17,22 +17,25 @@ namespace ptc {
 class GroupSink {
  public:
   virtual ~GroupSink() = default;
-  /// @param group  as it lies in a page, with what was returned for the groups of its children; valid during the call
+  /// @param group  as it lies in a page, with what was returned for the groups of its children;
+  /// valid during the call
   /// @param end    the point after its last
   /// @return where the group can be found: an interior reference
   virtual ChildRef add(const GroupView& group, std::uint64_t end) = 0;
 };
 
 /// Builds the octree of surfels that arrive in Morton order (Kontkanen et al. 2011, restated in
-/// Fischer et al. 2024): cells of a few thousand points side by side, the cells around them as theirs are done.
+/// Fischer et al. 2024): cells of a few thousand points side by side, the cells around them as
+/// theirs are done.
 ///
 /// A cell is split while it holds more than `leaf_points` points; chains of cells with one occupied
 /// child are one node, which stands for the smallest cell that holds its points. Cells of
 /// coincident points are split by rank, below the lattice. Sums run in the order of the tree, so
 /// they depend on the points alone.
 ///
-/// Memory: the points of one call of add() and their groups, some 100 bytes each; of all before, one open cell
-/// per level with at most 8 closed children each and kSubtreePoints or leaf_points points, whichever is more.
+/// Memory: the points of one call of add() and their groups, some 100 bytes each; of all before,
+/// one open cell per level with at most 8 closed children each and kSubtreePoints or leaf_points
+/// points, whichever is more.
 class OctreeBuilder {
  public:
   /// A cell with no more points is built by one thread.
@@ -52,12 +55,12 @@ class OctreeBuilder {
   void load(StateReader& state, std::uint32_t pages);
 
   struct Result {
-    ChildRef root;            ///< of the root group; not interior when there are no points
-    NodeSummary total;        ///< of all points
+    ChildRef root;      ///< of the root group; not interior when there are no points
+    NodeSummary total;  ///< of all points
     std::uint64_t points = 0;
     std::uint64_t nodes = 0;  ///< children of all groups
     std::uint64_t groups = 0;
-    int levels = 0;           ///< greatest level of a group + 1
+    int levels = 0;  ///< greatest level of a group + 1
   };
   /// Closes all cells. Call once.
   [[nodiscard]] Result finish();
@@ -68,9 +71,9 @@ class OctreeBuilder {
     std::uint64_t first = 0;
     std::size_t count = 0;
     std::uint64_t rank = 0;  ///< of its first point among those with its key
-    int shared = 0;          ///< level of the smallest cell that holds its first point and the one before
-    MortonKey before;        ///< key of that one
-    NodeChild top;           ///< interior references of its groups are numbers of groups
+    int shared = 0;    ///< level of the smallest cell that holds its first point and the one before
+    MortonKey before;  ///< key of that one
+    NodeChild top;     ///< interior references of its groups are numbers of groups
     SubtreeGroups groups;
   };
 
@@ -89,12 +92,12 @@ class OctreeBuilder {
   std::size_t piece_points_;
   double unit_;
   std::vector<SubtreeBuilder> builders_;  ///< one a thread
-  std::vector<PointRecord> window_;       ///< points from window_first_ on: those not yet in a piece
+  std::vector<PointRecord> window_;  ///< points from window_first_ on: those not yet in a piece
   std::uint64_t window_first_ = 0;
   std::uint64_t rank_ = 0;       ///< of the point that cut() is at among those with its key
   MortonKey last_key_;           ///< of the point before it
   std::uint64_t last_rank_ = 0;  ///< likewise
-  std::vector<Piece> pieces_;  ///< kept between calls for their memory
+  std::vector<Piece> pieces_;    ///< kept between calls for their memory
   std::size_t piece_count_ = 0;
   std::vector<ChildRef> places_;  ///< of a piece's groups
   std::vector<NodeGroup> path_;   ///< open cells, from the root on

@@ -9,7 +9,9 @@ namespace ptc {
 namespace {
 
 /// Payloads are read as numbers.
-std::vector<std::byte> aligned(std::span<const std::byte> bytes) { return {bytes.begin(), bytes.end()}; }
+std::vector<std::byte> aligned(std::span<const std::byte> bytes) {
+  return {bytes.begin(), bytes.end()};
+}
 
 }  // namespace
 
@@ -36,7 +38,8 @@ void PageOrder::Range::include(const GroupView& group) {
 
 ChildRef PageOrder::add(const GroupView& group, std::uint64_t end) {
   while (!points_.empty() && next_point_ <= end) take_points();
-  std::optional<Stream>& stream = streams_[static_cast<std::size_t>(group.level() / levels_per_stream_)];
+  std::optional<Stream>& stream =
+      streams_[static_cast<std::size_t>(group.level() / levels_per_stream_)];
   if (stream && !stream->encoder.fits(static_cast<std::size_t>(group.size()))) flush(stream);
   if (!stream) stream.emplace(Stream{writer_.reserve_page(), NodePageEncoder(payload_limit_)});
   stream->keys.include(group);
@@ -88,13 +91,15 @@ void PageOrder::load(StateReader& state, std::uint64_t points) {
   next_point_ = state.get_count(points);
   for (auto pages = state.get<std::uint64_t>(); pages > 0; --pages) {
     const std::vector<PointRecord> records = load_points(state);
-    state.require(!records.empty() && records.size() <= points_per_page_, "a page with no or too many points");
+    state.require(!records.empty() && records.size() <= points_per_page_,
+                  "a page with no or too many points");
     points_.push_back(point_page(records));
   }
   for (std::optional<Stream>& stream : streams_) load_stream(state, stream, points);
 }
 
-void PageOrder::load_stream(StateReader& state, std::optional<Stream>& stream, std::uint64_t points) {
+void PageOrder::load_stream(StateReader& state, std::optional<Stream>& stream,
+                            std::uint64_t points) {
   const auto groups = state.get<std::uint32_t>();
   if (groups == 0) return;
   const std::uint32_t pages = writer_.state().pages;
@@ -104,7 +109,8 @@ void PageOrder::load_stream(StateReader& state, std::optional<Stream>& stream, s
   const std::vector<std::byte> payload = aligned(state.get_bytes());
   const NodePage page(payload, groups, pages, points);
   for (std::uint32_t slot = 0; slot < groups; ++slot) {
-    state.require(stream->encoder.fits(static_cast<std::size_t>(page[slot].size())), "an open page that is too long");
+    state.require(stream->encoder.fits(static_cast<std::size_t>(page[slot].size())),
+                  "an open page that is too long");
     stream->keys.include(page[slot]);
     stream->encoder.add(page[slot]);
   }

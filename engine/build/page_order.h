@@ -19,8 +19,9 @@ namespace ptc {
 /// A page of points, its number not given yet. @param points  1 to points_per_page, ascending
 [[nodiscard]] ContainerWriter::Page point_page(std::span<const PointRecord> points);
 
-/// A node page is there when it is full, one open page per stream of levels; it gets its number when it is opened, so
-/// that parents can refer to groups that are not on the disk yet. A point page comes before the groups that end in it.
+/// A node page is there when it is full, one open page per stream of levels; it gets its number
+/// when it is opened, so that parents can refer to groups that are not on the disk yet. A point
+/// page comes before the groups that end in it.
 class PageOrder : public GroupSink {
  public:
   using Page = ContainerWriter::Page;
@@ -33,7 +34,8 @@ class PageOrder : public GroupSink {
   ChildRef add(const GroupView& group, std::uint64_t end) override;
   /// The pages that are whole.
   [[nodiscard]] std::vector<Page> take() noexcept { return std::exchange(whole_, {}); }
-  /// Adds all others; of nodes those still open, deepest first: the coarse levels end up last in the file.
+  /// Adds all others; of nodes those still open, deepest first: the coarse levels end up last in
+  /// the file.
   void finish();
 
   /// What there is between two calls, when all whole pages were taken.

@@ -29,10 +29,13 @@ inline double to_double(std::uint64_t v) {
   return std::bit_cast<double>(v | 0x4330000000000000) - 0x1p52;
 }
 
-/// Columns of `count` points from `first` on; what of each is read together lies together for a while.
-void decode_points(const PointRecord* points, std::size_t count, double unit, double* columns, std::size_t stride) {
+/// Columns of `count` points from `first` on; what of each is read together lies together for a
+/// while.
+void decode_points(const PointRecord* points, std::size_t count, double unit, double* columns,
+                   std::size_t stride) {
   constexpr std::size_t kBlock = kPositionBlock;
-  constexpr double kGreatest = 1e150;  // spec/nodes.md#node-number: what is stored ends at 3e38 anyway
+  constexpr double kGreatest =
+      1e150;  // spec/nodes.md#node-number: what is stored ends at 3e38 anyway
   PositionBlock positions;
   std::array<float, kBlock> radius;
   std::array<std::int16_t, kBlock> u, v;
@@ -49,7 +52,8 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
     const auto out = [&](PointColumns::Column k) { return columns + k * stride + first; };
     decode_positions({points + first, n}, positions);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < n; ++i) columns[axis * stride + first + i] = to_double(positions[axis][i]);
+      for (std::size_t i = 0; i < n; ++i)
+        columns[axis * stride + first + i] = to_double(positions[axis][i]);
     }
     double* const lattice_radius = out(PointColumns::kDiscRadius);
     double* const area = out(PointColumns::kDiscArea);
@@ -84,7 +88,9 @@ class Lanes {
     return hn::LoadU(D(), points_.column(k) + first_);
   }
   /// `value` where there is a point.
-  [[nodiscard]] HWY_INLINE V only(V value, V otherwise) const { return hn::IfThenElse(mask_, value, otherwise); }
+  [[nodiscard]] HWY_INLINE V only(V value, V otherwise) const {
+    return hn::IfThenElse(mask_, value, otherwise);
+  }
 
  private:
   const PointColumns& points_;
@@ -101,7 +107,7 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
   const D d;
   const std::array<double, 3> slab_axis = slab_normal(node);
   const bool has_axis = set_cone_axis(node, slab_axis);
-  const auto splat = [&](const auto& from, V (&to)[3]) {
+  const auto splat = [&](const auto& from, V(&to)[3]) {
     for (std::size_t k = 0; k < 3; ++k) to[k] = hn::Set(d, static_cast<double>(from[k]));
   };
   V mean[3], slab[3], axis[3];
@@ -112,29 +118,34 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
   V radius = zero, thickness = zero, cosine = one;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
     const Lanes point(points, i, end);
-    const V away[3] = {hn::Sub(point[PointColumns::kX], mean[0]), hn::Sub(point[PointColumns::kY], mean[1]),
+    const V away[3] = {hn::Sub(point[PointColumns::kX], mean[0]),
+                       hn::Sub(point[PointColumns::kY], mean[1]),
                        hn::Sub(point[PointColumns::kZ], mean[2])};
     const V wide = point[PointColumns::kDiscRadius];
     radius = hn::Max(radius, point.only(hn::Add(hn::Sqrt(dot(away, away)), wide), zero));
     if (!has_axis) continue;
-    const V n[3] = {point[PointColumns::kNormalX], point[PointColumns::kNormalY], point[PointColumns::kNormalZ]};
+    const V n[3] = {point[PointColumns::kNormalX], point[PointColumns::kNormalY],
+                    point[PointColumns::kNormalZ]};
     const V squared = dot(n, n);
     const V to_axis = hn::Div(dot(axis, n), hn::Sqrt(hn::Mul(axis_squared, squared)));
     cosine = hn::Min(cosine, point.only(to_axis, one));
-    const V cross[3] = {hn::Sub(hn::Mul(slab[1], n[2]), hn::Mul(slab[2], n[1])), hn::Sub(hn::Mul(slab[2], n[0]), hn::Mul(slab[0], n[2])),
+    const V cross[3] = {hn::Sub(hn::Mul(slab[1], n[2]), hn::Mul(slab[2], n[1])),
+                        hn::Sub(hn::Mul(slab[2], n[0]), hn::Mul(slab[0], n[2])),
                         hn::Sub(hn::Mul(slab[0], n[1]), hn::Mul(slab[1], n[0]))};
     const V reach = hn::Div(hn::Mul(wide, hn::Sqrt(dot(cross, cross))), hn::Sqrt(squared));
     thickness = hn::Max(thickness, point.only(hn::Add(hn::Abs(dot(slab, away)), reach), zero));
   }
   node.radius = hn::GetLane(hn::MaxOfLanes(d, radius));
-  set_bounds(node, has_axis, hn::GetLane(hn::MinOfLanes(d, cosine)), hn::GetLane(hn::MaxOfLanes(d, thickness)));
+  set_bounds(node, has_axis, hn::GetLane(hn::MinOfLanes(d, cosine)),
+             hn::GetLane(hn::MaxOfLanes(d, thickness)));
 }
 
 NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t end) {
   NodeSummary node;
   const auto value = [&](PointColumns::Column k, std::size_t i) { return points.column(k)[i]; };
   // Sums of offsets keep the lattice unit, sums of coordinates up to 2^42 lose it.
-  const std::array<double, 3> origin{value(PointColumns::kX, begin), value(PointColumns::kY, begin), value(PointColumns::kZ, begin)};
+  const std::array<double, 3> origin{value(PointColumns::kX, begin), value(PointColumns::kY, begin),
+                                     value(PointColumns::kZ, begin)};
   double weight = 0;
   bool has_area = false;
   for (std::size_t i = begin; i < end; ++i) has_area |= value(PointColumns::kDiscArea, i) > 0;
@@ -147,8 +158,12 @@ NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t
     node.mean[2] += w * (value(PointColumns::kZ, i) - origin[2]);
     weight += w;
     node.area += area;
-    const std::array<double, 3> normal{value(PointColumns::kNormalX, i), value(PointColumns::kNormalY, i), value(PointColumns::kNormalZ, i)};
-    const std::array<double, 4> light{1, value(PointColumns::kRed, i), value(PointColumns::kGreen, i), value(PointColumns::kBlue, i)};
+    const std::array<double, 3> normal{value(PointColumns::kNormalX, i),
+                                       value(PointColumns::kNormalY, i),
+                                       value(PointColumns::kNormalZ, i)};
+    const std::array<double, 4> light{1, value(PointColumns::kRed, i),
+                                      value(PointColumns::kGreen, i),
+                                      value(PointColumns::kBlue, i)};
     for (std::size_t k = 0; k < 6; ++k) {
       const double towards_axis = k % 2 == 0 ? normal[k / 2] : -normal[k / 2];
       const double facing = area * (towards_axis > 0 ? towards_axis : 0.0);

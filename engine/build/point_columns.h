@@ -10,17 +10,34 @@
 
 namespace ptc {
 
-/// The numbers of surfels, decoded once; in lattice units where nothing else is said.   Memory: 88 bytes a point.
+/// The numbers of surfels, decoded once; in lattice units where nothing else is said.   Memory: 88
+/// bytes a point.
 class PointColumns {
  public:
-  enum Column : std::size_t { kX, kY, kZ, kDiscRadius, kNormalX, kNormalY, kNormalZ, kDiscArea, kRed, kGreen, kBlue, kColumns };
+  enum Column : std::size_t {
+    kX,
+    kY,
+    kZ,
+    kDiscRadius,
+    kNormalX,
+    kNormalY,
+    kNormalZ,
+    kDiscArea,
+    kRed,
+    kGreen,
+    kBlue,
+    kColumns
+  };
 
   /// Decodes points in place of what was here.
   /// @param unit  lattice unit in scene units
   void assign(std::span<const PointRecord> points, double unit);
 
-  /// Values of a column. The area is 2 radius^2 in scene units squared. At least kMostLanes values can be read from each.
-  [[nodiscard]] const double* column(Column k) const noexcept { return values_.data() + k * stride_; }
+  /// Values of a column. The area is 2 radius^2 in scene units squared. At least kMostLanes values
+  /// can be read from each.
+  [[nodiscard]] const double* column(Column k) const noexcept {
+    return values_.data() + k * stride_;
+  }
 
   /// Lanes of the widest vectors that read columns.
   static constexpr std::size_t kMostLanes = 8;
@@ -30,8 +47,9 @@ class PointColumns {
   std::vector<double> values_;
 };
 
-/// Summary of the points from `begin` to `end`, at least one: exact bounding sphere and cone. Sums run in the order of the
-/// points, so that they are the same on every machine.
-[[nodiscard]] NodeSummary summarise_points(const PointColumns& points, std::size_t begin, std::size_t end);
+/// Summary of the points from `begin` to `end`, at least one: exact bounding sphere and cone. Sums
+/// run in the order of the points, so that they are the same on every machine.
+[[nodiscard]] NodeSummary summarise_points(const PointColumns& points, std::size_t begin,
+                                           std::size_t end);
 
 }  // namespace ptc

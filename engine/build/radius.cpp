@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <nanoflann.hpp>
 #include <vector>
+
+#include <nanoflann.hpp>
 
 namespace ptc {
 namespace {
@@ -18,17 +19,21 @@ constexpr double kLargest = 3;  // times the chunk's median
 struct Cloud {
   std::vector<std::array<double, 3>> points;
   [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const { return points[i][axis]; }
+  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return points[i][axis];
+  }
   template <class Box>
   bool kdtree_get_bbox(Box&) const {
     return false;
   }
 };
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, 3, std::size_t>;
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud,
+                                                 3, std::size_t>;
 
 class RadiusStream : public PointStream {
  public:
-  RadiusStream(PointStream& sorted, double unit, std::uint64_t first) : sorted_(sorted), unit_(unit) {
+  RadiusStream(PointStream& sorted, double unit, std::uint64_t first)
+      : sorted_(sorted), unit_(unit) {
     at_ = chunk_end_ = static_cast<std::size_t>(first / kChunk * kChunk - first_for_radii(first));
     fill(chunk_end_);
     pass_over(*this, first % kChunk);
@@ -85,7 +90,8 @@ class RadiusStream : public PointStream {
     cloud.points.reserve(window_.size());
     for (const PointRecord& p : window_) {
       const LatticePoint q = decode_morton(p.key);
-      cloud.points.push_back({static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])});
+      cloud.points.push_back(
+          {static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])});
     }
     const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
     std::array<std::size_t, kNeighbours + 1> index{};
@@ -93,8 +99,11 @@ class RadiusStream : public PointStream {
     std::vector<double> radii;
     radii.reserve(end - begin);
     for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t found = tree.knnSearch(cloud.points[i].data(), index.size(), index.data(), squared.data());
-      radii.push_back(found > 1 ? std::sqrt(squared[found - 1] * M_PI / (2.0 * static_cast<double>(found - 1))) : 0);
+      const std::size_t found =
+          tree.knnSearch(cloud.points[i].data(), index.size(), index.data(), squared.data());
+      radii.push_back(
+          found > 1 ? std::sqrt(squared[found - 1] * M_PI / (2.0 * static_cast<double>(found - 1)))
+                    : 0);
     }
     return radii;
   }

@@ -9,15 +9,18 @@
 namespace ptc {
 
 /// Gives every sorted surfel whose radius is 0 one that lets its disc reach its neighbours:
-/// r = d sqrt(pi / 12), d the distance to the 6th nearest point, which circumscribes the square cell
-/// of an even sampling; held to 3 times the median of its chunk, so that stray points stay small.
+/// r = d sqrt(pi / 12), d the distance to the 6th nearest point, which circumscribes the square
+/// cell of an even sampling; held to 3 times the median of its chunk, so that stray points stay
+/// small.
 ///
 /// Neighbours are searched among 2^16 points of the Z-curve and 2^13 on either side: chunks are
 /// counted from the first point, so the result does not depend on memory or threads.
 /// @param sorted  must outlive the result
 /// @param unit    lattice unit in scene units
-/// @param first   number of the point to begin with; then `sorted` begins with that of first_for_radii()
-[[nodiscard]] std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit, std::uint64_t first = 0);
+/// @param first   number of the point to begin with; then `sorted` begins with that of
+/// first_for_radii()
+[[nodiscard]] std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit,
+                                                          std::uint64_t first = 0);
 
 /// The first of the points that bear on the radii of those from `first` on.
 [[nodiscard]] std::uint64_t first_for_radii(std::uint64_t first) noexcept;

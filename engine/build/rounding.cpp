@@ -46,7 +46,8 @@ class RoundedStream : public PointStream {
     // Where pieces meet, what is before may move a point, and that one the next.
     for (std::size_t begin = 0; begin < count; begin += kGrain) {
       for (std::size_t i = begin; i < count; ++i) {
-        const MortonKey key = rounded_key(exact_[i], out[i].radius, i == 0 ? last_ : out[i - 1].key);
+        const MortonKey key =
+            rounded_key(exact_[i], out[i].radius, i == 0 ? last_ : out[i - 1].key);
         if (key == out[i].key) break;
         out[i].key = key;
       }
@@ -65,9 +66,11 @@ class RoundedStream : public PointStream {
     point.key = rounded_key(point.key, point.radius, before);
   }
 
-  /// The low corner of the largest cell around the point whose diagonal the radius allows. A coarser cell than
-  /// that of the point before may start in front of it: then a smaller one is taken, at the end the point itself.
-  [[nodiscard]] MortonKey rounded_key(const MortonKey& key, float radius, const MortonKey& before) const noexcept {
+  /// The low corner of the largest cell around the point whose diagonal the radius allows. A
+  /// coarser cell than that of the point before may start in front of it: then a smaller one is
+  /// taken, at the end the point itself.
+  [[nodiscard]] MortonKey rounded_key(const MortonKey& key, float radius,
+                                      const MortonKey& before) const noexcept {
     const double edge = static_cast<double>(radius) / unit_ * (kRoundedPosition / std::sqrt(3.0));
     const int exponent = static_cast<int>(std::bit_cast<std::uint64_t>(edge) >> 52) - 1023;
     int level = edge >= 1 ? std::max(kLatticeBits - exponent, 0) : kLatticeBits;
@@ -93,7 +96,8 @@ bool is_rounded(Profile profile) noexcept {
   return profile == Profile::fast || profile == Profile::compact;
 }
 
-std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit, const Executor& executor, const MortonKey& before) {
+std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit,
+                                          const Executor& executor, const MortonKey& before) {
   return std::make_unique<RoundedStream>(sorted, unit, executor, before);
 }
 

@@ -25,14 +25,16 @@ inline constexpr double kRoundedNormal = 0.0021;       ///< angle, rad
 inline constexpr double kRoundedRadiance = 1.0 / 256;  ///< share, or 2^-22 if that is more
 
 /// The same in words.
-inline constexpr const char* kRounding = "position 0.001 radius, radius 1/512, normal 0.0021, radiance 1/256";
+inline constexpr const char* kRounding =
+    "position 0.001 radius, radius 1/512, normal 0.0021, radiance 1/256";
 
-/// Rounds sorted points; their order stays. Rounding what is rounded changes nothing. Points of radius 0 keep
-/// their position.
+/// Rounds sorted points; their order stays. Rounding what is rounded changes nothing. Points of
+/// radius 0 keep their position.
 /// @param sorted, executor  must outlive the result
 /// @param unit              lattice unit in scene units
 /// @param before            key of the rounded point before the first; none: zero
-[[nodiscard]] std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit, const Executor& executor,
+[[nodiscard]] std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit,
+                                                        const Executor& executor,
                                                         const MortonKey& before = {});
 
 }  // namespace ptc

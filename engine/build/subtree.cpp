@@ -14,11 +14,13 @@ constexpr int kRankLevels = kMaxLevel - kLatticeBits;  // 20 octal digits of ran
 }  // namespace
 
 int common_rank_level(std::uint64_t a, std::uint64_t b) noexcept {
-  const int differ = 64 - std::countl_zero(a ^ b);  // bits from the lowest to the first that differs
+  const int differ =
+      64 - std::countl_zero(a ^ b);  // bits from the lowest to the first that differs
   return kRankLevels - (differ + 2) / 3;
 }
 
-NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64_t first, std::uint64_t rank, const Emit& emit) {
+NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64_t first,
+                                std::uint64_t rank, const Emit& emit) {
   points_ = points;
   first_ = first;
   emit_ = &emit;
@@ -41,7 +43,8 @@ NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64
   return top;
 }
 
-NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64_t first, std::uint64_t rank, SubtreeGroups& out) {
+NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64_t first,
+                                std::uint64_t rank, SubtreeGroups& out) {
   return build(points, first, rank, [&](const NodeGroup& group, std::uint64_t end) {
     const std::size_t begin = out.bytes.size();
     append_group(group, out.bytes);
@@ -52,11 +55,14 @@ NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64
 
 void SubtreeBuilder::build(std::size_t begin, std::size_t end, std::size_t depth, NodeChild& node) {
   if (end - begin <= leaf_points_) {
-    node.ref = {.first_point = first_ + begin, .point_count = static_cast<std::uint32_t>(end - begin)};
+    node.ref = {.first_point = first_ + begin,
+                .point_count = static_cast<std::uint32_t>(end - begin)};
     node.node = summarise_points(columns_, begin, end);
     return;
   }
-  const auto at = [this](std::size_t i) { return levels_.begin() + static_cast<std::ptrdiff_t>(i); };
+  const auto at = [this](std::size_t i) {
+    return levels_.begin() + static_cast<std::ptrdiff_t>(i);
+  };
   const std::uint8_t level = *std::min_element(at(begin + 1), at(end));
   NodeGroup& group = path_[depth];
   group.level = level;
@@ -65,7 +71,10 @@ void SubtreeBuilder::build(std::size_t begin, std::size_t end, std::size_t depth
   group.children.reserve(kMaxChildren);
   for (std::size_t first = begin; first < end;) {
     const void* const found = std::memchr(levels_.data() + first + 1, level, end - first - 1);
-    const std::size_t last = found == nullptr ? end : static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - levels_.data());
+    const std::size_t last =
+        found == nullptr
+            ? end
+            : static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - levels_.data());
     build(first, last, depth + 1, group.children.emplace_back());
     first = last;
   }

@@ -13,8 +13,8 @@
 
 namespace ptc {
 
-/// Groups of a part of the tree in post-order, one after another as they lie in pages. References of interior
-/// children are numbers of groups in here.
+/// Groups of a part of the tree in post-order, one after another as they lie in pages. References
+/// of interior children are numbers of groups in here.
 struct SubtreeGroups {
   struct Group {
     std::size_t begin = 0;  ///< in bytes
@@ -33,7 +33,8 @@ struct SubtreeGroups {
 /// Octal digits that the ranks of two coincident points share, of kMaxLevel - kLatticeBits.
 [[nodiscard]] int common_rank_level(std::uint64_t a, std::uint64_t b) noexcept;
 
-/// Builds the octree below one cell, as OctreeBuilder says.   Memory: 90 bytes a point, and a group for each level.
+/// Builds the octree below one cell, as OctreeBuilder says.   Memory: 90 bytes a point, and a group
+/// for each level.
 class SubtreeBuilder {
  public:
   /// Takes a group when its children are done. @return an interior reference to it
@@ -46,9 +47,11 @@ class SubtreeBuilder {
   /// @param first   number of the first of them
   /// @param rank    of the first among those with its key
   /// @return the node that stands for them: a leaf when it has no more points than a leaf may
-  [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first, std::uint64_t rank, const Emit& emit);
+  [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first,
+                                std::uint64_t rank, const Emit& emit);
   /// The same; groups are appended to `out`.
-  [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first, std::uint64_t rank, SubtreeGroups& out);
+  [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first,
+                                std::uint64_t rank, SubtreeGroups& out);
 
  private:
   void build(std::size_t begin, std::size_t end, std::size_t depth, NodeChild& node);
@@ -59,8 +62,9 @@ class SubtreeBuilder {
   PointColumns columns_;
   std::uint64_t first_ = 0;
   const Emit* emit_ = nullptr;
-  std::vector<std::uint8_t> levels_;  ///< of the smallest cell that holds a point and the one before
-  std::vector<NodeGroup> path_;       ///< groups being filled, by depth; kept for their memory
+  std::vector<std::uint8_t>
+      levels_;                   ///< of the smallest cell that holds a point and the one before
+  std::vector<NodeGroup> path_;  ///< groups being filled, by depth; kept for their memory
 };
 
 }  // namespace ptc

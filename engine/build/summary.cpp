@@ -1,16 +1,19 @@
 // What a node knows of its surfels (spec/nodes.md#summary).
+#include "engine/build/summary.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "engine/build/point_columns.h"
-#include "engine/build/summary.h"
 
 namespace ptc {
 namespace {
 
 using Vec3 = std::array<double, 3>;
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double dot(const Vec3& a, const Vec3& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 double distance(const Vec3& a, const Vec3& b) {  // lattice coordinates: no square overflows
   const Vec3 d{a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -47,7 +50,8 @@ float round_down(double x) {
 }  // namespace
 
 Vec3 slab_normal(const NodeSummary& node) {
-  const Vec3 sum{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3], node.facing[4] - node.facing[5]};
+  const Vec3 sum{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3],
+                 node.facing[4] - node.facing[5]};
   const double length = std::sqrt(dot(sum, sum));
   if (!(length > 1e-6 * node.area)) return {};
   return {sum[0] / length, sum[1] / length, sum[2] / length};
@@ -75,7 +79,8 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
   NodeSummary sum;
   const Vec3& origin = nodes.front()->mean;
   double weight = 0;
-  const bool has_area = std::ranges::any_of(nodes, [](const NodeSummary* n) { return n->area > 0; });
+  const bool has_area =
+      std::ranges::any_of(nodes, [](const NodeSummary* n) { return n->area > 0; });
   for (const NodeSummary* node : nodes) {
     const double w = has_area ? node->area : 1.0;
     for (std::size_t k = 0; k < 3; ++k) sum.mean[k] += w * (node->mean[k] - origin[k]);
@@ -95,7 +100,8 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
     const double half = std::acos(std::clamp(static_cast<double>(node->cone_cos), -1.0, 1.0));
     angle = std::max(angle, std::acos(cosine_to_axis(sum, node->cone_axis)) + half);
     const double reach = extent_along(slab, slab_normal(*node), node->thickness, node->radius);
-    sum.thickness = std::max(sum.thickness, offset_along(slab, node->mean, sum.mean) + std::min(reach, node->radius));
+    sum.thickness = std::max(
+        sum.thickness, offset_along(slab, node->mean, sum.mean) + std::min(reach, node->radius));
   }
   set_bounds(sum, has_axis, angle >= M_PI ? -1.0 : std::cos(angle), sum.thickness);
   return sum;
@@ -103,7 +109,8 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
 
 NodeSummary summarise_children(std::span<const NodeChild> children) {
   std::array<const NodeSummary*, kMaxChildren> nodes{};
-  std::ranges::transform(children, nodes.begin(), [](const NodeChild& child) { return &child.node; });
+  std::ranges::transform(children, nodes.begin(),
+                         [](const NodeChild& child) { return &child.node; });
   return summarise_nodes(std::span(nodes).first(children.size()));
 }
 

@@ -9,13 +9,15 @@
 
 namespace ptc {
 
-/// Summary of a run of surfels: exact bounding sphere and cone. @param unit  lattice unit in scene units
+/// Summary of a run of surfels: exact bounding sphere and cone. @param unit  lattice unit in scene
+/// units
 [[nodiscard]] NodeSummary summarise_points(std::span<const PointRecord> points, double unit);
 /// Summary of several clusters; the sphere holds their spheres, the cone their cones.
 [[nodiscard]] NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes);
 [[nodiscard]] NodeSummary summarise_children(std::span<const NodeChild> children);
 
-/// Unit normal of the slab that holds a cluster whose sums are known, the mean of its normals; zero where they cancel out.
+/// Unit normal of the slab that holds a cluster whose sums are known, the mean of its normals; zero
+/// where they cancel out.
 [[nodiscard]] std::array<double, 3> slab_normal(const NodeSummary& node);
 /// Sets the axis of the normal cone: the slab's normal; +z where that is zero.
 /// @return false where it is zero

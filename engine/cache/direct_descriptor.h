@@ -25,10 +25,12 @@ class DirectDescriptor {
   int fd_;
 };
 
-/// A range, when so many bytes of its blocks have been read. What a transfer left out, as at the end of the file or after
-/// an error, is read through the page cache, which tells what is wrong, if anything is.
+/// A range, when so many bytes of its blocks have been read. What a transfer left out, as at the
+/// end of the file or after an error, is read through the page cache, which tells what is wrong, if
+/// anything is.
 /// @param blocks  where they were read to
-[[nodiscard]] inline std::span<const std::byte> complete(const DirectRange& range, std::byte* blocks, std::int64_t got,
+[[nodiscard]] inline std::span<const std::byte> complete(const DirectRange& range,
+                                                         std::byte* blocks, std::int64_t got,
                                                          const InputFile& file) {
   const std::span<std::byte> bytes(blocks + range.lead, range.bytes);
   if (got < static_cast<std::int64_t>(range.lead + range.bytes)) file.read_at(range.offset, bytes);

@@ -19,7 +19,8 @@ FrameTable::FrameTable(const Layout& layout, Replacement replacement)
 
 std::uint64_t FrameTable::bytes(std::uint64_t pages, std::uint64_t frames, std::uint64_t readers,
                                 std::uint64_t slots) noexcept {
-  return pages * sizeof(std::uint32_t) + frames * (sizeof(Frame) + kReplacementBytes) + readers * row(slots) * sizeof(Held);
+  return pages * sizeof(std::uint32_t) + frames * (sizeof(Frame) + kReplacementBytes) +
+         readers * row(slots) * sizeof(Held);
 }
 
 std::uint32_t FrameTable::hold(std::uint32_t reader, std::uint32_t page) noexcept {
@@ -93,7 +94,8 @@ std::uint32_t FrameTable::claim(std::uint32_t reader, std::uint32_t page) noexce
   return frame;
 }
 
-void FrameTable::ready(std::uint32_t frame, std::uint32_t bytes, std::uint32_t record_count) noexcept {
+void FrameTable::ready(std::uint32_t frame, std::uint32_t bytes,
+                       std::uint32_t record_count) noexcept {
   Frame& f = frames_[frame];
   assert(f.state == State::loading);
   f.bytes = bytes;

@@ -22,17 +22,19 @@ inline constexpr std::uint32_t kNoFrame = 0xffffffff;
 ///      |   last leave      v
 ///      +--------------- failed
 ///
-/// A reader has as many slots as its own level; what it holds of page p is told in slot p mod slots, so a frame's
-/// holders are found by one look at each reader. hold() finds a page that is ready without a lock and without a
-/// write that other readers share:
+/// A reader has as many slots as its own level; what it holds of page p is told in slot p mod
+/// slots, so a frame's holders are found by one look at each reader. hold() finds a page that is
+/// ready without a lock and without a write that other readers share:
 ///
 ///   hold()                          claim(), of a page in frame f
 ///   held = f                        frame of the page = none
 ///   is it still the page's frame?   does anyone hold f?
 ///
-/// Both store first and look then, in one order for all threads (seq_cst): one of the two sees the other.
+/// Both store first and look then, in one order for all threads (seq_cst): one of the two sees the
+/// other.
 ///
-/// Threads: hold() and release() by each reader for itself, at any time; all else by who has the caller's lock.
+/// Threads: hold() and release() by each reader for itself, at any time; all else by who has the
+/// caller's lock.
 class FrameTable {
  public:
   enum class State : std::uint8_t { empty, loading, ready, failed };
@@ -46,8 +48,8 @@ class FrameTable {
   FrameTable(const Layout& layout, Replacement replacement);
 
   /// Bytes that the tables take.
-  [[nodiscard]] static std::uint64_t bytes(std::uint64_t pages, std::uint64_t frames, std::uint64_t readers,
-                                           std::uint64_t slots) noexcept;
+  [[nodiscard]] static std::uint64_t bytes(std::uint64_t pages, std::uint64_t frames,
+                                           std::uint64_t readers, std::uint64_t slots) noexcept;
 
   /// Holds the frame of a page that is ready, in place of what the reader held in that slot.
   /// @return the frame, or kNoFrame: the page is not ready, and the slot holds nothing
@@ -61,23 +63,31 @@ class FrameTable {
 
   /// Frame of a page that is loading or ready, which the reader holds from now on; else kNoFrame.
   [[nodiscard]] std::uint32_t join(std::uint32_t reader, std::uint32_t page) noexcept;
-  /// A frame for a page that is in none: an empty one, or one that nobody holds. It is loading, and the reader
-  /// holds it. @pre readers hold fewer frames than there are
+  /// A frame for a page that is in none: an empty one, or one that nobody holds. It is loading, and
+  /// the reader holds it. @pre readers hold fewer frames than there are
   [[nodiscard]] std::uint32_t claim(std::uint32_t reader, std::uint32_t page) noexcept;
   /// The page has arrived. @pre loading
   void ready(std::uint32_t frame, std::uint32_t bytes, std::uint32_t record_count) noexcept;
-  /// The page did not arrive: it can be claimed anew at once; the frame becomes empty when all who claimed or
-  /// joined it have left, so that they can read the error. @pre loading
+  /// The page did not arrive: it can be claimed anew at once; the frame becomes empty when all who
+  /// claimed or joined it have left, so that they can read the error. @pre loading
   void fail(std::uint32_t frame, std::exception_ptr error) noexcept;
   /// Lets go of a frame that failed. Each who claimed or joined it does so once.
   void leave(std::uint32_t reader, std::uint32_t frame) noexcept;
 
   [[nodiscard]] State state(std::uint32_t frame) const noexcept { return frames_[frame].state; }
   /// Of a frame that the caller holds and that is ready, also without the lock.
-  [[nodiscard]] std::uint32_t page_bytes(std::uint32_t frame) const noexcept { return frames_[frame].bytes; }
-  [[nodiscard]] std::uint32_t record_count(std::uint32_t frame) const noexcept { return frames_[frame].record_count; }
-  [[nodiscard]] const std::exception_ptr& error(std::uint32_t frame) const noexcept { return frames_[frame].error; }
-  [[nodiscard]] std::uint32_t size() const noexcept { return static_cast<std::uint32_t>(frames_.size()); }
+  [[nodiscard]] std::uint32_t page_bytes(std::uint32_t frame) const noexcept {
+    return frames_[frame].bytes;
+  }
+  [[nodiscard]] std::uint32_t record_count(std::uint32_t frame) const noexcept {
+    return frames_[frame].record_count;
+  }
+  [[nodiscard]] const std::exception_ptr& error(std::uint32_t frame) const noexcept {
+    return frames_[frame].error;
+  }
+  [[nodiscard]] std::uint32_t size() const noexcept {
+    return static_cast<std::uint32_t>(frames_.size());
+  }
   [[nodiscard]] std::uint64_t evictions() const noexcept { return evictions_; }
   /// Most frames that were not empty at once.
   [[nodiscard]] std::uint32_t peak() const noexcept { return peak_; }
@@ -96,7 +106,8 @@ class FrameTable {
     State state = State::empty;
   };
   using Held = std::atomic<std::uint32_t>;
-  static constexpr std::size_t kApart = 128 / sizeof(Held);  ///< two readers' slots: cache lines come in pairs
+  static constexpr std::size_t kApart =
+      128 / sizeof(Held);  ///< two readers' slots: cache lines come in pairs
 
   [[nodiscard]] static std::size_t row(std::size_t slots) noexcept { return slots + kApart; }
   [[nodiscard]] Held& held(std::uint32_t reader, std::uint32_t page) noexcept {

@@ -1,10 +1,12 @@
 // Finding, claiming and loading frames.
 //
-// Why a claim always finds a frame. Let T be the readers, S the slots of each, F the frames; the constructor sees to
-// T * S <= F. A slot holds at most one frame, and that of the page being asked for is empty by then: hold() left it so.
-// A frame that is loading or failed is held in a slot of its loader and of those who still have to read its error. So
-// when a reader claims, slots hold fewer than T * S <= F frames, and some frame is empty, or ready and held by nobody.
-// No claim waits, hence there is no deadlock: the only wait is for another reader's read, and who reads holds no lock.
+// Why a claim always finds a frame. Let T be the readers, S the slots of each, F the frames; the
+// constructor sees to T * S <= F. A slot holds at most one frame, and that of the page being asked
+// for is empty by then: hold() left it so. A frame that is loading or failed is held in a slot of
+// its loader and of those who still have to read its error. So when a reader claims, slots hold
+// fewer than T * S <= F frames, and some frame is empty, or ready and held by nobody. No claim
+// waits, hence there is no deadlock: the only wait is for another reader's read, and who reads
+// holds no lock.
 #include "engine/cache/page_cache.h"
 
 #include <algorithm>
@@ -33,19 +35,23 @@ std::uint64_t frame_bytes(const ContainerReader& container) {
   return (container.page_payload_limit() + 63) / 64 * 64 + kGuardBytes;
 }
 
-std::size_t most_stored(const ContainerReader& container) { return std::size_t{1} << container.header().page_shift; }
+std::size_t most_stored(const ContainerReader& container) {
+  return std::size_t{1} << container.header().page_shift;
+}
 
 /// What the readers take: table, decoder, and the back end's buffers.
 std::uint64_t reader_bytes(const ContainerReader& container, unsigned threads, BackEnd back_end) {
-  return threads * (kMostSlots * kTableSlotBytes + kDecoderBytes + page_source_bytes(back_end, most_stored(container)));
+  return threads * (kMostSlots * kTableSlotBytes + kDecoderBytes +
+                    page_source_bytes(back_end, most_stored(container)));
 }
 
 /// Frames within the cap; more than the pages and a working set for each thread are of no use.
 std::uint32_t count_frames(const ContainerReader& container, const CacheOptions& options) {
   const std::uint64_t least = PageCache::least_bytes(container, options.threads, options.back_end);
   if (options.memory_bytes < least) {
-    throw std::invalid_argument("page cache: " + std::to_string(options.memory_bytes) + " bytes are too few, " +
-                                std::to_string(least) + " are needed for " + std::to_string(options.threads) + " threads");
+    throw std::invalid_argument("page cache: " + std::to_string(options.memory_bytes) +
+                                " bytes are too few, " + std::to_string(least) +
+                                " are needed for " + std::to_string(options.threads) + " threads");
   }
   const std::uint64_t pages = container.page_count();
   const std::uint64_t fixed = PageCache::bytes_for(container, options.threads, 0, options.back_end);
@@ -53,7 +59,8 @@ std::uint32_t count_frames(const ContainerReader& container, const CacheOptions&
   const std::uint64_t wanted = std::max<std::uint64_t>(
       pages, std::uint64_t{2} * options.threads * std::max(1u, options.local_slots));
   constexpr std::uint64_t kMostFrames = 0x7fffffff;  // FrameTable needs a bit
-  return static_cast<std::uint32_t>(std::min({(options.memory_bytes - fixed) / each, wanted, kMostFrames}));
+  return static_cast<std::uint32_t>(
+      std::min({(options.memory_bytes - fixed) / each, wanted, kMostFrames}));
 }
 
 std::uint32_t choose_slots(const CacheOptions& options, std::uint32_t frames) {
@@ -73,7 +80,8 @@ std::uint32_t choose_slots(const CacheOptions& options, std::uint32_t frames) {
 }  // namespace
 
 struct PageCache::Impl {
-  Impl(const ContainerReader& from, const CacheOptions& with) : Impl(from, with, count_frames(from, with)) {}
+  Impl(const ContainerReader& from, const CacheOptions& with)
+      : Impl(from, with, count_frames(from, with)) {}
   Impl(const ContainerReader& from, const CacheOptions& with, std::uint32_t frames)
       : container(from),
         options(with),
@@ -85,7 +93,8 @@ struct PageCache::Impl {
         seats(with.threads) {}
 
   PageReader::Page view(std::uint32_t frame) const noexcept {
-    return {arena.data() + frame * frame_stride, table.page_bytes(frame), table.record_count(frame)};
+    return {arena.data() + frame * frame_stride, table.page_bytes(frame),
+            table.record_count(frame)};
   }
 
   /// What a reader brings along to the shared level.
@@ -124,8 +133,9 @@ struct PageCache::Impl {
     double waited = 0;
     try {
       const std::span<const std::byte> image = fetch(page, caller.source, waited);
-      header = container.decode_page(page, image, {arena.data() + frame * frame_stride, frame_stride - kGuardBytes},
-                                     caller.decoder);
+      header = container.decode_page(
+          page, image, {arena.data() + frame * frame_stride, frame_stride - kGuardBytes},
+          caller.decoder);
     } catch (...) {
       lock.lock();
       table.fail(frame, std::current_exception());
@@ -141,7 +151,8 @@ struct PageCache::Impl {
     return frame;
   }
 
-  // Pages of a kind follow the Z-curve, and so do receivers: the next one is wanted soon more often than not.
+  // Pages of a kind follow the Z-curve, and so do receivers: the next one is wanted soon more often
+  // than not.
   std::span<const std::byte> fetch(std::uint32_t page, PageSource& source, double& waited) const {
     const auto begin = Clock::now();
     const std::uint32_t next = reads_ahead ? next_of_kind(page) : kNoPage;
@@ -158,7 +169,8 @@ struct PageCache::Impl {
   std::uint32_t next_of_kind(std::uint32_t page) const {
     const PageType type = container.entry(page).type;
     if (type != PageType::point && type != PageType::node) return kNoPage;
-    const std::span<const std::uint32_t> kind = type == PageType::point ? container.point_pages() : container.node_pages();
+    const std::span<const std::uint32_t> kind =
+        type == PageType::point ? container.point_pages() : container.node_pages();
     const auto next = std::ranges::upper_bound(kind, page);
     return next == kind.end() ? kNoPage : *next;
   }
@@ -193,14 +205,16 @@ PageCache::PageCache(const ContainerReader& container, const CacheOptions& optio
 
 PageCache::~PageCache() = default;
 
-std::uint64_t PageCache::least_bytes(const ContainerReader& container, unsigned threads, BackEnd back_end) {
+std::uint64_t PageCache::least_bytes(const ContainerReader& container, unsigned threads,
+                                     BackEnd back_end) {
   return bytes_for(container, threads, std::uint64_t{2} * threads, back_end);
 }
 
-std::uint64_t PageCache::bytes_for(const ContainerReader& container, unsigned threads, std::uint64_t frames,
-                                   BackEnd back_end) {
+std::uint64_t PageCache::bytes_for(const ContainerReader& container, unsigned threads,
+                                   std::uint64_t frames, BackEnd back_end) {
   return reader_bytes(container, threads, back_end) +
-         FrameTable::bytes(container.page_count(), frames, threads, kMostSlots) + frames * frame_bytes(container);
+         FrameTable::bytes(container.page_count(), frames, threads, kMostSlots) +
+         frames * frame_bytes(container);
 }
 
 const ContainerReader& PageCache::container() const noexcept {
@@ -224,7 +238,8 @@ PageReader::PageReader(PageCache& cache)
     : shared_(*cache.impl_),
       table_(std::make_unique<Slot[]>(shared_.slots)),
       mask_(shared_.slots - 1),
-      source_(make_page_source(shared_.options.back_end, shared_.container.file(), most_stored(shared_.container))) {
+      source_(make_page_source(shared_.options.back_end, shared_.container.file(),
+                               most_stored(shared_.container))) {
   static_assert(sizeof(Slot) <= kTableSlotBytes);
   const std::lock_guard lock(shared_.mutex);
   const auto seat = std::ranges::find(shared_.seats, false);
@@ -255,7 +270,8 @@ PageReader::Page PageReader::find(std::uint32_t page) {
   if (frame != kNoFrame) {
     ++shared_hits_;
   } else {
-    frame = shared_.acquire(page, {number_, decoder_, *source_, std::exchange(lookups_, 0), std::exchange(shared_hits_, 0)});
+    frame = shared_.acquire(page, {number_, decoder_, *source_, std::exchange(lookups_, 0),
+                                   std::exchange(shared_hits_, 0)});
   }
   slot.view = shared_.view(frame);
   slot.page = page;

@@ -31,18 +31,21 @@ struct CacheStatistics {
   std::uint64_t bytes_read = 0;   ///< stored bytes of pages that arrived, headers included
   std::uint64_t frames = 0;       ///< frames there are: what the cap allows and the file can use
   std::uint64_t peak_frames = 0;  ///< most that were in use at once
-  double wait_seconds = 0;        ///< for bytes from the back end or for another thread's read, all readers together
+  double wait_seconds =
+      0;  ///< for bytes from the back end or for another thread's read, all readers together
   [[nodiscard]] double hit_rate() const noexcept;  ///< 1 - misses / lookups; 1 without lookups
 };
 
-/// The shared level. A page that is there is found without a lock (engine/cache/frame_table.h). One that is not is
-/// read once even when several threads ask for it at the same time (single flight); reading and verifying happen
-/// outside the lock. Of the pages that no reader holds, one that was not asked for of late leaves first.
+/// The shared level. A page that is there is found without a lock (engine/cache/frame_table.h). One
+/// that is not is read once even when several threads ask for it at the same time (single flight);
+/// reading and verifying happen outside the lock. Of the pages that no reader holds, one that was
+/// not asked for of late leaves first.
 ///
 /// A page that cannot be read fails for all who wait for it; who asks later tries again.
-/// Memory: frames of one page size each in one block, 4 bytes a page of the container, and for each reader its table,
-/// its decoder and its back end's buffers; all of it within the cap. The container's own directory is not counted.
-/// Threads: a PageCache may be shared; each thread makes its own PageReader.
+/// Memory: frames of one page size each in one block, 4 bytes a page of the container, and for each
+/// reader its table, its decoder and its back end's buffers; all of it within the cap. The
+/// container's own directory is not counted. Threads: a PageCache may be shared; each thread makes
+/// its own PageReader.
 class PageCache {
  public:
   /// @param container  outlives the cache
@@ -57,11 +60,12 @@ class PageCache {
   [[nodiscard]] static std::uint64_t least_bytes(const ContainerReader& container, unsigned threads,
                                                  BackEnd back_end = BackEnd::pread);
   /// Least cap that gives so many frames.
-  [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads, std::uint64_t frames,
+  [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads,
+                                               std::uint64_t frames,
                                                BackEnd back_end = BackEnd::pread);
   [[nodiscard]] const ContainerReader& container() const noexcept;
-  /// Sums over the shared level and all readers that have ended. Of a living reader, hits since its last miss are
-  /// missing.
+  /// Sums over the shared level and all readers that have ended. Of a living reader, hits since its
+  /// last miss are missing.
   [[nodiscard]] CacheStatistics statistics() const;
   /// Pages that each reader holds on to.
   [[nodiscard]] std::uint32_t local_slots() const noexcept;
@@ -72,12 +76,13 @@ class PageCache {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A thread's way to pages: a direct-mapped table of pages that it holds, so a repeated access takes no lock and writes
-/// nothing shared. Not thread-safe: one per thread.
+/// A thread's way to pages: a direct-mapped table of pages that it holds, so a repeated access
+/// takes no lock and writes nothing shared. Not thread-safe: one per thread.
 class PageReader {
  public:
   /// @param cache  outlives the reader
-  /// @throws std::invalid_argument when as many readers as CacheOptions::threads exist already; std::system_error
+  /// @throws std::invalid_argument when as many readers as CacheOptions::threads exist already;
+  /// std::system_error
   ///         when the system does not have the back end
   explicit PageReader(PageCache& cache);
   ~PageReader();
@@ -103,7 +108,8 @@ class PageReader {
   }
 
  private:
-  static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};  // equal to no page number, kNoPage included
+  static constexpr std::uint64_t kEmpty =
+      ~std::uint64_t{0};  // equal to no page number, kNoPage included
   struct Slot {
     std::uint64_t page = kEmpty;
     Page view;

@@ -39,7 +39,8 @@ class DirectSource : public PageSource {
 
   std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
     const DirectRange range(offset, bytes);
-    const ssize_t got = ::pread(direct_.get(), blocks_.data(), range.whole, static_cast<off_t>(range.begin));
+    const ssize_t got =
+        ::pread(direct_.get(), blocks_.data(), range.whole, static_cast<off_t>(range.begin));
     return complete(range, blocks_.data(), got, file_);
   }
 
@@ -54,7 +55,8 @@ class MmapSource : public PageSource {
  public:
   explicit MmapSource(const InputFile& file) : bytes_(file.size()) {
     void* data = ::mmap(nullptr, bytes_, PROT_READ, MAP_SHARED, file.descriptor(), 0);
-    if (data == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap " + file.path().string());
+    if (data == MAP_FAILED)
+      throw std::system_error(errno, std::generic_category(), "mmap " + file.path().string());
     data_ = static_cast<std::byte*>(data);
     ::madvise(data_, bytes_, MADV_RANDOM);
   }
@@ -75,7 +77,8 @@ class MmapSource : public PageSource {
  private:
   void advise(std::uint64_t offset, std::size_t bytes, std::uint64_t unit, int advice) noexcept {
     const std::uint64_t begin = offset / unit * unit;
-    const std::uint64_t end = std::min<std::uint64_t>((offset + bytes + unit - 1) / unit * unit, bytes_);
+    const std::uint64_t end =
+        std::min<std::uint64_t>((offset + bytes + unit - 1) / unit * unit, bytes_);
     ::madvise(data_ + begin, end - begin, advice);
   }
 
@@ -90,24 +93,34 @@ class MmapSource : public PageSource {
 DirectDescriptor::DirectDescriptor(const InputFile& file) {
   // By its descriptor, not its path, behind which there may be another file by now.
   fd_ = open_retrying("/proc/self/fd/" + std::to_string(file.descriptor()), O_RDONLY | O_DIRECT);
-  if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "open for direct transfers " + file.path().string());
+  if (fd_ < 0)
+    throw std::system_error(errno, std::generic_category(),
+                            "open for direct transfers " + file.path().string());
 }
 
-DirectDescriptor::~DirectDescriptor() { ::close(fd_); }
+DirectDescriptor::~DirectDescriptor() {
+  ::close(fd_);
+}
 
-std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& file, std::size_t most_bytes) {
+std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& file,
+                                             std::size_t most_bytes) {
   switch (back_end) {
-    case BackEnd::mmap: return std::make_unique<MmapSource>(file);
-    case BackEnd::direct: return std::make_unique<DirectSource>(file, most_bytes);
-    case BackEnd::io_uring: return std::make_unique<UringSource>(file, most_bytes);
-    case BackEnd::pread: break;
+    case BackEnd::mmap:
+      return std::make_unique<MmapSource>(file);
+    case BackEnd::direct:
+      return std::make_unique<DirectSource>(file, most_bytes);
+    case BackEnd::io_uring:
+      return std::make_unique<UringSource>(file, most_bytes);
+    case BackEnd::pread:
+      break;
   }
   return std::make_unique<PreadSource>(file, most_bytes);
 }
 
 std::uint64_t page_source_bytes(BackEnd back_end, std::size_t most_bytes) noexcept {
   const std::uint64_t room = direct_room(most_bytes);
-  return back_end == BackEnd::io_uring ? UringSource::kSlots * room + UringSource::kRingBytes : room;
+  return back_end == BackEnd::io_uring ? UringSource::kSlots * room + UringSource::kRingBytes
+                                       : room;
 }
 
 }  // namespace ptc

@@ -15,7 +15,8 @@ class ClockOrder : public ReplacementOrder {
   void insert(std::uint32_t frame) noexcept override { marks_[frame].takes_part = true; }
   void touch(std::uint32_t frame) noexcept override {
     std::atomic<bool>& asked_for = marks_[frame].asked_for;
-    if (!asked_for.load(std::memory_order_relaxed)) asked_for.store(true, std::memory_order_relaxed);
+    if (!asked_for.load(std::memory_order_relaxed))
+      asked_for.store(true, std::memory_order_relaxed);
   }
   std::uint32_t candidate() noexcept override {
     for (;;) {
@@ -97,7 +98,8 @@ class LruOrder : public ReplacementOrder {
 
 }  // namespace
 
-std::unique_ptr<ReplacementOrder> make_replacement_order(Replacement replacement, std::uint32_t frames) {
+std::unique_ptr<ReplacementOrder> make_replacement_order(Replacement replacement,
+                                                         std::uint32_t frames) {
   if (replacement == Replacement::lru) return std::make_unique<LruOrder>(frames);
   return std::make_unique<ClockOrder>(frames);
 }

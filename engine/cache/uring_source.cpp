@@ -10,13 +10,18 @@ namespace ptc {
 namespace {
 
 void check(int result, const char* call, const InputFile& file) {
-  if (result < 0) throw std::system_error(-result, std::generic_category(), call + (" for " + file.path().string()));
+  if (result < 0)
+    throw std::system_error(-result, std::generic_category(),
+                            call + (" for " + file.path().string()));
 }
 
 }  // namespace
 
 UringSource::UringSource(const InputFile& file, std::size_t most_bytes)
-    : file_(file), direct_(file), slot_bytes_(direct_room(most_bytes)), blocks_(kSlots * slot_bytes_) {
+    : file_(file),
+      direct_(file),
+      slot_bytes_(direct_room(most_bytes)),
+      blocks_(kSlots * slot_bytes_) {
   check(io_uring_queue_init(kSlots, &ring_, 0), "io_uring_setup", file);
 }
 
@@ -43,8 +48,8 @@ void UringSource::expect(std::uint64_t offset, std::size_t bytes) {
 }
 
 UringSource::Slot* UringSource::find(std::uint64_t offset) noexcept {
-  const auto found =
-      std::ranges::find_if(slots_, [&](const Slot& slot) { return slot.wanted && slot.range.offset == offset; });
+  const auto found = std::ranges::find_if(
+      slots_, [&](const Slot& slot) { return slot.wanted && slot.range.offset == offset; });
   return found == slots_.end() ? nullptr : &*found;
 }
 
@@ -55,7 +60,8 @@ UringSource::Slot& UringSource::begin(std::uint64_t offset, std::size_t bytes) {
   io_uring_sqe* const entry = io_uring_get_sqe(&ring_);
   assert(entry != nullptr);  // as many as slots
   slot = {.range = {offset, bytes}, .wanted = true, .flying = true};
-  io_uring_prep_read(entry, direct_.get(), blocks_of(slot), static_cast<unsigned>(slot.range.whole), slot.range.begin);
+  io_uring_prep_read(entry, direct_.get(), blocks_of(slot), static_cast<unsigned>(slot.range.whole),
+                     slot.range.begin);
   io_uring_sqe_set_data(entry, &slot);
   return slot;
 }

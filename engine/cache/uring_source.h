@@ -1,9 +1,9 @@
 // Pages past the page cache, those expected while others are decoded.
 #pragma once
 
-#include <liburing.h>
-
 #include <array>
+
+#include <liburing.h>
 
 #include "engine/base/memory.h"
 #include "engine/cache/direct_descriptor.h"
@@ -11,8 +11,8 @@
 
 namespace ptc {
 
-/// Direct transfers by io_uring into a ring of slots: what is expected stays in its slot, as it is stored, until
-/// it is read or so many others were begun after it.
+/// Direct transfers by io_uring into a ring of slots: what is expected stays in its slot, as it is
+/// stored, until it is read or so many others were begun after it.
 class UringSource : public PageSource {
  public:
   static constexpr std::size_t kSlots = 32;

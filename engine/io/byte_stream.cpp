@@ -1,12 +1,12 @@
 // Buffering, lines and gunzip.
 #include "engine/io/byte_stream.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
 #include <new>
+
+#include <zlib.h>
 
 #include "engine/base/error.h"
 
@@ -30,7 +30,8 @@ struct ByteStream::Gunzip {
 
   /// False at the end of the file.
   bool refill() {
-    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(input.size(), file.size() - at));
+    const auto count =
+        static_cast<std::size_t>(std::min<std::uint64_t>(input.size(), file.size() - at));
     file.read_at(at, std::span(input).first(count));
     at += count;
     stream.next_in = reinterpret_cast<Bytef*>(input.data());
@@ -38,10 +39,12 @@ struct ByteStream::Gunzip {
     return count > 0;
   }
 
-  /// Behind a member comes another one, or what is not meant for us: padding (RFC 1952 says nothing).
+  /// Behind a member comes another one, or what is not meant for us: padding (RFC 1952 says
+  /// nothing).
   [[nodiscard]] bool between() const { return members > 0 && stream.total_in <= 2; }
 
-  /// @return bytes unpacked, fewer than there is room for at the end only; or a negative error of zlib
+  /// @return bytes unpacked, fewer than there is room for at the end only; or a negative error of
+  /// zlib
   int read(std::span<std::byte> out) {
     stream.next_out = reinterpret_cast<Bytef*>(out.data());
     stream.avail_out = static_cast<uInt>(out.size());
@@ -96,8 +99,10 @@ std::size_t ByteStream::read_some(std::span<std::byte> out) {
     if (count == Z_MEM_ERROR) throw std::bad_alloc();
     if (count < 0) {
       const char* const text = gunzip_->stream.msg;
-      fail_at(base_ + end_, std::string("damaged gzip data: ") +
-                                (count == Z_BUF_ERROR ? "it ends too early" : text ? text : zError(count)));
+      fail_at(base_ + end_,
+              std::string("damaged gzip data: ") + (count == Z_BUF_ERROR ? "it ends too early"
+                                                    : text               ? text
+                                                                         : zError(count)));
     }
     return static_cast<std::size_t>(count);
   }

@@ -15,7 +15,9 @@ inline constexpr std::size_t kDirectBytes = 4096;
 }
 
 /// Room for the blocks of any range of so many bytes.
-[[nodiscard]] constexpr std::size_t direct_room(std::size_t bytes) noexcept { return direct_blocks(bytes + kDirectBytes - 1); }
+[[nodiscard]] constexpr std::size_t direct_room(std::size_t bytes) noexcept {
+  return direct_blocks(bytes + kDirectBytes - 1);
+}
 
 /// The blocks that a range of a file lies in: direct transfers move whole ones.
 struct DirectRange {

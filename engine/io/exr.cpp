@@ -1,4 +1,13 @@
 // OpenEXR pictures: any compression in, ZIP scan lines out.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+#include <new>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -8,15 +17,6 @@
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
 #include <half.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <exception>
-#include <new>
-#include <set>
-#include <stdexcept>
-#include <utility>
 
 #include "engine/base/error.h"
 #include "engine/io/file.h"

@@ -20,16 +20,36 @@ constexpr std::int64_t kMostTileSide = 8192;
 /// Types whose values the library reads by these sizes, whatever size the attribute declares: where
 /// the two differ, it would take what follows for names and sizes that were not checked.
 constexpr std::array<std::pair<std::string_view, std::uint32_t>, 24> kTypeBytes = {
-    {{"box2f", 16},   {"box2i", 16},    {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1},
-     {"double", 8},   {"envmap", 1},    {"float", 4},           {"int", 4},         {"keycode", 28},
-     {"lineOrder", 1}, {"m33d", 72},    {"m33f", 36},           {"m44d", 128},      {"m44f", 64},
-     {"rational", 8}, {"tiledesc", 9},  {"timecode", 8},        {"v2d", 16},        {"v2f", 8},
-     {"v2i", 8},      {"v3d", 24},      {"v3f", 12},            {"v3i", 12}}};
+    {{"box2f", 16},
+     {"box2i", 16},
+     {"chromaticities", 32},
+     {"compression", 1},
+     {"deepImageState", 1},
+     {"double", 8},
+     {"envmap", 1},
+     {"float", 4},
+     {"int", 4},
+     {"keycode", 28},
+     {"lineOrder", 1},
+     {"m33d", 72},
+     {"m33f", 36},
+     {"m44d", 128},
+     {"m44f", 64},
+     {"rational", 8},
+     {"tiledesc", 9},
+     {"timecode", 8},
+     {"v2d", 16},
+     {"v2f", 8},
+     {"v2i", 8},
+     {"v3d", 24},
+     {"v3f", 12},
+     {"v3i", 12}}};
 
 /// Whether a value of this type may take so many bytes.
 bool suits(std::string_view type, std::uint32_t size) {
   if (type == "floatvector") return size % 4 == 0;
-  const auto* const found = std::ranges::find(kTypeBytes, type, [](const auto& t) { return t.first; });
+  const auto* const found =
+      std::ranges::find(kTypeBytes, type, [](const auto& t) { return t.first; });
   return found == kTypeBytes.end() || found->second == size;
 }
 
@@ -81,7 +101,8 @@ class HeaderWalk {
       }
       const std::uint64_t end = stream_.offset() + size;
       if (!suits(type, size)) {
-        stream_.fail_at(stream_.offset(), "EXR: attribute '" + attribute + "' has not the size of its type");
+        stream_.fail_at(stream_.offset(),
+                        "EXR: attribute '" + attribute + "' has not the size of its type");
       }
       const bool whole = read_value(attribute, type, end);
       if (stream_.offset() > end || (whole && stream_.offset() < end)) {

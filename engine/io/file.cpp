@@ -147,7 +147,8 @@ std::filesystem::path temporary_name(const std::filesystem::path& target) {
                                  std::to_string(counter.fetch_add(1)));
 }
 
-/// Permissions of a file that is to be replaced, nothing where there is none. @throws std::system_error where none can be
+/// Permissions of a file that is to be replaced, nothing where there is none. @throws
+/// std::system_error where none can be
 std::optional<mode_t> mode_of(const std::filesystem::path& target) {
   struct stat old {};
   const bool exists = ::stat(target.c_str(), &old) == 0;
@@ -180,7 +181,8 @@ void sync_directory(const std::filesystem::path& file) {
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept {
   if (bytes == 0) return;
   // Where that cannot be the blocks stay until the file goes.
-  static_cast<void>(::fallocate(fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(offset), static_cast<off_t>(bytes)));
+  static_cast<void>(::fallocate(fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE,
+                                static_cast<off_t>(offset), static_cast<off_t>(bytes)));
 }
 
 InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
@@ -254,7 +256,8 @@ void OutputFile::append(std::span<const std::byte> bytes) {
 }
 
 void OutputFile::truncate(std::uint64_t bytes) {
-  if (retrying([&] { return ::ftruncate(fd_, static_cast<off_t>(bytes)); }) != 0) fail(errno, "ftruncate", temporary_);
+  if (retrying([&] { return ::ftruncate(fd_, static_cast<off_t>(bytes)); }) != 0)
+    fail(errno, "ftruncate", temporary_);
   size_ = bytes;
 }
 
@@ -344,6 +347,8 @@ void TempFile::drop_cache() const noexcept {
   ::posix_fadvise(fd_, 0, 0, POSIX_FADV_DONTNEED);
 }
 
-void TempFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept { discard_blocks(fd_, offset, bytes); }
+void TempFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept {
+  discard_blocks(fd_, offset, bytes);
+}
 
 }  // namespace ptc

@@ -46,8 +46,8 @@ class OutputFile {
  public:
   /// @throws std::system_error; a directory (EISDIR) or device (EINVAL) as target is refused
   explicit OutputFile(const std::filesystem::path& target);
-  /// The same under a given name instead of a temporary one: a file of that name is gone on with, and stays unless it is
-  /// published. @param partial  in the directory of the target
+  /// The same under a given name instead of a temporary one: a file of that name is gone on with,
+  /// and stays unless it is published. @param partial  in the directory of the target
   OutputFile(const std::filesystem::path& target, const std::filesystem::path& partial);
   /// Removes the temporary file unless it was published.
   ~OutputFile();
@@ -66,7 +66,8 @@ class OutputFile {
   }
   /// Cuts what lies behind.
   void truncate(std::uint64_t bytes);
-  /// fdatasync: what was written so far is on the disk when it returns. Threads: while others write, too.
+  /// fdatasync: what was written so far is on the disk when it returns. Threads: while others
+  /// write, too.
   void sync();
   /// fsync, rename over the target, fsync of the directory. The file is closed afterwards.
   void publish();
@@ -100,18 +101,20 @@ class TemporaryName {
 /// fsync of the directory that a file is in: its name is on the disk.
 void sync_directory(const std::filesystem::path& file);
 
-/// open() of a descriptor that programs begun from this one do not get, EINTR retried. @return -1 and errno as open()
-[[nodiscard]] int open_retrying(const std::filesystem::path& path, int flags, mode_t mode = 0) noexcept;
+/// open() of a descriptor that programs begun from this one do not get, EINTR retried. @return -1
+/// and errno as open()
+[[nodiscard]] int open_retrying(const std::filesystem::path& path, int flags,
+                                mode_t mode = 0) noexcept;
 
 /// Gives back the disk's blocks under these bytes of an open file, where the file system can.
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept;
 
-/// Removes all TemporaryNames and temporary names of OutputFiles, for a process that ends at once: who
-/// makes or drops one from now on waits for ever. Allocates nothing.
+/// Removes all TemporaryNames and temporary names of OutputFiles, for a process that ends at once:
+/// who makes or drops one from now on waits for ever. Allocates nothing.
 void remove_temporaries() noexcept;
 
-/// From now on SIGINT, SIGTERM and SIGHUP call remove_temporaries() before they end the process as they
-/// would have; a signal that was ignored stays ignored. For programs, once.
+/// From now on SIGINT, SIGTERM and SIGHUP call remove_temporaries() before they end the process as
+/// they would have; a signal that was ignored stays ignored. For programs, once.
 void remove_temporaries_on_signal();
 
 /// A nameless file in `directory` that vanishes when it is closed (O_TMPFILE, or unlinked at once).
@@ -129,7 +132,8 @@ class TempFile {
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   /// Tells the system that the page cache need not keep what was written or read.
   void drop_cache() const noexcept;
-  /// Gives back the disk's blocks under these bytes, where the file system can; they read as zero then.
+  /// Gives back the disk's blocks under these bytes, where the file system can; they read as zero
+  /// then.
   void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
  private:

@@ -1,9 +1,6 @@
 // 8-bit pictures through stb; the choice of the reader.
 #include "engine/io/image.h"
 
-#include <stb_image.h>
-#include <stb_image_write.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +8,9 @@
 #include <memory>
 #include <new>
 #include <stdexcept>
+
+#include <stb_image.h>
+#include <stb_image_write.h>
 
 #include "engine/base/error.h"
 #include "engine/io/file.h"

@@ -141,8 +141,8 @@ bool bmp_is_complete(std::span<const std::byte> bytes) {
   return !at.past_end() && !data.past_end();
 }
 
-// One run-length coded line: four channels of `width` bytes. Runs of none are passed over as stb does,
-// which at the end of the file takes zeros for such runs and never ends.
+// One run-length coded line: four channels of `width` bytes. Runs of none are passed over as stb
+// does, which at the end of the file takes zeros for such runs and never ends.
 void skip_hdr_line(Cursor& at, std::uint64_t width) {
   for (int channel = 0; channel < 4; ++channel) {
     for (std::uint64_t done = 0; done < width && !at.past_end();) {

@@ -14,7 +14,8 @@ namespace {
 
 dev_t disk_of(const std::filesystem::path& path) {
   struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) throw std::system_error(errno, std::generic_category(), "stat " + path.string());
+  if (::stat(path.c_str(), &status) != 0)
+    throw std::system_error(errno, std::generic_category(), "stat " + path.string());
   return status.st_dev;
 }
 
@@ -37,18 +38,22 @@ const std::filesystem::path& roomiest(std::span<const std::filesystem::path> dir
   });
 }
 
-bool share_a_disk(std::span<const std::filesystem::path> directories, const std::filesystem::path& path) {
+bool share_a_disk(std::span<const std::filesystem::path> directories,
+                  const std::filesystem::path& path) {
   const dev_t disk = disk_of(path);
-  return std::ranges::any_of(directories, [&](const std::filesystem::path& other) { return disk_of(other) == disk; });
+  return std::ranges::any_of(
+      directories, [&](const std::filesystem::path& other) { return disk_of(other) == disk; });
 }
 
-void require_room(std::span<const std::filesystem::path> directories, std::uint64_t bytes, const std::string& what) {
+void require_room(std::span<const std::filesystem::path> directories, std::uint64_t bytes,
+                  const std::string& what) {
   const std::uint64_t free = free_bytes(directories);
   if (bytes <= free) return;
-  throw std::system_error(ENOSPC, std::generic_category(),
-                          fmt::format("{} take up to {} in {}, with {} free; "
-                                      "name other or more directories with --temp, or fewer points",
-                                      what, giga_text(bytes), names_text(directories), giga_text(free)));
+  throw std::system_error(
+      ENOSPC, std::generic_category(),
+      fmt::format("{} take up to {} in {}, with {} free; "
+                  "name other or more directories with --temp, or fewer points",
+                  what, giga_text(bytes), names_text(directories), giga_text(free)));
 }
 
 std::string names_text(std::span<const std::filesystem::path> paths) {
@@ -60,6 +65,8 @@ std::string names_text(std::span<const std::filesystem::path> paths) {
   return text;
 }
 
-std::string giga_text(std::uint64_t bytes) { return fmt::format("{:.1f} GB", static_cast<double>(bytes) / 1e9); }
+std::string giga_text(std::uint64_t bytes) {
+  return fmt::format("{:.1f} GB", static_cast<double>(bytes) / 1e9);
+}
 
 }  // namespace ptc

@@ -13,14 +13,17 @@ namespace ptc {
 [[nodiscard]] std::uint64_t free_bytes(std::span<const std::filesystem::path> directories);
 
 /// The directory with most room. @param directories  at least one
-[[nodiscard]] const std::filesystem::path& roomiest(std::span<const std::filesystem::path> directories);
+[[nodiscard]] const std::filesystem::path& roomiest(
+    std::span<const std::filesystem::path> directories);
 
 /// True when one of the directories is on the file system of `path`.
-[[nodiscard]] bool share_a_disk(std::span<const std::filesystem::path> directories, const std::filesystem::path& path);
+[[nodiscard]] bool share_a_disk(std::span<const std::filesystem::path> directories,
+                                const std::filesystem::path& path);
 
 /// @param what  is going to be written there, e.g. "5 files": begins the message
 /// @throws std::system_error (ENOSPC) when the directories have less free than that, together
-void require_room(std::span<const std::filesystem::path> directories, std::uint64_t bytes, const std::string& what);
+void require_room(std::span<const std::filesystem::path> directories, std::uint64_t bytes,
+                  const std::string& what);
 
 /// "a", "a and b" or "a, b and c", for messages.
 [[nodiscard]] std::string names_text(std::span<const std::filesystem::path> paths);

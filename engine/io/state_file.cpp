@@ -28,7 +28,9 @@ void StateWriter::put_bytes(std::span<const std::byte> bytes) {
   bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
 }
 
-void StateReader::fail(const std::string& text) const { throw DataError(name_ + ": " + text); }
+void StateReader::fail(const std::string& text) const {
+  throw DataError(name_ + ": " + text);
+}
 
 std::span<const std::byte> StateReader::take(std::uint64_t count) {
   if (count > bytes_.size()) fail("the state ends too early");
@@ -43,7 +45,9 @@ std::uint64_t StateReader::get_count(std::uint64_t most) {
   return count;
 }
 
-std::span<const std::byte> StateReader::get_bytes() { return take(get<std::uint64_t>()); }
+std::span<const std::byte> StateReader::get_bytes() {
+  return take(get<std::uint64_t>());
+}
 
 std::string StateReader::get_text() {
   const std::span<const std::byte> bytes = get_bytes();
@@ -54,7 +58,9 @@ void StateReader::end() const {
   if (!bytes_.empty()) fail("the state is longer than it should be");
 }
 
-std::filesystem::path state_temporary(const std::filesystem::path& path) { return path.string() + ".new"; }
+std::filesystem::path state_temporary(const std::filesystem::path& path) {
+  return path.string() + ".new";
+}
 
 void write_state(const std::filesystem::path& path, std::span<const std::byte> state) {
   std::array<std::byte, kHeadBytes> head{};
@@ -78,11 +84,14 @@ std::vector<std::byte> read_state(const std::filesystem::path& path) {
   require(file.size() >= head.size(), "the state is cut short");
   file.read_at(0, head);
   require(load<std::uint64_t>(head.data(), 0) == kMagic, "it is no state of a build");
-  require(load<std::uint64_t>(head.data(), 8) == kVersion, "the state is of another version of this program");
-  require(load<std::uint64_t>(head.data(), 16) == file.size() - head.size(), "the state is cut short");
+  require(load<std::uint64_t>(head.data(), 8) == kVersion,
+          "the state is of another version of this program");
+  require(load<std::uint64_t>(head.data(), 16) == file.size() - head.size(),
+          "the state is cut short");
   std::vector<std::byte> state(static_cast<std::size_t>(file.size() - head.size()));
   file.read_at(head.size(), state);
-  require(load<std::uint64_t>(head.data(), 24) == xxh3_64(state, kVersion), "the state's checksum is wrong");
+  require(load<std::uint64_t>(head.data(), 24) == xxh3_64(state, kVersion),
+          "the state's checksum is wrong");
   return state;
 }
 
@@ -99,14 +108,19 @@ FileLock::FileLock(const std::filesystem::path& path) {
     while (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
       if (errno != EINTR) fail("flock");
     }
-    struct stat held {}, named {};
+    struct stat held {
+    }, named{};
     if (::fstat(fd_, &held) != 0) fail("fstat");
     // Who held it before may have renamed or removed it.
-    if (::stat(path.c_str(), &named) == 0 && held.st_dev == named.st_dev && held.st_ino == named.st_ino) return;
+    if (::stat(path.c_str(), &named) == 0 && held.st_dev == named.st_dev &&
+        held.st_ino == named.st_ino)
+      return;
     ::close(fd_);
   }
 }
 
-FileLock::~FileLock() { ::close(fd_); }
+FileLock::~FileLock() {
+  ::close(fd_);
+}
 
 }  // namespace ptc

@@ -29,12 +29,14 @@ class StateWriter {
   std::vector<std::byte> bytes_;
 };
 
-/// Reads what a StateWriter wrote, in the same order. Nothing is read beyond the end, whatever the bytes say.
+/// Reads what a StateWriter wrote, in the same order. Nothing is read beyond the end, whatever the
+/// bytes say.
 class StateReader {
  public:
   /// @param bytes  must outlive this
   /// @param name   of the file, for errors
-  StateReader(std::span<const std::byte> bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
+  StateReader(std::span<const std::byte> bytes, std::string name)
+      : bytes_(bytes), name_(std::move(name)) {}
 
   /// @throws DataError as all of these
   template <class T>
@@ -59,10 +61,11 @@ class StateReader {
   std::string name_;
 };
 
-/// Under which write_state() writes: one that a process which was killed has left is overwritten by the next.
+/// Under which write_state() writes: one that a process which was killed has left is overwritten by
+/// the next.
 [[nodiscard]] std::filesystem::path state_temporary(const std::filesystem::path& path);
-/// Writes a state under a temporary name, syncs it and renames it over the old one: at any moment the one or the
-/// other is there, whole.
+/// Writes a state under a temporary name, syncs it and renames it over the old one: at any moment
+/// the one or the other is there, whole.
 void write_state(const std::filesystem::path& path, std::span<const std::byte> state);
 /// @throws DataError naming the file when it is not what write_state() wrote; std::system_error
 [[nodiscard]] std::vector<std::byte> read_state(const std::filesystem::path& path);

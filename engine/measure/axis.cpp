@@ -1,13 +1,13 @@
 #include "engine/measure/axis.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <string_view>
 #include <utility>
+
+#include <fmt/format.h>
 
 namespace ptc {
 namespace {

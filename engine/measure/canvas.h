@@ -1,12 +1,12 @@
 // What charts are drawn with: shapes and text in units of the SVG, y downwards.
 #pragma once
 
-#include <cairo.h>
-
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
+
+#include <cairo.h>
 
 namespace ptc {
 

@@ -1,10 +1,10 @@
 // Charts as pictures.
 #include "engine/measure/chart.h"
 
-#include <cairo.h>
-
 #include <cmath>
 #include <stdexcept>
+
+#include <cairo.h>
 
 #include "engine/measure/chart_drawing.h"
 #include "engine/measure/chart_layout.h"
@@ -41,11 +41,12 @@ void write_chart(const std::filesystem::path& target, const Chart& chart) {
   }
   const std::vector<SeriesStyle> styles = styles_of(chart);
   const ChartLayout layout = measured_layout(chart, styles);
-  write_picture(target, {.width = layout.width,
-                         .height = layout.height,
-                         .title = chart.title,
-                         .description = description(chart, styles),
-                         .draw = [&](Canvas& canvas) { draw_chart(canvas, chart, layout, styles); }});
+  write_picture(target,
+                {.width = layout.width,
+                 .height = layout.height,
+                 .title = chart.title,
+                 .description = description(chart, styles),
+                 .draw = [&](Canvas& canvas) { draw_chart(canvas, chart, layout, styles); }});
 }
 
 }  // namespace ptc

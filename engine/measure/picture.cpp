@@ -1,16 +1,16 @@
 // Surfaces and files of pictures (engine/measure/picture.h).
 #include "engine/measure/picture.h"
 
-#include <cairo-svg.h>
-#include <cairo.h>
-#include <fmt/format.h>
-
 #include <cmath>
 #include <new>
 #include <span>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
+
+#include <cairo-svg.h>
+#include <cairo.h>
+#include <fmt/format.h>
 
 #include "engine/io/file.h"
 
@@ -58,7 +58,8 @@ std::string without_surface_number(std::string svg) {
 
 std::string svg_of(const Picture& picture) {
   std::string svg;
-  const Surface surface(cairo_svg_surface_create_for_stream(collect, &svg, picture.width, picture.height));
+  const Surface surface(
+      cairo_svg_surface_create_for_stream(collect, &svg, picture.width, picture.height));
   check(cairo_surface_status(surface.get()));
   cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
   {
@@ -70,14 +71,14 @@ std::string svg_of(const Picture& picture) {
   check(cairo_surface_status(surface.get()));
   svg = without_surface_number(std::move(svg));
   const std::size_t root = svg.find('>', svg.find("<svg"));
-  return svg.insert(root + 1, fmt::format("\n<title>{}</title>\n<desc>{}</desc>", escaped(picture.title),
-                                          escaped(picture.description)));
+  return svg.insert(root + 1, fmt::format("\n<title>{}</title>\n<desc>{}</desc>",
+                                          escaped(picture.title), escaped(picture.description)));
 }
 
 std::string png_of(const Picture& picture) {
-  const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24,
-                                                   static_cast<int>(std::lround(picture.width * kPixelsAUnit)),
-                                                   static_cast<int>(std::lround(picture.height * kPixelsAUnit))));
+  const Surface surface(cairo_image_surface_create(
+      CAIRO_FORMAT_RGB24, static_cast<int>(std::lround(picture.width * kPixelsAUnit)),
+      static_cast<int>(std::lround(picture.height * kPixelsAUnit))));
   check(cairo_surface_status(surface.get()));
   Canvas canvas(surface, kPixelsAUnit);
   picture.draw(canvas);

@@ -19,16 +19,18 @@ bool is_double_sided(const Mesh& mesh, std::uint32_t triangle) {
 }
 
 // The surface that a cosine ray from a hit meets.
-std::optional<SurfaceHit> follow(const RayScene& scene, const SurfaceHit& hit, const glm::vec3& normal, std::uint64_t seed) {
+std::optional<SurfaceHit> follow(const RayScene& scene, const SurfaceHit& hit,
+                                 const glm::vec3& normal, std::uint64_t seed) {
   const std::optional<glm::dvec3> origin = step_off(scene, hit.position, normal);
   if (!origin) return std::nullopt;
-  const glm::vec3 direction = Basis(normal).to_world(cosine_direction(SquarePoints(seed).square(0)));
+  const glm::vec3 direction =
+      Basis(normal).to_world(cosine_direction(SquarePoints(seed).square(0)));
   return scene.closest(*origin, direction, 0, std::numeric_limits<double>::infinity());
 }
 
 // Radiance that leaves a hit towards where the ray came from.
-glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const SurfaceHit& hit, const LightPaths& paths,
-                      bool emits, std::uint64_t seed) {
+glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const SurfaceHit& hit,
+                      const LightPaths& paths, bool emits, std::uint64_t seed) {
   if (!hit.front && !is_double_sided(scene.mesh(), hit.triangle)) return glm::vec3(0);
   const glm::vec3 normal = hit.front ? hit.normal : -hit.normal;
   const DirectLight::Result direct = light.irradiance(hit.position, normal, paths.sampling, seed);
@@ -38,7 +40,8 @@ glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const Sur
   const std::uint64_t next_seed = mix_bits(seed);
   if (const auto next = follow(scene, hit, normal, next_seed)) {
     const LightPaths rest{paths.sampling, paths.bounces - 1};
-    radiance += hit.albedo * radiance_of(scene, light, *next, rest, paths.sampling.area_rays == 0, next_seed);
+    radiance += hit.albedo *
+                radiance_of(scene, light, *next, rest, paths.sampling.area_rays == 0, next_seed);
   }
   return radiance;
 }
@@ -46,7 +49,8 @@ glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const Sur
 }  // namespace
 
 RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm::dvec3& position,
-                     const glm::vec3& normal, unsigned rays, const LightPaths& paths, std::uint64_t seed) {
+                     const glm::vec3& normal, unsigned rays, const LightPaths& paths,
+                     std::uint64_t seed) {
   RayTraced result;
   const glm::vec3 unit = glm::normalize(normal);
   if (rays == 0 || !std::isfinite(unit.x + unit.y + unit.z)) return result;
@@ -63,7 +67,8 @@ RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm:
     const auto hit = scene.closest(*origin, direction, 0, std::numeric_limits<double>::infinity());
     if (hit) {
       ++hits;
-      if (paths.bounces > 0) result.irradiance += radiance_of(scene, light, *hit, paths, true, mix_bits(seed) + i);
+      if (paths.bounces > 0)
+        result.irradiance += radiance_of(scene, light, *hit, paths, true, mix_bits(seed) + i);
     } else {
       result.sky += light.rig().sky.at(direction);
     }

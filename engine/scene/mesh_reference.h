@@ -18,14 +18,15 @@ struct RayTraced {
 /// How light gets to what a receiver sees.
 struct LightPaths {
   LightSampling sampling;  ///< of direct light at every hit
-  unsigned bounces = 1;    ///< reflections before the receiver, at most; 0: no light from surfaces, emitted neither
+  unsigned bounces =
+      1;  ///< reflections before the receiver, at most; 0: no light from surfaces, emitted neither
 };
 
 /// Traces `rays` stratified cosine rays from a receiver; radiance at a hit is emission plus
 /// albedo / pi times direct light there (sky included), 0 on a back side unless the material is
-/// double-sided: then the back reflects, and does not emit. Light of further bounces comes along a path
-/// of cosine rays, one a hit; what such a ray meets emits only when `sampling` has no area rays, which
-/// bring that light otherwise. Deterministic in `seed`.
+/// double-sided: then the back reflects, and does not emit. Light of further bounces comes along a
+/// path of cosine rays, one a hit; what such a ray meets emits only when `sampling` has no area
+/// rays, which bring that light otherwise. Deterministic in `seed`.
 /// @param normal  of any length; without a direction there is nothing to see
 [[nodiscard]] RayTraced trace_mesh(const RayScene& scene, const DirectLight& light,
                                    const glm::dvec3& position, const glm::vec3& normal,

@@ -143,7 +143,7 @@ struct RayScene::Impl {
 
   const Mesh& mesh;
   std::atomic<std::int64_t> bytes = 0;  // what Embree holds
-  glm::vec3 middle{0};  // Embree's zero, in the mesh's frame
+  glm::vec3 middle{0};                  // Embree's zero, in the mesh's frame
   glm::dvec3 half_extent{0};
   double epsilon = 0;
   Owned<RTCDevice, rtcReleaseDevice> device;
@@ -246,7 +246,9 @@ glm::vec3 RayScene::Impl::albedo(const Material& material,
 RayScene::RayScene(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
 RayScene::~RayScene() = default;
 
-std::uint64_t RayScene::bytes() const noexcept { return static_cast<std::uint64_t>(impl_->bytes.load()); }
+std::uint64_t RayScene::bytes() const noexcept {
+  return static_cast<std::uint64_t>(impl_->bytes.load());
+}
 
 const Mesh& RayScene::mesh() const noexcept {
   return impl_->mesh;

@@ -30,7 +30,7 @@ constexpr unsigned kPointsPerSurfel = 16;
 constexpr unsigned kRounds = 6;
 constexpr unsigned kLitPoints = 4;    // of a surfel's points, evenly spread
 constexpr double kLeastNormal = 0.1;  // length of a mean normal that means something
-constexpr double kMostAcross = 3e5;  // spacings along the side of a square as large as the mesh
+constexpr double kMostAcross = 3e5;   // spacings along the side of a square as large as the mesh
 
 // What each of some points takes of a number of rays.
 unsigned share(unsigned rays) {
@@ -107,7 +107,8 @@ class MeshSource final : public PointSource {
       : light_(light),
         scene_(scene),
         options_(resolved(scene.mesh(), options)),
-        lit_point_{share(options.lights.sun_rays), share(options.lights.area_rays), share(options.lights.sky_rays)},
+        lit_point_{share(options.lights.sun_rays), share(options.lights.area_rays),
+                   share(options.lights.sky_rays)},
         executor_(executor),
         field_(options_),
         patches_(scene.mesh(), field_, kPatchSurfels) {}
@@ -147,9 +148,11 @@ class MeshSource final : public PointSource {
   [[nodiscard]] std::vector<Group> sum_up(const std::vector<SurfacePoint>& points,
                                           const std::vector<std::uint32_t>& owners,
                                           const std::vector<Cluster>& clusters) const;
-  [[nodiscard]] Surfel place(const Group& group, const SurfacePoint& nearest, const Cluster& cluster) const;
-  [[nodiscard]] std::optional<glm::vec3> reflected(const Group& group, std::span<const SurfacePoint> points,
-                                                   float side, std::uint64_t seed) const;
+  [[nodiscard]] Surfel place(const Group& group, const SurfacePoint& nearest,
+                             const Cluster& cluster) const;
+  [[nodiscard]] std::optional<glm::vec3> reflected(const Group& group,
+                                                   std::span<const SurfacePoint> points, float side,
+                                                   std::uint64_t seed) const;
 
   const DirectLight& light_;
   const RayScene& scene_;
@@ -186,9 +189,10 @@ std::vector<Group> MeshSource::sum_up(const std::vector<SurfacePoint>& points,
   return groups;
 }
 
-// A surfel at the middle of its group, on the triangle of the point nearest to that, across the group's mean normal;
-// away from edges that it sticks out over.
-Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest, const Cluster& cluster) const {
+// A surfel at the middle of its group, on the triangle of the point nearest to that, across the
+// group's mean normal; away from edges that it sticks out over.
+Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest,
+                         const Cluster& cluster) const {
   const Mesh& mesh = scene_.mesh();
   const auto& c = mesh.triangles[nearest.triangle];
   glm::vec2 uv =
@@ -202,12 +206,15 @@ Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest, const 
   surfel.normal = length > kLeastNormal * count ? glm::vec3(group.normal / length) : at.normal;
   surfel.radius = static_cast<float>(std::sqrt(0.5 * group.area));
   surfel.albedo = finite_or_black(glm::vec3(group.albedo / count));
-  surfel.position = at.position + glm::dvec3(move_inwards(scene_, at.position, surfel.normal, surfel.radius));
+  surfel.position =
+      at.position + glm::dvec3(move_inwards(scene_, at.position, surfel.normal, surfel.radius));
   return surfel;
 }
 
-// Light reflected by a group in the mean: by those of a few points that are not buried. Nothing when all are.
-std::optional<glm::vec3> MeshSource::reflected(const Group& group, std::span<const SurfacePoint> points, float side,
+// Light reflected by a group in the mean: by those of a few points that are not buried. Nothing
+// when all are.
+std::optional<glm::vec3> MeshSource::reflected(const Group& group,
+                                               std::span<const SurfacePoint> points, float side,
                                                std::uint64_t seed) const {
   const std::size_t size = group.members.size(), count = std::min<std::size_t>(kLitPoints, size);
   glm::vec3 sum(0);
@@ -217,7 +224,8 @@ std::optional<glm::vec3> MeshSource::reflected(const Group& group, std::span<con
     const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
     const std::uint64_t own_seed = kLitPoints * seed + i;
     if (is_buried(scene_, at.position, side * at.geometric_normal, own_seed)) continue;
-    const DirectLight::Result direct = light_.irradiance(at.position, side * at.normal, lit_point_, own_seed);
+    const DirectLight::Result direct =
+        light_.irradiance(at.position, side * at.normal, lit_point_, own_seed);
     sum += finite_or_black(at.albedo / kPi * (direct.local + direct.sky));
     lit += 1;
   }
@@ -240,10 +248,12 @@ std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
     const double sides = sides_of(scene_.mesh(), nearest.triangle);
     covered += group.area * sides;
     const auto front = reflected(group, patch.points, 1, 2 * (patch.first + i));
-    const auto back = sides == 1 ? std::nullopt : reflected(group, patch.points, -1, 2 * (patch.first + i) + 1);
+    const auto back =
+        sides == 1 ? std::nullopt : reflected(group, patch.points, -1, 2 * (patch.first + i) + 1);
     if (!front && !back) continue;
     Surfel surfel = place(group, nearest, clusters[i]);
-    const glm::vec3 emission = finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
+    const glm::vec3 emission =
+        finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
     surfel.radiance = emission + front.value_or(glm::vec3(0));
     surfels.push_back(surfel);
     if (sides == 1) continue;
@@ -271,7 +281,8 @@ double spacing_for(const Mesh& mesh, std::uint64_t count) {
   return std::sqrt(area / static_cast<double>(count));
 }
 
-std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels, unsigned threads) noexcept {
+std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels,
+                             unsigned threads) noexcept {
   return 24 * std::max(triangles, surfels / 1000) + (std::uint64_t{20} << 20) * threads;
 }
 

@@ -30,13 +30,12 @@ struct SamplingOptions {
 /// Surfels spread evenly over a mesh, lit: radiance = emission + albedo / pi * irradiance.
 ///
 /// Each surfel stands for a compact patch of surface of about spacing^2: the patches are Voronoi
-/// cells whose middles are nearly regular, whatever the tessellation (see clusters.h). It lies on the
-/// mesh at the patch's middle, across the patch's mean normal, moved inwards in its plane where it
-/// would stick out over an edge (see surroundings.h); albedo, emission and light are the patch's mean.
-/// Sum of 2 r^2 equals the mesh's area, less what is left out: patches all of which is buried in solids.
-/// Double-sided materials give two surfels back to back. Deterministic for any thread count. The
-/// order is that of the Z-curve, roughly.
-/// Memory: sampling_bytes().
+/// cells whose middles are nearly regular, whatever the tessellation (see clusters.h). It lies on
+/// the mesh at the patch's middle, across the patch's mean normal, moved inwards in its plane where
+/// it would stick out over an edge (see surroundings.h); albedo, emission and light are the patch's
+/// mean. Sum of 2 r^2 equals the mesh's area, less what is left out: patches all of which is buried
+/// in solids. Double-sided materials give two surfels back to back. Deterministic for any thread
+/// count. The order is that of the Z-curve, roughly. Memory: sampling_bytes().
 /// @param light, scene, executor  must outlive the source
 /// @throws std::invalid_argument when count, spacing or a camera's number makes no sense, or there
 ///         would be more than 9 * 10^10 surfels
@@ -44,8 +43,9 @@ struct SamplingOptions {
                                                        const RayScene& scene,
                                                        const SamplingOptions& options,
                                                        const Executor& executor);
-/// What sampling takes besides the mesh: 24 bytes a triangle or a thousandth of the surfels, and 20 MB
-/// a thread.
-[[nodiscard]] std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels, unsigned threads) noexcept;
+/// What sampling takes besides the mesh: 24 bytes a triangle or a thousandth of the surfels, and 20
+/// MB a thread.
+[[nodiscard]] std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels,
+                                           unsigned threads) noexcept;
 
 }  // namespace ptc

@@ -24,13 +24,15 @@ std::vector<Surfel> load_surfels(const ContainerReader& container, std::uint64_t
   return surfels;
 }
 
-void append_surfels(const ContainerReader& container, std::span<const std::uint32_t> pages, std::vector<Surfel>& surfels) {
+void append_surfels(const ContainerReader& container, std::span<const std::uint32_t> pages,
+                    std::vector<Surfel>& surfels) {
   std::vector<std::byte> payload(container.page_payload_limit());
   PageDecoder decoder;
   for (const std::uint32_t page : pages) {
     const PageHeader header = container.read_page(page, payload, decoder);
     const PointPage points(payload.data(), header.record_count);
-    for (std::uint32_t i = 0; i < points.size(); ++i) surfels.push_back(to_surfel(points[i], container.header().frame));
+    for (std::uint32_t i = 0; i < points.size(); ++i)
+      surfels.push_back(to_surfel(points[i], container.header().frame));
   }
 }
 

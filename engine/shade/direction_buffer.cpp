@@ -14,7 +14,9 @@ namespace {
 constexpr float kPi = 3.14159265F;
 
 /// Solid angle of the part of a cube face below and left of (u, v), up to a constant.
-double corner_solid_angle(double u, double v) { return std::atan2(u * v, std::sqrt(u * u + v * v + 1)); }
+double corner_solid_angle(double u, double v) {
+  return std::atan2(u * v, std::sqrt(u * u + v * v + 1));
+}
 
 /// A rotation far from every symmetry of the axes; other variants turn on about a fixed axis by the
 /// golden angle, which comes near no multiple of a quarter soon.
@@ -45,20 +47,23 @@ FaceRows rows_over(const CubeGeometry& cube, const Horizon& horizon) {
 
 }  // namespace
 
-DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
+DirectionGrid::DirectionGrid(unsigned resolution,
+                             const std::function<glm::vec3(const glm::vec3&)>& sky,
                              unsigned variant)
     : variant_(variant) {
   if (resolution == 0 || resolution > kMostResolution || resolution % 16 != 0) {
     throw std::invalid_argument("DirectionGrid: the resolution is 16, 32, 48 or 64");
   }
   const double step = 2.0 / resolution;
-  for (unsigned i = 0; i < resolution; ++i) centre_.push_back(static_cast<float>((i + 0.5) * step - 1));
+  for (unsigned i = 0; i < resolution; ++i)
+    centre_.push_back(static_cast<float>((i + 0.5) * step - 1));
   centre_.resize(resolution + DiscQueue::kReadLanes, std::numeric_limits<float>::quiet_NaN());
   for (unsigned y = 0; y < resolution; ++y) {
     for (unsigned x = 0; x < resolution; ++x) {
       const double u = x * step - 1, v = y * step - 1;
       const double solid_angle = corner_solid_angle(u, v) - corner_solid_angle(u + step, v) -
-                                 corner_solid_angle(u, v + step) + corner_solid_angle(u + step, v + step);
+                                 corner_solid_angle(u, v + step) +
+                                 corner_solid_angle(u + step, v + step);
       const float length = std::sqrt(1 + centre_[x] * centre_[x] + centre_[y] * centre_[y]);
       inverse_length_.push_back(1 / length);
       weight_.push_back(static_cast<float>(solid_angle) / length);
@@ -68,7 +73,8 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
   edge_v_.resize(weight_.size());
   for (std::size_t at = 0; at < weight_.size(); ++at) {
     if ((at + 1) % resolution != 0) edge_u_[at] = 0.5F * (weight_[at] + weight_[at + 1]);
-    if (at + resolution < weight_.size()) edge_v_[at] = 0.5F * (weight_[at] + weight_[at + resolution]);
+    if (at + resolution < weight_.size())
+      edge_v_[at] = 0.5F * (weight_[at] + weight_[at + resolution]);
   }
   geometry_ = {.centre = centre_.data(),
                .inverse_length = inverse_length_.data(),
@@ -94,7 +100,8 @@ DirectionGrid::DirectionGrid(unsigned resolution, const std::function<glm::vec3(
         direction[a.v] = centre_[pixel / resolution] + (sub / 2 == 0 ? -shift : shift);
         sum += sky(glm::normalize(to_world * direction));
       }
-      for (int c = 0; c < 3; ++c) sky_[static_cast<std::size_t>(3 * face + c) * plane + pixel] = sum[c] * 0.25F;
+      for (int c = 0; c < 3; ++c)
+        sky_[static_cast<std::size_t>(3 * face + c) * plane + pixel] = sum[c] * 0.25F;
     }
   }
 }
@@ -113,10 +120,10 @@ void DirectionBuffer::copy(const DirectionBuffer& other) noexcept {
   std::ranges::copy(other.rgbe_, rgbe_.begin());
 }
 
-void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides, unsigned viewpoint,
-                           const Horizon& horizon) noexcept {
-  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, rows_over(grid.geometry_, horizon), discs, sides,
-             viewpoint);
+void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides,
+                           unsigned viewpoint, const Horizon& horizon) noexcept {
+  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, rows_over(grid.geometry_, horizon),
+             discs, sides, viewpoint);
 }
 
 Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
@@ -128,8 +135,9 @@ Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& nor
     for (int k = 0; k < 3; ++k) turned.axis[k][i] = offset[k];
   }
   PixelSums sums;
-  sum_pixels(grid.geometry_, {nearness_.data(), rgbe_.data()}, grid.sky_.empty() ? nullptr : grid.sky_.data(),
-             rotation * normal, offsets.empty() ? nullptr : &turned, sums);
+  sum_pixels(grid.geometry_, {nearness_.data(), rgbe_.data()},
+             grid.sky_.empty() ? nullptr : grid.sky_.data(), rotation * normal,
+             offsets.empty() ? nullptr : &turned, sums);
   Shading shading;
   shading.occlusion = sums.covered / sums.total;
   shading.irradiance = sums.light * (kPi / sums.total);

@@ -22,11 +22,14 @@ class DirectionGrid {
   /// @param resolution  pixels along a cube edge, a multiple of 16, at most 64
   /// @throws std::invalid_argument at another resolution
   /// @param sky  radiance from a direction (unit, away from the receiver), or empty: no sky
-  DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky, unsigned variant = 0);
+  DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
+                unsigned variant = 0);
   DirectionGrid(const DirectionGrid&) = delete;
   DirectionGrid& operator=(const DirectionGrid&) = delete;
 
-  [[nodiscard]] unsigned resolution() const noexcept { return static_cast<unsigned>(geometry_.resolution); }
+  [[nodiscard]] unsigned resolution() const noexcept {
+    return static_cast<unsigned>(geometry_.resolution);
+  }
   [[nodiscard]] unsigned variant() const noexcept { return variant_; }
   /// From the world to the axes of the cube.
   [[nodiscard]] const glm::mat3& rotation() const noexcept { return geometry_.rotation; }
@@ -34,19 +37,20 @@ class DirectionGrid {
  private:
   friend class DirectionBuffer;
   unsigned variant_;
-  std::vector<float> centre_;  // resolution: pixel centres in [-1, 1]
+  std::vector<float> centre_;          // resolution: pixel centres in [-1, 1]
   std::vector<float> inverse_length_;  // resolution^2: 1 / |(1, u, v)|
-  std::vector<float> weight_;  // resolution^2: solid angle / length
-  std::vector<float> edge_u_;  // as CubeGeometry has them
+  std::vector<float> weight_;          // resolution^2: solid angle / length
+  std::vector<float> edge_u_;          // as CubeGeometry has them
   std::vector<float> edge_v_;
-  std::vector<float> sky_;     // by face: planes of red, green, blue; or empty
-  CubeGeometry geometry_;      // of the above, and the rotation
+  std::vector<float> sky_;  // by face: planes of red, green, blue; or empty
+  CubeGeometry geometry_;   // of the above, and the rotation
 };
 
 /// Directions over the horizon of some normal of a cone.
 struct Horizon {
   glm::vec3 axis{0};  ///< unit
-  float cone_sin = 2; ///< sine of the cone's half angle, which is below a right one; above 1: every direction
+  float cone_sin =
+      2;  ///< sine of the cone's half angle, which is below a right one; above 1: every direction
 };
 
 /// Nearest coverer of every direction pixel and its RGBE colour.
@@ -72,7 +76,7 @@ class DirectionBuffer {
                                 std::span<const glm::vec3> offsets = {}) const noexcept;
 
  private:
-  std::vector<float> nearness_;  // CubePixels
+  std::vector<float> nearness_;      // CubePixels
   std::vector<std::uint32_t> rgbe_;  // empty without colours
 };
 

@@ -12,15 +12,18 @@
 namespace ptc {
 
 /// The geometry of a cube of direction pixels. Faces: 0 +x  1 -x  2 +y  3 -y  4 +z  5 -z; w points
-/// through a face, u runs along its rows and v along its columns, the axes that follow w cyclically.
+/// through a face, u runs along its rows and v along its columns, the axes that follow w
+/// cyclically.
 struct CubeGeometry {
-  const float* centre;    ///< resolution: pixel centres in [-1, 1]; then DiscQueue::kReadLanes times NaN
+  const float*
+      centre;  ///< resolution: pixel centres in [-1, 1]; then DiscQueue::kReadLanes times NaN
   const float* inverse_length;  ///< resolution^2: 1 / |(1, u, v)|
-  const float* weight;    ///< resolution^2: solid angle over length
-  const float* edge_u;    ///< resolution^2: mean weight of a pixel and the next in its row, 0 for the last
-  const float* edge_v;    ///< resolution^2: mean weight of a pixel and the one in the next row
-  int resolution;         ///< a multiple of 16, at most 64
-  glm::mat3 rotation;     ///< from the world to the cube's axes
+  const float* weight;          ///< resolution^2: solid angle over length
+  const float*
+      edge_u;  ///< resolution^2: mean weight of a pixel and the next in its row, 0 for the last
+  const float* edge_v;  ///< resolution^2: mean weight of a pixel and the one in the next row
+  int resolution;       ///< a multiple of 16, at most 64
+  glm::mat3 rotation;   ///< from the world to the cube's axes
 };
 
 inline constexpr int kMostResolution = 64;
@@ -30,10 +33,12 @@ struct CubeFace {
   int w, u, v;
   float sign;  ///< of the face along w
 
-  constexpr explicit CubeFace(int face) : w(face / 2), u((w + 1) % 3), v((w + 2) % 3), sign(face % 2 == 0 ? 1.0F : -1.0F) {}
+  constexpr explicit CubeFace(int face)
+      : w(face / 2), u((w + 1) % 3), v((w + 2) % 3), sign(face % 2 == 0 ? 1.0F : -1.0F) {}
 };
 
-/// What covers each pixel, by face, row and column. Up to 4 rows past the last are read, and written as they are.
+/// What covers each pixel, by face, row and column. Up to 4 rows past the last are read, and
+/// written as they are.
 struct CubePixels {
   /// 1 / t, t along the ray (1, u, v) of the pixel; 0 where nothing covers. The lowest 4 bits say
   /// which viewpoint it was drawn from.
@@ -50,7 +55,8 @@ struct PixelView {
 /// Viewpoints whose pixels one cube may hold.
 inline constexpr int kViewpoints = 16;
 
-/// Where the receiver lies relative to each viewpoint, in the axes of the cube; 0 where they are the same.
+/// Where the receiver lies relative to each viewpoint, in the axes of the cube; 0 where they are
+/// the same.
 struct ViewOffsets {
   float axis[3][kViewpoints];
 };
@@ -65,23 +71,24 @@ struct FaceRows {
 /// colour stays, so the order of drawing does not matter.
 /// @param rows       others may be left as they are
 /// @param viewpoint  what the discs are relative to, below kViewpoints
-void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const DiscQueue& discs,
-                Sides sides, unsigned viewpoint);
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
+                const DiscQueue& discs, Sides sides, unsigned viewpoint);
 
 /// Sums over the pixels above the horizon.
 struct PixelSums {
-  float total = 0;       ///< of weights
+  float total = 0;  ///< of weights
   float covered = 0;
-  glm::vec3 light{0};    ///< of weight times colour
-  glm::vec3 sky{0};      ///< of weight times sky where uncovered
-  glm::vec3 open{0};     ///< of weight times direction, in the axes of the cube, where uncovered
+  glm::vec3 light{0};  ///< of weight times colour
+  glm::vec3 sky{0};    ///< of weight times sky where uncovered
+  glm::vec3 open{0};   ///< of weight times direction, in the axes of the cube, where uncovered
 };
 
 /// @param sky      of each face 3 planes of resolution^2, or null
 /// @param normal   the receiver's, in the axes of the cube
-/// @param offsets  moves what was drawn from other viewpoints, to first order: where the nearer of two
+/// @param offsets  moves what was drawn from other viewpoints, to first order: where the nearer of
+/// two
 ///                 neighbouring pixels grows over the other, light follows. Null: nothing moves
-void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky, const glm::vec3& normal,
-                const ViewOffsets* offsets, PixelSums& sums);
+void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
+                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums);
 
 }  // namespace ptc

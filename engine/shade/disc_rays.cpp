@@ -1,11 +1,10 @@
 // Embree rays at oriented discs (engine/shade/brute_force.h).
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
+#include <embree3/rtcore.h>
 #include <glm/geometric.hpp>
 
 #include "engine/shade/brute_force.h"
@@ -54,7 +53,9 @@ struct DiscRays::Impl {
     if (device) rtcReleaseDevice(device);
   }
 
-  [[nodiscard]] glm::vec3 centre(unsigned i) const { return glm::vec3(surfels[i].position - origin); }
+  [[nodiscard]] glm::vec3 centre(unsigned i) const {
+    return glm::vec3(surfels[i].position - origin);
+  }
 
   /// One candidate of one ray: whether the disc stops it, and which of overlapping discs wins.
   static void filter(const RTCFilterFunctionNArguments* args) {
@@ -66,7 +67,8 @@ struct DiscRays::Impl {
     const glm::vec3 from(ray.org_x, ray.org_y, ray.org_z), along(ray.dir_x, ray.dir_y, ray.dir_z);
     const glm::vec3 to = context.discs->centre(hit.primID) - from;
     const bool back = glm::dot(to, disc.normal) >= 0;
-    if (back && (context.discs->sides == Sides::front || glm::dot(to, to) < 4 * disc.radius * disc.radius)) {
+    if (back && (context.discs->sides == Sides::front ||
+                 glm::dot(to, to) < 4 * disc.radius * disc.radius)) {
       args->valid[0] = 0;
       return;
     }
@@ -80,7 +82,8 @@ struct DiscRays::Impl {
     args->valid[0] = 0;
   }
 
-  [[nodiscard]] static RTCRayHit make_ray(const glm::vec3& from, const glm::vec3& along, float near, float far) {
+  [[nodiscard]] static RTCRayHit make_ray(const glm::vec3& from, const glm::vec3& along, float near,
+                                          float far) {
     RTCRayHit ray{};
     ray.ray.org_x = from.x;
     ray.ray.org_y = from.y;
@@ -121,7 +124,8 @@ struct DiscRays::Impl {
   }
 };
 
-DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides, std::function<glm::vec3(const glm::vec3&)> sky,
+DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
+                   std::function<glm::vec3(const glm::vec3&)> sky,
                    const std::optional<glm::dvec3>& origin)
     : impl_(std::make_unique<Impl>()) {
   impl_->surfels = surfels;
@@ -134,10 +138,10 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides, std::function<g
   if (!impl_->device) throw std::runtime_error("Embree: no device");
   impl_->scene = rtcNewScene(impl_->device);
   RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                                               RTC_FORMAT_FLOAT4, 16, surfels.size()));
-  auto* normals = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_NORMAL, 0,
-                                                              RTC_FORMAT_FLOAT3, 12, surfels.size()));
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 16, surfels.size()));
+  auto* normals = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_NORMAL, 0, RTC_FORMAT_FLOAT3, 12, surfels.size()));
   if (surfels.size() > 0 && (!vertices || !normals)) throw std::bad_alloc();
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     const glm::vec3 c = impl_->centre(static_cast<unsigned>(i));
@@ -162,7 +166,8 @@ namespace {
 /// @param side  of the square
 template <class Body>
 void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const Body& body) {
-  const glm::vec3 tangent = glm::normalize(glm::cross(n, std::abs(n.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
+  const glm::vec3 tangent =
+      glm::normalize(glm::cross(n, std::abs(n.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
   const glm::vec3 bitangent = glm::cross(n, tangent);
   Uniform uniform(seed);
   for (unsigned j = 0; j < side; ++j) {
@@ -170,13 +175,16 @@ void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const B
       const float u = (static_cast<float>(i) + uniform()) / static_cast<float>(side);
       const float angle = 2 * kPi * (static_cast<float>(j) + uniform()) / static_cast<float>(side);
       const float sine = std::sqrt(u);
-      body(std::size_t{j} * side + i, tangent * (sine * std::cos(angle)) + bitangent * (sine * std::sin(angle)) +
+      body(std::size_t{j} * side + i, tangent * (sine * std::cos(angle)) +
+                                          bitangent * (sine * std::sin(angle)) +
                                           n * std::sqrt(std::max(0.0F, 1 - u)));
     }
   }
 }
 
-unsigned side_of(std::size_t rays) { return static_cast<unsigned>(std::sqrt(static_cast<double>(rays))); }
+unsigned side_of(std::size_t rays) {
+  return static_cast<unsigned>(std::sqrt(static_cast<double>(rays)));
+}
 
 }  // namespace
 

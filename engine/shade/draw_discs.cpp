@@ -21,15 +21,16 @@ constexpr float kSlack = 1e-3F;  // pixels: rounding of a disc's bounds
 constexpr int kChunk = 64;       // discs that are sorted by face at once
 
 /// Discs on one face of the cube, set up for their pixels. A pixel at (du, dv) from the projected
-/// centre sees the disc's plane at t = cw / w, w = 1 + alpha du + beta dv, and the disc itself where
+/// centre sees the disc's plane at t = cw / w, w = 1 + alpha du + beta dv, and the disc itself
+/// where
 ///   aa du^2 + 2 ab du dv + bb dv^2 < (radius / cw)^2 w^2.
 struct FaceDiscs {
   alignas(64) float u0[kLanes], v0[kLanes];
   float aa[kLanes], ab2[kLanes], bb[kLanes];
   float alpha[kLanes], beta[kLanes];
-  float square[kLanes];    // (radius / cw)^2
-  float inverse[kLanes];   // 1 / cw
-  float bump[kLanes];      // nearness lost per unit of the quadratic form
+  float square[kLanes];   // (radius / cw)^2
+  float inverse[kLanes];  // 1 / cw
+  float bump[kLanes];     // nearness lost per unit of the quadratic form
   std::int32_t x0[kLanes], x1[kLanes], y0[kLanes], y1[kLanes];
   std::int32_t first[kLanes];  // pixel of the face
 };
@@ -60,17 +61,20 @@ struct FaceDisc {
     const F f;
     const float dv = v - v0;
     const auto du = hn::Sub(u, u0);
-    const auto form = hn::MulAdd(hn::MulAdd(aa, du, hn::Set(f, ab2 * dv)), du, hn::Set(f, bb * dv * dv));
+    const auto form =
+        hn::MulAdd(hn::MulAdd(aa, du, hn::Set(f, ab2 * dv)), du, hn::Set(f, bb * dv * dv));
     const auto w = hn::MulAdd(alpha, du, hn::Set(f, 1 + beta * dv));
-    const auto near = hn::NegMulAdd(form, bump, hn::Mul(w, inverse));  // below 0 behind the receiver
+    const auto near =
+        hn::NegMulAdd(form, bump, hn::Mul(w, inverse));  // below 0 behind the receiver
     canvas.cover(at, near, hn::Lt(form, hn::Mul(square, hn::Mul(w, w))), colour);
   }
 };
 
-/// Draws a disc that reaches into one vector of each of so many rows at most. The rows that it does not reach
-/// are drawn too, without a branch; past the face, centres are NaN and nothing is inside.
+/// Draws a disc that reaches into one vector of each of so many rows at most. The rows that it does
+/// not reach are drawn too, without a branch; past the face, centres are NaN and nothing is inside.
 template <int kRows, class CanvasType>
-HWY_INLINE void draw_narrow(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i, std::uint32_t rgbe) {
+HWY_INLINE void draw_narrow(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i,
+                            std::uint32_t rgbe) {
   const FaceDisc disc(discs, i, rgbe);
   const float* centre = canvas.cube.centre;
   const std::ptrdiff_t first = discs.first[i] + discs.y0[i] * canvas.cube.resolution + discs.x0[i];
@@ -82,21 +86,23 @@ HWY_INLINE void draw_narrow(const CanvasType& canvas, const FaceDiscs& discs, st
 
 /// Draws a disc of any size.
 template <class CanvasType>
-HWY_INLINE void draw_broad(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i, std::uint32_t rgbe) {
+HWY_INLINE void draw_broad(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i,
+                           std::uint32_t rgbe) {
   const FaceDisc disc(discs, i, rgbe);
   const float* centre = canvas.cube.centre;
   const int lanes = static_cast<int>(hn::Lanes(F())), x1 = discs.x1[i], y1 = discs.y1[i];
   std::ptrdiff_t row = discs.first[i] + discs.y0[i] * canvas.cube.resolution;
   for (int y = discs.y0[i]; y < y1; ++y, row += canvas.cube.resolution) {
-    for (int x = discs.x0[i]; x < x1; x += lanes) disc.draw(canvas, hn::LoadU(F(), centre + x), centre[y], row + x);
+    for (int x = discs.x0[i]; x < x1; x += lanes)
+      disc.draw(canvas, hn::LoadU(F(), centre + x), centre[y], row + x);
   }
 }
 
 /// Discs in the axes of the cube, a lane each.
 struct CubeLanes {
-  VF c[3], n[3];   // centre, normal
+  VF c[3], n[3];  // centre, normal
   VF radius, radius2;
-  VF height;       // c . n
+  VF height;  // c . n
 };
 
 /// Discs in the axes of the faces that their centres lie before, a lane each.
@@ -109,7 +115,8 @@ struct FaceLanes {
 struct FaceQueue {
   static constexpr int kCapacity = 3 * kChunk + kLanes;  // a disc is before three faces at most
   alignas(64) float cw[kCapacity];
-  float cu[kCapacity], cv[kCapacity], nw[kCapacity], nu[kCapacity], nv[kCapacity], radius[kCapacity];
+  float cu[kCapacity], cv[kCapacity], nw[kCapacity], nu[kCapacity], nv[kCapacity],
+      radius[kCapacity];
   std::uint32_t rgbe[kCapacity];
   std::int32_t face[kCapacity];
   std::size_t size = 0;
@@ -121,8 +128,10 @@ HWY_INLINE VF dot(const VF (&a)[3], const VF (&b)[3]) {
 
 HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs, int begin) {
   const F f;
-  const VF c[3] = {hn::LoadU(f, discs.x + begin), hn::LoadU(f, discs.y + begin), hn::LoadU(f, discs.z + begin)};
-  const VF n[3] = {hn::LoadU(f, discs.nx + begin), hn::LoadU(f, discs.ny + begin), hn::LoadU(f, discs.nz + begin)};
+  const VF c[3] = {hn::LoadU(f, discs.x + begin), hn::LoadU(f, discs.y + begin),
+                   hn::LoadU(f, discs.z + begin)};
+  const VF n[3] = {hn::LoadU(f, discs.nx + begin), hn::LoadU(f, discs.ny + begin),
+                   hn::LoadU(f, discs.nz + begin)};
   CubeLanes turned;
   for (int k = 0; k < 3; ++k) {
     const glm::mat3& m = cube.rotation;
@@ -137,7 +146,8 @@ HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs
 }
 
 template <class CanvasType>
-HWY_INLINE void draw_wide_discs(const CanvasType& canvas, const FaceRows& rows, const CubeLanes& discs, MF mask, VU colour) {
+HWY_INLINE void draw_wide_discs(const CanvasType& canvas, const FaceRows& rows,
+                                const CubeLanes& discs, MF mask, VU colour) {
   const F f;
   alignas(64) float c[3][kLanes], n[3][kLanes], radius[kLanes];
   alignas(64) std::uint32_t colours[kLanes];
@@ -149,7 +159,8 @@ HWY_INLINE void draw_wide_discs(const CanvasType& canvas, const FaceRows& rows, 
   hn::StoreU(discs.radius, f, radius);
   for (unsigned rest = bits_of(f, mask); rest != 0; rest &= rest - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(rest));
-    draw_wide_disc(canvas, rows, {c[0][i], c[1][i], c[2][i]}, {n[0][i], n[1][i], n[2][i]}, radius[i], colours[i]);
+    draw_wide_disc(canvas, rows, {c[0][i], c[1][i], c[2][i]}, {n[0][i], n[1][i], n[2][i]},
+                   radius[i], colours[i]);
   }
 }
 
@@ -174,7 +185,8 @@ struct FaceBounds {
 };
 
 /// @param first_row, end_row  of the pixels that matter
-HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I> first_row, hn::VFromD<I> end_row) {
+HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I> first_row,
+                                hn::VFromD<I> end_row) {
   const F f;
   const I i;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
@@ -186,7 +198,8 @@ HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I
   const float edge = static_cast<float>(resolution);
   const auto scale = hn::Set(f, 0.5F * edge);
   const auto pixel = [&](VF at, float slack) {
-    return hn::Min(hn::Max(hn::MulAdd(at, scale, hn::Set(f, 0.5F * edge + slack)), zero), hn::Set(f, edge));
+    return hn::Min(hn::Max(hn::MulAdd(at, scale, hn::Set(f, 0.5F * edge + slack)), zero),
+                   hn::Set(f, edge));
   };
   // The span of pixels whose centres lie within middle -+ half.
   const auto span = [&](VF cx, VF nx, VF ny, hn::VFromD<I>& first, hn::VFromD<I>& end) {
@@ -196,7 +209,8 @@ HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I
     s = hn::NegMulAdd(cross, cross, s);
     s = hn::NegMulAdd(d.radius2, hn::Mul(ny, ny), s);
     const auto middle = hn::IfThenZeroElse(whole, hn::Mul(q, per_p));
-    const auto half = hn::IfThenElse(whole, one, hn::Mul(hn::Mul(d.radius, hn::Sqrt(hn::Max(s, zero))), per_p));
+    const auto half =
+        hn::IfThenElse(whole, one, hn::Mul(hn::Mul(d.radius, hn::Sqrt(hn::Max(s, zero))), per_p));
     first = hn::ConvertTo(i, hn::Ceil(pixel(hn::Sub(middle, half), -0.5F - kSlack)));
     end = hn::ConvertTo(i, hn::Floor(pixel(hn::Add(middle, half), 0.5F + kSlack)));
   };
@@ -236,15 +250,17 @@ HWY_INLINE void store_forms(const FaceLanes& d, VF per_height, FaceDiscs& out) {
   hn::StoreU(hn::Div(hn::Set(f, kBump), hn::Mul(d.radius, hn::Sqrt(length2))), f, out.bump);
 }
 
-/// Appends discs to the faces that may see them, each across every axis on the side where its centre is. A
-/// disc seen under less than 30 degrees reaches no face whose side its centre is not on.
+/// Appends discs to the faces that may see them, each across every axis on the side where its
+/// centre is. A disc seen under less than 30 degrees reaches no face whose side its centre is not
+/// on.
 HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQueue& out) {
   const F f;
   const I i;
   const U u32;
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    const auto cw = hn::Abs(discs.c[axis]), far = hn::Add(cw, discs.radius);  // no sphere around the disc reaches beyond
+    const auto cw = hn::Abs(discs.c[axis]),
+               far = hn::Add(cw, discs.radius);  // no sphere around the disc reaches beyond
     const auto reaches = [&](VF c) { return hn::Lt(hn::Sub(hn::Abs(c), discs.radius), far); };
     const auto seen = hn::And(mask, hn::And(reaches(discs.c[u]), reaches(discs.c[v])));
     const auto negative = hn::Lt(discs.c[axis], hn::Zero(f));
@@ -256,18 +272,21 @@ HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQue
     append(discs.n[u], seen, f, out.nu + at);
     append(discs.n[v], seen, f, out.nv + at);
     append(discs.radius, seen, f, out.radius + at);
-    const auto face = hn::IfThenElse(hn::RebindMask(i, negative), hn::Set(i, 2 * axis + 1), hn::Set(i, 2 * axis));
+    const auto face =
+        hn::IfThenElse(hn::RebindMask(i, negative), hn::Set(i, 2 * axis + 1), hn::Set(i, 2 * axis));
     append(face, hn::RebindMask(i, seen), i, out.face + at);
     out.size += append(colour, hn::RebindMask(u32, seen), u32, out.rgbe + at);
   }
 }
 
-/// Discs that cross a face's plane beside their centres: set up for that face, they would lose their figures in
-/// divisions by next to nothing.
+/// Discs that cross a face's plane beside their centres: set up for that face, they would lose
+/// their figures in divisions by next to nothing.
 HWY_INLINE MF across_faces(const CubeLanes& discs, VF distance2) {
   const F f;
-  const auto beside = hn::Min(hn::Abs(discs.c[0]), hn::Min(hn::Abs(discs.c[1]), hn::Abs(discs.c[2])));
-  return hn::And(hn::Lt(beside, hn::Mul(hn::Set(f, 0.05F), discs.radius)), hn::Lt(distance2, hn::Mul(hn::Set(f, 9.0F), discs.radius2)));
+  const auto beside =
+      hn::Min(hn::Abs(discs.c[0]), hn::Min(hn::Abs(discs.c[1]), hn::Abs(discs.c[2])));
+  return hn::And(hn::Lt(beside, hn::Mul(hn::Set(f, 0.05F), discs.radius)),
+                 hn::Lt(distance2, hn::Mul(hn::Set(f, 9.0F), discs.radius2)));
 }
 
 /// Draws the discs of a queue.
@@ -281,11 +300,11 @@ HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const
     const auto load = [&](const float* column) { return hn::LoadU(f, column + begin); };
     const auto radius = load(queue.radius);
     const FaceLanes d{load(queue.cw), load(queue.cu), load(queue.cv), load(queue.nw),
-                      load(queue.nu), load(queue.nv), radius, hn::Mul(radius, radius)};
+                      load(queue.nu), load(queue.nv), radius,         hn::Mul(radius, radius)};
     auto mask = hn::FirstN(f, queue.size - begin);
     const auto face = hn::IfThenElseZero(hn::RebindMask(i, mask), hn::LoadU(i, queue.face + begin));
-    const FaceBounds bounds =
-        bounds_of(d, cube.resolution, hn::GatherIndex(i, rows.first, face), hn::GatherIndex(i, rows.end, face));
+    const FaceBounds bounds = bounds_of(d, cube.resolution, hn::GatherIndex(i, rows.first, face),
+                                        hn::GatherIndex(i, rows.end, face));
     mask = hn::And(mask, bounds.seen);
     if (hn::AllFalse(f, mask)) continue;
     const auto height = hn::MulAdd(d.cw, d.nw, hn::MulAdd(d.cu, d.nu, hn::Mul(d.cv, d.nv)));
@@ -299,11 +318,14 @@ HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const
         body(k, rgbe[k]);
       }
     };
-    // One by one their numbers of rows cannot be foretold, and a branch mistaken costs as much as two rows.
-    const auto two = hn::And(mask, bounds.within(2)), four = hn::AndNot(two, hn::And(mask, bounds.within(4)));
+    // One by one their numbers of rows cannot be foretold, and a branch mistaken costs as much as
+    // two rows.
+    const auto two = hn::And(mask, bounds.within(2)),
+               four = hn::AndNot(two, hn::And(mask, bounds.within(4)));
     for_each(two, [&](std::size_t k, std::uint32_t c) { draw_narrow<2>(canvas, set, k, c); });
     for_each(four, [&](std::size_t k, std::uint32_t c) { draw_narrow<4>(canvas, set, k, c); });
-    for_each(hn::AndNot(hn::Or(two, four), mask), [&](std::size_t k, std::uint32_t c) { draw_broad(canvas, set, k, c); });
+    for_each(hn::AndNot(hn::Or(two, four), mask),
+             [&](std::size_t k, std::uint32_t c) { draw_broad(canvas, set, k, c); });
   }
 }
 
@@ -320,10 +342,12 @@ void draw_all(const CanvasType& canvas, const FaceRows& rows, const DiscQueue& d
       const auto back = hn::Ge(d.height, hn::Zero(f));
       const auto distance2 = dot(d.c, d.c);
       const auto close = hn::Lt(distance2, hn::Mul(hn::Set(f, 4.0F), d.radius2));
-      auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)), hn::Gt(d.radius, hn::Zero(f)));
+      auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)),
+                           hn::Gt(d.radius, hn::Zero(f)));
       // Backs are clear to receivers within two radii.
       drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, close), drawn);
-      const auto colour = hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin));
+      const auto colour =
+          hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin));
       const auto wide = hn::And(drawn, hn::Or(close, across_faces(d, distance2)));
       if (!hn::AllFalse(f, wide)) draw_wide_discs(canvas, rows, d, wide, colour);
       add_to_faces(d, hn::AndNot(wide, drawn), colour, queue);
@@ -334,8 +358,8 @@ void draw_all(const CanvasType& canvas, const FaceRows& rows, const DiscQueue& d
 
 }  // namespace
 
-void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const DiscQueue& discs,
-                Sides sides, unsigned viewpoint) {
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
+                const DiscQueue& discs, Sides sides, unsigned viewpoint) {
   if (pixels.rgbe) {
     draw_all(Canvas<true>(cube, pixels, viewpoint), rows, discs, sides);
   } else {
@@ -351,8 +375,8 @@ namespace ptc {
 
 HWY_EXPORT(draw_discs);
 
-void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows, const DiscQueue& discs,
-                Sides sides, unsigned viewpoint) {
+void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
+                const DiscQueue& discs, Sides sides, unsigned viewpoint) {
   HWY_DYNAMIC_DISPATCH(draw_discs)(cube, pixels, rows, discs, sides, viewpoint);
 }
 

@@ -32,14 +32,18 @@ struct Gather::Impl {
   std::vector<PlacedReceiver> receivers;
   std::span<Shading> results;
   std::vector<std::unique_ptr<Level>> levels;  // by depth, made when first needed
-  std::vector<ClusterPayload> payloads;        // of the clusters that the current cells left, outer cells first
+  std::vector<ClusterPayload>
+      payloads;  // of the clusters that the current cells left, outer cells first
   std::vector<ChildRef> stack;
   std::vector<std::uint32_t> opened;
   DirectionBuffer empty, leaf;
   DiscQueue queue;
 
   Impl(const SceneView& view, PageCache& cache, const GatherOptions& o)
-      : scene(view, cache), options(o), empty(o.resolution, o.bleeding), leaf(o.resolution, o.bleeding) {
+      : scene(view, cache),
+        options(o),
+        empty(o.resolution, o.bleeding),
+        leaf(o.resolution, o.bleeding) {
     empty.clear();
   }
 
@@ -69,7 +73,8 @@ struct Gather::Impl {
   /// What waits on the stack is looked at for this cell too.
   /// @param inherited  what the cells around this one have drawn
   /// @param bound      on what stand-ins among that change
-  void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited, std::size_t depth, float bound) {
+  void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited,
+                  std::size_t depth, float bound) {
     const ReceiverCell bounds(cell, scene.view().frame().unit());
     if (cell.size() == 1) {
       const DirectionBuffer& drawn = collect(bounds, inherited, leaf, nullptr, depth, bound);
@@ -77,7 +82,8 @@ struct Gather::Impl {
       return;
     }
     if (depth + 1 == kViewpoints) {  // cells within cells beyond what a pixel can name: one by one
-      for (std::size_t i = 0; i < cell.size(); ++i) shade_cell(cell.subspan(i, 1), inherited, depth, bound);
+      for (std::size_t i = 0; i < cell.size(); ++i)
+        shade_cell(cell.subspan(i, 1), inherited, depth, bound);
       return;
     }
     ++counts.cells;
@@ -86,11 +92,14 @@ struct Gather::Impl {
     level.centre = bounds.centre;
     level.left.clear();
     const std::size_t before = payloads.size();
-    const DirectionBuffer& drawn = collect(bounds, inherited, level.buffer, &level.left, depth, bound);
+    const DirectionBuffer& drawn =
+        collect(bounds, inherited, level.buffer, &level.left, depth, bound);
     if (level.left.empty()) {
       resolve(cell, drawn, depth + 1, bound);
     } else {
-      split(cell, [&](std::span<const PlacedReceiver> child) { shade_cell(child, drawn, depth + 1, bound); });
+      split(cell, [&](std::span<const PlacedReceiver> child) {
+        shade_cell(child, drawn, depth + 1, bound);
+      });
     }
     payloads.resize(before);
   }
@@ -98,13 +107,16 @@ struct Gather::Impl {
   /// Sums for receivers that see the same pixels.
   /// @param depth  of the cells around them: those whose pixels move as they see them
   /// @param bound  on what stand-ins change
-  void resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn, std::size_t depth, float bound) {
+  void resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn,
+               std::size_t depth, float bound) {
     std::array<glm::vec3, kViewpoints> offsets{};
     for (const PlacedReceiver& receiver : cell) {
       for (std::size_t i = 0; i < depth; ++i) {
-        offsets[i] = glm::vec3((receiver.position - levels[i]->centre) * scene.view().frame().unit());
+        offsets[i] =
+            glm::vec3((receiver.position - levels[i]->centre) * scene.view().frame().unit());
       }
-      results[receiver.index] = drawn.resolve(*grid, receiver.normal, std::span(offsets).first(depth));
+      results[receiver.index] =
+          drawn.resolve(*grid, receiver.normal, std::span(offsets).first(depth));
     }
     counts.receivers += cell.size();
     if (bound > 0) counts.damage.add(cell.size(), std::min(1.0F, bound));
@@ -126,22 +138,25 @@ struct Gather::Impl {
     }
   }
 
-  /// Looks at the stack and at what the cell around left. Draws what is settled for all receivers of
-  /// the cell; the rest goes to `left`, for its children. Without `left` everything is settled.
+  /// Looks at the stack and at what the cell around left. Draws what is settled for all receivers
+  /// of the cell; the rest goes to `left`, for its children. Without `left` everything is settled.
   /// @param bound  grows by what stand-ins may cover
   /// @return  `own`, a copy of `inherited` that was drawn into; `inherited` when nothing was
-  const DirectionBuffer& collect(const ReceiverCell& cell, const DirectionBuffer& inherited, DirectionBuffer& own,
-                                 NearLists* left, std::size_t depth, float& bound) {
+  const DirectionBuffer& collect(const ReceiverCell& cell, const DirectionBuffer& inherited,
+                                 DirectionBuffer& own, NearLists* left, std::size_t depth,
+                                 float& bound) {
     const double unit = scene.view().frame().unit();
-    const CellTest test{.cell = cell,
-                        .unit = unit,
-                        .limit = options.solid_angle / kPi,
-                        .shared_from = left ? std::min(std::numeric_limits<float>::max(), cell.radius / options.parallax) : 0,
-                        .inflation = options.inflation,
-                        .sides = options.sides,
-                        .bleeding = options.bleeding,
-                        .last = left == nullptr,
-                        .damaged = scene.view().lost() != nullptr};
+    const CellTest test{
+        .cell = cell,
+        .unit = unit,
+        .limit = options.solid_angle / kPi,
+        .shared_from =
+            left ? std::min(std::numeric_limits<float>::max(), cell.radius / options.parallax) : 0,
+        .inflation = options.inflation,
+        .sides = options.sides,
+        .bleeding = options.bleeding,
+        .last = left == nullptr,
+        .damaged = scene.view().lost() != nullptr};
     CellOutput out{queue, left, payloads};
     WalkLimit limit(scene.view());
     const Horizon horizon = cell.has_horizon ? Horizon{cell.axis, cell.cone_sin} : Horizon{};
@@ -157,8 +172,10 @@ struct Gather::Impl {
       const Level& around = *levels[depth - 1];
       const glm::vec3 move((around.centre - cell.centre) * unit);
       opened.clear();
-      for (std::size_t i = 0; i < around.left.clusters.size; flush()) i = look_at_clusters(around, i, move, test, out);
-      for (std::size_t i = 0; i < around.left.surfels.size; flush()) i = look_at_surfels(around, i, move, test, out);
+      for (std::size_t i = 0; i < around.left.clusters.size; flush())
+        i = look_at_clusters(around, i, move, test, out);
+      for (std::size_t i = 0; i < around.left.surfels.size; flush())
+        i = look_at_surfels(around, i, move, test, out);
       for (const std::uint32_t i : opened) push(payloads[i]);
     }
     while (!stack.empty()) {
@@ -179,7 +196,8 @@ struct Gather::Impl {
     return touched ? own : inherited;
   }
 
-  std::size_t look_at_clusters(const Level& around, std::size_t from, const glm::vec3& move, const CellTest& test, CellOutput& out) {
+  std::size_t look_at_clusters(const Level& around, std::size_t from, const glm::vec3& move,
+                               const CellTest& test, CellOutput& out) {
     const int before = queue.size;
     const std::size_t next = gather_clusters(around.left.clusters, from, move, test, out, opened);
     counts.clusters += static_cast<unsigned>(queue.size - before);
@@ -187,7 +205,8 @@ struct Gather::Impl {
     return next;
   }
 
-  std::size_t look_at_surfels(const Level& around, std::size_t from, const glm::vec3& move, const CellTest& test, CellOutput& out) {
+  std::size_t look_at_surfels(const Level& around, std::size_t from, const glm::vec3& move,
+                              const CellTest& test, CellOutput& out) {
     const int before = queue.size;
     const std::size_t next = gather_surfels(around.left.surfels, from, move, test, out);
     counts.surfels += static_cast<unsigned>(queue.size - before);
@@ -207,17 +226,20 @@ struct Gather::Impl {
     const int before = queue.size;
     const unsigned open = gather_group(group, closed, test, out);
     counts.clusters += static_cast<unsigned>(queue.size - before);
-    for (unsigned rest = open; rest != 0; rest &= rest - 1) stack.push_back(group.child(std::countr_zero(rest)));
+    for (unsigned rest = open; rest != 0; rest &= rest - 1)
+      stack.push_back(group.child(std::countr_zero(rest)));
   }
 
   /// The points of a leaf, in runs of 8 that do not cross a page.
   template <class Flush>
-  void look_at_run(const ChildRef& leaf_node, const CellTest& test, CellOutput& out, const Flush& flush) {
+  void look_at_run(const ChildRef& leaf_node, const CellTest& test, CellOutput& out,
+                   const Flush& flush) {
     const std::uint32_t per_page = scene.view().points_per_page();
     std::uint64_t first = leaf_node.first_point;
     for (const std::uint64_t end = first + leaf_node.point_count; first < end;) {
       const auto slot = static_cast<std::uint32_t>(first % per_page);
-      const auto number = static_cast<unsigned>(std::min<std::uint64_t>({8, end - first, per_page - slot}));
+      const auto number =
+          static_cast<unsigned>(std::min<std::uint64_t>({8, end - first, per_page - slot}));
       ++counts.surfel_blocks;
       const PageReader::Page page = scene.points(first);
       if (queue.full()) flush();
@@ -233,7 +255,8 @@ Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& opt
     : impl_(std::make_unique<Impl>(view, cache, options)) {}
 Gather::~Gather() = default;
 
-void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> results, const DirectionGrid& grid) {
+void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> results,
+                   const DirectionGrid& grid) {
   if (receivers.empty()) return;
   impl_->grid = &grid;
   impl_->place(receivers);
@@ -241,7 +264,9 @@ void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> resul
   impl_->run();
 }
 
-const GatherCounts& Gather::counts() const noexcept { return impl_->counts; }
+const GatherCounts& Gather::counts() const noexcept {
+  return impl_->counts;
+}
 
 void GatherCounts::add(const GatherCounts& other) noexcept {
   receivers += other.receivers;

@@ -24,7 +24,8 @@ class Gather {
   /// @param receivers  neighbours, in any order; a few thousand share best
   /// @param results    as many
   /// @param grid       of the options' resolution; its variant shifts the cells too
-  void shade(std::span<const Receiver> receivers, std::span<Shading> results, const DirectionGrid& grid);
+  void shade(std::span<const Receiver> receivers, std::span<Shading> results,
+             const DirectionGrid& grid);
   [[nodiscard]] const GatherCounts& counts() const noexcept;
 
  private:

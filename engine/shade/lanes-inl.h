@@ -44,16 +44,18 @@ static constexpr PackedLanes kPackedLanes;
 
 /// Writes the lanes of a mask side by side, and anything behind them up to a vector's length.
 ///
-/// Packed in a register: stores that pack made the gather 1.5 to 2.4 times slower on Zen 4. On AVX2 by a table
-/// of our own: that of Highway 1.0.3 is copied to the stack, 1 KiB each time, when GCC 12 compiles it.
+/// Packed in a register: stores that pack made the gather 1.5 to 2.4 times slower on Zen 4. On AVX2
+/// by a table of our own: that of Highway 1.0.3 is copied to the stack, 1 KiB each time, when GCC
+/// 12 compiles it.
 /// @return  how many
 template <class D, class T>
 HWY_INLINE std::size_t append(hn::VFromD<D> lanes, hn::Mask<D> mask, D d, T* to) {
 #if HWY_TARGET == HWY_AVX2
   const hn::RebindToUnsigned<D> u;
   const unsigned bits = bits_of(d, mask);
-  const auto from = hn::And(hn::Shr(hn::Set(u, kPackedLanes.lanes[bits]), hn::ShiftLeft<2>(hn::Iota(u, 0U))),
-                            hn::Set(u, 7U));
+  const auto from =
+      hn::And(hn::Shr(hn::Set(u, kPackedLanes.lanes[bits]), hn::ShiftLeft<2>(hn::Iota(u, 0U))),
+              hn::Set(u, 7U));
   hn::StoreU(hn::TableLookupLanes(lanes, hn::IndicesFromVec(d, from)), d, to);
   return static_cast<std::size_t>(std::popcount(bits));
 #else
@@ -74,8 +76,11 @@ template <class D>
 HWY_INLINE UnpackedRgbe<D> unpack_rgbe(D f, hn::VFromD<hn::RebindToUnsigned<D>> rgbe) {
   const hn::RebindToUnsigned<D> u;
   const hn::RebindToSigned<D> i;
-  const auto byte = [&](auto bits) { return hn::ConvertTo(f, hn::BitCast(i, hn::And(bits, hn::Set(u, 255U)))); };
-  const auto exponent = hn::Max(hn::Sub(hn::BitCast(i, hn::ShiftRight<24>(rgbe)), hn::Set(i, 9)), hn::Zero(i));
+  const auto byte = [&](auto bits) {
+    return hn::ConvertTo(f, hn::BitCast(i, hn::And(bits, hn::Set(u, 255U))));
+  };
+  const auto exponent =
+      hn::Max(hn::Sub(hn::BitCast(i, hn::ShiftRight<24>(rgbe)), hn::Set(i, 9)), hn::Zero(i));
   return {{byte(rgbe), byte(hn::ShiftRight<8>(rgbe)), byte(hn::ShiftRight<16>(rgbe))},
           hn::BitCast(f, hn::ShiftLeft<23>(exponent))};
 }

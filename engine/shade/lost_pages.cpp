@@ -25,8 +25,8 @@ void LostPages::add(std::uint32_t page, const char* why) {
   states_.at(page).store(kLost, std::memory_order_relaxed);
 }
 
-bool read_unless_lost(const ContainerReader& container, std::uint32_t page, std::span<std::byte> out,
-                      PageDecoder& decoder, LostPages* lost) {
+bool read_unless_lost(const ContainerReader& container, std::uint32_t page,
+                      std::span<std::byte> out, PageDecoder& decoder, LostPages* lost) {
   try {
     static_cast<void>(container.read_page(page, out, decoder));
   } catch (const FormatError& error) {

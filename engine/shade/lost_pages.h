@@ -13,9 +13,9 @@
 
 namespace ptc {
 
-/// Which pages break a rule of the format, as far as anyone has asked. Each is looked at once: one that becomes damaged
-/// later is an error for who reads it. What the system cannot read is an error at once.
-/// Threads: may be shared.   Memory: a byte a page of the container.
+/// Which pages break a rule of the format, as far as anyone has asked. Each is looked at once: one
+/// that becomes damaged later is an error for who reads it. What the system cannot read is an error
+/// at once. Threads: may be shared.   Memory: a byte a page of the container.
 class LostPages {
  public:
   explicit LostPages(const ContainerReader& container) : states_(container.page_count()) {}
@@ -39,7 +39,8 @@ class LostPages {
 /// @param lost  where a damaged page is told; null: it is an error
 /// @return  false when it is damaged
 /// @throws as ContainerReader::read_page(), FormatError without `lost` alone
-[[nodiscard]] bool read_unless_lost(const ContainerReader& container, std::uint32_t page, std::span<std::byte> out,
-                                    PageDecoder& decoder, LostPages* lost);
+[[nodiscard]] bool read_unless_lost(const ContainerReader& container, std::uint32_t page,
+                                    std::span<std::byte> out, PageDecoder& decoder,
+                                    LostPages* lost);
 
 }  // namespace ptc

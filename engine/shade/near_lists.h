@@ -1,4 +1,5 @@
-// What a receiver cell leaves to its children, decoded once: columns, so that several are tested at once.
+// What a receiver cell leaves to its children, decoded once: columns, so that several are tested at
+// once.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +35,8 @@ struct NearClusters {
   void make_room(std::size_t more) {
     const std::size_t wanted = size + more + kListLanes;
     if (x.size() >= wanted) return;
-    for (auto* column : {&x, &y, &z, &radius, &thickness, &mean_x, &mean_y, &mean_z}) column->resize(2 * wanted);
+    for (auto* column : {&x, &y, &z, &radius, &thickness, &mean_x, &mean_y, &mean_z})
+      column->resize(2 * wanted);
     payload.resize(2 * wanted);
   }
 };

@@ -29,7 +29,8 @@ struct Cluster {
 };
 
 float share_at(const GroupView& group, int axis, int child) {
-  return static_cast<float>(GroupView::u16_at(group.facing(axis), child)) / static_cast<float>(kFacingSteps);
+  return static_cast<float>(GroupView::u16_at(group.facing(axis), child)) /
+         static_cast<float>(kFacingSteps);
 }
 
 Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const glm::dvec3& from) {
@@ -39,7 +40,8 @@ Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const gl
   Cluster c;
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
-    const double at = static_cast<double>(corner[axis]) + step * GroupView::u16_at(columns[axis], i);
+    const double at =
+        static_cast<double>(corner[axis]) + step * GroupView::u16_at(columns[axis], i);
     c.to[k] = static_cast<float>(frame.origin[axis] + at * frame.unit() - from[k]);
   }
   const auto unit = static_cast<float>(frame.unit());
@@ -52,7 +54,8 @@ Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const gl
   return c;
 }
 
-/// What leaves towards a receiver by the three faces of the ambient cube that look at it, over the cluster's area.
+/// What leaves towards a receiver by the three faces of the ambient cube that look at it, over the
+/// cluster's area.
 struct Front {
   float area = 0;
   glm::vec3 radiance{0};  ///< times area
@@ -72,15 +75,19 @@ Front front_of(const GroupView& group, int i, const Cluster& c, const glm::vec3&
   return front;
 }
 
-std::uint32_t pack(const glm::vec3& colour) { return encode_rgbe({colour.r, colour.g, colour.b}); }
+std::uint32_t pack(const glm::vec3& colour) {
+  return encode_rgbe({colour.r, colour.g, colour.b});
+}
 
-void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options, DiscQueue& queue) {
+void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options,
+                  DiscQueue& queue) {
   const glm::vec3 toward = -glm::normalize(c.to);
   const Front front = front_of(group, i, c, toward);
   const float back = front.area - glm::dot(c.mean, toward);
   const float projected = options.sides == Sides::both ? std::max(front.area, back) : front.area;
   if (!(c.area * projected > 0)) return;
-  const Splat splat = make_splat({c.mean, c.area, c.radius, c.thickness}, toward, c.area * projected, options.inflation);
+  const Splat splat = make_splat({c.mean, c.area, c.radius, c.thickness}, toward,
+                                 c.area * projected, options.inflation);
   const float over = lit_area(splat, front.area, projected);
   const glm::vec3 colour = over > 0 ? front.radiance / over : glm::vec3(0);
   queue.push(c.to, splat.normal, splat.radius, pack(colour));
@@ -88,9 +95,11 @@ void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherO
 
 }  // namespace
 
-Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float projected, float inflation) {
+Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float projected,
+                 float inflation) {
   const float length = glm::length(shape.mean);
-  if (length > kFlat) return {shape.mean / length, std::min(shape.radius, std::sqrt(shape.area / 2)), true};
+  if (length > kFlat)
+    return {shape.mean / length, std::min(shape.radius, std::sqrt(shape.area / 2)), true};
   // The silhouette of an ellipsoid is that of a disc across it, turned towards the receiver.
   Splat splat{.normal = toward};
   float foreshortened = 1;
@@ -108,7 +117,8 @@ Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float proje
   return splat;
 }
 
-float height_of_top(const glm::vec3& to, const glm::vec3& normal, float radius, const glm::vec3& slab_normal, float thickness) {
+float height_of_top(const glm::vec3& to, const glm::vec3& normal, float radius,
+                    const glm::vec3& slab_normal, float thickness) {
   const float height = glm::dot(to, normal);
   const float cosine = glm::dot(slab_normal, normal);
   const float tilt = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
@@ -161,9 +171,12 @@ void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
   for (std::uint64_t k = run.first_point; k < run.first_point + run.point_count; ++k) {
     const PageReader::Page page = scene_.points(k);
     const PointPage points(page.payload, page.record_count);
-    const Surfel surfel = to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
+    const Surfel surfel =
+        to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
     const glm::vec3 to(surfel.position - receiver.position);
-    if (!(surfel.radius > 0) || height_of_top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0) continue;
+    if (!(surfel.radius > 0) ||
+        height_of_top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0)
+      continue;
     ++counts_.surfels;
     queue_.push(to, surfel.normal, surfel.radius, pack(surfel.radiance));
     if (!queue_.full()) continue;

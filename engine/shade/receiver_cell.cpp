@@ -11,8 +11,8 @@ namespace ptc {
 MortonKey receiver_key(const Frame& frame, const glm::dvec3& position, unsigned variant) {
   LatticePoint q = frame.to_lattice({position.x, position.y, position.z});
   if (variant == 0) return encode_morton(q);
-  // Half the lattice, moved by up to the other half: multiples of the roots of x^4 = x + 1, modulo 1
-  // (Roberts 2018), spread evenly.
+  // Half the lattice, moved by up to the other half: multiples of the roots of x^4 = x + 1, modulo
+  // 1 (Roberts 2018), spread evenly.
   constexpr std::array<double, 3> kStep{0.8191725134, 0.6710436067, 0.5497004779};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double whole = 0;

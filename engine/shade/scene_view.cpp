@@ -39,14 +39,17 @@ unsigned SceneReader::lost_children(std::uint32_t page, std::uint16_t slot) {
   const int count = view.size();
   for (int i = 0; i < count; ++i) children[static_cast<std::size_t>(i)] = view.child(i);
   unsigned lost = 0;
-  for (int i = 0; i < count; ++i) lost |= (is_lost(children[static_cast<std::size_t>(i)]) ? 1U : 0U) << i;
+  for (int i = 0; i < count; ++i)
+    lost |= (is_lost(children[static_cast<std::size_t>(i)]) ? 1U : 0U) << i;
   return lost;
 }
 
 bool SceneReader::is_lost(const ChildRef& child) {
   if (child.interior) return view_.lost()->contains(child.page, pages_);
-  const std::uint64_t end = child.first_point + child.point_count, per_page = view_.points_per_page();
-  for (std::uint64_t point = child.first_point; point < end; point = (point / per_page + 1) * per_page) {
+  const std::uint64_t end = child.first_point + child.point_count,
+                      per_page = view_.points_per_page();
+  for (std::uint64_t point = child.first_point; point < end;
+       point = (point / per_page + 1) * per_page) {
     if (view_.lost()->contains(view_.point_page(point), pages_)) return true;
   }
   return false;
@@ -57,7 +60,8 @@ void WalkLimit::take_group() {
 }
 
 void WalkLimit::take_points(std::uint64_t count) {
-  if (count > points_) view_.fail("spec/nodes.md#node-leaf", "leaves hold more points than there are");
+  if (count > points_)
+    view_.fail("spec/nodes.md#node-leaf", "leaves hold more points than there are");
   points_ -= count;
 }
 

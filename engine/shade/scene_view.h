@@ -50,7 +50,9 @@ class SceneReader {
   /// Children of a group that need a lost page: bit i for child i. Groups given before are gone.
   [[nodiscard]] unsigned lost_children(std::uint32_t page, std::uint16_t slot);
   /// The page that holds a point; valid until the next call.
-  [[nodiscard]] PageReader::Page points(std::uint64_t point) { return pages_.get(view_.point_page(point)); }
+  [[nodiscard]] PageReader::Page points(std::uint64_t point) {
+    return pages_.get(view_.point_page(point));
+  }
 
  private:
   [[nodiscard]] bool is_lost(const ChildRef& child);
@@ -59,10 +61,12 @@ class SceneReader {
   PageReader pages_;
 };
 
-/// What one walk down the tree may still meet: no group or point twice, so a walk ends whatever the references say.
+/// What one walk down the tree may still meet: no group or point twice, so a walk ends whatever the
+/// references say.
 class WalkLimit {
  public:
-  explicit WalkLimit(const SceneView& view) : view_(view), groups_(view.groups()), points_(view.points()) {}
+  explicit WalkLimit(const SceneView& view)
+      : view_(view), groups_(view.groups()), points_(view.points()) {}
 
   /// @throws FormatError when more were met than there are
   void take_group();

@@ -30,11 +30,11 @@ struct Shader::Impl {
     }
   }
 
-  static std::unique_ptr<PageCache> make_cache(const ContainerReader& container, const ShadeOptions& options,
-                                               const Executor& e) {
-    return std::make_unique<PageCache>(
-        container,
-        CacheOptions{.memory_bytes = options.cache_bytes, .threads = e.threads(), .back_end = options.back_end});
+  static std::unique_ptr<PageCache> make_cache(const ContainerReader& container,
+                                               const ShadeOptions& options, const Executor& e) {
+    return std::make_unique<PageCache>(container, CacheOptions{.memory_bytes = options.cache_bytes,
+                                                               .threads = e.threads(),
+                                                               .back_end = options.back_end});
   }
 
   Gather& gather(unsigned thread) {
@@ -43,7 +43,8 @@ struct Shader::Impl {
   }
 
   /// Indices of the receivers along the Z-curve.
-  [[nodiscard]] std::vector<std::size_t> z_order(std::span<const Receiver> receivers, unsigned variant) const {
+  [[nodiscard]] std::vector<std::size_t> z_order(std::span<const Receiver> receivers,
+                                                 unsigned variant) const {
     struct Placed {
       MortonKey key;
       std::size_t index;
@@ -63,17 +64,19 @@ struct Shader::Impl {
   }
 };
 
-Shader::Shader(const ContainerReader& container, const ShadeOptions& options, const Executor& executor)
+Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
+               const Executor& executor)
     : impl_(std::make_unique<Impl>(container, options, executor)) {}
 Shader::~Shader() = default;
 
-void Shader::shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress,
-                   unsigned variant) {
+void Shader::shade(std::span<const Receiver> receivers, std::span<Shading> results,
+                   Progress& progress, unsigned variant) {
   variant %= static_cast<unsigned>(impl_->grids.size());
   const std::vector<std::size_t> order = impl_->z_order(receivers, variant);
   const std::size_t blocks = (order.size() + kBlock - 1) / kBlock;
   impl_->executor.for_each(blocks, [&](std::size_t block, unsigned thread) {
-    const auto indices = std::span(order).subspan(block * kBlock, std::min(kBlock, order.size() - block * kBlock));
+    const auto indices =
+        std::span(order).subspan(block * kBlock, std::min(kBlock, order.size() - block * kBlock));
     std::vector<Receiver> in(indices.size());
     std::vector<Shading> out(indices.size());
     std::ranges::transform(indices, in.begin(), [&](std::size_t i) { return receivers[i]; });

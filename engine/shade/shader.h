@@ -18,10 +18,13 @@ struct ShadeOptions {
   GatherOptions gather;
   /// Radiance that arrives from a direction (unit) where nothing covers it; empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;
-  /// Pages to read through in place of a cache of its own, for as many threads; it outlives the Shader.
+  /// Pages to read through in place of a cache of its own, for as many threads; it outlives the
+  /// Shader.
   PageCache* cache = nullptr;
-  LostPages* lost = nullptr;  ///< goes on past damaged pages, which it tells there; null: they are errors. It outlives the Shader
-  unsigned variants = 1;  ///< turns of the direction cube and shifts of the receiver cells to choose from
+  LostPages* lost = nullptr;  ///< goes on past damaged pages, which it tells there; null: they are
+                              ///< errors. It outlives the Shader
+  unsigned variants =
+      1;  ///< turns of the direction cube and shifts of the receiver cells to choose from
 };
 
 /// Keeps cache and gathers between calls.

@@ -10,13 +10,15 @@ constexpr std::uint64_t kSurfelBytes = sizeof(Surfel) + DiscRays::kBytes;
 
 }  // namespace
 
-StreamedRays::StreamedRays(const ContainerReader& scene, Sides sides, std::function<glm::vec3(const glm::vec3&)> sky,
+StreamedRays::StreamedRays(const ContainerReader& scene, Sides sides,
+                           std::function<glm::vec3(const glm::vec3&)> sky,
                            std::uint64_t memory_bytes)
     : scene_(scene), sides_(sides), sky_(std::move(sky)) {
   const std::uint64_t for_hits = std::min<std::uint64_t>(memory_bytes / 4, std::uint64_t{64} << 20);
   hit_count_ = static_cast<std::size_t>(for_hits / sizeof(DiscHit));
   const std::uint64_t page_bytes = kSurfelBytes * std::max(1U, scene.superblock().points_per_page);
-  pages_of_part_ = static_cast<std::size_t>(std::max<std::uint64_t>(1, (memory_bytes - for_hits) / page_bytes));
+  pages_of_part_ =
+      static_cast<std::size_t>(std::max<std::uint64_t>(1, (memory_bytes - for_hits) / page_bytes));
   parts_ = (scene.point_pages().size() + pages_of_part_ - 1) / pages_of_part_;
   if (parts_ > 0) load(0);
 }
@@ -25,7 +27,8 @@ void StreamedRays::load(std::size_t part) {
   if (rays_ && loaded_ == part) return;
   rays_.reset();
   const auto pages = scene_.point_pages().subspan(
-      part * pages_of_part_, std::min(pages_of_part_, scene_.point_pages().size() - part * pages_of_part_));
+      part * pages_of_part_,
+      std::min(pages_of_part_, scene_.point_pages().size() - part * pages_of_part_));
   surfels_.clear();
   surfels_.reserve(pages.size() * scene_.superblock().points_per_page);
   append_surfels(scene_, pages, surfels_);
@@ -40,9 +43,12 @@ void StreamedRays::trace(std::span<const Receiver> receivers, unsigned rays, std
                          std::span<Shading> results, const Executor& executor, Progress& progress) {
   const auto side = static_cast<std::size_t>(std::sqrt(static_cast<double>(rays)));
   const std::size_t rays_of_each = side * side;
-  const std::size_t batch = std::clamp<std::size_t>(hit_count_ / rays_of_each, 1, std::max<std::size_t>(1, receivers.size()));
+  const std::size_t batch = std::clamp<std::size_t>(hit_count_ / rays_of_each, 1,
+                                                    std::max<std::size_t>(1, receivers.size()));
   std::vector<DiscHit> hits(batch * rays_of_each);
-  const auto hits_of = [&](std::size_t i) { return std::span(hits).subspan(i * rays_of_each, rays_of_each); };
+  const auto hits_of = [&](std::size_t i) {
+    return std::span(hits).subspan(i * rays_of_each, rays_of_each);
+  };
   for (std::size_t first = 0; first < receivers.size(); first += batch) {
     const std::size_t count = std::min(batch, receivers.size() - first);
     std::ranges::fill(hits, DiscHit{});

@@ -60,7 +60,8 @@ struct FaceView {
     return hn::Max(hn::Zero(f), hn::MulAdd(hn::Set(f, nu), u, hn::Set(f, row)));
   }
 
-  /// How far the edge between two pixels moves towards the second, in pixels: as the nearer of them does.
+  /// How far the edge between two pixels moves towards the second, in pixels: as the nearer of them
+  /// does.
   /// @param at      coordinate of the edge along the axis
   /// @param offset  of the receiver along the axis, by viewpoint
   HWY_INLINE VW shift_of(VW a, VW b, VW at, const float* offset) const {
@@ -69,7 +70,8 @@ struct FaceView {
     const auto near = hn::Max(a, b);
     const auto viewpoint = hn::And(hn::BitCast(i, near), hn::Set(i, kViewpoints - 1));
     const auto move = hn::MulSub(at, look_up(offset_w, viewpoint), look_up(offset, viewpoint));
-    const auto pixels = hn::Mul(hn::Mul(near, move), hn::Set(f, 0.5F * static_cast<float>(cube.resolution)));
+    const auto pixels =
+        hn::Mul(hn::Mul(near, move), hn::Set(f, 0.5F * static_cast<float>(cube.resolution)));
     return hn::Max(hn::Min(pixels, hn::Set(f, kMostShift)), hn::Set(f, -kMostShift));
   }
 };
@@ -79,16 +81,20 @@ struct FaceView {
 /// @param last  no row below is seen
 /// @param down  weights that come from the row above; then those that pass to the row below
 template <bool kMoves>
-HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTRICT down, LaneSums& sums) {
+HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTRICT down,
+                        LaneSums& sums) {
   const W f;
   const auto zero = hn::Zero(f);
   const CubeGeometry& cube = face.cube;
-  const std::size_t plane = static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
+  const std::size_t plane =
+      static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
   const float row = face.cosine(cube.centre[y]);
-  const float half_step = 1 / static_cast<float>(cube.resolution), edge = cube.centre[y] + half_step;
+  const float half_step = 1 / static_cast<float>(cube.resolution),
+              edge = cube.centre[y] + half_step;
   const auto first_lane = hn::FirstN(f, 1);
-  const auto one_up = hn::IndicesFromVec(f, hn::And(hn::Sub(hn::Iota(WI(), 0), hn::Set(WI(), 1)),
-                                                    hn::Set(WI(), static_cast<int>(hn::Lanes(f)) - 1)));
+  const auto one_up =
+      hn::IndicesFromVec(f, hn::And(hn::Sub(hn::Iota(WI(), 0), hn::Set(WI(), 1)),
+                                    hn::Set(WI(), static_cast<int>(hn::Lanes(f)) - 1)));
   auto carried = zero, row_open = zero;
   for (int x = 0; x < cube.resolution; x += static_cast<int>(hn::Lanes(f))) {
     const auto at = static_cast<std::size_t>(y * cube.resolution + x);
@@ -105,10 +111,13 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
       carried = turned;
       auto below = zero;
       if (!last) {
-        below = hn::Mul(face.shift_of(near, hn::LoadU(f, here + cube.resolution), hn::Set(f, edge), face.offset_v),
-                        hn::Mul(face.cosine(pu, face.cosine(edge)), hn::LoadU(f, cube.edge_v + at)));
+        below =
+            hn::Mul(face.shift_of(near, hn::LoadU(f, here + cube.resolution), hn::Set(f, edge),
+                                  face.offset_v),
+                    hn::Mul(face.cosine(pu, face.cosine(edge)), hn::LoadU(f, cube.edge_v + at)));
       }
-      weight = hn::Add(own, hn::Add(hn::Sub(right, from_left), hn::Sub(below, hn::LoadU(f, down + x))));
+      weight =
+          hn::Add(own, hn::Add(hn::Sub(right, from_left), hn::Sub(below, hn::LoadU(f, down + x))));
       hn::StoreU(below, f, down + x);
     }
     const auto empty = hn::Eq(near, zero);
@@ -121,9 +130,11 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
       for (int k = 0; k < 3; ++k) sums.light[k] = hn::MulAdd(rgbe.byte[k], scale, sums.light[k]);
     }
     for (std::size_t k = 0; face.sky && k < 3; ++k) {
-      sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at), sums.sky[k]);
+      sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at),
+                               sums.sky[k]);
     }
-    const auto direction = hn::IfThenElseZero(empty, hn::Mul(own, hn::LoadU(f, cube.inverse_length + at)));
+    const auto direction =
+        hn::IfThenElseZero(empty, hn::Mul(own, hn::LoadU(f, cube.inverse_length + at)));
     row_open = hn::Add(row_open, direction);
     sums.open[1] = hn::MulAdd(direction, pu, sums.open[1]);
   }
@@ -142,13 +153,14 @@ HWY_INLINE void add_face(const FaceView& face, LaneSums& sums) {
 
 }  // namespace
 
-void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky, const glm::vec3& normal,
-                const ViewOffsets* offsets, PixelSums& sums) {
+void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
+                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums) {
   const W f;
   const auto zero = hn::Zero(f);
   LaneSums lane{zero, zero, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
   VW open[3] = {zero, zero, zero};
-  const std::size_t plane = static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
+  const std::size_t plane =
+      static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
   for (int i = 0; i < 6; ++i) {
     const CubeFace axes(i);
     FaceView face{.cube = cube,
@@ -192,8 +204,8 @@ namespace ptc {
 
 HWY_EXPORT(sum_pixels);
 
-void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky, const glm::vec3& normal,
-                const ViewOffsets* offsets, PixelSums& sums) {
+void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
+                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums) {
   HWY_DYNAMIC_DISPATCH(sum_pixels)(cube, pixels, sky, normal, offsets, sums);
 }
 

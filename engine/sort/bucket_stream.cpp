@@ -20,8 +20,8 @@ std::size_t BlockStream::next(std::span<PointRecord> out) {
   return filled;
 }
 
-BucketLoader::BucketLoader(std::shared_ptr<const Partition> partition, std::size_t first, SpillFile& file,
-                           const SortPlan& plan, const Executor& executor,
+BucketLoader::BucketLoader(std::shared_ptr<const Partition> partition, std::size_t first,
+                           SpillFile& file, const SortPlan& plan, const Executor& executor,
                            std::atomic<std::uint32_t>& leaves)
     : file_(file),
       reader_(plan.read_bytes),
@@ -38,7 +38,8 @@ void BucketLoader::push(std::shared_ptr<const Partition> partition, std::size_t 
   }
 }
 
-BucketLoader::Block BucketLoader::read(std::span<PointRecord> out, const std::function<std::span<PointRecord>()>& scratch) {
+BucketLoader::Block BucketLoader::read(std::span<PointRecord> out,
+                                       const std::function<std::span<PointRecord>()>& scratch) {
   while (!buckets_.empty()) {
     BucketReader& bucket = buckets_.back();
     if (bucket.left() > out.size() && !bucket.single_key()) {
@@ -79,34 +80,38 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
   push(partition, 0);
 }
 
-BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory, const Executor& executor,
-                           std::function<void()> at_end)
+BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory,
+                           const Executor& executor, std::function<void()> at_end)
     : loader_(std::move(loader)), executor_(executor), at_end_(std::move(at_end)) {
   const std::size_t quarter = memory.size() / 4;
   const auto block = [&](std::size_t k) { return memory.subspan(k * quarter, quarter); };
   scratch_ = block(0);  // on a page boundary, for it is written where a range is partitioned again
-  reading_ = std::async(std::launch::async, [this, out = block(1)] { return loader_.read(out, [this] { return scratch_; }); });
+  reading_ = std::async(std::launch::async, [this, out = block(1)] {
+    return loader_.read(out, [this] { return scratch_; });
+  });
   advance(block(2));
   current_ = block(3);
 }
 
 BucketStream::~BucketStream() = default;
 
-// What was read is sorted, and more is read. Reading leaves the processor free: it has a thread even if the executor has
-// only one.
+// What was read is sorted, and more is read. Reading leaves the processor free: it has a thread
+// even if the executor has only one.
 void BucketStream::advance(std::span<PointRecord> free) {
   const Block read = reading_.get();
   const auto sort = [this, read] {
     if (!read.sorted && !read.records.empty()) radix_sort(read.records, scratch_, executor_);
     return read;
   };
-  sorting_ = std::async(executor_.threads() == 1 ? std::launch::deferred : std::launch::async, sort).share();
+  sorting_ = std::async(executor_.threads() == 1 ? std::launch::deferred : std::launch::async, sort)
+                 .share();
   if (read.records.empty()) return;
   const auto scratch = [this, sorting = sorting_] {
     sorting.wait();
     return scratch_;
   };
-  reading_ = std::async(std::launch::async, [this, free, scratch] { return loader_.read(free, scratch); });
+  reading_ =
+      std::async(std::launch::async, [this, free, scratch] { return loader_.read(free, scratch); });
 }
 
 std::span<const PointRecord> BucketStream::next_block() {

@@ -38,8 +38,8 @@ class BucketLoader {
   /// @param first   range to begin with
   /// @param file    for ranges that are partitioned again
   /// @param leaves  counts the buckets that were loaded
-  BucketLoader(std::shared_ptr<const Partition> partition, std::size_t first, SpillFile& file, const SortPlan& plan,
-               const Executor& executor, std::atomic<std::uint32_t>& leaves);
+  BucketLoader(std::shared_ptr<const Partition> partition, std::size_t first, SpillFile& file,
+               const SortPlan& plan, const Executor& executor, std::atomic<std::uint32_t>& leaves);
 
   /// Records of one range, all of it unless their keys are equal.
   struct Block {
@@ -49,7 +49,8 @@ class BucketLoader {
 
   /// Reads the next records into the front of `out`.
   /// @param scratch  as long as `out`; called where a range does not fit and is partitioned again
-  [[nodiscard]] Block read(std::span<PointRecord> out, const std::function<std::span<PointRecord>()>& scratch);
+  [[nodiscard]] Block read(std::span<PointRecord> out,
+                           const std::function<std::span<PointRecord>()>& scratch);
 
  private:
   void push(std::shared_ptr<const Partition> partition, std::size_t first);
@@ -63,8 +64,8 @@ class BucketLoader {
   std::vector<BucketReader> buckets_;  // not loaded yet, the next one last; none is empty
 };
 
-/// Streams from buckets on disk. While one block is handed out the next is sorted, if the executor has
-/// more than one thread, and the one after it read.
+/// Streams from buckets on disk. While one block is handed out the next is sorted, if the executor
+/// has more than one thread, and the one after it read.
 class BucketStream final : public BlockStream {
  public:
   /// @param memory  given back at the end; its quarters are the three blocks and the scratch

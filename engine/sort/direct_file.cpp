@@ -24,14 +24,16 @@ constexpr std::size_t kMostBytes = std::size_t{8} << 20;  // of one call
 }  // namespace
 
 DirectFile::DirectFile(const std::filesystem::path& directory)
-    : name_("temporary file in " + directory.string()), fd_(open_retrying(directory, kFlags | O_TMPFILE, 0600)) {
+    : name_("temporary file in " + directory.string()),
+      fd_(open_retrying(directory, kFlags | O_TMPFILE, 0600)) {
   if (fd_ < 0) buffered_.emplace(directory);  // no direct transfers here, or an error to report
 }
 
 DirectFile::DirectFile(const std::filesystem::path& file, Kept how) : name_(file.string()) {
   const int flags = kFlags | (how == Kept::made ? O_CREAT | O_TRUNC : 0);
   fd_ = open_retrying(file, flags, 0600);
-  if (fd_ < 0 && errno == EINVAL) fd_ = open_retrying(file, flags & ~O_DIRECT, 0600);  // no direct transfers here
+  if (fd_ < 0 && errno == EINVAL)
+    fd_ = open_retrying(file, flags & ~O_DIRECT, 0600);  // no direct transfers here
   if (fd_ < 0) fail("open", name_);
 }
 

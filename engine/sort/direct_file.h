@@ -14,11 +14,11 @@
 
 namespace ptc {
 
-/// A file in a directory that vanishes when it is closed unless it has a name, read and written without the page cache
-/// (O_DIRECT) where the file system can do so: what is spilled is read once, long after, and the
-/// cache would cost a copy, a fresh page for every 4 KiB and the memory that the cap is to save.
-/// Elsewhere it is a TempFile.
-/// Threads: read_at and write_at may be called concurrently.
+/// A file in a directory that vanishes when it is closed unless it has a name, read and written
+/// without the page cache (O_DIRECT) where the file system can do so: what is spilled is read once,
+/// long after, and the cache would cost a copy, a fresh page for every 4 KiB and the memory that
+/// the cap is to save. Elsewhere it is a TempFile. Threads: read_at and write_at may be called
+/// concurrently.
 class DirectFile {
  public:
   /// @throws std::system_error naming the directory
@@ -45,7 +45,7 @@ class DirectFile {
   bool give_up_direct(bool was_direct) const noexcept;
 
   std::string name_;  ///< for errors
-  int fd_ = -1;  // -1: buffered_ instead
+  int fd_ = -1;       // -1: buffered_ instead
   mutable std::atomic<bool> direct_{true};
   std::optional<TempFile> buffered_;
 };

@@ -50,7 +50,8 @@ class MemoryStream final : public BlockStream {
 }  // namespace
 
 void pass_over(PointStream& points, std::uint64_t count) {
-  std::vector<PointRecord> passed(static_cast<std::size_t>(std::min<std::uint64_t>(count, kPassed)));
+  std::vector<PointRecord> passed(
+      static_cast<std::size_t>(std::min<std::uint64_t>(count, kPassed)));
   while (count > 0) {
     const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(count, passed.size()));
     const std::size_t now = points.next(std::span(passed).first(most));
@@ -73,15 +74,15 @@ struct ExternalSorter::Impl {
     const bool will_spill = expected_spill() > 0;
     filling = will_spill ? part(0) : memory().first(plan.run_records);
     if (!will_spill) return;
-    // Better now than after an hour of partitioning. What is expected may be a little more than comes.
-    require_room(options.temp_dirs, expected_spill() / 100 * 95,
-                 "some " + std::to_string(options.expected) + " points on their way through the sort");
+    // Better now than after an hour of partitioning. What is expected may be a little more than
+    // comes.
+    require_room(
+        options.temp_dirs, expected_spill() / 100 * 95,
+        "some " + std::to_string(options.expected) + " points on their way through the sort");
   }
 
   Impl(const SortOptions& sort_options, const Executor& sort_executor, StateReader& state)
-      : options(sort_options),
-        executor(sort_executor),
-        kept(true) {
+      : options(sort_options), executor(sort_executor), kept(true) {
     digest = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
     points = state.get<std::uint64_t>();
     plan = plan_sort(options.memory_bytes, executor.threads(), points);
@@ -89,7 +90,8 @@ struct ExternalSorter::Impl {
     file = SpillFile::reopened(state);
     partition = std::make_shared<Partition>(*file, state);
     std::uint64_t found = 0;
-    for (std::size_t range = 0; range < partition->ranges(); ++range) found += partition->size(range);
+    for (std::size_t range = 0; range < partition->ranges(); ++range)
+      found += partition->size(range);
     state.require(found == points, "the temporary files do not hold as many points as were added");
   }
 
@@ -111,14 +113,16 @@ struct ExternalSorter::Impl {
   void spill_all();
   void keep(StateWriter& state);
   void discard_before(std::uint64_t record);
-  /// Memory in four: while one part is filled, another is grouped into the third, and the fourth is written.
+  /// Memory in four: while one part is filled, another is grouped into the third, and the fourth is
+  /// written.
   [[nodiscard]] std::span<PointRecord> part(std::size_t k) noexcept {
     return memory().subspan(k * part_records(), part_records());
   }
   [[nodiscard]] std::size_t part_records() noexcept { return memory().size() / 4; }
   /// Where there is a partition: the ranges of records of the first run.
   [[nodiscard]] std::span<std::uint16_t> ranges_of(std::span<const PointRecord> records) noexcept {
-    return std::span(range_of).subspan(static_cast<std::size_t>(records.data() - memory().data()), records.size());
+    return std::span(range_of).subspan(static_cast<std::size_t>(records.data() - memory().data()),
+                                       records.size());
   }
   [[nodiscard]] std::unique_ptr<PointStream> stream_memory();
   [[nodiscard]] std::unique_ptr<PointStream> stream_buckets(std::uint64_t first);
@@ -127,22 +131,24 @@ struct ExternalSorter::Impl {
   const Executor& executor;
   SortPlan plan;
   std::vector<MortonKey> sample;
-  Arena arena;             // two runs
-  std::span<PointRecord> filling;  // a run, or a part() once it is known that not all will fit
-  std::size_t filled = 0;          // records there
+  Arena arena;                          // two runs
+  std::span<PointRecord> filling;       // a run, or a part() once it is known that not all will fit
+  std::size_t filled = 0;               // records there
   std::vector<std::uint16_t> range_of;  // see ranges_of()
-  bool kept = false;               // files have names, and stay
+  bool kept = false;                    // files have names, and stay
   std::uint64_t points = 0;
   Digest digest{};
   bool finished = false;
   std::optional<SpillFile> file;  // from the first spill on, or with kept files
   std::shared_ptr<Partition> partition;
-  std::optional<SpillFile> nested;  // for buckets of kept files that are partitioned again: nobody needs them later
+  std::optional<SpillFile>
+      nested;  // for buckets of kept files that are partitioned again: nobody needs them later
   std::size_t discarded = 0;           // ranges, of kept files
   std::uint64_t discarded_points = 0;  // there
   std::atomic<std::uint32_t> buckets{0};
   std::size_t turn = 0;  // which of two parts is grouped into next
-  // Of what was filled before, and of what was grouped into either part; last, so that they are waited for first.
+  // Of what was filled before, and of what was grouped into either part; last, so that they are
+  // waited for first.
   std::shared_future<Partition::Starts> grouping;
   std::array<std::shared_future<void>, 2> writing;
 };
@@ -196,7 +202,9 @@ void ExternalSorter::Impl::spill() {
   if (!partition) begin_partition();
   if (grouping.valid()) grouping.wait();  // out of the part that is filled next
   const std::span<PointRecord> records = filling.first(filled);
-  const bool whole_run = filling.size() > part_records();  // the first one, where it was not known that more would come
+  const bool whole_run =
+      filling.size() >
+      part_records();  // the first one, where it was not known that more would come
   const auto grouped = std::as_writable_bytes(whole_run ? scratch() : part(2 + turn));
   const auto group = [this, records, grouped, free = writing[turn]] {
     if (free.valid()) free.get();
@@ -206,7 +214,8 @@ void ExternalSorter::Impl::spill() {
   grouping = std::async(at_once ? std::launch::deferred : std::launch::async, group).share();
   if (at_once) grouping.wait();
   // Direct writes leave the processor free: another thread, even if the executor has only one.
-  writing[turn] = std::async(std::launch::async, [this, grouped, grouping = grouping, before = writing[1 - turn]] {
+  writing[turn] = std::async(std::launch::async, [this, grouped, grouping = grouping,
+                                                  before = writing[1 - turn]] {
                     if (before.valid()) before.get();
                     partition->write_run(grouped, grouping.get());
                   }).share();
@@ -254,10 +263,11 @@ void ExternalSorter::Impl::discard_before(std::uint64_t record) {
 std::unique_ptr<PointStream> ExternalSorter::Impl::stream_buckets(std::uint64_t first) {
   if (kept) nested.emplace(options.temp_dirs);
   std::size_t range = 0;
-  for (; range < partition->ranges() && partition->size(range) <= first; ++range) first -= partition->size(range);
+  for (; range < partition->ranges() && partition->size(range) <= first; ++range)
+    first -= partition->size(range);
   auto stream = std::make_unique<BucketStream>(
-      BucketLoader(partition, range, kept ? *nested : *file, plan, executor, buckets), memory(), executor,
-      [this] { arena = Arena(); });
+      BucketLoader(partition, range, kept ? *nested : *file, plan, executor, buckets), memory(),
+      executor, [this] { arena = Arena(); });
   pass_over(*stream, first);
   return stream;
 }
@@ -266,12 +276,15 @@ ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& execu
                                std::span<const MortonKey> sample)
     : impl_(std::make_unique<Impl>(options, executor, sample)) {}
 
-ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& executor, StateReader& kept)
+ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& executor,
+                               StateReader& kept)
     : impl_(std::make_unique<Impl>(options, executor, kept)) {}
 
 ExternalSorter::~ExternalSorter() = default;
 
-std::uint64_t ExternalSorter::expected_spill() const noexcept { return impl_->expected_spill(); }
+std::uint64_t ExternalSorter::expected_spill() const noexcept {
+  return impl_->expected_spill();
+}
 
 void ExternalSorter::add(std::span<const PointRecord> records) {
   if (impl_->finished) throw std::invalid_argument("ExternalSorter::add after finish");
@@ -282,9 +295,13 @@ std::array<std::uint64_t, 2> ExternalSorter::digest() const noexcept {
   return impl_->digest;
 }
 
-void ExternalSorter::keep(StateWriter& state) { impl_->keep(state); }
+void ExternalSorter::keep(StateWriter& state) {
+  impl_->keep(state);
+}
 
-void ExternalSorter::discard_before(std::uint64_t record) { impl_->discard_before(record); }
+void ExternalSorter::discard_before(std::uint64_t record) {
+  impl_->discard_before(record);
+}
 
 std::unique_ptr<PointStream> ExternalSorter::finish(std::uint64_t first) {
   if (std::exchange(impl_->finished, true))
@@ -295,7 +312,9 @@ std::unique_ptr<PointStream> ExternalSorter::finish(std::uint64_t first) {
 }
 
 SortStatistics ExternalSorter::statistics() const noexcept {
-  const auto bytes_of = [](const std::optional<SpillFile>& file) { return file ? file->bytes() : 0; };
+  const auto bytes_of = [](const std::optional<SpillFile>& file) {
+    return file ? file->bytes() : 0;
+  };
   return {impl_->points, bytes_of(impl_->file) + bytes_of(impl_->nested), impl_->buckets};
 }
 

@@ -26,13 +26,16 @@ class PointStream {
 void pass_over(PointStream& points, std::uint64_t count);
 
 struct SortOptions {
-  /// All that this stage holds at once; at least 256 KiB. What is of no use is not touched: see plan_sort().
+  /// All that this stage holds at once; at least 256 KiB. What is of no use is not touched: see
+  /// plan_sort().
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
-  std::vector<std::filesystem::path> temp_dirs{"."};  ///< at least one; what is spilled is spread over them
-  /// About how many records will come; 0: not known. Those that are known not to fit leave for the disk sooner, in as many
-  /// ranges as let each fit.
+  std::vector<std::filesystem::path> temp_dirs{
+      "."};  ///< at least one; what is spilled is spread over them
+  /// About how many records will come; 0: not known. Those that are known not to fit leave for the
+  /// disk sooner, in as many ranges as let each fit.
   std::uint64_t expected = 0;
-  /// Names of the temporary files, which then stay and hold all records, whatever fits in memory; empty: they have none.
+  /// Names of the temporary files, which then stay and hold all records, whatever fits in memory;
+  /// empty: they have none.
   std::vector<std::filesystem::path> kept_files;
 };
 
@@ -45,23 +48,26 @@ struct SortStatistics {
 /// Sorts records by key; equal keys stay in the order in which they came, so the result depends on
 /// neither cap nor threads.
 ///
-/// Records collect in memory while there is little of them; more are partitioned on disk by splitters taken
-/// from the sample, and each bucket is radix-sorted in memory: while one is handed out the next is
-/// sorted and the one after it read. A bucket that turns out larger than memory is partitioned again.
-/// The temporary files have no names and vanish with the sorter.
-/// Threads: add() and next() are called from outside the bodies of the executor's loops.
+/// Records collect in memory while there is little of them; more are partitioned on disk by
+/// splitters taken from the sample, and each bucket is radix-sorted in memory: while one is handed
+/// out the next is sorted and the one after it read. A bucket that turns out larger than memory is
+/// partitioned again. The temporary files have no names and vanish with the sorter. Threads: add()
+/// and next() are called from outside the bodies of the executor's loops.
 class ExternalSorter {
  public:
   /// @param executor  must outlive the sorter
   /// @param sample    keys drawn evenly from the input, any order; a few thousand are enough; with
   ///                  fewer than 64 the first records that fill the memory serve instead
-  /// @throws std::invalid_argument when the cap is too small, std::bad_alloc; std::system_error (ENOSPC)
+  /// @throws std::invalid_argument when the cap is too small, std::bad_alloc; std::system_error
+  /// (ENOSPC)
   ///         when the directories have no room for what is expected
   ExternalSorter(const SortOptions& options, const Executor& executor,
                  std::span<const MortonKey> sample);
-  /// Goes on with the files of a sorter that was kept; nothing can be added. Its digest and statistics are known.
+  /// Goes on with the files of a sorter that was kept; nothing can be added. Its digest and
+  /// statistics are known.
   /// @param kept  from keep(), read to its end
-  /// @throws DataError when files or table are not what they were, also later by what finish() gives; std::system_error
+  /// @throws DataError when files or table are not what they were, also later by what finish()
+  /// gives; std::system_error
   ExternalSorter(const SortOptions& options, const Executor& executor, StateReader& kept);
   ~ExternalSorter();
 
@@ -73,11 +79,11 @@ class ExternalSorter {
   void add(std::span<const PointRecord> records);
   /// Order-independent digest of all records so far: the same set gives the same value.
   [[nodiscard]] std::array<std::uint64_t, 2> digest() const noexcept;
-  /// Of a sorter with kept_files: puts all records on the disk, and adds to `state` what another process needs to go on
-  /// with them. Nothing may be added afterwards. @throws as add()
+  /// Of a sorter with kept_files: puts all records on the disk, and adds to `state` what another
+  /// process needs to go on with them. Nothing may be added afterwards. @throws as add()
   void keep(StateWriter& state);
-  /// Gives back the disk of kept records before the one of this number in sorted order, as far as the buckets go that
-  /// lie whole before it. Threads: while others read the stream, too.
+  /// Gives back the disk of kept records before the one of this number in sorted order, as far as
+  /// the buckets go that lie whole before it. Threads: while others read the stream, too.
   void discard_before(std::uint64_t record);
   /// The sorted stream; this must outlive it. Nothing may be added afterwards. Its memory is given
   /// back when it has handed out all. @throws as add(); so does the stream's next()

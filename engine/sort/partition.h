@@ -22,8 +22,9 @@ inline constexpr std::size_t kCacheLineBytes = 64;
 /// What a WriteCombiner hands to memory at once.
 inline constexpr std::size_t kBurstBytes = 4 * kCacheLineBytes;
 
-/// Writes the first bytes of records to many places at once, a burst of cache lines at a time. A record stored on its own
-/// would fetch the cache line it goes to and, with more places than the TLB has entries, its page as well.
+/// Writes the first bytes of records to many places at once, a burst of cache lines at a time. A
+/// record stored on its own would fetch the cache line it goes to and, with more places than the
+/// TLB has entries, its page as well.
 ///
 ///   destination   | ......## | ######## | ####.... |   bursts from a line's start
 ///                        ^ begin of the class          a first and a last one may be partial
@@ -76,7 +77,8 @@ class WriteCombiner {
 #if defined(__SSE2__)
       const auto* from = reinterpret_cast<const __m128i*>(bursts_[c].bytes);
       auto* to = reinterpret_cast<__m128i*>(place.line);
-      for (std::size_t i = 0; i < kBurstBytes / sizeof(__m128i); ++i) _mm_stream_si128(to + i, _mm_load_si128(from + i));
+      for (std::size_t i = 0; i < kBurstBytes / sizeof(__m128i); ++i)
+        _mm_stream_si128(to + i, _mm_load_si128(from + i));
 #else
       std::memcpy(place.line, bursts_[c].bytes, kBurstBytes);
 #endif
@@ -135,9 +137,10 @@ class ClassCounts {
     });
   }
 
-  /// Of classes that are known, without a look at the records. @param class_of  each record's, in the same order
-  ClassCounts(std::span<const PointRecord> from, std::span<const std::uint16_t> class_of, std::size_t classes, std::size_t blocks,
-              const Executor& executor)
+  /// Of classes that are known, without a look at the records. @param class_of  each record's, in
+  /// the same order
+  ClassCounts(std::span<const PointRecord> from, std::span<const std::uint16_t> class_of,
+              std::size_t classes, std::size_t blocks, const Executor& executor)
       : from_(from), classes_(classes), counts_(blocks, std::vector<std::size_t>(classes, 0)) {
     each_block(executor, [&](std::size_t b) {
       const std::span<std::size_t> counts = counts_[b];

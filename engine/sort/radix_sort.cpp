@@ -2,6 +2,8 @@
 // the cache are sorted as 64-bit words of 32 key bits and an index, then moved once.
 //
 // Records move back and forth between the two arrays; each piece knows where it has to end.
+#include "engine/sort/radix_sort.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -13,7 +15,6 @@
 
 #include "engine/sort/external_sort.h"
 #include "engine/sort/partition.h"
-#include "engine/sort/radix_sort.h"
 
 namespace ptc {
 namespace {
@@ -76,11 +77,14 @@ void insertion_sort(std::uint64_t* words, std::size_t count) noexcept {
   }
 }
 
-// Sorts words by their windows, into `at`: a stable pass for each digit that is not the same in all, the lowest first.
+// Sorts words by their windows, into `at`: a stable pass for each digit that is not the same in
+// all, the lowest first.
 void sort_words(std::uint64_t* at, std::uint64_t* other, std::size_t count) noexcept {
   if (count <= kInsertionWords) return insertion_sort(at, count);
   std::array<std::array<std::uint16_t, kDigits>, kWindowBits / kDigitBits> starts{};
-  const auto digit = [](std::uint64_t word, std::size_t k) { return word >> (kIndexBits + k * kDigitBits) & (kDigits - 1); };
+  const auto digit = [](std::uint64_t word, std::size_t k) {
+    return word >> (kIndexBits + k * kDigitBits) & (kDigits - 1);
+  };
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t k = 0; k < starts.size(); ++k) ++starts[k][digit(at[i], k)];
   }

@@ -28,16 +28,19 @@ static_assert(kPageRecords * sizeof(PointRecord) % kDirectBytes == 0);
 // Parts of 94 MB hold pieces of each range that are long enough.
 constexpr std::uint64_t kPartRecords = kPageRecords * 4608;
 
-// A range is one bucket. Small ones are sorted sooner, but grouping by more ranges and reading more pieces takes longer:
-// this is the smallest of use. The largest should fit into a quarter of the memory although ranges differ.
+// A range is one bucket. Small ones are sorted sooner, but grouping by more ranges and reading more
+// pieces takes longer: this is the smallest of use. The largest should fit into a quarter of the
+// memory although ranges differ.
 constexpr std::uint64_t kLeastRangeRecords = 5 << 16, kMostRangeRecords = kPartRecords / 8 * 5;
 
 }  // namespace
 
 std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept {
   const std::uint64_t runs = 2 * std::uint64_t{plan.run_records} * sizeof(PointRecord);
-  // Grouping a run takes less than radix_sort() but for the first block and the numbers of the ranges.
-  const std::uint64_t work = radix_sort_bytes(plan.run_records, threads) + partition_bytes(plan.ranges) +
+  // Grouping a run takes less than radix_sort() but for the first block and the numbers of the
+  // ranges.
+  const std::uint64_t work = radix_sort_bytes(plan.run_records, threads) +
+                             partition_bytes(plan.ranges) +
                              plan.run_records * sizeof(std::uint16_t);
   return runs + work + 2 * plan.sample_keys * sizeof(MortonKey) + plan.read_bytes;
 }
@@ -46,11 +49,16 @@ SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads, std::uint64_t e
   if (memory_bytes < kLeastBytes)
     throw std::invalid_argument("SortOptions::memory_bytes: less than 256 KiB");
   SortPlan plan;
-  const std::uint64_t usual = expected == 0 ? kUsualRanges : std::clamp(expected / kLeastRangeRecords, kLeastRanges, kUsualRanges);
+  const std::uint64_t usual =
+      expected == 0 ? kUsualRanges
+                    : std::clamp(expected / kLeastRangeRecords, kLeastRanges, kUsualRanges);
   const std::uint64_t wanted = std::clamp(expected / kMostRangeRecords + 1, usual, kMostRanges);
-  plan.ranges = static_cast<std::size_t>(std::clamp(memory_bytes / 2 / kPieceBytes, kLeastRanges, wanted));
+  plan.ranges =
+      static_cast<std::size_t>(std::clamp(memory_bytes / 2 / kPieceBytes, kLeastRanges, wanted));
   const std::uint64_t keys_of_cap = memory_bytes / 64 / sizeof(MortonKey) / plan.ranges;
-  plan.sample_keys = static_cast<std::size_t>(std::clamp(keys_of_cap, kLeastSampleKeys, kMostSampleKeys)) * plan.ranges;
+  plan.sample_keys =
+      static_cast<std::size_t>(std::clamp(keys_of_cap, kLeastSampleKeys, kMostSampleKeys)) *
+      plan.ranges;
 
   plan.read_bytes =
       static_cast<std::size_t>(std::clamp(memory_bytes / 64, kLeastReadBytes, kMostReadBytes));

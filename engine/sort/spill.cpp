@@ -30,14 +30,17 @@ std::uint64_t sample_position(std::uint64_t i, std::uint64_t count, std::uint64_
   return begin + (mixed ^ mixed >> 31) % (end - begin);
 }
 
-/// A disk, a quota or what the file system allows a file is used up: another directory may have room.
+/// A disk, a quota or what the file system allows a file is used up: another directory may have
+/// room.
 bool is_full(const std::error_code& code) noexcept {
   return code.value() == ENOSPC || code.value() == EDQUOT || code.value() == EFBIG;
 }
 
-/// Of what goes to the disk of records from the i-th of a run's part on. Those of its pieces add up to that of the part.
+/// Of what goes to the disk of records from the i-th of a run's part on. Those of its pieces add up
+/// to that of the part.
 /// @param stride  bytes from record to record
-std::uint64_t digest_of(std::span<const std::byte> records, std::size_t stride, std::uint64_t i) noexcept {
+std::uint64_t digest_of(std::span<const std::byte> records, std::size_t stride,
+                        std::uint64_t i) noexcept {
   return xxh3_64_sum(records, kSpilledBytes, stride, i);
 }
 
@@ -49,10 +52,12 @@ void unpack(const std::byte* bytes, std::span<PointRecord> out) noexcept {
   }
 }
 
-void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::span<std::byte> buffer) {
+void read_piece(const SpillFile& file, const SpillReader::Piece& piece,
+                std::span<std::byte> buffer) {
   SpillPlace place = piece.place;
   for (std::span<PointRecord> out = piece.out; !out.empty();) {
-    const std::size_t count = std::min(out.size(), (buffer.size() - place.offset % kDirectBytes) / kSpilledBytes);
+    const std::size_t count =
+        std::min(out.size(), (buffer.size() - place.offset % kDirectBytes) / kSpilledBytes);
     const DirectRange range(place.offset, count * kSpilledBytes);
     file.read_at({place.volume, range.begin}, buffer.first(range.whole));
     unpack(buffer.data() + range.lead, out.first(count));
@@ -62,10 +67,12 @@ void read_piece(const SpillFile& file, const SpillReader::Piece& piece, std::spa
 }
 
 void write_pieces(DirectFile& file, std::uint64_t offset, std::span<const std::byte> bytes) {
-  for_each_transfer((bytes.size() + kPieceBytes - 1) / kPieceBytes, [&](std::size_t i, std::size_t) {
-    const std::size_t begin = i * kPieceBytes;
-    file.write_at(offset + begin, bytes.subspan(begin, std::min(kPieceBytes, bytes.size() - begin)));
-  });
+  for_each_transfer(
+      (bytes.size() + kPieceBytes - 1) / kPieceBytes, [&](std::size_t i, std::size_t) {
+        const std::size_t begin = i * kPieceBytes;
+        file.write_at(offset + begin,
+                      bytes.subspan(begin, std::min(kPieceBytes, bytes.size() - begin)));
+      });
 }
 
 }  // namespace
@@ -76,7 +83,8 @@ SpillFile::SpillFile(std::span<const std::filesystem::path> directories) {
 
 SpillFile SpillFile::named(std::span<const std::filesystem::path> names) {
   SpillFile file;
-  for (const auto& name : names) file.volumes_.push_back(std::make_unique<Volume>(name, DirectFile::Kept::made, 0));
+  for (const auto& name : names)
+    file.volumes_.push_back(std::make_unique<Volume>(name, DirectFile::Kept::made, 0));
   return file;
 }
 
@@ -107,7 +115,9 @@ std::vector<std::uint32_t> SpillFile::by_room(std::uint64_t bytes) const {
     std::error_code unknown;  // a write tells what is wrong
     const std::uint64_t free = std::filesystem::space(volume->place, unknown).available;
     const auto used = static_cast<double>(volume->end + bytes);
-    fill.push_back(unknown ? used : used / (static_cast<double>(volume->end) + static_cast<double>(free) + 1.0));
+    fill.push_back(
+        unknown ? used
+                : used / (static_cast<double>(volume->end) + static_cast<double>(free) + 1.0));
   }
   std::vector<std::uint32_t> order(volumes_.size());
   std::iota(order.begin(), order.end(), 0U);
@@ -145,8 +155,9 @@ void SpillFile::read_at(const SpillPlace& place, std::span<std::byte> bytes) con
 }
 
 void SpillFile::refuse(const SpillPlace& place, std::size_t points) const {
-  throw DataError(volumes_[place.volume]->place.string() + ": offset " + std::to_string(place.offset) + ": the " +
-                  std::to_string(points) + " points there are not what was written");
+  throw DataError(volumes_[place.volume]->place.string() + ": offset " +
+                  std::to_string(place.offset) + ": the " + std::to_string(points) +
+                  " points there are not what was written");
 }
 
 void SpillFile::discard(const SpillPlace& place, std::uint64_t bytes) const noexcept {
@@ -176,17 +187,20 @@ void SpillReader::read(const SpillFile& file, std::span<const Piece> pieces) {
 Partition::Partition(SpillFile& file, Splitters splitters, bool kept)
     : file_(file), splitters_(std::move(splitters)), kept_(kept) {}
 
-Partition::Partition(SpillFile& file, StateReader& state) : file_(file), splitters_(state), kept_(true) {
+Partition::Partition(SpillFile& file, StateReader& state)
+    : file_(file), splitters_(state), kept_(true) {
   const std::uint64_t ends = ranges() + 1;
   for (std::uint64_t count = state.get<std::uint64_t>(); count > 0; --count) {
     Run& run = runs_.emplace_back();
     run.place = {state.get<std::uint32_t>(), state.get<std::uint64_t>()};
     for (std::uint64_t i = 0; i < ends; ++i) {
       run.starts.push_back(state.get<std::uint32_t>());
-      state.require(i == 0 ? run.starts[i] == 0 : run.starts[i - 1] <= run.starts[i], "ranges of a run do not ascend");
+      state.require(i == 0 ? run.starts[i] == 0 : run.starts[i - 1] <= run.starts[i],
+                    "ranges of a run do not ascend");
     }
     for (std::uint64_t i = 0; i < ranges(); ++i) run.digests.push_back(state.get<std::uint64_t>());
-    state.require(file_.holds(run.place, run.starts.back() * kSpilledBytes), "a run past the end of its file");
+    state.require(file_.holds(run.place, run.starts.back() * kSpilledBytes),
+                  "a run past the end of its file");
   }
 }
 
@@ -208,36 +222,46 @@ std::uint64_t Partition::size(std::size_t range) const noexcept {
 }
 
 void Partition::discard(std::size_t range) const noexcept {
-  for (const Run& run : runs_) file_.discard(run.place_of(range, 0), run.size(range) * kSpilledBytes);
+  for (const Run& run : runs_)
+    file_.discard(run.place_of(range, 0), run.size(range) * kSpilledBytes);
 }
 
-void Partition::find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of) const noexcept {
-  for (std::size_t i = 0; i < records.size(); ++i) range_of[i] = static_cast<std::uint16_t>(splitters_(records[i].key));
+void Partition::find_ranges(std::span<const PointRecord> records,
+                            std::span<std::uint16_t> range_of) const noexcept {
+  for (std::size_t i = 0; i < records.size(); ++i)
+    range_of[i] = static_cast<std::uint16_t>(splitters_(records[i].key));
 }
 
-void Partition::find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of, const Executor& executor) const {
+void Partition::find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of,
+                            const Executor& executor) const {
   constexpr std::size_t kGrain = 1 << 14;
   executor.for_ranges(records.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     find_ranges(records.subspan(begin, end - begin), range_of.subspan(begin));
   });
 }
 
-Partition::Starts Partition::group_run(std::span<const PointRecord> records, std::span<const std::uint16_t> range_of,
-                                       std::span<std::byte> grouped, const Executor& executor) const {
+Partition::Starts Partition::group_run(std::span<const PointRecord> records,
+                                       std::span<const std::uint16_t> range_of,
+                                       std::span<std::byte> grouped,
+                                       const Executor& executor) const {
   const std::size_t blocks = partition_blocks(records.size(), ranges(), executor.threads());
   const ClassCounts counts(records, range_of, ranges(), blocks, executor);
-  const auto known = [&](const PointRecord& record) { return range_of[static_cast<std::size_t>(&record - records.data())]; };
+  const auto known = [&](const PointRecord& record) {
+    return range_of[static_cast<std::size_t>(&record - records.data())];
+  };
   counts.scatter_packed<kSpilledBytes>(grouped.data(), known, executor);
   const std::vector<std::size_t> starts = counts.starts();
   Starts ends(starts.size());
-  std::ranges::transform(starts, ends.begin(), [](std::size_t i) { return static_cast<std::uint32_t>(i); });
+  std::ranges::transform(starts, ends.begin(),
+                         [](std::size_t i) { return static_cast<std::uint32_t>(i); });
   return ends;
 }
 
 void Partition::write_run(std::span<const std::byte> grouped, Starts starts) {
   Run run{.place = {}, .starts = std::move(starts), .digests = {}};
   for (std::size_t range = 0; kept_ && range < ranges(); ++range) {
-    const auto part = grouped.subspan(run.starts[range] * kSpilledBytes, run.size(range) * kSpilledBytes);
+    const auto part =
+        grouped.subspan(run.starts[range] * kSpilledBytes, run.size(range) * kSpilledBytes);
     run.digests.push_back(digest_of(part, kSpilledBytes, 0));
   }
   run.place = file_.append(grouped.first(run.starts.back() * kSpilledBytes));
@@ -274,7 +298,8 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
     verify(first_run, first_at, out.first(filled));
     return filled;
   }
-  for (const SpillReader::Piece& piece : pieces) partition_->file_.discard(piece.place, piece.out.size() * kSpilledBytes);
+  for (const SpillReader::Piece& piece : pieces)
+    partition_->file_.discard(piece.place, piece.out.size() * kSpilledBytes);
   return filled;
 }
 
@@ -286,7 +311,8 @@ void BucketReader::verify(std::size_t run, std::size_t at, std::span<const Point
     digest_ += digest_of(std::as_bytes(records.first(count)), sizeof(PointRecord), at);
     records = records.subspan(count);
     if (at + count < size) return;
-    if (std::exchange(digest_, 0) != from.digests[range_]) partition_->file_.refuse(from.place_of(range_, 0), size);
+    if (std::exchange(digest_, 0) != from.digests[range_])
+      partition_->file_.refuse(from.place_of(range_, 0), size);
   }
 }
 

@@ -28,8 +28,8 @@ struct SpillPlace {
   std::uint64_t offset = 0;  ///< bytes
 };
 
-/// Temporary files of records, one volume in each of several directories. Threads: one appends, others may read and
-/// discard what it has appended.
+/// Temporary files of records, one volume in each of several directories. Threads: one appends,
+/// others may read and discard what it has appended.
 class SpillFile {
  public:
   /// @param directories  at least one
@@ -37,14 +37,16 @@ class SpillFile {
   explicit SpillFile(std::span<const std::filesystem::path> directories);
   /// Volumes with names, which stay; one that is there already is overwritten.
   [[nodiscard]] static SpillFile named(std::span<const std::filesystem::path> names);
-  /// Those of which save() told. @throws DataError when they are not what they were, std::system_error
+  /// Those of which save() told. @throws DataError when they are not what they were,
+  /// std::system_error
   [[nodiscard]] static SpillFile reopened(StateReader& state);
   /// Puts volumes with names on the disk, and tells what there is in them.
   void save(StateWriter& state);
 
-  /// Writes records to the volume that this leaves least full, by its directory's room; when there is none left, to
-  /// the others.
-  /// @param packed  kSpilledBytes of each, at an address that is a multiple of kDirectBytes, in memory that can be read up
+  /// Writes records to the volume that this leaves least full, by its directory's room; when there
+  /// is none left, to the others.
+  /// @param packed  kSpilledBytes of each, at an address that is a multiple of kDirectBytes, in
+  /// memory that can be read up
   ///                to the next such multiple behind them
   /// @return  their place, its offset a multiple of kDirectBytes
   /// @throws std::system_error naming the directory
@@ -54,8 +56,8 @@ class SpillFile {
   void read_at(const SpillPlace& place, std::span<std::byte> bytes) const;
   /// @throws DataError: so many points there are not what was written
   [[noreturn]] void refuse(const SpillPlace& place, std::size_t points) const;
-  /// Gives back the disk's blocks that end in these bytes, which are not read again, nor those in front of them in
-  /// their first block.
+  /// Gives back the disk's blocks that end in these bytes, which are not read again, nor those in
+  /// front of them in their first block.
   void discard(const SpillPlace& place, std::uint64_t bytes) const noexcept;
   /// Bytes appended so far.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
@@ -112,15 +114,20 @@ class Partition {
   /// Where each range begins in a run, and the end.
   using Starts = std::vector<std::uint32_t>;
 
-  /// Fills the front of `range_of` with the numbers of the ranges that records lie in. Threads: any time.
-  void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of) const noexcept;
-  void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of, const Executor& executor) const;
+  /// Fills the front of `range_of` with the numbers of the ranges that records lie in. Threads: any
+  /// time.
+  void find_ranges(std::span<const PointRecord> records,
+                   std::span<std::uint16_t> range_of) const noexcept;
+  void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of,
+                   const Executor& executor) const;
   /// Groups what goes to the disk of a run, stable. Threads: while another run is written, too.
   /// @param range_of  each record's range
   /// @param grouped   for kSpilledBytes of each
-  [[nodiscard]] Starts group_run(std::span<const PointRecord> records, std::span<const std::uint16_t> range_of,
+  [[nodiscard]] Starts group_run(std::span<const PointRecord> records,
+                                 std::span<const std::uint16_t> range_of,
                                  std::span<std::byte> grouped, const Executor& executor) const;
-  /// Writes what group_run() has grouped, as SpillFile::append(). Runs come in the order of the input.
+  /// Writes what group_run() has grouped, as SpillFile::append(). Runs come in the order of the
+  /// input.
   void write_run(std::span<const std::byte> grouped, Starts starts);
 
   [[nodiscard]] std::size_t ranges() const noexcept { return splitters_.size(); }
@@ -134,9 +141,12 @@ class Partition {
   struct Run {
     SpillPlace place;
     Starts starts;
-    std::vector<std::uint64_t> digests;  // of each range in the run, when kept: a power cut may tear what is to be on the disk
+    std::vector<std::uint64_t> digests;  // of each range in the run, when kept: a power cut may
+                                         // tear what is to be on the disk
 
-    [[nodiscard]] std::size_t size(std::size_t range) const noexcept { return starts[range + 1] - starts[range]; }
+    [[nodiscard]] std::size_t size(std::size_t range) const noexcept {
+      return starts[range + 1] - starts[range];
+    }
     [[nodiscard]] SpillPlace place_of(std::size_t range, std::size_t i) const noexcept {
       return {place.volume, place.offset + (starts[range] + i) * kSpilledBytes};
     }
@@ -148,9 +158,9 @@ class Partition {
   std::vector<Run> runs_;
 };
 
-/// Reads the records of one range in the order of the input. What was read leaves the disk unless it is kept: ranges
-/// of a partition are read by ascending number. What is kept is compared with what was written, run by run, when all of
-/// the range there was read.
+/// Reads the records of one range in the order of the input. What was read leaves the disk unless
+/// it is kept: ranges of a partition are read by ascending number. What is kept is compared with
+/// what was written, run by run, when all of the range there was read.
 class BucketReader {
  public:
   BucketReader(std::shared_ptr<const Partition> partition, std::size_t range);
@@ -162,7 +172,8 @@ class BucketReader {
   /// True when all have the same key.
   [[nodiscard]] bool single_key() const noexcept;
   [[nodiscard]] bool kept() const noexcept { return partition_->kept_; }
-  /// Fills the front of `out`. @return how many. @throws DataError when what is kept is not what was written
+  /// Fills the front of `out`. @return how many. @throws DataError when what is kept is not what
+  /// was written
   [[nodiscard]] std::size_t read(std::span<PointRecord> out, SpillReader& reader);
   /// `count` keys, at least 1, from all parts of the range.
   [[nodiscard]] std::vector<MortonKey> sample(std::size_t count, SpillReader& reader) const;
@@ -174,8 +185,8 @@ class BucketReader {
   std::size_t range_;
   std::uint64_t size_ = 0;
   std::uint64_t left_ = 0;
-  std::size_t run_ = 0;  // where to read on
-  std::size_t at_ = 0;   // in that run's part
+  std::size_t run_ = 0;       // where to read on
+  std::size_t at_ = 0;        // in that run's part
   std::uint64_t digest_ = 0;  // of what was read of that part
 };
 

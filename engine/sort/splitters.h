@@ -40,7 +40,9 @@ class Splitters {
     const auto cell = static_cast<std::size_t>((k - keys_.front()) >> shift_);
     const std::size_t first = below_cell_[cell], last = below_cell_[cell + 1];
     // Seldom more than one splitter: then without a branch, which keys in no order would mislead.
-    if (last - first < 2) return first + (static_cast<std::size_t>(first < last) & static_cast<std::size_t>(keys_[first] <= k));
+    if (last - first < 2)
+      return first +
+             (static_cast<std::size_t>(first < last) & static_cast<std::size_t>(keys_[first] <= k));
     const Whole* const keys = keys_.data();
     return static_cast<std::size_t>(std::upper_bound(keys + first, keys + last, k) - keys);
   }

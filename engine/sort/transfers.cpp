@@ -7,7 +7,8 @@
 
 namespace ptc {
 
-void for_each_transfer(std::size_t count, const std::function<void(std::size_t i, std::size_t worker)>& body) {
+void for_each_transfer(std::size_t count,
+                       const std::function<void(std::size_t i, std::size_t worker)>& body) {
   std::atomic<std::size_t> next = 0;
   const auto work = [&](std::size_t worker) {
     for (std::size_t i = next++; i < count; i = next++) body(i, worker);

@@ -31,14 +31,17 @@ decltype(auto) at_offset(const InputFile& file, std::uint64_t base, Body&& body)
 /// was committed, its superblocks are damaged, or there is none: unfinished or truncated.
 [[nodiscard]] Superblock read_superblock(const InputFile& file, const FileHeader& header);
 
-/// Blocks before the end of a file that are searched for a superblock when it is not where it should be.
+/// Blocks before the end of a file that are searched for a superblock when it is not where it
+/// should be.
 inline constexpr std::uint64_t kSuperblockSearch = 256;
 
 /// Length that a whole superblock among them gives the file, when there is one.
-[[nodiscard]] std::optional<std::uint64_t> committed_length(const InputFile& file, const FileHeader& header);
+[[nodiscard]] std::optional<std::uint64_t> committed_length(const InputFile& file,
+                                                            const FileHeader& header);
 
 /// Bytes of the entries of directory page `index`.
-[[nodiscard]] std::size_t directory_page_entry_bytes(const Superblock& superblock, std::uint32_t index) noexcept;
+[[nodiscard]] std::size_t directory_page_entry_bytes(const Superblock& superblock,
+                                                     std::uint32_t index) noexcept;
 /// Reads the entries of directory page `index`, checksum verified.
 /// @param out  as many bytes as directory_page_entry_bytes()
 void read_directory_page(const InputFile& file, const Superblock& superblock, std::uint32_t index,

@@ -8,7 +8,8 @@ namespace ptc {
 
 std::uint32_t EntryTable::add(std::uint32_t pages) {
   const std::lock_guard lock(mutex_);
-  if (pages > kMaxPages - has_.size()) throw std::length_error("entry table: more pages than a container has");
+  if (pages > kMaxPages - has_.size())
+    throw std::length_error("entry table: more pages than a container has");
   const auto first = static_cast<std::uint32_t>(has_.size());
   has_.resize(has_.size() + pages);
   return first;

@@ -12,8 +12,8 @@
 
 namespace ptc {
 
-/// A directory as it grows, kept on the disk as it will be written: pages are numbered before they are, and lie in any
-/// order, so that what memory holds of a page until the end is one bit.
+/// A directory as it grows, kept on the disk as it will be written: pages are numbered before they
+/// are, and lie in any order, so that what memory holds of a page until the end is one bit.
 /// Threads: may be called concurrently.   Memory: a bit a page.
 class EntryTable {
  public:
@@ -24,7 +24,8 @@ class EntryTable {
   /// @return  number of the first. @throws std::length_error when that would be more than kMaxPages
   std::uint32_t add(std::uint32_t pages);
   [[nodiscard]] std::uint32_t size() const;
-  /// True when set() was called for the page. @throws std::out_of_range for a page that was not added
+  /// True when set() was called for the page. @throws std::out_of_range for a page that was not
+  /// added
   [[nodiscard]] bool has(std::uint32_t page) const;
   /// True when set() was called for every page.
   [[nodiscard]] bool complete() const;

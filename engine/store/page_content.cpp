@@ -30,11 +30,13 @@ void verify_references(const NodePage& nodes, std::span<const DirectoryEntry> en
   }
 }
 
-void verify_content(const PageHeader& page, std::span<const std::byte> payload, const PageRules& rules) {
+void verify_content(const PageHeader& page, std::span<const std::byte> payload,
+                    const PageRules& rules) {
   if (page.type == PageType::point) PointPage(payload, page.record_count).verify();
   if (page.type != PageType::node) return;
   if (rules.entries.empty()) {
-    static_cast<void>(NodePage(payload, page.record_count, kNoPage, std::numeric_limits<std::uint64_t>::max()));
+    static_cast<void>(
+        NodePage(payload, page.record_count, kNoPage, std::numeric_limits<std::uint64_t>::max()));
     return;
   }
   const auto pages = static_cast<std::uint32_t>(rules.entries.size());
@@ -59,8 +61,8 @@ GroupColumns columns_by_group(const Meta& meta) {
   return columns;
 }
 
-void decode_payload(const PageHeader& page, std::span<const std::byte> stored, const PageRules& rules,
-                    std::span<std::byte> out, PageDecoder& decoder) {
+void decode_payload(const PageHeader& page, std::span<const std::byte> stored,
+                    const PageRules& rules, std::span<std::byte> out, PageDecoder& decoder) {
   const std::span<std::byte> payload = out.first(page.raw_bytes);
   try {
     decoder.decode(page.coding, stored, payload, columns_of(page, rules));

@@ -75,7 +75,8 @@ struct ContainerReader::Impl {
                     PageDecoder& decoder) const {
     return at_offset(file, entry(page).offset, [&] {
       const PageHeader found = checked_header(page, image);
-      decode_payload(found, image.subspan(kPageHeaderBytes), {entries, superblock.points, &columns}, out, decoder);
+      decode_payload(found, image.subspan(kPageHeaderBytes), {entries, superblock.points, &columns},
+                     out, decoder);
       return found;
     });
   }

@@ -26,7 +26,7 @@ class ContainerReader {
   explicit ContainerReader(const std::filesystem::path& path);
   ~ContainerReader();
 
-  static constexpr std::uint64_t kPageBytes = 36;      ///< of memory a page
+  static constexpr std::uint64_t kPageBytes = 36;       ///< of memory a page
   static constexpr std::uint64_t kMostPageBytes = 100;  ///< while it opens
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
@@ -42,7 +42,8 @@ class ContainerReader {
   [[nodiscard]] std::span<const std::uint32_t> point_pages() const noexcept;
   [[nodiscard]] std::span<const std::uint32_t> node_pages() const noexcept;
   [[nodiscard]] std::span<const std::uint32_t> attribute_pages(std::uint16_t group) const;
-  /// Columns of a group's attribute pages, for ContainerWriter::write_page(); none where there is no such group.
+  /// Columns of a group's attribute pages, for ContainerWriter::write_page(); none where there is
+  /// no such group.
   [[nodiscard]] std::span<const PackedColumn> attribute_columns(std::uint16_t group) const;
 
   /// Reads, verifies and decodes a page's payload. Point and node pages also pass the checks of
@@ -54,8 +55,8 @@ class ContainerReader {
   PageHeader read_page(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder) const;
   /// The same of a page whose bytes are at hand.
   /// @param image  page_range() of file()
-  PageHeader decode_page(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
-                         PageDecoder& decoder) const;
+  PageHeader decode_page(std::uint32_t page, std::span<const std::byte> image,
+                         std::span<std::byte> out, PageDecoder& decoder) const;
   /// Where the header and the stored bytes of a page are.
   struct PageRange {
     std::uint64_t offset = 0;

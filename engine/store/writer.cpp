@@ -45,7 +45,8 @@ FileHeader make_header(const WriterOptions& options) {
   header.uuid = options.uuid;
   header.page_shift = options.page_shift;
   header.frame = options.frame;
-  refuse_what_readers_refuse([&] { static_cast<void>(decode_file_header(encode_file_header(header))); });
+  refuse_what_readers_refuse(
+      [&] { static_cast<void>(decode_file_header(encode_file_header(header))); });
   return header;
 }
 
@@ -80,7 +81,8 @@ struct ContainerWriter::Impl {
     const auto check = [&](bool holds, const char* text) {
       if (!holds) throw DataError(partial.string() + ": " + text);
     };
-    check(in.size() >= end && end >= kBlockBytes, "the unfinished container is shorter than it was");
+    check(in.size() >= end && end >= kBlockBytes,
+          "the unfinished container is shorter than it was");
     Block block;
     in.read_at(0, block);
     check(block == encode_file_header(header), "it is no unfinished container of this scene");
@@ -89,7 +91,8 @@ struct ContainerWriter::Impl {
       std::array<std::byte, kPageHeaderBytes> bytes;
       in.read_at(at, bytes);
       const PageHeader page = at_offset(in, at, [&] { return decode_page_header(bytes, header); });
-      check(page.page_id < entries.size() && !entries.has(page.page_id), "a page that was not written");
+      check(page.page_id < entries.size() && !entries.has(page.page_id),
+            "a page that was not written");
       entries.set(page.page_id, entry_of(page, at));
       at += extent_bytes(page.stored_bytes);
     }
@@ -159,13 +162,16 @@ struct ContainerWriter::Impl {
   };
 
   Encoding& encoding(std::size_t thread) {
-    while (encodings.size() <= thread) encodings.push_back(std::make_unique<Encoding>(codec, level));
+    while (encodings.size() <= thread)
+      encodings.push_back(std::make_unique<Encoding>(codec, level));
     return *encodings[thread];
   }
 
-  void encode_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
-                   std::span<const PackedColumn> columns, Encoding& with, Image& image) const {
-    require(!payload.empty() && payload.size() <= payload_limit(), "a payload that is empty or longer than a page");
+  void encode_page(std::uint32_t page_id, const PageFacts& facts,
+                   std::span<const std::byte> payload, std::span<const PackedColumn> columns,
+                   Encoding& with, Image& image) const {
+    require(!payload.empty() && payload.size() <= payload_limit(),
+            "a payload that is empty or longer than a page");
     image.page = page_header(page_id, facts);
     image.page.raw_bytes = static_cast<std::uint32_t>(payload.size());
     if (facts.type == PageType::point) columns = packed_point_columns();
@@ -196,7 +202,8 @@ struct ContainerWriter::Impl {
     static_cast<void>(encoding(executor.threads() - 1));
     const auto write = [this, pages = std::move(pages), &executor] {
       executor.for_each(pages.size(), [&](std::size_t i, unsigned thread) {
-        encode_page(pages[i].id, pages[i].facts, pages[i].payload, {}, *encodings[thread], images[i]);
+        encode_page(pages[i].id, pages[i].facts, pages[i].payload, {}, *encodings[thread],
+                    images[i]);
       });
       for (const Image& image : std::span(images).first(pages.size())) append_page(image);
     };
@@ -238,15 +245,18 @@ struct ContainerWriter::Impl {
     if (superblock.writer.empty()) superblock.writer = writer_name();
   }
 
-  std::vector<DirectoryEntry> decode_directory(std::span<const std::byte> all, std::uint64_t file_bytes) const {
+  std::vector<DirectoryEntry> decode_directory(std::span<const std::byte> all,
+                                               std::uint64_t file_bytes) const {
     std::vector<DirectoryEntry> pages;
     pages.reserve(entries.size());
-    for (; !all.empty(); all = all.subspan(kDirectoryEntryBytes)) pages.push_back(decode_directory_entry(all, header, file_bytes));
+    for (; !all.empty(); all = all.subspan(kDirectoryEntryBytes))
+      pages.push_back(decode_directory_entry(all, header, file_bytes));
     return pages;
   }
 
   /// The commit record, once it and the pages are what a reader takes.
-  Block encode_checked(Superblock& superblock, std::span<const std::byte> directory, const Meta& meta) const {
+  Block encode_checked(Superblock& superblock, std::span<const std::byte> directory,
+                       const Meta& meta) const {
     Block block{};
     refuse_what_readers_refuse([&] {
       const std::vector<DirectoryEntry> pages = decode_directory(directory, superblock.file_bytes);
@@ -297,7 +307,8 @@ ContainerWriter::ContainerWriter(const std::filesystem::path& target, const Writ
 
 ContainerWriter::~ContainerWriter() = default;
 
-ContainerWriter::ContainerWriter(const std::filesystem::path& target, const WriterOptions& options, const WriterState& state)
+ContainerWriter::ContainerWriter(const std::filesystem::path& target, const WriterOptions& options,
+                                 const WriterState& state)
     : impl_(std::make_unique<Impl>(target, options, state)) {}
 
 WriterState ContainerWriter::state() {
@@ -305,15 +316,20 @@ WriterState ContainerWriter::state() {
   return {impl_->entries.size(), impl_->end};
 }
 
-void ContainerWriter::sync() { impl_->file.sync(); }
+void ContainerWriter::sync() {
+  impl_->file.sync();
+}
 
 std::uint64_t ContainerWriter::writing_bytes(std::uint8_t page_shift, unsigned threads) noexcept {
   return threads * (kEncoderBytes + (std::uint64_t{2} << page_shift));
 }
 
-std::uint64_t ContainerWriter::finish_bytes(std::uint64_t pages) noexcept { return pages * kPageBytes; }
+std::uint64_t ContainerWriter::finish_bytes(std::uint64_t pages) noexcept {
+  return pages * kPageBytes;
+}
 
-std::uint64_t ContainerWriter::memory_bytes(std::uint64_t pages, std::uint8_t page_shift, unsigned threads) noexcept {
+std::uint64_t ContainerWriter::memory_bytes(std::uint64_t pages, std::uint8_t page_shift,
+                                            unsigned threads) noexcept {
   return finish_bytes(pages) + writing_bytes(page_shift, threads);
 }
 
@@ -329,7 +345,8 @@ std::uint32_t ContainerWriter::reserve_page() {
   return impl_->reserve();
 }
 
-void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
+void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts,
+                                 std::span<const std::byte> payload,
                                  std::span<const PackedColumn> columns) {
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
@@ -337,9 +354,12 @@ void ContainerWriter::write_page(std::uint32_t page_id, const PageFacts& facts, 
 }
 
 void ContainerWriter::write_pages(std::vector<Page> pages, const Executor& executor) {
-  require(std::ranges::none_of(pages, [](const Page& page) {
-            return page.facts.type == PageType::directory || page.facts.type == PageType::meta || page.facts.type == PageType::attribute;
-          }),
+  require(std::ranges::none_of(pages,
+                               [](const Page& page) {
+                                 return page.facts.type == PageType::directory ||
+                                        page.facts.type == PageType::meta ||
+                                        page.facts.type == PageType::attribute;
+                               }),
           "write_pages() is for pages of points and nodes");
   impl_->write_pages(std::move(pages), executor);
 }
@@ -348,12 +368,13 @@ void ContainerWriter::flush() {
   impl_->wait();
 }
 
-void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
-                                        std::uint32_t raw_bytes,
+void ContainerWriter::write_stored_page(std::uint32_t page_id, const PageFacts& facts,
+                                        Coding coding, std::uint32_t raw_bytes,
                                         std::span<const std::byte> stored) {
   require(facts.type != PageType::directory && facts.type != PageType::meta,
           "directory and meta page are written by finish()");
-  require(!stored.empty() && stored.size() <= impl_->payload_limit(), "a stored payload that is empty or longer than a page");
+  require(!stored.empty() && stored.size() <= impl_->payload_limit(),
+          "a stored payload that is empty or longer than a page");
   impl_->begin_page();
   Impl::Image& image = impl_->single;
   image.page = impl_->page_header(page_id, facts);

@@ -21,13 +21,14 @@ struct WriterOptions {
   int level = 1;  ///< of zstd, clamped to its range
   Uuid uuid{};
   Frame frame;
-  /// Name of the file until it is published, under which it stays when it is not; empty: a temporary one.
+  /// Name of the file until it is published, under which it stays when it is not; empty: a
+  /// temporary one.
   std::filesystem::path partial;
 };
 
 /// How far a writer got.
 struct WriterState {
-  std::uint32_t pages = 0;  ///< reserved
+  std::uint32_t pages = 0;          ///< reserved
   std::uint64_t end = kBlockBytes;  ///< of those written
 };
 
@@ -44,18 +45,25 @@ struct WriterState {
 /// Memory: memory_bytes().   Threads: one at a time.
 class ContainerWriter {
  public:
-  /// Most that a writer holds while pages are written, beside those that it is given: an encoder for each thread of write_pages().
-  [[nodiscard]] static std::uint64_t writing_bytes(std::uint8_t page_shift, unsigned threads) noexcept;
-  /// What finish() of so many pages takes: the directory, encoded and not, and its order. Until then it is on the disk.
+  /// Most that a writer holds while pages are written, beside those that it is given: an encoder
+  /// for each thread of write_pages().
+  [[nodiscard]] static std::uint64_t writing_bytes(std::uint8_t page_shift,
+                                                   unsigned threads) noexcept;
+  /// What finish() of so many pages takes: the directory, encoded and not, and its order. Until
+  /// then it is on the disk.
   [[nodiscard]] static std::uint64_t finish_bytes(std::uint64_t pages) noexcept;
   /// Both.
-  [[nodiscard]] static std::uint64_t memory_bytes(std::uint64_t pages, std::uint8_t page_shift, unsigned threads) noexcept;
+  [[nodiscard]] static std::uint64_t memory_bytes(std::uint64_t pages, std::uint8_t page_shift,
+                                                  unsigned threads) noexcept;
 
-  /// @throws std::invalid_argument when page_shift is not 12 to 20 or the frame breaks a rule of spec/morton.md#frame
+  /// @throws std::invalid_argument when page_shift is not 12 to 20 or the frame breaks a rule of
+  /// spec/morton.md#frame
   ContainerWriter(const std::filesystem::path& target, const WriterOptions& options);
-  /// Goes on with the partial file of a writer with the same options, whose state() this was; what lies behind is cut.
+  /// Goes on with the partial file of a writer with the same options, whose state() this was; what
+  /// lies behind is cut.
   /// @throws DataError when the file does not hold these pages
-  ContainerWriter(const std::filesystem::path& target, const WriterOptions& options, const WriterState& state);
+  ContainerWriter(const std::filesystem::path& target, const WriterOptions& options,
+                  const WriterState& state);
   ~ContainerWriter();
 
   [[nodiscard]] const FileHeader& header() const noexcept;
@@ -75,7 +83,8 @@ class ContainerWriter {
   [[nodiscard]] static PageFacts facts_of(const PageHeader& page) noexcept;
   /// Compresses, checksums and writes the page. Each reserved page must be written once.
   /// @param payload  1 to page size - 64 bytes
-  /// @param columns  of an attribute page, from packed_group_columns(); without them it is not packed
+  /// @param columns  of an attribute page, from packed_group_columns(); without them it is not
+  /// packed
   void write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
                   std::span<const PackedColumn> columns = {});
   /// A page that is not compressed yet.
@@ -84,8 +93,9 @@ class ContainerWriter {
     PageFacts facts;
     std::vector<std::byte> payload;
   };
-  /// The same of several, compressed side by side; they lie in the file in their order here. Not of attribute pages.
-  /// With more than one thread they are on their way when this returns, and what goes wrong is thrown by a later call.
+  /// The same of several, compressed side by side; they lie in the file in their order here. Not of
+  /// attribute pages. With more than one thread they are on their way when this returns, and what
+  /// goes wrong is thrown by a later call.
   /// @param executor  must outlive the next call of flush() or finish()
   /// Memory: the pages and their stored bytes.
   void write_pages(std::vector<Page> pages, const Executor& executor);

@@ -1,11 +1,11 @@
 // Patterns that copies, disks and transfers leave (spec/recovery.md#causes).
 #include "engine/verify/diagnose.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <initializer_list>
+
+#include <fmt/format.h>
 
 #include "format/checksum.h"
 
@@ -31,7 +31,9 @@ Diagnosis find_flipped_bit(std::span<std::byte> bytes, const Whole& whole, FlipB
     bytes[bit / 8] ^= mask;
     const bool found = whole();
     bytes[bit / 8] ^= mask;
-    if (found) return {Cause::bit_flip, fmt::format("bit {} of the byte is flipped", bit % 8), bit / 8, 1, static_cast<unsigned>(bit % 8)};
+    if (found)
+      return {Cause::bit_flip, fmt::format("bit {} of the byte is flipped", bit % 8), bit / 8, 1,
+              static_cast<unsigned>(bit % 8)};
   }
   return {};
 }
@@ -70,14 +72,18 @@ Diagnosis diagnose_magic(std::span<const std::byte> begin) {
     return {Cause::text_mode, "it was encoded anew as UTF-8"};
   }
   if (begin.size() < 8) return {Cause::truncated, fmt::format("it has {} bytes", begin.size())};
-  if (all_zero(begin)) return {Cause::zeroed, fmt::format("its first {} bytes are zero", begin.size()), 0, begin.size()};
+  if (all_zero(begin))
+    return {Cause::zeroed, fmt::format("its first {} bytes are zero", begin.size()), 0,
+            begin.size()};
   if (is({0x1f, 0x8b})) return {Cause::foreign, "it is a gzip file"};
   if (is({0x28, 0xb5, 0x2f, 0xfd})) return {Cause::foreign, "it is a zstd file"};
   return {Cause::foreign, ""};
 }
 
-Diagnosis diagnose_sealed(std::span<std::byte> bytes, const std::function<void()>& decodes, FlipBudget& budget) {
-  if (all_zero(bytes)) return {Cause::zeroed, fmt::format("{} bytes are zero", bytes.size()), 0, bytes.size()};
+Diagnosis diagnose_sealed(std::span<std::byte> bytes, const std::function<void()>& decodes,
+                          FlipBudget& budget) {
+  if (all_zero(bytes))
+    return {Cause::zeroed, fmt::format("{} bytes are zero", bytes.size()), 0, bytes.size()};
   const auto whole = [&] {
     try {
       decodes();
@@ -95,7 +101,8 @@ Diagnosis diagnose_payload(std::span<std::byte> stored, std::uint64_t expected, 
     Diagnosis zeroed = zeroed_sectors(stored, offset);
     if (zeroed.cause == Cause::zeroed) return zeroed;
   }
-  return find_flipped_bit(stored, [&] { return xxh3_64(stored) == expected; }, budget);
+  return find_flipped_bit(
+      stored, [&] { return xxh3_64(stored) == expected; }, budget);
 }
 
 void apply(const Diagnosis& diagnosis, std::uint64_t offset, Finding& finding) {

@@ -14,19 +14,19 @@ namespace ptc {
 
 /// What a fault looks like it came from (spec/recovery.md#causes).
 enum class Cause : std::uint8_t {
-  unknown,      ///< bytes changed, and how cannot be told
-  bit_flip,     ///< one bit changed
-  zeroed,       ///< whole sectors are zero: a hole, as copies that lose blocks leave
-  swapped,      ///< another page of the file lies here
-  stale,        ///< a page of another file, or of an earlier version of this one
-  unfinished,   ///< the writer never finished
-  truncated,    ///< bytes are missing at the end
-  appended,     ///< bytes follow the end
-  text_mode,    ///< a transfer took the file for text
-  unreadable,   ///< the system could not read it
-  foreign,      ///< no file of this format
-  newer,        ///< a version or feature that this program does not know
-  writer,       ///< checksums are right and a rule is broken: so it was written
+  unknown,     ///< bytes changed, and how cannot be told
+  bit_flip,    ///< one bit changed
+  zeroed,      ///< whole sectors are zero: a hole, as copies that lose blocks leave
+  swapped,     ///< another page of the file lies here
+  stale,       ///< a page of another file, or of an earlier version of this one
+  unfinished,  ///< the writer never finished
+  truncated,   ///< bytes are missing at the end
+  appended,    ///< bytes follow the end
+  text_mode,   ///< a transfer took the file for text
+  unreadable,  ///< the system could not read it
+  foreign,     ///< no file of this format
+  newer,       ///< a version or feature that this program does not know
+  writer,      ///< checksums are right and a rule is broken: so it was written
 };
 
 /// The name that --json prints, e.g. "bit-flip".

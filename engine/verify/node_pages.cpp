@@ -11,13 +11,15 @@ NodePages::Place NodePages::page(std::uint32_t number) {
   if (found == pages_.end()) found = load(number);
   Page& page = found->second;
   page.used = ++clock_;
-  return {NodePage(page.payload.data(), page.header.record_count), page.payload.data(), page.header.coding.codec == Codec::raw};
+  return {NodePage(page.payload.data(), page.header.record_count), page.payload.data(),
+          page.header.coding.codec == Codec::raw};
 }
 
 std::unordered_map<std::uint32_t, NodePages::Page>::iterator NodePages::load(std::uint32_t page) {
   Page fresh;
   if (pages_.size() >= capacity_) {
-    const auto oldest = std::ranges::min_element(pages_, {}, [](const auto& entry) { return entry.second.used; });
+    const auto oldest =
+        std::ranges::min_element(pages_, {}, [](const auto& entry) { return entry.second.used; });
     fresh.payload = std::move(oldest->second.payload);
     pages_.erase(oldest);
   }

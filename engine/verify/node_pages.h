@@ -16,7 +16,8 @@ class NodePages {
  public:
   /// @param container  must outlive this
   /// @param capacity   pages, at least 1
-  NodePages(const ContainerReader& container, std::size_t capacity) : container_(container), capacity_(capacity) {}
+  NodePages(const ContainerReader& container, std::size_t capacity)
+      : container_(container), capacity_(capacity) {}
 
   struct Place {
     NodePage nodes;

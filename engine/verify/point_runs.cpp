@@ -1,10 +1,10 @@
 // Page by page (engine/verify/point_runs.h).
 #include "engine/verify/point_runs.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -28,7 +28,8 @@ void TreeReport::superblock(const char* clause, const std::string& text) const {
                  .text = text});
 }
 
-void TreeReport::page(std::uint32_t page, std::uint64_t from_header, const char* clause, const std::string& text) const {
+void TreeReport::page(std::uint32_t page, std::uint64_t from_header, const char* clause,
+                      const std::string& text) const {
   findings_.add({.cause = Cause::writer,
                  .level = 3,
                  .offset = container_.entry(page).offset + from_header,
@@ -37,7 +38,8 @@ void TreeReport::page(std::uint32_t page, std::uint64_t from_header, const char*
                  .text = fmt::format("page {}: {}", page, text)});
 }
 
-std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first, std::size_t count) {
+std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
+                                                            std::size_t count) {
   block_.clear();
   const std::uint64_t per_page = container_.superblock().points_per_page;
   for (std::uint64_t at = first; at < first + count;) {
@@ -48,7 +50,8 @@ std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
       page_ = page;
     }
     const PointPage points(payload_.data(), count_);
-    for (auto i = static_cast<std::uint32_t>(at % per_page); i < count_ && at < first + count; ++i, ++at) {
+    for (auto i = static_cast<std::uint32_t>(at % per_page); i < count_ && at < first + count;
+         ++i, ++at) {
       block_.push_back(points[i]);
     }
   }
@@ -58,18 +61,21 @@ std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
 
 void PointRuns::finish() const {
   const Superblock& s = container_.superblock();
-  if (next_ != s.points) report_.superblock(kCounts, fmt::format("leaves hold {} of {} points", next_, s.points));
+  if (next_ != s.points)
+    report_.superblock(kCounts, fmt::format("leaves hold {} of {} points", next_, s.points));
   compare("area", s.area, area_);
   for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
   if (s.bounds_low != low_ || s.bounds_high != high_) {
-    report_.superblock(kTotals, fmt::format("bounds are not those of the points, {} {} {} to {} {} {}", low_[0], low_[1],
-                                            low_[2], high_[0], high_[1], high_[2]));
+    report_.superblock(
+        kTotals, fmt::format("bounds are not those of the points, {} {} {} to {} {} {}", low_[0],
+                             low_[1], low_[2], high_[0], high_[1], high_[2]));
   }
 }
 
 void PointRuns::add(std::uint64_t number, const PointRecord& point) {
   if (point.key < last_) {
-    report_.page(page_, kPageHeaderBytes, kOrder, fmt::format("key of point {} is below the one before", number));
+    report_.page(page_, kPageHeaderBytes, kOrder,
+                 fmt::format("key of point {} is below the one before", number));
   }
   last_ = point.key;
   const std::array<double, 3> at = container_.header().frame.to_position(decode_morton(point.key));
@@ -85,7 +91,8 @@ void PointRuns::add(std::uint64_t number, const PointRecord& point) {
 
 void PointRuns::compare(const char* what, double said, double found) const {
   if (std::abs(said - found) <= kRelative * std::max(std::abs(said), std::abs(found))) return;
-  report_.superblock(kTotals, fmt::format("superblock says {} {}, the points have {}", what, said, found));
+  report_.superblock(kTotals,
+                     fmt::format("superblock says {} {}, the points have {}", what, said, found));
 }
 
 }  // namespace ptc

@@ -1,12 +1,13 @@
-// Two trees side by side: groups leave the builder in the order in which a walk of the stored tree leaves them.
+// Two trees side by side: groups leave the builder in the order in which a walk of the stored tree
+// leaves them.
 #include "engine/verify/rebuild.h"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstring>
 #include <optional>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "engine/build/container_points.h"
 #include "engine/build/octree.h"
@@ -25,7 +26,8 @@ std::vector<std::byte> content_of(const GroupView& group) {
   const auto bytes = group.bytes();
   std::vector<std::byte> content(bytes.begin(), bytes.end());
   for (unsigned i = 0; i < static_cast<unsigned>(group.size()); ++i) {
-    if ((group.interior_mask() >> i & 1) != 0) std::memset(content.data() + kGroupHeadBytes + 8 * std::size_t{i}, 0, 8);
+    if ((group.interior_mask() >> i & 1) != 0)
+      std::memset(content.data() + kGroupHeadBytes + 8 * std::size_t{i}, 0, 8);
   }
   return content;
 }
@@ -33,7 +35,8 @@ std::vector<std::byte> content_of(const GroupView& group) {
 /// The groups of a stored tree, children before parents.
 class StoredGroups {
  public:
-  StoredGroups(const ContainerReader& container, std::size_t cached_pages) : pages_(container, cached_pages) {
+  StoredGroups(const ContainerReader& container, std::size_t cached_pages)
+      : pages_(container, cached_pages) {
     const Superblock& s = container.superblock();
     if (s.points > 0) descend(s.root_page, s.root_slot);
   }
@@ -79,9 +82,7 @@ class StoredGroups {
 class Comparison : public GroupSink {
  public:
   Comparison(const ContainerReader& container, std::size_t cached_pages, Findings& findings)
-      : container_(container),
-        findings_(findings),
-        stored_(container, cached_pages) {}
+      : container_(container), findings_(findings), stored_(container, cached_pages) {}
 
   ChildRef add(const GroupView& group, std::uint64_t) override {
     const auto stored = take();
@@ -92,14 +93,16 @@ class Comparison : public GroupSink {
   std::array<std::uint64_t, 2> finish() {
     while (const auto stored = take()) differ(stored);  // the builder has no such groups
     if (differing_ == 0) return digest_;
-    findings_.add({.severity = container_.superblock().writer == writer_name() ? Severity::damage : Severity::warning,
+    findings_.add({.severity = container_.superblock().writer == writer_name() ? Severity::damage
+                                                                               : Severity::warning,
                    .cause = Cause::writer,
                    .level = 4,
                    .offset = container_.entry(first_.page).offset,
                    .page = first_.page,
                    .rule = kRebuild,
-                   .text = fmt::format("page {}: group {} is not what its points give; {} groups in all are not",
-                                       first_.page, first_.slot, differing_)});
+                   .text = fmt::format(
+                       "page {}: group {} is not what its points give; {} groups in all are not",
+                       first_.page, first_.slot, differing_)});
     return digest_;
   }
 
@@ -115,7 +118,8 @@ class Comparison : public GroupSink {
   }
 
   void differ(const std::optional<StoredGroups::Group>& stored) {
-    if (differing_++ == 0) first_ = stored.value_or(StoredGroups::Group{.page = container_.superblock().root_page});
+    if (differing_++ == 0)
+      first_ = stored.value_or(StoredGroups::Group{.page = container_.superblock().root_page});
   }
 
   const ContainerReader& container_;
@@ -128,8 +132,9 @@ class Comparison : public GroupSink {
 
 }  // namespace
 
-std::array<std::uint64_t, 2> compare_rebuilt(const ContainerReader& container, std::size_t cached_pages,
-                                             Findings& findings, const Executor& executor, Progress& progress) {
+std::array<std::uint64_t, 2> compare_rebuilt(const ContainerReader& container,
+                                             std::size_t cached_pages, Findings& findings,
+                                             const Executor& executor, Progress& progress) {
   const Superblock& s = container.superblock();
   Comparison comparison(container, cached_pages, findings);
   OctreeBuilder builder(comparison, std::max(1U, s.leaf_points), s.header.frame.unit(), executor);

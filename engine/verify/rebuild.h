@@ -12,12 +12,16 @@
 
 namespace ptc {
 
-/// Builds the octree again and compares it with the stored one group by group, every bit but where pages lie. A tree
-/// that differs is damage when this version of the program wrote it, else a warning: other writers round as they may.
+/// Builds the octree again and compares it with the stored one group by group, every bit but where
+/// pages lie. A tree that differs is damage when this version of the program wrote it, else a
+/// warning: other writers round as they may.
 /// @param container  whose tree verify_tree() found whole
 /// @return  the digest of the stored tree (spec/nodes.md#tree-digest)
 /// Memory: the cached pages, and what OctreeBuilder takes.
-[[nodiscard]] std::array<std::uint64_t, 2> compare_rebuilt(const ContainerReader& container, std::size_t cached_pages,
-                                                           Findings& findings, const Executor& executor, Progress& progress);
+[[nodiscard]] std::array<std::uint64_t, 2> compare_rebuilt(const ContainerReader& container,
+                                                           std::size_t cached_pages,
+                                                           Findings& findings,
+                                                           const Executor& executor,
+                                                           Progress& progress);
 
 }  // namespace ptc

@@ -1,8 +1,6 @@
 // From the pages that prove themselves to a new file (spec/recovery.md#salvage).
 #include "engine/verify/salvage.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -10,6 +8,8 @@
 #include <stdexcept>
 #include <system_error>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/build/build.h"
@@ -24,8 +24,9 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
-constexpr std::uint64_t kPageBytes = 320;                      // of a page of the file: its site, twice where pages moved, and two maps
-constexpr std::uint64_t kPagesOpen = 80;                       // of the build: one a level, and some
+constexpr std::uint64_t kPageBytes =
+    320;  // of a page of the file: its site, twice where pages moved, and two maps
+constexpr std::uint64_t kPagesOpen = 80;  // of the build: one a level, and some
 
 /// A page that is known of, and of a sound one of points the keys at its ends.
 struct Known {
@@ -36,7 +37,8 @@ struct Known {
 /// Points of the kept pages, page by page.
 class KeptPoints : public PointStream {
  public:
-  KeptPoints(SurveyedPage& page, FlipBudget& flips, const std::map<std::uint64_t, const PageSite*>& pages)
+  KeptPoints(SurveyedPage& page, FlipBudget& flips,
+             const std::map<std::uint64_t, const PageSite*>& pages)
       : page_(page), flips_(flips), next_(pages.begin()), end_(pages.end()) {}
 
   std::size_t next(std::span<PointRecord> out) override {
@@ -76,7 +78,8 @@ class Salvage {
     for (const auto& [group, columns] : survey_.columns) by_group_[group];
     find_sound_pages();
     rank_pages();
-    if (points_.empty()) refuse("spec/recovery.md#survey", "no point page is whole: there is nothing to salvage");
+    if (points_.empty())
+      refuse("spec/recovery.md#survey", "no point page is whole: there is nothing to salvage");
     write(target);
     return report_;
   }
@@ -87,12 +90,18 @@ class Salvage {
   }
 
   void require_what_it_takes() const {
-    if (!survey_.header) refuse("spec/recovery.md#survey", "neither the header nor a superblock is whole: no page proves that it is of this file");
-    if (survey_.header->feature_ro_compat != 0) refuse("spec/versions.md#features", "the file uses a feature that forbids to repair it");
+    if (!survey_.header)
+      refuse(
+          "spec/recovery.md#survey",
+          "neither the header nor a superblock is whole: no page proves that it is of this file");
+    if (survey_.header->feature_ro_compat != 0)
+      refuse("spec/versions.md#features", "the file uses a feature that forbids to repair it");
     const std::uint64_t page = std::uint64_t{1} << survey_.header->page_shift;
     const std::uint64_t least = kBaseBytes + kPageBytes * survey_.sites.size() + kPagesOpen * page;
     if (options_.memory_bytes < least) {
-      throw LimitError(fmt::format("the memory cap is too small to salvage this file: the least that works is {}M", (least >> 20) + 1));
+      throw LimitError(fmt::format(
+          "the memory cap is too small to salvage this file: the least that works is {}M",
+          (least >> 20) + 1));
     }
   }
 
@@ -105,8 +114,8 @@ class Salvage {
     return wanted ? &attribute_sites_[entry.group] : nullptr;
   }
 
-  /// Of several sites with one number the first that is sound counts. A page that is not where it should be may lie
-  /// elsewhere, if two were swapped.
+  /// Of several sites with one number the first that is sound counts. A page that is not where it
+  /// should be may lie elsewhere, if two were swapped.
   void find_sound_pages() {
     progress_.begin("check pages", survey_.sites.size(), "pages");
     bool lost = false;
@@ -201,7 +210,10 @@ class Salvage {
 
   void write(const std::filesystem::path& target) {
     const std::optional<Superblock>& before = survey_.superblock;
-    ContainerWriter writer(target, {.page_shift = survey_.header->page_shift, .codec = codec(), .uuid = new_uuid(), .frame = survey_.header->frame});
+    ContainerWriter writer(target, {.page_shift = survey_.header->page_shift,
+                                    .codec = codec(),
+                                    .uuid = new_uuid(),
+                                    .frame = survey_.header->frame});
     BuildOptions tree;
     if (before) tree.leaf_points = std::max(1U, before->leaf_points);
     KeptPoints points(*page_, flips_, points_);
@@ -210,9 +222,10 @@ class Salvage {
     progress_.end();
     for (const auto& [group, kept] : by_group_) write_channels(writer, group, kept, after.points);
     Meta meta = survey_.meta;
-    meta.text.insert_or_assign("salvaged", fmt::format("{} of {} points, {} of {} pages of channels", after.points,
-                                                       before ? std::to_string(before->points) : "an unknown number of",
-                                                       report_.attribute_pages, report_.attribute_pages_before));
+    meta.text.insert_or_assign(
+        "salvaged", fmt::format("{} of {} points, {} of {} pages of channels", after.points,
+                                before ? std::to_string(before->points) : "an unknown number of",
+                                report_.attribute_pages, report_.attribute_pages_before));
     report_.superblock = writer.finish(meta, std::move(after));
     report_.points = report_.superblock.points;
     const auto share = [](double part, double whole) { return whole > 0 ? part / whole : 1.0; };
@@ -222,22 +235,25 @@ class Salvage {
     report_.flux_share = share(flux(report_.superblock), flux(*before));
   }
 
-  void write_channels(ContainerWriter& writer, std::uint16_t group, const std::map<std::uint64_t, const PageSite*>& kept,
-                      std::uint64_t points) {
+  void write_channels(ContainerWriter& writer, std::uint16_t group,
+                      const std::map<std::uint64_t, const PageSite*>& kept, std::uint64_t points) {
     const std::vector<PackedColumn>& columns = survey_.columns.at(group);
     auto beside = points_.begin();
     const auto next_page = [&](std::span<std::byte> payload) {
       const auto& [rank, site] = *beside++;
       std::ranges::fill(payload, std::byte{0});
       const auto found = kept.find(rank);
-      if (found != kept.end() && !page_->check(*found->second, 3, flips_)) std::ranges::copy(page_->payload(), payload.begin());
+      if (found != kept.end() && !page_->check(*found->second, 3, flips_))
+        std::ranges::copy(page_->payload(), payload.begin());
       return site->entry.record_count;
     };
-    ChannelPager pager(columns, (std::size_t{1} << survey_.header->page_shift) - kPageHeaderBytes, next_page);
+    ChannelPager pager(columns, (std::size_t{1} << survey_.header->page_shift) - kPageHeaderBytes,
+                       next_page);
     const std::uint32_t full = points_per_page(writer.header());
     for (std::uint64_t left = points; left > 0;) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
-      writer.write_page(writer.reserve_page(), {.type = PageType::attribute, .group = group, .record_count = count},
+      writer.write_page(writer.reserve_page(),
+                        {.type = PageType::attribute, .group = group, .record_count = count},
                         pager.next(count), columns);
       left -= count;
     }
@@ -267,16 +283,18 @@ class Salvage {
   std::optional<SurveyedPage> page_;
   std::vector<PageSite> moved_;  ///< found by their headers
   Sites point_sites_;
-  std::map<std::uint16_t, Sites> attribute_sites_;  ///< by group
-  std::map<std::uint64_t, const PageSite*> points_;                             ///< by rank
-  std::map<std::uint16_t, std::map<std::uint64_t, const PageSite*>> by_group_;  ///< attribute pages, by rank
+  std::map<std::uint16_t, Sites> attribute_sites_;   ///< by group
+  std::map<std::uint64_t, const PageSite*> points_;  ///< by rank
+  std::map<std::uint16_t, std::map<std::uint64_t, const PageSite*>>
+      by_group_;  ///< attribute pages, by rank
   SalvageReport report_;
 };
 
 }  // namespace
 
-SalvageReport salvage_container(const std::filesystem::path& path, const std::filesystem::path& target,
-                                const SalvageOptions& options, Progress& progress) {
+SalvageReport salvage_container(const std::filesystem::path& path,
+                                const std::filesystem::path& target, const SalvageOptions& options,
+                                Progress& progress) {
   std::error_code absent;
   if (std::filesystem::equivalent(path, target, absent)) {
     throw std::invalid_argument("what is salvaged goes into another file than " + path.string());

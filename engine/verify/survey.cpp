@@ -1,11 +1,12 @@
-// From both ends of a file to its pages, past whatever is broken on the way (spec/recovery.md#survey).
+// From both ends of a file to its pages, past whatever is broken on the way
+// (spec/recovery.md#survey).
 #include "engine/verify/survey.h"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "engine/store/commit.h"
 #include "engine/store/structure.h"
@@ -19,7 +20,8 @@ constexpr std::size_t kScanBytes = std::size_t{1} << 20;
 
 /// Calls body(header, offset) for every sector that begins with the header of a page of this file.
 template <class Body>
-void for_each_page(const InputFile& file, const FileHeader& header, Progress& progress, const Body& body) {
+void for_each_page(const InputFile& file, const FileHeader& header, Progress& progress,
+                   const Body& body) {
   progress.begin("look for pages", file.size(), "bytes");
   std::vector<std::byte> chunk(kScanBytes);
   for (std::uint64_t at = 0; at < file.size(); at += kScanBytes) {
@@ -48,7 +50,8 @@ class Surveyor {
     look_at_superblocks();
     if (!open()) {
       if (survey_.superblock) look_at_directory();
-      const bool all_listed = survey_.superblock && survey_.sites.size() == survey_.superblock->page_count;
+      const bool all_listed =
+          survey_.superblock && survey_.sites.size() == survey_.superblock->page_count;
       if (!structure_only && !all_listed) scan();
       if (no_superblock_) report_end();
       std::ranges::sort(survey_.sites, {}, [](const PageSite& site) { return site.entry.offset; });
@@ -60,11 +63,13 @@ class Surveyor {
  private:
   Block read_block(std::uint64_t offset) const {
     Block block{};
-    file_.read_at(offset, std::span(block).first(std::min<std::uint64_t>(kBlockBytes, file_.size() - offset)));
+    file_.read_at(offset, std::span(block).first(
+                              std::min<std::uint64_t>(kBlockBytes, file_.size() - offset)));
     return block;
   }
 
-  void add(const FormatError& error, int level, const Diagnosis& diagnosis, std::uint64_t looked_at) {
+  void add(const FormatError& error, int level, const Diagnosis& diagnosis,
+           std::uint64_t looked_at) {
     Finding finding = finding_of(error, level);
     apply(diagnosis, looked_at, finding);
     findings_.add(std::move(finding));
@@ -88,9 +93,11 @@ class Surveyor {
     const std::string code = code_of(finding_of(error, 0));
     if (code == "header-version" || code == "header-features") return {Cause::newer};
     if (code == "header-length") return {Cause::truncated};
-    Diagnosis diagnosis = diagnose_sealed(bytes, [&] { static_cast<void>(decode_file_header(bytes)); }, flips_);
+    Diagnosis diagnosis = diagnose_sealed(
+        bytes, [&] { static_cast<void>(decode_file_header(bytes)); }, flips_);
     if (diagnosis.cause != Cause::unknown || code == "header-checksum") return diagnosis;
-    if (code == "header-magic") return diagnose_magic(bytes.first(std::min<std::size_t>(16, bytes.size())));
+    if (code == "header-magic")
+      return diagnose_magic(bytes.first(std::min<std::size_t>(16, bytes.size())));
     return {Cause::writer};
   }
 
@@ -124,13 +131,17 @@ class Surveyor {
       if (auto fault = look_at_copy(blocks[i], offset)) faults.push_back(std::move(*fault));
     }
     if (survey_.superblock && faults.empty() && blocks[0] != blocks[1]) {
-      const FormatError error(size - 2 * kBlockBytes, "spec/container.md#superblock-copies", "the two superblocks differ");
+      const FormatError error(size - 2 * kBlockBytes, "spec/container.md#superblock-copies",
+                              "the two superblocks differ");
       add(error, 0, {Cause::writer}, 0);
     }
     if (!survey_.superblock) {
-      if (const auto length = committed_length(file_, *survey_.header)) return report_length(*length);
+      if (const auto length = committed_length(file_, *survey_.header))
+        return report_length(*length);
       // Damaged ones are named; none at all is another matter.
-      std::erase_if(faults, [](const Finding& f) { return code_of(f) == "superblock-magic" && f.cause == Cause::unknown; });
+      std::erase_if(faults, [](const Finding& f) {
+        return code_of(f) == "superblock-magic" && f.cause == Cause::unknown;
+      });
       no_superblock_ = faults.empty();
     }
     for (Finding& fault : faults) findings_.add(std::move(fault));
@@ -145,8 +156,10 @@ class Surveyor {
     } catch (const FormatError& error) {
       Finding finding = finding_of(error.rebased(offset, ""), 0);
       const std::string code = code_of(finding);
-      Diagnosis diagnosis = diagnose_sealed(block, [&] { static_cast<void>(decode()); }, flips_);
-      if (diagnosis.cause == Cause::unknown && code != "superblock-magic" && code != "superblock-checksum") {
+      Diagnosis diagnosis = diagnose_sealed(
+          block, [&] { static_cast<void>(decode()); }, flips_);
+      if (diagnosis.cause == Cause::unknown && code != "superblock-magic" &&
+          code != "superblock-checksum") {
         diagnosis.cause = Cause::writer;
       }
       apply(diagnosis, offset, finding);
@@ -162,7 +175,8 @@ class Surveyor {
                    .offset = std::min(size, committed),
                    .bytes = longer ? by : 0,
                    .rule = "spec/container.md#superblock-length",
-                   .text = fmt::format("the file is {} bytes {} than its superblock says", by, longer ? "longer" : "shorter"),
+                   .text = fmt::format("the file is {} bytes {} than its superblock says", by,
+                                       longer ? "longer" : "shorter"),
                    .expected = std::to_string(committed),
                    .actual = std::to_string(size)});
     for (const std::uint64_t back : {2 * kBlockBytes, kBlockBytes}) {
@@ -187,7 +201,8 @@ class Surveyor {
     }
     const ContainerReader& container = *survey_.container;
     survey_.sites.reserve(container.page_count());
-    for (std::uint32_t page = 0; page < container.page_count(); ++page) list(page, container.entry(page));
+    for (std::uint32_t page = 0; page < container.page_count(); ++page)
+      list(page, container.entry(page));
     std::ranges::sort(survey_.sites, {}, [](const PageSite& site) { return site.entry.offset; });
     survey_.meta = container.meta();
     survey_.columns = columns_by_group(survey_.meta);
@@ -207,7 +222,8 @@ class Surveyor {
     for (std::uint32_t i = 0; i < s.directory_pages; ++i) {
       const std::uint64_t offset = directory_page_offset(s, i);
       const std::size_t bytes = directory_page_entry_bytes(s, i);
-      if (offset + kPageHeaderBytes + bytes > file_.size()) break;  // said already: the file is too short
+      if (offset + kPageHeaderBytes + bytes > file_.size())
+        break;  // said already: the file is too short
       entries.resize(bytes);
       try {
         read_directory_page(file_, s, i, entries);
@@ -230,7 +246,8 @@ class Surveyor {
       found.offset += kPageHeaderBytes;
       return found;
     } catch (const FormatError&) {
-      return diagnose_sealed(header, [&] { static_cast<void>(decode()); }, flips_);
+      return diagnose_sealed(
+          header, [&] { static_cast<void>(decode()); }, flips_);
     }
   }
 
@@ -239,7 +256,8 @@ class Surveyor {
     const std::uint32_t first = directory_page * directory_entries_per_page(s.header);
     for (std::uint32_t i = 0; i * kDirectoryEntryBytes < bytes.size(); ++i) {
       try {
-        list(first + i, decode_directory_entry(bytes.subspan(i * kDirectoryEntryBytes), s.header, s.file_bytes));
+        list(first + i, decode_directory_entry(bytes.subspan(i * kDirectoryEntryBytes), s.header,
+                                               s.file_bytes));
       } catch (const FormatError&) {  // the refusal of the whole names it
       }
     }
@@ -247,13 +265,14 @@ class Surveyor {
 
   /// Pages that are not listed, by the header that each has on a sector.
   void scan() {
-    for_each_page(file_, *survey_.header, progress_, [&](const PageHeader& header, std::uint64_t offset) {
-      if (header.type == PageType::directory) {
-        directory_end_ = offset + kPageHeaderBytes + header.stored_bytes;
-      } else if (header.page_id >= listed_.size() || !listed_[header.page_id]) {
-        survey_.sites.push_back({entry_of(header, offset), header.page_id});
-      }
-    });
+    for_each_page(file_, *survey_.header, progress_,
+                  [&](const PageHeader& header, std::uint64_t offset) {
+                    if (header.type == PageType::directory) {
+                      directory_end_ = offset + kPageHeaderBytes + header.stored_bytes;
+                    } else if (header.page_id >= listed_.size() || !listed_[header.page_id]) {
+                      survey_.sites.push_back({entry_of(header, offset), header.page_id});
+                    }
+                  });
   }
 
   void report_end() {
@@ -298,11 +317,13 @@ class Surveyor {
 
 }  // namespace
 
-Survey survey_file(const InputFile& file, Findings& findings, FlipBudget& flips, bool structure_only, Progress& progress) {
+Survey survey_file(const InputFile& file, Findings& findings, FlipBudget& flips,
+                   bool structure_only, Progress& progress) {
   return Surveyor(file, findings, flips, progress).run(structure_only);
 }
 
-std::vector<PageSite> find_pages(const InputFile& file, const FileHeader& header, Progress& progress) {
+std::vector<PageSite> find_pages(const InputFile& file, const FileHeader& header,
+                                 Progress& progress) {
   std::vector<PageSite> sites;
   for_each_page(file, header, progress, [&](const PageHeader& page, std::uint64_t offset) {
     if (page.type != PageType::directory) sites.push_back({entry_of(page, offset), page.page_id});

@@ -1,11 +1,11 @@
 // The rules of one page in the order of spec/container.md#opening, and what its damage looks like.
 #include "engine/verify/surveyed_page.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <system_error>
+
+#include <fmt/format.h>
 
 #include "format/bytes.h"
 #include "format/checksum.h"
@@ -23,7 +23,8 @@ constexpr char kValues[] = "spec/points.md#attribute-pages";
 
 constexpr std::size_t kPayloadHashAt = 48;  // in the page header
 
-void check_keys(const PageHeader& header, std::uint64_t first, std::uint64_t last, const char* whose) {
+void check_keys(const PageHeader& header, std::uint64_t first, std::uint64_t last,
+                const char* whose) {
   if (header.first_key == first && header.last_key == last) return;
   throw FormatError(32, kPageKeys, fmt::format("keys are not those of its {}", whose));
 }
@@ -36,7 +37,8 @@ void check_groups(const PageHeader& header, const NodePage& nodes) {
     first = std::min(first, nodes[slot].cell().high);
     last = std::max(last, nodes[slot].cell().high);
   }
-  if (least != header.level) throw FormatError(22, kPageLevel, "level is not the least of its groups");
+  if (least != header.level)
+    throw FormatError(22, kPageLevel, "level is not the least of its groups");
   check_keys(header, first, last, "groups");
 }
 
@@ -45,7 +47,8 @@ void check_values(const PageHeader& header, const Meta& meta, const std::byte* c
   const auto check = [&]<class T>(T infinity, std::size_t count, const std::string& name) {
     for (std::size_t i = 0; i < count; ++i) {
       if ((load<T>(column, i * sizeof(T)) & infinity) != infinity) continue;
-      throw FormatError(0, kValues, fmt::format("{} of point {} is not finite", name, i % header.record_count));
+      throw FormatError(0, kValues,
+                        fmt::format("{} of point {} is not finite", name, i % header.record_count));
     }
   };
   for (const Channel& channel : meta.channels) {
@@ -117,8 +120,10 @@ std::optional<Finding> SurveyedPage::check_header(const PageSite& site, FlipBudg
     const auto decode = [&] { static_cast<void>(decode_page_header(bytes, *survey_.header)); };
     Diagnosis seen = diagnose_sealed(bytes, decode, budget);
     if (code != "page-magic" && code != "page-checksum") seen = {Cause::writer};
-    if (code == "page-checksum" && seen.cause == Cause::unknown && image_.size() > kPageHeaderBytes &&
-        xxh3_64(stored().first(std::min<std::size_t>(stored().size(), load<std::uint32_t>(image_.data(), 12)))) ==
+    if (code == "page-checksum" && seen.cause == Cause::unknown &&
+        image_.size() > kPageHeaderBytes &&
+        xxh3_64(stored().first(
+            std::min<std::size_t>(stored().size(), load<std::uint32_t>(image_.data(), 12)))) ==
             load<std::uint64_t>(image_.data(), kPayloadHashAt)) {
       seen = {Cause::stale, "it is a whole page of another file"};
     }
@@ -130,12 +135,18 @@ std::optional<Finding> SurveyedPage::check_header(const PageSite& site, FlipBudg
 }
 
 std::optional<Finding> SurveyedPage::check_agreement(const PageSite& site) const {
-  if (header_.page_id == site.page && entry_of(header_, site.entry.offset) == site.entry) return std::nullopt;
-  Finding finding = finding_in(site, 1, {0, kAgreement, fmt::format("the page header is not what the directory says of page {}", site.page)});
+  if (header_.page_id == site.page && entry_of(header_, site.entry.offset) == site.entry)
+    return std::nullopt;
+  Finding finding = finding_in(
+      site, 1,
+      {0, kAgreement,
+       fmt::format("the page header is not what the directory says of page {}", site.page)});
   finding.cause = header_.page_id != site.page ? Cause::swapped : Cause::stale;
   finding.bytes = kPageHeaderBytes + header_.stored_bytes;
-  finding.expected = header_.page_id != site.page ? fmt::format("page {}", site.page) : "payload " + hex(site.entry.payload_xxh3);
-  finding.actual = header_.page_id != site.page ? fmt::format("page {}", header_.page_id) : "payload " + hex(header_.payload_xxh3);
+  finding.expected = header_.page_id != site.page ? fmt::format("page {}", site.page)
+                                                  : "payload " + hex(site.entry.payload_xxh3);
+  finding.actual = header_.page_id != site.page ? fmt::format("page {}", header_.page_id)
+                                                : "payload " + hex(header_.payload_xxh3);
   return finding;
 }
 
@@ -143,12 +154,15 @@ std::optional<Finding> SurveyedPage::check_payload(const PageSite& site, FlipBud
   const auto bytes = std::span(image_).subspan(kPageHeaderBytes);
   const std::uint64_t actual = xxh3_64(bytes);
   if (actual == header_.payload_xxh3) return std::nullopt;
-  Finding finding = finding_in(site, 2, {kPageHeaderBytes, kPayload, "payload's checksum is wrong"});
+  Finding finding =
+      finding_in(site, 2, {kPageHeaderBytes, kPayload, "payload's checksum is wrong"});
   finding.bytes = bytes.size();
   finding.expected = hex(header_.payload_xxh3);
   finding.actual = hex(actual);
   const std::uint64_t offset = site.entry.offset + kPageHeaderBytes;
-  apply(diagnose_payload(bytes, header_.payload_xxh3, header_.coding.codec != Codec::raw, offset, budget), offset, finding);
+  apply(diagnose_payload(bytes, header_.payload_xxh3, header_.coding.codec != Codec::raw, offset,
+                         budget),
+        offset, finding);
   if (repaired(finding, site.entry.offset)) return std::nullopt;
   return finding;
 }
@@ -167,7 +181,9 @@ bool SurveyedPage::has_content() const {
 /// Readers check it when they open the file, which this one may not be for them.
 void SurveyedPage::check_channels() const {
   if (header_.type != PageType::attribute) return;
-  if (header_.raw_bytes == header_.record_count * group_point_bytes(survey_.meta.channels, header_.group)) return;
+  if (header_.raw_bytes ==
+      header_.record_count * group_point_bytes(survey_.meta.channels, header_.group))
+    return;
   throw FormatError(16, kValues, "is not as long as its channels are");
 }
 

@@ -1,13 +1,13 @@
 // The levels of a verification, one after another (engine/verify/verify.h).
 #include "engine/verify/verify.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <memory>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/base/executor.h"
@@ -34,12 +34,16 @@ struct Extent {
 class FileCheck {
  public:
   FileCheck(const std::filesystem::path& path, const VerifyOptions& options)
-      : file_(path), options_(options), executor_(options.threads), findings_(options.keep_findings, options.fail_fast),
+      : file_(path),
+        options_(options),
+        executor_(options.threads),
+        findings_(options.keep_findings, options.fail_fast),
         flips_(options.flip_budget) {}
 
   VerifyReport run(Progress& progress) {
     try {
-      survey_ = survey_file(file_, findings_, flips_, options_.level == VerifyLevel::commit, progress);
+      survey_ =
+          survey_file(file_, findings_, flips_, options_.level == VerifyLevel::commit, progress);
       keep_to_cap();
       if (options_.level >= VerifyLevel::directory) {
         check_pages(progress);
@@ -60,7 +64,8 @@ class FileCheck {
     report_.warnings = findings_.warnings();
     report_.file_bytes = file_.size();
     report_.pages = survey_.sites.size();
-    report_.damaged_pages = static_cast<std::uint64_t>(std::ranges::count(survey_.sites, false, &PageSite::sound));
+    report_.damaged_pages =
+        static_cast<std::uint64_t>(std::ranges::count(survey_.sites, false, &PageSite::sound));
     if (survey_.superblock) report_.points = survey_.superblock->points;
     report_.superblock = survey_.superblock;
     report_.sites = std::move(survey_.sites);
@@ -71,17 +76,22 @@ class FileCheck {
     if (!survey_.superblock) return;
     const Superblock& s = *survey_.superblock;
     const std::uint64_t page = std::uint64_t{1} << s.header.page_shift;
-    const std::uint64_t groups = survey_.container ? s.node_groups : 0;  // a lone superblock may say anything
+    const std::uint64_t groups =
+        survey_.container ? s.node_groups : 0;  // a lone superblock may say anything
     const std::uint64_t fixed = kBaseBytes + 100 * survey_.sites.size() + groups / 8 +
                                 3 * page * executor_.threads() + 100 * s.leaf_points;
     const std::uint64_t least = fixed + kLeastCachedPages * page;
     if (options_.memory_bytes < least) {
-      throw LimitError(fmt::format("the memory cap is too small for this file: the least that works is {}M", (least >> 20) + 1));
+      throw LimitError(
+          fmt::format("the memory cap is too small for this file: the least that works is {}M",
+                      (least >> 20) + 1));
     }
-    cached_pages_ = static_cast<std::size_t>(std::min<std::uint64_t>(kMostCachedPages, (options_.memory_bytes - fixed) / page));
+    cached_pages_ = static_cast<std::size_t>(
+        std::min<std::uint64_t>(kMostCachedPages, (options_.memory_bytes - fixed) / page));
   }
 
-  /// What keeps readers from opening the file is a finding, unless it was found in a page or the directory.
+  /// What keeps readers from opening the file is a finding, unless it was found in a page or the
+  /// directory.
   void explain_refusal() {
     if (!survey_.refusal) return;
     const auto same = [&](const Finding& f) { return f.rule == survey_.refusal->rule; };
@@ -97,7 +107,8 @@ class FileCheck {
       read_ahead(first + count);
       executor_.for_each(count, [&](std::size_t i, unsigned thread) {
         if (!pages[thread]) pages[thread] = std::make_unique<SurveyedPage>(file_, survey_);
-        found[i] = pages[thread]->check(survey_.sites[first + i], static_cast<int>(options_.level), flips_);
+        found[i] = pages[thread]->check(survey_.sites[first + i], static_cast<int>(options_.level),
+                                        flips_);
       });
       for (std::size_t i = 0; i < count; ++i) {
         if (!found[i]) continue;
@@ -109,11 +120,13 @@ class FileCheck {
     progress.end();
   }
 
-  /// The pages of the next round, those from `first` on, come from the disk while others are checked.
+  /// The pages of the next round, those from `first` on, come from the disk while others are
+  /// checked.
   void read_ahead(std::size_t first) const noexcept {
     if (first >= survey_.sites.size() || options_.level < VerifyLevel::payload) return;
     const std::uint64_t begin = survey_.sites[first].entry.offset;
-    const std::uint64_t end = survey_.sites[std::min(first + kPagesAtOnce, survey_.sites.size()) - 1].end();
+    const std::uint64_t end =
+        survey_.sites[std::min(first + kPagesAtOnce, survey_.sites.size()) - 1].end();
     if (begin < end) file_.read_ahead(begin, end - begin);
   }
 
@@ -129,8 +142,10 @@ class FileCheck {
     // Directory pages were checked when the file was opened, all but what pads the last.
     const std::uint32_t full = directory_entries_per_page(s.header);
     const std::uint64_t entries = s.page_count - (s.directory_pages - 1) * std::uint64_t{full};
-    const std::uint64_t last = s.directory_offset + (std::uint64_t{s.directory_pages - 1} << s.header.page_shift);
-    check_zero({last + kPageHeaderBytes + entries * kDirectoryEntryBytes, s.file_bytes - 2 * kBlockBytes});
+    const std::uint64_t last =
+        s.directory_offset + (std::uint64_t{s.directory_pages - 1} << s.header.page_shift);
+    check_zero(
+        {last + kPageHeaderBytes + entries * kDirectoryEntryBytes, s.file_bytes - 2 * kBlockBytes});
   }
 
   void check_zero(Extent gap) {
@@ -138,7 +153,8 @@ class FileCheck {
     Finding finding{.level = 2, .rule = kPadding};
     int bits = 0;
     for (; gap.begin < gap.end; gap.begin += block.size()) {
-      const auto part = std::span(block).first(std::min<std::uint64_t>(block.size(), gap.end - gap.begin));
+      const auto part =
+          std::span(block).first(std::min<std::uint64_t>(block.size(), gap.end - gap.begin));
       file_.read_at(gap.begin, part);
       for (std::size_t i = 0; i < part.size(); ++i) {
         if (part[i] == std::byte{0}) continue;
@@ -157,7 +173,8 @@ class FileCheck {
     std::vector<bool> damaged(survey_.container->page_count());
     for (const PageSite& site : survey_.sites) damaged[site.page] = !site.sound;
     progress.begin("check tree", survey_.superblock->points, "points");
-    const TreeCounts tree = verify_tree(*survey_.container, damaged, cached_pages_, findings_, progress);
+    const TreeCounts tree =
+        verify_tree(*survey_.container, damaged, cached_pages_, findings_, progress);
     progress.end();
     report_.nodes = tree.nodes;
     report_.groups = tree.groups;
@@ -168,7 +185,8 @@ class FileCheck {
   void rebuild(Progress& progress) {
     progress.begin("build again", survey_.superblock->points, "points");
     try {
-      report_.tree_digest = compare_rebuilt(*survey_.container, cached_pages_, findings_, executor_, progress);
+      report_.tree_digest =
+          compare_rebuilt(*survey_.container, cached_pages_, findings_, executor_, progress);
     } catch (const FormatError&) {  // points that descend were found before, and have no tree
     }
     progress.end();
@@ -186,7 +204,8 @@ class FileCheck {
 
 }  // namespace
 
-VerifyReport verify_container(const std::filesystem::path& path, const VerifyOptions& options, Progress& progress) {
+VerifyReport verify_container(const std::filesystem::path& path, const VerifyOptions& options,
+                              Progress& progress) {
   return FileCheck(path, options).run(progress);
 }
 

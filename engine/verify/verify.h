@@ -41,25 +41,28 @@ struct VerifyReport {
   std::uint64_t pages = 0;          ///< that are listed or were found
   std::uint64_t damaged_pages = 0;  ///< of these
   std::uint64_t points = 0;
-  std::uint64_t nodes = 0;          ///< in groups that were reached
+  std::uint64_t nodes = 0;  ///< in groups that were reached
   std::uint64_t groups = 0;
   int levels = 0;
-  bool tree_checked = false;        ///< and whole: false where damage hides part of it
-  std::optional<std::array<std::uint64_t, 2>> tree_digest;  ///< of the stored tree (spec/nodes.md#tree-digest), level 4
-  std::vector<PageSite> sites;      ///< ascending by offset
+  bool tree_checked = false;  ///< and whole: false where damage hides part of it
+  std::optional<std::array<std::uint64_t, 2>>
+      tree_digest;              ///< of the stored tree (spec/nodes.md#tree-digest), level 4
+  std::vector<PageSite> sites;  ///< ascending by offset
   std::optional<Superblock> superblock;
 
   [[nodiscard]] bool sound() const noexcept { return damage == 0; }
 };
 
-/// Checks a container and reports every fault that the level looks for. What lies behind a fault is checked as far
-/// as it does not depend on what is damaged: pages one by one, and of the tree all that sound pages hold.
+/// Checks a container and reports every fault that the level looks for. What lies behind a fault is
+/// checked as far as it does not depend on what is damaged: pages one by one, and of the tree all
+/// that sound pages hold.
 ///
-/// Sums: what a child stores is what its points or its own children add up to, within the quantisation
-/// (spec/nodes.md#quantisation), and its sphere and cone hold theirs.
+/// Sums: what a child stores is what its points or its own children add up to, within the
+/// quantisation (spec/nodes.md#quantisation), and its sphere and cone hold theirs.
 /// @throws std::system_error; LimitError naming the least cap that works
-/// Memory: 100 bytes a page of the file, a bit a group, three pages a thread, and pages of nodes up to the cap.
-[[nodiscard]] VerifyReport verify_container(const std::filesystem::path& path, const VerifyOptions& options,
-                                            Progress& progress);
+/// Memory: 100 bytes a page of the file, a bit a group, three pages a thread, and pages of nodes up
+/// to the cap.
+[[nodiscard]] VerifyReport verify_container(const std::filesystem::path& path,
+                                            const VerifyOptions& options, Progress& progress);
 
 }  // namespace ptc

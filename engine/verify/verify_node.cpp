@@ -1,10 +1,10 @@
 // The bounds of quantisation, one function a quantity.
 #include "engine/verify/verify_node.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "format/scalar.h"
 
@@ -187,9 +187,10 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
     const double height = std::abs(dot(slab, position) - dot(slab, stored.mean)) +
                           static_cast<double>(points[i].radius) / unit * tilt;
     if (height > thickness && stored.thickness < kGreatestUfloat16) {
-      return Fault{kSlab, fmt::format("disc {} of the leaf reaches {} lattice units from the middle "
-                                      "plane, beyond the slab's {}",
-                                      i, height, stored.thickness)};
+      return Fault{kSlab,
+                   fmt::format("disc {} of the leaf reaches {} lattice units from the middle "
+                               "plane, beyond the slab's {}",
+                               i, height, stored.thickness)};
     }
     if (dot(normal, axis) < static_cast<double>(stored.cone_cos) - kAngleSlack) {
       return Fault{kCone, fmt::format("normal {} of the leaf is outside the cone", i)};

@@ -21,7 +21,8 @@ struct Fault {
 ///
 ///   mean      half a step of cell edge / 65536; a whole one at the upper end of the cell
 ///   radius    at least exact radius + |stored mean - exact mean|, at most 1 + 2^-8 times that
-///   slab      at least exact thickness + radius |stored normal - exact normal| + |stored mean - exact
+///   slab      at least exact thickness + radius |stored normal - exact normal| + |stored mean -
+///   exact
 ///             mean| or else the sphere's radius, at most 1 + 2^-8 times that
 ///   area      2^-9 of itself
 ///   facing    half a step of 1 / 65535 of the area, along each axis

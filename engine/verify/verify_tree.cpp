@@ -1,14 +1,14 @@
 // The octree against its points (spec/nodes.md#verify).
 #include "engine/verify/verify_tree.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "engine/build/octree.h"
 #include "engine/verify/node_pages.h"
@@ -31,12 +31,13 @@ constexpr char kRoot[] = "spec/container.md#superblock-root";
 struct OpenGroup {
   NodeGroup group;
   std::uint32_t page = 0;
-  std::uint64_t from_header = 0;  ///< where it lies in the page; of its payload when that is compressed
-  std::string place;              ///< for messages
-  std::size_t next = 0;           ///< child to be visited
-  std::uint64_t points = 0;       ///< in the children visited
-  int last_octant = -1;           ///< of the child before
-  bool complete = true;           ///< all children so far were visited whole
+  std::uint64_t from_header =
+      0;                     ///< where it lies in the page; of its payload when that is compressed
+  std::string place;         ///< for messages
+  std::size_t next = 0;      ///< child to be visited
+  std::uint64_t points = 0;  ///< in the children visited
+  int last_octant = -1;      ///< of the child before
+  bool complete = true;      ///< all children so far were visited whole
   std::array<NodeSummary, kMaxChildren> exact;  ///< of the children visited
 };
 
@@ -47,7 +48,8 @@ OpenGroup open_group(NodePages& pages, std::uint32_t page, std::uint16_t slot) {
   opened.group = place.nodes.decode(slot);
   opened.page = page;
   opened.from_header = kPageHeaderBytes + (place.raw ? at : 0);
-  opened.place = (place.raw ? "" : fmt::format("decoded byte {}: ", at)) + fmt::format("group {}: ", slot);
+  opened.place =
+      (place.raw ? "" : fmt::format("decoded byte {}: ", at)) + fmt::format("group {}: ", slot);
   return opened;
 }
 
@@ -94,8 +96,8 @@ class ReachedGroups {
 /// The walk: groups from the root to where it is now.
 class TreeWalk {
  public:
-  TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged, std::size_t cached_pages,
-           Findings& findings, Progress& progress)
+  TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged,
+           std::size_t cached_pages, Findings& findings, Progress& progress)
       : superblock_(container.superblock()),
         damaged_(damaged),
         report_(container, findings),
@@ -119,9 +121,11 @@ class TreeWalk {
   }
 
  private:
-  void require_equal(const char* clause, const char* what, std::uint64_t said, std::uint64_t found) const {
+  void require_equal(const char* clause, const char* what, std::uint64_t said,
+                     std::uint64_t found) const {
     if (said == found) return;
-    report_.superblock(clause, fmt::format("superblock says {} {}, the tree has {}", said, what, found));
+    report_.superblock(clause,
+                       fmt::format("superblock says {} {}, the tree has {}", said, what, found));
   }
 
   void fault(const OpenGroup& open, const char* clause, const std::string& text) const {
@@ -188,7 +192,8 @@ class TreeWalk {
     const NodeGroup& group = open.group;
     const NodeGroup& around = parent.group;
     if (group.level <= around.level) {
-      fault(open, kLevel, fmt::format("level {} is not below its parent's {}", group.level, around.level));
+      fault(open, kLevel,
+            fmt::format("level {} is not below its parent's {}", group.level, around.level));
       return false;
     }
     if (group.children.size() < 2) fault(open, kChildren, "has one child and is not the root");
@@ -210,7 +215,8 @@ class TreeWalk {
     if (open.group.level >= kLatticeBits || open.group.children.size() == 1) return;
     const int digit = octant(key, open.group.level + 1);
     if (digit <= open.last_octant) {
-      fault(open, kChildren, fmt::format("child {} is not in an octant behind the one before", open.next));
+      fault(open, kChildren,
+            fmt::format("child {} is not in an octant behind the one before", open.next));
     }
     open.last_octant = digit;
   }
@@ -220,13 +226,15 @@ class TreeWalk {
       fault(open, clause, fmt::format("child {}: {}", open.next, text));
     };
     if (ref.first_point != next_point_ && !(resume_ && ref.first_point > next_point_)) {
-      child_fault(kLeaf, fmt::format("its points begin with {}, the next is {}", ref.first_point, next_point_));
+      child_fault(kLeaf, fmt::format("its points begin with {}, the next is {}", ref.first_point,
+                                     next_point_));
       return pass_over();
     }
     resume_ = false;
     next_point_ = ref.first_point + ref.point_count;
     if (ref.point_count > superblock_.leaf_points) {
-      child_fault(kLeaf, fmt::format("has {} points, a leaf has at most {}", ref.point_count, superblock_.leaf_points));
+      child_fault(kLeaf, fmt::format("has {} points, a leaf has at most {}", ref.point_count,
+                                     superblock_.leaf_points));
     }
     const auto points = points_.take(ref.first_point, ref.point_count);
     progress_.advance(ref.point_count);
@@ -257,7 +265,8 @@ class TreeWalk {
   /// @param compare  false when the child was found to be wrong already
   void close_child(OpenGroup& open, const NodeSummary& exact, std::uint64_t points, bool compare) {
     const NodeSummary& stored = open.group.children[open.next].node;
-    if (const auto wrong = compare ? compare_summary(stored, exact, open.group.level) : std::nullopt) {
+    if (const auto wrong =
+            compare ? compare_summary(stored, exact, open.group.level) : std::nullopt) {
       fault(open, wrong->clause, fmt::format("child {}: {}", open.next, wrong->text));
     }
     open.exact[open.next] = exact;
@@ -294,8 +303,8 @@ class TreeWalk {
 
 }  // namespace
 
-TreeCounts verify_tree(const ContainerReader& container, const std::vector<bool>& damaged, std::size_t cached_pages,
-                       Findings& findings, Progress& progress) {
+TreeCounts verify_tree(const ContainerReader& container, const std::vector<bool>& damaged,
+                       std::size_t cached_pages, Findings& findings, Progress& progress) {
   return TreeWalk(container, damaged, cached_pages, findings, progress).run();
 }
 

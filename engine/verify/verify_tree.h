@@ -18,11 +18,12 @@ struct TreeCounts {
 };
 
 /// Walks the octree from its root and the points in their order, and checks order, references, sums
-/// and the superblock's totals. What lies in or below damaged pages is passed over, and so are the sums above it.
+/// and the superblock's totals. What lies in or below damaged pages is passed over, and so are the
+/// sums above it.
 /// @param damaged       by page
 /// @param cached_pages  node pages that are kept decoded, at least 1
 /// Memory: a bit a group, 8 bytes a page, the cached pages, the points of one leaf.
-TreeCounts verify_tree(const ContainerReader& container, const std::vector<bool>& damaged, std::size_t cached_pages,
-                       Findings& findings, Progress& progress);
+TreeCounts verify_tree(const ContainerReader& container, const std::vector<bool>& damaged,
+                       std::size_t cached_pages, Findings& findings, Progress& progress);
 
 }  // namespace ptc

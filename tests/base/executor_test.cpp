@@ -2,13 +2,14 @@
 #include "engine/base/executor.h"
 
 #include <atomic>
-#include <catch2/catch.hpp>
 #include <chrono>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 using namespace ptc;
 

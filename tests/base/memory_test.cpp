@@ -4,12 +4,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <functional>
 #include <limits>
 #include <new>
 #include <utility>
+
+#include <catch2/catch.hpp>
 
 #include "tests/support/sanitizers.h"
 

@@ -3,7 +3,6 @@
 
 #include <unistd.h>
 
-#include <catch2/catch.hpp>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +11,8 @@
 #include <string>
 #include <thread>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/progress_text.h"
 
@@ -50,7 +51,8 @@ TEST_CASE("progress: a note is a line of its own, on a terminal too", "[base][pr
     Desk desk;
     const auto progress = desk.progress(terminal);
     progress->note("12.0 GB of temporary files");
-    CHECK(desk.take() == std::string(program_invocation_short_name) + ": 12.0 GB of temporary files\n");
+    CHECK(desk.take() ==
+          std::string(program_invocation_short_name) + ": 12.0 GB of temporary files\n");
     progress->begin("sort", 10, "points");
     desk.take();
     progress->note("more");  // after what the stage has to say

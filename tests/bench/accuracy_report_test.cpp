@@ -17,8 +17,10 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-AccuracyRow row(const std::string& set, const std::string& method, Quantity job, double us, double rms) {
-  const ErrorStatistics errors{.count = 10, .rms = rms, .bias = -rms / 10, .percentile_99 = 3 * rms, .reference_mean = 1};
+AccuracyRow row(const std::string& set, const std::string& method, Quantity job, double us,
+                double rms) {
+  const ErrorStatistics errors{
+      .count = 10, .rms = rms, .bias = -rms / 10, .percentile_99 = 3 * rms, .reference_mean = 1};
   const bool light = job == Quantity::bleeding;
   return {.scene = "two, \"rooms\"",
           .set = set,
@@ -29,7 +31,8 @@ AccuracyRow row(const std::string& set, const std::string& method, Quantity job,
           .us_per_receiver = {us, 0.9 * us, 1.1 * us},
           .counts = {.receivers = method == "ptcx" ? 1000U : 0U, .groups = 2500},
           .occlusion = errors,
-          .irradiance = light ? errors : ErrorStatistics{.rms = kNone, .bias = kNone, .percentile_99 = kNone},
+          .irradiance =
+              light ? errors : ErrorStatistics{.rms = kNone, .bias = kNone, .percentile_99 = kNone},
           .flip = set == "camera" ? 0.01 : kNone,
           .occlusion_rms_mesh = kNone,
           .irradiance_rms_mesh = kNone,
@@ -95,9 +98,28 @@ TEST_CASE("facts: a row says where, what, how long and how wrong", "[bench][repo
   const nlohmann::ordered_json facts = facts_of({accuracy()});
   REQUIRE(facts.at("rows").size() == 8);
   for (const auto& found : facts.at("rows")) {
-    for (const char* key : {"scene", "set", "job", "method", "setting", "receivers", "us_per_receiver", "us_low",
-                            "us_high", "ao_rms", "e_rms", "bias", "p99", "flip", "ao_rms_mesh", "e_rms_mesh",
-                            "speedup_discs", "speedup_mesh", "groups", "surfel_blocks", "clusters", "surfels"}) {
+    for (const char* key : {"scene",
+                            "set",
+                            "job",
+                            "method",
+                            "setting",
+                            "receivers",
+                            "us_per_receiver",
+                            "us_low",
+                            "us_high",
+                            "ao_rms",
+                            "e_rms",
+                            "bias",
+                            "p99",
+                            "flip",
+                            "ao_rms_mesh",
+                            "e_rms_mesh",
+                            "speedup_discs",
+                            "speedup_mesh",
+                            "groups",
+                            "surfel_blocks",
+                            "clusters",
+                            "surfels"}) {
       CAPTURE(key);
       CHECK(found.contains(key));
     }
@@ -127,8 +149,9 @@ TEST_CASE("facts: what was not measured is null", "[bench][report]") {
   CHECK(facts.dump().find("nan") == std::string::npos);
 }
 
-TEST_CASE("reports: the files hold the facts, and each line of the table has a cell for each column",
-          "[bench][report]") {
+TEST_CASE(
+    "reports: the files hold the facts, and each line of the table has a cell for each column",
+    "[bench][report]") {
   const test::TemporaryDirectory dir;
   SceneAccuracy plain = accuracy();
   for (AccuracyRow& r : plain.rows) r.scene = "rooms";
@@ -143,7 +166,9 @@ TEST_CASE("reports: the files hold the facts, and each line of the table has a c
     REQUIRE(lines[i].size() == lines[0].size());
     for (std::size_t k = 0; k < lines[0].size(); ++k) {
       const auto& value = facts.at("rows")[i - 1].at(lines[0][k]);
-      CHECK(lines[i][k] == (value.is_null() ? "" : value.is_string() ? value.get<std::string>() : value.dump()));
+      CHECK(lines[i][k] == (value.is_null()     ? ""
+                            : value.is_string() ? value.get<std::string>()
+                                                : value.dump()));
     }
   }
   for (const char* name : {"accuracy", "accuracy-rooms", "accuracy-two, \"rooms\""}) {
@@ -152,7 +177,8 @@ TEST_CASE("reports: the files hold the facts, and each line of the table has a c
   }
 }
 
-TEST_CASE("words: a line for each row and for each reference, nothing that is no number", "[bench][report]") {
+TEST_CASE("words: a line for each row and for each reference, nothing that is no number",
+          "[bench][report]") {
   const std::string text = accuracy_text({accuracy()});
   CHECK(std::ranges::count(text, '\n') == 1 + 8 + 2);
   CHECK(text.find("nan") == std::string::npos);
@@ -164,8 +190,9 @@ TEST_CASE("chart: each set has a row of panels, each method a curve", "[bench][r
   CHECK(chart.columns == 4);
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
-  CHECK(titles == std::vector<std::string>{"Camera: occlusion", "Camera: irradiance", "Camera: irradiance, worst 1 %",
-                                           "Camera: lit picture", "Points: occlusion", "Points: irradiance",
+  CHECK(titles == std::vector<std::string>{"Camera: occlusion", "Camera: irradiance",
+                                           "Camera: irradiance, worst 1 %", "Camera: lit picture",
+                                           "Points: occlusion", "Points: irradiance",
                                            "Points: irradiance, worst 1 %"});
   const ChartPanel& panel = chart.panels[1];
   REQUIRE(panel.series.size() == 2);

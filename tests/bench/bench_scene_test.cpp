@@ -31,7 +31,8 @@ TEST_CASE("scene: three words are scenes, everything else is a file", "[bench][s
     CHECK(choice.file.empty());
     CHECK(!choice.backdrop);
   }
-  for (const char* text : {"Fractal", "./city", "windows", "city.ply"}) CHECK(parse_scene(text).file == text);
+  for (const char* text : {"Fractal", "./city", "windows", "city.ply"})
+    CHECK(parse_scene(text).file == text);
 }
 
 TEST_CASE("scene: a file's name ends before its first dot", "[bench][scene]") {
@@ -48,7 +49,8 @@ TEST_CASE("scene: names hold nothing that a chart cannot show", "[bench][scene]"
   CHECK(parse_scene("a\n\x7f.ply").name == "a__");
 }
 
-TEST_CASE("scene: a backdrop is taken off a file's name and refused behind a word", "[bench][scene]") {
+TEST_CASE("scene: a backdrop is taken off a file's name and refused behind a word",
+          "[bench][scene]") {
   const SceneChoice choice = parse_scene("meshes/dragon.ply+backdrop");
   CHECK(choice.file == "meshes/dragon.ply");
   CHECK(choice.name == "dragon");
@@ -66,10 +68,12 @@ TEST_CASE("scene: nothing is no scene", "[bench][scene]") {
 
 TEST_CASE("scene: no two have one name", "[bench][scene]") {
   const std::vector<SceneChoice> choices =
-      parse_scenes({"a/room.obj", "b/room.ply", "room-2.obj", "city", "room.obj", "x/city.obj", "room.obj+backdrop"});
+      parse_scenes({"a/room.obj", "b/room.ply", "room-2.obj", "city", "room.obj", "x/city.obj",
+                    "room.obj+backdrop"});
   std::vector<std::string> names;
   for (const SceneChoice& choice : choices) names.push_back(choice.name);
-  CHECK(names == std::vector<std::string>{"room", "room-2", "room-2-2", "city", "room-3", "city-2", "room-4"});
+  CHECK(names == std::vector<std::string>{"room", "room-2", "room-2-2", "city", "room-3", "city-2",
+                                          "room-4"});
   CHECK(choices[1].file == "b/room.ply");
 }
 
@@ -81,7 +85,8 @@ TEST_CASE("scene: it leaves nothing in its directory, not even while it lives", 
   CHECK(scene.surfels().size() == scene.container().superblock().points);
 }
 
-TEST_CASE("scene: pixels of the middle of the picture are receivers, and points of the scene", "[bench][scene]") {
+TEST_CASE("scene: pixels of the middle of the picture are receivers, and points of the scene",
+          "[bench][scene]") {
   const test::TemporaryDirectory dir;
   Progress silent;
   const BenchScene scene(parse_scene("window"), kSmall, dir.path(), {.threads = 1}, silent);
@@ -93,7 +98,8 @@ TEST_CASE("scene: pixels of the middle of the picture are receivers, and points 
   CHECK(camera.window_width == 8);
   CHECK(camera.window_height == 5);
   for (unsigned y = 0; y < 5; ++y) {
-    for (unsigned x = 0; x < 8; ++x) CHECK(camera.window[y * 8 + x].receiver == (6 + y) * 32 + 12 + x);
+    for (unsigned x = 0; x < 8; ++x)
+      CHECK(camera.window[y * 8 + x].receiver == (6 + y) * 32 + 12 + x);
   }
   const ReceiverSet& points = scene.sets()[1];
   CHECK(points.name == "points");

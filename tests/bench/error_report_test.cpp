@@ -16,14 +16,22 @@ using namespace ptc::bench;
 namespace {
 
 CheckError error_of(double share) {
-  return {.occlusion_rms = share / 4, .occlusion_mean = 0.5, .irradiance_rms = share, .irradiance_mean = 2};
+  return {.occlusion_rms = share / 4,
+          .occlusion_mean = 0.5,
+          .irradiance_rms = share,
+          .irradiance_mean = 2};
 }
 
 /// Errors that fall as one over the square of time.
 SceneErrors errors(bool mesh) {
   SceneErrors scene{.name = "room", .surfels = 1000};
   for (const double asked : {0.1, 0.02}) {
-    ErrorRow row{.scene = "room", .set = "points", .asked = asked, .receivers = 500, .us_per_receiver = 20, .pilot_share = 0.1};
+    ErrorRow row{.scene = "room",
+                 .set = "points",
+                 .asked = asked,
+                 .receivers = 500,
+                 .us_per_receiver = 20,
+                 .pilot_share = 0.1};
     row.tuning = {.asked = asked, .met = asked > 0.05, .setting = 3, .measured = error_of(0.07)};
     row.check = {.receivers = 100, .rays = 4096, .discs = error_of(0.06)};
     if (mesh) row.check.mesh = error_of(0.08);
@@ -51,7 +59,9 @@ TEST_CASE("error report: the slope is the exponent of error over time", "[bench]
   CHECK(gap.slope() == Approx(-2));
 }
 
-TEST_CASE("error report: rows say what was asked, what was measured, and null where there is no mesh", "[bench][error]") {
+TEST_CASE(
+    "error report: rows say what was asked, what was measured, and null where there is no mesh",
+    "[bench][error]") {
   const nlohmann::ordered_json facts = facts_of(std::vector{errors(false)});
   REQUIRE(facts.at("rows").size() == 2);
   const auto& row = facts.at("rows").at(1);

@@ -1,9 +1,10 @@
 // How far the discs of a mesh are from the mesh: what no gather can be better than.
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <memory>
 #include <vector>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "engine/scene/mesh_reference.h"
 #include "engine/scene/sampler.h"
@@ -24,7 +25,8 @@ std::vector<SurfaceHit> seen(const RayScene& rays, Camera camera, unsigned side)
   camera.width = camera.height = side;
   std::vector<SurfaceHit> hits;
   for (unsigned i = 0; i < side * side; ++i) {
-    const glm::vec3 along = camera.direction(static_cast<float>(i % side) + 0.5F, static_cast<float>(i / side) + 0.5F);
+    const glm::vec3 along =
+        camera.direction(static_cast<float>(i % side) + 0.5F, static_cast<float>(i / side) + 0.5F);
     if (const auto hit = rays.closest(camera.position, along, 0, 1e9)) hits.push_back(*hit);
   }
   return hits;
@@ -52,7 +54,8 @@ Floor measure(const bench::LitScene& scene, std::uint64_t count, unsigned side) 
   double occlusion = 0, irradiance = 0;
   for (std::size_t i = 0; i < hits.size(); ++i) {
     floor.occlusion += std::pow(static_cast<double>(ours[i].occlusion - truth[i].occlusion), 2);
-    floor.irradiance += std::pow(static_cast<double>(ours[i].irradiance.g - truth[i].irradiance.g), 2);
+    floor.irradiance +=
+        std::pow(static_cast<double>(ours[i].irradiance.g - truth[i].irradiance.g), 2);
     occlusion += static_cast<double>(truth[i].occlusion);
     irradiance += static_cast<double>(truth[i].irradiance.g);
   }
@@ -68,7 +71,8 @@ bench::LitScene planks() {
   const auto quad = [&mesh](const glm::vec3& a, const glm::vec3& u, const glm::vec3& v) {
     const auto first = static_cast<std::uint32_t>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), {a, a + u, a + u + v, a + v});
-    mesh.triangles.insert(mesh.triangles.end(), {{first, first + 1, first + 2}, {first, first + 2, first + 3}});
+    mesh.triangles.insert(mesh.triangles.end(),
+                          {{first, first + 1, first + 2}, {first, first + 2, first + 3}});
     mesh.material_of.insert(mesh.material_of.end(), {0, 0});
   };
   quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4});
@@ -90,10 +94,12 @@ TEST_CASE("floor: planks of discs let through what planks do", "[bench][floor]")
   CHECK(floor.occlusion < 0.03);  // 0.148 with discs about the middles of their patches
 }
 
-TEST_CASE("floor: a terrain finer than its surfels occludes and is lit as its mesh is", "[bench][floor]") {
+TEST_CASE("floor: a terrain finer than its surfels occludes and is lit as its mesh is",
+          "[bench][floor]") {
   const Floor floor = measure(bench::make_fractal(80000), 20000, 16);
   INFO(floor.occlusion << " " << floor.irradiance);
-  CHECK(floor.occlusion < 0.075);  // 0.097 and 0.169 with a place and a normal of the mesh for each disc
+  CHECK(floor.occlusion <
+        0.075);  // 0.097 and 0.169 with a place and a normal of the mesh for each disc
   CHECK(floor.irradiance < 0.13);
 }
 

@@ -70,7 +70,8 @@ std::vector<GrowthRow> all_rows() {
 
 }  // namespace
 
-TEST_CASE("growth: a row for each number of surfels, checked and beside Embree", "[bench][growth]") {
+TEST_CASE("growth: a row for each number of surfels, checked and beside Embree",
+          "[bench][growth]") {
   const std::vector<GrowthRow> rows = measure(small(), "surfels");
   REQUIRE(rows.size() == 2);
   CHECK(rows[0].x == Approx(10'000).epsilon(0.06));
@@ -142,7 +143,8 @@ TEST_CASE("growth: a disk without room is told before anything is built", "[benc
   options.panels = {"surfels"};
   CHECK_THROWS_AS(measure_growth(options, dir.path(), {.threads = 1}, silent), std::system_error);
   CHECK_THROWS_WITH(measure_growth(options, dir.path(), {.threads = 1}, silent),
-                    Catch::Contains(dir.path().string()) && Catch::Contains("GB free") && Catch::Contains("--temp"));
+                    Catch::Contains(dir.path().string()) && Catch::Contains("GB free") &&
+                        Catch::Contains("--temp"));
 }
 
 TEST_CASE("growth: a build stays below the bytes that it was said to take", "[bench][growth]") {
@@ -151,15 +153,17 @@ TEST_CASE("growth: a build stays below the bytes that it was said to take", "[be
   BuildRequest request;
   request.city_points = 50'000;
   build_container(request, dir / "city.ptcx", silent);
-  CHECK(std::filesystem::file_size(dir / "city.ptcx") + 50'000 * kSpilledBytes < build_disk_bytes(50'000));
+  CHECK(std::filesystem::file_size(dir / "city.ptcx") + 50'000 * kSpilledBytes <
+        build_disk_bytes(50'000));
 }
 
-TEST_CASE("growth report: a panel for each thing that varied, and three for caps", "[bench][report]") {
+TEST_CASE("growth report: a panel for each thing that varied, and three for caps",
+          "[bench][report]") {
   const Chart chart = chart_of(all_rows());
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
-  CHECK(titles == std::vector<std::string>{"Surfels", "Solid angle", "Depth complexity", "Memory", "Memory, wall time",
-                                           "Reading"});
+  CHECK(titles == std::vector<std::string>{"Surfels", "Solid angle", "Depth complexity", "Memory",
+                                           "Memory, wall time", "Reading"});
   const ChartPanel& surfels = chart.panels[0];
   REQUIRE(surfels.series.size() == 2);
   CHECK(surfels.series[0].name == "PTCX");
@@ -181,7 +185,8 @@ TEST_CASE("growth report: a panel for each thing that varied, and three for caps
   CHECK(chart_of({row("depth", 4, 2, 70)}).panels.size() == 1);
 }
 
-TEST_CASE("growth report: rows have the same members, and null for what was not measured", "[bench][report]") {
+TEST_CASE("growth report: rows have the same members, and null for what was not measured",
+          "[bench][report]") {
   const nlohmann::ordered_json facts = facts_of(all_rows());
   REQUIRE(facts.at("rows").size() == 8);
   for (const auto& r : facts.at("rows")) CHECK(r.size() == facts.at("rows").front().size());

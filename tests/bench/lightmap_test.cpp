@@ -13,7 +13,8 @@ using test::add_rectangle;
 
 namespace {
 
-const glm::vec3 kRed(0.75F, 0.125F, 0), kBlue(0, 0.25F, 0.5F);  // as rgbe has them, without rounding
+const glm::vec3 kRed(0.75F, 0.125F, 0),
+    kBlue(0, 0.25F, 0.5F);  // as rgbe has them, without rounding
 
 void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
@@ -30,7 +31,8 @@ std::vector<Surfel> marked(std::vector<Surfel> surfels) {
 
 }  // namespace
 
-TEST_CASE("lightmap: each quad has the colour of its own surfels, up to its edges", "[bench][lightmap]") {
+TEST_CASE("lightmap: each quad has the colour of its own surfels, up to its edges",
+          "[bench][lightmap]") {
   Mesh mesh{.origin = {1000, -2000, 3000}};
   add_quad(mesh, {0, 0, 0}, {2, 0, 0}, {0, 1, 0});
   add_quad(mesh, {2, 0, 0}, {3, 0, 0}, {0, 1, 0});
@@ -49,14 +51,16 @@ TEST_CASE("lightmap: each quad has the colour of its own surfels, up to its edge
   }
 }
 
-TEST_CASE("lightmap: u is the weight of the second corner, v that of the third", "[bench][lightmap]") {
+TEST_CASE("lightmap: u is the weight of the second corner, v that of the third",
+          "[bench][lightmap]") {
   Mesh mesh;
   mesh.positions = {{0, 0, 0}, {4, 0, 0}, {0, 2, 0}};
   mesh.triangles = {{0, 1, 2}};
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {0, 0, 0}, {4, 0, 0}, {0, 2, 0}, 0.02, kRed);
   const Lightmap map(mesh, marked(surfels), 0.02);
-  for (const auto& [u, v] : {std::pair{0.0F, 0.0F}, {1.0F, 0.0F}, {0.0F, 1.0F}, {0.5F, 0.5F}, {0.25F, 0.125F}}) {
+  for (const auto& [u, v] :
+       {std::pair{0.0F, 0.0F}, {1.0F, 0.0F}, {0.0F, 1.0F}, {0.5F, 0.5F}, {0.25F, 0.125F}}) {
     const glm::vec3 at = map.at(0, u, v) - 1.0F;
     CHECK(at.x == Approx(4 * u).margin(0.05));
     CHECK(at.y == Approx(2 * v).margin(0.05));
@@ -71,7 +75,8 @@ TEST_CASE("lightmap: no place on the far edge is black, whatever the texels", "[
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 0.37F, 0}};
     mesh.triangles = {{0, 1, 2}};
     const Lightmap map(mesh, surfels, 1.0 / size);
-    for (float u = 0; u <= 1; u = std::nextafter(u + 0.003F, 2.0F)) REQUIRE(map.at(0, u, 1 - u) == kRed);
+    for (float u = 0; u <= 1; u = std::nextafter(u + 0.003F, 2.0F))
+      REQUIRE(map.at(0, u, 1 - u) == kRed);
     for (int k = 0; k <= size; ++k) {  // where texels meet
       const float u = static_cast<float>(k) / static_cast<float>(size);
       for (const float near : {std::nextafter(u, 0.0F), u, std::nextafter(u, 1.0F)}) {
@@ -81,7 +86,8 @@ TEST_CASE("lightmap: no place on the far edge is black, whatever the texels", "[
   }
 }
 
-TEST_CASE("lightmap: each of two faces in one place takes the surfels that face its way", "[bench][lightmap]") {
+TEST_CASE("lightmap: each of two faces in one place takes the surfels that face its way",
+          "[bench][lightmap]") {
   Mesh mesh;
   add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   add_quad(mesh, {0, 0, 0}, {0, 1, 0}, {1, 0, 0});

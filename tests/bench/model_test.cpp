@@ -49,8 +49,8 @@ const SceneModel& measured() {
   return model;
 }
 
-const ModelRow& row_of(const SceneModel& model, const std::string& axis, const std::string& variant, const std::string& form,
-                       double solid_angle = ModelRow::kNone) {
+const ModelRow& row_of(const SceneModel& model, const std::string& axis, const std::string& variant,
+                       const std::string& form, double solid_angle = ModelRow::kNone) {
   const auto found = std::ranges::find_if(model.rows, [&](const ModelRow& r) {
     const bool angle = std::isnan(solid_angle) || r.solid_angle == Approx(solid_angle);
     return r.axis == axis && r.variant == variant && r.form == form && angle;
@@ -77,12 +77,15 @@ TEST_CASE("model: every axis has its rows, and each says what it costs", "[bench
     CHECK(row.occlusion.rms > 0);
     CHECK((row.evaluate_us > 0) == (row.axis == "payload" || row.axis == "node"));
   }
-  CHECK(rows == std::map<std::string, int>{{"payload", 34}, {"node", 4}, {"leaf", 2}, {"directions", 2}, {"pages", 14}});
+  CHECK(rows == std::map<std::string, int>{
+                    {"payload", 34}, {"node", 4}, {"leaf", 2}, {"directions", 2}, {"pages", 14}});
 }
 
 TEST_CASE("model: a payload that tells more shades no worse, within a tenth", "[bench][model]") {
   for (const double angle : {0.1, 0.02}) {
-    const auto error = [&](const char* name) { return row_of(measured(), "payload", name, "stored", angle).irradiance.rms; };
+    const auto error = [&](const char* name) {
+      return row_of(measured(), "payload", name, "stored", angle).irradiance.rms;
+    };
     const auto no_worse = [&](const char* more, const char* less) {
       CAPTURE(angle, more, less, error(more), error(less));
       CHECK(error(more) < 1.1 * error(less) + 0.001);  // below a thousandth they differ either way
@@ -110,8 +113,11 @@ TEST_CASE("model: rounding changes no error by more than a twentieth", "[bench][
 TEST_CASE("model: leaves, directions and pages cost what they should", "[bench][model]") {
   const SceneModel& model = measured();
   CHECK(row_of(model, "leaf", "32", "").bytes < 0.8 * row_of(model, "leaf", "4", "").bytes);
-  CHECK(row_of(model, "directions", "48", "").irradiance.rms < 0.7 * row_of(model, "directions", "16", "").irradiance.rms);
-  const auto bytes = [&](const char* variant, const char* form) { return row_of(model, "pages", variant, form).bytes; };
+  CHECK(row_of(model, "directions", "48", "").irradiance.rms <
+        0.7 * row_of(model, "directions", "16", "").irradiance.rms);
+  const auto bytes = [&](const char* variant, const char* form) {
+    return row_of(model, "pages", variant, form).bytes;
+  };
   for (const char* form : {"points", "nodes"}) {
     CHECK(bytes("zstd 1", form) < 0.95 * bytes("raw", form));
     CHECK(bytes("lz4", form) < bytes("raw", form));
@@ -137,7 +143,8 @@ TEST_CASE("model: nodes as they are stored shade as the plain gather does", "[be
   std::vector<Receiver> receivers(scene.sets().front().receivers);
   receivers.resize(30);
   const std::vector<ModelRow> rows = study_payloads(scene, receivers, options, executor, silent);
-  const auto ours = std::ranges::find_if(rows, [](const ModelRow& r) { return r.axis == "node" && r.form == "stored"; });
+  const auto ours = std::ranges::find_if(
+      rows, [](const ModelRow& r) { return r.axis == "node" && r.form == "stored"; });
   REQUIRE(ours != rows.end());
 
   const SceneView view(scene.container());
@@ -179,7 +186,8 @@ TEST_CASE("model report: rows have the same members, panels what was measured", 
   CHECK(over_bytes.series.size() == 9);
   CHECK(over_bytes.series[3].name == "cube");
   CHECK(over_bytes.series[3].points[0].x == 60);
-  CHECK(over_bytes.series[3].points[0].y == Approx(100 * row_of(measured(), "payload", "cube", "stored", 0.02).irradiance.rms));
+  CHECK(over_bytes.series[3].points[0].y ==
+        Approx(100 * row_of(measured(), "payload", "cube", "stored", 0.02).irradiance.rms));
   CHECK(over_bytes.limits.size() == 1);
   CHECK(chart.panels[2].series[3].points.size() == 2);
   SceneModel few = measured();

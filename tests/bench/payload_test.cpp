@@ -32,7 +32,8 @@ struct Cluster {
   explicit Cluster(const std::vector<Surfel>& from) {
     const test::SortedScene sorted = test::sort_scene(from);
     summary = summarise_points(sorted.records, sorted.frame.unit());
-    for (const PointRecord& record : sorted.records) surfels.push_back(to_surfel(record, sorted.frame));
+    for (const PointRecord& record : sorted.records)
+      surfels.push_back(to_surfel(record, sorted.frame));
   }
   [[nodiscard]] std::vector<float> fit(const Payload& payload) const {
     std::vector<float> numbers(payload.count());
@@ -44,7 +45,8 @@ struct Cluster {
 };
 
 /// RMS over directions of what is off, over the mean: area that faces, and its light.
-std::array<double, 2> errors_of(const Payload& payload, const std::vector<float>& numbers, const Cluster& cluster) {
+std::array<double, 2> errors_of(const Payload& payload, const std::vector<float>& numbers,
+                                const Cluster& cluster) {
   double area = 0, light = 0, area_off = 0, light_off = 0;
   for (const glm::vec3& d : directions()) {
     const Seen ours = payload.see(numbers.data(), d), truth = see_exactly(cluster.surfels, d);
@@ -77,13 +79,17 @@ TEST_CASE("payload: products of harmonics add up to Legendre polynomials", "[ben
     spherical_harmonics(4, other, b.data());
     for (unsigned l = 0; l <= 4; ++l) {
       double sum = 0;
-      for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) sum += static_cast<double>(a[i] * b[i]);
-      CHECK(sum == Approx(std::legendre(l, std::clamp(static_cast<double>(glm::dot(d, other)), -1.0, 1.0))).margin(1e-5));
+      for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i)
+        sum += static_cast<double>(a[i] * b[i]);
+      CHECK(sum ==
+            Approx(std::legendre(l, std::clamp(static_cast<double>(glm::dot(d, other)), -1.0, 1.0)))
+                .margin(1e-5));
     }
   }
 }
 
-TEST_CASE("payload: a wall of one colour is told exactly by all but the harmonics", "[bench][payload]") {
+TEST_CASE("payload: a wall of one colour is told exactly by all but the harmonics",
+          "[bench][payload]") {
   std::vector<Surfel> surfels;
   test::add_rectangle(surfels, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.25, {1, 0.5F, 0.25F});
   const Cluster wall(surfels);
@@ -99,7 +105,8 @@ TEST_CASE("payload: a wall of one colour is told exactly by all but the harmonic
 TEST_CASE("payload: more of it tells more of a corner of three colours", "[bench][payload]") {
   const Cluster cluster = corner();
   std::map<std::string, std::array<double, 2>> found;
-  for (const Payload& payload : payloads()) found[payload.name] = errors_of(payload, cluster.fit(payload), cluster);
+  for (const Payload& payload : payloads())
+    found[payload.name] = errors_of(payload, cluster.fit(payload), cluster);
   const auto light = [&](const char* name) { return found.at(name)[1]; };
   CHECK(light("two lobes") < 0.7 * light("surfel"));
   CHECK(light("cube") < 0.7 * light("surfel"));
@@ -111,7 +118,8 @@ TEST_CASE("payload: more of it tells more of a corner of three colours", "[bench
   }
 }
 
-TEST_CASE("payload: the cube with 22 bytes of bounds is a child of spec/nodes.md", "[bench][payload]") {
+TEST_CASE("payload: the cube with 22 bytes of bounds is a child of spec/nodes.md",
+          "[bench][payload]") {
   const auto cube = std::ranges::find(payloads(), std::string("cube"), &Payload::name);
   REQUIRE(cube != payloads().end());
   CHECK(2 * (cube->stored_bytes() + 22) == node_group_bytes(4) - node_group_bytes(2));

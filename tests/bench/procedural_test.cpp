@@ -23,10 +23,12 @@ void check_sound(const Mesh& mesh) {
   for (const auto& triangle : mesh.triangles) {
     for (const std::uint32_t corner : triangle) used[corner] = true;
     const glm::vec3 a = mesh.positions[triangle[0]];
-    const glm::vec3 normal = glm::cross(mesh.positions[triangle[1]] - a, mesh.positions[triangle[2]] - a);
+    const glm::vec3 normal =
+        glm::cross(mesh.positions[triangle[1]] - a, mesh.positions[triangle[2]] - a);
     REQUIRE(glm::length(normal) > 0);
   }
-  for (const glm::vec3& p : mesh.positions) REQUIRE((std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)));
+  for (const glm::vec3& p : mesh.positions)
+    REQUIRE((std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)));
   CHECK(std::ranges::find(used, false) == used.end());
   for (const std::uint16_t material : mesh.material_of) REQUIRE(material < mesh.materials.size());
 }
@@ -46,11 +48,13 @@ constexpr double kFar = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-TEST_CASE("fractal: as many triangles as asked for, none degenerate, each vertex in use", "[bench][procedural]") {
+TEST_CASE("fractal: as many triangles as asked for, none degenerate, each vertex in use",
+          "[bench][procedural]") {
   for (const std::uint64_t wanted : {1'000U, 5'000U, 10'000U, 20'000U, 77'777U, 300'000U}) {
     const LitScene scene = make_fractal(wanted);
     CAPTURE(wanted);
-    CHECK(static_cast<double>(scene.mesh.triangles.size()) == Approx(static_cast<double>(wanted)).epsilon(0.1));
+    CHECK(static_cast<double>(scene.mesh.triangles.size()) ==
+          Approx(static_cast<double>(wanted)).epsilon(0.1));
     check_sound(scene.mesh);
   }
 }
@@ -83,12 +87,14 @@ TEST_CASE("window room: light leaves it through the window alone", "[bench][proc
   const LitScene scene = make_window_room();
   const RayScene rays(scene.mesh);
   constexpr std::uint32_t kRays = 1 << 14;
-  for (const glm::vec3& from : {glm::vec3(3, 1.5F, 2), glm::vec3(5, 1.2F, 0.5F), glm::vec3(4.5F, 2.5F, 3.5F)}) {
+  for (const glm::vec3& from :
+       {glm::vec3(3, 1.5F, 2), glm::vec3(5, 1.2F, 0.5F), glm::vec3(4.5F, 2.5F, 3.5F)}) {
     const SquarePoints points(7);
     unsigned escaped = 0, through_window = 0;
     for (std::uint32_t i = 0; i < kRays; ++i) {
       const glm::vec2 p = points.square(i);
-      const float y = 2 * p.x - 1, ring = std::sqrt(1 - y * y), turn = 2 * std::numbers::pi_v<float> * p.y;
+      const float y = 2 * p.x - 1, ring = std::sqrt(1 - y * y),
+                  turn = 2 * std::numbers::pi_v<float> * p.y;
       const glm::vec3 along(ring * std::cos(turn), y, ring * std::sin(turn));
       const float margin = along.x > 0 ? std::min(inside_window(at_plane(from, along, 6)),
                                                   inside_window(at_plane(from, along, 6.25F)))
@@ -96,7 +102,8 @@ TEST_CASE("window room: light leaves it through the window alone", "[bench][proc
       if (std::abs(margin) < 1e-4F) continue;  // the frame's edge
       const bool open = !rays.occluded(glm::dvec3(from), along, 0, kFar);
       if (margin < 0) REQUIRE(!open);
-      // Downwards it meets the ground outside; nothing inside is between these places and the window.
+      // Downwards it meets the ground outside; nothing inside is between these places and the
+      // window.
       if (margin > 0 && along.y > 0) REQUIRE(open);
       escaped += open ? 1 : 0;
       through_window += margin > 0 ? 1 : 0;
@@ -107,14 +114,16 @@ TEST_CASE("window room: light leaves it through the window alone", "[bench][proc
   }
 }
 
-TEST_CASE("layers: half of a sheet's tiles are missing, the rest face up or down", "[bench][scene]") {
+TEST_CASE("layers: half of a sheet's tiles are missing, the rest face up or down",
+          "[bench][scene]") {
   for (const unsigned layers : {0U, 1U, 16U}) {
     const Mesh mesh = make_layers(layers).mesh;
     const double tiles = static_cast<double>(mesh.triangles.size()) / 2 - 1;
     CHECK(tiles == Approx(512.0 * layers).margin(30 * std::sqrt(layers)));
     std::size_t up = 0;
     for (const auto& t : mesh.triangles) {
-      const glm::vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+      const glm::vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
+                      &c = mesh.positions[t[2]];
       const glm::vec3 normal = glm::normalize(glm::cross(b - a, c - a));
       REQUIRE(std::abs(normal.y) == 1);
       up += normal.y > 0;

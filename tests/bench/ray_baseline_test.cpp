@@ -26,7 +26,8 @@ std::vector<Surfel> balls_before_a_wall() {
   test::add_rectangle(surfels, {-2, 1.5, 0}, {4, 0, 0}, {0, 0, 2}, kSpacing, {0.8F, 0.1F, 0.1F});
   for (int i = 0; i < 5; ++i) {
     const glm::vec3 colour(0.2F * static_cast<float>(i), 0.6F, 0.3F);
-    test::add_sphere(surfels, {-1.5 + 0.7 * i, -1 + 0.4 * (i * 3 % 5), 0.3}, 0.28, kSpacing, colour);
+    test::add_sphere(surfels, {-1.5 + 0.7 * i, -1 + 0.4 * (i * 3 % 5), 0.3}, 0.28, kSpacing,
+                     colour);
   }
   return surfels;
 }
@@ -35,7 +36,8 @@ std::vector<Surfel> balls_before_a_wall() {
 std::vector<Receiver> floor_receivers() {
   std::vector<Receiver> receivers;
   for (int j = 0; j < 8; ++j) {
-    for (int i = 0; i < 8; ++i) receivers.push_back({{-1.6 + 0.43 * i, -1.6 + 0.37 * j, 0.01}, {0, 0, 1}});
+    for (int i = 0; i < 8; ++i)
+      receivers.push_back({{-1.6 + 0.43 * i, -1.6 + 0.37 * j, 0.01}, {0, 0, 1}});
   }
   return receivers;
 }
@@ -58,7 +60,8 @@ Compared compare(const std::vector<Receiver>& receivers, const Ours& ours, const
   return {over_mean(error_statistics(a, b)), over_mean(error_statistics(light_a, light_b))};
 }
 
-auto trace_with(const RayBaseline& rays, Job job, Packets packets, unsigned count, std::uint64_t seed = 0) {
+auto trace_with(const RayBaseline& rays, Job job, Packets packets, unsigned count,
+                std::uint64_t seed = 0) {
   return [&rays, job, packets, count, seed](const Receiver& receiver, std::size_t i) {
     return rays.trace(receiver, job, packets, count, seed + i);
   };
@@ -66,14 +69,17 @@ auto trace_with(const RayBaseline& rays, Job job, Packets packets, unsigned coun
 
 }  // namespace
 
-TEST_CASE("ray baseline: discs give what the oracle's discs give, both sides and fronts alone", "[bench][rays]") {
+TEST_CASE("ray baseline: discs give what the oracle's discs give, both sides and fronts alone",
+          "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   for (const Sides sides : {Sides::both, Sides::front}) {
     const RayBaseline rays(surfels, sides);
     const DiscRays oracle(surfels, sides, {});
-    const Compared errors = compare(
-        floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 8192),
-        [&](const Receiver& receiver, std::size_t i) { return oracle.trace(receiver, 8100, 5000 + i); });
+    const Compared errors =
+        compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 8192),
+                [&](const Receiver& receiver, std::size_t i) {
+                  return oracle.trace(receiver, 8100, 5000 + i);
+                });
     CHECK(errors.occlusion.reference_mean > 0.1);
     CHECK(errors.irradiance.reference_mean > 0.1);
     CHECK(errors.occlusion.rms < 0.006);
@@ -86,17 +92,22 @@ TEST_CASE("ray baseline: discs give what the oracle's discs give, both sides and
 TEST_CASE("ray baseline: a mesh gives what its surfels give as discs", "[bench][rays]") {
   // A wall over a floor: discs cover both but for their rims.
   Mesh mesh{.origin = {50, 60, 70}};
-  mesh.positions = {{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}, {-2, 1.5F, 0}, {2, 1.5F, 0}, {2, 1.5F, 2}, {-2, 1.5F, 2}};
+  mesh.positions = {{-2, -2, 0},   {2, -2, 0},   {2, 2, 0},    {-2, 2, 0},
+                    {-2, 1.5F, 0}, {2, 1.5F, 0}, {2, 1.5F, 2}, {-2, 1.5F, 2}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
   std::vector<Surfel> surfels;
-  test::add_rectangle(surfels, mesh.origin + glm::dvec3(-2, -2, 0), {4, 0, 0}, {0, 4, 0}, kSpacing, glm::vec3(0.5F));
-  test::add_rectangle(surfels, mesh.origin + glm::dvec3(-2, 1.5, 0), {4, 0, 0}, {0, 0, 2}, kSpacing, {0.8F, 0.1F, 0.1F});
+  test::add_rectangle(surfels, mesh.origin + glm::dvec3(-2, -2, 0), {4, 0, 0}, {0, 4, 0}, kSpacing,
+                      glm::vec3(0.5F));
+  test::add_rectangle(surfels, mesh.origin + glm::dvec3(-2, 1.5, 0), {4, 0, 0}, {0, 0, 2}, kSpacing,
+                      {0.8F, 0.1F, 0.1F});
   std::vector<Receiver> receivers = floor_receivers();
   for (Receiver& r : receivers) r.position += mesh.origin;
-  std::erase_if(receivers, [](const Receiver& r) { return r.position.y > 61.3; });  // not behind the wall
+  std::erase_if(receivers,
+                [](const Receiver& r) { return r.position.y > 61.3; });  // not behind the wall
   const RayBaseline discs(surfels, Sides::both), triangles(mesh, surfels, kSpacing);
-  const Compared errors = compare(receivers, trace_with(triangles, Job::bleeding, Packets::sixteen, 4096),
-                                  trace_with(discs, Job::bleeding, Packets::sixteen, 4096));
+  const Compared errors =
+      compare(receivers, trace_with(triangles, Job::bleeding, Packets::sixteen, 4096),
+              trace_with(discs, Job::bleeding, Packets::sixteen, 4096));
   CHECK(errors.irradiance.reference_mean > 0.05);
   CHECK(errors.occlusion.rms < 0.012);
   CHECK(errors.irradiance.rms < 0.015);
@@ -120,7 +131,8 @@ TEST_CASE("ray baseline: a back covers and is black", "[bench][rays]") {
   }
 }
 
-TEST_CASE("ray baseline: single rays and packets of one seed differ in ties alone", "[bench][rays]") {
+TEST_CASE("ray baseline: single rays and packets of one seed differ in ties alone",
+          "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   for (const Job job : {Job::occlusion, Job::bleeding}) {
@@ -137,7 +149,8 @@ TEST_CASE("ray baseline: any hit covers what the closest hit covers", "[bench][r
   for (const Packets packets : {Packets::single, Packets::sixteen}) {
     for (const Receiver& receiver : floor_receivers()) {
       const Shading any = rays.trace(receiver, Job::occlusion, packets, 1024, 3);
-      CHECK(any.occlusion == Approx(rays.trace(receiver, Job::bleeding, packets, 1024, 3).occlusion).margin(0.0011));
+      CHECK(any.occlusion ==
+            Approx(rays.trace(receiver, Job::bleeding, packets, 1024, 3).occlusion).margin(0.0011));
       CHECK(any.irradiance == glm::vec3(0));
     }
   }
@@ -147,8 +160,10 @@ TEST_CASE("ray baseline: errors fall faster than the root of the rays", "[bench]
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   const auto truth = trace_with(rays, Job::bleeding, Packets::sixteen, 65536, 1'000'000);
-  const Compared few = compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 128), truth);
-  const Compared many = compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 1024), truth);
+  const Compared few =
+      compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 128), truth);
+  const Compared many =
+      compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 1024), truth);
   const double root = std::sqrt(1024.0 / 128);
   CHECK(few.occlusion.rms > 1.2 * root * many.occlusion.rms);
   CHECK(few.irradiance.rms > 1.2 * root * many.irradiance.rms);
@@ -165,12 +180,14 @@ TEST_CASE("ray baseline: the same seed gives the same, another one another", "[b
   CHECK(trace(1) != trace(2));
 }
 
-TEST_CASE("ray baseline: numbers of rays that are no power of two from 16 to 65536 are refused", "[bench][rays]") {
+TEST_CASE("ray baseline: numbers of rays that are no power of two from 16 to 65536 are refused",
+          "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   const Receiver receiver{{0, 0, 1}, {0, 0, 1}};
   for (const unsigned count : {0U, 1U, 8U, 15U, 17U, 100U, 65535U, 131072U, 1U << 31, ~0U}) {
-    CHECK_THROWS_AS(rays.trace(receiver, Job::occlusion, Packets::sixteen, count, 0), std::invalid_argument);
+    CHECK_THROWS_AS(rays.trace(receiver, Job::occlusion, Packets::sixteen, count, 0),
+                    std::invalid_argument);
   }
   for (unsigned count = 16; count <= 65536; count *= 2) {
     CHECK_NOTHROW(rays.trace(receiver, Job::occlusion, Packets::single, count, 0));
@@ -179,7 +196,8 @@ TEST_CASE("ray baseline: numbers of rays that are no power of two from 16 to 655
 
 TEST_CASE("ray baseline: nothing is around no discs", "[bench][rays]") {
   const RayBaseline rays(std::span<const Surfel>(), Sides::both);
-  const Shading shading = rays.trace({{0, 0, 0}, {0, 0, 1}}, Job::bleeding, Packets::sixteen, 64, 0);
+  const Shading shading =
+      rays.trace({{0, 0, 0}, {0, 0, 1}}, Job::bleeding, Packets::sixteen, 64, 0);
   CHECK(shading.occlusion == 0);
   CHECK(shading.irradiance == glm::vec3(0));
 }

@@ -35,14 +35,16 @@ std::uint64_t written_bytes() {
 
 bool begins_with(const std::vector<PointRecord>& whole, const std::vector<PointRecord>& front) {
   return front.size() <= whole.size() &&
-         std::memcmp(static_cast<const void*>(whole.data()), front.data(), front.size() * sizeof(PointRecord)) == 0;
+         std::memcmp(static_cast<const void*>(whole.data()), front.data(),
+                     front.size() * sizeof(PointRecord)) == 0;
 }
 
 }  // namespace
 
 TEST_CASE("record file: noise fills it to its last record", "[bench][records]") {
   const test::TemporaryDirectory dir;
-  for (const std::uint64_t count : std::vector<std::uint64_t>{1, RecordFile::kBlock, 5 * RecordFile::kBlock + 1}) {
+  for (const std::uint64_t count :
+       std::vector<std::uint64_t>{1, RecordFile::kBlock, 5 * RecordFile::kBlock + 1}) {
     RecordFile file(dir.path());
     file.fill(count);
     CHECK(file.records() == count);
@@ -54,14 +56,16 @@ TEST_CASE("record file: noise fills it to its last record", "[bench][records]") 
   }
 }
 
-TEST_CASE("record file: a copy holds the whole records of the bytes asked for, and can be read", "[bench][records]") {
+TEST_CASE("record file: a copy holds the whole records of the bytes asked for, and can be read",
+          "[bench][records]") {
   const test::TemporaryDirectory dir;
   RecordFile file(dir.path());
   file.fill(3 * RecordFile::kBlock + 7);
   const std::vector<PointRecord> all = records_of(file);
   constexpr std::uint64_t kBlock = RecordFile::kBlock * sizeof(PointRecord);
-  for (const std::uint64_t bytes : std::vector<std::uint64_t>{0, 39, 40, 5000, kBlock - 1, kBlock, kBlock + 1, 2 * kBlock + 4096,
-                                                              file.bytes(), ~std::uint64_t{0}}) {
+  for (const std::uint64_t bytes :
+       std::vector<std::uint64_t>{0, 39, 40, 5000, kBlock - 1, kBlock, kBlock + 1,
+                                  2 * kBlock + 4096, file.bytes(), ~std::uint64_t{0}}) {
     INFO(bytes);
     RecordFile copy(dir.path());
     const std::uint64_t before = written_bytes();

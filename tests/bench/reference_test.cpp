@@ -14,14 +14,17 @@ using namespace ptc::bench;
 namespace {
 
 /// Evenly spread in [-1, 1).
-float noise(std::uint64_t seed) { return 2 * to_unit(static_cast<std::uint32_t>(mix_bits(seed) >> 32)) - 1; }
+float noise(std::uint64_t seed) {
+  return 2 * to_unit(static_cast<std::uint32_t>(mix_bits(seed) >> 32)) - 1;
+}
 
 /// A window of 16 x 16 pixels in which every fourth sees nothing.
 ReceiverSet windowed_set() {
   ReceiverSet set{.name = "camera", .window_width = 16, .window_height = 16};
   for (std::size_t i = 0; i < 256; ++i) {
     const bool seen = i % 4 != 0;
-    set.window.push_back({.receiver = seen ? set.receivers.size() : ReceiverSet::kNone, .albedo = glm::vec3(0.5F)});
+    set.window.push_back(
+        {.receiver = seen ? set.receivers.size() : ReceiverSet::kNone, .albedo = glm::vec3(0.5F)});
     if (seen) set.receivers.push_back({});
   }
   return set;
@@ -45,8 +48,10 @@ TEST_CASE("reference: what it says of its own error is true", "[bench][reference
   const Reference reference = make_reference(set, checked, {.half = 64}, trace, Executor(1));
   CHECK(reference.window.empty());
   const std::vector<float> truth(kCount, 0.5F), light(3 * kCount, 3.0F);
-  CHECK(reference.occlusion_noise == Approx(relative_rms(occlusion_of(reference.mean), truth)).epsilon(0.03));
-  CHECK(reference.irradiance_noise == Approx(relative_rms(irradiance_of(reference.mean), light)).epsilon(0.03));
+  CHECK(reference.occlusion_noise ==
+        Approx(relative_rms(occlusion_of(reference.mean), truth)).epsilon(0.03));
+  CHECK(reference.irradiance_noise ==
+        Approx(relative_rms(irradiance_of(reference.mean), light)).epsilon(0.03));
   CHECK(reference.occlusion_noise == Approx(0.2 / std::sqrt(6.0)).epsilon(0.03));
 }
 
@@ -56,14 +61,16 @@ TEST_CASE("reference: the window has rays of its own", "[bench][reference]") {
   const auto trace = [](const Receiver&, unsigned rays, std::uint64_t) {
     return Shading{.occlusion = static_cast<float>(rays)};
   };
-  const Reference reference = make_reference(set, checked, {.half = 64, .window = 16}, trace, Executor(1));
+  const Reference reference =
+      make_reference(set, checked, {.half = 64, .window = 16}, trace, Executor(1));
   CHECK(occlusion_of(reference.mean) == std::vector<float>{64, 64});
   CHECK(occlusion_of(reference.window) == std::vector<float>{16, 16, 16});
 }
 
 TEST_CASE("window: a picture differs from others and not from itself", "[bench][window]") {
   const ReceiverSet set = windowed_set();
-  const std::vector<Shading> dark(set.receivers.size(), {.occlusion = 0.9F, .irradiance = glm::vec3(0.1F)});
+  const std::vector<Shading> dark(set.receivers.size(),
+                                  {.occlusion = 0.9F, .irradiance = glm::vec3(0.1F)});
   std::vector<Shading> other = dark;
   other[70].irradiance = {3, 0, 0};
   other[70].occlusion = 0.1F;
@@ -88,7 +95,8 @@ TEST_CASE("window: exposure makes dark pictures as bright as others", "[bench][w
   CHECK(flip_at(1e4F) == Approx(flip_at(1)).epsilon(1e-3));
 }
 
-TEST_CASE("window: a set without one has no difference, a black one none that is no number", "[bench][window]") {
+TEST_CASE("window: a set without one has no difference, a black one none that is no number",
+          "[bench][window]") {
   CHECK(std::isnan(window_flip({}, {}, {}, Quantity::occlusion, glm::vec3(1))));
   ReceiverSet nothing{.window_width = 4, .window_height = 4};
   nothing.window.resize(16, {.receiver = ReceiverSet::kNone});

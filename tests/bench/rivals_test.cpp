@@ -10,8 +10,10 @@ using namespace ptc::bench;
 
 namespace {
 
-AccuracyRow row(const std::string& method, const std::string& setting, Quantity job, double us, double rms) {
-  AccuracyRow made{.method = method, .setting = setting, .job = job, .us_per_receiver = {us, us, us}};
+AccuracyRow row(const std::string& method, const std::string& setting, Quantity job, double us,
+                double rms) {
+  AccuracyRow made{
+      .method = method, .setting = setting, .job = job, .us_per_receiver = {us, us, us}};
   (job == Quantity::occlusion ? made.occlusion : made.irradiance).rms = rms;
   return made;
 }
@@ -36,7 +38,8 @@ TEST_CASE("time at an error: at a measured one it is the measured time", "[bench
 
 TEST_CASE("time at an error: there is none outside of those measured", "[bench][rivals]") {
   const std::vector<TimedError> measured{{0.1, 7}, {0.01, 90}};
-  for (const double error : {0.1001, 0.00999, 0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double error :
+       {0.1001, 0.00999, 0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     CHECK(std::isnan(time_at(measured, error)));
   }
   CHECK(std::isnan(time_at({}, 0.1)));
@@ -51,18 +54,20 @@ TEST_CASE("time at an error: the nearest on both sides count where errors do not
 }
 
 TEST_CASE("packets: of each pair of a job the faster stays, in its place", "[bench][rivals]") {
-  std::vector<AccuracyRow> rows{row("ptcx", "0.01 sr, 0.1 rad, R 32", Quantity::occlusion, 50, 0.01),
-                                row("ptcx", "0.01 sr, 0.1 rad, R 32", Quantity::bleeding, 50, 0.02),
-                                row("embree-discs", "64 rays, single", Quantity::occlusion, 20, 0.1),
-                                row("embree-discs", "64 rays, single", Quantity::bleeding, 25, 0.2),
-                                row("embree-discs", "64 rays, packets", Quantity::occlusion, 15, 0.1),
-                                row("embree-discs", "64 rays, packets", Quantity::bleeding, 30, 0.2),
-                                row("embree-discs", "128 rays, single", Quantity::occlusion, 40, 0.05),
-                                row("embree-mesh", "64 rays, single", Quantity::occlusion, 10, 0.1),
-                                row("embree-mesh", "64 rays, packets", Quantity::occlusion, 10, 0.1)};
+  std::vector<AccuracyRow> rows{
+      row("ptcx", "0.01 sr, 0.1 rad, R 32", Quantity::occlusion, 50, 0.01),
+      row("ptcx", "0.01 sr, 0.1 rad, R 32", Quantity::bleeding, 50, 0.02),
+      row("embree-discs", "64 rays, single", Quantity::occlusion, 20, 0.1),
+      row("embree-discs", "64 rays, single", Quantity::bleeding, 25, 0.2),
+      row("embree-discs", "64 rays, packets", Quantity::occlusion, 15, 0.1),
+      row("embree-discs", "64 rays, packets", Quantity::bleeding, 30, 0.2),
+      row("embree-discs", "128 rays, single", Quantity::occlusion, 40, 0.05),
+      row("embree-mesh", "64 rays, single", Quantity::occlusion, 10, 0.1),
+      row("embree-mesh", "64 rays, packets", Quantity::occlusion, 10, 0.1)};
   keep_faster_packets(rows);
   std::vector<std::string> kept;
-  for (const AccuracyRow& r : rows) kept.push_back(r.method + ": " + r.setting + ": " + name_of(r.job));
+  for (const AccuracyRow& r : rows)
+    kept.push_back(r.method + ": " + r.setting + ": " + name_of(r.job));
   CHECK(kept == std::vector<std::string>{"ptcx: 0.01 sr, 0.1 rad, R 32: occlusion",
                                          "ptcx: 0.01 sr, 0.1 rad, R 32: bleeding",
                                          "embree-discs: 64 rays, packets: occlusion",
@@ -71,7 +76,8 @@ TEST_CASE("packets: of each pair of a job the faster stays, in its place", "[ben
                                          "embree-mesh: 64 rays, single: occlusion"});
 }
 
-TEST_CASE("speedups: the rival's time at a row's error over the row's time, job by job", "[bench][rivals]") {
+TEST_CASE("speedups: the rival's time at a row's error over the row's time, job by job",
+          "[bench][rivals]") {
   std::vector<AccuracyRow> rows{row("ptcx", "a", Quantity::occlusion, 10, 0.02),
                                 row("ptcx", "a", Quantity::bleeding, 10, 0.04),
                                 row("ptcx", "b", Quantity::occlusion, 100, 0.001),

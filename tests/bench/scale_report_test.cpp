@@ -14,7 +14,8 @@ using namespace ptc::bench;
 
 namespace {
 
-ScaleRow row(const std::string& stage, std::uint64_t points, double seconds, std::uint64_t resident = 1000) {
+ScaleRow row(const std::string& stage, std::uint64_t points, double seconds,
+             std::uint64_t resident = 1000) {
   const bool limit = stage.ends_with("floor") || stage == "memcpy";
   ScaleRow made{.stage = stage,
                 .points = points,
@@ -51,8 +52,11 @@ std::vector<ScaleRow> rows_of(const std::vector<std::uint64_t>& sizes) {
 
 }  // namespace
 
-TEST_CASE("scale report: a power law is found again, and its middle where measurements lie about it", "[bench][report]") {
-  const PowerLaw exact = fit_power_law({{1, 3}, {10, 3 * std::pow(10, 0.7)}, {1000, 3 * std::pow(1000, 0.7)}});
+TEST_CASE(
+    "scale report: a power law is found again, and its middle where measurements lie about it",
+    "[bench][report]") {
+  const PowerLaw exact =
+      fit_power_law({{1, 3}, {10, 3 * std::pow(10, 0.7)}, {1000, 3 * std::pow(1000, 0.7)}});
   CHECK(exact.factor == Approx(3));
   CHECK(exact.exponent == Approx(0.7));
   CHECK(exact.at(1e6) == Approx(3 * std::pow(1e6, 0.7)));
@@ -60,10 +64,12 @@ TEST_CASE("scale report: a power law is found again, and its middle where measur
   CHECK(noisy.factor == Approx(1));
   CHECK(noisy.exponent == Approx(0.5));
   CHECK(std::isnan(fit_power_law({{5, 1}}).exponent));
-  for (const double x : {3.0, 7.0, 1e6}) CHECK(std::isnan(fit_power_law({{x, 1}, {x, 2}, {x, 4}}).at(x)));
+  for (const double x : {3.0, 7.0, 1e6})
+    CHECK(std::isnan(fit_power_law({{x, 1}, {x, 2}, {x, 4}}).at(x)));
 }
 
-TEST_CASE("scale report: each stage has its law, and time at 1.7 billion points", "[bench][report]") {
+TEST_CASE("scale report: each stage has its law, and time at 1.7 billion points",
+          "[bench][report]") {
   const std::vector<ScaleLaw> laws = laws_of(rows_of({1'000'000, 5'000'000}));
   REQUIRE(laws.size() == 3);
   CHECK(laws[0].stage == "build");
@@ -77,20 +83,25 @@ TEST_CASE("scale report: each stage has its law, and time at 1.7 billion points"
   for (const ScaleLaw& law : laws) CHECK(std::isnan(law.time_ratio));  // none of 20 million
 }
 
-TEST_CASE("scale report: the greatest size is held against the least of 20 million or more", "[bench][report]") {
-  const std::vector<ScaleLaw> laws = laws_of(rows_of({1'000'000, 20'000'000, 50'000'000, 200'000'000}));
+TEST_CASE("scale report: the greatest size is held against the least of 20 million or more",
+          "[bench][report]") {
+  const std::vector<ScaleLaw> laws =
+      laws_of(rows_of({1'000'000, 20'000'000, 50'000'000, 200'000'000}));
   CHECK(laws[0].time_ratio == Approx(1));  // of a point
   CHECK(laws[0].resident_ratio == Approx(3000.0 / 1200));
   CHECK(laws[1].time_ratio == Approx(std::sqrt(0.1)));
   CHECK(laws[2].time_ratio == Approx(1));  // of a receiver
   CHECK(laws[2].resident_ratio == 1);
-  CHECK(std::isnan(laws_of(rows_of({1'000'000, 20'000'000}))[0].time_ratio));  // the greatest is the least
+  CHECK(std::isnan(
+      laws_of(rows_of({1'000'000, 20'000'000}))[0].time_ratio));  // the greatest is the least
   CHECK(std::isnan(laws_of(rows_of({19'999'999, 20'000'000}))[0].resident_ratio));
   CHECK(std::isfinite(laws[0].predicted_seconds));
-  CHECK(std::isnan(laws_of(rows_of({20'000'000, 1'700'000'000}))[0].predicted_seconds));  // measured
+  CHECK(
+      std::isnan(laws_of(rows_of({20'000'000, 1'700'000'000}))[0].predicted_seconds));  // measured
 }
 
-TEST_CASE("scale report: rows have the same members, and null for what a stage has not", "[bench][report]") {
+TEST_CASE("scale report: rows have the same members, and null for what a stage has not",
+          "[bench][report]") {
   const nlohmann::ordered_json facts = facts_of(rows_of({1'000'000, 20'000'000}));
   const auto& rows = facts.at("rows");
   REQUIRE(rows.size() == 12);
@@ -110,18 +121,21 @@ TEST_CASE("scale report: rows have the same members, and null for what a stage h
   CHECK(facts["laws"][0]["time_ratio"].is_null());
 }
 
-TEST_CASE("scale report: panels of time, receivers, memory and bytes; limits are dashed", "[bench][report]") {
+TEST_CASE("scale report: panels of time, receivers, memory and bytes; limits are dashed",
+          "[bench][report]") {
   const Chart chart = chart_of(rows_of({1'000'000, 20'000'000}));
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
-  CHECK(titles == std::vector<std::string>{"Time of a point", "Time of a receiver", "Memory", "Bytes"});
+  CHECK(titles ==
+        std::vector<std::string>{"Time of a point", "Time of a receiver", "Memory", "Bytes"});
   const ChartPanel& time = chart.panels[0];
   std::vector<std::string> names;
   for (const ChartSeries& series : time.series) {
     names.push_back(series.name + (series.dashed ? " dashed" : ""));
     CHECK(series.points.size() == 2);
   }
-  CHECK(names == std::vector<std::string>{"build", "verify", "build floor dashed", "verify floor dashed", "memcpy dashed"});
+  CHECK(names == std::vector<std::string>{"build", "verify", "build floor dashed",
+                                          "verify floor dashed", "memcpy dashed"});
   CHECK(time.series[0].points[1].x == 2e7);
   CHECK(time.series[0].points[1].y == Approx(400));
   REQUIRE(chart.panels[1].series.size() == 1);
@@ -137,7 +151,8 @@ TEST_CASE("scale report: panels of time, receivers, memory and bytes; limits are
 
 TEST_CASE("scale report: files and text of one size and of several", "[bench][report]") {
   const test::TemporaryDirectory dir;
-  for (const std::vector<std::uint64_t>& sizes : {std::vector<std::uint64_t>{1'000'000}, {1'000'000, 20'000'000, 200'000'000}}) {
+  for (const std::vector<std::uint64_t>& sizes :
+       {std::vector<std::uint64_t>{1'000'000}, {1'000'000, 20'000'000, 200'000'000}}) {
     const std::vector<ScaleRow> rows = rows_of(sizes);
     write_reports(dir.path(), rows);
     for (const char* ending : {".json", ".csv", ".svg", ".png"}) {
@@ -148,7 +163,8 @@ TEST_CASE("scale report: files and text of one size and of several", "[bench][re
     for (std::string line; std::getline(csv, line);) ++lines;
     CHECK(lines == rows.size() + 1);
     const std::string text = scale_text(rows);
-    CHECK_THAT(text, Catch::Contains("build floor") && Catch::Contains("    9.0    99.50         5 "));
+    CHECK_THAT(text,
+               Catch::Contains("build floor") && Catch::Contains("    9.0    99.50         5 "));
     CHECK((text.find("nan") == std::string::npos));
   }
 }

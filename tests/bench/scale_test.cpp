@@ -1,6 +1,4 @@
 // Scale: what is measured, and that wrong answers are found.
-#include "tools/bench/scale_bench.h"
-
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -13,21 +11,28 @@
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
 #include "tools/bench/scale_answers.h"
+#include "tools/bench/scale_bench.h"
 
 using namespace ptc;
 using namespace ptc::bench;
 
 namespace {
 
-const std::vector<std::string> kStages{"build", "verify", "shade", "build floor", "verify floor", "memcpy"};
+const std::vector<std::string> kStages{"build",       "verify",       "shade",
+                                       "build floor", "verify floor", "memcpy"};
 
-ScaleOptions small() { return {.points = {20'000, 60'000}, .receivers = 500, .repeats = 2}; }
+ScaleOptions small() {
+  return {.points = {20'000, 60'000}, .receivers = 500, .repeats = 2};
+}
 
 /// Does something to the files of a bench after one of its stages, and hears what it is told.
 class Meddler : public Progress {
  public:
-  explicit Meddler(std::uint64_t stage = 0, std::function<void()> meddle = {}) : stage_(stage), meddle_(std::move(meddle)) {}
-  void begin(const std::string&, std::uint64_t total, const std::string&) override { total_ += total; }
+  explicit Meddler(std::uint64_t stage = 0, std::function<void()> meddle = {})
+      : stage_(stage), meddle_(std::move(meddle)) {}
+  void begin(const std::string&, std::uint64_t total, const std::string&) override {
+    total_ += total;
+  }
   void advance(std::uint64_t count) override {
     done_ += count;
     if (done_ == stage_) meddle_();
@@ -55,13 +60,15 @@ std::filesystem::path file_in(const std::filesystem::path& directory, const char
 
 /// A bench with whose files somebody meddles must say what is wrong and leave nothing.
 /// @param stage  after which; there are six in a run
-void require_found(std::uint64_t stage, const std::function<void(const std::filesystem::path& file)>& meddle,
+void require_found(std::uint64_t stage,
+                   const std::function<void(const std::filesystem::path& file)>& meddle,
                    const std::string& what, const char* ending = ".ptcx") {
   const test::TemporaryDirectory dir;
   Meddler meddler(stage, [&] { meddle(file_in(dir.path(), ending)); });
   ScaleOptions options = small();
   options.points = {20'000};
-  CHECK_THROWS_WITH(measure_scale(options, dir.path(), {.threads = 2}, meddler), Catch::Contains(what));
+  CHECK_THROWS_WITH(measure_scale(options, dir.path(), {.threads = 2}, meddler),
+                    Catch::Contains(what));
   CHECK(std::filesystem::is_empty(dir.path()));
 }
 
@@ -91,7 +98,8 @@ void spoil(const std::filesystem::path& ply) {
 /// A PLY of two points with a column of its own.
 std::filesystem::path write_values(const std::filesystem::path& target, float second) {
   PlyWriter writer(target, 2, {{.name = "light"}});
-  const std::vector<Surfel> surfels(2, Surfel{.position = {1, 2, 3}, .normal = {0, 0, 1}, .radius = 1});
+  const std::vector<Surfel> surfels(
+      2, Surfel{.position = {1, 2, 3}, .normal = {0, 0, 1}, .radius = 1});
   const std::vector<float> values{1, second};
   writer.write(surfels, values);
   writer.finish();
@@ -111,7 +119,8 @@ TEST_CASE("scale: a row for every stage and limit of every size", "[bench][scale
   Meddler progress;
   std::size_t reported = 0;
   const std::vector<ScaleRow> rows =
-      measure_scale(small(), dir.path(), {.threads = 2}, progress, [&](const std::vector<ScaleRow>& r) { reported = r.size(); });
+      measure_scale(small(), dir.path(), {.threads = 2}, progress,
+                    [&](const std::vector<ScaleRow>& r) { reported = r.size(); });
   CHECK(std::filesystem::is_empty(dir.path()));
   CHECK_THAT(progress.notes(), Catch::Contains("GB free") && Catch::Contains(dir.path().string()));
   CHECK(progress.done() == progress.total());
@@ -135,7 +144,8 @@ TEST_CASE("scale: a row for every stage and limit of every size", "[bench][scale
     CHECK(build.bytes_per_point > 6);
     CHECK(build.bytes_per_point < 12);
     CHECK(build.bytes_per_node < 40);
-    CHECK(static_cast<double>(build.points) * build.bytes_per_point + static_cast<double>(build.nodes) * build.bytes_per_node <
+    CHECK(static_cast<double>(build.points) * build.bytes_per_point +
+              static_cast<double>(build.nodes) * build.bytes_per_node <
           static_cast<double>(build.file_bytes));
     CHECK(verify.moved_bytes == build.file_bytes);
     CHECK(verify.rebuilt);
@@ -153,31 +163,36 @@ TEST_CASE("scale: a row for every stage and limit of every size", "[bench][scale
   }
 }
 
-TEST_CASE("scale: what the cap does not hold is spilled, and every stage keeps below it", "[bench][scale]") {
+TEST_CASE("scale: what the cap does not hold is spilled, and every stage keeps below it",
+          "[bench][scale]") {
   const test::TemporaryDirectory dir;
   Progress silent;
   const ScaleOptions options{.points = {900'000}, .receivers = 100, .repeats = 1};
   const RunOptions run{.memory_bytes = std::uint64_t{96} << 20, .threads = 2};
   const std::vector<ScaleRow> rows = measure_scale(options, dir.path(), run, silent);
   REQUIRE(rows.size() == 6);
-  CHECK(rows[0].spilled_bytes >= kSpilledBytes * rows[0].points);  // and what fills the last blocks of the disk
+  CHECK(rows[0].spilled_bytes >=
+        kSpilledBytes * rows[0].points);  // and what fills the last blocks of the disk
   CHECK(rows[0].spilled_bytes == Approx(kSpilledBytes * rows[0].points).epsilon(0.001));
   CHECK(rows[0].moved_bytes == 2 * rows[0].spilled_bytes + rows[0].file_bytes);
   CHECK(rows[3].moved_bytes == rows[0].moved_bytes);
-  if (rows[3].disk_bytes > 0) CHECK(rows[3].disk_bytes == Approx(rows[0].spilled_bytes).epsilon(0.02));
+  if (rows[3].disk_bytes > 0)
+    CHECK(rows[3].disk_bytes == Approx(rows[0].spilled_bytes).epsilon(0.02));
   if (rows[4].disk_bytes > 0) CHECK(rows[4].disk_bytes == Approx(rows[0].file_bytes).epsilon(0.02));
   CHECK(rows[2].cap_share < 1);
   for (std::size_t i = 0; i < 3; ++i) CHECK(rows[i].resident_bytes < run.memory_bytes);
 }
 
-TEST_CASE("scale: a disk without room for the largest is told before anything is built", "[bench][scale]") {
+TEST_CASE("scale: a disk without room for the largest is told before anything is built",
+          "[bench][scale]") {
   const test::TemporaryDirectory dir;
   Meddler progress;
   ScaleOptions options = small();
   options.points.push_back(std::uint64_t{1} << 46);
   CHECK_THROWS_AS(measure_scale(options, dir.path(), {.threads = 1}, progress), std::system_error);
   CHECK_THROWS_WITH(measure_scale(options, dir.path(), {.threads = 1}, progress),
-                    Catch::Contains(dir.path().string()) && Catch::Contains("GB free") && Catch::Contains("--temp"));
+                    Catch::Contains(dir.path().string()) && Catch::Contains("GB free") &&
+                        Catch::Contains("--temp"));
   CHECK(progress.total() == 0);
   CHECK(std::filesystem::is_empty(dir.path()));
 }
@@ -187,46 +202,55 @@ TEST_CASE("scale: files that are damaged or others are found, and none stays", "
   require_found(2, damage, "not sound");  // by the verification at level 4
   require_found(7, damage, "not sound");  // in the second run
   require_found(3, spoil, "is not finite", ".ply");
-  require_found(1, [](const auto& file) { build_city(file, 22'000); }, "went through the sort");
-  require_found(7, [](const auto& file) { build_city(file, 20'000, 3); }, "another container");
-  require_found(8, [](const auto& file) { build_city(file, 22'000); }, "other values");
+  require_found(
+      1, [](const auto& file) { build_city(file, 22'000); }, "went through the sort");
+  require_found(
+      7, [](const auto& file) { build_city(file, 20'000, 3); }, "another container");
+  require_found(
+      8, [](const auto& file) { build_city(file, 22'000); }, "other values");
 }
 
 TEST_CASE("scale: answers that differ are told apart", "[bench][scale]") {
   const ScaleAnswers first{.points = 1, .content = {2, 3}, .values = 4};
   CHECK_NOTHROW(require_same(first, first));
-  CHECK_THROWS_WITH(require_same(first, {2, {2, 3}, 4}), Catch::Contains("another number of points"));
+  CHECK_THROWS_WITH(require_same(first, {2, {2, 3}, 4}),
+                    Catch::Contains("another number of points"));
   CHECK_THROWS_WITH(require_same(first, {1, {2, 4}, 4}), Catch::Contains("another container"));
   CHECK_THROWS_WITH(require_same(first, {1, {2, 3}, 5}), Catch::Contains("other values"));
 }
 
 TEST_CASE("scale: a city has the points asked for within 5 %", "[bench][scale]") {
-  for (const std::uint64_t points : {std::uint64_t{9'500}, std::uint64_t{10'000}, std::uint64_t{10'500}}) {
+  for (const std::uint64_t points :
+       {std::uint64_t{9'500}, std::uint64_t{10'000}, std::uint64_t{10'500}}) {
     CHECK_NOTHROW(require_whole(report_of(points), 10'000, points));
   }
   for (const std::uint64_t points : {std::uint64_t{9'499}, std::uint64_t{10'501}}) {
     CHECK_THROWS_AS(require_whole(report_of(points), 10'000, points), DataError);
   }
-  CHECK_THROWS_WITH(require_whole(report_of(10'000), 10'000, 10'001), Catch::Contains("10001 went through the sort"));
+  CHECK_THROWS_WITH(require_whole(report_of(10'000), 10'000, 10'001),
+                    Catch::Contains("10001 went through the sort"));
   VerifyReport damaged = report_of(10'000);
   damaged.damage = 1;
   damaged.findings.emplace_back();
   CHECK_THROWS_WITH(require_whole(damaged, 10'000, 10'000), Catch::Contains("not sound"));
 }
 
-TEST_CASE("scale: values must be finite, all there, and have a digest of their own", "[bench][scale]") {
+TEST_CASE("scale: values must be finite, all there, and have a digest of their own",
+          "[bench][scale]") {
   const test::TemporaryDirectory dir;
   const std::filesystem::path file = dir / "values.ply";
   const std::uint64_t one = digest_of_values(write_values(file, 1), 2);
   CHECK(digest_of_values(write_values(file, 1), 2) == one);
   CHECK(digest_of_values(write_values(file, 1.0000001F), 2) != one);
-  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     CHECK_THROWS_WITH(digest_of_values(write_values(file, bad), 2),
                       Catch::Contains("values.ply: point 1: light is not finite"));
   }
   write_values(file, 1);
   for (const std::uint64_t count : {std::uint64_t{1}, std::uint64_t{3}}) {
-    CHECK_THROWS_WITH(digest_of_values(file, count), Catch::Contains("values.ply: not the values of"));
+    CHECK_THROWS_WITH(digest_of_values(file, count),
+                      Catch::Contains("values.ply: not the values of"));
   }
   std::ofstream(dir / "none.ply") << "ply\n";
   CHECK_THROWS_WITH(digest_of_values(dir / "none.ply", 0), Catch::Contains("no end_header"));

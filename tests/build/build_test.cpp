@@ -1,9 +1,10 @@
-#include <catch2/catch.hpp>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
+
+#include <catch2/catch.hpp>
 
 #include "engine/build/radius.h"
 #include "engine/io/record.h"
@@ -60,7 +61,9 @@ TEST_CASE("build: radii of points from any one on are those of all", "[build][ch
   SortedScene scene = sort_scene(random_surfels(140'000, 6));
   for (PointRecord& record : scene.records) record.radius = 0;
   const auto radii = [&](std::uint64_t first) {
-    VectorStream points({scene.records.begin() + static_cast<std::ptrdiff_t>(first_for_radii(first)), scene.records.end()});
+    VectorStream points(
+        {scene.records.begin() + static_cast<std::ptrdiff_t>(first_for_radii(first)),
+         scene.records.end()});
     const auto stream = estimate_radii(points, scene.frame.unit(), first);
     std::vector<float> all;
     std::vector<PointRecord> block(10'000);
@@ -71,8 +74,11 @@ TEST_CASE("build: radii of points from any one on are those of all", "[build][ch
   };
   const std::vector<float> whole = radii(0);
   REQUIRE(whole.size() == scene.records.size());
-  for (const std::size_t first : {1u, 65'535u, 65'536u, 65'540u, 100'000u, 131'072u, 139'999u, 140'000u}) {
-    const bool same = radii(first) == std::vector<float>(whole.begin() + static_cast<std::ptrdiff_t>(first), whole.end());
+  for (const std::size_t first :
+       {1u, 65'535u, 65'536u, 65'540u, 100'000u, 131'072u, 139'999u, 140'000u}) {
+    const bool same =
+        radii(first) ==
+        std::vector<float>(whole.begin() + static_cast<std::ptrdiff_t>(first), whole.end());
     CHECK(same);
   }
 }
@@ -94,7 +100,8 @@ TEST_CASE("build: when the stream fails no page is on its way any more", "[build
     ContainerWriter writer(dir / "a.ptcx", {.frame = scene.frame});
     Failing stream(scene.records);
     Progress silent;
-    // The executor is gone before the writer is: pages that were still being compressed would use it.
+    // The executor is gone before the writer is: pages that were still being compressed would use
+    // it.
     CHECK_THROWS_WITH(build_pages(stream, writer, {}, Executor(2), silent), "the stream failed");
     const std::uintmax_t bytes = written();
     std::this_thread::sleep_for(std::chrono::milliseconds(200));

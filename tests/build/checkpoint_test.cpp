@@ -1,7 +1,8 @@
 // Builds that end at a checkpoint and go on from it.
-#include <catch2/catch.hpp>
 #include <memory>
 #include <optional>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/build/build.h"
@@ -32,20 +33,25 @@ struct Setting {
 
 class Rebuild {
  public:
-  Rebuild(const SortedScene& scene, const Setting& setting) : scene_(scene), setting_(setting), executor_(setting.threads) {}
+  Rebuild(const SortedScene& scene, const Setting& setting)
+      : scene_(scene), setting_(setting), executor_(setting.threads) {}
 
   /// Builds from a checkpoint or from the first point on; stops after so many checkpoints.
-  void run(const std::filesystem::path& target, const std::filesystem::path& partial, const std::optional<Saved>& from,
-           std::size_t most = kPoints) {
-    const WriterOptions options{.page_shift = setting_.page_shift, .frame = scene_.frame, .partial = partial};
-    ContainerWriter writer = from ? ContainerWriter(target, options, from->writer) : ContainerWriter(target, options);
+  void run(const std::filesystem::path& target, const std::filesystem::path& partial,
+           const std::optional<Saved>& from, std::size_t most = kPoints) {
+    const WriterOptions options{
+        .page_shift = setting_.page_shift, .frame = scene_.frame, .partial = partial};
+    ContainerWriter writer =
+        from ? ContainerWriter(target, options, from->writer) : ContainerWriter(target, options);
     const std::uint64_t first = from ? from->place.points : 0;
     const auto begin = scene_.records.begin() + static_cast<std::ptrdiff_t>(first_for_radii(first));
     VectorStream points({begin, scene_.records.end()});
     const double unit = scene_.frame.unit();
     const auto radii = estimate_radii(points, unit, first);
-    const auto rounded = round_points(*radii, unit, executor_, from ? from->place.last_key : MortonKey{});
-    Checkpoints checkpoints{.interval = 1, .save = [&](const BuildPlace& place, std::vector<std::byte> state) {
+    const auto rounded =
+        round_points(*radii, unit, executor_, from ? from->place.last_key : MortonKey{});
+    Checkpoints checkpoints{.interval = 1,
+                            .save = [&](const BuildPlace& place, std::vector<std::byte> state) {
                               saved.push_back({place, writer.state(), std::move(state)});
                               if (saved.size() == most) throw DataError("killed");
                             }};
@@ -65,10 +71,12 @@ class Rebuild {
 
 SortedScene scene_without_radii() {
   SortedScene scene = sort_scene(random_surfels(kPoints, 3));
-  for (std::size_t i = 0; i < 3000; ++i) scene.records[100'000 + i].key = scene.records[100'000].key;  // split by rank
+  for (std::size_t i = 0; i < 3000; ++i)
+    scene.records[100'000 + i].key = scene.records[100'000].key;  // split by rank
   std::ranges::stable_sort(scene.records, {}, &PointRecord::key);
   for (PointRecord& record : scene.records) record.radius = 0;
-  // Behind a point that is not rounded lies one that may not go in front of it: the key before counts in every block.
+  // Behind a point that is not rounded lies one that may not go in front of it: the key before
+  // counts in every block.
   for (std::size_t i = 2; i < kPoints; i += 2) {
     PointRecord &before = scene.records[i - 1], &record = scene.records[i];
     if (before.key == record.key) continue;
@@ -85,8 +93,9 @@ SortedScene scene_without_radii() {
 TEST_CASE("checkpoint: a build goes on from each to the same bytes", "[build][checkpoint]") {
   const TemporaryDirectory dir;
   const SortedScene scene = scene_without_radii();
-  for (const Setting& setting : {Setting{}, Setting{.page_shift = 16, .tree = {.leaf_points = 5, .levels_per_stream = 63}},
-                                 Setting{.page_shift = 13, .tree = {.leaf_points = 60'000}, .threads = 1}}) {
+  for (const Setting& setting :
+       {Setting{}, Setting{.page_shift = 16, .tree = {.leaf_points = 5, .levels_per_stream = 63}},
+        Setting{.page_shift = 13, .tree = {.leaf_points = 60'000}, .threads = 1}}) {
     CAPTURE(int{setting.page_shift});
     Rebuild whole(scene, setting);
     whole.run(dir / "whole.ptcx", {}, {});
@@ -116,7 +125,9 @@ TEST_CASE("checkpoint: every prefix of a state is refused", "[build][checkpoint]
   CHECK_THROWS(first.run(dir / "a.ptcx", dir / "pages", {}, 1));
   const Saved& saved = first.saved.front();
   const std::vector<char> pages = bytes_of(dir / "pages");
-  ContainerWriter writer(dir / "a.ptcx", {.page_shift = 12, .frame = scene.frame, .partial = dir / "pages"}, saved.writer);
+  ContainerWriter writer(dir / "a.ptcx",
+                         {.page_shift = 12, .frame = scene.frame, .partial = dir / "pages"},
+                         saved.writer);
   const auto load = [&](const std::vector<std::byte>& bytes) {
     VectorStream none({});
     StateReader state(bytes, "state");
@@ -124,9 +135,11 @@ TEST_CASE("checkpoint: every prefix of a state is refused", "[build][checkpoint]
     static_cast<void>(build_pages(none, writer, {}, Executor(1), silent, {.from = &state}));
   };
   std::vector<std::byte> bytes = saved.state;
-  const std::size_t step = bytes.size() / 2000 + 1;  // the first and last bytes one by one, and some between
+  const std::size_t step =
+      bytes.size() / 2000 + 1;  // the first and last bytes one by one, and some between
   for (std::size_t n = 0; n < bytes.size(); n += n < 300 || n + 3000 > bytes.size() ? 1 : step) {
-    const std::vector<std::byte> prefix(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n));
+    const std::vector<std::byte> prefix(bytes.begin(),
+                                        bytes.begin() + static_cast<std::ptrdiff_t>(n));
     bool refused = false;
     try {
       load(prefix);
@@ -139,7 +152,8 @@ TEST_CASE("checkpoint: every prefix of a state is refused", "[build][checkpoint]
   }
 }
 
-TEST_CASE("checkpoint: an unfinished container that is not what it was is refused", "[build][checkpoint]") {
+TEST_CASE("checkpoint: an unfinished container that is not what it was is refused",
+          "[build][checkpoint]") {
   const TemporaryDirectory dir;
   const SortedScene scene = scene_without_radii();
   Rebuild first(scene, {});
@@ -152,9 +166,12 @@ TEST_CASE("checkpoint: an unfinished container that is not what it was is refuse
   CHECK_NOTHROW(open(options, saved.writer));
   WriterOptions other = options;
   other.uuid[0] = std::byte{1};
-  CHECK_THROWS_WITH(open(other, saved.writer), Catch::Contains("no unfinished container of this scene"));
-  CHECK_THROWS_WITH(open(options, {saved.writer.pages, saved.writer.end - 512}), Catch::Contains("last page is cut"));
-  CHECK_THROWS_WITH(open(options, {saved.writer.pages / 2, saved.writer.end}), Catch::Contains("was not written"));
+  CHECK_THROWS_WITH(open(other, saved.writer),
+                    Catch::Contains("no unfinished container of this scene"));
+  CHECK_THROWS_WITH(open(options, {saved.writer.pages, saved.writer.end - 512}),
+                    Catch::Contains("last page is cut"));
+  CHECK_THROWS_WITH(open(options, {saved.writer.pages / 2, saved.writer.end}),
+                    Catch::Contains("was not written"));
   std::filesystem::resize_file(dir / "pages", saved.writer.end - 1);
   CHECK_THROWS_WITH(open(options, saved.writer), Catch::Contains("shorter than it was"));
 }

@@ -1,10 +1,12 @@
+#include "engine/build/octree.h"
+
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
 #include <map>
 
-#include "engine/build/octree.h"
+#include <catch2/catch.hpp>
+
 #include "format/scalar.h"
 #include "tests/support/scenes.h"
 
@@ -19,9 +21,13 @@ struct KeptGroups {
   ChildRef add(const NodeGroup& group) {
     groups.push_back(group);
     const std::size_t i = groups.size() - 1;
-    return {.interior = true, .page = static_cast<std::uint32_t>(i / 100), .slot = static_cast<std::uint16_t>(i % 100)};
+    return {.interior = true,
+            .page = static_cast<std::uint32_t>(i / 100),
+            .slot = static_cast<std::uint16_t>(i % 100)};
   }
-  [[nodiscard]] const NodeGroup& at(const ChildRef& ref) const { return groups.at(ref.page * 100 + ref.slot); }
+  [[nodiscard]] const NodeGroup& at(const ChildRef& ref) const {
+    return groups.at(ref.page * 100 + ref.slot);
+  }
 };
 
 struct Tree {
@@ -32,11 +38,13 @@ struct Tree {
 Tree build(const std::vector<PointRecord>& records, std::uint32_t leaf_points, double unit) {
   Tree tree;
   SubtreeBuilder builder(leaf_points, unit);
-  tree.root = builder.build(records, 0, 0, [&](const NodeGroup& group, std::uint64_t) { return tree.sink.add(group); });
+  tree.root = builder.build(
+      records, 0, 0, [&](const NodeGroup& group, std::uint64_t) { return tree.sink.add(group); });
   return tree;
 }
 
-/// Keeps what a builder emits, with the numbers of groups for references, as SubtreeGroups has them.
+/// Keeps what a builder emits, with the numbers of groups for references, as SubtreeGroups has
+/// them.
 struct Emitted : GroupSink {
   SubtreeGroups out;
   ChildRef add(const GroupView& group, std::uint64_t end) override {
@@ -48,27 +56,32 @@ struct Emitted : GroupSink {
 };
 
 /// The groups of one builder given `block` points at a time, and its result.
-std::pair<SubtreeGroups, OctreeBuilder::Result> streamed(std::span<const PointRecord> records, std::uint32_t leaf_points,
+std::pair<SubtreeGroups, OctreeBuilder::Result> streamed(std::span<const PointRecord> records,
+                                                         std::uint32_t leaf_points,
                                                          std::size_t block, unsigned threads) {
   Emitted sink;
   const Executor executor(threads);
   OctreeBuilder builder(sink, leaf_points, 1.0, executor);
-  for (; records.size() > block; records = records.subspan(block)) builder.add(records.first(block));
+  for (; records.size() > block; records = records.subspan(block))
+    builder.add(records.first(block));
   builder.add(records);
   const OctreeBuilder::Result result = builder.finish();
   return {std::move(sink.out), result};
 }
 
 bool equal(const SubtreeGroups& a, const SubtreeGroups& b) {
-  return std::ranges::equal(a.groups, b.groups, [&](const SubtreeGroups::Group& x, const SubtreeGroups::Group& y) {
-    const std::size_t size = std::min(x.size, y.size);  // the one that is padded is longer
-    return x.end == y.end && std::ranges::equal(std::span(a.bytes).subspan(x.begin, size), std::span(b.bytes).subspan(y.begin, size));
-  });
+  return std::ranges::equal(
+      a.groups, b.groups, [&](const SubtreeGroups::Group& x, const SubtreeGroups::Group& y) {
+        const std::size_t size = std::min(x.size, y.size);  // the one that is padded is longer
+        return x.end == y.end && std::ranges::equal(std::span(a.bytes).subspan(x.begin, size),
+                                                    std::span(b.bytes).subspan(y.begin, size));
+      });
 }
 
 /// The octree by definition, top down: the leaves as (first, count), in order.
-void expected_leaves(const std::vector<PointRecord>& records, std::uint64_t first, std::uint64_t count,
-                     std::uint32_t leaf_points, std::vector<std::pair<std::uint64_t, std::uint64_t>>& leaves) {
+void expected_leaves(const std::vector<PointRecord>& records, std::uint64_t first,
+                     std::uint64_t count, std::uint32_t leaf_points,
+                     std::vector<std::pair<std::uint64_t, std::uint64_t>>& leaves) {
   if (count <= leaf_points) {
     leaves.emplace_back(first, count);
     return;
@@ -77,13 +90,16 @@ void expected_leaves(const std::vector<PointRecord>& records, std::uint64_t firs
   REQUIRE(level < kLatticeBits);  // no coincident cell with more than leaf_points in this test
   for (std::uint64_t begin = first; begin < first + count;) {
     std::uint64_t end = begin + 1;
-    while (end < first + count && octant(records[end].key, level + 1) == octant(records[begin].key, level + 1)) ++end;
+    while (end < first + count &&
+           octant(records[end].key, level + 1) == octant(records[begin].key, level + 1))
+      ++end;
     expected_leaves(records, begin, end - begin, leaf_points, leaves);
     begin = end;
   }
 }
 
-void walk(const Tree& tree, const ChildRef& ref, const std::function<void(const NodeGroup&, const NodeChild&)>& visit) {
+void walk(const Tree& tree, const ChildRef& ref,
+          const std::function<void(const NodeGroup&, const NodeChild&)>& visit) {
   for (const NodeChild& child : tree.sink.at(ref).children) {
     visit(tree.sink.at(ref), child);
     if (child.ref.interior) walk(tree, child.ref, visit);
@@ -110,7 +126,8 @@ TEST_CASE("octree: leaves are those of the top-down definition", "[build][octree
   }
 }
 
-TEST_CASE("octree: a group's cell holds all its points and no deeper cell does", "[build][octree]") {
+TEST_CASE("octree: a group's cell holds all its points and no deeper cell does",
+          "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(3000, 2));
   const Tree tree = build(scene.records, 4, scene.frame.unit());
   const std::function<std::pair<std::uint64_t, std::uint64_t>(const ChildRef&)> check =
@@ -134,7 +151,8 @@ TEST_CASE("octree: a group's cell holds all its points and no deeper cell does",
   CHECK(last == scene.records.size());
 }
 
-TEST_CASE("octree: spheres hold every disc below them and sums agree with the points", "[build][octree]") {
+TEST_CASE("octree: spheres hold every disc below them and sums agree with the points",
+          "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(2000, 3));
   const double unit = scene.frame.unit();
   const Tree tree = build(scene.records, 8, unit);
@@ -147,12 +165,14 @@ TEST_CASE("octree: spheres hold every disc below them and sums agree with the po
             points.insert(points.end(), below.begin(), below.end());
           }
         } else {
-          for (std::uint32_t i = 0; i < ref.point_count; ++i) points.push_back(&scene.records[ref.first_point + i]);
+          for (std::uint32_t i = 0; i < ref.point_count; ++i)
+            points.push_back(&scene.records[ref.first_point + i]);
         }
         double area = 0;
         for (const PointRecord* p : points) {
           const LatticePoint q = decode_morton(p->key);
-          const double d = std::hypot(static_cast<double>(q[0]) - node.mean[0], static_cast<double>(q[1]) - node.mean[1],
+          const double d = std::hypot(static_cast<double>(q[0]) - node.mean[0],
+                                      static_cast<double>(q[1]) - node.mean[1],
                                       static_cast<double>(q[2]) - node.mean[2]);
           CHECK(d + static_cast<double>(p->radius) / unit <= node.radius * (1 + 1e-12));
           area += 2.0 * static_cast<double>(p->radius) * static_cast<double>(p->radius);
@@ -191,7 +211,8 @@ TEST_CASE("octree: up to leaf_points points make a root group with one leaf", "[
     const GroupView root(groups.bytes.data());
     REQUIRE(root.size() == 1);
     CHECK(root.level() == 0);
-    CHECK(root.child(0) == ChildRef{.first_point = 0, .point_count = static_cast<std::uint32_t>(count)});
+    CHECK(root.child(0) ==
+          ChildRef{.first_point = 0, .point_count = static_cast<std::uint32_t>(count)});
     CHECK(result.root == ChildRef{.interior = true});
     CHECK(result.nodes == 1);
   }
@@ -202,7 +223,8 @@ TEST_CASE("octree: up to leaf_points points make a root group with one leaf", "[
 
 TEST_CASE("octree: blocks and threads change neither groups nor their order", "[build][octree]") {
   std::vector<PointRecord> spread = sort_scene(random_surfels(30'000, 5)).records;
-  std::vector<PointRecord> heaps = spread;  // heaps of coincident points of any size, alone and among others
+  std::vector<PointRecord> heaps =
+      spread;  // heaps of coincident points of any size, alone and among others
   std::size_t at = 0;
   for (const std::size_t count : {1U, 2U, 7U, 8U, 9U, 600U, 4095U, 4096U, 4097U, 9000U}) {
     for (std::size_t i = 1; i < count; ++i) heaps[at + i].key = heaps[at].key;
@@ -213,7 +235,8 @@ TEST_CASE("octree: blocks and threads change neither groups nor their order", "[
       SubtreeGroups whole;
       const NodeChild top = SubtreeBuilder(leaf_points, 1.0).build(records, 0, 0, whole);
       if (!top.ref.interior) continue;
-      for (const auto& [block, threads] : {std::pair(std::size_t{777}, 1U), {std::size_t{10'000}, 3U}, {records.size(), 2U}}) {
+      for (const auto& [block, threads] :
+           {std::pair(std::size_t{777}, 1U), {std::size_t{10'000}, 3U}, {records.size(), 2U}}) {
         const auto [groups, result] = streamed(records, leaf_points, block, threads);
         CHECK(equal(groups, whole));
         CHECK(result.root == top.ref);
@@ -225,7 +248,8 @@ TEST_CASE("octree: blocks and threads change neither groups nor their order", "[
   }
 }
 
-TEST_CASE("octree: points that coincide far from the corner have their mean where they are", "[build][octree]") {
+TEST_CASE("octree: points that coincide far from the corner have their mean where they are",
+          "[build][octree]") {
   std::vector<PointRecord> points(1000);
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].key = encode_morton({kLatticeMax, kLatticeMax - 1, 12345});
@@ -234,11 +258,13 @@ TEST_CASE("octree: points that coincide far from the corner have their mean wher
   const NodeSummary leaf = summarise_points(points, 1);
   const std::array<const NodeSummary*, 3> children{&leaf, &leaf, &leaf};
   for (const NodeSummary& node : {leaf, summarise_nodes(children)}) {
-    CHECK(node.mean == std::array<double, 3>{static_cast<double>(kLatticeMax), static_cast<double>(kLatticeMax - 1), 12345});
+    CHECK(node.mean == std::array<double, 3>{static_cast<double>(kLatticeMax),
+                                             static_cast<double>(kLatticeMax - 1), 12345});
   }
 }
 
-TEST_CASE("octree: points without area or with opposite normals still have a middle and a cone", "[build][octree]") {
+TEST_CASE("octree: points without area or with opposite normals still have a middle and a cone",
+          "[build][octree]") {
   std::vector<PointRecord> points(2);
   points[0].key = encode_morton({0, 0, 0});
   points[1].key = encode_morton({8, 0, 0});
@@ -254,7 +280,8 @@ TEST_CASE("octree: points without area or with opposite normals still have a mid
   CHECK(opposite.facing[1] == Approx(2));
 }
 
-TEST_CASE("octree: the slab of a plane is thin, of opposite normals as thick as the sphere", "[build][octree]") {
+TEST_CASE("octree: the slab of a plane is thin, of opposite normals as thick as the sphere",
+          "[build][octree]") {
   std::vector<PointRecord> points(64);
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].key = encode_morton({1000 + i % 8, 2000 + i / 8, 500});
@@ -305,7 +332,8 @@ TEST_CASE("octree: cones hold every normal to the last bit", "[build][octree]") 
   }
 }
 
-TEST_CASE("octree: discs of any size over a lattice of any unit have finite bounds", "[build][octree]") {
+TEST_CASE("octree: discs of any size over a lattice of any unit have finite bounds",
+          "[build][octree]") {
   SortedScene scene = sort_scene(random_surfels(9, 6));
   for (PointRecord& p : scene.records) p.radius = 3e38F;
   const NodeSummary all = summarise_points(scene.records, 0x1p-1002);

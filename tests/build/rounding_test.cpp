@@ -2,9 +2,9 @@
 #include "engine/build/rounding.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/io/record.h"
@@ -16,7 +16,8 @@ using namespace ptc::test;
 
 namespace {
 
-std::vector<PointRecord> rounded(const std::vector<PointRecord>& records, const Frame& frame, std::size_t block = 777) {
+std::vector<PointRecord> rounded(const std::vector<PointRecord>& records, const Frame& frame,
+                                 std::size_t block = 777) {
   VectorStream stream(records, block);
   const Executor executor(2);
   const std::unique_ptr<PointStream> from = round_points(stream, frame.unit(), executor);
@@ -49,7 +50,8 @@ TEST_CASE("rounding: a point does not depend on which others come with it", "[bu
   const std::vector<PointRecord> one = rounded(scene.records, scene.frame, 1);
   const std::vector<PointRecord> all = rounded(scene.records, scene.frame, scene.records.size());
   CHECK(std::ranges::equal(one, all, {}, &PointRecord::key, &PointRecord::key));
-  std::size_t moved_by_others = 0;  // else the pieces that are rounded side by side would not matter
+  std::size_t moved_by_others =
+      0;  // else the pieces that are rounded side by side would not matter
   for (std::size_t i = 1; i < all.size(); ++i) {
     moved_by_others += rounded({scene.records[i]}, scene.frame, 1)[0].key != all[i].key;
   }
@@ -63,15 +65,20 @@ TEST_CASE("rounding: points stay in order and within the bounds", "[build][round
   double position = 0, radius = 0, normal = 0, radiance = 0;
   std::size_t moved = 0;
   for (std::size_t i = 0; i < records.size(); ++i) {
-    const Surfel was = to_surfel(scene.records[i], scene.frame), is = to_surfel(records[i], scene.frame);
+    const Surfel was = to_surfel(scene.records[i], scene.frame),
+                 is = to_surfel(records[i], scene.frame);
     moved += records[i].key != scene.records[i].key;
-    position = std::max(position, glm::distance(was.position, is.position) / static_cast<double>(is.radius));
-    radius = std::max(radius, std::abs(static_cast<double>(is.radius) / static_cast<double>(was.radius) - 1));
+    position = std::max(position,
+                        glm::distance(was.position, is.position) / static_cast<double>(is.radius));
+    radius = std::max(
+        radius, std::abs(static_cast<double>(is.radius) / static_cast<double>(was.radius) - 1));
     const glm::dvec3 a(was.normal), b(is.normal);
     normal = std::max(normal, std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
     for (int c = 0; c < 3; ++c) {
-      const double from = static_cast<double>(was.radiance[c]), off = std::abs(static_cast<double>(is.radiance[c]) - from);
-      radiance = std::max(radiance, std::min(from > 0 ? off / from : off, off / 0x1p-22 * kRoundedRadiance));
+      const double from = static_cast<double>(was.radiance[c]),
+                   off = std::abs(static_cast<double>(is.radiance[c]) - from);
+      radiance = std::max(radiance,
+                          std::min(from > 0 ? off / from : off, off / 0x1p-22 * kRoundedRadiance));
     }
     REQUIRE(records[i].albedo == scene.records[i].albedo);
   }
@@ -92,7 +99,8 @@ TEST_CASE("rounding: what is rounded stays, and blocks do not matter", "[build][
   const std::vector<PointRecord> once = rounded(scene.records, scene.frame);
   const auto same = [&](const std::vector<PointRecord>& other) {
     return std::ranges::equal(once, other, [](const PointRecord& a, const PointRecord& b) {
-      return a.key == b.key && a.radius == b.radius && a.normal == b.normal && a.radiance == b.radiance;
+      return a.key == b.key && a.radius == b.radius && a.normal == b.normal &&
+             a.radiance == b.radiance;
     });
   };
   CHECK(same(rounded(once, scene.frame)));
@@ -102,7 +110,8 @@ TEST_CASE("rounding: what is rounded stays, and blocks do not matter", "[build][
 TEST_CASE("rounding: axes, ends of ranges and points without radius stay", "[build][rounding]") {
   Frame frame;
   std::vector<PointRecord> records(5);
-  for (std::size_t i = 0; i < records.size(); ++i) records[i].key = encode_morton({12345 + 2 * i, 777, 4242});
+  for (std::size_t i = 0; i < records.size(); ++i)
+    records[i].key = encode_morton({12345 + 2 * i, 777, 4242});
   records[0].normal = {32767, 0};
   records[1].normal = {0, -32767};
   records[2].radiance = {0x7bff, 0x8000, 1};

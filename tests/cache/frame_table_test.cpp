@@ -1,8 +1,6 @@
 // The bookkeeping of the cache against textbook replacement.
 #include "engine/cache/frame_table.h"
 
-#include <catch2/catch.hpp>
-
 #include <algorithm>
 #include <array>
 #include <deque>
@@ -10,6 +8,8 @@
 #include <random>
 #include <stdexcept>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "tests/cache/pages.h"
 
@@ -49,9 +49,7 @@ class TextbookClock {
  public:
   explicit TextbookClock(std::uint32_t frames) : asked_for_(frames) {}
   void insert(std::uint32_t frame) { asked_for_[frame] = false; }
-  void touch(std::uint32_t frame) {
-    asked_for_[frame] = true;
-  }
+  void touch(std::uint32_t frame) { asked_for_[frame] = true; }
   template <class Held>
   std::uint32_t evict(const Held& held) {
     for (;; hand_ = (hand_ + 1) % asked_for_.size()) {
@@ -77,7 +75,9 @@ template <class Order>
 class Session {
  public:
   Session(std::uint32_t frames, Replacement replacement)
-      : table_({kPages, frames, kReaders, kSlots}, replacement), page_in_(frames, kPages), order_(frames) {}
+      : table_({kPages, frames, kReaders, kSlots}, replacement),
+        page_in_(frames, kPages),
+        order_(frames) {}
 
   void step(std::mt19937& random) {
     const std::uint32_t reader = below(kReaders, random);
@@ -115,9 +115,12 @@ class Session {
     if (found == page_in_.end()) return {};
     return static_cast<std::uint32_t>(found - page_in_.begin());
   }
-  [[nodiscard]] bool loading(std::uint32_t frame) const { return std::ranges::count(waits_, frame) > 0; }
+  [[nodiscard]] bool loading(std::uint32_t frame) const {
+    return std::ranges::count(waits_, frame) > 0;
+  }
   [[nodiscard]] bool is_held(std::uint32_t frame) const {
-    return std::ranges::any_of(holds_, [&](const auto& slots) { return std::ranges::count(slots, frame) > 0; });
+    return std::ranges::any_of(
+        holds_, [&](const auto& slots) { return std::ranges::count(slots, frame) > 0; });
   }
 
   std::uint32_t claim(std::uint32_t reader, std::uint32_t page) {
@@ -198,7 +201,8 @@ TEST_CASE("frame table: what a reader let go of leaves, what it holds stays", "[
   CHECK(table.evictions() == 2);
 }
 
-TEST_CASE("frame table: a failed page keeps its error until the last who waited has read it", "[cache][frames]") {
+TEST_CASE("frame table: a failed page keeps its error until the last who waited has read it",
+          "[cache][frames]") {
   FrameTable table({.pages = 4, .frames = 2, .readers = 2, .slots = 1}, Replacement::clock);
   const std::uint32_t frame = table.claim(0, 3);
   CHECK(table.join(1, 3) == frame);

@@ -1,8 +1,6 @@
 // One thread: what the cache answers, counts, evicts and takes.
 #include "engine/cache/page_cache.h"
 
-#include <catch2/catch.hpp>
-
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -13,6 +11,8 @@
 #include <random>
 #include <stdexcept>
 #include <string>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/memory.h"
 #include "format/error.h"

@@ -1,13 +1,13 @@
 // What the back ends read is what is in the file.
 #include "engine/cache/page_source.h"
 
-#include <catch2/catch.hpp>
-
 #include <unistd.h>
 
 #include <algorithm>
 #include <random>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "tests/cache/pages.h"
@@ -57,7 +57,8 @@ TEST_CASE("page source: any range is what the file holds, expected or not", "[ca
       std::vector<std::pair<std::uint64_t, std::size_t>> ranges;
       for (std::uint32_t k = 0; k <= expected; ++k) {
         const std::size_t bytes = 1 + below(kMostBytes, random);
-        ranges.emplace_back(below(static_cast<std::uint32_t>(noise.bytes.size() - bytes + 1), random), bytes);
+        ranges.emplace_back(
+            below(static_cast<std::uint32_t>(noise.bytes.size() - bytes + 1), random), bytes);
         if (k > 0) source->expect(ranges.back().first, bytes);
       }
       for (const auto& [offset, bytes] : ranges) {
@@ -70,7 +71,8 @@ TEST_CASE("page source: any range is what the file holds, expected or not", "[ca
   }
 }
 
-TEST_CASE("page source: the last bytes of a file are read, and none beyond them", "[cache][source]") {
+TEST_CASE("page source: the last bytes of a file are read, and none beyond them",
+          "[cache][source]") {
   const NoiseFile noise;
   const InputFile file(noise.path());
   for (const BackEnd back_end : available_back_ends(file)) {
@@ -83,7 +85,8 @@ TEST_CASE("page source: the last bytes of a file are read, and none beyond them"
   }
 }
 
-TEST_CASE("page source: a file that became shorter is an error that names it", "[cache][source][failure]") {
+TEST_CASE("page source: a file that became shorter is an error that names it",
+          "[cache][source][failure]") {
   const NoiseFile noise;
   const InputFile file(noise.path());
   for (const BackEnd back_end : available_back_ends(file)) {

@@ -1,8 +1,6 @@
 // A container for the tests of the cache, with what its pages hold.
 #pragma once
 
-#include <catch2/catch.hpp>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -12,6 +10,8 @@
 #include <system_error>
 #include <utility>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/cache/page_cache.h"
 #include "tests/store/sample.h"
@@ -73,7 +73,8 @@ class Pages {
   }
   /// Options that give exactly so many frames.
   [[nodiscard]] CacheOptions options(unsigned threads, std::uint64_t frames,
-                                     std::uint32_t local_slots = 0, BackEnd back_end = BackEnd::pread) const {
+                                     std::uint32_t local_slots = 0,
+                                     BackEnd back_end = BackEnd::pread) const {
     CacheOptions options;
     options.memory_bytes = PageCache::bytes_for(container, threads, frames, back_end);
     options.threads = threads;

@@ -1,6 +1,4 @@
 // Many threads on one cache: contents, single flight, failure, and no deadlock at the least cap.
-#include <catch2/catch.hpp>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -14,6 +12,8 @@
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/cache/frame_table.h"
 #include "engine/cache/page_cache.h"
@@ -66,10 +66,12 @@ void check_sums(const CacheStatistics& s, std::uint64_t lookups) {
 
 }  // namespace
 
-TEST_CASE("frame table: a frame that a reader holds keeps its page while others claim", "[cache][frames][threads]") {
+TEST_CASE("frame table: a frame that a reader holds keeps its page while others claim",
+          "[cache][frames][threads]") {
   constexpr std::uint32_t kReaders = 4, kPages = 6;
   for (const Replacement replacement : {Replacement::clock, Replacement::lru}) {
-    FrameTable table({.pages = kPages, .frames = kReaders, .readers = kReaders, .slots = 1}, replacement);
+    FrameTable table({.pages = kPages, .frames = kReaders, .readers = kReaders, .slots = 1},
+                     replacement);
     std::array<std::atomic<std::uint32_t>, kReaders> page_in{};
     std::mutex mutex;
     std::atomic<std::size_t> wrong = 0;
@@ -212,8 +214,8 @@ TEST_CASE("cache: all who ask for a damaged page get its error, the others their
           caught = std::current_exception();
         }
         if (!caught) continue;
-        // Threads share the error. It is counted in a library that the thread sanitizer does not see: under a lock it sees
-        // that who frees it comes after all who read it.
+        // Threads share the error. It is counted in a library that the thread sanitizer does not
+        // see: under a lock it sees that who frees it comes after all who read it.
         const std::lock_guard lock(reading);
         try {
           std::rethrow_exception(std::exchange(caught, nullptr));

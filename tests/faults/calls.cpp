@@ -205,7 +205,8 @@ int open_watched(int base, const char* path, int flags, mode_t mode) {
   const bool creates = (flags & (O_CREAT | __O_TMPFILE)) != 0;
   if (strikes("open", creates ? Kind::create : Kind::open, where)) return -1;
   const TraceGuard guard;
-  const bool is_there = where[0] != '\0' && ::access(where, F_OK) == 0;  // then its name does not change
+  const bool is_there =
+      where[0] != '\0' && ::access(where, F_OK) == 0;  // then its name does not change
   const int fd = real(base, path, flags, mode);
   if (fd < 0 || fd >= kMostFiles || where[0] == '\0') return fd;
   std::strcpy(paths[fd], where);
@@ -331,7 +332,8 @@ int fallocate(int fd, int mode, off_t offset, off_t bytes) {
   return result;
 }
 
-int fallocate64(int fd, int mode, off64_t offset, off64_t bytes) __attribute__((alias("fallocate")));
+int fallocate64(int fd, int mode, off64_t offset, off64_t bytes)
+    __attribute__((alias("fallocate")));
 
 int fsync(int fd) {
   static const auto real = next_of(&::fsync, "fsync");

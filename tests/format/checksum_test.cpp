@@ -1,11 +1,12 @@
 // XXH3 against published values and against the table that the second reader is tested with too.
 #include "format/checksum.h"
 
-#include <catch2/catch.hpp>
 #include <fstream>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "format/container.h"
 #include "tests/format/support.h"

@@ -1,9 +1,8 @@
 // Page compression: exact sizes, hostile frames, and the same bytes from a used context.
 #include "format/codec.h"
 
-#include <zstd.h>
-
 #include <catch2/catch.hpp>
+#include <zstd.h>
 
 #include "tests/format/support.h"
 
@@ -162,6 +161,5 @@ TEST_CASE("codec: raw payloads keep their size", "[format][codec]") {
   Bytes out(10);
   decoder.decode({}, Bytes(10, std::byte{3}), out);
   CHECK(out == Bytes(10, std::byte{3}));
-  CHECK(clause_of([&] { decoder.decode({}, Bytes(9), out); }) ==
-        "spec/container.md#page-length");
+  CHECK(clause_of([&] { decoder.decode({}, Bytes(9), out); }) == "spec/container.md#page-length");
 }

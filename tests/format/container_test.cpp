@@ -2,8 +2,9 @@
 // broken under a right checksum is named.
 #include "format/container.h"
 
-#include <catch2/catch.hpp>
 #include <limits>
+
+#include <catch2/catch.hpp>
 
 #include "format/checksum.h"
 #include "format/point_page.h"
@@ -338,8 +339,9 @@ TEST_CASE("directory: a page outside the file is refused, however the numbers wr
   CHECK(at(4608) == "none");
   CHECK(at(65536 - 8192 - 4096) == "none");
   for (const std::uint64_t offset :
-       {std::uint64_t{0}, std::uint64_t{4095}, std::uint64_t{8193}, std::uint64_t{8448}, std::uint64_t{65536 - 8192},
-        std::uint64_t{65536}, ~std::uint64_t{0}, ~std::uint64_t{4095}, std::uint64_t{1} << 63}) {
+       {std::uint64_t{0}, std::uint64_t{4095}, std::uint64_t{8193}, std::uint64_t{8448},
+        std::uint64_t{65536 - 8192}, std::uint64_t{65536}, ~std::uint64_t{0}, ~std::uint64_t{4095},
+        std::uint64_t{1} << 63}) {
     CHECK(at(offset) == kExtent);
   }
   const EntryBytes bytes = encode_entry(example_entry());

@@ -1,8 +1,9 @@
 // The lattice laid over a scene: what it holds, and what it keeps exactly.
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
 
 #include "format/morton.h"
 #include "tests/format/support.h"

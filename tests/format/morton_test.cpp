@@ -2,8 +2,9 @@
 #include "format/morton.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "tests/format/support.h"
 

@@ -2,9 +2,10 @@
 #include "format/node_page.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
 
 #include "format/scalar.h"
 #include "tests/format/support.h"
@@ -91,9 +92,9 @@ std::string changed(const Bytes& payload, std::uint32_t groups, std::size_t at, 
 
 bool finite(const NodeSummary& node) {
   const auto ok = [](double x) { return std::isfinite(x); };
-  return std::ranges::all_of(node.mean, ok) && ok(node.radius) && ok(node.area) && ok(node.thickness) &&
-         std::ranges::all_of(node.facing, ok) && std::ranges::all_of(node.cone_axis, ok) &&
-         ok(node.cone_cos) &&
+  return std::ranges::all_of(node.mean, ok) && ok(node.radius) && ok(node.area) &&
+         ok(node.thickness) && std::ranges::all_of(node.facing, ok) &&
+         std::ranges::all_of(node.cone_axis, ok) && ok(node.cone_cos) &&
          std::ranges::all_of(node.flux, [&](const auto& f) { return std::ranges::all_of(f, ok); });
 }
 
@@ -155,7 +156,8 @@ TEST_CASE("node page: the stored sphere holds the given one", "[format][nodes]")
 TEST_CASE("node page: the stored slab holds the given one", "[format][nodes]") {
   using Vec = std::array<double, 3>;
   const auto normal = [](const NodeSummary& node) {
-    Vec v{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3], node.facing[4] - node.facing[5]};
+    Vec v{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3],
+          node.facing[4] - node.facing[5]};
     const double length = std::hypot(v[0], v[1], v[2]);
     for (double& x : v) x /= length;
     return v;
@@ -178,10 +180,12 @@ TEST_CASE("node page: the stored slab holds the given one", "[format][nodes]") {
     Vec side{};
     for (std::size_t k = 0; k < 3; ++k) side[k] = double{other[k]} - along * n[k];
     const double length = std::hypot(side[0], side[1], side[2]);
-    const double wide = std::sqrt(std::max(0.0, given.radius * given.radius - given.thickness * given.thickness));
+    const double wide =
+        std::sqrt(std::max(0.0, given.radius * given.radius - given.thickness * given.thickness));
     double height = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      height += s[k] * (given.mean[k] - stored.mean[k] + given.thickness * n[k] + wide * side[k] / length);
+      height += s[k] *
+                (given.mean[k] - stored.mean[k] + given.thickness * n[k] + wide * side[k] / length);
     }
     wrong += std::abs(height) > stored.thickness;
     useful += stored.thickness < 1.1 * given.thickness + 1e-3 * given.radius + cell_edge(5) / 32768;
@@ -398,6 +402,7 @@ TEST_CASE("node page: a broken rule is named", "[format][nodes]") {
   CHECK(with(8 + 48 + 6 * 3, std::uint16_t{0xff00}) == "spec/nodes.md#node-number");  // radius
   CHECK(with(8 + 48 + 6 * 3, std::uint16_t{0xfeff}) == "none");
   CHECK(with(8 + 48 + 6 * 6 + 4, std::uint16_t{0xffff}) == "spec/nodes.md#node-number");  // area
-  CHECK(with(8 + 48 + 6 * 7 + 2, std::uint16_t{0xff00}) == "spec/nodes.md#node-number");  // thickness
+  CHECK(with(8 + 48 + 6 * 7 + 2, std::uint16_t{0xff00}) ==
+        "spec/nodes.md#node-number");  // thickness
   CHECK(with(8 + 204, std::uint16_t{1}) == "spec/nodes.md#node-zero");
 }

@@ -1,4 +1,5 @@
-// Packed columns: every payload comes back, the bytes are those of the specification, nonsense is refused.
+// Packed columns: every payload comes back, the bytes are those of the specification, nonsense is
+// refused.
 #include "format/packed_columns.h"
 
 #include <catch2/catch.hpp>
@@ -18,7 +19,8 @@ namespace {
 
 constexpr char kPacked[] = "spec/points.md#packed-columns";
 
-/// Points along a Z-curve whose coordinates end in `zeros` zero bits, other numbers within `spread` bits.
+/// Points along a Z-curve whose coordinates end in `zeros` zero bits, other numbers within `spread`
+/// bits.
 Bytes point_payload(std::uint32_t count, unsigned zeros, unsigned spread, std::uint64_t seed) {
   Random random(seed);
   std::vector<PointRecord> points(count);
@@ -28,8 +30,10 @@ Bytes point_payload(std::uint32_t count, unsigned zeros, unsigned spread, std::u
     point.key = encode_morton(q);
     point.radius = static_cast<float>(random.unit());
     for (auto& n : point.normal) n = static_cast<std::int16_t>(random.bits());
-    for (auto& c : point.radiance) c = static_cast<std::uint16_t>(random.below(std::uint64_t{1} << spread) % 0x7c00);
-    for (auto& c : point.albedo) c = static_cast<std::uint8_t>(random.below(std::uint64_t{1} << spread));
+    for (auto& c : point.radiance)
+      c = static_cast<std::uint16_t>(random.below(std::uint64_t{1} << spread) % 0x7c00);
+    for (auto& c : point.albedo)
+      c = static_cast<std::uint8_t>(random.below(std::uint64_t{1} << spread));
   }
   std::ranges::sort(points, {}, &PointRecord::key);
   return encode_point_page(points);
@@ -93,7 +97,8 @@ TEST_CASE("packed columns: bytes are those of the specification", "[format][pack
   // 1, 65535: the way round the end is the shorter one, -2, zigzag 3.
   CHECK(pack(bytes_of({1, 0, 255, 255}), 2, u16) == bytes_of({0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 3}));
   // The second column is kept as what it is above the first: -1, -1.
-  const std::vector<PackedColumn> pair{{.before = 0, .bits = 8}, {.before = 1, .bits = 8, .minus = 0}};
+  const std::vector<PackedColumn> pair{{.before = 0, .bits = 8},
+                                       {.before = 1, .bits = 8, .minus = 0}};
   CHECK(pack(bytes_of({10, 20, 9, 19}), 2, pair) ==
         bytes_of({1, 1, 10, 0, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 255, 0, 0, 0, 0, 0, 0, 0}));
 }
@@ -108,7 +113,8 @@ TEST_CASE("packed columns: what they are not is refused", "[format][packed]") {
   };
   CHECK(unpack(packed) == "none");
   for (std::size_t n = 0; n < packed.size(); ++n) {
-    CHECK(unpack(Bytes(packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(n))) == kPacked);
+    CHECK(unpack(Bytes(packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(n))) ==
+          kPacked);
   }
   Bytes longer = packed;
   longer.push_back(std::byte{0});
@@ -118,21 +124,25 @@ TEST_CASE("packed columns: what they are not is refused", "[format][packed]") {
     put(bytes, at, value);
     return unpack(bytes);
   };
-  CHECK(changed(0, std::uint8_t{42}) == kPacked);   // shift of 42 bits
-  CHECK(changed(1, std::uint8_t{7}) == kPacked);    // planes of 42 bits
+  CHECK(changed(0, std::uint8_t{42}) == kPacked);  // shift of 42 bits
+  CHECK(changed(1, std::uint8_t{7}) == kPacked);   // planes of 42 bits
   CHECK(changed(2, std::uint64_t{1} << 42) == kPacked);
-  CHECK(changed(2, get<std::uint64_t>(packed, 2) ^ 8) == "none");  // another place, as far as this tells
+  CHECK(changed(2, get<std::uint64_t>(packed, 2) ^ 8) ==
+        "none");  // another place, as far as this tells
 }
 
 TEST_CASE("packed columns: payloads of another size are the caller's mistake", "[format][packed]") {
   Bytes payload = point_payload(9, 0, 8, 1), packed = pack(payload, 9, packed_point_columns());
   for (const std::uint32_t count : {0u, 8u, 10u}) {
-    CHECK_THROWS_AS(pack_columns(payload, count, packed_point_columns(), packed), std::invalid_argument);
-    CHECK_THROWS_AS(unpack_columns(packed, count, packed_point_columns(), payload), std::invalid_argument);
+    CHECK_THROWS_AS(pack_columns(payload, count, packed_point_columns(), packed),
+                    std::invalid_argument);
+    CHECK_THROWS_AS(unpack_columns(packed, count, packed_point_columns(), payload),
+                    std::invalid_argument);
   }
 }
 
-TEST_CASE("codec: columns are packed where that is shorter, and come back", "[format][codec][packed]") {
+TEST_CASE("codec: columns are packed where that is shorter, and come back",
+          "[format][codec][packed]") {
   for (const Codec codec : {Codec::zstd, Codec::lz4}) {
     PageEncoder encoder(codec);
     PageDecoder decoder;
@@ -150,7 +160,8 @@ TEST_CASE("codec: columns are packed where that is shorter, and come back", "[fo
     }
   }
   Bytes stored;
-  CHECK(PageEncoder(Codec::raw).encode(point_payload(60, 20, 4, 1), stored, {60, packed_point_columns()}) == Coding{});
+  CHECK(PageEncoder(Codec::raw)
+            .encode(point_payload(60, 20, 4, 1), stored, {60, packed_point_columns()}) == Coding{});
 }
 
 TEST_CASE("codec: LZ4 blocks of another size or shape are refused", "[format][codec]") {
@@ -167,7 +178,8 @@ TEST_CASE("codec: LZ4 blocks of another size or shape are refused", "[format][co
   CHECK(decode(stored, 599) == kBlock);
   CHECK(decode(stored, 601) == kBlock);
   for (std::size_t n = 0; n < stored.size(); ++n) {
-    CHECK(decode(Bytes(stored.begin(), stored.begin() + static_cast<std::ptrdiff_t>(n)), 600) == kBlock);
+    CHECK(decode(Bytes(stored.begin(), stored.begin() + static_cast<std::ptrdiff_t>(n)), 600) ==
+          kBlock);
   }
   Bytes longer = stored;
   longer.push_back(std::byte{0});

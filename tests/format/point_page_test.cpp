@@ -2,10 +2,11 @@
 #include "format/point_page.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
 
 #include "format/scalar.h"
 #include "tests/format/support.h"

@@ -1,9 +1,10 @@
 // Small number types against the rules that define them.
 #include "format/scalar.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+
+#include <catch2/catch.hpp>
 
 #include "tests/format/support.h"
 

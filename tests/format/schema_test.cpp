@@ -1,9 +1,10 @@
 // The meta page: what is written comes back, and nothing else is let in.
 #include "format/schema.h"
 
-#include <catch2/catch.hpp>
 #include <limits>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
 
 #include "format/text.h"
 #include "tests/format/support.h"
@@ -91,10 +92,12 @@ TEST_CASE("meta: counts beyond the payload are refused before anything is alloca
   }
 }
 
-TEST_CASE("meta: as many channels as groups hold come back, one more is of no group", "[format][meta]") {
+TEST_CASE("meta: as many channels as groups hold come back, one more is of no group",
+          "[format][meta]") {
   Meta meta;
   for (unsigned i = 0; i < 255 * 34; ++i) {
-    meta.channels.push_back({std::to_string(i), ChannelType::u8, 1, static_cast<std::uint16_t>(1 + i / 34)});
+    meta.channels.push_back(
+        {std::to_string(i), ChannelType::u8, 1, static_cast<std::uint16_t>(1 + i / 34)});
   }
   Bytes payload = encode_meta(meta);
   CHECK(decode_meta(payload).channels == meta.channels);

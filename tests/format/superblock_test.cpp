@@ -1,7 +1,8 @@
 // The commit record: what it repeats, counts and bounds.
-#include <catch2/catch.hpp>
 #include <limits>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
 
 #include "format/checksum.h"
 #include "format/container.h"

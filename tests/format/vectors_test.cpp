@@ -1,11 +1,12 @@
 // The vectors of the spec through the decoders of format/: good ones decode, and of bad ones each
 // rule that a decoder can see alone is named. The file names say which rule.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <set>
+
+#include <catch2/catch.hpp>
 
 #include "format/checksum.h"
 #include "format/codec.h"
@@ -62,7 +63,8 @@ void walk_page(std::span<const std::byte> page, const FileHeader& file, Walk& wa
   Bytes payload(header.raw_bytes);
   const bool filtered = header.coding.filter != Filter::none;
   if (filtered && header.type == PageType::attribute) return;  // its columns are in the meta page
-  PageDecoder().decode(header.coding, stored, payload, {header.record_count, packed_point_columns()});
+  PageDecoder().decode(header.coding, stored, payload,
+                       {header.record_count, packed_point_columns()});
   switch (header.type) {
     case PageType::point:
       PointPage(payload, header.record_count).verify();
@@ -86,11 +88,14 @@ void walk_page(std::span<const std::byte> page, const FileHeader& file, Walk& wa
   }
 }
 
-DirectoryEntry read_entry(std::span<const std::byte> file, const Superblock& superblock, std::uint32_t page) {
+DirectoryEntry read_entry(std::span<const std::byte> file, const Superblock& superblock,
+                          std::uint32_t page) {
   const std::uint32_t full = directory_entries_per_page(superblock.header);
-  const auto listing = file.subspan(superblock.directory_offset + (std::size_t{page / full} << superblock.header.page_shift));
+  const auto listing = file.subspan(superblock.directory_offset +
+                                    (std::size_t{page / full} << superblock.header.page_shift));
   (void)decode_page_header(listing.first(kPageHeaderBytes), superblock.header);
-  const auto entry = listing.subspan(kPageHeaderBytes + page % full * kDirectoryEntryBytes, kDirectoryEntryBytes);
+  const auto entry =
+      listing.subspan(kPageHeaderBytes + page % full * kDirectoryEntryBytes, kDirectoryEntryBytes);
   return decode_directory_entry(entry, superblock.header, superblock.file_bytes);
 }
 

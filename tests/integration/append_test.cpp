@@ -1,12 +1,13 @@
 // Points added to a container.
+#include "engine/append.h"
+
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
 
+#include <catch2/catch.hpp>
 #include <fmt/format.h>
 
-#include "engine/append.h"
 #include "engine/base/error.h"
 #include "engine/build/container_points.h"
 #include "engine/build/merge.h"
@@ -23,14 +24,15 @@ using namespace ptc::test;
 namespace {
 
 /// Numbers that a float and the lattice hold exactly.
-void write_cloud(const std::filesystem::path& path, const std::vector<Surfel>& surfels, const glm::dvec3& moved = glm::dvec3(0)) {
+void write_cloud(const std::filesystem::path& path, const std::vector<Surfel>& surfels,
+                 const glm::dvec3& moved = glm::dvec3(0)) {
   std::ofstream out(path);
   out.precision(17);
   out << "# x y z nx ny nz radius\n";
   for (const Surfel& s : surfels) {
     const glm::dvec3 p = glm::dvec3(glm::vec3(s.position + moved));
-    out << p.x << ' ' << p.y << ' ' << p.z << ' ' << s.normal.x << ' ' << s.normal.y << ' ' << s.normal.z << ' ' << s.radius
-        << '\n';
+    out << p.x << ' ' << p.y << ' ' << p.z << ' ' << s.normal.x << ' ' << s.normal.y << ' '
+        << s.normal.z << ' ' << s.radius << '\n';
   }
 }
 
@@ -40,14 +42,17 @@ std::vector<Surfel> points_of(const std::filesystem::path& path) {
   std::vector<PointRecord> block(4096);
   std::vector<Surfel> surfels;
   while (const std::size_t count = points.next(block)) {
-    for (const PointRecord& r : std::span(block).first(count)) surfels.push_back(to_surfel(r, scene.header().frame));
+    for (const PointRecord& r : std::span(block).first(count))
+      surfels.push_back(to_surfel(r, scene.header().frame));
   }
   return surfels;
 }
 
 /// Order in space, so that two ways to the same points can be compared one by one.
 void arrange(std::vector<Surfel>& surfels) {
-  std::ranges::sort(surfels, {}, [](const Surfel& s) { return std::array{s.radius, s.normal.x, s.normal.y, s.normal.z}; });
+  std::ranges::sort(surfels, {}, [](const Surfel& s) {
+    return std::array{s.radius, s.normal.x, s.normal.y, s.normal.z};
+  });
 }
 
 /// The same points but for so much of a radius.
@@ -58,8 +63,10 @@ void check_same(std::vector<Surfel> a, std::vector<Surfel> b, double tolerance) 
   double worst = 0;
   bool rest = true;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    worst = std::max(worst, glm::length(a[i].position - b[i].position) / static_cast<double>(a[i].radius));
-    rest = rest && a[i].radius == b[i].radius && a[i].normal == b[i].normal && a[i].radiance == b[i].radiance;
+    worst = std::max(worst,
+                     glm::length(a[i].position - b[i].position) / static_cast<double>(a[i].radius));
+    rest = rest && a[i].radius == b[i].radius && a[i].normal == b[i].normal &&
+           a[i].radiance == b[i].radiance;
   }
   CHECK(worst <= tolerance);
   CHECK(rest);
@@ -70,8 +77,8 @@ struct Place {
   Progress silent;
   std::vector<Surfel> first = random_surfels(9000, 1), second = random_surfels(7000, 2);
 
-  BuildReport build(const char* target, const std::vector<std::filesystem::path>& inputs, Profile profile,
-                    const char* append = nullptr) {
+  BuildReport build(const char* target, const std::vector<std::filesystem::path>& inputs,
+                    Profile profile, const char* append = nullptr) {
     BuildRequest request{.inputs = inputs, .profile = profile};
     if (append) request.append = dir / append;
     BuildReport report = build_container(request, dir / target, silent);
@@ -82,7 +89,8 @@ struct Place {
 
 }  // namespace
 
-TEST_CASE("append: a scene and more have the points of both built at once", "[integration][append]") {
+TEST_CASE("append: a scene and more have the points of both built at once",
+          "[integration][append]") {
   for (const Profile profile : {Profile::exact, Profile::compact}) {
     for (const glm::dvec3& moved : {glm::dvec3(0), glm::dvec3(0.25, 5, -40)}) {
       Place place;
@@ -103,12 +111,14 @@ TEST_CASE("append: a scene and more have the points of both built at once", "[in
   }
 }
 
-TEST_CASE("append: with all in the cube old points keep their bytes, and nothing new changes none", "[integration][append]") {
+TEST_CASE("append: with all in the cube old points keep their bytes, and nothing new changes none",
+          "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
   std::ofstream none(place.dir / "none.ply");
   none << "ply\nformat ascii 1.0\nelement vertex 0\n";
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) none << "property float " << name << "\n";
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"})
+    none << "property float " << name << "\n";
   none << "end_header\n";
   none.close();
   place.build("a.ptcx", {place.dir / "a.xyz"}, Profile::compact);
@@ -118,11 +128,13 @@ TEST_CASE("append: with all in the cube old points keep their bytes, and nothing
   const ContainerReader a(place.dir / "a.ptcx"), same(place.dir / "same.ptcx");
   REQUIRE(a.page_count() == same.page_count());
   for (std::uint32_t page = 0; page < a.page_count(); ++page) {
-    if (page != a.superblock().meta_page) REQUIRE(a.entry(page).payload_xxh3 == same.entry(page).payload_xxh3);
+    if (page != a.superblock().meta_page)
+      REQUIRE(a.entry(page).payload_xxh3 == same.entry(page).payload_xxh3);
   }
 }
 
-TEST_CASE("append: twice, in place, under other caps and interrupted gives the same points", "[integration][append]") {
+TEST_CASE("append: twice, in place, under other caps and interrupted gives the same points",
+          "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
   write_cloud(place.dir / "b.xyz", place.second, {3, 0, 0});
@@ -131,42 +143,54 @@ TEST_CASE("append: twice, in place, under other caps and interrupted gives the s
   place.build("s.ptcx", {place.dir / "b.xyz"}, Profile::compact, "s.ptcx");
   std::filesystem::copy_file(place.dir / "s.ptcx", place.dir / "two.ptcx");
   place.build("s.ptcx", {place.dir / "c.xyz"}, Profile::compact, "s.ptcx");
-  place.build("all.ptcx", {place.dir / "a.xyz", place.dir / "b.xyz", place.dir / "c.xyz"}, Profile::compact);
-  check_same(points_of(place.dir / "s.ptcx"), points_of(place.dir / "all.ptcx"), 2 * kRoundedPosition);
+  place.build("all.ptcx", {place.dir / "a.xyz", place.dir / "b.xyz", place.dir / "c.xyz"},
+              Profile::compact);
+  check_same(points_of(place.dir / "s.ptcx"), points_of(place.dir / "all.ptcx"),
+             2 * kRoundedPosition);
 
-  BuildRequest request{.inputs = {place.dir / "c.xyz"}, .append = place.dir / "two.ptcx", .resume = true, .checkpoint_points = 1};
+  BuildRequest request{.inputs = {place.dir / "c.xyz"},
+                       .append = place.dir / "two.ptcx",
+                       .resume = true,
+                       .checkpoint_points = 1};
   request.run.threads = 1;
   build_container(request, place.dir / "again.ptcx", place.silent);
   CHECK(bytes_of(place.dir / "again.ptcx") == bytes_of(place.dir / "s.ptcx"));
-  CHECK_THROWS_AS(build_container(request, place.dir / "two.ptcx", place.silent), std::invalid_argument);
+  CHECK_THROWS_AS(build_container(request, place.dir / "two.ptcx", place.silent),
+                  std::invalid_argument);
 }
 
-TEST_CASE("append: what is damaged, shaded or too far away is refused, and the old file stays", "[integration][append]") {
+TEST_CASE("append: what is damaged, shaded or too far away is refused, and the old file stays",
+          "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
   write_cloud(place.dir / "far.xyz", place.second, {0, 1e9, 0});
   place.build("a.ptcx", {place.dir / "a.xyz"}, Profile::compact);
   const std::vector<char> old = bytes_of(place.dir / "a.ptcx");
   BuildRequest request{.inputs = {place.dir / "far.xyz"}, .append = place.dir / "a.ptcx"};
-  CHECK_THROWS_WITH(build_container(request, place.dir / "a.ptcx", place.silent), Catch::Contains("build all anew"));
+  CHECK_THROWS_WITH(build_container(request, place.dir / "a.ptcx", place.silent),
+                    Catch::Contains("build all anew"));
 
   std::vector<char> damaged = old;
   damaged[damaged.size() / 3] = static_cast<char>(damaged[damaged.size() / 3] ^ 1);
-  std::ofstream(place.dir / "a.ptcx", std::ios::binary).write(damaged.data(), static_cast<std::streamsize>(damaged.size()));
+  std::ofstream(place.dir / "a.ptcx", std::ios::binary)
+      .write(damaged.data(), static_cast<std::streamsize>(damaged.size()));
   request.inputs = {place.dir / "a.xyz"};
   CHECK_THROWS_AS(build_container(request, place.dir / "a.ptcx", place.silent), FormatError);
   CHECK(bytes_of(place.dir / "a.ptcx") == damaged);
 
-  std::ofstream(place.dir / "a.ptcx", std::ios::binary).write(old.data(), static_cast<std::streamsize>(old.size()));
+  std::ofstream(place.dir / "a.ptcx", std::ios::binary)
+      .write(old.data(), static_cast<std::streamsize>(old.size()));
   const RunOptions run{.memory_bytes = std::uint64_t{256} << 20, .threads = 2};
-  shade_container({.scene = place.dir / "a.ptcx", .run = run}, place.dir / "lit.ptcx", place.silent);
+  shade_container({.scene = place.dir / "a.ptcx", .run = run}, place.dir / "lit.ptcx",
+                  place.silent);
   request.append = place.dir / "lit.ptcx";
   CHECK_THROWS_WITH(build_container(request, place.dir / "b.ptcx", place.silent),
                     Catch::Contains("lit.ptcx: new points would have no occlusion"));
   CHECK(std::distance(std::filesystem::directory_iterator(place.dir.path()), {}) == 4);
 }
 
-TEST_CASE("append: a scene whose points descend from page to page is refused", "[integration][append]") {
+TEST_CASE("append: a scene whose points descend from page to page is refused",
+          "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
   BuildRequest request{.inputs = {place.dir / "a.xyz"}, .page_shift = 14, .profile = Profile::raw};
@@ -178,10 +202,13 @@ TEST_CASE("append: a scene whose points descend from page to page is refused", "
   std::swap(forged.pages[pages[1]].stored, forged.pages[pages[2]].stored);
   const std::vector<std::byte> bytes = forged.bytes();
   std::ofstream(place.dir / "a.ptcx", std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      .write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
   const auto refused = [&](auto&& make) {
-    const std::string place_of_it = fmt::format("a.ptcx: offset {}: ", forged.pages[pages[2]].offset + kPageHeaderBytes);
-    CHECK_THROWS_WITH(make(), Catch::Contains(place_of_it) && Catch::Contains("spec/points.md#point-order"));
+    const std::string place_of_it =
+        fmt::format("a.ptcx: offset {}: ", forged.pages[pages[2]].offset + kPageHeaderBytes);
+    CHECK_THROWS_WITH(
+        make(), Catch::Contains(place_of_it) && Catch::Contains("spec/points.md#point-order"));
     CHECK_FALSE(std::filesystem::exists(place.dir / "b.ptcx"));
   };
   for (const Profile profile : {Profile::exact, Profile::compact}) {
@@ -189,7 +216,10 @@ TEST_CASE("append: a scene whose points descend from page to page is refused", "
     request.profile = profile;
     refused([&] { build_container(request, place.dir / "b.ptcx", place.silent); });
     const ContainerReader descending(place.dir / "a.ptcx");
-    refused([&] { recode_container(descending, place.dir / "b.ptcx", {.profile = profile, .page_shift = 12}, place.silent); });
+    refused([&] {
+      recode_container(descending, place.dir / "b.ptcx", {.profile = profile, .page_shift = 12},
+                       place.silent);
+    });
   }
 }
 
@@ -211,12 +241,14 @@ TEST_CASE("append: what is not asked for is kept", "[integration][append]") {
   }
 }
 
-TEST_CASE("append: a cube grows by doublings that keep positions and the order of keys", "[build][append]") {
+TEST_CASE("append: a cube grows by doublings that keep positions and the order of keys",
+          "[build][append]") {
   const std::array<double, 3> low{0.3, -7, 1000}, high{5, -6.5, 1001};
   const Frame old = frame_around(low, high);
   std::vector<MortonKey> keys;
   for (const Surfel& s : random_surfels(2000, 4)) {
-    keys.push_back(encode_morton(old.to_lattice({s.position.x * 8 + 0.3, s.position.y * 8 - 7, s.position.z * 8 + 1000})));
+    keys.push_back(encode_morton(
+        old.to_lattice({s.position.x * 8 + 0.3, s.position.y * 8 - 7, s.position.z * 8 + 1000})));
   }
   std::ranges::sort(keys);
   for (const double reach : {0.0, 1.0, 9.0, 300.0, 50'000.0}) {
@@ -226,8 +258,10 @@ TEST_CASE("append: a cube grows by doublings that keep positions and the order o
       (side < 0 ? box_high : box_low)[0] -= side * reach * 0.5;
       if (box_low[0] > box_high[0]) std::swap(box_low[0], box_high[0]);
       const Frame grown = grow_frame(old, box_low, box_high);
-      CHECK(grown.to_position(grown.to_lattice(box_low))[1] == Approx(box_low[1]).margin(grown.unit()));
-      CHECK(grown.to_position(grown.to_lattice(box_high))[1] == Approx(box_high[1]).margin(grown.unit()));
+      CHECK(grown.to_position(grown.to_lattice(box_low))[1] ==
+            Approx(box_low[1]).margin(grown.unit()));
+      CHECK(grown.to_position(grown.to_lattice(box_high))[1] ==
+            Approx(box_high[1]).margin(grown.unit()));
       const LatticeMove move(old, grown);
       CHECK(move.moves() == (grown.edge != old.edge));
       CHECK(move.moves() == (reach > 0));
@@ -237,7 +271,8 @@ TEST_CASE("append: a cube grows by doublings that keep positions and the order o
         const MortonKey moved = move(key);
         REQUIRE(before <= moved);
         before = moved;
-        const auto was = old.to_position(decode_morton(key)), is = grown.to_position(decode_morton(moved));
+        const auto was = old.to_position(decode_morton(key)),
+                   is = grown.to_position(decode_morton(moved));
         for (std::size_t k = 0; k < 3; ++k) worst = std::max(worst, std::abs(was[k] - is[k]));
       }
       CHECK(worst < grown.unit());

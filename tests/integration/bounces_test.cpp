@@ -50,7 +50,8 @@ struct Lit {
   ShadeReport report;
 };
 
-Lit bounce(const ContainerReader& scene, unsigned bounces, const TemporaryDirectory& dir, unsigned threads = 1) {
+Lit bounce(const ContainerReader& scene, unsigned bounces, const TemporaryDirectory& dir,
+           unsigned threads = 1) {
   Lit lit;
   Progress silent;
   const Executor executor(threads);
@@ -74,19 +75,22 @@ std::vector<Receiver> all_points(const ContainerReader& scene) {
   std::vector<PointRecord> records(scene.superblock().points);
   ContainerPoints(scene).next(records);
   std::vector<Receiver> receivers;
-  for (const PointRecord& r : records) receivers.push_back(lifted(to_surfel(r, scene.header().frame), 0.15F));
+  for (const PointRecord& r : records)
+    receivers.push_back(lifted(to_surfel(r, scene.header().frame), 0.15F));
   return receivers;
 }
 
-void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v, std::uint16_t material) {
+void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v,
+              std::uint16_t material) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   mesh.positions.insert(mesh.positions.end(), {corner, corner + u, corner + u + v, corner + v});
-  mesh.triangles.insert(mesh.triangles.end(), {{first, first + 1, first + 2}, {first, first + 2, first + 3}});
+  mesh.triangles.insert(mesh.triangles.end(),
+                        {{first, first + 1, first + 2}, {first, first + 2, first + 3}});
   mesh.material_of.insert(mesh.material_of.end(), {material, material});
 }
 
-/// Two rooms of 2 x 2 x 2 with a doorway between them, red, green and white. The first has a ceiling that
-/// shines; most of the light in the second has met several surfaces.
+/// Two rooms of 2 x 2 x 2 with a doorway between them, red, green and white. The first has a
+/// ceiling that shines; most of the light in the second has met several surfaces.
 Mesh two_rooms() {
   Mesh mesh;
   mesh.materials = {{.name = "white", .albedo = glm::vec3(0.8F)},
@@ -94,14 +98,15 @@ Mesh two_rooms() {
                     {.name = "green", .albedo = {0.1F, 0.8F, 0.1F}},
                     {.name = "lamp", .albedo = glm::vec3(0.5F), .emission = {2, 2, 1.5F}}};
   const glm::vec3 x(1, 0, 0), y(0, 2, 0), z(0, 0, 2);
-  add_quad(mesh, {0, 0, 0}, z, 4.0F * x, 0);            // floor
-  add_quad(mesh, {0, 2, 0}, 2.0F * x, z, 3);            // ceilings
+  add_quad(mesh, {0, 0, 0}, z, 4.0F * x, 0);  // floor
+  add_quad(mesh, {0, 2, 0}, 2.0F * x, z, 3);  // ceilings
   add_quad(mesh, {2, 2, 0}, 2.0F * x, z, 0);
-  add_quad(mesh, {0, 0, 0}, 4.0F * x, y, 0);            // back
-  add_quad(mesh, {0, 0, 2}, y, 4.0F * x, 0);            // front
-  add_quad(mesh, {0, 0, 0}, y, z, 1);                   // left
-  add_quad(mesh, {4, 0, 0}, z, y, 2);                   // right
-  add_quad(mesh, {1.95F, 0, 0}, 0.6F * z, y, 0);        // between them: a slab 0.1 thick, a doorway of 0.8
+  add_quad(mesh, {0, 0, 0}, 4.0F * x, y, 0);  // back
+  add_quad(mesh, {0, 0, 2}, y, 4.0F * x, 0);  // front
+  add_quad(mesh, {0, 0, 0}, y, z, 1);         // left
+  add_quad(mesh, {4, 0, 0}, z, y, 2);         // right
+  add_quad(mesh, {1.95F, 0, 0}, 0.6F * z, y,
+           0);  // between them: a slab 0.1 thick, a doorway of 0.8
   add_quad(mesh, {2.05F, 0, 0}, y, 0.6F * z, 0);
   add_quad(mesh, {1.95F, 0, 1.2F}, 0.1F * x, y, 0);
   return mesh;
@@ -121,8 +126,8 @@ struct Means {
 };
 
 /// Points of one of the rooms against paths on the mesh.
-Means compare_with_paths(const ContainerReader& lit, const DirectLight& light, const RayScene& rays, unsigned bounces,
-                         bool second_room) {
+Means compare_with_paths(const ContainerReader& lit, const DirectLight& light, const RayScene& rays,
+                         unsigned bounces, bool second_room) {
   std::vector<Receiver> receivers;
   const std::vector<Receiver> all = all_points(lit);
   for (std::size_t i = 0; i < all.size(); i += 83) {
@@ -132,7 +137,8 @@ Means compare_with_paths(const ContainerReader& lit, const DirectLight& light, c
   const std::vector<Shading> shaded = shade(lit, receivers);
   std::vector<float> ours, traced;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
-    const RayTraced t = trace_mesh(rays, light, receivers[i].position, receivers[i].normal, 1024, {{1, 0, 4}, bounces}, i);
+    const RayTraced t = trace_mesh(rays, light, receivers[i].position, receivers[i].normal, 1024,
+                                   {{1, 0, 4}, bounces}, i);
     for (int c = 0; c < 3; ++c) {
       ours.push_back(shaded[i].irradiance[c]);
       traced.push_back(t.irradiance[c]);
@@ -144,7 +150,8 @@ Means compare_with_paths(const ContainerReader& lit, const DirectLight& light, c
 
 }  // namespace
 
-TEST_CASE("bounces: a furnace glows by the geometric series of its albedo", "[integration][bounces]") {
+TEST_CASE("bounces: a furnace glows by the geometric series of its albedo",
+          "[integration][bounces]") {
   for (const bool round : {true, false}) {
     const TemporaryDirectory dir;
     write_scene(dir / "furnace.ptcx", furnace(round, 0.6F));
@@ -156,8 +163,10 @@ TEST_CASE("bounces: a furnace glows by the geometric series of its albedo", "[in
       const ContainerReader& seen = lit.bounced ? *lit.bounced : scene;
       double mean = 0;
       const std::vector<Shading> shaded = shade(seen, all_points(seen));
-      for (const Shading& s : shaded) mean += static_cast<double>(s.irradiance.r) / static_cast<double>(shaded.size());
-      INFO((round ? "sphere" : "box") << ", " << n << " bounces: " << mean / (std::numbers::pi * series));
+      for (const Shading& s : shaded)
+        mean += static_cast<double>(s.irradiance.r) / static_cast<double>(shaded.size());
+      INFO((round ? "sphere" : "box")
+           << ", " << n << " bounces: " << mean / (std::numbers::pi * series));
       CHECK(mean == Approx(std::numbers::pi * series).epsilon(0.015));
     }
   }
@@ -205,13 +214,15 @@ TEST_CASE("bounces: sky is in the light of the points once", "[integration][boun
   const DirectLight light(rays, *request.lights);
   for (unsigned n = 1; n <= 3; ++n) {
     const Lit lit = bounce(scene, n, dir);
-    const Means means = compare_with_paths(lit.bounced ? *lit.bounced : scene, light, rays, n, false);
+    const Means means =
+        compare_with_paths(lit.bounced ? *lit.bounced : scene, light, rays, n, false);
     INFO(n << " bounces: " << means.ours << " of " << means.traced);
     CHECK(means.ours == Approx(means.traced).epsilon(0.02));
   }
 }
 
-TEST_CASE("bounces: no bounce brings more light than the one before, white walls or not", "[integration][bounces]") {
+TEST_CASE("bounces: no bounce brings more light than the one before, white walls or not",
+          "[integration][bounces]") {
   for (const float albedo : {1.0F, 0.5F, 0.0F}) {
     const TemporaryDirectory dir;
     write_scene(dir / "box.ptcx", furnace(false, albedo));
@@ -230,7 +241,8 @@ TEST_CASE("bounces: no bounce brings more light than the one before, white walls
   }
 }
 
-TEST_CASE("bounces: points, tree and albedo stay, and one bounce is the scene itself", "[integration][bounces]") {
+TEST_CASE("bounces: points, tree and albedo stay, and one bounce is the scene itself",
+          "[integration][bounces]") {
   const TemporaryDirectory dir;
   write_scene(dir / "box.ptcx", furnace(false, 0.5F));
   const ContainerReader scene(dir / "box.ptcx");
@@ -256,7 +268,8 @@ TEST_CASE("bounces: points, tree and albedo stay, and one bounce is the scene it
   CHECK(lit.report.bounce_cpu_seconds > 0);
 }
 
-TEST_CASE("bounces: threads and cap change no byte, and nothing is left behind", "[integration][bounces]") {
+TEST_CASE("bounces: threads and cap change no byte, and nothing is left behind",
+          "[integration][bounces]") {
   const TemporaryDirectory dir;
   write_scene(dir / "box.ptcx", furnace(false, 0.7F));
   Progress silent;
@@ -273,7 +286,8 @@ TEST_CASE("bounces: threads and cap change no byte, and nothing is left behind",
   CHECK(ContainerReader(dir / "lit.ptcx").meta().text.at("shading").ends_with(" bounces 3"));
   ShadeRequest once{.scene = dir / "box.ptcx"};
   shade_container(once, dir / "lit.ptcx", silent);
-  CHECK(ContainerReader(dir / "lit.ptcx").meta().text.at("shading").find("bounces") == std::string::npos);
+  CHECK(ContainerReader(dir / "lit.ptcx").meta().text.at("shading").find("bounces") ==
+        std::string::npos);
 }
 
 TEST_CASE("bounces: another cloud's points and a picture see them", "[integration][bounces]") {
@@ -288,9 +302,11 @@ TEST_CASE("bounces: another cloud's points and a picture see them", "[integratio
   CHECK(report.check->discs.irradiance_mean == Approx(1.5 * std::numbers::pi).epsilon(0.02));
   CHECK(report.check->discs.irradiance_rms < 0.02);
   RenderRequest picture{.scene = dir / "box.ptcx", .samples = 1, .bounces = 2};
-  picture.camera = Camera{.position = {0, 0, 0.9}, .look_at = {0, 0, -1}, .width = 16, .height = 16};
+  picture.camera =
+      Camera{.position = {0, 0, 0.9}, .look_at = {0, 0, -1}, .width = 16, .height = 16};
   picture.check = {.receivers = 50, .rays = 256};
-  const ShadeReport render = render_picture(picture, std::array{PictureTarget{dir / "a.png"}}, silent);
+  const ShadeReport render =
+      render_picture(picture, std::array{PictureTarget{dir / "a.png"}}, silent);
   CHECK(render.check->discs.irradiance_mean == Approx(1.5 * std::numbers::pi).epsilon(0.02));
   CHECK(entries_in(dir) == 4);
 }
@@ -308,21 +324,25 @@ TEST_CASE("bounces: an emitter lights a picture once", "[integration][bounces][r
   obj << "mtllib furnace.mtl\nusemtl furnace\n";
   std::ofstream(dir / "furnace.mtl") << "newmtl furnace\nKd 0.5 0.5 0.5\nKe 1 1 1\n";
   for (const glm::vec3& p : mesh.positions) obj << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
-  for (const auto& t : mesh.triangles) obj << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+  for (const auto& t : mesh.triangles)
+    obj << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
   obj.close();
   BuildRequest build{.inputs = {dir / "furnace.obj"}};
   build.sampling.count = 10'000;
   build.sampling.lights.area_rays = 0;
   Progress silent;
   build_container(build, dir / "furnace.ptcx", silent);
-  RenderRequest request{.scene = dir / "furnace.ptcx", .meshes = {dir / "furnace.obj"}, .samples = 1};
-  request.camera = Camera{.position = {0, 0, 0.9}, .look_at = {0, 0, -1}, .width = 16, .height = 16};
+  RenderRequest request{
+      .scene = dir / "furnace.ptcx", .meshes = {dir / "furnace.obj"}, .samples = 1};
+  request.camera =
+      Camera{.position = {0, 0, 0.9}, .look_at = {0, 0, -1}, .width = 16, .height = 16};
   double expected = 1;
   for (unsigned n = 1; n <= 3; ++n) {
     request.bounces = n;
     render_picture(request, std::array{PictureTarget{dir / "a.exr"}}, silent);
     expected += std::pow(0.5, n);
-    CHECK(static_cast<double>(read_image(dir / "a.exr").pixels[8 * 16 + 8].g) == Approx(expected).epsilon(0.01));
+    CHECK(static_cast<double>(read_image(dir / "a.exr").pixels[8 * 16 + 8].g) ==
+          Approx(expected).epsilon(0.01));
   }
 }
 
@@ -339,7 +359,8 @@ TEST_CASE("bounces: a run that fails leaves nothing", "[integration][bounces]") 
   CHECK(entries_in(dir) == 1);
 }
 
-TEST_CASE("bounces: emitters that lit the surfels are refused, those that did not are not", "[integration][bounces]") {
+TEST_CASE("bounces: emitters that lit the surfels are refused, those that did not are not",
+          "[integration][bounces]") {
   const TemporaryDirectory dir;
   Progress silent;
   BuildRequest request = rooms_request();
@@ -349,5 +370,6 @@ TEST_CASE("bounces: emitters that lit the surfels are refused, those that did no
   request.sampling.lights.area_rays = 1;
   build_container(request, dir / "rooms.ptcx", silent);
   CHECK_NOTHROW(bounce(ContainerReader(dir / "rooms.ptcx"), 1, dir));
-  CHECK_THROWS_WITH(bounce(ContainerReader(dir / "rooms.ptcx"), 2, dir), Catch::Contains("--area-rays 0"));
+  CHECK_THROWS_WITH(bounce(ContainerReader(dir / "rooms.ptcx"), 2, dir),
+                    Catch::Contains("--area-rays 0"));
 }

@@ -1,9 +1,11 @@
 // What receivers are off, as estimated, against what they are.
+#include "engine/estimate.h"
+
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <string>
 
-#include "engine/estimate.h"
+#include <catch2/catch.hpp>
+
 #include "engine/pipeline.h"
 #include "tests/shade/gather_scene.h"
 

@@ -1,8 +1,9 @@
 // What a memory cap must hold.
 #include <array>
-#include <catch2/catch.hpp>
 #include <functional>
 #include <system_error>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/pipeline.h"
@@ -38,14 +39,18 @@ std::uint64_t least_cap(const std::function<void(std::uint64_t)>& run) {
 class EndAtPartition final : public Progress {
  public:
   struct Begun {};
-  void begin(const std::string& stage, std::uint64_t /*total*/, const std::string& /*unit*/) override {
+  void begin(const std::string& stage, std::uint64_t /*total*/,
+             const std::string& /*unit*/) override {
     if (stage == "partition") throw Begun();
   }
 };
 
 }  // namespace
 
-TEST_CASE("memory: a cap for a build holds an encoder for each thread, and the directory when the sort is done", "[integration][memory]") {
+TEST_CASE(
+    "memory: a cap for a build holds an encoder for each thread, and the directory when the sort "
+    "is done",
+    "[integration][memory]") {
   const TemporaryDirectory dir;
   const auto building = [&](std::uint64_t points, std::uint8_t page_shift, unsigned threads) {
     return least_cap([&](std::uint64_t bytes) {
@@ -57,7 +62,8 @@ TEST_CASE("memory: a cap for a build holds an encoder for each thread, and the d
       try {
         build_container(request, dir / "o.ptcx", until_begun);
       } catch (const EndAtPartition::Begun&) {
-      } catch (const std::system_error& error) {  // the points' way through the sort is longer than this disk
+      } catch (const std::system_error&
+                   error) {  // the points' way through the sort is longer than this disk
         CHECK(error.code() == std::errc::no_space_on_device);
       }
     });
@@ -66,13 +72,15 @@ TEST_CASE("memory: a cap for a build holds an encoder for each thread, and the d
   CHECK(building(100, 16, 9) - least == 9 * ((768 << 10) + (2 << 16)) - ((768 << 10) + (2 << 12)));
   CHECK(building(100'000, 12, 1) == least);
   // Whose directories are longer than the least that the sort holds before.
-  const std::uint64_t per_page = points_per_page({.page_shift = 12}), some = 60'000'000, more = 120'000'000;
+  const std::uint64_t per_page = points_per_page({.page_shift = 12}), some = 60'000'000,
+                      more = 120'000'000;
   const auto directory = [&](std::uint64_t points) { return 80 * (points / per_page * 3 / 2); };
   CHECK(building(more, 12, 1) - building(some, 12, 1) == directory(more) - directory(some));
   CHECK(building(some, 12, 1) - least == directory(some) - kLeastSort);
 }
 
-TEST_CASE("memory: a cap for shading holds the directory of each container that is open", "[integration][memory]") {
+TEST_CASE("memory: a cap for shading holds the directory of each container that is open",
+          "[integration][memory]") {
   const TemporaryDirectory dir;
   write_scene(dir / "few.ptcx", random_surfels(100, 1));
   write_scene(dir / "many.ptcx", random_surfels(9000, 1));
@@ -94,13 +102,16 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
   CHECK(shading("few.ptcx", "many.ptcx") == least + 36 * many);
   const auto lit = [&](const char* scene, unsigned bounces, unsigned threads) {
     return least_cap([&](std::uint64_t bytes) {
-      ShadeRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = threads}};
+      ShadeRequest request{.scene = dir / scene,
+                           .run = {.memory_bytes = bytes, .threads = threads}};
       request.bounces = bounces;
       shade_container(request, dir / "o.ptcx", silent);
     });
   };
-  CHECK(lit("many.ptcx", 1, 1) - lit("few.ptcx", 1, 1) == (36 + 2 * 80) * (many - few));  // with that of what is written
-  CHECK(lit("few.ptcx", 2, 1) - lit("few.ptcx", 1, 1) > (512 << 10) + (36 + 80) * few);  // and an encoder
+  CHECK(lit("many.ptcx", 1, 1) - lit("few.ptcx", 1, 1) ==
+        (36 + 2 * 80) * (many - few));  // with that of what is written
+  CHECK(lit("few.ptcx", 2, 1) - lit("few.ptcx", 1, 1) >
+        (512 << 10) + (36 + 80) * few);  // and an encoder
   const auto picture = [&](const char* scene) {
     return least_cap([&](std::uint64_t bytes) {
       RenderRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}};

@@ -1,14 +1,16 @@
 // The road end to end: mesh or cloud to container to shaded points and pictures.
-#include <catch2/catch.hpp>
+#include "engine/pipeline.h"
+
 #include <fstream>
 
+#include <catch2/catch.hpp>
+
 #include "engine/base/error.h"
-#include "engine/verify/verify.h"
 #include "engine/io/image.h"
 #include "engine/io/points.h"
-#include "engine/pipeline.h"
 #include "engine/stages.h"
 #include "engine/store/reader.h"
+#include "engine/verify/verify.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -21,7 +23,8 @@ std::vector<std::uint64_t> pages_of(const std::filesystem::path& path) {
   const ContainerReader container(path);
   std::vector<std::uint64_t> pages;
   for (std::uint32_t page = 0; page < container.page_count(); ++page) {
-    if (page != container.superblock().meta_page) pages.push_back(container.entry(page).payload_xxh3);
+    if (page != container.superblock().meta_page)
+      pages.push_back(container.entry(page).payload_xxh3);
   }
   return pages;
 }
@@ -63,7 +66,8 @@ TEST_CASE("pipeline: threads and cap change no byte of a container", "[integrati
 
 TEST_CASE("pipeline: only meshes without any light get a sun and a sky", "[integration][build]") {
   const TemporaryDirectory dir;
-  const auto lights_of = [&](const std::filesystem::path& input, const std::optional<LightRig>& lights) {
+  const auto lights_of = [&](const std::filesystem::path& input,
+                             const std::optional<LightRig>& lights) {
     Progress silent;
     BuildRequest request = cube_request(input);
     request.lights = lights;
@@ -74,7 +78,8 @@ TEST_CASE("pipeline: only meshes without any light get a sun and a sky", "[integ
   CHECK(lights_of(dir / "cube.obj", {}) == to_json(default_rig()));
   CHECK(lights_of(dir / "cube.obj", LightRig{}) == to_json(LightRig{}));
   std::ofstream(dir / "lamp.mtl") << "newmtl lamp\nKe 1 1 1\n";
-  std::ofstream(dir / "lamp.obj") << "mtllib lamp.mtl\nusemtl lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  std::ofstream(dir / "lamp.obj")
+      << "mtllib lamp.mtl\nusemtl lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   CHECK(lights_of(dir / "lamp.obj", {}) == to_json(LightRig{}));
   std::ofstream(dir / "cloud.xyz") << "0 0 0 0 1 0\n1 0 0 0 1 0\n";
   CHECK(lights_of(dir / "cloud.xyz", {}) == to_json(LightRig{}));
@@ -112,16 +117,20 @@ TEST_CASE("pipeline: a mesh in memory is built as its file is", "[integration][b
   CHECK_FALSE(std::filesystem::exists(dir / "broken.ptcx"));
 }
 
-TEST_CASE("pipeline: an output that its disk has no room for is refused before work begins", "[integration][build]") {
+TEST_CASE("pipeline: an output that its disk has no room for is refused before work begins",
+          "[integration][build]") {
   const TemporaryDirectory dir;
   const std::vector<std::filesystem::path> temps{dir.path(), dir.path()};
-  CHECK_THROWS_WITH(require_build_space(std::uint64_t{1} << 45, 0, Profile::raw, temps, dir / "a.ptcx"),
-                    Catch::Contains("take about 1618481.1 GB in " + dir.path().string()) && Catch::Contains(" GB free"));
+  CHECK_THROWS_WITH(
+      require_build_space(std::uint64_t{1} << 45, 0, Profile::raw, temps, dir / "a.ptcx"),
+      Catch::Contains("take about 1618481.1 GB in " + dir.path().string()) &&
+          Catch::Contains(" GB free"));
   const BuildSpace space = require_build_space(1000, 40'000, Profile::raw, temps, dir / "a.ptcx");
   CHECK(space.temp_bytes == 40'000);
   CHECK(space.output_bytes == 46'000);
   CHECK(space.temp_free_bytes < space.output_free_bytes * 3 / 2);  // twice the same disk
-  CHECK(require_build_space(0, 0, Profile::raw, temps, dir / "a.ptcx").output_free_bytes == 0);  // not known
+  CHECK(require_build_space(0, 0, Profile::raw, temps, dir / "a.ptcx").output_free_bytes ==
+        0);  // not known
 }
 
 TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integration][build]") {
@@ -140,7 +149,8 @@ TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integr
   CHECK(verify_container(dir / "tight.ptcx", {}, silent).sound());
 }
 
-TEST_CASE("pipeline: shading adds channels, keeps the points and verifies", "[integration][shade]") {
+TEST_CASE("pipeline: shading adds channels, keeps the points and verifies",
+          "[integration][shade]") {
   const TemporaryDirectory dir;
   write_cube(dir / "cube.obj");
   Progress silent;
@@ -159,7 +169,8 @@ TEST_CASE("pipeline: shading adds channels, keeps the points and verifies", "[in
   // Shading a shaded container replaces the channels: the same bytes again.
   request.scene = dir / "shaded.ptcx";
   shade_container(request, dir / "again.ptcx", silent);
-  CHECK(ContainerReader(dir / "again.ptcx").superblock().content_xxh3 == shaded.superblock().content_xxh3);
+  CHECK(ContainerReader(dir / "again.ptcx").superblock().content_xxh3 ==
+        shaded.superblock().content_xxh3);
 
   shade_container(request, dir / "shaded.ply", silent);
   const PointFile ply = open_points(dir / "shaded.ply");
@@ -182,18 +193,22 @@ TEST_CASE("pipeline: another cloud's points can be shaded by a scene", "[integra
   const ShadeReport report = shade_container(request, dir / "probes.ply", silent);
   CHECK(report.receivers == 2);
   std::size_t entries = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(dir.path())) ++entries;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(dir.path()))
+    ++entries;
   CHECK(entries == 4);  // cube, scene, probes.xyz, probes.ply: no temporary is left
 }
 
-TEST_CASE("pipeline: a picture has the layers it promises, with and without a mesh", "[integration][render]") {
+TEST_CASE("pipeline: a picture has the layers it promises, with and without a mesh",
+          "[integration][render]") {
   const TemporaryDirectory dir;
   write_cube(dir / "cube.obj");
   Progress silent;
   build_container(cube_request(dir / "cube.obj"), dir / "scene.ptcx", silent);
-  RenderRequest request{.scene = dir / "scene.ptcx", .meshes = {dir / "cube.obj"}, .backdrop = true, .samples = 1};
+  RenderRequest request{
+      .scene = dir / "scene.ptcx", .meshes = {dir / "cube.obj"}, .backdrop = true, .samples = 1};
   request.size = {{64, 48}};
-  const std::vector<PictureTarget> targets{{dir / "a.exr", ""}, {dir / "a.png", "beauty"}, {dir / "o.png", "occlusion"}};
+  const std::vector<PictureTarget> targets{
+      {dir / "a.exr", ""}, {dir / "a.png", "beauty"}, {dir / "o.png", "occlusion"}};
   render_picture(request, targets, silent);
   const Image with_mesh = read_image(dir / "a.exr");
   CHECK(with_mesh.width == 64);
@@ -210,24 +225,29 @@ TEST_CASE("pipeline: a picture has the layers it promises, with and without a me
   CHECK(close > with_mesh.pixels.size() * 80 / 100);
 }
 
-TEST_CASE("pipeline: a cap that is too small is refused with the least that works", "[integration]") {
+TEST_CASE("pipeline: a cap that is too small is refused with the least that works",
+          "[integration]") {
   const TemporaryDirectory dir;
   Progress silent;
   BuildRequest request;
   request.city_points = 10'000;
   request.run = {.memory_bytes = std::uint64_t{60} << 20, .threads = 2};
-  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent), Catch::Contains("least that works is 82M"));
+  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent),
+                    Catch::Contains("least that works is 82M"));
   request.run.memory_bytes = std::uint64_t{82} << 20;
   CHECK_NOTHROW(build_container(request, dir / "a.ptcx", silent));
 }
 
-TEST_CASE("pipeline: clouds without normals and inputs without points are refused by name", "[integration]") {
+TEST_CASE("pipeline: clouds without normals and inputs without points are refused by name",
+          "[integration]") {
   const TemporaryDirectory dir;
   Progress silent;
-  std::ofstream(dir / "bare.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-                                     "property float z\nend_header\n0 0 0\n";
+  std::ofstream(dir / "bare.ply")
+      << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+         "property float z\nend_header\n0 0 0\n";
   BuildRequest request;
   request.inputs = {dir / "bare.ply"};
-  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent), Catch::Contains("bare.ply") && Catch::Contains("normals"));
+  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent),
+                    Catch::Contains("bare.ply") && Catch::Contains("normals"));
   CHECK_FALSE(std::filesystem::exists(dir / "a.ptcx"));
 }

@@ -1,8 +1,9 @@
 // Builds that are interrupted and go on.
-#include <catch2/catch.hpp>
 #include <chrono>
 #include <fstream>
 #include <utility>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/pipeline.h"
@@ -29,7 +30,8 @@ class Interrupt : public Progress {
 };
 
 std::size_t entries(const std::filesystem::path& directory) {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(directory), {}));
+  return static_cast<std::size_t>(
+      std::distance(std::filesystem::directory_iterator(directory), {}));
 }
 
 void write_cloud(const std::filesystem::path& path, std::size_t count) {
@@ -40,22 +42,24 @@ void write_cloud(const std::filesystem::path& path, std::size_t count) {
   }
 }
 
-/// Pairs of a point that is not rounded and one that rounding may not move in front of it; blocks of a build begin with the
-/// second of a pair.
+/// Pairs of a point that is not rounded and one that rounding may not move in front of it; blocks
+/// of a build begin with the second of a pair.
 void write_pairs(const std::filesystem::path& path, std::size_t count) {
   std::ofstream out(path);
   out.precision(17);
   out << "# x y z nx ny nz radius\n-1e-3 -1e-3 -1e-3 0 0 1 1e-30\n";
   for (const Surfel& s : random_surfels(count / 2, 5)) {
     for (const auto& [step, radius] : {std::pair(0.0, 1e-30), std::pair(1e-9, 0.5)}) {
-      out << s.position.x + step << ' ' << s.position.y + step << ' ' << s.position.z + step << " 0 0 1 " << radius << '\n';
+      out << s.position.x + step << ' ' << s.position.y + step << ' ' << s.position.z + step
+          << " 0 0 1 " << radius << '\n';
     }
   }
 }
 
 enum class Kind { city, cloud, pairs };
 
-/// A city, or a cloud of the same size whose radii are estimated or known, with temporary files in two directories.
+/// A city, or a cloud of the same size whose radii are estimated or known, with temporary files in
+/// two directories.
 struct Place {
   TemporaryDirectory dir;
   BuildRequest request;
@@ -71,7 +75,9 @@ struct Place {
     if (kind == Kind::pairs) write_pairs(dir / "c.xyz", 300'000);
     if (kind == Kind::city) request.city_points = 300'000;
     if (kind != Kind::city) request.inputs = {dir / "c.xyz"};
-    request.run = {.memory_bytes = std::uint64_t{200} << 20, .threads = 2, .temp_dirs = {dir / "t1", dir / "t2"}};
+    request.run = {.memory_bytes = std::uint64_t{200} << 20,
+                   .threads = 2,
+                   .temp_dirs = {dir / "t1", dir / "t2"}};
     Progress silent;
     points = build_container(request, dir / "whole.ptcx", silent).superblock.points;
     before = entries(dir.path());
@@ -93,12 +99,15 @@ struct Place {
 
 }  // namespace
 
-TEST_CASE("resume: a build that is interrupted anywhere comes to the same bytes", "[integration][resume]") {
+TEST_CASE("resume: a build that is interrupted anywhere comes to the same bytes",
+          "[integration][resume]") {
   for (const Kind kind : {Kind::city, Kind::cloud, Kind::pairs}) {
     Place place(kind);
-    const std::uint64_t passes = (kind == Kind::city ? 1 : 2) * place.points;  // points reported before the sorted ones
+    const std::uint64_t passes =
+        (kind == Kind::city ? 1 : 2) * place.points;  // points reported before the sorted ones
     Progress silent;
-    for (const std::uint64_t after : {100'000u, 299'000u}) {  // nothing is kept of a sort that did not end
+    for (const std::uint64_t after :
+         {100'000u, 299'000u}) {  // nothing is kept of a sort that did not end
       place.interrupt(after);
       CHECK(place.clean());
     }
@@ -115,20 +124,23 @@ TEST_CASE("resume: a build that is interrupted anywhere comes to the same bytes"
       std::filesystem::remove(place.out);
     }
     place.interrupt(passes + 101'000);
-    for (unsigned k = 0; k < 3; ++k) place.interrupt(65'280 * (k + 2) + 10'000);  // what was built before counts, too
+    for (unsigned k = 0; k < 3; ++k)
+      place.interrupt(65'280 * (k + 2) + 10'000);  // what was built before counts, too
     CHECK(build_container(place.request, place.out, silent).resumed_points == 4 * 65'280);
     CHECK(place.made_whole());
   }
 }
 
-TEST_CASE("resume: what is left of another request or of changed inputs is refused by name", "[integration][resume]") {
+TEST_CASE("resume: what is left of another request or of changed inputs is refused by name",
+          "[integration][resume]") {
   Place place(Kind::cloud);
   place.interrupt(2 * place.points + 200'000);
   Progress silent;
   BuildRequest other = place.request;
   other.tree.leaf_points = 9;
-  CHECK_THROWS_WITH(build_container(other, place.out, silent), Catch::Contains("--leaf: 16") && Catch::Contains("--leaf: 9") &&
-                                                                   Catch::Contains("to start anew, remove"));
+  CHECK_THROWS_WITH(build_container(other, place.out, silent),
+                    Catch::Contains("--leaf: 16") && Catch::Contains("--leaf: 9") &&
+                        Catch::Contains("to start anew, remove"));
   other = place.request;
   other.profile = Profile::raw;
   CHECK_THROWS_WITH(build_container(other, place.out, silent), Catch::Contains("--profile"));
@@ -155,22 +167,27 @@ TEST_CASE("resume: torn states are refused with what to remove", "[integration][
   Progress silent;
   for (const char* name : {"o.ptcx.resume", "o.ptcx.resume-at"}) {
     const std::vector<char> whole = bytes_of(place.dir / name);
-    for (const std::size_t keep : {std::size_t{0}, std::size_t{20}, whole.size() / 2, whole.size() - 1}) {
+    for (const std::size_t keep :
+         {std::size_t{0}, std::size_t{20}, whole.size() / 2, whole.size() - 1}) {
       std::filesystem::resize_file(place.dir / name, keep);
       CHECK_THROWS_WITH(build_container(place.request, place.out, silent), Catch::Contains(name));
-      std::ofstream(place.dir / name, std::ios::binary).write(whole.data(), static_cast<std::streamsize>(whole.size()));
+      std::ofstream(place.dir / name, std::ios::binary)
+          .write(whole.data(), static_cast<std::streamsize>(whole.size()));
     }
   }
   CHECK(build_container(place.request, place.out, silent).resumed_points > 0);
   CHECK(place.made_whole());
 }
 
-TEST_CASE("resume: points on the disk that are not what was written are refused with what to remove", "[integration][resume]") {
+TEST_CASE(
+    "resume: points on the disk that are not what was written are refused with what to remove",
+    "[integration][resume]") {
   for (const Kind kind : {Kind::city, Kind::cloud}) {
     Place place(kind);
     place.interrupt((kind == Kind::city ? 1 : 2) * place.points + 200'000);
     std::filesystem::path spill;
-    for (const auto& file : std::filesystem::directory_iterator(place.dir / "t1")) spill = file.path();
+    for (const auto& file : std::filesystem::directory_iterator(place.dir / "t1"))
+      spill = file.path();
     REQUIRE(!spill.empty());
     const std::vector<char> whole = bytes_of(spill);
     REQUIRE(whole.size() > 100'000);
@@ -181,14 +198,16 @@ TEST_CASE("resume: points on the disk that are not what was written are refused 
       file.seekp(static_cast<std::streamoff>(offset));
       file.put(static_cast<char>(whole[offset] ^ bits));
     };
-    const std::size_t record = (whole.size() - 50'000) / kSpilledBytes * kSpilledBytes;  // not yet read
+    const std::size_t record =
+        (whole.size() - 50'000) / kSpilledBytes * kSpilledBytes;  // not yet read
     for (const std::size_t offset : {record + 3, record + 20}) {  // of a key, of what is behind it
       flip(offset, 0x40);
       for (int again = 0; again < 2; ++again) {
-        CHECK_THROWS_WITH(build_container(place.request, place.out, silent),
-                          Catch::StartsWith(spill.string() + ": offset ") &&
-                              Catch::Contains("points there are not what was written; to start anew, remove ") &&
-                              Catch::Contains("o.ptcx.resume-pages"));
+        CHECK_THROWS_WITH(
+            build_container(place.request, place.out, silent),
+            Catch::StartsWith(spill.string() + ": offset ") &&
+                Catch::Contains("points there are not what was written; to start anew, remove ") &&
+                Catch::Contains("o.ptcx.resume-pages"));
       }
       CHECK_FALSE(std::filesystem::exists(place.out));
       CHECK(entries(place.dir.path()) == files);
@@ -201,10 +220,12 @@ TEST_CASE("resume: points on the disk that are not what was written are refused 
   }
 }
 
-TEST_CASE("resume: before its first page a build goes on beside an old file of any kind", "[integration][resume]") {
+TEST_CASE("resume: before its first page a build goes on beside an old file of any kind",
+          "[integration][resume]") {
   Place place(Kind::city);
   place.interrupt(place.points + 100);
-  std::filesystem::resize_file(place.dir / "o.ptcx.resume-pages", 0);  // as a power cut may leave it
+  std::filesystem::resize_file(place.dir / "o.ptcx.resume-pages",
+                               0);  // as a power cut may leave it
   std::ofstream(place.out) << "what was there before";
   Progress silent;
   CHECK(build_container(place.request, place.out, silent).resumed_points == 0);
@@ -212,7 +233,8 @@ TEST_CASE("resume: before its first page a build goes on beside an old file of a
   CHECK(place.clean());
 }
 
-TEST_CASE("resume: a build that was published before what it had kept was removed is done", "[integration][resume]") {
+TEST_CASE("resume: a build that was published before what it had kept was removed is done",
+          "[integration][resume]") {
   Place place(Kind::city);
   place.interrupt(place.points + 200'000);
   std::filesystem::copy_file(place.dir / "whole.ptcx", place.out);

@@ -1,13 +1,15 @@
 // The error that was asked for, against the error that is measured.
-#include <catch2/catch.hpp>
+#include "engine/tuning.h"
+
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include <catch2/catch.hpp>
+
 #include "engine/error_sums.h"
 #include "engine/pipeline.h"
 #include "engine/stages.h"
-#include "engine/tuning.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;
@@ -16,7 +18,9 @@ using namespace ptc::test;
 namespace {
 
 /// A floor, a wall, balls: all lit alike.
-std::vector<Surfel> lit_balls() { return small_scene(0.02); }
+std::vector<Surfel> lit_balls() {
+  return small_scene(0.02);
+}
 
 /// Crossed sheets over a floor: edges and backs everywhere.
 std::vector<Surfel> crossed_sheets() {
@@ -24,7 +28,8 @@ std::vector<Surfel> crossed_sheets() {
   add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0.03, {0.6F, 0.6F, 0.4F});
   for (int i = 0; i < 6; ++i) {
     const double x = -1.5 + 0.6 * i;
-    add_rectangle(surfels, {x, -1.5, 0}, {0, 3, 0}, {0.2, 0, 0.9}, 0.03, {0.2F, 0.1F * static_cast<float>(i), 0.7F});
+    add_rectangle(surfels, {x, -1.5, 0}, {0, 3, 0}, {0.2, 0, 0.9}, 0.03,
+                  {0.2F, 0.1F * static_cast<float>(i), 0.7F});
   }
   return surfels;
 }
@@ -45,14 +50,16 @@ std::vector<double> errors_along_ladder(const Scene& scene) {
   }
   Progress silent;
   std::vector<double> errors;
-  for (const RungError& rung : climb(*scene.container, {.cache_bytes = 64U << 20}, pilots, 2304, Executor(1), silent)) {
+  for (const RungError& rung :
+       climb(*scene.container, {.cache_bytes = 64U << 20}, pilots, 2304, Executor(1), silent)) {
     CHECK(rung.us_per_receiver > 0);
     errors.push_back(rung.error.relative());
   }
   return errors;
 }
 
-ShadeReport shade_with(const Scene& scene, double error, const RunOptions& run = {}, const char* name = "o.ply") {
+ShadeReport shade_with(const Scene& scene, double error, const RunOptions& run = {},
+                       const char* name = "o.ply") {
   ShadeRequest request{.scene = scene.dir / "scene.ptcx", .error = error, .run = run};
   request.check = {.receivers = 1000, .rays = 2048};
   Progress silent;
@@ -61,15 +68,18 @@ ShadeReport shade_with(const Scene& scene, double error, const RunOptions& run =
 
 }  // namespace
 
-TEST_CASE("error sums: what rays are off is told apart from what we are off", "[integration][error]") {
+TEST_CASE("error sums: what rays are off is told apart from what we are off",
+          "[integration][error]") {
   std::mt19937 bits;
   std::normal_distribution<float> normal;
   ErrorSums sums;
   for (int i = 0; i < 20'000; ++i) {
     const auto rays = [&] {
-      return Shading{.occlusion = 0.5F + 0.1F * normal(bits), .irradiance = glm::vec3(2 + 0.2F * normal(bits))};
+      return Shading{.occlusion = 0.5F + 0.1F * normal(bits),
+                     .irradiance = glm::vec3(2 + 0.2F * normal(bits))};
     };
-    const Shading ours{.occlusion = 0.5F + 0.04F + 0.03F * normal(bits), .irradiance = glm::vec3(2.1F)};
+    const Shading ours{.occlusion = 0.5F + 0.04F + 0.03F * normal(bits),
+                       .irradiance = glm::vec3(2.1F)};
     const Shading a = rays(), b = rays();
     sums.add(ours, a, b);
   }
@@ -106,14 +116,17 @@ TEST_CASE("tuning: the error falls along the ladder", "[integration][error]") {
     const std::vector<double> errors = errors_along_ladder(scene);
     REQUIRE(errors.size() == ladder().size());
     CAPTURE(sheets, errors);
-    for (std::size_t i = 2; i < errors.size(); ++i) CHECK(errors[i] <= 1.05 * errors[i - 2] + 0.002);
+    for (std::size_t i = 2; i < errors.size(); ++i)
+      CHECK(errors[i] <= 1.05 * errors[i - 2] + 0.002);
     CHECK(errors.back() < errors.front() / 5);
     CHECK(errors.back() > 0);
   }
-  for (std::size_t i = 1; i < ladder().size(); ++i) CHECK(ladder()[i].usual_error < ladder()[i - 1].usual_error);
+  for (std::size_t i = 1; i < ladder().size(); ++i)
+    CHECK(ladder()[i].usual_error < ladder()[i - 1].usual_error);
 }
 
-TEST_CASE("tuning: an error that was asked for is met at receivers that had no part in it", "[integration][error]") {
+TEST_CASE("tuning: an error that was asked for is met at receivers that had no part in it",
+          "[integration][error]") {
   for (const auto& surfels : {lit_balls(), crossed_sheets(), dark_balls()}) {
     const Scene scene(surfels);
     unsigned setting = 0;
@@ -130,7 +143,8 @@ TEST_CASE("tuning: an error that was asked for is met at receivers that had no p
   }
 }
 
-TEST_CASE("tuning: below the floor the finest setting is taken and the floor told", "[integration][error]") {
+TEST_CASE("tuning: below the floor the finest setting is taken and the floor told",
+          "[integration][error]") {
   const Scene scene(lit_balls());
   const ShadeReport report = shade_with(scene, 1e-4);
   CHECK_FALSE(report.tuning->met);
@@ -139,11 +153,14 @@ TEST_CASE("tuning: below the floor the finest setting is taken and the floor tol
   CHECK(report.check->discs.relative() == Approx(report.tuning->measured.relative()).epsilon(0.5));
 }
 
-TEST_CASE("tuning: neither threads nor the cap change the choice or a byte", "[integration][error]") {
+TEST_CASE("tuning: neither threads nor the cap change the choice or a byte",
+          "[integration][error]") {
   const Scene scene(lit_balls());
   const auto bytes = [&](const char* name) { return bytes_of(scene.dir / name); };
-  const ShadeReport one = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ptcx");
-  const ShadeReport two = shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{81} << 20, .threads = 2}, "two.ptcx");
+  const ShadeReport one =
+      shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ptcx");
+  const ShadeReport two =
+      shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{81} << 20, .threads = 2}, "two.ptcx");
   CHECK(one.tuning->setting == two.tuning->setting);
   CHECK(one.tuning->measured.relative() == two.tuning->measured.relative());
   CHECK(bytes("one.ptcx") == bytes("two.ptcx"));
@@ -152,7 +169,8 @@ TEST_CASE("tuning: neither threads nor the cap change the choice or a byte", "[i
   CHECK(bytes("other.ptcx") != bytes("one.ptcx"));
 }
 
-TEST_CASE("tuning: runs of few receivers and scenes of few surfels have pilots too", "[integration][error]") {
+TEST_CASE("tuning: runs of few receivers and scenes of few surfels have pilots too",
+          "[integration][error]") {
   const Scene scene(lit_balls());
   for (const std::uint64_t count : {1U, 2U, 5U, 40U}) {
     ShadeRequest request{.scene = scene.dir / "scene.ptcx", .count = count, .error = 0.1};

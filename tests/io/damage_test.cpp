@@ -1,6 +1,7 @@
 // Flipped bytes in every text and binary format that is read: a value or a refusal, nothing else.
-#include <catch2/catch.hpp>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/io/mesh.h"
 #include "engine/io/points.h"

@@ -1,4 +1,8 @@
 // OpenEXR pictures out and in.
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
 #include <ImfChannelList.h>
 #include <ImfCompression.h>
 #include <ImfFrameBuffer.h>
@@ -6,12 +10,8 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfTiledOutputFile.h>
-#include <half.h>
-
-#include <array>
 #include <catch2/catch.hpp>
-#include <cmath>
-#include <stdexcept>
+#include <half.h>
 
 #include "engine/base/error.h"
 #include "engine/io/image.h"

@@ -1,9 +1,9 @@
 // Meshes, materials and cameras from glTF and GLB.
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/mesh.h"

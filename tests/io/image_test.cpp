@@ -1,11 +1,11 @@
 // 8-bit pictures: the sRGB curve, the formats, and what damaged files do.
 #include "engine/io/image.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
 
+#include <catch2/catch.hpp>
 #include <glm/common.hpp>
 
 #include "engine/base/error.h"
@@ -175,7 +175,8 @@ TEST_CASE("image: no flipped byte does more than change the picture or refuse it
   }
 }
 
-TEST_CASE("image: an HDR of empty runs, or of a size that is told two ways, is refused and ends", "[io][image]") {
+TEST_CASE("image: an HDR of empty runs, or of a size that is told two ways, is refused and ends",
+          "[io][image]") {
   const std::string whole = coded_hdr();
   const std::size_t pixels = whole.find("+X 8\n") + 5;
   CHECK_THROWS_AS(decode(whole.substr(0, pixels + 4) + std::string(60, '\0'), "a"), DataError);

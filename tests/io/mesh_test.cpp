@@ -1,9 +1,9 @@
 // Boxes, and joining meshes.
 #include "engine/io/mesh.h"
 
-#include <catch2/catch.hpp>
 #include <stdexcept>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 

@@ -1,7 +1,6 @@
 // Meshes from PLY.
-#include <zlib.h>
-
 #include <catch2/catch.hpp>
+#include <zlib.h>
 
 #include "engine/base/error.h"
 #include "engine/io/mesh.h"

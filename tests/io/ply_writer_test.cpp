@@ -1,8 +1,9 @@
 // Clouds to PLY and back.
-#include <catch2/catch.hpp>
 #include <random>
 #include <stdexcept>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/io/points.h"
 #include "tests/io/files.h"

@@ -1,10 +1,10 @@
 // Clouds from PLY.
-#include <zlib.h>
-
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
+
+#include <catch2/catch.hpp>
+#include <zlib.h>
 
 #include "engine/base/error.h"
 #include "engine/io/points.h"
@@ -348,7 +348,8 @@ TEST_CASE("ply: a gzip file of several members, with or without padding, is read
   const auto path = scratch.path() / "a.ply.gz";
   const std::string cloud = binary_cloud(false);
   for (const std::size_t cut : {std::size_t{1}, cloud.size() / 2, cloud.size() - 1}) {
-    const std::string members = gzipped(path, cloud.substr(0, cut)) + gzipped(path, cloud.substr(cut));
+    const std::string members =
+        gzipped(path, cloud.substr(0, cut)) + gzipped(path, cloud.substr(cut));
     for (const std::string padding : {"", "\1", "padding"})
       check_cloud(read_all(scratch.file("b.ply.gz", members + padding)));
   }

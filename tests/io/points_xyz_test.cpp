@@ -1,6 +1,7 @@
 // Clouds from XYZ text.
-#include <catch2/catch.hpp>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/points.h"

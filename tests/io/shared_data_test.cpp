@@ -1,9 +1,9 @@
 // Real files: counts that are known, and that nothing odd does more than be refused.
-#include <catch2/catch.hpp>
 #include <iostream>
 #include <map>
 #include <vector>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"

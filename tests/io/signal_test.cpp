@@ -3,10 +3,11 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <catch2/catch.hpp>
 #include <csignal>
 #include <optional>
 #include <thread>
+
+#include <catch2/catch.hpp>
 
 #include "engine/io/file.h"
 #include "tests/io/files.h"

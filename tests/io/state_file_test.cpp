@@ -1,9 +1,10 @@
 // States that are written whole, and refused when they are not.
 #include "engine/io/state_file.h"
 
-#include <catch2/catch.hpp>
 #include <fstream>
 #include <system_error>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "tests/io/files.h"
@@ -22,7 +23,8 @@ std::vector<std::byte> some_state() {
 }
 
 void rewrite(const std::filesystem::path& path, const std::vector<char>& bytes) {
-  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  std::ofstream(path, std::ios::binary)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 }  // namespace
@@ -44,7 +46,8 @@ TEST_CASE("state: what was put is got in the same order", "[io][state]") {
 TEST_CASE("state: every proper prefix ends too early", "[io][state]") {
   const std::vector<std::byte> bytes = some_state();
   for (std::size_t n = 0; n < bytes.size(); ++n) {
-    const std::vector<std::byte> prefix(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n));
+    const std::vector<std::byte> prefix(bytes.begin(),
+                                        bytes.begin() + static_cast<std::ptrdiff_t>(n));
     StateReader state(prefix, "here");
     const auto read = [&] {
       static_cast<void>(state.get<std::uint64_t>());
@@ -84,7 +87,8 @@ TEST_CASE("lock: one at a time holds a file", "[io][state]") {
   const std::filesystem::path path = scratch.path() / "locked";
   {
     const FileLock lock(path);
-    CHECK_THROWS_WITH(FileLock(path), Catch::Contains(path.string()) && Catch::Contains("another program"));
+    CHECK_THROWS_WITH(FileLock(path),
+                      Catch::Contains(path.string()) && Catch::Contains("another program"));
     std::filesystem::remove(path);
     const FileLock other(path);  // of another file with that name
     CHECK(std::filesystem::exists(path));

@@ -1,10 +1,10 @@
 // Polygons to triangles: same area, same winding, nothing outside.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
 #include <random>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/io/mesh_soup.h"

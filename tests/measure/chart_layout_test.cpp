@@ -2,10 +2,11 @@
 #include "engine/measure/chart_layout.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <set>
 #include <utility>
+
+#include <catch2/catch.hpp>
 
 using namespace ptc;
 

@@ -1,11 +1,12 @@
 // Files of charts.
 #include "engine/measure/chart.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <system_error>
+
+#include <catch2/catch.hpp>
 
 #include "engine/io/image.h"
 #include "engine/io/srgb.h"

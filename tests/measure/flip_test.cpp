@@ -1,11 +1,11 @@
 // LDR-FLIP: what the formulas say of plain colours, a second implementation, and what eyes expect.
 #include "engine/measure/flip.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
 #include <stdexcept>
 
+#include <catch2/catch.hpp>
 #include <glm/vec3.hpp>
 
 #include "tests/measure/flip_oracle.h"

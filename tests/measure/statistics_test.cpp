@@ -1,10 +1,11 @@
 // Hand-computed spreads and errors.
 #include "engine/measure/statistics.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 using namespace ptc;
 

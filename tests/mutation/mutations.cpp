@@ -11,8 +11,12 @@ using Pages = std::span<const PagePlace>;
 constexpr std::size_t kSector = 512;
 constexpr std::size_t kMostAppended = 10000;
 
-auto at(Bytes& bytes, std::size_t offset) { return bytes.begin() + static_cast<std::ptrdiff_t>(offset); }
-auto at(const Bytes& bytes, std::size_t offset) { return bytes.begin() + static_cast<std::ptrdiff_t>(offset); }
+auto at(Bytes& bytes, std::size_t offset) {
+  return bytes.begin() + static_cast<std::ptrdiff_t>(offset);
+}
+auto at(const Bytes& bytes, std::size_t offset) {
+  return bytes.begin() + static_cast<std::ptrdiff_t>(offset);
+}
 
 bool flip_bit(const Bytes& whole, Pages, std::size_t k, Bytes& out) {
   out = whole;
@@ -26,8 +30,12 @@ bool fill(const Bytes& whole, std::size_t offset, std::size_t bytes, std::byte v
   return out != whole;
 }
 
-bool zero_sector(const Bytes& whole, Pages, std::size_t k, Bytes& out) { return fill(whole, k * kSector, kSector, std::byte{0}, out); }
-bool fill_sector(const Bytes& whole, Pages, std::size_t k, Bytes& out) { return fill(whole, k * kSector, kSector, std::byte{0xff}, out); }
+bool zero_sector(const Bytes& whole, Pages, std::size_t k, Bytes& out) {
+  return fill(whole, k * kSector, kSector, std::byte{0}, out);
+}
+bool fill_sector(const Bytes& whole, Pages, std::size_t k, Bytes& out) {
+  return fill(whole, k * kSector, kSector, std::byte{0xff}, out);
+}
 bool zero_page(const Bytes& whole, Pages pages, std::size_t k, Bytes& out) {
   return fill(whole, pages[k].offset, pages[k].bytes, std::byte{0}, out);
 }
@@ -44,7 +52,8 @@ bool swap_pages(const Bytes& whole, Pages pages, std::size_t k, Bytes& out) {
 bool copy_page(const Bytes& whole, Pages pages, std::size_t k, Bytes& out) {
   const PagePlace from = pages[k / pages.size()], to = pages[k % pages.size()];
   out = whole;
-  std::copy_n(at(whole, from.offset), std::min(from.bytes, whole.size() - to.offset), at(out, to.offset));
+  std::copy_n(at(whole, from.offset), std::min(from.bytes, whole.size() - to.offset),
+              at(out, to.offset));
   return out != whole;
 }
 

@@ -22,10 +22,12 @@ struct Mutation {
   std::string name;
   std::size_t count = 0;
   /// The file after way k, in `out`; false when that changes nothing.
-  bool (*apply)(const Bytes& whole, std::span<const PagePlace> pages, std::size_t k, Bytes& out) = nullptr;
+  bool (*apply)(const Bytes& whole, std::span<const PagePlace> pages, std::size_t k,
+                Bytes& out) = nullptr;
 };
 
 /// All kinds for a file.
-[[nodiscard]] std::vector<Mutation> mutations_of(const Bytes& whole, std::span<const PagePlace> pages);
+[[nodiscard]] std::vector<Mutation> mutations_of(const Bytes& whole,
+                                                 std::span<const PagePlace> pages);
 
 }  // namespace ptc::test

@@ -1,10 +1,9 @@
-// Changes small containers of every profile in all ways of mutations.h and counts what a verification and a reader
-// make of each: detected, accepted silently, crashed, or without end.
+// Changes small containers of every profile in all ways of mutations.h and counts what a
+// verification and a reader make of each: detected, accepted silently, crashed, or without end.
 //
 //   mutation_score [--every N]   tries one way in N of the kinds that have many; 1: all
 //
 // Exits with 1 unless all were detected.
-#include <fmt/format.h>
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -17,6 +16,8 @@
 #include <new>
 #include <string>
 #include <thread>
+
+#include <fmt/format.h>
 
 #include "engine/build/rounding.h"
 #include "engine/convert.h"
@@ -35,10 +36,10 @@ constexpr std::size_t kFew = 500;  // ways: of so few all are tried
 
 /// What a child tells its parent while it works.
 struct Tally {
-  std::size_t next = 0;      ///< way that it is at
+  std::size_t next = 0;  ///< way that it is at
   std::size_t tried = 0;
-  std::size_t silent = 0;    ///< the verification found nothing
-  std::size_t misread = 0;   ///< a reader gave other bytes without a word
+  std::size_t silent = 0;   ///< the verification found nothing
+  std::size_t misread = 0;  ///< a reader gave other bytes without a word
   std::size_t first_silent = 0;
 };
 
@@ -55,7 +56,8 @@ struct Subject {
   Bytes content;
 };
 
-Subject make_subject(const TemporaryDirectory& directory, const std::string& name, Profile profile, bool shaded) {
+Subject make_subject(const TemporaryDirectory& directory, const std::string& name, Profile profile,
+                     bool shaded) {
   Progress silent;
   const std::filesystem::path scene = directory / "scene.ptcx", lit = directory / "lit.ptcx";
   write_scene(scene, random_surfels(150, 3), {}, 12, Codec::raw);
@@ -65,12 +67,14 @@ Subject make_subject(const TemporaryDirectory& directory, const std::string& nam
     shade_container(request, lit, silent);
   }
   Subject subject{.name = name, .path = directory / "changed.ptcx"};
-  recode_container(ContainerReader(shaded ? lit : scene), subject.path, {.profile = profile}, silent);
+  recode_container(ContainerReader(shaded ? lit : scene), subject.path, {.profile = profile},
+                   silent);
   subject.whole = read_file(subject.path);
   subject.content = walk(subject.path);
   const ContainerReader container(subject.path);
   for (const DirectoryEntry& entry : container.entries()) {
-    subject.pages.push_back({entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
+    subject.pages.push_back(
+        {entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
   }
   return subject;
 }
@@ -99,13 +103,15 @@ void work(const Subject& subject, const Mutation& mutation, std::size_t every, T
     if (!mutation.apply(subject.whole, subject.pages, tally.next, changed)) continue;
     write_file(subject.path, changed);
     ++tally.tried;
-    if (!verification_finds_it(subject.path) && tally.silent++ == 0) tally.first_silent = tally.next;
+    if (!verification_finds_it(subject.path) && tally.silent++ == 0)
+      tally.first_silent = tally.next;
     tally.misread += reader_is_misled(subject);
   }
 }
 
 Score try_all(const Subject& subject, const Mutation& mutation, std::size_t every) {
-  void* const shared = ::mmap(nullptr, sizeof(Tally), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void* const shared =
+      ::mmap(nullptr, sizeof(Tally), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (shared == MAP_FAILED) throw std::bad_alloc();
   auto& tally = *new (shared) Tally;
   Score score;
@@ -128,7 +134,8 @@ Score try_all(const Subject& subject, const Mutation& mutation, std::size_t ever
     }
     if (WIFSIGNALED(status) || WEXITSTATUS(status) != 0) {
       ++(WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM ? score.hangs : score.crashes);
-      if (score.hangs + score.crashes == 1) fmt::print("{}, {}: way {} ended the process\n", subject.name, mutation.name, tally.next);
+      if (score.hangs + score.crashes == 1)
+        fmt::print("{}, {}: way {} ended the process\n", subject.name, mutation.name, tally.next);
       tally.next += every;
     }
   }
@@ -139,12 +146,15 @@ Score try_all(const Subject& subject, const Mutation& mutation, std::size_t ever
 
 int run(std::size_t every) {
   const TemporaryDirectory directory;
-  const std::array subjects{
-      make_subject(directory, "raw", Profile::raw, false), make_subject(directory, "exact", Profile::exact, false),
-      make_subject(directory, "fast", Profile::fast, false), make_subject(directory, "compact", Profile::compact, false),
-      make_subject(directory, "compact, shaded", Profile::compact, true)};
+  const std::array subjects{make_subject(directory, "raw", Profile::raw, false),
+                            make_subject(directory, "exact", Profile::exact, false),
+                            make_subject(directory, "fast", Profile::fast, false),
+                            make_subject(directory, "compact", Profile::compact, false),
+                            make_subject(directory, "compact, shaded", Profile::compact, true)};
   Score all;
-  fmt::print("| change | tried | found | accepted silently | misread | crashes | hangs |\n|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| change | tried | found | accepted silently | misread | crashes | hangs "
+      "|\n|---|---|---|---|---|---|---|\n");
   const std::size_t kinds = mutations_of(subjects[0].whole, subjects[0].pages).size();
   for (std::size_t kind = 0; kind < kinds; ++kind) {
     Score sum;
@@ -153,7 +163,8 @@ int run(std::size_t every) {
       const Mutation mutation = mutations_of(subject.whole, subject.pages)[kind];
       name = mutation.name;
       const Score score = try_all(subject, mutation, mutation.count < kFew ? 1 : every);
-      if (score.tally.silent > 0) fmt::print("{}, {}: way {} was accepted\n", subject.name, name, score.tally.first_silent);
+      if (score.tally.silent > 0)
+        fmt::print("{}, {}: way {} was accepted\n", subject.name, name, score.tally.first_silent);
       for (Score* const into : {&sum, &all}) {
         into->tally.tried += score.tally.tried;
         into->tally.silent += score.tally.silent;
@@ -162,12 +173,15 @@ int run(std::size_t every) {
         into->hangs += score.hangs;
       }
     }
-    fmt::print("| {} | {} | {} | {} | {} | {} | {} |\n", name, sum.tally.tried, sum.tally.tried - sum.tally.silent - sum.crashes - sum.hangs,
-               sum.tally.silent, sum.tally.misread, sum.crashes, sum.hangs);
+    fmt::print("| {} | {} | {} | {} | {} | {} | {} |\n", name, sum.tally.tried,
+               sum.tally.tried - sum.tally.silent - sum.crashes - sum.hangs, sum.tally.silent,
+               sum.tally.misread, sum.crashes, sum.hangs);
     std::fflush(stdout);
   }
   const Tally& t = all.tally;
-  fmt::print("| all | {} | {} | {} | {} | {} | {} |\n", t.tried, t.tried - t.silent - all.crashes - all.hangs, t.silent, t.misread, all.crashes, all.hangs);
+  fmt::print("| all | {} | {} | {} | {} | {} | {} |\n", t.tried,
+             t.tried - t.silent - all.crashes - all.hangs, t.silent, t.misread, all.crashes,
+             all.hangs);
   return t.tried > 1000 && t.silent + t.misread + all.crashes + all.hangs == 0 ? 0 : 1;
 }
 
@@ -175,7 +189,8 @@ int run(std::size_t every) {
 }  // namespace ptc::test
 
 int main(int argc, char** argv) {
-  const bool wrong = argc != 1 && (argc != 3 || std::strcmp(argv[1], "--every") != 0 || std::atoi(argv[2]) < 1);
+  const bool wrong =
+      argc != 1 && (argc != 3 || std::strcmp(argv[1], "--every") != 0 || std::atoi(argv[2]) < 1);
   if (wrong) {
     fmt::print(stderr, "usage: mutation_score [--every N]\n");
     return 2;

@@ -1,6 +1,7 @@
 // Emissive triangles, against the form factor of a rectangle.
-#include <catch2/catch.hpp>
 #include <cmath>
+
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/scene/lights.h"

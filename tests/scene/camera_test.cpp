@@ -1,12 +1,13 @@
 // The pinhole camera and its record.
 #include "engine/scene/camera.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
 #include <string>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
 #include "tests/scene/meshes.h"

@@ -1,12 +1,13 @@
 // The procedural city.
 #include "engine/scene/city.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <set>
 #include <stdexcept>
 #include <utility>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "engine/scene/city_block.h"
 #include "engine/scene/ray_scene.h"

@@ -1,10 +1,11 @@
 // Grouping surface points.
 #include "engine/scene/clusters.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <set>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "tests/scene/meshes.h"
 

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <unordered_map>
 
 #include "engine/scene/low_discrepancy.h"
 #include "tests/scene/meshes.h"

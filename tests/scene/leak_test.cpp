@@ -1,8 +1,9 @@
 // Light must not come through closed walls, and a surface must not hide itself.
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "engine/scene/directions.h"
 #include "engine/scene/lights.h"

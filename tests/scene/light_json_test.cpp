@@ -1,9 +1,10 @@
 // The light rig's record.
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/scene/lights.h"

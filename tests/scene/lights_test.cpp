@@ -1,12 +1,13 @@
 // Suns, point lights and the constant sky, against formulas.
 #include "engine/scene/lights.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
 #include <string>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "engine/scene/directions.h"
 #include "tests/scene/meshes.h"

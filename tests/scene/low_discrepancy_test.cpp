@@ -1,10 +1,11 @@
 // Sample points.
 #include "engine/scene/low_discrepancy.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <set>
 #include <utility>
+
+#include <catch2/catch.hpp>
 
 using namespace ptc;
 

@@ -1,8 +1,9 @@
 // The ray-traced reference, against form factors and a furnace.
 #include "engine/scene/mesh_reference.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
+
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/scene/directions.h"
@@ -132,8 +133,9 @@ TEST_CASE("trace_mesh: in a furnace the irradiance is pi times emission plus one
   CHECK(result.sky == glm::vec3(0));
 }
 
-TEST_CASE("trace_mesh: in a furnace every bounce adds its power of the albedo, however emission arrives",
-          "[scene][reference]") {
+TEST_CASE(
+    "trace_mesh: in a furnace every bounce adds its power of the albedo, however emission arrives",
+    "[scene][reference]") {
   const Mesh mesh = furnace();
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
@@ -141,7 +143,8 @@ TEST_CASE("trace_mesh: in a furnace every bounce adds its power of the albedo, h
   for (const unsigned area_rays : {0u, 16u}) {
     for (unsigned n = 1; n <= 4; ++n) {
       const double expected = 2 - std::pow(0.5, area_rays > 0 ? n : n - 1.0);
-      const RayTraced result = trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 4096, {{1, area_rays, 1}, n}, 1);
+      const RayTraced result =
+          trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 4096, {{1, area_rays, 1}, n}, 1);
       INFO(area_rays << " area rays, " << n << " bounces");
       CHECK(result.irradiance.x == Approx(expected * kPiWide).epsilon(0.01));
     }

@@ -1,12 +1,13 @@
 // Rays against a mesh, with a loop over all triangles in double as the oracle.
 #include "engine/scene/ray_scene.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <initializer_list>
 #include <limits>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "tests/scene/meshes.h"
 

@@ -1,6 +1,7 @@
 // Finer surfels where a camera looks close.
-#include <catch2/catch.hpp>
 #include <cmath>
+
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/scene/sampler.h"

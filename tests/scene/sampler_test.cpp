@@ -2,13 +2,14 @@
 #include "engine/scene/sampler.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "engine/scene/directions.h"
 #include "tests/scene/coverage.h"
@@ -147,7 +148,8 @@ TEST_CASE("sampler: surfels lie on the mesh and have its normals and colours", "
   }
 }
 
-TEST_CASE("sampler: a surfel has the mean normal of its patch where the mesh is finer", "[scene][sampler]") {
+TEST_CASE("sampler: a surfel has the mean normal of its patch where the mesh is finer",
+          "[scene][sampler]") {
   Mesh mesh = empty_mesh();  // a corrugated square, flat in the mean
   constexpr int kRoofs = 200;
   for (int i = 0; i < kRoofs; ++i) {
@@ -161,7 +163,8 @@ TEST_CASE("sampler: a surfel has the mean normal of its patch where the mesh is 
   CHECK(tilt < 0.02 * static_cast<double>(surfels.size()));  // 0.07 with the normals of the roofs
 }
 
-TEST_CASE("sampler: surfels stick out over an edge about as much as they leave out", "[scene][sampler]") {
+TEST_CASE("sampler: surfels stick out over an edge about as much as they leave out",
+          "[scene][sampler]") {
   const auto surfels = sample(ground(1), 2000);
   const auto covered = [&](float x, float z) {
     return std::ranges::any_of(surfels, [&](const Surfel& s) {
@@ -173,7 +176,8 @@ TEST_CASE("sampler: surfels stick out over an edge about as much as they leave o
   double net = 0;  // in units of the spacing times the length of the edge
   constexpr int kProbes = 4000;
   for (int i = 0; i < kProbes; ++i) {
-    const auto along = static_cast<float>(random.between(-0.9, 0.9)), off = static_cast<float>(random.unit() * spacing);
+    const auto along = static_cast<float>(random.between(-0.9, 0.9)),
+               off = static_cast<float>(random.unit() * spacing);
     net += (covered(1 + off, along) ? 1.0 : 0.0) / kProbes;
     net -= (covered(along, 1 - off) ? 0.0 : 1.0) / kProbes;
   }
@@ -190,7 +194,8 @@ TEST_CASE("sampler: what lies inside a solid gives no surfels", "[scene][sampler
   CHECK(sample(mesh, options).size() == Approx(alone.size()).epsilon(0.02));
 }
 
-TEST_CASE("sampler: a surfel's light is the mean over its patch, its buried part left out", "[scene][sampler]") {
+TEST_CASE("sampler: a surfel's light is the mean over its patch, its buried part left out",
+          "[scene][sampler]") {
   Mesh mesh = ground(1);
   LightRig rig;
   rig.suns.push_back({{0, 1, 0}, glm::vec3(kPi), 0});

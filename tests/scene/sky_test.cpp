@@ -1,8 +1,9 @@
 // The sky map: where its pixels lie, and what they give.
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <memory>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "engine/scene/directions.h"
 #include "engine/scene/lights.h"

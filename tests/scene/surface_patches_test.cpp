@@ -1,10 +1,11 @@
 // Cutting a mesh into patches and spreading points over them.
 #include "engine/scene/surface_patches.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <map>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
 #include "tests/scene/meshes.h"
 

@@ -1,8 +1,9 @@
 // Where a surface ends, and what lies inside a solid.
 #include "engine/scene/surroundings.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
+
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "tests/scene/meshes.h"
@@ -16,7 +17,8 @@ const glm::vec3 kUp(0, 1, 0);
 
 }  // namespace
 
-TEST_CASE("surroundings: a disc stays where the surface goes on, flat or curved", "[scene][surroundings]") {
+TEST_CASE("surroundings: a disc stays where the surface goes on, flat or curved",
+          "[scene][surroundings]") {
   const Mesh plane = ground(1);
   const RayScene scene(plane);
   for (const double x : {-0.85, 0.0, 0.3, 0.89}) {
@@ -40,12 +42,14 @@ TEST_CASE("surroundings: a disc that sticks out over an edge moves to where it l
       const glm::vec3 at = rotation * glm::vec3(1 - distance * kRadius, 0, 0.3F);
       const glm::vec3 moved = move_inwards(scene, glm::dvec3(at), rotation * kUp, kRadius);
       INFO(i << " at " << distance << " radii");
-      CHECK(glm::distance(moved, rotation * glm::vec3(-(0.909F - distance) * kRadius, 0, 0)) < 0.06F * kRadius);
+      CHECK(glm::distance(moved, rotation * glm::vec3(-(0.909F - distance) * kRadius, 0, 0)) <
+            0.06F * kRadius);
     }
   }
 }
 
-TEST_CASE("surroundings: a corner moves a disc from both edges, a strip from neither", "[scene][surroundings]") {
+TEST_CASE("surroundings: a corner moves a disc from both edges, a strip from neither",
+          "[scene][surroundings]") {
   const Mesh plane = ground(1);
   const RayScene scene(plane);
   const glm::vec3 moved = move_inwards(scene, {0.95, 0, 0.95}, kUp, kRadius);
@@ -58,7 +62,8 @@ TEST_CASE("surroundings: a corner moves a disc from both edges, a strip from nei
   CHECK(glm::length(move_inwards(narrow, {0, 0, 0}, kUp, kRadius)) < 0.02F * kRadius);
 }
 
-TEST_CASE("surroundings: a disc stays where another surface hides what sticks out", "[scene][surroundings]") {
+TEST_CASE("surroundings: a disc stays where another surface hides what sticks out",
+          "[scene][surroundings]") {
   Mesh mesh = ground(1);
   add_quad(mesh, {1, 0, 1}, {0, 0, -2}, {0, 1, 0});
   const RayScene scene(mesh);
@@ -66,12 +71,13 @@ TEST_CASE("surroundings: a disc stays where another surface hides what sticks ou
   CHECK(move_inwards(scene, {-0.95, 0, 0}, kUp, kRadius).x > 0.3F * kRadius);
 }
 
-TEST_CASE("surroundings: inside a solid and where solids touch a place is buried, elsewhere it is not",
-          "[scene][surroundings]") {
+TEST_CASE(
+    "surroundings: inside a solid and where solids touch a place is buried, elsewhere it is not",
+    "[scene][surroundings]") {
   Mesh mesh = empty_mesh();
   add_box(mesh, {-2, -1, -2}, {2, 0, 2}, false);
-  add_box(mesh, {-0.5F, 0, -0.5F}, {0.5F, 1, 0.5F}, false);   // stands on the first
-  add_box(mesh, {0.4F, 0.25F, 0.4F}, {1, 0.5F, 1}, false);  // sunk into the second
+  add_box(mesh, {-0.5F, 0, -0.5F}, {0.5F, 1, 0.5F}, false);  // stands on the first
+  add_box(mesh, {0.4F, 0.25F, 0.4F}, {1, 0.5F, 1}, false);   // sunk into the second
   const RayScene scene(mesh);
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     CHECK(is_buried(scene, {-0.3, 0, -0.3}, kUp, seed));
@@ -83,7 +89,8 @@ TEST_CASE("surroundings: inside a solid and where solids touch a place is buried
   }
 }
 
-TEST_CASE("surroundings: what shows itself or its reflecting back buries nothing", "[scene][surroundings]") {
+TEST_CASE("surroundings: what shows itself or its reflecting back buries nothing",
+          "[scene][surroundings]") {
   Mesh room = empty_mesh();
   add_box(room, glm::vec3(-1), glm::vec3(1), true);
   const RayScene inward(room);

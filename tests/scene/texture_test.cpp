@@ -1,9 +1,10 @@
 // Texture and panorama lookups.
 #include "engine/scene/texture.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+
+#include <catch2/catch.hpp>
 
 using namespace ptc;
 

@@ -1,7 +1,9 @@
-// Shading past pages that cannot be read: what stands in for them, and the bound on what that changes.
-#include <catch2/catch.hpp>
+// Shading past pages that cannot be read: what stands in for them, and the bound on what that
+// changes.
 #include <fstream>
 #include <optional>
+
+#include <catch2/catch.hpp>
 
 #include "format/error.h"
 #include "tests/shade/gather_scene.h"
@@ -20,13 +22,17 @@ struct Pair {
   [[nodiscard]] double off() const { return std::abs(found.occlusion - expected.occlusion); }
 };
 
-/// A scene, the small one where none is given, whole and with two bytes changed in the payload of some pages.
+/// A scene, the small one where none is given, whole and with two bytes changed in the payload of
+/// some pages.
 struct Damaged {
   Scene scene;
   std::unique_ptr<ContainerReader> broken;
 
   Damaged() : Damaged(small_scene(kSpacing), {}) { add_floor_receivers(scene.receivers, kSpacing); }
-  Damaged(const std::vector<Surfel>& surfels, const BuildOptions& options) : scene(surfels, options) { break_pages({}); }
+  Damaged(const std::vector<Surfel>& surfels, const BuildOptions& options)
+      : scene(surfels, options) {
+    break_pages({});
+  }
 
   [[nodiscard]] std::vector<std::uint32_t> node_pages() const {
     std::vector<std::uint32_t> pages;
@@ -43,14 +49,16 @@ struct Damaged {
       bytes[at] = static_cast<char>(~bytes[at]);
       bytes[at + 1] = static_cast<char>(~bytes[at + 1]);
     }
-    std::ofstream(scene.dir / "broken.ptcx", std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    std::ofstream(scene.dir / "broken.ptcx", std::ios::binary)
+        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     broken = std::make_unique<ContainerReader>(scene.dir / "broken.ptcx");
   }
 
   /// Every so many receivers, each by itself, with a bound of its own.
   [[nodiscard]] std::vector<Pair> shade_alone(std::size_t step, LostPages& lost) const {
     const SceneView whole(*scene.container), view(*broken, &lost);
-    PageCache whole_cache(*scene.container, {.memory_bytes = 64U << 20}), cache(*broken, {.memory_bytes = 64U << 20});
+    PageCache whole_cache(*scene.container, {.memory_bytes = 64U << 20}),
+        cache(*broken, {.memory_bytes = 64U << 20});
     const DirectionGrid grid(GatherOptions().resolution, {}, 0);
     Gather reference(whole, whole_cache, {});
     std::vector<Pair> pairs;
@@ -70,7 +78,8 @@ struct Damaged {
     std::vector<Shading> results;
     GatherCounts counts;
   };
-  [[nodiscard]] Run shade(LostPages* lost, unsigned threads = 1, std::uint64_t cache_bytes = 64U << 20) const {
+  [[nodiscard]] Run shade(LostPages* lost, unsigned threads = 1,
+                          std::uint64_t cache_bytes = 64U << 20) const {
     const Executor executor(threads);
     Shader shader(*broken, {.cache_bytes = cache_bytes, .lost = lost}, executor);
     Run run{std::vector<Shading>(scene.receivers.size()), {}};
@@ -82,7 +91,8 @@ struct Damaged {
 };
 
 bool same(const Shading& a, const Shading& b) {
-  return a.occlusion == b.occlusion && a.bent_normal == b.bent_normal && a.irradiance == b.irradiance && a.sky == b.sky;
+  return a.occlusion == b.occlusion && a.bent_normal == b.bent_normal &&
+         a.irradiance == b.irradiance && a.sky == b.sky;
 }
 
 }  // namespace
@@ -97,9 +107,11 @@ TEST_CASE("damage: of a whole scene nothing is lost and no bit differs", "[shade
   CHECK(run.counts.damage.greatest_bound == 0);
 }
 
-TEST_CASE("damage: without leave to go on a lost page is an error that names file, place and rule", "[shade][damage]") {
+TEST_CASE("damage: without leave to go on a lost page is an error that names file, place and rule",
+          "[shade][damage]") {
   Damaged damaged;
-  for (const std::uint32_t page : {damaged.node_pages().back(), damaged.scene.container->point_pages()[30]}) {
+  for (const std::uint32_t page :
+       {damaged.node_pages().back(), damaged.scene.container->point_pages()[30]}) {
     damaged.break_pages({page});
     try {
       static_cast<void>(damaged.shade(nullptr));
@@ -116,8 +128,13 @@ TEST_CASE("damage: what stands in changes no receiver by more than its bound", "
   Damaged damaged;
   const std::vector<std::uint32_t> nodes = damaged.node_pages();
   const auto points = damaged.scene.container->point_pages();
-  const std::vector<std::vector<std::uint32_t>> trials{{points[10]}, {points[30], points[31], points[60]}, {nodes.back()}, {nodes[nodes.size() / 2]},
-                                                       {nodes.front(), nodes[1]}, {points[20], points[21], points[22], nodes[3]}};
+  const std::vector<std::vector<std::uint32_t>> trials{
+      {points[10]},
+      {points[30], points[31], points[60]},
+      {nodes.back()},
+      {nodes[nodes.size() / 2]},
+      {nodes.front(), nodes[1]},
+      {points[20], points[21], points[22], nodes[3]}};
   std::size_t changed = 0, tight = 0;
   for (const auto& pages : trials) {
     damaged.break_pages(pages);
@@ -125,28 +142,35 @@ TEST_CASE("damage: what stands in changes no receiver by more than its bound", "
     for (const Pair& pair : damaged.shade_alone(7, lost)) {
       changed += pair.off() > 0.01;
       tight += pair.bound < 0.1;
-      if (pair.off() > pair.bound + 0.01) FAIL("off by " << pair.off() << ", bound " << pair.bound << ", page " << pages[0]);
-      if (pair.bound == 0 && !same(pair.found, pair.expected)) FAIL("no bound, and off by " << pair.off());
+      if (pair.off() > pair.bound + 0.01)
+        FAIL("off by " << pair.off() << ", bound " << pair.bound << ", page " << pages[0]);
+      if (pair.bound == 0 && !same(pair.found, pair.expected))
+        FAIL("no bound, and off by " << pair.off());
       CHECK(std::isfinite(pair.found.irradiance.g));
     }
     CHECK_FALSE(lost.list().empty());  // some may be needed by no receiver
-    for (const auto& [page, why] : lost.list()) CHECK(std::ranges::find(pages, page) != pages.end());
+    for (const auto& [page, why] : lost.list())
+      CHECK(std::ranges::find(pages, page) != pages.end());
   }
   CHECK(changed > 20);
   CHECK(tight > damaged.scene.receivers.size() / 7 * trials.size() / 2);
 }
 
 TEST_CASE("damage: the worst that can stand in comes near its bound", "[shade][damage]") {
-  // Two piles of equal discs in one leaf: their summed area fills its sphere, and they themselves cover little.
+  // Two piles of equal discs in one leaf: their summed area fills its sphere, and they themselves
+  // cover little.
   std::vector<Surfel> piles;
   for (int i = 0; i < 40; ++i) {
-    for (const double at : {0.1, 0.3}) piles.push_back({.position = {at, at, 0}, .normal = {0, 0, 1}, .radius = 0.02F});
+    for (const double at : {0.1, 0.3})
+      piles.push_back({.position = {at, at, 0}, .normal = {0, 0, 1}, .radius = 0.02F});
   }
-  for (int i = 0; i < 100; ++i) piles.push_back({.position = glm::dvec3(1 - 1e-4 * i), .normal = {0, 0, 1}, .radius = 1e-5F});
+  for (int i = 0; i < 100; ++i)
+    piles.push_back({.position = glm::dvec3(1 - 1e-4 * i), .normal = {0, 0, 1}, .radius = 1e-5F});
   Damaged damaged(piles, {.leaf_points = 90});
   for (int i = 0; i < 40; ++i) {
     const double turn = 0.04 * i, far = 0.25 + 0.05 * i;
-    const glm::dvec3 from(std::sin(turn) * std::cos(3.0 * i), std::sin(turn) * std::sin(3.0 * i), std::cos(turn));
+    const glm::dvec3 from(std::sin(turn) * std::cos(3.0 * i), std::sin(turn) * std::sin(3.0 * i),
+                          std::cos(turn));
     damaged.scene.receivers.push_back({glm::dvec3(0.2, 0.2, 0) + from * far, -glm::vec3(from)});
   }
   const auto points = damaged.scene.container->point_pages();
@@ -167,7 +191,8 @@ TEST_CASE("damage: neither threads nor the cap change what stands in", "[shade][
   damaged.break_pages({points[10], points[30], damaged.node_pages().back()});
   std::optional<Damaged::Run> first;
   for (const unsigned threads : {1U, 3U}) {
-    for (const std::uint64_t cap : {PageCache::least_bytes(*damaged.broken, threads), std::uint64_t{64} << 20}) {
+    for (const std::uint64_t cap :
+         {PageCache::least_bytes(*damaged.broken, threads), std::uint64_t{64} << 20}) {
       LostPages lost(*damaged.broken);
       const auto run = damaged.shade(&lost, threads, cap);
       CHECK(lost.list().size() == 3);

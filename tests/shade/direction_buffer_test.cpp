@@ -1,12 +1,13 @@
-#include <catch2/catch.hpp>
+#include "engine/shade/direction_buffer.h"
+
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <span>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/shade/direction_buffer.h"
 #include "format/scalar.h"
 
 using namespace ptc;
@@ -20,8 +21,8 @@ glm::vec3 random_direction(std::mt19937& bits) {
   return glm::normalize(glm::vec3(normal(bits), normal(bits), normal(bits)));
 }
 
-void draw_disc(const DirectionGrid& grid, DirectionBuffer& buffer, const glm::vec3& to, const glm::vec3& normal, float radius, std::uint32_t rgbe,
-               Sides sides) {
+void draw_disc(const DirectionGrid& grid, DirectionBuffer& buffer, const glm::vec3& to,
+               const glm::vec3& normal, float radius, std::uint32_t rgbe, Sides sides) {
   DiscQueue queue;
   queue.push(to, normal, radius, rgbe);
   buffer.draw(grid, queue, sides);
@@ -34,7 +35,8 @@ const DirectionGrid& fine_grid() {
 
 }  // namespace
 
-TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole sky", "[shade][buffer]") {
+TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole sky",
+          "[shade][buffer]") {
   const DirectionGrid grid(32, [](const glm::vec3&) { return glm::vec3(1, 2, 3); });
   DirectionBuffer buffer(32);
   std::mt19937 bits(1);
@@ -48,7 +50,9 @@ TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole 
   }
 }
 
-TEST_CASE("direction buffer: irradiance from a gradient does not depend on the turn of the receiver", "[shade][buffer]") {
+TEST_CASE(
+    "direction buffer: irradiance from a gradient does not depend on the turn of the receiver",
+    "[shade][buffer]") {
   // Radiance 1 + cos(angle to z): E(n) = pi + 2 pi / 3 n.z, whatever the cube's pixels are.
   const DirectionGrid grid(32, [](const glm::vec3& d) { return glm::vec3(1 + d.z); });
   DirectionBuffer buffer(32);
@@ -59,7 +63,8 @@ TEST_CASE("direction buffer: irradiance from a gradient does not depend on the t
   }
 }
 
-TEST_CASE("direction buffer: small discs cover their solid angle in every direction", "[shade][buffer]") {
+TEST_CASE("direction buffer: small discs cover their solid angle in every direction",
+          "[shade][buffer]") {
   std::mt19937 bits(3);
   std::uniform_real_distribution<float> uniform;
   double ratio_sum = 0;
@@ -68,8 +73,10 @@ TEST_CASE("direction buffer: small discs cover their solid angle in every direct
     const float distance = std::exp(6 * uniform(bits) - 3);
     const float solid_angle = 0.02F;
     DirectionBuffer buffer(64);
-    draw_disc(fine_grid(), buffer, direction * distance, -direction, std::sqrt(solid_angle / kPi) * distance, 1, Sides::front);
-    const double covered = static_cast<double>(buffer.resolve(fine_grid(), direction).occlusion * kPi / solid_angle);
+    draw_disc(fine_grid(), buffer, direction * distance, -direction,
+              std::sqrt(solid_angle / kPi) * distance, 1, Sides::front);
+    const double covered =
+        static_cast<double>(buffer.resolve(fine_grid(), direction).occlusion * kPi / solid_angle);
     CHECK(covered > 0.6);  // one pixel row more or less of about ten
     CHECK(covered < 1.4);
     ratio_sum += covered;
@@ -77,7 +84,8 @@ TEST_CASE("direction buffer: small discs cover their solid angle in every direct
   CHECK(ratio_sum / 1000 == Approx(1).margin(0.02));
 }
 
-TEST_CASE("direction buffer: a disc over the receiver has the analytic form factor", "[shade][buffer]") {
+TEST_CASE("direction buffer: a disc over the receiver has the analytic form factor",
+          "[shade][buffer]") {
   std::mt19937 bits(4);
   for (const float radius : {0.01F, 0.1F, 0.5F, 1.0F, 3.0F, 30.0F}) {
     for (int i = 0; i < 20; ++i) {
@@ -93,7 +101,8 @@ TEST_CASE("direction buffer: a disc over the receiver has the analytic form fact
   }
 }
 
-TEST_CASE("direction buffer: a disc close to the receiver never covers more than the hemisphere", "[shade][buffer]") {
+TEST_CASE("direction buffer: a disc close to the receiver never covers more than the hemisphere",
+          "[shade][buffer]") {
   for (const float height : {1.0F, 1e-1F, 1e-3F, 1e-6F, 0.0F}) {
     DirectionBuffer buffer(64);
     draw_disc(fine_grid(), buffer, {0, 0, height}, {0, 0, -1}, 1, 1, Sides::both);
@@ -104,7 +113,8 @@ TEST_CASE("direction buffer: a disc close to the receiver never covers more than
   }
 }
 
-TEST_CASE("direction buffer: the back of a disc is black, and clear within two radii", "[shade][buffer]") {
+TEST_CASE("direction buffer: the back of a disc is black, and clear within two radii",
+          "[shade][buffer]") {
   const std::uint32_t white = encode_rgbe({1, 1, 1});
   const auto shade = [&](float distance, Sides sides) {
     DirectionBuffer buffer(64);
@@ -117,12 +127,14 @@ TEST_CASE("direction buffer: the back of a disc is black, and clear within two r
   CHECK(shade(2.5F, Sides::front).occlusion == 0);
 }
 
-TEST_CASE("direction buffer: the nearer of two walls is seen whatever is drawn first", "[shade][buffer]") {
+TEST_CASE("direction buffer: the nearer of two walls is seen whatever is drawn first",
+          "[shade][buffer]") {
   const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0});
   for (const bool near_first : {true, false}) {
     DirectionBuffer buffer(64);
     for (const bool near : {near_first, !near_first}) {
-      draw_disc(fine_grid(), buffer, {0, 0, near ? 1.0F : 1.001F}, {0, 0, -1}, 2, near ? red : green, Sides::front);
+      draw_disc(fine_grid(), buffer, {0, 0, near ? 1.0F : 1.001F}, {0, 0, -1}, 2,
+                near ? red : green, Sides::front);
     }
     const Shading s = buffer.resolve(fine_grid(), {0, 0, 1});
     CHECK(s.irradiance.r == Approx(kPi * 0.8).margin(0.02));
@@ -130,20 +142,27 @@ TEST_CASE("direction buffer: the nearer of two walls is seen whatever is drawn f
   }
 }
 
-TEST_CASE("direction buffer: coplanar overlapping discs divide half way between their centres", "[shade][buffer]") {
+TEST_CASE("direction buffer: coplanar overlapping discs divide half way between their centres",
+          "[shade][buffer]") {
   const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0});
   for (const bool swap : {false, true}) {
     DirectionBuffer buffer(64);
-    draw_disc(fine_grid(), buffer, {swap ? 0.5F : -0.5F, 0, 1}, {0, 0, -1}, 2, swap ? green : red, Sides::front);
-    draw_disc(fine_grid(), buffer, {swap ? -0.5F : 0.5F, 0, 1}, {0, 0, -1}, 2, swap ? red : green, Sides::front);
+    draw_disc(fine_grid(), buffer, {swap ? 0.5F : -0.5F, 0, 1}, {0, 0, -1}, 2, swap ? green : red,
+              Sides::front);
+    draw_disc(fine_grid(), buffer, {swap ? -0.5F : 0.5F, 0, 1}, {0, 0, -1}, 2, swap ? red : green,
+              Sides::front);
     const Shading s = buffer.resolve(fine_grid(), {0, 0, 1});
     CHECK(s.irradiance.r == Approx(s.irradiance.g).epsilon(0.03));
   }
 }
 
-TEST_CASE("direction buffer: right over a plane of discs only the disc of the nearest centre is seen", "[shade][buffer]") {
-  const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0}), blue = encode_rgbe({0, 0, 1});
-  for (const float height : {1e-2F, 1e-3F, 1e-4F, 1e-6F}) {  // less than the bump of a disc, 0.01 e^2 / r, where it can
+TEST_CASE(
+    "direction buffer: right over a plane of discs only the disc of the nearest centre is seen",
+    "[shade][buffer]") {
+  const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0}),
+                      blue = encode_rgbe({0, 0, 1});
+  for (const float height :
+       {1e-2F, 1e-3F, 1e-4F, 1e-6F}) {  // less than the bump of a disc, 0.01 e^2 / r, where it can
     DirectionBuffer buffer(64);
     draw_disc(fine_grid(), buffer, {0.6F, 0, height}, {0, 0, -1}, 1, red, Sides::both);
     draw_disc(fine_grid(), buffer, {-0.7F, 0, height}, {0, 0, -1}, 1, green, Sides::both);
@@ -156,7 +175,8 @@ TEST_CASE("direction buffer: right over a plane of discs only the disc of the ne
   }
 }
 
-TEST_CASE("direction buffer: an emitter moving across pixels changes the light smoothly", "[shade][buffer]") {
+TEST_CASE("direction buffer: an emitter moving across pixels changes the light smoothly",
+          "[shade][buffer]") {
   const std::uint32_t white = encode_rgbe({1, 1, 1});
   const DirectionGrid grid(32, {});
   float last = -1, largest = 0, least = 1e9F;
@@ -164,17 +184,18 @@ TEST_CASE("direction buffer: an emitter moving across pixels changes the light s
     const float angle = 0.5F + 0.3F * static_cast<float>(i) / 400;
     DirectionBuffer buffer(32);
     draw_disc(grid, buffer, 10.0F * glm::vec3(std::sin(angle), 0, std::cos(angle)),
-                     -glm::vec3(std::sin(angle), 0, std::cos(angle)), 2, white, Sides::front);
+              -glm::vec3(std::sin(angle), 0, std::cos(angle)), 2, white, Sides::front);
     const float e = buffer.resolve(grid, {0, 0, 1}).irradiance.r / std::cos(angle);
     if (last >= 0) largest = std::max(largest, std::abs(e - last));
     last = e;
     least = std::min(least, e);
   }
   CHECK(least == Approx(kPi * 0.04 / 1.04).epsilon(0.1));  // about 36 pixels
-  CHECK(largest < 0.08F * least);                        // at most two or three at once
+  CHECK(largest < 0.08F * least);                          // at most two or three at once
 }
 
-TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiver, to first order", "[shade][buffer]") {
+TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiver, to first order",
+          "[shade][buffer]") {
   std::mt19937 bits(7);
   std::uniform_real_distribution<float> uniform;
   const DirectionGrid& grid = fine_grid();
@@ -195,13 +216,15 @@ TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiv
     const float there = occlusion(offset, {});
     unmoved += std::pow(occlusion({}, {}) - there, 2);
     moved += std::pow(occlusion({}, std::span(&offset, 1)) - there, 2);
-    INFO(i << " " << occlusion({}, {}) << " " << occlusion({}, std::span(&offset, 1)) << " " << there);
+    INFO(i << " " << occlusion({}, {}) << " " << occlusion({}, std::span(&offset, 1)) << " "
+           << there);
     CHECK(std::abs(occlusion({}, std::span(&offset, 1)) - there) < 0.004F);
   }
   CHECK(moved < 0.1 * unmoved);
 }
 
-TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wherever it lies", "[shade][buffer]") {
+TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wherever it lies",
+          "[shade][buffer]") {
   // Centres 0.3 to 3 radii away: discs around the receiver, edge-on, across several faces.
   std::mt19937 bits(11);
   std::uniform_real_distribution<float> unit(0, 1);
@@ -216,13 +239,15 @@ TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wher
     const glm::vec3 up = random_direction(bits);
     // Stratified cosine directions about `up`.
     constexpr int kSide = 128;
-    const glm::vec3 x = glm::normalize(glm::cross(up, std::abs(up.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
+    const glm::vec3 x = glm::normalize(
+        glm::cross(up, std::abs(up.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
     const glm::vec3 y = glm::cross(up, x);
     int hits = 0;
     for (int k = 0; k < kSide * kSide; ++k) {
       const float u = (static_cast<float>(k % kSide) + 0.5F) / kSide;
       const float a = 2 * kPi * (static_cast<float>(k / kSide) + 0.5F) / kSide;
-      const glm::vec3 d = std::sqrt(u) * (std::cos(a) * x + std::sin(a) * y) + std::sqrt(1 - u) * up;
+      const glm::vec3 d =
+          std::sqrt(u) * (std::cos(a) * x + std::sin(a) * y) + std::sqrt(1 - u) * up;
       const float t = glm::dot(to, normal) / glm::dot(d, normal);
       if (t > 0 && glm::length(t * d - to) < 1) ++hits;
     }
@@ -231,7 +256,9 @@ TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wher
   }
 }
 
-TEST_CASE("direction buffer: a disc covers as much across the middle of the cube as a little beside it", "[shade][buffer]") {
+TEST_CASE(
+    "direction buffer: a disc covers as much across the middle of the cube as a little beside it",
+    "[shade][buffer]") {
   // Centres of discs in a plane through the cube's middle, and so far beside it.
   const glm::mat3 to_world = glm::transpose(fine_grid().rotation());
   std::mt19937 bits(13);
@@ -258,7 +285,8 @@ TEST_CASE("direction buffer: a disc covers as much across the middle of the cube
   }
 }
 
-TEST_CASE("direction buffer: what is left out below a horizon changes no sum over it", "[shade][buffer]") {
+TEST_CASE("direction buffer: what is left out below a horizon changes no sum over it",
+          "[shade][buffer]") {
   std::mt19937 bits(12);
   std::uniform_real_distribution<float> unit(0, 1);
   const DirectionGrid grid(32, [](const glm::vec3&) { return glm::vec3(1); });
@@ -266,7 +294,8 @@ TEST_CASE("direction buffer: what is left out below a horizon changes no sum ove
     DiscQueue queue;
     for (int k = 0; k < 300; ++k) {
       const float distance = 0.5F + 5 * unit(bits);
-      queue.push(random_direction(bits) * distance, random_direction(bits), 0.05F + 0.6F * unit(bits), 0x88c0c0c0U);
+      queue.push(random_direction(bits) * distance, random_direction(bits),
+                 0.05F + 0.6F * unit(bits), 0x88c0c0c0U);
     }
     const float sine = 0.9F * unit(bits);
     const Horizon horizon{random_direction(bits), sine};
@@ -287,7 +316,9 @@ TEST_CASE("direction buffer: what is left out below a horizon changes no sum ove
   }
 }
 
-TEST_CASE("direction buffer: a resolution that the pixel loops cannot take is refused", "[shade][buffer]") {
-  for (const unsigned resolution : {0U, 8U, 24U, 80U}) CHECK_THROWS_AS(DirectionGrid(resolution, {}), std::invalid_argument);
+TEST_CASE("direction buffer: a resolution that the pixel loops cannot take is refused",
+          "[shade][buffer]") {
+  for (const unsigned resolution : {0U, 8U, 24U, 80U})
+    CHECK_THROWS_AS(DirectionGrid(resolution, {}), std::invalid_argument);
   for (const unsigned resolution : {16U, 48U, 64U}) CHECK_NOTHROW(DirectionGrid(resolution, {}));
 }

@@ -22,7 +22,8 @@ struct Scene {
     container = std::make_unique<ContainerReader>(dir / "scene.ptcx");
   }
 
-  [[nodiscard]] std::vector<Shading> shade(ShadeOptions options = {}, unsigned threads = 1, unsigned variant = 0) const {
+  [[nodiscard]] std::vector<Shading> shade(ShadeOptions options = {}, unsigned threads = 1,
+                                           unsigned variant = 0) const {
     const Executor executor(threads);
     if (options.cache_bytes > (64U << 20)) options.cache_bytes = 64U << 20;
     Shader shader(*container, options, executor);
@@ -39,8 +40,8 @@ inline std::vector<Surfel> small_scene(double spacing) {
   add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, spacing, glm::vec3(0.5F));
   add_rectangle(surfels, {-2, 1.5, 0}, {4, 0, 0}, {0, 0, 2}, spacing, {0.8F, 0.1F, 0.1F});
   for (int i = 0; i < 8; ++i) {
-    add_sphere(surfels, {-1.5 + 0.4 * i, -1 + 0.3 * (i * 5 % 8), 0.3 + 0.1 * (i % 3)}, 0.2 + 0.03 * (i % 4), spacing,
-               {0.2F + 0.08F * static_cast<float>(i), 0.6F, 0.3F});
+    add_sphere(surfels, {-1.5 + 0.4 * i, -1 + 0.3 * (i * 5 % 8), 0.3 + 0.1 * (i % 3)},
+               0.2 + 0.03 * (i % 4), spacing, {0.2F + 0.08F * static_cast<float>(i), 0.6F, 0.3F});
   }
   return surfels;
 }
@@ -48,7 +49,8 @@ inline std::vector<Surfel> small_scene(double spacing) {
 inline void add_floor_receivers(std::vector<Receiver>& receivers, double spacing) {
   for (int j = 0; j < 48; ++j) {
     for (int i = 0; i < 48; ++i) {
-      receivers.push_back({{-1.5 + 3.0 * (i + 0.5) / 48, -1.5 + 2.9 * (j + 0.5) / 48, 0.1 * spacing}, {0, 0, 1}});
+      receivers.push_back(
+          {{-1.5 + 3.0 * (i + 0.5) / 48, -1.5 + 2.9 * (j + 0.5) / 48, 0.1 * spacing}, {0, 0, 1}});
     }
   }
 }

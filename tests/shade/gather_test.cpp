@@ -1,8 +1,8 @@
 // The gather against formulas, against every surfel, and against rays.
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <hwy/targets.h>
@@ -16,7 +16,8 @@ using namespace ptc::test;
 namespace {
 
 /// The same scene and receivers, turned and moved.
-void transform(std::vector<Surfel>& surfels, std::vector<Receiver>& receivers, const glm::dmat3& turn, const glm::dvec3& move) {
+void transform(std::vector<Surfel>& surfels, std::vector<Receiver>& receivers,
+               const glm::dmat3& turn, const glm::dvec3& move) {
   for (Surfel& s : surfels) {
     s.position = turn * s.position + move;
     s.normal = glm::vec3(turn * glm::dvec3(s.normal));
@@ -36,17 +37,21 @@ glm::dmat3 tilted() {
 
 }  // namespace
 
-TEST_CASE("gather: a plane alone has no occlusion, in any attitude and at any scale", "[shade][gather]") {
+TEST_CASE("gather: a plane alone has no occlusion, in any attitude and at any scale",
+          "[shade][gather]") {
   for (const double scale : {1e-3, 1.0, 1e4}) {
     for (int turn = 0; turn < 4; ++turn) {
       const double a = 0.7 * turn;
-      const glm::dvec3 u(std::cos(a), std::sin(a), 0.3 * turn), v = glm::cross(glm::dvec3(0.1, 0.2, 1), u);
+      const glm::dvec3 u(std::cos(a), std::sin(a), 0.3 * turn),
+          v = glm::cross(glm::dvec3(0.1, 0.2, 1), u);
       std::vector<Surfel> surfels;
-      add_rectangle(surfels, {0, 0, 0}, u * scale, glm::normalize(v) * scale, 0.02 * scale, glm::vec3(1));
+      add_rectangle(surfels, {0, 0, 0}, u * scale, glm::normalize(v) * scale, 0.02 * scale,
+                    glm::vec3(1));
       Scene scene(surfels);
       for (std::size_t i = 0; i < surfels.size(); i += 23) {  // rims, corners and inside
         const Surfel& s = surfels[i];
-        scene.receivers.push_back({s.position + glm::dvec3(s.normal * (0.15F * s.radius)), s.normal});
+        scene.receivers.push_back(
+            {s.position + glm::dvec3(s.normal * (0.15F * s.radius)), s.normal});
       }
       float worst = 0;
       for (const Shading& s : scene.shade()) worst = std::max(worst, s.occlusion);
@@ -55,7 +60,8 @@ TEST_CASE("gather: a plane alone has no occlusion, in any attitude and at any sc
   }
 }
 
-TEST_CASE("gather: a floor beside a wall sees the analytic form factor up to the crease", "[shade][gather]") {
+TEST_CASE("gather: a floor beside a wall sees the analytic form factor up to the crease",
+          "[shade][gather]") {
   constexpr double kSpacing = 0.02;
   std::vector<Surfel> surfels;
   // Wall: x = 0, z in [0, 2], y in [-3, 3], facing +x. Floor receivers at (d, 0, 0).
@@ -67,7 +73,9 @@ TEST_CASE("gather: a floor beside a wall sees the analytic form factor up to the
     scene.receivers.push_back({{d, 0, 0.1 * kSpacing}, {0, 0, 1}});
     // Differential area to a perpendicular rectangle with one edge in its plane, halves of width 3.
     const double a = d / 3, b = 2.0 / 3;
-    const double half = (std::atan(1 / a) - a / std::hypot(a, b) * std::atan(1 / std::hypot(a, b))) / (2 * std::numbers::pi);
+    const double half =
+        (std::atan(1 / a) - a / std::hypot(a, b) * std::atan(1 / std::hypot(a, b))) /
+        (2 * std::numbers::pi);
     expected.push_back(2 * half);
   }
   const std::vector<Shading> results = scene.shade();
@@ -90,7 +98,8 @@ TEST_CASE("gather: parallel squares exchange the analytic form factor", "[shade]
   CHECK(s.irradiance.g == Approx(2 * std::numbers::pi * 4 * quarter).margin(0.06));
 }
 
-TEST_CASE("gather: a closed box keeps the sky out, whichever way its walls face", "[shade][gather]") {
+TEST_CASE("gather: a closed box keeps the sky out, whichever way its walls face",
+          "[shade][gather]") {
   const bool inward = GENERATE(true, false);
   CAPTURE(inward);
   std::vector<Surfel> surfels;
@@ -135,7 +144,8 @@ TEST_CASE("gather: nothing shines through a wall, from either side", "[shade][ga
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0.02, glm::vec3(1));  // faces +z
   Scene scene(surfels);
-  for (int i = 0; i < 50; ++i) scene.receivers.push_back({{0.01 * i, 0, -0.1 - 0.01 * i}, {0, 0, 1}});
+  for (int i = 0; i < 50; ++i)
+    scene.receivers.push_back({{0.01 * i, 0, -0.1 - 0.01 * i}, {0, 0, 1}});
   for (const Sides sides : {Sides::both, Sides::front}) {
     ShadeOptions options;
     options.gather.sides = sides;
@@ -150,11 +160,13 @@ TEST_CASE("gather: nothing shines through a wall, from either side", "[shade][ga
   }
 }
 
-TEST_CASE("gather: equals drawing every surfel when no cluster may stand for any", "[shade][gather]") {
+TEST_CASE("gather: equals drawing every surfel when no cluster may stand for any",
+          "[shade][gather]") {
   Scene scene(small_scene(0.08));
   add_floor_receivers(scene.receivers, 0.08);
   scene.receivers.resize(200);
-  for (std::size_t i = 0; i < 200; i += 3) scene.receivers[i].normal = glm::normalize(glm::vec3(0.7F, 0, 1));
+  for (std::size_t i = 0; i < 200; i += 3)
+    scene.receivers[i].normal = glm::normalize(glm::vec3(0.7F, 0, 1));
   ShadeOptions options;
   options.gather.solid_angle = 1e-12F;
   for (const Sides sides : {Sides::both, Sides::front}) {
@@ -163,14 +175,17 @@ TEST_CASE("gather: equals drawing every surfel when no cluster may stand for any
     const std::vector<Shading> ours = scene.shade(options);
     std::vector<Shading> all(ours.size());
     const DirectionGrid grid(options.gather.resolution, {});
-    shade_brute_force(load_surfels(*scene.container, 1'000'000), scene.receivers, all, grid, sides, Executor(1));
+    shade_brute_force(load_surfels(*scene.container, 1'000'000), scene.receivers, all, grid, sides,
+                      Executor(1));
     const Errors e = compare(ours, all);
     CHECK(e.occlusion_rms < 1e-4);  // float rounding at the edges of discs moves single pixels
     CHECK(e.irradiance_rms < 1e-3);
   }
 }
 
-TEST_CASE("gather: default settings stay within 0.02 of occlusion and 5 % of irradiance against rays", "[shade][gather]") {
+TEST_CASE(
+    "gather: default settings stay within 0.02 of occlusion and 5 % of irradiance against rays",
+    "[shade][gather]") {
   Scene scene(small_scene(0.02));
   add_floor_receivers(scene.receivers, 0.02);
   const std::vector<Shading> ours = scene.shade();
@@ -188,7 +203,8 @@ TEST_CASE("gather: default settings stay within 0.02 of occlusion and 5 % of irr
   CHECK(e.occlusion_mean > 0.1);  // the scene does occlude
 }
 
-TEST_CASE("gather: every instruction set that the machine has gives the same shading", "[shade][gather]") {
+TEST_CASE("gather: every instruction set that the machine has gives the same shading",
+          "[shade][gather]") {
   Scene scene(small_scene(0.05));
   add_floor_receivers(scene.receivers, 0.05);
   ShadeOptions options;
@@ -207,12 +223,14 @@ TEST_CASE("gather: every instruction set that the machine has gives the same sha
   for (const std::int64_t target : targets) {
     INFO(hwy::TargetName(target));
     const Errors e = compare(with_target(target), best);
-    CHECK(e.occlusion_rms < 1e-3);  // without fused multiply-add, pixels at the rims of discs change sides
+    CHECK(e.occlusion_rms <
+          1e-3);  // without fused multiply-add, pixels at the rims of discs change sides
     CHECK(e.irradiance_rms < 1e-2);
   }
 }
 
-TEST_CASE("gather: without bleeding, occlusion and sky are the same to the bit", "[shade][gather]") {
+TEST_CASE("gather: without bleeding, occlusion and sky are the same to the bit",
+          "[shade][gather]") {
   Scene scene(small_scene(0.05));
   add_floor_receivers(scene.receivers, 0.05);
   for (const unsigned resolution : {16U, 32U, 48U}) {
@@ -227,7 +245,9 @@ TEST_CASE("gather: without bleeding, occlusion and sky are the same to the bit",
     for (std::size_t i = 0; i < all.size(); ++i) {
       light += static_cast<double>(all[i].irradiance.g);
       CHECK(some[i].irradiance == glm::vec3(0));
-      if (some[i].occlusion != all[i].occlusion || some[i].bent_normal != all[i].bent_normal || some[i].sky != all[i].sky) ++differ;
+      if (some[i].occlusion != all[i].occlusion || some[i].bent_normal != all[i].bent_normal ||
+          some[i].sky != all[i].sky)
+        ++differ;
     }
     CHECK(differ == 0);
     CHECK(light > 0);
@@ -261,7 +281,8 @@ TEST_CASE("gather: threads, cap, page order and mmap change no bit", "[shade][ga
   CHECK_FALSE(same(scene.shade({.gather = {.solid_angle = 0.02F}})));
 }
 
-TEST_CASE("gather: a scene ten million metres away equals the same scene at home", "[shade][gather]") {
+TEST_CASE("gather: a scene ten million metres away equals the same scene at home",
+          "[shade][gather]") {
   std::vector<Surfel> surfels = small_scene(0.04);
   Scene home(surfels);
   add_floor_receivers(home.receivers, 0.04);
@@ -275,17 +296,21 @@ TEST_CASE("gather: a scene ten million metres away equals the same scene at home
   CHECK(e.irradiance_rms < 0.02);
 }
 
-TEST_CASE("gather: scenes ten thousand kilometres apart shade in one call as each alone", "[shade][gather]") {
-  // Relative to the cell around both, floats tell half a unit apart: more than plate and receivers are.
+TEST_CASE("gather: scenes ten thousand kilometres apart shade in one call as each alone",
+          "[shade][gather]") {
+  // Relative to the cell around both, floats tell half a unit apart: more than plate and receivers
+  // are.
   for (int attempt = 0; attempt < 8; ++attempt) {
     const glm::dvec3 gap = glm::dvec3(1e7, 1e7, 1e7) + 0.37 * attempt;
     std::vector<Surfel> surfels;
     add_rectangle(surfels, {-2, -2, 0.1}, {0, 4, 0}, {4, 0, 0}, 0.05, glm::vec3(1));  // looks down
     std::vector<Receiver> receivers;
     for (int i = 0; i < 64; ++i) {
-      receivers.push_back({{0.1 * attempt + 0.01 * (i % 8), 0.01 * (i / 8) - 0.07 * attempt, 0}, {0, 0, 1}});
+      receivers.push_back(
+          {{0.1 * attempt + 0.01 * (i % 8), 0.01 * (i / 8) - 0.07 * attempt, 0}, {0, 0, 1}});
     }
-    transform(surfels, receivers, tilted(), {0, 0, 0});  // so that roundings along the axes do not agree
+    transform(surfels, receivers, tilted(),
+              {0, 0, 0});  // so that roundings along the axes do not agree
     Scene alone(surfels);
     alone.receivers = receivers;
     std::vector<Surfel> there = surfels;
@@ -306,18 +331,24 @@ TEST_CASE("gather: receivers with nothing near share sums over one buffer", "[sh
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {-3, -3, 5}, {0, 6, 0}, {6, 0, 0}, 0.1, glm::vec3(2));  // looks down
   Scene scene(surfels);
-  for (int i = 0; i < 400; ++i) scene.receivers.push_back({{0.034 * (i % 20), 0.034 * (i / 20), 0}, {0, 0, 1}});
+  for (int i = 0; i < 400; ++i)
+    scene.receivers.push_back({{0.034 * (i % 20), 0.034 * (i / 20), 0}, {0, 0, 1}});
   const std::vector<Shading> shared = scene.shade();
   std::vector<Shading> exact(shared.size());
-  shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both, Executor(2));
+  shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both,
+                    Executor(2));
   const Errors e = compare(shared, exact);
   CAPTURE(e.occlusion_rms, e.irradiance_rms);
   CHECK(e.occlusion_rms < 0.003);
   CHECK(e.irradiance_rms < 0.008);
 }
 
-TEST_CASE("gather: receivers beside each other, over and under one disc's plane, see it each from its own side", "[shade][gather]") {
-  const std::vector<Surfel> surfels(1, {.position = {0.8, 0, 0}, .normal = {0, 0, 1}, .radius = 1, .radiance = glm::vec3(1)});
+TEST_CASE(
+    "gather: receivers beside each other, over and under one disc's plane, see it each from its "
+    "own side",
+    "[shade][gather]") {
+  const std::vector<Surfel> surfels(
+      1, {.position = {0.8, 0, 0}, .normal = {0, 0, 1}, .radius = 1, .radiance = glm::vec3(1)});
   Scene scene(surfels);
   for (int i = 0; i < 200; ++i) {
     const double height = 0.0002 * (i - 100) + 0.0001;
@@ -326,7 +357,8 @@ TEST_CASE("gather: receivers beside each other, over and under one disc's plane,
   const std::vector<Shading> results = scene.shade();
   for (std::size_t i = 0; i < results.size(); ++i) {
     CAPTURE(scene.receivers[i].position.z);
-    CHECK(results[i].occlusion == Approx(i < 100 ? 0 : 1).margin(0.03));  // backs are clear within two radii
+    CHECK(results[i].occlusion ==
+          Approx(i < 100 ? 0 : 1).margin(0.03));  // backs are clear within two radii
   }
 }
 
@@ -348,7 +380,8 @@ TEST_CASE("gather: the mean of four variants has less error than one", "[shade][
   add_floor_receivers(scene.receivers, 0.03);
   const std::vector<Surfel> surfels = load_surfels(*scene.container, 1'000'000);
   std::vector<Shading> exact(scene.receivers.size());
-  shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both, Executor(2));
+  shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both,
+                    Executor(2));
   ShadeOptions options;
   options.variants = 4;
   std::vector<Shading> mean(exact.size());
@@ -362,8 +395,11 @@ TEST_CASE("gather: the mean of four variants has less error than one", "[shade][
   CHECK(compare(mean, exact).occlusion_rms < 0.85 * single);
 }
 
-TEST_CASE("gather: coincident surfels and receivers, and empty scenes, are no trouble", "[shade][gather]") {
-  std::vector<Surfel> surfels(5000, {.position = {0, 0, 1}, .normal = {0, 0, -1}, .radius = 0.5F, .radiance = glm::vec3(1)});
+TEST_CASE("gather: coincident surfels and receivers, and empty scenes, are no trouble",
+          "[shade][gather]") {
+  std::vector<Surfel> surfels(
+      5000,
+      {.position = {0, 0, 1}, .normal = {0, 0, -1}, .radius = 0.5F, .radiance = glm::vec3(1)});
   Scene scene(surfels);
   scene.receivers.assign(100, {{0, 0, 0}, {0, 0, 1}});
   for (const Shading& s : scene.shade()) CHECK(s.occlusion == Approx(0.2).margin(0.01));
@@ -389,15 +425,19 @@ TEST_CASE("gather: receivers right at a disc see at most the hemisphere of it", 
   }
 }
 
-TEST_CASE("gather: a back is clear to the receivers of a cell within two radii, and to no others", "[shade][gather]") {
+TEST_CASE("gather: a back is clear to the receivers of a cell within two radii, and to no others",
+          "[shade][gather]") {
   // A disc at the edge of that reach, and one whose plane passes between the receivers.
-  for (const Surfel& disc : {Surfel{.position = {0, 0, 2}, .normal = {0, 0, 1}, .radius = 1},
-                             Surfel{.position = {0.7, 0, -0.14}, .normal = {0, 0, 1}, .radius = 1}}) {
+  for (const Surfel& disc :
+       {Surfel{.position = {0, 0, 2}, .normal = {0, 0, 1}, .radius = 1},
+        Surfel{.position = {0.7, 0, -0.14}, .normal = {0, 0, 1}, .radius = 1}}) {
     Scene scene({disc});
-    for (int i = -20; i < 20; ++i) scene.receivers.push_back({{0.001 * i, 0.002 * (i % 3), 0.01 * (i + 0.5)}, {0.6F, 0, 0.8F}});
+    for (int i = -20; i < 20; ++i)
+      scene.receivers.push_back({{0.001 * i, 0.002 * (i % 3), 0.01 * (i + 0.5)}, {0.6F, 0, 0.8F}});
     const std::vector<Shading> results = scene.shade({.gather = {.parallax = 0.4F}});
     std::vector<Shading> all(results.size());
-    shade_brute_force(std::span(&disc, 1), scene.receivers, all, DirectionGrid(32, {}), Sides::both, Executor(1));
+    shade_brute_force(std::span(&disc, 1), scene.receivers, all, DirectionGrid(32, {}), Sides::both,
+                      Executor(1));
     for (std::size_t i = 0; i < results.size(); ++i) {
       CAPTURE(disc.position.x, scene.receivers[i].position.z);
       CHECK(results[i].occlusion == Approx(all[i].occlusion).margin(0.06));

@@ -1,7 +1,8 @@
 // Two gathers written apart: one receiver at a time they must agree.
+#include "engine/shade/plain_gather.h"
+
 #include <catch2/catch.hpp>
 
-#include "engine/shade/plain_gather.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;
@@ -20,7 +21,8 @@ Pair shade_alone(const Scene& scene, const GatherOptions& options) {
   PageCache cache(*scene.container, {.memory_bytes = 64U << 20, .threads = 2});
   Gather gather(view, cache, options);
   PlainGather plain(view, cache, options);
-  const DirectionGrid grid(options.resolution, [](const glm::vec3& d) { return glm::vec3(1 + d.z); });
+  const DirectionGrid grid(options.resolution,
+                           [](const glm::vec3& d) { return glm::vec3(1 + d.z); });
   Pair pair;
   for (const Receiver& receiver : scene.receivers) {
     pair.shared.emplace_back();
@@ -34,7 +36,8 @@ Pair shade_alone(const Scene& scene, const GatherOptions& options) {
 
 }  // namespace
 
-TEST_CASE("plain gather: a receiver alone gets what the hierarchical gather gives it", "[shade][gather]") {
+TEST_CASE("plain gather: a receiver alone gets what the hierarchical gather gives it",
+          "[shade][gather]") {
   // Surfaces, whose clusters are flat, and a cloud of normals at random, whose clusters are not.
   std::vector<Surfel> surfels = small_scene(0.04);
   const std::vector<Surfel> cloud = random_surfels(3000, 7);
@@ -54,7 +57,8 @@ TEST_CASE("plain gather: a receiver alone gets what the hierarchical gather give
       }
       // The cone of normals, which only one of them asks, saves clusters that show their backs.
       CHECK(pair.plain_counts.clusters >= pair.shared_counts.clusters);
-      if (sides == Sides::both) CHECK(pair.plain_counts.surfels == Approx(pair.shared_counts.surfels).epsilon(0.001));
+      if (sides == Sides::both)
+        CHECK(pair.plain_counts.surfels == Approx(pair.shared_counts.surfels).epsilon(0.001));
     }
   }
 }
@@ -65,10 +69,12 @@ TEST_CASE("plain gather: nothing is seen in an empty scene", "[shade][gather]") 
   CHECK(shade_alone(scene, {}).plain[0].occlusion == 0);
 }
 
-TEST_CASE("gather: groups that are children of two nodes are an error, not a walk without end", "[shade][gather]") {
+TEST_CASE("gather: groups that are children of two nodes are an error, not a walk without end",
+          "[shade][gather]") {
   for (const char* name : {"itself", "cycle", "fan"}) {
     INFO(name);
-    const ContainerReader container(PTC_SOURCE_DIR "/spec/vectors/verify/nodes-references." + std::string(name) + ".ptcx");
+    const ContainerReader container(PTC_SOURCE_DIR "/spec/vectors/verify/nodes-references." +
+                                    std::string(name) + ".ptcx");
     const SceneView view(container);
     PageCache cache(container, {.memory_bytes = 64U << 20, .threads = 2});
     const GatherOptions options{.solid_angle = 1e-12F};
@@ -79,7 +85,8 @@ TEST_CASE("gather: groups that are children of two nodes are an error, not a wal
     PlainGather plain(view, cache, options);
     const auto refusal = Catch::Matches(container.path().string() + ".*spec/nodes.md#references.*");
     CHECK_THROWS_WITH(gather.shade(receivers, results, grid), refusal);
-    CHECK_THROWS_WITH(gather.shade(std::span(receivers).first(1), std::span(results).first(1), grid), refusal);
+    CHECK_THROWS_WITH(
+        gather.shade(std::span(receivers).first(1), std::span(results).first(1), grid), refusal);
     CHECK_THROWS_WITH(plain.shade(receivers[0], grid), refusal);
   }
 }

@@ -1,7 +1,7 @@
 // What clusters are drawn as, against the surfels in them.
-#include <catch2/catch.hpp>
 #include <cmath>
 
+#include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/shade/brute_force.h"
@@ -59,7 +59,8 @@ Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
   constexpr int kDirections = 200;
   for (int i = 0; i < kDirections; ++i) {
     const double z = (2.0 * i + 1) / kDirections - 1, turn = 2.39996 * i;
-    const glm::dvec3 to(std::sqrt(1 - z * z) * std::cos(turn), std::sqrt(1 - z * z) * std::sin(turn), z);
+    const glm::dvec3 to(std::sqrt(1 - z * z) * std::cos(turn),
+                        std::sqrt(1 - z * z) * std::sin(turn), z);
     scene.receivers.push_back({to * 6.0, glm::vec3(-to)});
   }
   ShadeOptions options;
@@ -75,7 +76,8 @@ Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
   shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both, executor);
   double square = 0, sum = 0, mean = 0, light = 0, exact_light = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
-    const double error = static_cast<double>(results[i].occlusion) - static_cast<double>(exact[i].occlusion);
+    const double error =
+        static_cast<double>(results[i].occlusion) - static_cast<double>(exact[i].occlusion);
     square += error * error;
     sum += error;
     mean += static_cast<double>(exact[i].occlusion);
@@ -83,25 +85,29 @@ Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
     exact_light += static_cast<double>(exact[i].irradiance.g);
   }
   const auto n = static_cast<double>(exact.size());
-  return {std::sqrt(square / n) / (mean / n), sum / mean, light / (mean + sum) / (exact_light / mean) - 1};
+  return {std::sqrt(square / n) / (mean / n), sum / mean,
+          light / (mean + sum) / (exact_light / mean) - 1};
 }
 
 }  // namespace
 
-TEST_CASE("splats: clusters cover little more than what is in them and are as bright", "[shade][gather]") {
+TEST_CASE("splats: clusters cover little more than what is in them and are as bright",
+          "[shade][gather]") {
   struct Shape {
     const char* name;
     std::vector<Surfel> surfels;
     double rms, bias, light;
   };
-  // A disc spills over the edges of a sheet that stands alone, and an ellipsoid of revolution knows no length.
-  const std::vector<Shape> shapes{{"a cube", box({1, 1, 1}), 0.30, 0.27, 0.15},
-                                  {"a ball", ball(), 0.48, 0.46, 0.06},
-                                  {"a tower", box({0.6, 0.6, 2}), 0.70, 0.63, 0.04},
-                                  {"a bowl", bowl(), 0.36, 0.34, 0.18},  // its inside is seen, black
-                                  {"a wall of two sides", box({2, 2, 0.1}), 0.46, 0.08, 0.03},
-                                  {"a sheet", stack_of_sheets(1), 0.33, 0.30, 0.02},
-                                  {"six sheets that face one way", stack_of_sheets(6), 0.27, 0.04, 0.02}};
+  // A disc spills over the edges of a sheet that stands alone, and an ellipsoid of revolution knows
+  // no length.
+  const std::vector<Shape> shapes{
+      {"a cube", box({1, 1, 1}), 0.30, 0.27, 0.15},
+      {"a ball", ball(), 0.48, 0.46, 0.06},
+      {"a tower", box({0.6, 0.6, 2}), 0.70, 0.63, 0.04},
+      {"a bowl", bowl(), 0.36, 0.34, 0.18},  // its inside is seen, black
+      {"a wall of two sides", box({2, 2, 0.1}), 0.46, 0.08, 0.03},
+      {"a sheet", stack_of_sheets(1), 0.33, 0.30, 0.02},
+      {"six sheets that face one way", stack_of_sheets(6), 0.27, 0.04, 0.02}};
   for (const Shape& shape : shapes) {
     const Covered covered = seen_as_clusters(shape.surfels);
     CAPTURE(shape.name, covered.rms, covered.bias, covered.light);

@@ -1,7 +1,8 @@
 // Rays at a container part by part, against rays at all of it.
+#include "engine/shade/streamed_rays.h"
+
 #include <catch2/catch.hpp>
 
-#include "engine/shade/streamed_rays.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;
@@ -23,7 +24,8 @@ TEST_CASE("streamed rays: parts of a scene give what the whole gives", "[shade][
     rays.trace(receivers, 400, 7, results, executor, silent);
     return results;
   };
-  const std::vector<Shading> whole = trace(std::uint64_t{128} << 20), parts = trace(StreamedRays::kLeastBytes);
+  const std::vector<Shading> whole = trace(std::uint64_t{128} << 20),
+                             parts = trace(StreamedRays::kLeastBytes);
   double covered = 0;
   for (std::size_t i = 0; i < whole.size(); ++i) {
     covered += static_cast<double>(whole[i].occlusion);
@@ -37,7 +39,8 @@ TEST_CASE("streamed rays: parts of a scene give what the whole gives", "[shade][
   const std::vector<Surfel> surfels = load_surfels(*scene.container, points);
   const DiscRays rays(surfels, Sides::both, sky);
   for (std::size_t i = 0; i < whole.size(); ++i) {
-    CHECK(rays.trace(receivers[i], 400, 7 + i).occlusion == Approx(whole[i].occlusion).margin(0.003));
+    CHECK(rays.trace(receivers[i], 400, 7 + i).occlusion ==
+          Approx(whole[i].occlusion).margin(0.003));
   }
 }
 
@@ -46,7 +49,9 @@ TEST_CASE("streamed rays: an empty scene covers nothing", "[shade][rays]") {
   const std::vector<Receiver> receivers{{{0, 0, 0}, {0, 0, 1}}};
   std::vector<Shading> results(1);
   Progress silent;
-  StreamedRays rays(*scene.container, Sides::both, [](const glm::vec3&) { return glm::vec3(1); }, StreamedRays::kLeastBytes);
+  StreamedRays rays(
+      *scene.container, Sides::both, [](const glm::vec3&) { return glm::vec3(1); },
+      StreamedRays::kLeastBytes);
   rays.trace(receivers, 64, 0, results, Executor(1), silent);
   CHECK(results[0].occlusion == 0);
   CHECK(results[0].sky.x == Approx(3.14159265F));

@@ -4,7 +4,6 @@
 #include <malloc.h>
 #include <sys/resource.h>
 
-#include <catch2/catch.hpp>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -12,6 +11,8 @@
 #include <memory>
 #include <stdexcept>
 #include <system_error>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/memory.h"
 #include "engine/sort/spill.h"
@@ -110,7 +111,8 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
       const Outcome one = sort(input, cap, 1, sample), two = sort(input, cap, 2, sample);
       CHECK(same_bytes(one.records, expected));
       CHECK(same_bytes(two.records, expected));
-      for (const std::uint64_t told : {input.size() / 100, 10 * input.size()}) {  // wrong guesses cost time alone
+      for (const std::uint64_t told :
+           {input.size() / 100, 10 * input.size()}) {  // wrong guesses cost time alone
         CHECK(same_bytes(sort(input, cap, 2, sample, told).records, expected));
       }
       CHECK(same_bytes(sort(input, cap, 1, sample, input.size()).records, expected));
@@ -128,16 +130,19 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
   }
 }
 
-TEST_CASE("external sort: what the disk has no room for is refused before it begins", "[sort][external]") {
+TEST_CASE("external sort: what the disk has no room for is refused before it begins",
+          "[sort][external]") {
   const TempDirectory directory;
   const Executor executor(1);
   try {
-    const ExternalSorter sorter({kLeastCap, {directory.path}, std::uint64_t{1} << 50}, executor, {});
+    const ExternalSorter sorter({kLeastCap, {directory.path}, std::uint64_t{1} << 50}, executor,
+                                {});
     FAIL("begun");
   } catch (const std::system_error& error) {
     CHECK(error.code() == std::errc::no_space_on_device);
     CHECK_THAT(error.what(), Catch::Matchers::Contains(directory.path.string()));
-    CHECK_THAT(error.what(), Catch::Matchers::Contains("36366567.0 GB"));  // what is wanted, less what a guess may be off
+    CHECK_THAT(error.what(), Catch::Matchers::Contains(
+                                 "36366567.0 GB"));  // what is wanted, less what a guess may be off
   }
 }
 
@@ -342,13 +347,15 @@ TEST_CASE("external sort: a disk that fills up is reported and leaves nothing be
   }
 }
 
-TEST_CASE("external sort: what one directory does not take goes to the others", "[sort][external]") {
+TEST_CASE("external sort: what one directory does not take goes to the others",
+          "[sort][external]") {
   const TempDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
   const std::vector<MortonKey> sample = sample_of(input, 1000);
   const Executor two(2);
   std::vector<std::filesystem::path> directories(2, directory.path);
-  if (std::filesystem::exists("/dev/shm")) directories[1] = "/dev/shm";  // on a disk of its own, with other room
+  if (std::filesystem::exists("/dev/shm"))
+    directories[1] = "/dev/shm";  // on a disk of its own, with other room
   const FileSizeLimit limit(input.size() * kSpilledBytes * 7 / 10);
   {
     ExternalSorter sorter({kMiB, directories}, two, sample);
@@ -424,7 +431,9 @@ TEST_CASE("external sort: resident memory stays below the cap and is given back"
           "[sort][external]") {
   constexpr std::uint64_t kCap = 8 * kMiB;
   if (kSanitized || !reset_peak()) {
-    WARN("skipped: the system does not reset the peak of resident memory, or a sanitizer adds to it");
+    WARN(
+        "skipped: the system does not reset the peak of resident memory, or a sanitizer adds to "
+        "it");
     return;
   }
   for (const unsigned threads : {1u, 2u}) {

@@ -1,9 +1,10 @@
 // Sorts whose files outlive them.
 #include <sys/stat.h>
 
-#include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/direct_range.h"
@@ -21,10 +22,13 @@ constexpr std::uint64_t kCap = 1 << 18;
 
 struct Kept {
   TemporaryDirectory directory;
-  SortOptions options{.memory_bytes = kCap, .temp_dirs = {directory.path()}, .kept_files = {directory / "a", directory / "b"}};
+  SortOptions options{.memory_bytes = kCap,
+                      .temp_dirs = {directory.path()},
+                      .kept_files = {directory / "a", directory / "b"}};
   std::vector<std::byte> state;
 
-  Kept(std::span<const PointRecord> input, std::span<const MortonKey> sample, std::uint64_t cap = kCap) {
+  Kept(std::span<const PointRecord> input, std::span<const MortonKey> sample,
+       std::uint64_t cap = kCap) {
     const Executor two(2);
     options.memory_bytes = cap;
     ExternalSorter sorter(options, two, sample);
@@ -53,19 +57,23 @@ struct Kept {
 
 std::vector<std::byte> read_file(const std::filesystem::path& path) {
   std::vector<std::byte> bytes(std::filesystem::file_size(path));
-  std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  std::ifstream(path, std::ios::binary)
+      .read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   return bytes;
 }
 
-void write_at(const std::filesystem::path& path, std::size_t offset, std::span<const std::byte> bytes) {
+void write_at(const std::filesystem::path& path, std::size_t offset,
+              std::span<const std::byte> bytes) {
   std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
   file.seekp(static_cast<std::streamoff>(offset));
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
 }
 
-/// Sorts what is kept with such bytes in the place of what was written to one file, which must be refused by name, after
-/// nothing but the first of the sorted records was handed out.
-void check_torn(const Kept& kept, std::span<const PointRecord> expected, const std::filesystem::path& file, std::size_t offset,
+/// Sorts what is kept with such bytes in the place of what was written to one file, which must be
+/// refused by name, after nothing but the first of the sorted records was handed out.
+void check_torn(const Kept& kept, std::span<const PointRecord> expected,
+                const std::filesystem::path& file, std::size_t offset,
                 std::span<const std::byte> torn) {
   const std::vector<std::byte> whole = read_file(file);
   write_at(file, offset, torn);
@@ -86,7 +94,8 @@ void check_torn(const Kept& kept, std::span<const PointRecord> expected, const s
     told = error.what();
   }
   CAPTURE(offset, all.size());
-  CHECK_THAT(told, Catch::StartsWith(file.string() + ": offset ") && Catch::EndsWith(" points there are not what was written"));
+  CHECK_THAT(told, Catch::StartsWith(file.string() + ": offset ") &&
+                       Catch::EndsWith(" points there are not what was written"));
   CHECK((all.size() < expected.size() && same_bytes(all, expected.first(all.size()))));
   write_at(file, offset, std::span(whole).subspan(offset, torn.size()));
 }
@@ -98,7 +107,8 @@ TEST_CASE("kept sort: another sorter goes on from any record under any cap", "[s
     const std::vector<PointRecord> input = make_records(keys, 20000);
     const std::vector<PointRecord> expected = stable_sorted(input);
     for (const bool fair : {true, false}) {  // else buckets are partitioned again
-      const Kept kept(input, fair ? sample_of(input, 2000) : std::vector<MortonKey>(100, input.front().key));
+      const Kept kept(
+          input, fair ? sample_of(input, 2000) : std::vector<MortonKey>(100, input.front().key));
       for (const std::uint64_t first : {0u, 1u, 400u, 7777u, 19999u, 20000u}) {
         for (const std::uint64_t cap : {kCap, std::uint64_t{8} << 20}) {
           CHECK(same_bytes(kept.from(first, cap), std::span(expected).subspan(first)));
@@ -108,7 +118,8 @@ TEST_CASE("kept sort: another sorter goes on from any record under any cap", "[s
   }
 }
 
-TEST_CASE("kept sort: what memory would hold is on the disk, too, and so is nothing", "[sort][kept]") {
+TEST_CASE("kept sort: what memory would hold is on the disk, too, and so is nothing",
+          "[sort][kept]") {
   const std::vector<PointRecord> input = make_records(Keys::surface, 10);
   CHECK(same_bytes(Kept(input, {}).from(0, 1 << 20), stable_sorted(input)));
   CHECK(Kept({}, {}).from(0).empty());
@@ -155,7 +166,8 @@ TEST_CASE("kept sort: files and tables that are not what they were are refused",
     reader.end();
   };
   CHECK_NOTHROW(open(kept.state));
-  for (std::size_t n = 0; n < kept.state.size(); ++n) CHECK_THROWS_AS(open(std::span(kept.state).first(n)), std::exception);
+  for (std::size_t n = 0; n < kept.state.size(); ++n)
+    CHECK_THROWS_AS(open(std::span(kept.state).first(n)), std::exception);
   for (std::size_t n = 16; n < kept.state.size(); ++n) {  // no crash, whatever the numbers say
     std::vector<std::byte> changed = kept.state;
     changed[n] ^= std::byte{0xff};
@@ -171,16 +183,22 @@ TEST_CASE("kept sort: files and tables that are not what they were are refused",
   CHECK_THROWS_WITH(open(kept.state), Catch::Contains(kept.options.kept_files[0].string()));
 }
 
-TEST_CASE("kept sort: records that are not what was written are refused by name before they go out", "[sort][kept]") {
+TEST_CASE("kept sort: records that are not what was written are refused by name before they go out",
+          "[sort][kept]") {
   constexpr std::size_t kCount = 40 * kPageRecords, kWholeBlocks = 4 * kPageRecords;
   static_assert(kCount % kWholeBlocks == 0 && kWholeBlocks * kSpilledBytes % kDirectBytes == 0);
-  std::uint64_t cap = 4 * kCap;  // what a run holds of a range is larger than the blocks that are handed out
-  while (plan_sort(cap, 2, kCount).run_records / 2 % kWholeBlocks != 0) cap += kDirectBytes;  // no byte of the files belongs to no record
+  std::uint64_t cap =
+      4 * kCap;  // what a run holds of a range is larger than the blocks that are handed out
+  while (plan_sort(cap, 2, kCount).run_records / 2 % kWholeBlocks != 0)
+    cap += kDirectBytes;  // no byte of the files belongs to no record
   for (const Keys keys : {Keys::surface, Keys::equal, Keys::heavy}) {
     const std::vector<PointRecord> input = make_records(keys, kCount);
     const std::vector<PointRecord> expected = stable_sorted(input);
     for (const bool fair : {true, false}) {  // else buckets are partitioned again
-      const Kept kept(input, fair ? sample_of(input, 2000) : std::vector<MortonKey>(100, MortonKey{~std::uint64_t{0}, 0}), cap);
+      const Kept kept(input,
+                      fair ? sample_of(input, 2000)
+                           : std::vector<MortonKey>(100, MortonKey{~std::uint64_t{0}, 0}),
+                      cap);
       CAPTURE(keys, fair);
       std::uint64_t bytes = 0;
       for (const auto& file : kept.options.kept_files) {
@@ -190,19 +208,23 @@ TEST_CASE("kept sort: records that are not what was written are refused by name 
         constexpr std::size_t kSteps = 19;
         for (std::size_t step = 0; step < kSteps; ++step) {
           // A byte: of the key, of what is behind it, of each in turn.
-          const std::size_t record = step * (whole.size() / kSpilledBytes - 1) / (kSteps - 1) * kSpilledBytes;
-          for (const std::size_t offset : {record + step % sizeof(MortonKey), record + 16 + step % (kSpilledBytes - 16)}) {
+          const std::size_t record =
+              step * (whole.size() / kSpilledBytes - 1) / (kSteps - 1) * kSpilledBytes;
+          for (const std::size_t offset :
+               {record + step % sizeof(MortonKey), record + 16 + step % (kSpilledBytes - 16)}) {
             const std::byte flipped = whole[offset] ^ std::byte{0x10};
             check_torn(kept, expected, file, offset, {&flipped, 1});
           }
           // A block that was not written, or is another.
-          const std::size_t block = step * (whole.size() / kDirectBytes - 1) / (kSteps - 1) * kDirectBytes;
+          const std::size_t block =
+              step * (whole.size() / kDirectBytes - 1) / (kSteps - 1) * kDirectBytes;
           check_torn(kept, expected, file, block, std::vector<std::byte>(kDirectBytes));
           const std::size_t other = block == 0 ? kDirectBytes : 0;
           check_torn(kept, expected, file, block, std::span(whole).subspan(other, kDirectBytes));
         }
         // Two records of a range that are whole, in each other's place.
-        std::vector<std::byte> exchanged(whole.begin() + kSpilledBytes, whole.begin() + 2 * kSpilledBytes);
+        std::vector<std::byte> exchanged(whole.begin() + kSpilledBytes,
+                                         whole.begin() + 2 * kSpilledBytes);
         exchanged.insert(exchanged.end(), whole.begin(), whole.begin() + kSpilledBytes);
         check_torn(kept, expected, file, 0, exchanged);
       }

@@ -35,7 +35,8 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
         const ClassCounts counts(input, classes, blocks, classify, three);
         CHECK(counts.starts() == starts);
         std::vector<std::uint16_t> class_of;
-        for (const PointRecord& r : input) class_of.push_back(static_cast<std::uint16_t>(classify(r)));
+        for (const PointRecord& r : input)
+          class_of.push_back(static_cast<std::uint16_t>(classify(r)));
         CHECK(ClassCounts(input, class_of, classes, blocks, three).starts() == starts);
         for (std::size_t shift = 0; shift < 8; ++shift) {  // places in a cache line
           std::vector<PointRecord> out(count + 8);
@@ -50,7 +51,8 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
         for (std::size_t shift = 0; shift < 70; shift += 23) {
           std::vector<std::byte> out(packed.size() + 70, kUntouched);
           counts.scatter_packed<kPacked>(out.data() + shift, classify, three);
-          const auto begin = out.begin() + static_cast<std::ptrdiff_t>(shift), end = begin + static_cast<std::ptrdiff_t>(packed.size());
+          const auto begin = out.begin() + static_cast<std::ptrdiff_t>(shift),
+                     end = begin + static_cast<std::ptrdiff_t>(packed.size());
           REQUIRE(std::equal(begin, end, packed.begin()));
           CHECK(std::count(out.begin(), begin, kUntouched) == begin - out.begin());
           CHECK(std::count(end, out.end(), kUntouched) == out.end() - end);

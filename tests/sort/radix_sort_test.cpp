@@ -1,10 +1,12 @@
 // The in-memory sort against std::stable_sort.
-#include <catch2/catch.hpp>
+#include "engine/sort/radix_sort.h"
+
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/memory.h"
 #include "engine/sort/external_sort.h"
-#include "engine/sort/radix_sort.h"
 #include "tests/sort/records.h"
 
 using namespace ptc;

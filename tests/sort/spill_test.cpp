@@ -4,12 +4,13 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <filesystem>
 #include <numeric>
 #include <stdexcept>
 #include <system_error>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
@@ -36,7 +37,8 @@ std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord>
     const std::size_t count = std::min(run, records.size());
     const std::span grouped(memory.data(), memory.size());
     partition->find_ranges(records.first(count), range_of, two);
-    partition->write_run(grouped, partition->group_run(records.first(count), range_of, grouped, two));
+    partition->write_run(grouped,
+                         partition->group_run(records.first(count), range_of, grouped, two));
     records = records.subspan(count);
   }
   return partition;
@@ -48,7 +50,8 @@ std::vector<std::uint64_t> nameless_files() {
   for (const auto& fd : std::filesystem::directory_iterator("/proc/self/fd")) {
     struct stat status {};
     const bool known = ::stat(fd.path().c_str(), &status) == 0;
-    if (known && S_ISREG(status.st_mode) && status.st_nlink == 0) files.push_back(static_cast<std::uint64_t>(status.st_blocks) * 512);
+    if (known && S_ISREG(status.st_mode) && status.st_nlink == 0)
+      files.push_back(static_cast<std::uint64_t>(status.st_blocks) * 512);
   }
   return files;
 }
@@ -138,14 +141,18 @@ TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
     BucketReader bucket(partition, range);
     const std::vector<MortonKey> before = bucket.sample(10, reader);  // samples take nothing away
     CHECK(bucket.read(out, reader) == bucket.size());
-    std::ranges::sort(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(bucket.size()), {}, &PointRecord::key);
+    std::ranges::sort(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(bucket.size()), {},
+                      &PointRecord::key);
     for (const MortonKey& key : before) {
-      CHECK(std::ranges::binary_search(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(bucket.size()), key, {}, &PointRecord::key));
+      CHECK(std::ranges::binary_search(out.begin(),
+                                       out.begin() + static_cast<std::ptrdiff_t>(bucket.size()),
+                                       key, {}, &PointRecord::key));
     }
     if (range == partition->ranges() / 2) CHECK(nameless_bytes() - others < all * 6 / 10);
   }
   const std::size_t runs = records.size() / 7'000 + 1;
-  CHECK(nameless_bytes() - others <= (runs + 4) * kDirectBytes);  // the last block of each, and what says where they are
+  CHECK(nameless_bytes() - others <=
+        (runs + 4) * kDirectBytes);  // the last block of each, and what says where they are
 }
 
 TEST_CASE("spill: records are spread over directories and come back from all", "[sort][spill]") {
@@ -169,7 +176,8 @@ TEST_CASE("spill: records are spread over directories and come back from all", "
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
     const std::size_t count = bucket.read(block, reader);
-    const std::vector<PointRecord> records = stable_sorted({block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count)});
+    const std::vector<PointRecord> records =
+        stable_sorted({block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count)});
     sorted.insert(sorted.end(), records.begin(), records.end());
   }
   CHECK(same_bytes(sorted, stable_sorted(input)));
@@ -220,7 +228,8 @@ TEST_CASE("spill: a read buffer below its least is refused", "[sort][spill]") {
   CHECK_THROWS_AS(SpillReader(SpillReader::kLeastBytes - 1), std::invalid_argument);
 }
 
-TEST_CASE("sort plan: for very many records it uses most of the cap and never more", "[sort][plan]") {
+TEST_CASE("sort plan: for very many records it uses most of the cap and never more",
+          "[sort][plan]") {
   for (std::uint64_t cap = 256 << 10; cap < std::uint64_t{1} << 40; cap += cap / 7)
     for (const unsigned threads : {1u, 2u, 64u}) {
       CAPTURE(cap, threads);
@@ -239,14 +248,16 @@ TEST_CASE("sort plan: for very many records it uses most of the cap and never mo
   CHECK_NOTHROW(plan_sort(~std::uint64_t{0}, 1, ~std::uint64_t{0}));
 }
 
-TEST_CASE("sort plan: it takes no more memory than lets a range of what comes fit", "[sort][plan]") {
+TEST_CASE("sort plan: it takes no more memory than lets a range of what comes fit",
+          "[sort][plan]") {
   constexpr std::uint64_t kRoom = std::uint64_t{64} << 30;
   const SortPlan least = plan_sort(kRoom, 2, 0);
   CHECK(2 * least.run_records * sizeof(PointRecord) < std::uint64_t{400} << 20);
   for (std::uint64_t expected = 1; expected < std::uint64_t{1} << 35; expected *= 3) {
     CAPTURE(expected);
     const SortPlan plan = plan_sort(kRoom, 2, expected);
-    const std::uint64_t block = plan.run_records / 2, average = expected / plan.ranges;  // what is sorted at once
+    const std::uint64_t block = plan.run_records / 2,
+                        average = expected / plan.ranges;  // what is sorted at once
     CHECK(block >= average * 3 / 2);
     if (expected < 2'900'000'000) {
       CHECK(plan.run_records == least.run_records);

@@ -2,9 +2,10 @@
 #include "engine/sort/splitters.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <random>
 #include <stdexcept>
+
+#include <catch2/catch.hpp>
 
 #include "tests/sort/records.h"
 

@@ -1,7 +1,5 @@
 // Bytes that changed after the file was written: damage is found, or what is read is what was
 // written.
-#include <catch2/catch.hpp>
-
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -9,6 +7,8 @@
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "format/error.h"

@@ -1,10 +1,10 @@
 // Entries come back as they were set, and memory does not hold them until then.
 #include "engine/store/entry_table.h"
 
-#include <catch2/catch.hpp>
-
 #include <stdexcept>
 #include <thread>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/memory.h"
 #include "tests/store/sample.h"
@@ -15,20 +15,29 @@ using namespace ptc::test;
 namespace {
 
 DirectoryEntry entry(std::uint32_t page) {
-  return {kBlockBytes + std::uint64_t{page} * kSectorBytes, page + 1, page + 2, ~std::uint64_t{page}, PageType::attribute, 7, page + 3};
+  return {kBlockBytes + std::uint64_t{page} * kSectorBytes,
+          page + 1,
+          page + 2,
+          ~std::uint64_t{page},
+          PageType::attribute,
+          7,
+          page + 3};
 }
 
 std::vector<std::byte> encoded_entries(std::uint32_t pages) {
   std::vector<std::byte> all(std::size_t{pages} * kDirectoryEntryBytes);
   for (std::uint32_t page = 0; page < pages; ++page) {
-    encode_directory_entry(entry(page), std::span(all).subspan(page * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
+    encode_directory_entry(
+        entry(page),
+        std::span(all).subspan(page * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
   }
   return all;
 }
 
 }  // namespace
 
-TEST_CASE("entry table: entries set in any order are encoded in that of pages", "[store][entries]") {
+TEST_CASE("entry table: entries set in any order are encoded in that of pages",
+          "[store][entries]") {
   const ScratchDirectory scratch;
   EntryTable table(scratch.path());
   CHECK(table.complete());

@@ -1,13 +1,13 @@
 // Containers whose checksums are right and whose structure is not: each lie is found, and the error
 // names file, place and rule.
-#include <catch2/catch.hpp>
-
 #include <algorithm>
 #include <cstring>
 #include <functional>
 #include <limits>
 #include <string>
 #include <utility>
+
+#include <catch2/catch.hpp>
 
 #include "format/error.h"
 #include "format/node_page.h"
@@ -360,7 +360,8 @@ TEST_CASE("reader: an error in a compressed page names the decoded byte", "[stor
   const float negative = -1;
   std::memcpy(&payload[at], &negative, sizeof negative);
   std::vector<std::byte> stored;
-  REQUIRE(PageEncoder(Codec::zstd).encode(payload, stored, columns) == Coding{Codec::zstd, Filter::columns});
+  REQUIRE(PageEncoder(Codec::zstd).encode(payload, stored, columns) ==
+          Coding{Codec::zstd, Filter::columns});
   f.pages[kPoint].stored = stored;
   f.pages[kPoint].header.stored_bytes = static_cast<std::uint32_t>(stored.size());
   f.entries[kPoint].stored_bytes = static_cast<std::uint32_t>(stored.size());

@@ -1,8 +1,8 @@
 // What was written comes back, for every codec and page size.
-#include <catch2/catch.hpp>
-
 #include <algorithm>
 #include <string>
+
+#include <catch2/catch.hpp>
 
 #include "format/error.h"
 #include "tests/store/forge.h"
@@ -32,7 +32,8 @@ void check_pages(const ContainerReader& reader, const Sample& sample) {
     REQUIRE(std::equal(payload.begin(), payload.end(), buffer.begin()));
     REQUIRE(reader.read_stored_page(page, stored).coding == header.coding);
     std::vector<std::byte> decoded(header.raw_bytes);
-    const auto columns = facts.type == PageType::point ? packed_point_columns() : std::span<const PackedColumn>();
+    const auto columns =
+        facts.type == PageType::point ? packed_point_columns() : std::span<const PackedColumn>();
     decoder.decode(header.coding, stored, decoded, {facts.record_count, columns});
     REQUIRE((decoded == payload));
   }

@@ -1,13 +1,13 @@
 // The conformance vectors of the specification: every good one is read whole, every bad one refused
 // by the rule that it is named after.
-#include <catch2/catch.hpp>
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <string>
 #include <vector>
+
+#include <catch2/catch.hpp>
+#include <fmt/format.h>
 
 #include "format/checksum.h"
 #include "format/error.h"
@@ -18,7 +18,9 @@ using namespace ptc::test;
 
 namespace {
 
-std::filesystem::path today() { return std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors"; }
+std::filesystem::path today() {
+  return std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors";
+}
 
 /// Where there are good vectors: those of today, and of each version that was released.
 std::vector<std::filesystem::path> roots() {
@@ -64,9 +66,9 @@ TEST_CASE("vectors: every good one holds what the second reader found", "[store]
     for (std::string line; std::getline(table, line);) expected.insert(line);
     for (const auto& path : vectors(root / "good")) {
       const Superblock s = ContainerReader(path).superblock();
-      found.insert(fmt::format("{} {} {} {} {} {} {:016x}{:016x} {:016x}", path.stem().string(), s.points, s.nodes,
-                               s.node_groups, s.levels, s.page_count, s.content_xxh3[1], s.content_xxh3[0],
-                               xxh3_64(walk(path))));
+      found.insert(fmt::format("{} {} {} {} {} {} {:016x}{:016x} {:016x}", path.stem().string(),
+                               s.points, s.nodes, s.node_groups, s.levels, s.page_count,
+                               s.content_xxh3[1], s.content_xxh3[0], xxh3_64(walk(path))));
     }
     CHECK(found == expected);
   }

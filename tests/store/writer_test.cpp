@@ -1,12 +1,12 @@
 // The file as it lies on the disk, what the writer refuses, and that it is whole or not there.
-#include <catch2/catch.hpp>
-
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <csignal>
 #include <string>
 #include <system_error>
+
+#include <catch2/catch.hpp>
 
 #include "tests/store/forge.h"
 #include "tests/store/sample.h"
@@ -67,7 +67,8 @@ TEST_CASE("writer: pages lie in the order of the calls, aligned, padded with zer
   expected = round_up(expected, 4096);
   for (std::size_t i = 0; i < parts.directory.size(); ++i) {
     CHECK(parts.directory[i].page_id == parts.entries.size() + i);
-    expect_page(parts.superblock.directory_offset + i * 4096, parts.directory[i].stored_bytes, 4096);
+    expect_page(parts.superblock.directory_offset + i * 4096, parts.directory[i].stored_bytes,
+                4096);
   }
   CHECK(file.size() == expected + 2 * kBlockBytes);
   const std::span tail = std::span(file).last(2 * kBlockBytes);
@@ -167,7 +168,8 @@ TEST_CASE("writer: a page that no reader would take is refused", "[store][writer
   refused(facts, payload);
   refused(good, {});
   refused(good, std::vector<std::byte>(4096 - 63));
-  const auto stored = [&](Coding coding, std::uint32_t raw_bytes, std::span<const std::byte> bytes) {
+  const auto stored = [&](Coding coding, std::uint32_t raw_bytes,
+                          std::span<const std::byte> bytes) {
     CHECK_THROWS_AS(writer.write_stored_page(page, good, coding, raw_bytes, bytes),
                     std::invalid_argument);
   };

@@ -24,7 +24,8 @@ std::vector<char> bytes_of(const std::filesystem::path& path) {
 
 TemporaryDirectory::TemporaryDirectory() {
   std::string name = (std::filesystem::temp_directory_path() / "ptc-test-XXXXXX").string();
-  if (!mkdtemp(name.data())) throw std::system_error(errno, std::generic_category(), "mkdtemp " + name);
+  if (!mkdtemp(name.data()))
+    throw std::system_error(errno, std::generic_category(), "mkdtemp " + name);
   path_ = name;
 }
 
@@ -45,14 +46,15 @@ SortedScene sort_scene(const std::vector<Surfel>& surfels) {
   Bounds bounds;
   for (const Surfel& s : surfels) bounds.add(s.position);
   if (surfels.empty()) return scene;
-  scene.frame = frame_around({bounds.low.x, bounds.low.y, bounds.low.z}, {bounds.high.x, bounds.high.y, bounds.high.z});
+  scene.frame = frame_around({bounds.low.x, bounds.low.y, bounds.low.z},
+                             {bounds.high.x, bounds.high.y, bounds.high.z});
   for (const Surfel& s : surfels) scene.records.push_back(to_record(s, scene.frame));
   std::ranges::stable_sort(scene.records, {}, &PointRecord::key);
   return scene;
 }
 
-void write_scene(const std::filesystem::path& target, const std::vector<Surfel>& surfels, const BuildOptions& options,
-                 std::uint8_t page_shift, Codec codec) {
+void write_scene(const std::filesystem::path& target, const std::vector<Surfel>& surfels,
+                 const BuildOptions& options, std::uint8_t page_shift, Codec codec) {
   SortedScene scene = sort_scene(surfels);
   ContainerWriter writer(target, {.page_shift = page_shift, .codec = codec, .frame = scene.frame});
   VectorStream stream(std::move(scene.records));
@@ -63,7 +65,9 @@ void write_scene(const std::filesystem::path& target, const std::vector<Surfel>&
 
 void add_rectangle(std::vector<Surfel>& surfels, const glm::dvec3& corner, const glm::dvec3& edge_u,
                    const glm::dvec3& edge_v, double spacing, const glm::vec3& radiance) {
-  const auto cells = [&](const glm::dvec3& e) { return std::max(1, static_cast<int>(std::ceil(glm::length(e) / spacing))); };
+  const auto cells = [&](const glm::dvec3& e) {
+    return std::max(1, static_cast<int>(std::ceil(glm::length(e) / spacing)));
+  };
   const int nu = cells(edge_u), nv = cells(edge_v);
   const glm::dvec3 du = edge_u / static_cast<double>(nu), dv = edge_v / static_cast<double>(nv);
   const glm::vec3 normal(glm::normalize(glm::cross(edge_u, edge_v)));
@@ -79,12 +83,14 @@ void add_rectangle(std::vector<Surfel>& surfels, const glm::dvec3& corner, const
   }
 }
 
-void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double radius, double spacing,
-                const glm::vec3& radiance) {
-  const int count = std::max(8, static_cast<int>(4 * std::numbers::pi * radius * radius / (spacing * spacing)));
+void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double radius,
+                double spacing, const glm::vec3& radiance) {
+  const int count =
+      std::max(8, static_cast<int>(4 * std::numbers::pi * radius * radius / (spacing * spacing)));
   const double area = 4 * std::numbers::pi * radius * radius / count;
   for (int i = 0; i < count; ++i) {  // Fibonacci lattice
-    const double z = 1 - 2 * (i + 0.5) / count, ring = std::sqrt(1 - z * z), turn = i * 2.399963229728653;
+    const double z = 1 - 2 * (i + 0.5) / count, ring = std::sqrt(1 - z * z),
+                 turn = i * 2.399963229728653;
     const glm::dvec3 n(ring * std::cos(turn), ring * std::sin(turn), z);
     surfels.push_back({.position = centre + n * radius,
                        .normal = glm::vec3(n),
@@ -99,7 +105,8 @@ std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed) {
   const auto uniform = [&] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
   std::vector<Surfel> surfels;
   for (std::size_t i = 0; i < count; ++i) {
-    const double z = 2 * uniform() - 1, turn = 2 * std::numbers::pi * uniform(), ring = std::sqrt(1 - z * z);
+    const double z = 2 * uniform() - 1, turn = 2 * std::numbers::pi * uniform(),
+                 ring = std::sqrt(1 - z * z);
     surfels.push_back({.position = {uniform(), uniform(), uniform()},
                        .normal = glm::vec3(ring * std::cos(turn), ring * std::sin(turn), z),
                        .radius = static_cast<float>(0.001 + 0.01 * uniform()),

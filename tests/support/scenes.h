@@ -19,7 +19,9 @@ class TemporaryDirectory {
   ~TemporaryDirectory();
   TemporaryDirectory(const TemporaryDirectory&) = delete;
   TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
+    return path_ / name;
+  }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
@@ -51,15 +53,16 @@ struct SortedScene {
 
 /// Writes the surfels to a container.
 void write_scene(const std::filesystem::path& target, const std::vector<Surfel>& surfels,
-                 const BuildOptions& options = {}, std::uint8_t page_shift = 12, Codec codec = Codec::zstd);
+                 const BuildOptions& options = {}, std::uint8_t page_shift = 12,
+                 Codec codec = Codec::zstd);
 
 /// A rectangle of n x m surfels: low corner, two edges; the normal is edge_u x edge_v.
 void add_rectangle(std::vector<Surfel>& surfels, const glm::dvec3& corner, const glm::dvec3& edge_u,
                    const glm::dvec3& edge_v, double spacing, const glm::vec3& radiance);
 
 /// A sphere of about 4 pi r^2 / spacing^2 surfels, normals outwards.
-void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double radius, double spacing,
-                const glm::vec3& radiance);
+void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double radius,
+                double spacing, const glm::vec3& radiance);
 
 /// `count` surfels in the unit cube from a fixed stream, normals and radii at random.
 [[nodiscard]] std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed);

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "engine/verify/verify.h"
 #include "engine/store/reader.h"
+#include "engine/verify/verify.h"
 #include "format/checksum.h"
 #include "tests/support/scenes.h"
 
@@ -25,7 +25,8 @@ std::vector<Surfel> small_scene() {
 std::string fault_of(const std::filesystem::path& path) {
   Progress silent;
   std::string faults;
-  for (const Finding& finding : verify_container(path, {.threads = 1, .flip_budget = 0}, silent).findings) {
+  for (const Finding& finding :
+       verify_container(path, {.threads = 1, .flip_budget = 0}, silent).findings) {
     faults += line_of(finding) + "\n";
   }
   return faults;
@@ -39,7 +40,8 @@ OpenContainer::OpenContainer(const std::filesystem::path& path) : bytes_(read_fi
     entries_.push_back(container.entry(page));
     headers_.push_back(decode_page_header(
         std::span(bytes_).subspan(entries_.back().offset, kPageHeaderBytes), container.header()));
-    if (headers_.back().coding.codec != Codec::raw) throw std::invalid_argument("a page that is not raw");
+    if (headers_.back().coding.codec != Codec::raw)
+      throw std::invalid_argument("a page that is not raw");
   }
 }
 

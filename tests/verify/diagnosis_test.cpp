@@ -1,8 +1,9 @@
 // What a verification says of the cause of damage, and how far it sees past it.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <functional>
 #include <string>
+
+#include <catch2/catch.hpp>
 
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
@@ -36,15 +37,19 @@ struct Subject {
     superblock = container.superblock();
   }
 
-  VerifyReport after(const std::function<void(Bytes&)>& damage, const VerifyOptions& options = {}) const {
+  VerifyReport after(const std::function<void(Bytes&)>& damage,
+                     const VerifyOptions& options = {}) const {
     Bytes bytes = whole;
     damage(bytes);
     write_file(path, bytes);
     return verify(path, options);
   }
-  [[nodiscard]] std::ptrdiff_t at(std::size_t page) const { return static_cast<std::ptrdiff_t>(entries[page].offset); }
+  [[nodiscard]] std::ptrdiff_t at(std::size_t page) const {
+    return static_cast<std::ptrdiff_t>(entries[page].offset);
+  }
   [[nodiscard]] std::ptrdiff_t sectors(std::size_t page) const {
-    return static_cast<std::ptrdiff_t>(round_up(kPageHeaderBytes + entries[page].stored_bytes, kSectorBytes));
+    return static_cast<std::ptrdiff_t>(
+        round_up(kPageHeaderBytes + entries[page].stored_bytes, kSectorBytes));
   }
 };
 
@@ -102,30 +107,38 @@ TEST_CASE("diagnosis: what copies and transfers do is told apart", "[verify]") {
     check_one(cut(100), Cause::truncated, "header-length");
   }
   SECTION("the writer was stopped") {
-    const VerifyReport report = cut(static_cast<std::ptrdiff_t>(subject.superblock.directory_offset));
+    const VerifyReport report =
+        cut(static_cast<std::ptrdiff_t>(subject.superblock.directory_offset));
     check_one(report, Cause::unfinished, "superblock-magic");
     CHECK(report.pages == subject.entries.size());  // found by their headers
   }
   SECTION("bytes follow") {
-    const VerifyReport report = subject.after([](Bytes& b) { b.resize(b.size() + 5000, std::byte{7}); });
+    const VerifyReport report =
+        subject.after([](Bytes& b) { b.resize(b.size() + 5000, std::byte{7}); });
     check_one(report, Cause::appended, "superblock-length");
     CHECK(report.findings[0].offset == subject.whole.size());
     CHECK(report.findings[0].bytes == 5000);
   }
   SECTION("text") {
-    check_one(subject.after([](Bytes& b) { b = with_line_ends(b); }), Cause::text_mode, "header-magic");
-    check_one(subject.after([](Bytes& b) { std::erase(b, std::byte{'\r'}); }), Cause::text_mode, "header-magic");
-    const auto seven_bits = [](Bytes& b) { std::ranges::for_each(b, [](std::byte& c) { c &= std::byte{0x7f}; }); };
+    check_one(subject.after([](Bytes& b) { b = with_line_ends(b); }), Cause::text_mode,
+              "header-magic");
+    check_one(subject.after([](Bytes& b) { std::erase(b, std::byte{'\r'}); }), Cause::text_mode,
+              "header-magic");
+    const auto seven_bits = [](Bytes& b) {
+      std::ranges::for_each(b, [](std::byte& c) { c &= std::byte{0x7f}; });
+    };
     check_one(subject.after(seven_bits), Cause::text_mode, "header-magic");
   }
   SECTION("another format") {
-    check_one(subject.after([](Bytes& b) { std::ranges::fill(b, std::byte{'x'}); }), Cause::foreign, "header-magic");
+    check_one(subject.after([](Bytes& b) { std::ranges::fill(b, std::byte{'x'}); }), Cause::foreign,
+              "header-magic");
   }
   SECTION("a newer version") {
     FileHeader header = subject.superblock.header;
     header.feature_incompat = 1;
     const Block block = encode_file_header(header);
-    check_one(subject.after([&](Bytes& b) { std::ranges::copy(block, b.begin()); }), Cause::newer, "header-features");
+    check_one(subject.after([&](Bytes& b) { std::ranges::copy(block, b.begin()); }), Cause::newer,
+              "header-features");
   }
   SECTION("zeros") {
     const auto zero = [&](std::ptrdiff_t from, std::ptrdiff_t bytes) {
@@ -145,11 +158,13 @@ TEST_CASE("diagnosis: what copies and transfers do is told apart", "[verify]") {
 
 TEST_CASE("diagnosis: pages in the wrong place are told from those of other files", "[verify]") {
   const Subject subject(Codec::raw);
-  const auto copy_page = [](const Bytes& from, std::ptrdiff_t source, Bytes& to, std::ptrdiff_t target, std::ptrdiff_t bytes) {
+  const auto copy_page = [](const Bytes& from, std::ptrdiff_t source, Bytes& to,
+                            std::ptrdiff_t target, std::ptrdiff_t bytes) {
     std::copy_n(from.begin() + source, bytes, to.begin() + target);
   };
   std::size_t one = 0;
-  while (subject.entries[one].type != PageType::point || subject.entries[one + 1].type != PageType::point ||
+  while (subject.entries[one].type != PageType::point ||
+         subject.entries[one + 1].type != PageType::point ||
          subject.entries[one].stored_bytes != subject.entries[one + 1].stored_bytes) {
     ++one;
   }
@@ -162,8 +177,10 @@ TEST_CASE("diagnosis: pages in the wrong place are told from those of other file
   }
   SECTION("the page of another file") {
     const VerifyReport report = subject.after([&](Bytes& b) {
-      const auto image = std::span(b).subspan(subject.entries[one].offset).first<kPageHeaderBytes>();
-      encode_page_header(decode_page_header(image, subject.superblock.header), Uuid{std::byte{9}}, image);
+      const auto image =
+          std::span(b).subspan(subject.entries[one].offset).first<kPageHeaderBytes>();
+      encode_page_header(decode_page_header(image, subject.superblock.header), Uuid{std::byte{9}},
+                         image);
     });
     check_one(report, Cause::stale, "page-checksum");
   }
@@ -172,7 +189,9 @@ TEST_CASE("diagnosis: pages in the wrong place are told from those of other file
 TEST_CASE("diagnosis: what is whole is checked past what is lost", "[verify]") {
   const Subject subject(Codec::raw, 9000);
   const std::size_t pages = subject.entries.size();
-  const auto payload_of = [&](Bytes& b, std::size_t page) -> std::byte& { return b[subject.entries[page].offset + 200]; };
+  const auto payload_of = [&](Bytes& b, std::size_t page) -> std::byte& {
+    return b[subject.entries[page].offset + 200];
+  };
   SECTION("without the file header, which superblocks repeat") {
     const VerifyReport report = subject.after([&](Bytes& b) {
       std::fill_n(b.begin(), kBlockBytes, std::byte{0});
@@ -194,7 +213,8 @@ TEST_CASE("diagnosis: what is whole is checked past what is lost", "[verify]") {
   SECTION("without one directory page of several") {
     REQUIRE(subject.superblock.directory_pages > 1);
     const VerifyReport report = subject.after([&](Bytes& b) {
-      std::fill_n(b.begin() + static_cast<std::ptrdiff_t>(subject.superblock.directory_offset), kBlockBytes, std::byte{0});
+      std::fill_n(b.begin() + static_cast<std::ptrdiff_t>(subject.superblock.directory_offset),
+                  kBlockBytes, std::byte{0});
       payload_of(b, 9) ^= std::byte{1};
     });
     CHECK(report.damage == 2);
@@ -205,7 +225,8 @@ TEST_CASE("diagnosis: what is whole is checked past what is lost", "[verify]") {
 
 TEST_CASE("diagnosis: packed channels whose names are lost are no crash", "[verify]") {
   const TemporaryDirectory directory;
-  const auto good = std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors/good/attributes.ptcx", path = directory / "a.ptcx";
+  const auto good = std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors/good/attributes.ptcx",
+             path = directory / "a.ptcx";
   Bytes bytes = read_file(good);
   const ContainerReader container(good);
   const auto at = container.entry(container.superblock().meta_page).offset + kPageHeaderBytes;
@@ -220,7 +241,8 @@ TEST_CASE("diagnosis: the rest of a tree is checked past a damaged page", "[veri
   OpenContainer wrong(subject.path);
   std::size_t last_nodes = 0, first_points = wrong.pages();
   for (std::size_t page = 0; page < wrong.pages(); ++page) {
-    if (wrong.header(page).type == PageType::node && wrong.header(page).level > 1) last_nodes = page;
+    if (wrong.header(page).type == PageType::node && wrong.header(page).level > 1)
+      last_nodes = page;
     if (wrong.header(page).type == PageType::point) first_points = std::min(first_points, page);
   }
   const NodePage nodes(wrong.payload(last_nodes).data(), wrong.header(last_nodes).record_count);
@@ -242,14 +264,18 @@ TEST_CASE("verify: each level finds what those below do not", "[verify]") {
   const Subject subject(Codec::raw);
   const auto found_at = [&](const std::function<void(Bytes&)>& damage) {
     int level = 0;
-    while (level <= 4 && subject.after(damage, {.level = static_cast<VerifyLevel>(level)}).sound()) ++level;
+    while (level <= 4 && subject.after(damage, {.level = static_cast<VerifyLevel>(level)}).sound())
+      ++level;
     return level;
   };
   const std::size_t end = subject.whole.size();
   CHECK(found_at([&](Bytes& b) { b[end - 100] ^= std::byte{1}; }) == 0);
   CHECK(found_at([&](Bytes& b) { b[subject.entries[2].offset + 9] ^= std::byte{1}; }) == 1);
   CHECK(found_at([&](Bytes& b) { b[subject.entries[2].offset + 99] ^= std::byte{1}; }) == 2);
-  CHECK(found_at([&](Bytes& b) { b[subject.entries[2].offset + kPageHeaderBytes + subject.entries[2].stored_bytes] = std::byte{1}; }) == 2);
+  CHECK(found_at([&](Bytes& b) {
+          b[subject.entries[2].offset + kPageHeaderBytes + subject.entries[2].stored_bytes] =
+              std::byte{1};
+        }) == 2);
   write_file(subject.path, subject.whole);
   OpenContainer wrong(subject.path);
   wrong.superblock().area *= 2;
@@ -259,7 +285,8 @@ TEST_CASE("verify: each level finds what those below do not", "[verify]") {
   CHECK(found_at([](Bytes&) {}) == 5);
 }
 
-TEST_CASE("verify: a tree that differs within the rounding is found by building it again", "[verify]") {
+TEST_CASE("verify: a tree that differs within the rounding is found by building it again",
+          "[verify]") {
   const Subject subject(Codec::raw);
   const VerifyReport whole = verify(subject.path, {.level = VerifyLevel::rebuild});
   CHECK(whole.sound());

@@ -1,12 +1,14 @@
-// salvage_container(): what is whole is kept, in order and beside its channels, whatever else is lost.
+// salvage_container(): what is whole is kept, in order and beside its channels, whatever else is
+// lost.
 #include "engine/verify/salvage.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <functional>
 #include <random>
 #include <string>
+
+#include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
 #include "engine/build/build.h"
@@ -24,24 +26,29 @@ namespace {
 using Bytes = std::vector<std::byte>;
 constexpr std::size_t kPoints = 3000;
 
-/// Points with the radiance of their number, and the number once more as a channel: what is kept says which it was.
+/// Points with the radiance of their number, and the number once more as a channel: what is kept
+/// says which it was.
 void write_numbered(const std::filesystem::path& path) {
   SortedScene scene = sort_scene(random_surfels(kPoints, 4));
   for (std::size_t i = 0; i < scene.records.size(); ++i) {
-    scene.records[i].radiance = {encode_half(static_cast<float>(i % 1000)), encode_half(static_cast<float>(i / 1000)), std::uint16_t{0}};
+    scene.records[i].radiance = {encode_half(static_cast<float>(i % 1000)),
+                                 encode_half(static_cast<float>(i / 1000)), std::uint16_t{0}};
   }
   ContainerWriter writer(path, {.page_shift = 12, .codec = Codec::zstd, .frame = scene.frame});
   VectorStream stream(scene.records);
   Progress silent;
   const Superblock superblock = build_pages(stream, writer, {.leaf_points = 4}, Executor(), silent);
-  const Meta meta{.channels = {{.name = "number", .type = ChannelType::u16}}, .text = {{"source", "test"}}};
+  const Meta meta{.channels = {{.name = "number", .type = ChannelType::u16}},
+                  .text = {{"source", "test"}}};
   const std::uint32_t full = points_per_page(writer.header());
   for (std::size_t first = 0; first < kPoints; first += full) {
     const std::size_t count = std::min<std::size_t>(full, kPoints - first);
     std::vector<std::uint16_t> numbers(count);
     for (std::size_t i = 0; i < count; ++i) numbers[i] = static_cast<std::uint16_t>(first + i + 1);
     writer.write_page(writer.reserve_page(),
-                      {.type = PageType::attribute, .group = 1, .record_count = static_cast<std::uint32_t>(count)},
+                      {.type = PageType::attribute,
+                       .group = 1,
+                       .record_count = static_cast<std::uint32_t>(count)},
                       std::as_bytes(std::span(numbers)));
   }
   writer.finish(meta, superblock);
@@ -49,8 +56,8 @@ void write_numbered(const std::filesystem::path& path) {
 
 struct Kept {
   SalvageReport report;
-  std::vector<std::size_t> points;    ///< their numbers, from 0 on
-  std::vector<std::size_t> channel;   ///< likewise from 1 on; 0 where it was lost
+  std::vector<std::size_t> points;   ///< their numbers, from 0 on
+  std::vector<std::size_t> channel;  ///< likewise from 1 on; 0 where it was lost
 };
 
 struct Patient {
@@ -94,7 +101,8 @@ struct Patient {
     std::vector<PointRecord> records(kPoints + 1);
     records.resize(stream.next(records));
     for (const PointRecord& p : records) {
-      kept.points.push_back(static_cast<std::size_t>(decode_half(p.radiance[0]) + 1000 * decode_half(p.radiance[1])));
+      kept.points.push_back(
+          static_cast<std::size_t>(decode_half(p.radiance[0]) + 1000 * decode_half(p.radiance[1])));
     }
     Bytes payload(container.page_payload_limit());
     PageDecoder decoder;
@@ -134,10 +142,15 @@ TEST_CASE("salvage: what costs nothing is kept whole", "[verify][salvage]") {
     return [=](Bytes& b) { std::fill_n(b.begin() + from, bytes, std::byte{0}); };
   };
   const auto swap_pages = [&](Bytes& b) {
-    const auto one = b.begin() + static_cast<std::ptrdiff_t>(patient.entries[patient.points[3]].offset);
-    const auto other = b.begin() + static_cast<std::ptrdiff_t>(patient.entries[patient.points[5]].offset);
-    const auto bytes = [&](std::uint32_t page) { return round_up(kPageHeaderBytes + patient.entries[page].stored_bytes, kSectorBytes); };
-    if (bytes(patient.points[3]) != bytes(patient.points[5])) FAIL("the pages are not equally long");
+    const auto one =
+        b.begin() + static_cast<std::ptrdiff_t>(patient.entries[patient.points[3]].offset);
+    const auto other =
+        b.begin() + static_cast<std::ptrdiff_t>(patient.entries[patient.points[5]].offset);
+    const auto bytes = [&](std::uint32_t page) {
+      return round_up(kPageHeaderBytes + patient.entries[page].stored_bytes, kSectorBytes);
+    };
+    if (bytes(patient.points[3]) != bytes(patient.points[5]))
+      FAIL("the pages are not equally long");
     std::swap_ranges(one, one + static_cast<std::ptrdiff_t>(bytes(patient.points[3])), other);
   };
   const std::vector<std::function<void(Bytes&)>> damages{
@@ -148,8 +161,12 @@ TEST_CASE("salvage: what costs nothing is kept whole", "[verify][salvage]") {
       zero(all - 8192, 4096),
       [](Bytes& b) { b.resize(b.size() - 100); },
       [](Bytes& b) { b.resize(b.size() + 70000, std::byte{1}); },
-      [&](Bytes& b) { for (const std::uint32_t page : patient.nodes) patient.spoil(b, page); },
-      [&](Bytes& b) { for (const auto& entry : patient.entries) b[entry.offset + 100] ^= std::byte{4}; },
+      [&](Bytes& b) {
+        for (const std::uint32_t page : patient.nodes) patient.spoil(b, page);
+      },
+      [&](Bytes& b) {
+        for (const auto& entry : patient.entries) b[entry.offset + 100] ^= std::byte{4};
+      },
       [&](Bytes& b) { b[patient.entries[patient.points[1]].offset + 30] ^= std::byte{4}; },
       swap_pages,
   };
@@ -185,7 +202,8 @@ TEST_CASE("salvage: a lost page costs what lies in it", "[verify][salvage]") {
   SECTION("points, and the directory page that lists them") {
     patient.damage([&](Bytes& b) {
       patient.spoil(b, patient.points[2]);
-      std::fill_n(b.begin() + static_cast<std::ptrdiff_t>(patient.superblock.directory_offset), kBlockBytes, std::byte{0});
+      std::fill_n(b.begin() + static_cast<std::ptrdiff_t>(patient.superblock.directory_offset),
+                  kBlockBytes, std::byte{0});
     });
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but(2));
@@ -196,7 +214,8 @@ TEST_CASE("salvage: a lost page costs what lies in it", "[verify][salvage]") {
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but());
     for (std::size_t i = 0; i < kPoints; ++i) {
-      if (kept.channel[i] != (i / patient.superblock.points_per_page == 4 ? 0 : i + 1)) FAIL("point " << i);
+      if (kept.channel[i] != (i / patient.superblock.points_per_page == 4 ? 0 : i + 1))
+        FAIL("point " << i);
     }
     CHECK(kept.report.attribute_pages + 1 == kept.report.attribute_pages_before);
   }
@@ -212,7 +231,10 @@ TEST_CASE("salvage: a lost page costs what lies in it", "[verify][salvage]") {
 TEST_CASE("salvage: of an unfinished file what was written is kept", "[verify][salvage]") {
   const Patient patient;
   const auto cut_behind = [&](std::uint32_t page) {
-    patient.damage([&](Bytes& b) { b.resize(patient.entries[page].offset + round_up(kPageHeaderBytes + patient.entries[page].stored_bytes, kSectorBytes)); });
+    patient.damage([&](Bytes& b) {
+      b.resize(patient.entries[page].offset +
+               round_up(kPageHeaderBytes + patient.entries[page].stored_bytes, kSectorBytes));
+    });
   };
   SECTION("all but directory and superblocks") {
     patient.damage([&](Bytes& b) { b.resize(patient.superblock.directory_offset); });
@@ -233,10 +255,14 @@ TEST_CASE("salvage: of an unfinished file what was written is kept", "[verify][s
     CHECK(kept.points == patient.all_but(2));
     check_beside(kept);
   }
-  SECTION("a point page that does not even tell its number: no channel can be told from the next page's") {
+  SECTION(
+      "a point page that does not even tell its number: no channel can be told from the next "
+      "page's") {
     patient.damage([&](Bytes& b) {
       b.resize(patient.superblock.directory_offset);
-      std::fill_n(b.begin() + static_cast<std::ptrdiff_t>(patient.entries[patient.points[2]].offset), kPageHeaderBytes, std::byte{0});
+      std::fill_n(
+          b.begin() + static_cast<std::ptrdiff_t>(patient.entries[patient.points[2]].offset),
+          kPageHeaderBytes, std::byte{0});
     });
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but(2));
@@ -261,18 +287,24 @@ TEST_CASE("salvage: where nothing proves itself nothing is written", "[verify][s
   };
   refused([](Bytes& b) { std::ranges::fill(b, std::byte{0}); });
   refused([](Bytes& b) { b.resize(10); });
-  refused([&](Bytes& b) { for (const std::uint32_t page : patient.points) patient.spoil(b, page); });
+  refused([&](Bytes& b) {
+    for (const std::uint32_t page : patient.points) patient.spoil(b, page);
+  });
   patient.damage([](Bytes&) {});
   CHECK_THROWS_AS(salvage_container(patient.path, patient.path, {}, silent), std::invalid_argument);
   CHECK(read_file(patient.path) == patient.whole);
-  CHECK_THROWS_AS(salvage_container(patient.path, patient.target, {.memory_bytes = 1 << 20}, silent), LimitError);
+  CHECK_THROWS_AS(
+      salvage_container(patient.path, patient.target, {.memory_bytes = 1 << 20}, silent),
+      LimitError);
   CHECK_FALSE(std::filesystem::exists(patient.target));
 }
 
 TEST_CASE("salvage: whatever happens to a file, what is kept was in it", "[verify][salvage]") {
   const Patient patient;
   std::mt19937 random(11);
-  const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
+  const auto below = [&](std::size_t n) {
+    return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);
+  };
   std::size_t kept_some = 0;
   for (int run = 0; run < 60; ++run) {
     patient.damage([&](Bytes& b) {
@@ -281,10 +313,19 @@ TEST_CASE("salvage: whatever happens to a file, what is kept was in it", "[verif
         const std::size_t bytes = std::min(b.size() - at, std::size_t{1} << below(14));
         const auto first = b.begin() + static_cast<std::ptrdiff_t>(at);
         switch (below(4)) {
-          case 0: std::fill_n(first, bytes, std::byte{0}); break;
-          case 1: b[at] ^= std::byte{1} << below(8); break;
-          case 2: std::copy_n(patient.whole.begin() + static_cast<std::ptrdiff_t>(below(patient.whole.size() - bytes)), bytes, first); break;
-          default: std::generate_n(first, bytes, [&] { return static_cast<std::byte>(random()); });
+          case 0:
+            std::fill_n(first, bytes, std::byte{0});
+            break;
+          case 1:
+            b[at] ^= std::byte{1} << below(8);
+            break;
+          case 2:
+            std::copy_n(patient.whole.begin() +
+                            static_cast<std::ptrdiff_t>(below(patient.whole.size() - bytes)),
+                        bytes, first);
+            break;
+          default:
+            std::generate_n(first, bytes, [&] { return static_cast<std::byte>(random()); });
         }
       }
     });
@@ -295,7 +336,8 @@ TEST_CASE("salvage: whatever happens to a file, what is kept was in it", "[verif
       CHECK(std::ranges::is_sorted(kept.points));
       CHECK(std::ranges::adjacent_find(kept.points) == kept.points.end());
       for (std::size_t i = 0; i < kept.channel.size(); ++i) {
-        if (kept.channel[i] != 0 && kept.channel[i] != kept.points[i] + 1) FAIL("point " << i << " has the value of another");
+        if (kept.channel[i] != 0 && kept.channel[i] != kept.points[i] + 1)
+          FAIL("point " << i << " has the value of another");
       }
     } catch (const FormatError&) {  // header and superblocks, or all points
     }

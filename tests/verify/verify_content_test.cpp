@@ -1,15 +1,16 @@
 // verify_container() and what pages say: faults behind checksums that are right.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <functional>
 #include <string>
 
+#include <catch2/catch.hpp>
+
 #include "engine/verify/verify.h"
 #include "format/node_page.h"
 #include "format/scalar.h"
-#include "tests/verify/damage.h"
 #include "tests/support/scenes.h"
+#include "tests/verify/damage.h"
 
 namespace ptc::test {
 namespace {
@@ -38,7 +39,8 @@ std::vector<Edit> edits() {
   }
   for (std::size_t k = 0; k < 6; ++k) {
     for (const int by : {-2, 2}) {
-      all.push_back({"facing", 2, by, [k](const GroupView& g, int i) { return column(g, i, 8 + k); }});
+      all.push_back(
+          {"facing", 2, by, [k](const GroupView& g, int i) { return column(g, i, 8 + k); }});
     }
     for (std::size_t c = 0; c < 4; ++c) {
       all.push_back({"radiance", 1, c < 3 ? 5 : 1, [k, c](const GroupView& g, int i) {
@@ -49,8 +51,8 @@ std::vector<Edit> edits() {
   return all;
 }
 
-std::filesystem::path write_raw(const std::filesystem::path& path, const std::vector<Surfel>& surfels,
-                                const BuildOptions& tree) {
+std::filesystem::path write_raw(const std::filesystem::path& path,
+                                const std::vector<Surfel>& surfels, const BuildOptions& tree) {
   write_scene(path, surfels, tree, 12, Codec::raw);
   return path;
 }
@@ -92,11 +94,13 @@ bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at
     const auto k = static_cast<int>((at - column(group, 0, 14)) / 4) / group.size();
     std::uint32_t rgbe;
     std::memcpy(&rgbe, group.radiance(k) + 4 * child, 4);
-    return GroupView::u16_at(group.facing(k), child) == 0 || (rgbe & 0xffffff) == 0 || before + edit.by > 255;
+    return GroupView::u16_at(group.facing(k), child) == 0 || (rgbe & 0xffffff) == 0 ||
+           before + edit.by > 255;
   }
   if (std::strcmp(edit.what, "cone axis") == 0) return false;
   if (std::strcmp(edit.what, "thickness") == 0) {  // of a plane it is below what sums may move
-    const double radius = static_cast<double>(decode_ufloat16(GroupView::u16_at(group.radius(), child)));
+    const double radius =
+        static_cast<double>(decode_ufloat16(GroupView::u16_at(group.radius(), child)));
     return static_cast<double>(decode_ufloat16(static_cast<std::uint16_t>(before))) < 1e-4 * radius;
   }
   if (std::strcmp(edit.what, "cone cos") == 0) {
@@ -108,8 +112,7 @@ bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at
 
 }  // namespace
 
-TEST_CASE("verify: a wrong number in any node is found though checksums are right",
-          "[verify]") {
+TEST_CASE("verify: a wrong number in any node is found though checksums are right", "[verify]") {
   Specimen specimen(small_scene(), {.leaf_points = 12});
   OpenContainer& container = specimen.container;
   REQUIRE(specimen.fault() == "");
@@ -235,7 +238,8 @@ TEST_CASE("verify: wrong totals in the superblock are found though checksums are
   CHECK(fault([](Superblock& s) { s.header.frame.origin[0] += s.header.frame.unit(); }) != "");
 }
 
-TEST_CASE("verify: points that descend from page to page are found, and no tree is made of them", "[verify]") {
+TEST_CASE("verify: points that descend from page to page are found, and no tree is made of them",
+          "[verify]") {
   Specimen specimen(random_surfels(500, 4));
   OpenContainer& container = specimen.container;
   std::vector<std::size_t> pages;
@@ -248,7 +252,8 @@ TEST_CASE("verify: points that descend from page to page are found, and no tree 
   std::swap(container.header(pages[1]).last_key, container.header(pages[2]).last_key);
   CHECK_THAT(specimen.fault(), Catch::Matchers::Contains("spec/points.md#point-order"));
   Progress silent;
-  const VerifyReport report = verify_container(specimen.directory / "wrong.ptcx", {.level = VerifyLevel::rebuild}, silent);
+  const VerifyReport report =
+      verify_container(specimen.directory / "wrong.ptcx", {.level = VerifyLevel::rebuild}, silent);
   CHECK(report.tree_checked);
   CHECK_FALSE(report.tree_digest);
 }

@@ -1,13 +1,14 @@
 // verify_container() and trees of another shape than the builder's.
 #include <algorithm>
+
 #include <catch2/catch.hpp>
 
 #include "engine/build/octree.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
-#include "tests/verify/damage.h"
 #include "tests/support/scenes.h"
+#include "tests/verify/damage.h"
 
 namespace ptc::test {
 namespace {

@@ -4,12 +4,13 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <catch2/catch.hpp>
 #include <string>
 
+#include <catch2/catch.hpp>
+
 #include "engine/store/reader.h"
-#include "tests/verify/damage.h"
 #include "tests/support/scenes.h"
+#include "tests/verify/damage.h"
 
 namespace ptc::test {
 namespace {
@@ -84,8 +85,8 @@ TEST_CASE("verify: numbers at the ends of their ranges pass", "[verify]") {
 TEST_CASE("verify: every vector gets its verdict", "[verify]") {
   for (const char* kind : {"good", "bad", "verify"}) {
     std::size_t seen = 0;
-    for (const auto& entry :
-         std::filesystem::directory_iterator(std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors" / kind)) {
+    for (const auto& entry : std::filesystem::directory_iterator(
+             std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors" / kind)) {
       const std::string name = entry.path().filename().string();
       INFO(kind << "/" << name);
       const std::string fault = fault_of(entry.path());
@@ -96,7 +97,8 @@ TEST_CASE("verify: every vector gets its verdict", "[verify]") {
       }
       // container-page-magic.variant.ptcx breaks spec/container.md#page-magic.
       const std::size_t dash = name.find('-');
-      const std::string rule = name.substr(0, dash) + ".md#" + name.substr(dash + 1, name.find('.') - dash - 1);
+      const std::string rule =
+          name.substr(0, dash) + ".md#" + name.substr(dash + 1, name.find('.') - dash - 1);
       CHECK_THAT(fault, Catch::Contains("spec/" + rule + ")"));
     }
     CHECK(seen > 10);
@@ -158,7 +160,8 @@ TEST_CASE("verify: the error names where the flipped byte lies", "[verify]") {
     const ContainerReader container(path);
     for (std::uint32_t page = 0; page < container.page_count(); ++page) {
       const DirectoryEntry& entry = container.entry(page);
-      parts.push_back({entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
+      parts.push_back(
+          {entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
     }
     parts.push_back({container.superblock().directory_offset, kBlockBytes});
     parts.push_back({whole.size() - 2 * kBlockBytes, kBlockBytes});
@@ -180,7 +183,8 @@ TEST_CASE("verify: the error names where the flipped byte lies", "[verify]") {
   }
 }
 
-TEST_CASE("verify: all damaged pages are named in the order of the file, or the first alone", "[verify]") {
+TEST_CASE("verify: all damaged pages are named in the order of the file, or the first alone",
+          "[verify]") {
   const TemporaryDirectory directory;
   const auto path = directory / "scene.ptcx";
   write_scene(path, random_surfels(5000, 9), {.leaf_points = 8}, 12, Codec::raw);
@@ -188,7 +192,8 @@ TEST_CASE("verify: all damaged pages are named in the order of the file, or the 
   std::vector<std::uint64_t> offsets;
   {
     const ContainerReader container(path);
-    for (std::uint32_t page = 0; page < container.page_count(); ++page) offsets.push_back(container.entry(page).offset);
+    for (std::uint32_t page = 0; page < container.page_count(); ++page)
+      offsets.push_back(container.entry(page).offset);
   }
   std::ranges::sort(offsets);
   REQUIRE(offsets.size() > 90);

@@ -8,7 +8,9 @@
 
 namespace ptc::bench {
 
-const char* name_of(Quantity job) noexcept { return job == Quantity::occlusion ? "occlusion" : "bleeding"; }
+const char* name_of(Quantity job) noexcept {
+  return job == Quantity::occlusion ? "occlusion" : "bleeding";
+}
 
 std::vector<GatherOptions> AccuracyOptions::default_settings() {
   std::vector<GatherOptions> settings;
@@ -19,22 +21,26 @@ std::vector<GatherOptions> AccuracyOptions::default_settings() {
                                                                  {0.03F, 0.2F, 32},
                                                                  {0.01F, 0.1F, 32},
                                                                  {0.003F, 0.05F, 48}}) {
-    settings.push_back({.solid_angle = solid_angle, .parallax = parallax, .resolution = resolution});
+    settings.push_back(
+        {.solid_angle = solid_angle, .parallax = parallax, .resolution = resolution});
   }
   return settings;
 }
 
-SceneAccuracy measure_accuracy(const BenchScene& scene, const AccuracyOptions& options, const Executor& executor,
-                               Progress& progress) {
-  SceneAccuracy accuracy{.surfels = scene.surfels().size(), .triangles = scene.mesh().triangles.size()};
+SceneAccuracy measure_accuracy(const BenchScene& scene, const AccuracyOptions& options,
+                               const Executor& executor, Progress& progress) {
+  SceneAccuracy accuracy{.surfels = scene.surfels().size(),
+                         .triangles = scene.mesh().triangles.size()};
   constexpr Sides kSides = Sides::both;
   const DiscRays oracle(scene.surfels(), kSides, {});
   std::optional<RayBaseline> discs, mesh;
   if (options.measures("embree-discs")) discs.emplace(scene.surfels(), kSides);
   if (accuracy.triangles > 0) mesh.emplace(scene.mesh(), scene.surfels(), scene.spacing());
-  const SceneRays rays{.oracle = &oracle, .discs = discs ? &*discs : nullptr, .mesh = mesh ? &*mesh : nullptr};
+  const SceneRays rays{
+      .oracle = &oracle, .discs = discs ? &*discs : nullptr, .mesh = mesh ? &*mesh : nullptr};
   for (const ReceiverSet& set : scene.sets()) {
-    if (set.receivers.empty() || std::ranges::find(options.sets, set.name) == options.sets.end()) continue;
+    if (set.receivers.empty() || std::ranges::find(options.sets, set.name) == options.sets.end())
+      continue;
     SetRun run(scene, set, options, rays, executor, progress);
     run.measure(progress);
     accuracy.references.push_back(run.note());
@@ -42,8 +48,9 @@ SceneAccuracy measure_accuracy(const BenchScene& scene, const AccuracyOptions& o
     accuracy.rows.insert(accuracy.rows.end(), rows.begin(), rows.end());
   }
   if (accuracy.rows.empty()) {
-    throw DataError(scene.name() + ": nothing to measure: " +
-                    (accuracy.references.empty() ? "the camera sees nothing" : "a cloud has no mesh for rays"));
+    throw DataError(
+        scene.name() + ": nothing to measure: " +
+        (accuracy.references.empty() ? "the camera sees nothing" : "a cloud has no mesh for rays"));
   }
   return accuracy;
 }

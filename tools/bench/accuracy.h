@@ -14,8 +14,8 @@
 
 namespace ptc::bench {
 
-/// What can be measured, in the order of charts: the hierarchical gather, the plain one, rays at the
-/// same discs, rays at the mesh.
+/// What can be measured, in the order of charts: the hierarchical gather, the plain one, rays at
+/// the same discs, rays at the mesh.
 inline constexpr std::array kMethods{"ptcx", "plain", "embree-discs", "embree-mesh"};
 /// Receivers: pixels of a picture, points of the scene itself.
 inline constexpr std::array kSets{"camera", "points"};
@@ -48,13 +48,13 @@ struct AccuracyOptions {
 struct AccuracyRow {
   std::string scene, set, method, setting;
   Quantity job = Quantity::occlusion;
-  std::size_t receivers = 0;       ///< that were timed
-  Spread us_per_receiver;          ///< CPU time of one core
-  GatherCounts counts;             ///< of a receiver in the mean, times a thousand; zeros of rays
+  std::size_t receivers = 0;  ///< that were timed
+  Spread us_per_receiver;     ///< CPU time of one core
+  GatherCounts counts;        ///< of a receiver in the mean, times a thousand; zeros of rays
   ErrorStatistics occlusion;
-  ErrorStatistics irradiance;      ///< over RGB; NaN for the job occlusion
-  double flip = 0;                 ///< mean over a window of the camera's picture; NaN for other sets
-  double occlusion_rms_mesh = 0;   ///< against rays at the mesh; NaN without one
+  ErrorStatistics irradiance;  ///< over RGB; NaN for the job occlusion
+  double flip = 0;             ///< mean over a window of the camera's picture; NaN for other sets
+  double occlusion_rms_mesh = 0;  ///< against rays at the mesh; NaN without one
   double irradiance_rms_mesh = 0;
   /// Time of Embree at the same error over the time of this method, by linear interpolation of
   /// logarithms; NaN where Embree was not measured around that error.
@@ -72,8 +72,10 @@ struct ReferenceNote {
   std::size_t receivers = 0;
   unsigned rays = 0;
   double occlusion_mean = 0, irradiance_mean = 0;
-  double occlusion_noise = 0, irradiance_noise = 0;  ///< RMS of the reference's own error, over its mean
-  double occlusion_floor = 0, irradiance_floor = 0;  ///< discs against mesh, RMS over the mean; NaN without one
+  double occlusion_noise = 0,
+         irradiance_noise = 0;  ///< RMS of the reference's own error, over its mean
+  double occlusion_floor = 0,
+         irradiance_floor = 0;  ///< discs against mesh, RMS over the mean; NaN without one
 };
 
 struct SceneAccuracy {
@@ -85,8 +87,10 @@ struct SceneAccuracy {
 };
 
 /// Measures all methods that were asked for in turn, as often as asked, in one process.
-/// @throws DataError when the scene has nothing to measure: no receiver, or no mesh for embree-mesh alone
-[[nodiscard]] SceneAccuracy measure_accuracy(const BenchScene& scene, const AccuracyOptions& options,
+/// @throws DataError when the scene has nothing to measure: no receiver, or no mesh for embree-mesh
+/// alone
+[[nodiscard]] SceneAccuracy measure_accuracy(const BenchScene& scene,
+                                             const AccuracyOptions& options,
                                              const Executor& executor, Progress& progress);
 
 }  // namespace ptc::bench

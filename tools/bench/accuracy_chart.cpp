@@ -29,10 +29,16 @@ const std::array<Measure, 4>& measures() {
        {"irradiance", "RMS error, % of the mean", Quantity::bleeding,
         [](const AccuracyRow& r) { return 100 * r.irradiance.rms; },
         [](const ReferenceNote& n) { return 100 * n.irradiance_noise; }},
-       {"irradiance, worst 1 %", "99th percentile of errors, % of the mean", Quantity::bleeding,
+       {"irradiance, worst 1 %",
+        "99th percentile of errors, % of the mean",
+        Quantity::bleeding,
         [](const AccuracyRow& r) { return 100 * r.irradiance.percentile_99; },
         {}},
-       {"lit picture", "mean FLIP", Quantity::bleeding, [](const AccuracyRow& r) { return r.flip; }, {}}}};
+       {"lit picture",
+        "mean FLIP",
+        Quantity::bleeding,
+        [](const AccuracyRow& r) { return r.flip; },
+        {}}}};
   return all;
 }
 
@@ -47,7 +53,9 @@ std::vector<ChartPanel> panels_of(const SceneAccuracy& scene, const ReferenceNot
                                   const std::string& title, std::span<const Measure> shown) {
   std::vector<ChartPanel> panels;
   for (const Measure& measure : shown) {
-    ChartPanel panel{.title = title + measure.title, .x_label = "CPU time per receiver, \u00b5s", .y_label = measure.label};
+    ChartPanel panel{.title = title + measure.title,
+                     .x_label = "CPU time per receiver, \u00b5s",
+                     .y_label = measure.label};
     for (const char* method : kMethods) {
       ChartSeries series{.name = legend_name(method)};
       for (const AccuracyRow& row : scene.rows) {
@@ -75,20 +83,24 @@ void append(Chart& chart, const std::vector<ChartPanel>& panels) {
 }
 
 std::string percent(double share) {
-  return std::isfinite(share) ? fmt::format("{:.2g} %", 100 * share) : std::string("an unknown share");
+  return std::isfinite(share) ? fmt::format("{:.2g} %", 100 * share)
+                              : std::string("an unknown share");
 }
 
 constexpr char kReading[] =
-    "Markers: median of all runs; bars: the fastest and the slowest. Beside them: solid angle in sr of PTCX and of the "
+    "Markers: median of all runs; bars: the fastest and the slowest. Beside them: solid angle in "
+    "sr of PTCX and of the "
     "plain gather, rays of Embree.\n";
 
 }  // namespace
 
 std::string note_text(const ReferenceNote& note, const SceneAccuracy& scene) {
   std::string text = fmt::format(
-      "{}, {}: {} surfels; errors at {} receivers against {} rays each at the same model, which are off by {} of the mean "
+      "{}, {}: {} surfels; errors at {} receivers against {} rays each at the same model, which "
+      "are off by {} of the mean "
       "occlusion",
-      note.scene, note.set, scene.surfels, note.receivers, note.rays, percent(note.occlusion_noise));
+      note.scene, note.set, scene.surfels, note.receivers, note.rays,
+      percent(note.occlusion_noise));
   const bool light = note.irradiance_mean > 0;
   if (light) text += fmt::format(" and {} of the mean irradiance", percent(note.irradiance_noise));
   text += ".";

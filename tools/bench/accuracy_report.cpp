@@ -68,24 +68,29 @@ nlohmann::ordered_json facts_of(const std::vector<SceneAccuracy>& scenes) {
   return {{"rows", rows}, {"references", references}};
 }
 
-void write_reports(const std::filesystem::path& directory, const std::vector<SceneAccuracy>& scenes) {
+void write_reports(const std::filesystem::path& directory,
+                   const std::vector<SceneAccuracy>& scenes) {
   const Json facts = facts_of(scenes);
   write_tables(directory / "accuracy", facts);
-  for (const SceneAccuracy& scene : scenes) write_figures(directory / ("accuracy-" + scene.name()), chart_of(scene));
+  for (const SceneAccuracy& scene : scenes)
+    write_figures(directory / ("accuracy-" + scene.name()), chart_of(scene));
   write_figures(directory / "accuracy", chart_of(scenes));
 }
 
 std::string accuracy_text(const std::vector<SceneAccuracy>& scenes) {
-  std::string text = fmt::format("{:<10} {:<7} {:<10} {:<32} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "scene", "set", "job",
-                                 "setting", "us", "RMS %", "bias %", "p99 %", "FLIP", "x discs", "x mesh");
+  std::string text = fmt::format(
+      "{:<10} {:<7} {:<10} {:<32} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "scene", "set",
+      "job", "setting", "us", "RMS %", "bias %", "p99 %", "FLIP", "x discs", "x mesh");
   for (const SceneAccuracy& scene : scenes) {
     for (const AccuracyRow& row : scene.rows) {
       const ErrorStatistics& e = row.error();
-      text += fmt::format("{:<10} {:<7} {:<10} {:<32} {:>9.1f} {:>8.2f} {:>+8.2f} {:>8.1f} {:>8} {:>8} {:>8}\n", row.scene, row.set,
-                          name_of(row.job), row.method == "ptcx" ? row.setting : row.method + ", " + row.setting,
-                          row.us_per_receiver.median, 100 * e.rms, 100 * e.bias, 100 * e.percentile_99,
-                          or_dash(row.flip, "{:.4f}"), or_dash(row.speedup_discs, "{:.1f}x"),
-                          or_dash(row.speedup_mesh, "{:.1f}x"));
+      text += fmt::format(
+          "{:<10} {:<7} {:<10} {:<32} {:>9.1f} {:>8.2f} {:>+8.2f} {:>8.1f} {:>8} {:>8} {:>8}\n",
+          row.scene, row.set, name_of(row.job),
+          row.method == "ptcx" ? row.setting : row.method + ", " + row.setting,
+          row.us_per_receiver.median, 100 * e.rms, 100 * e.bias, 100 * e.percentile_99,
+          or_dash(row.flip, "{:.4f}"), or_dash(row.speedup_discs, "{:.1f}x"),
+          or_dash(row.speedup_mesh, "{:.1f}x"));
     }
     for (const ReferenceNote& note : scene.references) text += note_text(note, scene) + "\n";
   }

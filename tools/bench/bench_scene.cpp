@@ -35,7 +35,8 @@ std::string plain_name(const std::filesystem::path& file) {
 using Hits = std::vector<std::optional<PrimaryHit>>;
 
 /// Receivers where pixels see something, and the window in their middle.
-ReceiverSet camera_set(const Hits& hits, unsigned width, unsigned height, const SceneOptions& options) {
+ReceiverSet camera_set(const Hits& hits, unsigned width, unsigned height,
+                       const SceneOptions& options) {
   ReceiverSet set{.name = "camera",
                   .window_width = std::min(options.window_width, width),
                   .window_height = std::min(options.window_height, height)};
@@ -47,9 +48,11 @@ ReceiverSet camera_set(const Hits& hits, unsigned width, unsigned height, const 
       if (inside) set.window.push_back({.receiver = ReceiverSet::kNone});
       if (!hit) continue;
       if (inside) {
-        set.window.back() = {.receiver = set.receivers.size(), .albedo = hit->albedo, .direct = hit->direct};
+        set.window.back() = {
+            .receiver = set.receivers.size(), .albedo = hit->albedo, .direct = hit->direct};
       }
-      set.receivers.push_back({hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
+      set.receivers.push_back(
+          {hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
     }
   }
   return set;
@@ -90,8 +93,9 @@ std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts) {
   return choices;
 }
 
-LitScene build_scene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& target,
-                     const RunOptions& run, Progress& progress) {
+LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
+                     const std::filesystem::path& target, const RunOptions& run,
+                     Progress& progress) {
   BuildRequest request{.backdrop = choice.backdrop, .profile = options.profile, .run = run};
   request.sampling.count = options.points;
   request.tree.levels_per_stream = options.levels_per_stream;
@@ -103,7 +107,7 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options, con
     request.city_points = options.points;
     if (options.rays) lit.mesh = city_mesh(options.points);
   } else if (procedural) {
-    lit = choice.layers > 0           ? make_layers(choice.layers)
+    lit = choice.layers > 0          ? make_layers(choice.layers)
           : choice.name == "fractal" ? make_fractal(options.points)
                                      : make_window_room();
     request.lights = lit.lights;
@@ -116,15 +120,16 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options, con
   const ContainerReader container(target);
   lit.lights = recorded_lights(container);
   if (!procedural) {
-    lit.camera = default_camera(container, cameras, choice.backdrop, std::array{options.width, options.height});
+    lit.camera = default_camera(container, cameras, choice.backdrop,
+                                std::array{options.width, options.height});
   }
   lit.camera.width = options.width;
   lit.camera.height = options.height;
   return lit;
 }
 
-BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
-                       const RunOptions& run, Progress& progress)
+BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options,
+                       const std::filesystem::path& work, const RunOptions& run, Progress& progress)
     : name_(choice.name) {
   container_ = make_temporary(work, [&](const std::filesystem::path& path) {
     lit_ = build_scene(choice, options, path, run, progress);
@@ -135,9 +140,12 @@ BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options, c
   add_points(options);
 }
 
-double BenchScene::spacing() const { return surfel_spacing(*container_); }
+double BenchScene::spacing() const {
+  return surfel_spacing(*container_);
+}
 
-void BenchScene::add_camera(const SceneOptions& options, const Executor& executor, Progress& progress) {
+void BenchScene::add_camera(const SceneOptions& options, const Executor& executor,
+                            Progress& progress) {
   const Camera& camera = lit_.camera;
   std::optional<RayScene> rays;
   std::optional<DirectLight> light;
@@ -148,14 +156,16 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
     rays.emplace(lit_.mesh);
     light.emplace(*rays, lit_.lights);
     const auto radius = static_cast<float>(spacing() / std::numbers::sqrt2);
-    view = view_mesh(*rays, *light, {.sun_rays = 1, .area_rays = 4, .sky_rays = 0}, camera, 1, options.lift * radius);
+    view = view_mesh(*rays, *light, {.sun_rays = 1, .area_rays = 4, .sky_rays = 0}, camera, 1,
+                     options.lift * radius);
   }
   const unsigned width = std::min(options.shaded_width, camera.width);
   const unsigned height = std::min(options.shaded_height, camera.height);
   const unsigned left = (camera.width - width) / 2, top = (camera.height - height) / 2;
   Hits hits(std::size_t{width} * height);
   executor.for_each(height, [&](std::size_t y, unsigned) {
-    for (unsigned x = 0; x < width; ++x) hits[y * width + x] = view->at(left + x, top + static_cast<unsigned>(y));
+    for (unsigned x = 0; x < width; ++x)
+      hits[y * width + x] = view->at(left + x, top + static_cast<unsigned>(y));
   });
   sets_.push_back(camera_set(hits, width, height, options));
 }
@@ -165,7 +175,8 @@ void BenchScene::add_points(const SceneOptions& options) {
   ReceiverSet set{.name = "points"};
   const std::uint64_t points = container_->superblock().points;
   const std::size_t blocks = points / Shader::kBlock;
-  const std::size_t wanted = std::max<std::size_t>(1, std::min<std::size_t>(blocks, options.own_points / Shader::kBlock));
+  const std::size_t wanted =
+      std::max<std::size_t>(1, std::min<std::size_t>(blocks, options.own_points / Shader::kBlock));
   ContainerPoints all(*container_);
   std::vector<PointRecord> block(Shader::kBlock);
   std::size_t taken = 0;
@@ -174,7 +185,8 @@ void BenchScene::add_points(const SceneOptions& options) {
     if (blocks > 0 && at != blocks * taken / wanted) continue;
     ++taken;
     for (std::size_t i = 0; i < count; ++i) {
-      set.receivers.push_back(lifted(to_surfel(block[i], container_->header().frame), options.lift));
+      set.receivers.push_back(
+          lifted(to_surfel(block[i], container_->header().frame), options.lift));
     }
   }
   sets_.push_back(std::move(set));

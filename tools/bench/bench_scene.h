@@ -18,10 +18,10 @@ namespace ptc::bench {
 
 /// Which scene: "fractal", "window", "city", or a mesh's or cloud's file.
 struct SceneChoice {
-  std::string name;             ///< in charts and their files: the word, or the file's name without ending
-  std::filesystem::path file;   ///< empty for the words
-  bool backdrop = false;        ///< the mesh stands on a ground before a wall
-  unsigned layers = 0;          ///< of make_layers(), instead of a word or a file
+  std::string name;  ///< in charts and their files: the word, or the file's name without ending
+  std::filesystem::path file;  ///< empty for the words
+  bool backdrop = false;       ///< the mesh stands on a ground before a wall
+  unsigned layers = 0;         ///< of make_layers(), instead of a word or a file
 };
 /// @param text  a word, or a path with "+backdrop" appended where wanted
 /// @throws std::invalid_argument when a word has a backdrop, or there is neither word nor path
@@ -38,7 +38,7 @@ struct Pixel {
 
 /// Receivers of one kind.
 struct ReceiverSet {
-  std::string name;                  ///< "camera" or "points"
+  std::string name;  ///< "camera" or "points"
   std::vector<Receiver> receivers;
   /// Of the camera: a window in the middle of those pixels, row by row; receiver is kNone where
   /// nothing is seen.
@@ -48,31 +48,33 @@ struct ReceiverSet {
 };
 
 struct SceneOptions {
-  std::uint64_t points = 2'000'000;           ///< surfels wanted; clouds have as many as they have
-  unsigned width = 640, height = 360;         ///< of the camera's picture
-  unsigned shaded_width = 640, shaded_height = 360;  ///< in its middle, whose pixels are receivers; 0: none
-  unsigned window_width = 128, window_height = 72;   ///< in the middle of that, to compare pictures
-  std::uint64_t own_points = 100'000;         ///< of the scene's points as receivers, in runs
-  float lift = 0.15F;                         ///< as ShadeRequest::lift
-  bool rays = true;                           ///< surfels and mesh are loaded, which rays need
-  Profile profile = Profile::compact;         ///< of the container
-  int levels_per_stream = 1;                  ///< as TreeOptions::levels_per_stream
-  std::uint8_t page_shift = 16;               ///< as BuildRequest::page_shift
+  std::uint64_t points = 2'000'000;    ///< surfels wanted; clouds have as many as they have
+  unsigned width = 640, height = 360;  ///< of the camera's picture
+  unsigned shaded_width = 640,
+           shaded_height = 360;  ///< in its middle, whose pixels are receivers; 0: none
+  unsigned window_width = 128, window_height = 72;  ///< in the middle of that, to compare pictures
+  std::uint64_t own_points = 100'000;               ///< of the scene's points as receivers, in runs
+  float lift = 0.15F;                               ///< as ShadeRequest::lift
+  bool rays = true;                    ///< surfels and mesh are loaded, which rays need
+  Profile profile = Profile::compact;  ///< of the container
+  int levels_per_stream = 1;           ///< as TreeOptions::levels_per_stream
+  std::uint8_t page_shift = 16;        ///< as BuildRequest::page_shift
 };
 
 /// Builds a scene's container.
 /// @return  its mesh (empty for a cloud), the light and the camera that belong to it
 /// @throws DataError, std::system_error, std::invalid_argument as build_container()
 [[nodiscard]] LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
-                                   const std::filesystem::path& target, const RunOptions& run, Progress& progress);
+                                   const std::filesystem::path& target, const RunOptions& run,
+                                   Progress& progress);
 
 /// Builds the container, loads what rays need, finds the receivers.
 class BenchScene {
  public:
   /// @param work  a directory with room for the container, which has no name there once it is open
   /// @throws DataError, std::system_error, std::invalid_argument as build_container()
-  BenchScene(const SceneChoice& choice, const SceneOptions& options, const std::filesystem::path& work,
-             const RunOptions& run, Progress& progress);
+  BenchScene(const SceneChoice& choice, const SceneOptions& options,
+             const std::filesystem::path& work, const RunOptions& run, Progress& progress);
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const ContainerReader& container() const noexcept { return *container_; }

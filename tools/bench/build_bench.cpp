@@ -39,9 +39,15 @@ struct Built {
 
 class BuildRun {
  public:
-  BuildRun(const BuildBenchOptions& options, const std::filesystem::path& work, const RunOptions& run, Progress& progress,
+  BuildRun(const BuildBenchOptions& options, const std::filesystem::path& work,
+           const RunOptions& run, Progress& progress,
            const std::function<void(const std::vector<BuildRow>&)>& report)
-      : options_(options), work_(work), run_(run), executor_(run.threads), progress_(progress), report_(report) {}
+      : options_(options),
+        work_(work),
+        run_(run),
+        executor_(run.threads),
+        progress_(progress),
+        report_(report) {}
 
   std::vector<BuildRow> measure() {
     for (const std::uint64_t points : options_.points) {
@@ -57,8 +63,10 @@ class BuildRun {
 
  private:
   [[nodiscard]] Input make_input(std::uint64_t points) {
-    constexpr std::uint64_t kFiles = 3;  // input, what is spilled, container; a city has up to 5 % more points
-    require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20, fmt::format("{} records", points));
+    constexpr std::uint64_t kFiles =
+        3;  // input, what is spilled, container; a city has up to 5 % more points
+    require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20,
+                 fmt::format("{} records", points));
     Input input{.file = RecordFile(work_), .frame = {}, .sample = {}};
     RecordWriter writer(input.file);
     progress_.begin("write input", points, "records");
@@ -80,7 +88,8 @@ class BuildRun {
       for (const std::string& profile : options_.profiles) {
         auto& [times, built] = methods[profile];
         Built now;
-        times.run([&] { now = build(input, profile == "fast" ? Profile::fast : Profile::compact, cap); });
+        times.run(
+            [&] { now = build(input, profile == "fast" ? Profile::fast : Profile::compact, cap); });
         if (repeat == 0) require_right(input, profile, built = now);
         std::filesystem::remove(target_);
         progress_.advance(1);
@@ -103,11 +112,13 @@ class BuildRun {
       row.bytes_per_node = built.stored.per_node;
     }
     const Built& moved = methods.begin()->second.second;
-    add_row(panel, "floor", input, floor).moved_bytes = input.file.bytes() + 2 * moved.spilled + moved.file_bytes;
+    add_row(panel, "floor", input, floor).moved_bytes =
+        input.file.bytes() + 2 * moved.spilled + moved.file_bytes;
     if (report_) report_(rows_);
   }
 
-  BuildRow& add_row(const std::string& panel, const std::string& method, const Input& input, const TimedRuns& times) {
+  BuildRow& add_row(const std::string& panel, const std::string& method, const Input& input,
+                    const TimedRuns& times) {
     return rows_.emplace_back(BuildRow{.panel = panel,
                                        .method = method,
                                        .points = input.file.records(),
@@ -122,17 +133,23 @@ class BuildRun {
     Built built;
     RunOptions run = run_;
     run.memory_bytes = cap;
-    ExternalSorter sorter({.memory_bytes = memory_left(run, kBufferBytes, kLeastSort, "this build"), .temp_dirs = {work_}, .expected = input.file.records()},
+    ExternalSorter sorter({.memory_bytes = memory_left(run, kBufferBytes, kLeastSort, "this build"),
+                           .temp_dirs = {work_},
+                           .expected = input.file.records()},
                           executor_, input.sample);
     {
       RecordReader reader(input.file);
-      for (std::span<const PointRecord> block = reader.next(); !block.empty(); block = reader.next()) sorter.add(block);
+      for (std::span<const PointRecord> block = reader.next(); !block.empty();
+           block = reader.next())
+        sorter.add(block);
     }
     ContainerWriter writer(target_, {.codec = codec_of(profile), .frame = input.frame});
     const std::unique_ptr<PointStream> sorted = sorter.finish();
-    const std::unique_ptr<PointStream> rounded = round_points(*sorted, input.frame.unit(), executor_);
+    const std::unique_ptr<PointStream> rounded =
+        round_points(*sorted, input.frame.unit(), executor_);
     Progress silent;
-    const Superblock superblock = writer.finish({}, build_pages(*rounded, writer, {}, executor_, silent));
+    const Superblock superblock =
+        writer.finish({}, build_pages(*rounded, writer, {}, executor_, silent));
     built.spilled = sorter.statistics().spilled_bytes;
     built.file_bytes = superblock.file_bytes;
     built.nodes = superblock.nodes;
@@ -142,13 +159,18 @@ class BuildRun {
 
   /// Sound, and the same as under other caps. Adds what pages take.
   void require_right(const Input& input, const std::string& profile, Built& built) {
-    const VerifyLevel level = input.file.records() <= kVerifiedWhole ? VerifyLevel::rebuild : VerifyLevel::payload;
+    const VerifyLevel level =
+        input.file.records() <= kVerifiedWhole ? VerifyLevel::rebuild : VerifyLevel::payload;
     Progress silent;
-    const VerifyReport report = verify_container(target_, {.level = level, .threads = run_.threads}, silent);
+    const VerifyReport report =
+        verify_container(target_, {.level = level, .threads = run_.threads}, silent);
     if (!report.sound()) throw DataError(fmt::format("{}: the container is not sound", profile));
-    if (report.points != input.file.records()) throw DataError(fmt::format("{}: points were lost", profile));
-    const auto [known, is_new] = contents_.try_emplace({input.file.records(), profile}, built.content);
-    if (known->second != built.content) throw DataError(fmt::format("{}: another cap gave another container", profile));
+    if (report.points != input.file.records())
+      throw DataError(fmt::format("{}: points were lost", profile));
+    const auto [known, is_new] =
+        contents_.try_emplace({input.file.records(), profile}, built.content);
+    if (known->second != built.content)
+      throw DataError(fmt::format("{}: another cap gave another container", profile));
 
     built.stored = stored_bytes(ContainerReader(target_));
   }
@@ -167,8 +189,9 @@ class BuildRun {
 
 }  // namespace
 
-std::vector<BuildRow> measure_build(const BuildBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
-                                    Progress& progress, const std::function<void(const std::vector<BuildRow>&)>& report) {
+std::vector<BuildRow> measure_build(
+    const BuildBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
+    Progress& progress, const std::function<void(const std::vector<BuildRow>&)>& report) {
   return BuildRun(options, work, run, progress, report).measure();
 }
 

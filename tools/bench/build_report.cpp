@@ -13,20 +13,28 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr char kReading[] =
-    "City, from a file of unsorted records of 40 bytes to a published container; medians of all runs, input and spilled records past the "
-    "system's cache. compact: zstd, fast: LZ4. The floor is the time in which the same disk moves the bytes of the first of them with "
-    "nothing done to them: input read, what is spilled written and read, as much as the container written.\n";
+    "City, from a file of unsorted records of 40 bytes to a published container; medians of all "
+    "runs, input and spilled records past the "
+    "system's cache. compact: zstd, fast: LZ4. The floor is the time in which the same disk moves "
+    "the bytes of the first of them with "
+    "nothing done to them: input read, what is spilled written and read, as much as the container "
+    "written.\n";
 
-double ns(double seconds, const BuildRow& row) { return 1e9 * seconds / static_cast<double>(row.points); }
+double ns(double seconds, const BuildRow& row) {
+  return 1e9 * seconds / static_cast<double>(row.points);
+}
 
 double floor_share(const std::vector<BuildRow>& rows, const BuildRow& row) {
   if (row.method == "floor") return std::nan("");
-  const auto from = rows.begin() + (&row - rows.data());  // the floor follows the methods of its size and cap
+  const auto from =
+      rows.begin() + (&row - rows.data());  // the floor follows the methods of its size and cap
   const auto found = std::ranges::find(from, rows.end(), "floor", &BuildRow::method);
   return found == rows.end() ? std::nan("") : found->wall.median / row.wall.median;
 }
 
-double moved_share(const BuildRow& row) { return static_cast<double>(row.moved_bytes) / static_cast<double>(row.input_bytes); }
+double moved_share(const BuildRow& row) {
+  return static_cast<double>(row.moved_bytes) / static_cast<double>(row.input_bytes);
+}
 
 Json row_facts(const std::vector<BuildRow>& rows, const BuildRow& row) {
   Json facts{{"panel", row.panel},
@@ -46,14 +54,17 @@ Json row_facts(const std::vector<BuildRow>& rows, const BuildRow& row) {
   return facts;
 }
 
-double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / 1048576; }
+double mebibytes(std::uint64_t bytes) {
+  return static_cast<double>(bytes) / 1048576;
+}
 
 /// A line for each method of a panel; over points or, of the panel "cap", over the cap.
 /// @param floor  whether it has a line
-ChartPanel panel_of(const std::vector<BuildRow>& rows, const std::string& name, const char* title, const char* y_label,
-                    bool floor, double (*value)(const BuildRow&)) {
+ChartPanel panel_of(const std::vector<BuildRow>& rows, const std::string& name, const char* title,
+                    const char* y_label, bool floor, double (*value)(const BuildRow&)) {
   const bool caps = name == "cap";
-  ChartPanel panel{.title = title, .x_label = caps ? "memory cap, MiB" : "points", .y_label = y_label};
+  ChartPanel panel{
+      .title = title, .x_label = caps ? "memory cap, MiB" : "points", .y_label = y_label};
   for (const BuildRow& row : rows) {
     if (row.panel != name || (row.method == "floor" && !floor)) continue;
     const double x = caps ? mebibytes(row.memory_bytes) : static_cast<double>(row.points);
@@ -73,7 +84,8 @@ Json facts_of(const std::vector<BuildRow>& rows) {
 Chart chart_of(const std::vector<BuildRow>& rows) {
   Chart chart{.title = "Sort and build", .note = kReading, .columns = 2};
   const auto wall = [](const BuildRow& row) { return ns(row.wall.median, row); };
-  const auto add = [&](const char* panel, const char* title, const char* y_label, bool floor, double (*value)(const BuildRow&)) {
+  const auto add = [&](const char* panel, const char* title, const char* y_label, bool floor,
+                       double (*value)(const BuildRow&)) {
     ChartPanel drawn = panel_of(rows, panel, title, y_label, floor, value);
     if (!drawn.series.empty()) chart.panels.push_back(std::move(drawn));
   };
@@ -82,7 +94,8 @@ Chart chart_of(const std::vector<BuildRow>& rows) {
     return static_cast<double>(row.moved_bytes) / static_cast<double>(row.points);
   });
   add("cap", "Time and memory", "wall time per point, ns", false, wall);
-  add("cap", "Memory", "most resident, MiB", false, [](const BuildRow& row) { return mebibytes(row.resident_bytes); });
+  add("cap", "Memory", "most resident, MiB", false,
+      [](const BuildRow& row) { return mebibytes(row.resident_bytes); });
   return chart;
 }
 
@@ -92,15 +105,19 @@ void write_reports(const std::filesystem::path& directory, const std::vector<Bui
 }
 
 std::string build_text(const std::vector<BuildRow>& rows) {
-  std::string text = fmt::format("{:<7} {:<8} {:>10} {:>3} {:>8} {:>8} {:>18} {:>8} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8}\n", "panel", "method",
-                                 "points", "thr", "cap MiB", "wall s", "[low, high]", "cpu ns", "moved GB", "x input", "MiB", "B/point",
-                                 "B/node", "floor %");
+  std::string text = fmt::format(
+      "{:<7} {:<8} {:>10} {:>3} {:>8} {:>8} {:>18} {:>8} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8}\n",
+      "panel", "method", "points", "thr", "cap MiB", "wall s", "[low, high]", "cpu ns", "moved GB",
+      "x input", "MiB", "B/point", "B/node", "floor %");
   for (const BuildRow& row : rows) {
-    text += fmt::format("{:<7} {:<8} {:>10} {:>3} {:>8.0f} {:>8.3f} {:>18} {:>8.1f} {:>9.2f} {:>7.2f} {:>8.0f} {:>8.2f} {:>8.2f} {:>8}\n",
-                        row.panel, row.method, row.points, row.threads, mebibytes(row.memory_bytes), row.wall.median,
-                        fmt::format("[{:.3f}, {:.3f}]", row.wall.low, row.wall.high), ns(row.cpu.median, row),
-                        static_cast<double>(row.moved_bytes) / 1e9, moved_share(row), mebibytes(row.resident_bytes), row.bytes_per_point,
-                        row.bytes_per_node, or_dash(100 * floor_share(rows, row), "{:.0f}"));
+    text += fmt::format(
+        "{:<7} {:<8} {:>10} {:>3} {:>8.0f} {:>8.3f} {:>18} {:>8.1f} {:>9.2f} {:>7.2f} {:>8.0f} "
+        "{:>8.2f} {:>8.2f} {:>8}\n",
+        row.panel, row.method, row.points, row.threads, mebibytes(row.memory_bytes),
+        row.wall.median, fmt::format("[{:.3f}, {:.3f}]", row.wall.low, row.wall.high),
+        ns(row.cpu.median, row), static_cast<double>(row.moved_bytes) / 1e9, moved_share(row),
+        mebibytes(row.resident_bytes), row.bytes_per_point, row.bytes_per_node,
+        or_dash(100 * floor_share(rows, row), "{:.0f}"));
   }
   return text;
 }

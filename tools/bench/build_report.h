@@ -12,8 +12,8 @@
 
 namespace ptc::bench {
 
-/// {"rows": [...]}: a BuildRow each, with nanoseconds of a point, `moved_share`, bytes moved over those of the input, and
-/// `floor_share`, the floor's wall time over that of the build.
+/// {"rows": [...]}: a BuildRow each, with nanoseconds of a point, `moved_share`, bytes moved over
+/// those of the input, and `floor_share`, the floor's wall time over that of the build.
 [[nodiscard]] nlohmann::ordered_json facts_of(const std::vector<BuildRow>& rows);
 [[nodiscard]] std::string build_text(const std::vector<BuildRow>& rows);
 [[nodiscard]] Chart chart_of(const std::vector<BuildRow>& rows);

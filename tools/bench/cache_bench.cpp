@@ -30,7 +30,8 @@ bool same(const std::vector<Shading>& a, const std::vector<Shading>& b) {
   return std::memcmp(a.data(), b.data(), a.size() * sizeof(Shading)) == 0;
 }
 
-/// Shades the scene's points with a cache of some frames that is empty at first, as is the system's.
+/// Shades the scene's points with a cache of some frames that is empty at first, as is the
+/// system's.
 class ShadeRun {
  public:
   struct Way {
@@ -50,27 +51,31 @@ class ShadeRun {
         results_(receivers_.size()) {
     const auto wanted = static_cast<std::uint64_t>(std::ceil(cap * scene.container().page_count()));
     const std::uint64_t frames = std::max<std::uint64_t>(wanted, 2 * threads);
-    cache_options_ = {.memory_bytes = PageCache::bytes_for(scene.container(), threads, frames, way.back_end),
-                      .threads = threads,
-                      .back_end = way.back_end,
-                      .replacement = way.replacement,
-                      .read_ahead = way.read_ahead};
+    cache_options_ = {
+        .memory_bytes = PageCache::bytes_for(scene.container(), threads, frames, way.back_end),
+        .threads = threads,
+        .back_end = way.back_end,
+        .replacement = way.replacement,
+        .read_ahead = way.read_ahead};
     if (way.shuffled) std::ranges::shuffle(receivers_, std::mt19937_64(1));
   }
 
   void run() {
     forget(scene_.container().file());
     PageCache cache(scene_.container(), cache_options_);
-    const Executor executor(threads_);  // of this run alone: the least of all there are limits the others
+    const Executor executor(
+        threads_);  // of this run alone: the least of all there are limits the others
     const std::uint64_t before = disk_bytes();
     times_.run([&] {
       Shader shader(scene_.container(), {.cache = &cache}, executor);
       Progress silent;
-      // A call shades its receivers in the order of the Z-curve: each block of a shuffled set is a call of its own.
+      // A call shades its receivers in the order of the Z-curve: each block of a shuffled set is a
+      // call of its own.
       const std::size_t step = way_.shuffled ? Shader::kBlock : receivers_.size();
       for (std::size_t at = 0; at < receivers_.size(); at += step) {
         const std::size_t count = std::min(step, receivers_.size() - at);
-        shader.shade(std::span(receivers_).subspan(at, count), std::span(results_).subspan(at, count), silent);
+        shader.shade(std::span(receivers_).subspan(at, count),
+                     std::span(results_).subspan(at, count), silent);
       }
       statistics_ = shader.cache_statistics();
     });
@@ -117,12 +122,15 @@ class HitRun {
   static constexpr std::uint32_t kPages = 256;
   static constexpr std::size_t kLookups = 4'000'000;
 
-  /// @param slots  of a reader's own level: kPages, so that it has all of them, or 1, so that it has none
-  HitRun(const ContainerReader& container, const std::string& method, Replacement replacement, std::uint32_t slots, unsigned threads)
+  /// @param slots  of a reader's own level: kPages, so that it has all of them, or 1, so that it
+  /// has none
+  HitRun(const ContainerReader& container, const std::string& method, Replacement replacement,
+         std::uint32_t slots, unsigned threads)
       : method_(method),
         threads_(threads),
         pages_(std::min(kPages, container.page_count())),
-        cache_(container, {.memory_bytes = PageCache::bytes_for(container, threads, std::max(pages_, 2 * slots * threads)),
+        cache_(container, {.memory_bytes = PageCache::bytes_for(
+                               container, threads, std::max(pages_, 2 * slots * threads)),
                            .threads = threads,
                            .replacement = replacement,
                            .local_slots = slots}) {
@@ -134,7 +142,8 @@ class HitRun {
       last = page;
     }
     PageReader reader(cache_);
-    for (std::uint32_t page = 0; page < pages_; ++page) payloads_.push_back(reader.get(page).payload);
+    for (std::uint32_t page = 0; page < pages_; ++page)
+      payloads_.push_back(reader.get(page).payload);
     for (const std::uint32_t page : sequence_) expected_ += static_cast<unsigned>(*payloads_[page]);
   }
 
@@ -144,11 +153,13 @@ class HitRun {
     times_.run([&] {
       std::vector<std::jthread> running;
       for (unsigned thread = 0; thread < threads_; ++thread) {
-        running.emplace_back([&, thread] { sums[thread] = pointers ? sum_by_pointers() : sum_by_reader(); });
+        running.emplace_back(
+            [&, thread] { sums[thread] = pointers ? sum_by_pointers() : sum_by_reader(); });
       }
     });
     for (const std::uint64_t sum : sums) {
-      if (sum != expected_) throw DataError(method_ + ": a lookup brought other bytes than the page's");
+      if (sum != expected_)
+        throw DataError(method_ + ": a lookup brought other bytes than the page's");
     }
   }
 
@@ -178,7 +189,8 @@ class HitRun {
   [[nodiscard]] std::uint64_t sum_by_reader() {
     PageReader reader(cache_);
     std::uint64_t sum = 0;
-    for (const std::uint32_t page : sequence_) sum += static_cast<unsigned>(*reader.get(page).payload);
+    for (const std::uint32_t page : sequence_)
+      sum += static_cast<unsigned>(*reader.get(page).payload);
     return sum;
   }
 
@@ -194,7 +206,8 @@ class HitRun {
 
 class CacheRun {
  public:
-  CacheRun(const CacheBenchOptions& options, const std::filesystem::path& work, const RunOptions& run, Progress& progress,
+  CacheRun(const CacheBenchOptions& options, const std::filesystem::path& work,
+           const RunOptions& run, Progress& progress,
            const std::function<void(const std::vector<CacheRow>&)>& report)
       : options_(options),
         work_(work),
@@ -210,27 +223,35 @@ class CacheRun {
       if (wants("back-end")) measure_back_ends(scene);
       if (wants("threads")) measure_threads(scene);
       if (wants("receivers")) {
-        shade_under_caps("receivers", scene, {{.name = "Z-curve"}, {.name = "no order", .shuffled = true}}, {threads_}, 1);
+        shade_under_caps("receivers", scene,
+                         {{.name = "Z-curve"}, {.name = "no order", .shuffled = true}}, {threads_},
+                         1);
       }
     }
     if (wants("pages")) {
-      for (const auto& [name, levels] : {std::pair("a stream a level", 1), {"subtrees", 3}, {"depth-first", kLatticeBits}}) {
+      for (const auto& [name, levels] :
+           {std::pair("a stream a level", 1), {"subtrees", 3}, {"depth-first", kLatticeBits}}) {
         shade_under_caps("pages", make_scene(levels, 16), {{.name = name}}, {1}, 1);
       }
     }
     if (wants("sizes")) {
-      for (const auto& [name, shift] : {std::pair("16 KiB", 14), {"64 KiB", 16}, {"256 KiB", 18}, {"1 MiB", 20}}) {
-        shade_under_caps("sizes", make_scene(1, static_cast<std::uint8_t>(shift)), {{.name = name}}, {1}, 1);
+      for (const auto& [name, shift] :
+           {std::pair("16 KiB", 14), {"64 KiB", 16}, {"256 KiB", 18}, {"1 MiB", 20}}) {
+        shade_under_caps("sizes", make_scene(1, static_cast<std::uint8_t>(shift)), {{.name = name}},
+                         {1}, 1);
       }
     }
     return std::move(rows_);
   }
 
  private:
-  [[nodiscard]] bool wants(const char* panel) const { return std::ranges::find(options_.panels, panel) != options_.panels.end(); }
+  [[nodiscard]] bool wants(const char* panel) const {
+    return std::ranges::find(options_.panels, panel) != options_.panels.end();
+  }
 
   [[nodiscard]] BenchScene make_scene(int levels_per_stream, std::uint8_t page_shift) {
-    require_room({&work_, 1}, build_disk_bytes(options_.points), fmt::format("{} surfels", options_.points));
+    require_room({&work_, 1}, build_disk_bytes(options_.points),
+                 fmt::format("{} surfels", options_.points));
     const SceneOptions scene{.points = options_.points,
                              .shaded_width = 0,
                              .own_points = options_.receivers,
@@ -271,7 +292,8 @@ class CacheRun {
       ways.push_back({.name = "direct", .back_end = BackEnd::direct});
       static_cast<void>(make_page_source(BackEnd::io_uring, scene.container().file(), 4096));
       ways.push_back({.name = "io_uring", .back_end = BackEnd::io_uring});
-      ways.push_back({.name = "io_uring, no read-ahead", .back_end = BackEnd::io_uring, .read_ahead = false});
+      ways.push_back(
+          {.name = "io_uring, no read-ahead", .back_end = BackEnd::io_uring, .read_ahead = false});
     } catch (const std::system_error&) {  // then there is no row of it
     }
     shade_under_caps("back-end", scene, ways, thread_counts(threads_), options_.repeats);
@@ -280,26 +302,31 @@ class CacheRun {
   void measure_threads(const BenchScene& scene) {
     std::vector<std::unique_ptr<ShadeRun>> runs;
     for (const unsigned threads : options_.threads) {
-      if (threads > 1 && threads * Shader::kBlock > options_.receivers) break;  // a block has one thread
-      for (const auto& way : {ShadeRun::Way{.name = "clock"}, {.name = "LRU", .replacement = Replacement::lru}}) {
+      if (threads > 1 && threads * Shader::kBlock > options_.receivers)
+        break;  // a block has one thread
+      for (const auto& way :
+           {ShadeRun::Way{.name = "clock"}, {.name = "LRU", .replacement = Replacement::lru}}) {
         runs.push_back(std::make_unique<ShadeRun>(scene, way, options_.middle_cap, threads));
       }
     }
     shade("threads", runs, options_.repeats);
   }
 
-  void shade_under_caps(const std::string& panel, const BenchScene& scene, const std::vector<ShadeRun::Way>& ways,
+  void shade_under_caps(const std::string& panel, const BenchScene& scene,
+                        const std::vector<ShadeRun::Way>& ways,
                         const std::vector<unsigned>& threads, unsigned repeats) {
     std::vector<std::unique_ptr<ShadeRun>> runs;
     for (const unsigned count : threads) {
       for (const double cap : options_.caps) {
-        for (const ShadeRun::Way& way : ways) runs.push_back(std::make_unique<ShadeRun>(scene, way, cap, count));
+        for (const ShadeRun::Way& way : ways)
+          runs.push_back(std::make_unique<ShadeRun>(scene, way, cap, count));
       }
     }
     shade(panel, runs, repeats);
   }
 
-  void shade(const std::string& panel, const std::vector<std::unique_ptr<ShadeRun>>& runs, unsigned repeats) {
+  void shade(const std::string& panel, const std::vector<std::unique_ptr<ShadeRun>>& runs,
+             unsigned repeats) {
     progress_.begin("shade, " + panel, repeats * runs.size(), "runs");
     for (unsigned repeat = 0; repeat < repeats; ++repeat) {
       for (const auto& run : runs) {
@@ -309,7 +336,8 @@ class CacheRun {
     }
     progress_.end();
     for (const auto& run : runs) {
-      const auto& first = *std::ranges::find_if(runs, [&](const auto& r) { return r->way().shuffled == run->way().shuffled; });
+      const auto& first = *std::ranges::find_if(
+          runs, [&](const auto& r) { return r->way().shuffled == run->way().shuffled; });
       if (!same(first->results(), run->results())) {
         throw DataError(panel + ", " + run->way().name + ": other values than with other caps");
       }
@@ -328,8 +356,9 @@ class CacheRun {
 
 }  // namespace
 
-std::vector<CacheRow> measure_cache(const CacheBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
-                                    Progress& progress, const std::function<void(const std::vector<CacheRow>&)>& report) {
+std::vector<CacheRow> measure_cache(
+    const CacheBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
+    Progress& progress, const std::function<void(const std::vector<CacheRow>&)>& report) {
   return CacheRun(options, work, run, progress, report).measure();
 }
 

@@ -12,8 +12,8 @@
 
 namespace ptc::bench {
 
-/// {"rows": [...]}: a CacheRow each, with nanoseconds of a receiver (of a lookup in "hits"), and `in_core_share`, its wall
-/// time over that with a frame for each page.
+/// {"rows": [...]}: a CacheRow each, with nanoseconds of a receiver (of a lookup in "hits"), and
+/// `in_core_share`, its wall time over that with a frame for each page.
 [[nodiscard]] nlohmann::ordered_json facts_of(const std::vector<CacheRow>& rows);
 [[nodiscard]] std::string cache_text(const std::vector<CacheRow>& rows);
 [[nodiscard]] Chart chart_of(const std::vector<CacheRow>& rows);

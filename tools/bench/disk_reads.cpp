@@ -16,6 +16,8 @@ std::uint64_t disk_bytes() {
   return 0;
 }
 
-void forget(const InputFile& file) { ::posix_fadvise(file.descriptor(), 0, 0, POSIX_FADV_DONTNEED); }
+void forget(const InputFile& file) {
+  ::posix_fadvise(file.descriptor(), 0, 0, POSIX_FADV_DONTNEED);
+}
 
 }  // namespace ptc::bench

@@ -45,12 +45,15 @@ std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, 
   const std::span<const std::uint32_t> pages = container.point_pages();
   const std::size_t per_page = std::max(1U, container.superblock().points_per_page);
   const std::size_t pages_of_block = (Shader::kBlock + per_page - 1) / per_page;
-  const std::size_t count = std::min<std::size_t>(wanted, std::max<std::size_t>(1, pages.size() / pages_of_block));
+  const std::size_t count =
+      std::min<std::size_t>(wanted, std::max<std::size_t>(1, pages.size() / pages_of_block));
   std::vector<Pilot> blocks(pages.empty() ? 0 : count);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const std::size_t first = (pages.size() - std::min(pages.size(), pages_of_block)) * i / std::max<std::size_t>(1, count - 1);
+    const std::size_t first = (pages.size() - std::min(pages.size(), pages_of_block)) * i /
+                              std::max<std::size_t>(1, count - 1);
     std::vector<Surfel> surfels;
-    append_surfels(container, pages.subspan(first, std::min(pages_of_block, pages.size() - first)), surfels);
+    append_surfels(container, pages.subspan(first, std::min(pages_of_block, pages.size() - first)),
+                   surfels);
     surfels.resize(std::min(surfels.size(), Shader::kBlock));
     for (const Surfel& s : surfels) blocks[i].receivers.push_back(lifted(s, lift));
   }
@@ -73,30 +76,36 @@ double SceneErrors::slope() const {
   return (n * xy - x * y) / (n * xx - x * x);
 }
 
-SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options, const std::filesystem::path& work,
-                           const RunOptions& run, Progress& progress) {
+SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,
+                           const std::filesystem::path& work, const RunOptions& run,
+                           Progress& progress) {
   const WorkFile scene(work, ".ptcx"), points(work, ".ply"), picture(work, ".exr");
   const LitScene lit = build_scene(choice, options.scene, scene.path(), run, progress);
   const CheckRequest check{.receivers = options.checked, .rays = options.rays};
   ShadeRequest shade{.scene = scene.path(), .lift = options.scene.lift, .check = check, .run = run};
-  RenderRequest render{.scene = scene.path(),
-                       .mesh = lit.mesh.triangles.empty() ? nullptr : std::make_shared<const Mesh>(lit.mesh),
-                       .camera = lit.camera,
-                       .samples = 1,
-                       .lift = options.scene.lift,
-                       .check = check,
-                       .run = run};
+  RenderRequest render{
+      .scene = scene.path(),
+      .mesh = lit.mesh.triangles.empty() ? nullptr : std::make_shared<const Mesh>(lit.mesh),
+      .camera = lit.camera,
+      .samples = 1,
+      .lift = options.scene.lift,
+      .check = check,
+      .run = run};
   const PictureTarget target{.path = picture.path()};
   SceneErrors errors{.name = choice.name};
   for (const double asked : options.asked) {
     shade.error = render.error = asked;
-    errors.rows.push_back(row_of(choice.name, "points", shade_container(shade, points.path(), progress)));
-    errors.rows.push_back(row_of(choice.name, "camera", render_picture(render, std::span(&target, 1), progress)));
+    errors.rows.push_back(
+        row_of(choice.name, "points", shade_container(shade, points.path(), progress)));
+    errors.rows.push_back(
+        row_of(choice.name, "camera", render_picture(render, std::span(&target, 1), progress)));
   }
   const ContainerReader container(scene.path());
   const Executor executor(run.threads);
   errors.surfels = container.superblock().points;
-  const ShadeOptions settings{.cache_bytes = cache_bytes_left(run, kBufferBytes, container, executor.threads(), BackEnd::pread, "the ladder")};
+  const ShadeOptions settings{.cache_bytes =
+                                  cache_bytes_left(run, kBufferBytes, container, executor.threads(),
+                                                   BackEnd::pread, "the ladder")};
   const std::vector<Pilot> blocks = blocks_of(container, options.climbed, options.scene.lift);
   progress.begin(choice.name + ", the ladder", 0, "receivers");
   errors.rungs = climb(container, settings, blocks, options.rays / 2, executor, progress);

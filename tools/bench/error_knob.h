@@ -15,9 +15,9 @@ namespace ptc::bench {
 struct ErrorOptions {
   SceneOptions scene;
   std::vector<double> asked{0.1, 0.05, 0.03, 0.02};  ///< shares
-  unsigned checked = 1000;                           ///< receivers of each run that are compared with rays
-  unsigned rays = 8192;                              ///< for each of them
-  unsigned climbed = 64;                             ///< blocks of points that every setting shades
+  unsigned checked = 1000;  ///< receivers of each run that are compared with rays
+  unsigned rays = 8192;     ///< for each of them
+  unsigned climbed = 64;    ///< blocks of points that every setting shades
 };
 
 /// One run that was asked for an error.
@@ -48,6 +48,7 @@ struct SceneErrors {
 /// @param work  a directory with room for the container and what is shaded, which go again
 /// @throws DataError, std::system_error, std::invalid_argument as build_container()
 [[nodiscard]] SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,
-                                         const std::filesystem::path& work, const RunOptions& run, Progress& progress);
+                                         const std::filesystem::path& work, const RunOptions& run,
+                                         Progress& progress);
 
 }  // namespace ptc::bench

@@ -25,7 +25,8 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr Spread kNoTime{kNone, kNone, kNone};
 
-GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene, const Executor& executor) {
+GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene,
+                 const Executor& executor) {
   return {.panel = panel,
           .x = x,
           .scene = scene.name(),
@@ -53,8 +54,9 @@ class CapRun {
       : scene_(scene), executor_(threads), results_(scene.sets().front().receivers.size()) {
     const ContainerReader& container = scene.container();
     const auto frames = static_cast<std::uint64_t>(std::ceil(share * container.page_count()));
-    options_.cache_bytes = std::max(PageCache::least_bytes(container, threads),
-                                    std::min(most_bytes, PageCache::bytes_for(container, threads, frames)));
+    options_.cache_bytes =
+        std::max(PageCache::least_bytes(container, threads),
+                 std::min(most_bytes, PageCache::bytes_for(container, threads, frames)));
     options_.sky = sky_function(scene.lights().sky);
   }
 
@@ -66,7 +68,8 @@ class CapRun {
     shader.shade(scene_.sets().front().receivers, results_, silent);
     const double each = 1e6 / static_cast<double>(results_.size());
     us_.push_back((cpu_seconds() - before) * each);
-    wall_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() * each);
+    wall_.push_back(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() * each);
     cache_ = shader.cache_statistics();
   }
 
@@ -97,7 +100,9 @@ class Truth {
     const ReceiverSet& set = scene.sets().front();
     checked_ = choose_checked(scene, set, options.checked);
     const DiscRays oracle(scene.surfels(), Sides::both, {});
-    const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) { return oracle.trace(r, rays, seed); };
+    const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) {
+      return oracle.trace(r, rays, seed);
+    };
     reference_ = make_reference(set, checked_, {.half = options.reference_rays}, trace, executor);
   }
 
@@ -117,9 +122,14 @@ class GrowthRun {
  public:
   using Report = std::function<void(const std::vector<GrowthRow>&)>;
 
-  GrowthRun(const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run, Progress& progress,
-            const Report& report)
-      : options_(options), work_(work), run_(run), executor_(run.threads), progress_(progress), report_(report) {}
+  GrowthRun(const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run,
+            Progress& progress, const Report& report)
+      : options_(options),
+        work_(work),
+        run_(run),
+        executor_(run.threads),
+        progress_(progress),
+        report_(report) {}
 
   std::vector<GrowthRow> measure() {
     if (wants("surfels")) {
@@ -134,7 +144,9 @@ class GrowthRun {
   }
 
  private:
-  [[nodiscard]] bool wants(const char* panel) const { return std::ranges::find(options_.panels, panel) != options_.panels.end(); }
+  [[nodiscard]] bool wants(const char* panel) const {
+    return std::ranges::find(options_.panels, panel) != options_.panels.end();
+  }
 
   template <class... Arguments>
   void tell(void (GrowthRun::*part)(Arguments...), Arguments... arguments) {
@@ -145,17 +157,22 @@ class GrowthRun {
   [[nodiscard]] bool in_reach(std::uint64_t points) const { return points <= options_.ray_reach; }
 
   [[nodiscard]] BenchScene make_scene(const SceneChoice& choice, std::uint64_t points) {
-    const std::filesystem::path directory = run_.temp_dirs.empty() ? work_ : roomiest(run_.temp_dirs);
+    const std::filesystem::path directory =
+        run_.temp_dirs.empty() ? work_ : roomiest(run_.temp_dirs);
     require_room({&directory, 1}, build_disk_bytes(points), fmt::format("{} surfels", points));
-    const SceneOptions options{.points = points, .shaded_width = 0, .own_points = options_.own_points, .rays = in_reach(points)};
+    const SceneOptions options{.points = points,
+                               .shaded_width = 0,
+                               .own_points = options_.own_points,
+                               .rays = in_reach(points)};
     return {choice, options, work_, run_, progress_};
   }
 
   /// Time and error at a list of settings, and of Embree around these errors.
-  void measure_settings(const BenchScene& scene, const std::string& panel, const std::vector<double>& at,
-                        const std::vector<GatherOptions>& settings) {
+  void measure_settings(const BenchScene& scene, const std::string& panel,
+                        const std::vector<double>& at, const std::vector<GatherOptions>& settings) {
     const std::vector<std::string> methods =
-        panel == "surfels" ? std::vector<std::string>{"ptcx", "embree-discs", "embree-mesh"} : std::vector<std::string>{"ptcx"};
+        panel == "surfels" ? std::vector<std::string>{"ptcx", "embree-discs", "embree-mesh"}
+                           : std::vector<std::string>{"ptcx"};
     const AccuracyOptions options{.checked = options_.checked,
                                   .reference_rays = options_.reference_rays,
                                   .repeats = options_.repeats,
@@ -202,7 +219,8 @@ class GrowthRun {
   }
 
   void measure_depth(unsigned layers) {
-    const BenchScene scene = make_scene({.name = fmt::format("{} sheets", layers), .layers = layers}, options_.middle_points);
+    const BenchScene scene = make_scene(
+        {.name = fmt::format("{} sheets", layers), .layers = layers}, options_.middle_points);
     measure_settings(scene, "depth", {static_cast<double>(layers)}, {GatherOptions{}});
   }
 
@@ -213,7 +231,8 @@ class GrowthRun {
     if (in_reach(points)) truth.emplace(scene, options_, executor_);
     std::vector<std::unique_ptr<CapRun>> runs;
     for (const unsigned threads : thread_counts(executor_.threads())) {
-      for (const double cap : options_.caps) runs.push_back(std::make_unique<CapRun>(scene, cap, threads));
+      for (const double cap : options_.caps)
+        runs.push_back(std::make_unique<CapRun>(scene, cap, threads));
     }
     progress_.begin("city, caps", options_.repeats * runs.size(), "runs");
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
@@ -243,13 +262,14 @@ class GrowthRun {
 }  // namespace
 
 std::uint64_t build_disk_bytes(std::uint64_t points) noexcept {
-  constexpr std::uint64_t kRecord = kSpilledBytes, kContainer = 64;  // of a point: spilled by the sort; pages
+  constexpr std::uint64_t kRecord = kSpilledBytes,
+                          kContainer = 64;  // of a point: spilled by the sort; pages
   return points * (kRecord + kContainer);
 }
 
-std::vector<GrowthRow> measure_growth(const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run,
-                                      Progress& progress,
-                                      const std::function<void(const std::vector<GrowthRow>&)>& report) {
+std::vector<GrowthRow> measure_growth(
+    const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run,
+    Progress& progress, const std::function<void(const std::vector<GrowthRow>&)>& report) {
   return GrowthRun(options, work, run, progress, report).measure();
 }
 

@@ -26,24 +26,28 @@ struct Cloud {
     return false;
   }
 };
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, 3, std::size_t>;
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud,
+                                                 3, std::size_t>;
 
 /// The nearest of a few that faces the same way, else the nearest.
-std::uint32_t nearest_radiance(const Tree& tree, std::span<const Surfel> surfels, const glm::dvec3& at,
-                               const glm::vec3& normal) {
+std::uint32_t nearest_radiance(const Tree& tree, std::span<const Surfel> surfels,
+                               const glm::dvec3& at, const glm::vec3& normal) {
   std::array<std::size_t, kNeighbours> found{};
   std::array<double, kNeighbours> distances{};
   const std::array<double, 3> query{at.x, at.y, at.z};
-  const std::size_t count = tree.knnSearch(query.data(), kNeighbours, found.data(), distances.data());
+  const std::size_t count =
+      tree.knnSearch(query.data(), kNeighbours, found.data(), distances.data());
   if (count == 0) return 0;
-  const auto* best = std::find_if(found.data(), found.data() + count,
-                                  [&](std::size_t i) { return glm::dot(surfels[i].normal, normal) > kAlike; });
+  const auto* best = std::find_if(found.data(), found.data() + count, [&](std::size_t i) {
+    return glm::dot(surfels[i].normal, normal) > kAlike;
+  });
   const Surfel& s = surfels[best == found.data() + count ? found[0] : *best];
   return encode_rgbe({s.radiance.r, s.radiance.g, s.radiance.b});
 }
 
 std::uint16_t texels_along(float length, double spacing) {
-  return static_cast<std::uint16_t>(std::clamp(std::ceil(static_cast<double>(length) / spacing), 1.0, 8192.0));
+  return static_cast<std::uint16_t>(
+      std::clamp(std::ceil(static_cast<double>(length) / spacing), 1.0, 8192.0));
 }
 
 }  // namespace
@@ -69,7 +73,9 @@ void Lightmap::fill(const Grid& grid, const Radiance& radiance) {
 Lightmap::Lightmap(const Mesh& mesh, std::span<const Surfel> surfels, double spacing) {
   grids_.resize(mesh.triangles.size());
   std::uint64_t count = 0;
-  const auto corner = [&](std::size_t triangle, std::size_t k) { return mesh.positions[mesh.triangles[triangle][k]]; };
+  const auto corner = [&](std::size_t triangle, std::size_t k) {
+    return mesh.positions[mesh.triangles[triangle][k]];
+  };
   for (std::size_t t = 0; t < grids_.size(); ++t) {
     grids_[t] = {count, texels_along(glm::length(corner(t, 1) - corner(t, 0)), spacing),
                  texels_along(glm::length(corner(t, 2) - corner(t, 0)), spacing)};
@@ -95,7 +101,8 @@ glm::vec3 Lightmap::at(std::uint32_t triangle, float u, float v) const noexcept 
   const auto place = [](float x, std::uint16_t size) {
     return std::min(static_cast<unsigned>(std::max(0.0F, x * size)), size - 1U);
   };
-  const auto rgb = decode_rgbe(texels_[grid.first + place(v, grid.rows) * grid.columns + place(u, grid.columns)]);
+  const auto rgb = decode_rgbe(
+      texels_[grid.first + place(v, grid.rows) * grid.columns + place(u, grid.columns)]);
   return {rgb[0], rgb[1], rgb[2]};
 }
 

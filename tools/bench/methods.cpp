@@ -21,16 +21,19 @@ double timed(std::size_t count, const Body& body) {
 
 class GatherMethod : public Method {
  public:
-  GatherMethod(const ContainerReader& container, const Sky& sky, const ReceiverSet& set, const Checked& checked,
-               const GatherOptions& options, PageCache& cache, const Executor& executor)
+  GatherMethod(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
+               const Checked& checked, const GatherOptions& options, PageCache& cache,
+               const Executor& executor)
       : set_(set),
         checked_(checked),
-        shader_(container, {.gather = options, .sky = sky_function(sky), .cache = &cache}, executor),
+        shader_(container, {.gather = options, .sky = sky_function(sky), .cache = &cache},
+                executor),
         results_(set.receivers.size()) {}
 
   double run() override {
     Progress silent;
-    const double us = timed(results_.size(), [&] { shader_.shade(set_.receivers, results_, silent); });
+    const double us =
+        timed(results_.size(), [&] { shader_.shade(set_.receivers, results_, silent); });
     static_cast<void>(shader_.cache_statistics());  // gives back the readers of the shared cache
     return us;
   }
@@ -71,11 +74,13 @@ class OneByOne : public Method {
   std::vector<Shading> shade_all(const std::vector<std::size_t>& indices) {
     constexpr std::size_t kGrain = 16;
     std::vector<Shading> results(indices.size());
-    executor_.for_each((indices.size() + kGrain - 1) / kGrain, [&](std::size_t block, unsigned thread) {
-      for (std::size_t i = block * kGrain; i < std::min(indices.size(), (block + 1) * kGrain); ++i) {
-        results[i] = shade(set_.receivers[indices[i]], indices[i], thread);
-      }
-    });
+    executor_.for_each((indices.size() + kGrain - 1) / kGrain,
+                       [&](std::size_t block, unsigned thread) {
+                         for (std::size_t i = block * kGrain;
+                              i < std::min(indices.size(), (block + 1) * kGrain); ++i) {
+                           results[i] = shade(set_.receivers[indices[i]], indices[i], thread);
+                         }
+                       });
     return results;
   }
 
@@ -87,8 +92,8 @@ class OneByOne : public Method {
 
 class PlainMethod : public OneByOne {
  public:
-  PlainMethod(const BenchScene& scene, const ReceiverSet& set, const Checked& checked, const GatherOptions& options,
-              PageCache& cache, const Executor& executor)
+  PlainMethod(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
+              const GatherOptions& options, PageCache& cache, const Executor& executor)
       : OneByOne(set, checked, executor),
         view_(scene.container()),
         grid_(options.resolution, sky_function(scene.lights().sky)),
@@ -109,7 +114,8 @@ class PlainMethod : public OneByOne {
 
  protected:
   Shading shade(const Receiver& receiver, std::size_t, unsigned thread) override {
-    if (!gathers_[thread]) gathers_[thread] = std::make_unique<PlainGather>(view_, cache_, options_);
+    if (!gathers_[thread])
+      gathers_[thread] = std::make_unique<PlainGather>(view_, cache_, options_);
     return gathers_[thread]->shade(receiver, grid_);
   }
 
@@ -123,8 +129,8 @@ class PlainMethod : public OneByOne {
 
 class RayMethod : public OneByOne {
  public:
-  RayMethod(const RayBaseline& baseline, const ReceiverSet& set, const Checked& checked, const RaySetting& setting,
-            const Executor& executor)
+  RayMethod(const RayBaseline& baseline, const ReceiverSet& set, const Checked& checked,
+            const RaySetting& setting, const Executor& executor)
       : OneByOne(set, checked, executor), baseline_(baseline), setting_(setting) {}
 
  protected:
@@ -146,27 +152,31 @@ Checked choose_checked(const BenchScene& scene, const ReceiverSet& set, unsigned
   std::mt19937_64 bits;  // its default seed
   std::ranges::sample(all, std::back_inserter(checked.receivers), wanted, bits);
   const Frame& frame = scene.container().header().frame;
-  std::ranges::sort(checked.receivers, {},
-                    [&](std::size_t i) { return receiver_key(frame, set.receivers[i].position, 0); });
+  std::ranges::sort(checked.receivers, {}, [&](std::size_t i) {
+    return receiver_key(frame, set.receivers[i].position, 0);
+  });
   for (const Pixel& pixel : set.window) {
     if (pixel.receiver != ReceiverSet::kNone) checked.window.push_back(pixel.receiver);
   }
   return checked;
 }
 
-std::unique_ptr<Method> make_gather(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
-                                    const Checked& checked, const GatherOptions& options, PageCache& cache,
+std::unique_ptr<Method> make_gather(const ContainerReader& container, const Sky& sky,
+                                    const ReceiverSet& set, const Checked& checked,
+                                    const GatherOptions& options, PageCache& cache,
                                     const Executor& executor) {
   return std::make_unique<GatherMethod>(container, sky, set, checked, options, cache, executor);
 }
 
-std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
-                                   const GatherOptions& options, PageCache& cache, const Executor& executor) {
+std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& set,
+                                   const Checked& checked, const GatherOptions& options,
+                                   PageCache& cache, const Executor& executor) {
   return std::make_unique<PlainMethod>(scene, set, checked, options, cache, executor);
 }
 
-std::unique_ptr<Method> make_rays(const RayBaseline& baseline, const ReceiverSet& set, const Checked& checked,
-                                  const RaySetting& setting, const Executor& executor) {
+std::unique_ptr<Method> make_rays(const RayBaseline& baseline, const ReceiverSet& set,
+                                  const Checked& checked, const RaySetting& setting,
+                                  const Executor& executor) {
   return std::make_unique<RayMethod>(baseline, set, checked, setting, executor);
 }
 

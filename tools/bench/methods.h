@@ -20,7 +20,8 @@ struct Checked {
 };
 
 /// A random choice of receivers in the order of the Z-curve, the same each time, and the window's.
-[[nodiscard]] Checked choose_checked(const BenchScene& scene, const ReceiverSet& set, unsigned wanted);
+[[nodiscard]] Checked choose_checked(const BenchScene& scene, const ReceiverSet& set,
+                                     unsigned wanted);
 
 /// Shadings of them, in the same order.
 struct Shadings {
@@ -41,19 +42,23 @@ class Method {
 };
 
 /// The hierarchical gather of the whole set, pages in `cache`.
-[[nodiscard]] std::unique_ptr<Method> make_gather(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
-                                                  const Checked& checked, const GatherOptions& options, PageCache& cache,
+[[nodiscard]] std::unique_ptr<Method> make_gather(const ContainerReader& container, const Sky& sky,
+                                                  const ReceiverSet& set, const Checked& checked,
+                                                  const GatherOptions& options, PageCache& cache,
                                                   const Executor& executor);
 /// The plain gather of those checked.
-[[nodiscard]] std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
-                                                 const GatherOptions& options, PageCache& cache, const Executor& executor);
+[[nodiscard]] std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& set,
+                                                 const Checked& checked,
+                                                 const GatherOptions& options, PageCache& cache,
+                                                 const Executor& executor);
 /// Rays from those checked.
 struct RaySetting {
   RayBaseline::Job job;
   RayBaseline::Packets packets;
   unsigned rays;
 };
-[[nodiscard]] std::unique_ptr<Method> make_rays(const RayBaseline& baseline, const ReceiverSet& set, const Checked& checked,
-                                                const RaySetting& setting, const Executor& executor);
+[[nodiscard]] std::unique_ptr<Method> make_rays(const RayBaseline& baseline, const ReceiverSet& set,
+                                                const Checked& checked, const RaySetting& setting,
+                                                const Executor& executor);
 
 }  // namespace ptc::bench

@@ -19,7 +19,8 @@ namespace {
 /// Bytes of all pages, as they are stored.
 double stored_bytes(const ContainerReader& container) {
   double sum = 0;
-  for (std::uint32_t page = 0; page < container.page_count(); ++page) sum += container.entry(page).stored_bytes;
+  for (std::uint32_t page = 0; page < container.page_count(); ++page)
+    sum += container.entry(page).stored_bytes;
   return sum;
 }
 
@@ -28,9 +29,11 @@ std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::u
                                              const std::filesystem::path& work) {
   return make_temporary(work, [&](const std::filesystem::path& path) {
     ContainerPoints points(from);
-    ContainerWriter writer(path, {.page_shift = from.header().page_shift, .frame = from.header().frame});
+    ContainerWriter writer(path,
+                           {.page_shift = from.header().page_shift, .frame = from.header().frame});
     Progress silent;
-    const Superblock superblock = build_pages(points, writer, {.leaf_points = leaf_points}, Executor(), silent);
+    const Superblock superblock =
+        build_pages(points, writer, {.leaf_points = leaf_points}, Executor(), silent);
     writer.finish(from.meta(), superblock);
   });
 }
@@ -38,16 +41,18 @@ std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::u
 /// The gather of PTCX at the default setting but for its pixels, and against rays.
 class GatherStudy {
  public:
-  GatherStudy(const BenchScene& scene, const ReceiverSet& set, const Checked& checked, const Reference& reference,
-              const Executor& executor)
+  GatherStudy(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
+              const Reference& reference, const Executor& executor)
       : scene_(scene), set_(set), checked_(checked), reference_(reference), executor_(executor) {}
 
-  [[nodiscard]] ModelRow measure(const ContainerReader& container, unsigned resolution, unsigned repeats, ModelRow row) const {
+  [[nodiscard]] ModelRow measure(const ContainerReader& container, unsigned resolution,
+                                 unsigned repeats, ModelRow row) const {
     const unsigned threads = executor_.threads();
     const std::uint64_t bytes = PageCache::bytes_for(container, threads, container.page_count());
     PageCache cache(container, {.memory_bytes = bytes, .threads = threads});
     const GatherOptions options{.resolution = resolution};
-    const auto method = make_gather(container, scene_.lights().sky, set_, checked_, options, cache, executor_);
+    const auto method =
+        make_gather(container, scene_.lights().sky, set_, checked_, options, cache, executor_);
     std::vector<double> us;
     for (unsigned repeat = 0; repeat < repeats; ++repeat) us.push_back(method->run());
     row.scene = scene_.name();
@@ -72,8 +77,9 @@ void compare(ModelRow& row, std::span<const Shading> ours, std::span<const Shadi
   row.irradiance = over_mean(error_statistics(irradiance_of(ours), irradiance_of(reference)));
 }
 
-SceneModel measure_model(const BenchScene& scene, const ModelOptions& options, const std::filesystem::path& work,
-                         const Executor& executor, Progress& progress) {
+SceneModel measure_model(const BenchScene& scene, const ModelOptions& options,
+                         const std::filesystem::path& work, const Executor& executor,
+                         Progress& progress) {
   const ReceiverSet& set = scene.sets().front();
   if (set.name != "camera" || set.receivers.empty()) {
     throw DataError(scene.name() + ": nothing to measure: the camera sees nothing");
@@ -84,8 +90,11 @@ SceneModel measure_model(const BenchScene& scene, const ModelOptions& options, c
 
   progress.begin(scene.name() + ", reference", 0, "rays");
   const DiscRays oracle(scene.surfels(), Sides::both, {});
-  const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) { return oracle.trace(r, rays, seed); };
-  const Reference reference = make_reference(set, checked, {.half = options.reference_rays}, trace, executor);
+  const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) {
+    return oracle.trace(r, rays, seed);
+  };
+  const Reference reference =
+      make_reference(set, checked, {.half = options.reference_rays}, trace, executor);
   progress.end();
   SceneModel model{.scene = scene.name(),
                    .surfels = scene.surfels().size(),
@@ -97,12 +106,15 @@ SceneModel measure_model(const BenchScene& scene, const ModelOptions& options, c
                    .rows = study_payloads(scene, receivers, options, executor, progress)};
 
   const GatherStudy gathers(scene, set, checked, reference, executor);
-  progress.begin(scene.name() + ", leaves, directions", options.leaf_points.size() + options.resolutions.size(), "rows");
+  progress.begin(scene.name() + ", leaves, directions",
+                 options.leaf_points.size() + options.resolutions.size(), "rows");
   for (const std::uint32_t leaf_points : options.leaf_points) {
     const auto container = with_leaves(scene.container(), leaf_points, work);
     const double bytes = stored_bytes(*container) / static_cast<double>(model.surfels);
-    const ModelRow row{.axis = "leaf", .variant = std::to_string(leaf_points), .bytes = bytes, .per = "point"};
-    model.rows.push_back(gathers.measure(*container, GatherOptions{}.resolution, options.repeats, row));
+    const ModelRow row{
+        .axis = "leaf", .variant = std::to_string(leaf_points), .bytes = bytes, .per = "point"};
+    model.rows.push_back(
+        gathers.measure(*container, GatherOptions{}.resolution, options.repeats, row));
     progress.advance(1);
   }
   for (const unsigned resolution : options.resolutions) {

@@ -20,21 +20,35 @@ using Choice = std::function<bool(const ModelRow&)>;
 constexpr char kTime[] = "CPU time per receiver, \u00b5s";
 constexpr char kError[] = "RMS error, % of the mean";
 constexpr char kReading[] =
-    "Payloads: plain gather of one receiver at a time, the same cut through the same tree, so that only what a node tells of its "
-    "surfels differs; against all surfels in the same pixels. Left marker: as stored; right: as floats. Whole node: all columns, "
-    "bounds too. Dashed: the sum over the node's own surfels, none in front of another, which payloads approximate. Clusters are "
+    "Payloads: plain gather of one receiver at a time, the same cut through the same tree, so that "
+    "only what a node tells of its "
+    "surfels differs; against all surfels in the same pixels. Left marker: as stored; right: as "
+    "floats. Whole node: all columns, "
+    "bounds too. Dashed: the sum over the node's own surfels, none in front of another, which "
+    "payloads approximate. Clusters are "
     "drawn as by PTCX. Over time: solid angles from coarse to fine. Leaves and directions: PTCX "
-    "at its default setting, against rays. Rounded points lie at most 0.001 of their radius from where they were.\n";
+    "at its default setting, against rays. Rounded points lie at most 0.001 of their radius from "
+    "where they were.\n";
 
-double occlusion(const ModelRow& row) { return 100 * row.occlusion.rms; }
-double irradiance(const ModelRow& row) { return 100 * row.irradiance.rms; }
-double bytes(const ModelRow& row) { return row.bytes; }
-double time(const ModelRow& row) { return row.us.median; }
-std::string variant(const ModelRow& row) { return row.variant; }
+double occlusion(const ModelRow& row) {
+  return 100 * row.occlusion.rms;
+}
+double irradiance(const ModelRow& row) {
+  return 100 * row.irradiance.rms;
+}
+double bytes(const ModelRow& row) {
+  return row.bytes;
+}
+double time(const ModelRow& row) {
+  return row.us.median;
+}
+std::string variant(const ModelRow& row) {
+  return row.variant;
+}
 
 /// Points of the rows chosen that have both values.
-void add_series(ChartPanel& panel, const SceneModel& scene, const std::string& name, const Choice& chosen, const Value& x,
-                const Value& y, const Label& label) {
+void add_series(ChartPanel& panel, const SceneModel& scene, const std::string& name,
+                const Choice& chosen, const Value& x, const Value& y, const Label& label) {
   ChartSeries series{.name = name};
   for (const ModelRow& row : scene.rows) {
     if (!chosen(row) || !std::isfinite(x(row)) || !std::isfinite(y(row))) continue;
@@ -47,7 +61,8 @@ void add_series(ChartPanel& panel, const SceneModel& scene, const std::string& n
 double middle_angle(const SceneModel& scene) {
   std::vector<double> angles;
   for (const ModelRow& row : scene.rows) {
-    if (row.axis == "payload" && std::ranges::find(angles, row.solid_angle) == angles.end()) angles.push_back(row.solid_angle);
+    if (row.axis == "payload" && std::ranges::find(angles, row.solid_angle) == angles.end())
+      angles.push_back(row.solid_angle);
   }
   return angles.empty() ? ModelRow::kNone : angles[angles.size() / 2];
 }
@@ -56,7 +71,8 @@ double middle_angle(const SceneModel& scene) {
 std::vector<std::string> payload_names(const SceneModel& scene) {
   std::vector<std::string> names;
   for (const ModelRow& row : scene.rows) {
-    if (row.axis == "payload" && row.variant != "exact" && std::ranges::find(names, row.variant) == names.end()) {
+    if (row.axis == "payload" && row.variant != "exact" &&
+        std::ranges::find(names, row.variant) == names.end()) {
       names.push_back(row.variant);
     }
   }
@@ -68,8 +84,11 @@ ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what, const 
   const std::string title = fmt::format("Payload at {:.2g} sr: {}", angle, what);
   ChartPanel panel{.title = title, .x_label = "bytes of a node", .y_label = kError};
   for (const std::string& name : payload_names(scene)) {
-    const auto chosen = [&](const ModelRow& r) { return r.axis == "payload" && r.variant == name && r.solid_angle == angle; };
-    add_series(panel, scene, name, chosen, bytes, error, [](const ModelRow& r) { return r.form == "stored" ? r.variant : ""; });
+    const auto chosen = [&](const ModelRow& r) {
+      return r.axis == "payload" && r.variant == name && r.solid_angle == angle;
+    };
+    add_series(panel, scene, name, chosen, bytes, error,
+               [](const ModelRow& r) { return r.form == "stored" ? r.variant : ""; });
   }
   const auto whole = [&](const ModelRow& r) { return r.axis == "node" && r.solid_angle == angle; };
   add_series(panel, scene, "whole node", whole, bytes, error, [](const ModelRow&) { return ""; });
@@ -83,7 +102,9 @@ ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what, const 
 ChartPanel payloads_over_time(const SceneModel& scene, const char* what, const Value& error) {
   ChartPanel panel{.title = fmt::format("Payload: {}", what), .x_label = kTime, .y_label = kError};
   for (const std::string& name : payload_names(scene)) {
-    const auto chosen = [&](const ModelRow& r) { return r.axis == "payload" && r.variant == name && r.form == "stored"; };
+    const auto chosen = [&](const ModelRow& r) {
+      return r.axis == "payload" && r.variant == name && r.form == "stored";
+    };
     add_series(panel, scene, name, chosen, time, error, [](const ModelRow& r) {
       return r.variant == "cube" ? fmt::format("{:.2g} sr", r.solid_angle) : std::string();
     });
@@ -91,7 +112,8 @@ ChartPanel payloads_over_time(const SceneModel& scene, const char* what, const V
   return panel;
 }
 
-ChartPanel gathers_over(const SceneModel& scene, const char* axis, const char* title, const char* x_label, const Value& x) {
+ChartPanel gathers_over(const SceneModel& scene, const char* axis, const char* title,
+                        const char* x_label, const Value& x) {
   ChartPanel panel{.title = title, .x_label = x_label, .y_label = kError};
   const auto chosen = [&](const ModelRow& r) { return r.axis == axis; };
   add_series(panel, scene, "irradiance", chosen, x, irradiance, variant);
@@ -100,10 +122,13 @@ ChartPanel gathers_over(const SceneModel& scene, const char* axis, const char* t
 }
 
 ChartPanel pages(const SceneModel& scene) {
-  ChartPanel panel{.title = "Pages", .x_label = "bytes of a point or node", .y_label = "CPU time to decode it, ns"};
+  ChartPanel panel{.title = "Pages",
+                   .x_label = "bytes of a point or node",
+                   .y_label = "CPU time to decode it, ns"};
   for (const char* form : {"points", "packed", "rounded", "nodes"}) {
     const auto chosen = [&](const ModelRow& r) { return r.axis == "pages" && r.form == form; };
-    add_series(panel, scene, form, chosen, bytes, [](const ModelRow& r) { return r.decode_ns; }, variant);
+    add_series(
+        panel, scene, form, chosen, bytes, [](const ModelRow& r) { return r.decode_ns; }, variant);
   }
   return panel;
 }
@@ -131,10 +156,12 @@ Json row_facts(const ModelRow& row) {
 }
 
 std::string note_text(const SceneModel& scene) {
-  return fmt::format("{}: {} surfels, {} nodes; {} pixels of the camera; {} rays each are off by {:.2g} % of the mean "
-                     "occlusion and {:.2g} % of the mean irradiance.\n",
-                     scene.scene, scene.surfels, scene.nodes, scene.receivers, scene.rays, 100 * scene.occlusion_noise,
-                     100 * scene.irradiance_noise);
+  return fmt::format(
+      "{}: {} surfels, {} nodes; {} pixels of the camera; {} rays each are off by {:.2g} % of the "
+      "mean "
+      "occlusion and {:.2g} % of the mean irradiance.\n",
+      scene.scene, scene.surfels, scene.nodes, scene.receivers, scene.rays,
+      100 * scene.occlusion_noise, 100 * scene.irradiance_noise);
 }
 
 }  // namespace
@@ -155,22 +182,26 @@ Json facts_of(const std::vector<SceneModel>& scenes) {
 }
 
 Chart chart_of(const SceneModel& scene) {
-  Chart chart{.title = "What the model costs and is worth: " + scene.scene, .note = kReading + note_text(scene), .columns = 4};
-  chart.panels = {payloads_over_bytes(scene, "irradiance", irradiance),
-                  payloads_over_bytes(scene, "occlusion", occlusion),
-                  payloads_over_time(scene, "irradiance", irradiance),
-                  payloads_over_time(scene, "occlusion", occlusion),
-                  gathers_over(scene, "leaf", "Points of a leaf", "bytes of a point, with its nodes", bytes),
-                  gathers_over(scene, "leaf", "Points of a leaf", kTime, time),
-                  gathers_over(scene, "directions", "Directions: pixels along a cube edge", kTime, time),
-                  pages(scene)};
+  Chart chart{.title = "What the model costs and is worth: " + scene.scene,
+              .note = kReading + note_text(scene),
+              .columns = 4};
+  chart.panels = {
+      payloads_over_bytes(scene, "irradiance", irradiance),
+      payloads_over_bytes(scene, "occlusion", occlusion),
+      payloads_over_time(scene, "irradiance", irradiance),
+      payloads_over_time(scene, "occlusion", occlusion),
+      gathers_over(scene, "leaf", "Points of a leaf", "bytes of a point, with its nodes", bytes),
+      gathers_over(scene, "leaf", "Points of a leaf", kTime, time),
+      gathers_over(scene, "directions", "Directions: pixels along a cube edge", kTime, time),
+      pages(scene)};
   std::erase_if(chart.panels, [](const ChartPanel& panel) { return panel.series.empty(); });
   return chart;
 }
 
 void write_reports(const std::filesystem::path& directory, const std::vector<SceneModel>& scenes) {
   write_tables(directory / "model", facts_of(scenes));
-  for (const SceneModel& scene : scenes) write_figures(directory / ("model-" + scene.scene), chart_of(scene));
+  for (const SceneModel& scene : scenes)
+    write_figures(directory / ("model-" + scene.scene), chart_of(scene));
 }
 
 std::string model_text(const std::vector<SceneModel>& scenes) {
@@ -180,11 +211,14 @@ std::string model_text(const std::vector<SceneModel>& scenes) {
                      fmt::format(kTail, "us", "to see", "ns", "AO %", "E %", "bias %", "p99 %");
   for (const SceneModel& scene : scenes) {
     for (const ModelRow& row : scene.rows) {
-      text += fmt::format(kHead, row.scene, row.axis, row.variant, row.form, or_dash(row.solid_angle, "{:.2g}"),
-                          or_dash(row.bytes, "{:.1f}"), row.per);
-      text += fmt::format(kTail, or_dash(row.us.median, "{:.1f}"), or_dash(row.evaluate_us, "{:.1f}"),
-                          or_dash(row.decode_ns, "{:.1f}"), or_dash(occlusion(row), "{:.2f}"), or_dash(irradiance(row), "{:.2f}"),
-                          or_dash(100 * row.irradiance.bias, "{:+.2f}"), or_dash(100 * row.irradiance.percentile_99, "{:.1f}"));
+      text +=
+          fmt::format(kHead, row.scene, row.axis, row.variant, row.form,
+                      or_dash(row.solid_angle, "{:.2g}"), or_dash(row.bytes, "{:.1f}"), row.per);
+      text += fmt::format(kTail, or_dash(row.us.median, "{:.1f}"),
+                          or_dash(row.evaluate_us, "{:.1f}"), or_dash(row.decode_ns, "{:.1f}"),
+                          or_dash(occlusion(row), "{:.2f}"), or_dash(irradiance(row), "{:.2f}"),
+                          or_dash(100 * row.irradiance.bias, "{:+.2f}"),
+                          or_dash(100 * row.irradiance.percentile_99, "{:.1f}"));
     }
     text += note_text(scene);
   }

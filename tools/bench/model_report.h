@@ -17,7 +17,8 @@ namespace ptc::bench {
 /// Payloads over bytes and over time; leaves over both; directions over time; pages.
 /// @param scene  with rows
 [[nodiscard]] Chart chart_of(const SceneModel& scene);
-/// Writes model.json, .csv and, for each scene, model-SCENE.svg and .png into a directory. @throws std::system_error
+/// Writes model.json, .csv and, for each scene, model-SCENE.svg and .png into a directory. @throws
+/// std::system_error
 void write_reports(const std::filesystem::path& directory, const std::vector<SceneModel>& scenes);
 /// A table of all rows.
 [[nodiscard]] std::string model_text(const std::vector<SceneModel>& scenes);

@@ -40,7 +40,8 @@ struct PointPayloads {
 
 double moved(const PointRecord& from, const PointRecord& to, const Frame& frame) {
   if (to.radius <= 0) return 0;
-  const std::array<double, 3> a = frame.to_position(decode_morton(from.key)), b = frame.to_position(decode_morton(to.key));
+  const std::array<double, 3> a = frame.to_position(decode_morton(from.key)),
+                              b = frame.to_position(decode_morton(to.key));
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / static_cast<double>(to.radius);
 }
 
@@ -48,13 +49,15 @@ PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
   const Frame& frame = container.header().frame;
   ContainerPoints originals(container), points(container);
   const Executor executor(1);
-  const std::unique_ptr<PointStream> rounding = rounded ? round_points(points, frame.unit(), executor) : nullptr;
+  const std::unique_ptr<PointStream> rounding =
+      rounded ? round_points(points, frame.unit(), executor) : nullptr;
   PointPayloads out;
   std::vector<PointRecord> from(container.superblock().points_per_page), to(from.size());
   while (const std::size_t count = originals.next(from)) {  // both hand out page by page
     const std::size_t same = rounding ? rounding->next(to) : points.next(to);
     if (same != count) throw std::logic_error("point_payloads: streams differ");
-    for (std::size_t i = 0; i < count; ++i) out.moved = std::max(out.moved, moved(from[i], to[i], frame));
+    for (std::size_t i = 0; i < count; ++i)
+      out.moved = std::max(out.moved, moved(from[i], to[i], frame));
     out.pages.push_back({encode_point_page(std::span(to).first(count)),
                          {static_cast<std::uint32_t>(count), packed_point_columns()}});
   }
@@ -67,7 +70,8 @@ class PageStudy {
   PageStudy(const BenchScene& scene, unsigned repeats) : scene_(scene), repeats_(repeats) {}
 
   /// @param form  points, packed, rounded or nodes
-  [[nodiscard]] ModelRow measure(const std::vector<Payload>& pages, const std::string& form, Codec codec, int level) const {
+  [[nodiscard]] ModelRow measure(const std::vector<Payload>& pages, const std::string& form,
+                                 Codec codec, int level) const {
     const bool nodes = form == "nodes";
     PageEncoder encoder(codec, level);
     std::vector<Stored> stored(pages.size());
@@ -83,7 +87,9 @@ class PageStudy {
     const auto records = static_cast<double>(nodes ? superblock.nodes : superblock.points);
     return {.scene = scene_.name(),
             .axis = "pages",
-            .variant = codec == Codec::zstd ? fmt::format("zstd {}", level) : codec == Codec::lz4 ? "lz4" : "raw",
+            .variant = codec == Codec::zstd  ? fmt::format("zstd {}", level)
+                       : codec == Codec::lz4 ? "lz4"
+                                             : "raw",
             .form = form,
             .bytes = bytes / records,
             .per = nodes ? "node" : "point",
@@ -96,12 +102,14 @@ class PageStudy {
     std::vector<std::byte> bytes;
   };
 
-  [[nodiscard]] double decode(const std::vector<Payload>& pages, const std::vector<Stored>& stored) const {
+  [[nodiscard]] double decode(const std::vector<Payload>& pages,
+                              const std::vector<Stored>& stored) const {
     PageDecoder decoder;
     std::vector<std::byte> payload(scene_.container().page_payload_limit());
     const double before = cpu_seconds();
     for (std::size_t i = 0; i < pages.size(); ++i) {
-      decoder.decode(stored[i].coding, stored[i].bytes, std::span(payload).first(pages[i].bytes.size()), pages[i].columns);
+      decoder.decode(stored[i].coding, stored[i].bytes,
+                     std::span(payload).first(pages[i].bytes.size()), pages[i].columns);
     }
     return cpu_seconds() - before;
   }
@@ -117,12 +125,15 @@ std::vector<ModelRow> study_pages(const BenchScene& scene, const ModelOptions& o
   std::vector<ModelRow> rows;
   const auto add = [&](const std::vector<Payload>& pages, const std::string& form) {
     const std::size_t first = rows.size();
-    if (form == "points" || form == "nodes") rows.push_back(study.measure(pages, form, Codec::raw, 0));
+    if (form == "points" || form == "nodes")
+      rows.push_back(study.measure(pages, form, Codec::raw, 0));
     rows.push_back(study.measure(pages, form, Codec::lz4, 0));
-    for (const int level : options.levels) rows.push_back(study.measure(pages, form, Codec::zstd, level));
+    for (const int level : options.levels)
+      rows.push_back(study.measure(pages, form, Codec::zstd, level));
     return std::span(rows).subspan(first);
   };
-  const PointPayloads exact = point_payloads(scene.container(), false), rounded = point_payloads(scene.container(), true);
+  const PointPayloads exact = point_payloads(scene.container(), false),
+                      rounded = point_payloads(scene.container(), true);
   for (ModelRow& row : add(exact.pages, "points")) row.moved = exact.moved;
   for (ModelRow& row : add(exact.pages, "packed")) row.moved = exact.moved;
   for (ModelRow& row : add(rounded.pages, "rounded")) row.moved = rounded.moved;

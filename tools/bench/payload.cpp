@@ -12,9 +12,13 @@
 namespace ptc::bench {
 namespace {
 
-float area_of(const Surfel& s) { return 2 * s.radius * s.radius; }
+float area_of(const Surfel& s) {
+  return 2 * s.radius * s.radius;
+}
 
-glm::vec3 vector_at(const float* p) { return {p[0], p[1], p[2]}; }
+glm::vec3 vector_at(const float* p) {
+  return {p[0], p[1], p[2]};
+}
 
 void put(float* p, const glm::vec3& v) {
   for (int k = 0; k < 3; ++k) p[k] = v[k];
@@ -38,11 +42,14 @@ void fit_one(std::span<const Surfel> some, float* out) {
   put(out + 4, area > 0 ? light / area : glm::vec3(0));
 }
 
-void fit_surfel(const NodeSummary&, std::span<const Surfel> below, float* out) { fit_one(below, out); }
+void fit_surfel(const NodeSummary&, std::span<const Surfel> below, float* out) {
+  fit_one(below, out);
+}
 
 Seen see_surfel(const float* p, const glm::vec3& toward) {
   const float along = p[0] * glm::dot(vector_at(p + 1), toward);
-  return {.front = std::max(0.0F, along), .back = std::max(0.0F, -along), .radiance = vector_at(p + 4)};
+  return {
+      .front = std::max(0.0F, along), .back = std::max(0.0F, -along), .radiance = vector_at(p + 4)};
 }
 
 // Two lobes: each a surfel that stands for those whose normals are nearest to its own (Lloyd 1982).
@@ -52,7 +59,9 @@ void fit_lobes(const NodeSummary&, std::span<const Surfel> below, float* out) {
   glm::vec3 mean(0);
   for (const Surfel& s : below) mean += area_of(s) * s.normal;
   const auto farthest = [&](const glm::vec3& from) {
-    return std::ranges::min_element(below, {}, [&](const Surfel& s) { return glm::dot(s.normal, from); })->normal;
+    return std::ranges::min_element(below, {},
+                                    [&](const Surfel& s) { return glm::dot(s.normal, from); })
+        ->normal;
   };
   axis[0] = farthest(mean);
   axis[1] = farthest(axis[0]);
@@ -72,13 +81,14 @@ void fit_lobes(const NodeSummary&, std::span<const Surfel> below, float* out) {
 Seen see_lobes(const float* p, const glm::vec3& toward) {
   const Seen a = see_surfel(p, toward), b = see_surfel(p + kSurfelCount, toward);
   const float front = a.front + b.front;
-  return {.front = front,
-          .back = a.back + b.back,
-          .radiance = front > 0 ? (a.front * a.radiance + b.front * b.radiance) / front : glm::vec3(0)};
+  return {
+      .front = front,
+      .back = a.back + b.back,
+      .radiance = front > 0 ? (a.front * a.radiance + b.front * b.radiance) / front : glm::vec3(0)};
 }
 
-// The vector model, of area and of area times radiance: what faces one way, and a rest that faces every way
-// alike. Area; then vectors over it, with sums before those of light.
+// The vector model, of area and of area times radiance: what faces one way, and a rest that faces
+// every way alike. Area; then vectors over it, with sums before those of light.
 
 constexpr std::size_t kVectorCount = 16;
 
@@ -112,15 +122,17 @@ Seen see_vector(const float* p, const glm::vec3& toward) {
   return seen;
 }
 
-// The ambient cube of spec/nodes.md: area, shares of it that face each axis, radiance towards each axis. Areas are
-// seen as sums over the faces, colours as the ratio of two such sums (spec/shading.md#splats).
+// The ambient cube of spec/nodes.md: area, shares of it that face each axis, radiance towards each
+// axis. Areas are seen as sums over the faces, colours as the ratio of two such sums
+// (spec/shading.md#splats).
 
 void fit_cube(const NodeSummary& node, std::span<const Surfel>, float* out) {
   out[0] = static_cast<float>(node.area);
   for (std::size_t k = 0; k < 6; ++k) {
     out[1 + k] = node.area > 0 ? static_cast<float>(node.facing[k] / node.area) : 0;
     for (std::size_t c = 0; c < 3; ++c) {
-      out[7 + 3 * k + c] = node.facing[k] > 0 ? static_cast<float>(node.flux[k][c] / node.facing[k]) : 0;
+      out[7 + 3 * k + c] =
+          node.facing[k] > 0 ? static_cast<float>(node.flux[k][c] / node.facing[k]) : 0;
     }
   }
 }
@@ -141,13 +153,16 @@ Seen see_cube(const float* p, const glm::vec3& toward) {
   return seen;
 }
 
-// Spherical harmonics of the projected area and of the projected area times radiance: area, then coefficients over
-// it, those of area, which begin at degree 1, before those of red, green, blue.
+// Spherical harmonics of the projected area and of the projected area times radiance: area, then
+// coefficients over it, those of area, which begin at degree 1, before those of red, green, blue.
 
-/// Degrees of max(0, cos): 1/4 P_0 + 1/2 P_1 + 5/16 P_2 - 3/32 P_4 + ...; over pi as Ramamoorthi and Hanrahan 2001.
+/// Degrees of max(0, cos): 1/4 P_0 + 1/2 P_1 + 5/16 P_2 - 3/32 P_4 + ...; over pi as Ramamoorthi
+/// and Hanrahan 2001.
 constexpr std::array kClampedCosine{0.25F, 0.5F, 0.3125F, 0.0F, -0.09375F};
 
-constexpr std::size_t square(std::size_t n) { return n * n; }
+constexpr std::size_t square(std::size_t n) {
+  return n * n;
+}
 
 template <std::size_t kDegree>
 void fit_harmonics(const NodeSummary&, std::span<const Surfel> below, float* out) {
@@ -165,7 +180,8 @@ void fit_harmonics(const NodeSummary&, std::span<const Surfel> below, float* out
   const float area = out[0];
   for (std::size_t channel = 0; channel < 4 && area > 0; ++channel) {
     for (std::size_t l = 0; l <= kDegree; ++l) {
-      for (std::size_t i = square(l); i < square(l + 1); ++i) out[n * channel + i] *= kClampedCosine[l] / area;
+      for (std::size_t i = square(l); i < square(l + 1); ++i)
+        out[n * channel + i] *= kClampedCosine[l] / area;
     }
   }
   out[0] = area;  // of area itself the first coefficient is known
@@ -176,7 +192,8 @@ Seen see_harmonics(const float* p, const glm::vec3& toward) {
   constexpr std::size_t n = square(kDegree + 1);
   std::array<float, n> basis;
   spherical_harmonics(kDegree, toward, basis.data());
-  float even = kClampedCosine[0], odd = 0;  // degrees whose sign is the same seen from behind, and the others
+  float even = kClampedCosine[0],
+        odd = 0;  // degrees whose sign is the same seen from behind, and the others
   for (std::size_t l = 1; l <= kDegree; ++l) {
     float& sum = l % 2 == 0 ? even : odd;
     for (std::size_t i = square(l); i < square(l + 1); ++i) sum += p[i] * basis[i];
@@ -202,10 +219,13 @@ std::string halves(std::size_t count) {
 
 template <std::size_t kDegree>
 Payload harmonics(const char* name) {
-  return {name, halves(4 * square(kDegree + 1) - 1), fit_harmonics<kDegree>, see_harmonics<kDegree>};
+  return {name, halves(4 * square(kDegree + 1) - 1), fit_harmonics<kDegree>,
+          see_harmonics<kDegree>};
 }
 
-std::size_t numbers_of(char field) { return field == 'o' || field == 'c' ? 3 : 1; }
+std::size_t numbers_of(char field) {
+  return field == 'o' || field == 'c' ? 3 : 1;
+}
 
 }  // namespace
 
@@ -224,11 +244,21 @@ void Payload::round(float* p) const {
     std::array<float, 3> three{};
     std::copy_n(p, numbers_of(field), three.begin());
     switch (field) {
-      case 'u': *p = decode_ufloat16(encode_ufloat16(*p)); break;
-      case 'h': *p = decode_half(encode_half(*p)); break;
-      case 'n': *p = std::round(std::clamp(*p, 0.0F, 1.0F) * 65535) / 65535; break;
-      case 'o': std::ranges::copy(decode_octahedral8(encode_octahedral8(three)), p); break;
-      default: std::ranges::copy(decode_rgbe(encode_rgbe(three)), p); break;
+      case 'u':
+        *p = decode_ufloat16(encode_ufloat16(*p));
+        break;
+      case 'h':
+        *p = decode_half(encode_half(*p));
+        break;
+      case 'n':
+        *p = std::round(std::clamp(*p, 0.0F, 1.0F) * 65535) / 65535;
+        break;
+      case 'o':
+        std::ranges::copy(decode_octahedral8(encode_octahedral8(three)), p);
+        break;
+      default:
+        std::ranges::copy(decode_rgbe(encode_rgbe(three)), p);
+        break;
     }
     p += numbers_of(field);
   }
@@ -271,14 +301,16 @@ void spherical_harmonics(std::size_t degree, const glm::vec3& unit, float* out) 
     }
     return s;
   }();
-  float cosine = 1, sine = 0, diagonal = 1;  // real and imaginary part of (x + i y)^m; P_mm over sine^m
+  float cosine = 1, sine = 0,
+        diagonal = 1;  // real and imaginary part of (x + i y)^m; P_mm over sine^m
   for (std::size_t m = 0; m <= degree; ++m) {
     float before = 0, legendre = diagonal;  // P_(l-1)m, P_lm by recurrence in l
     for (std::size_t l = m; l <= degree; ++l) {
       out[l * l + l + m] = scale[l][m] * legendre * cosine;
       if (m > 0) out[l * l + l - m] = scale[l][m] * legendre * sine;
-      const float next = (static_cast<float>(2 * l + 1) * unit.z * legendre - static_cast<float>(l + m) * before) /
-                         static_cast<float>(l - m + 1);
+      const float next =
+          (static_cast<float>(2 * l + 1) * unit.z * legendre - static_cast<float>(l + m) * before) /
+          static_cast<float>(l - m + 1);
       before = std::exchange(legendre, next);
     }
     diagonal *= static_cast<float>(2 * m + 1);

@@ -14,16 +14,16 @@ namespace ptc::bench {
 
 /// A cluster as it is seen from a direction.
 struct Seen {
-  float front = 0;         ///< projected area of what faces it, scene units squared
-  float back = 0;          ///< likewise of what faces away
-  glm::vec3 radiance{0};   ///< mean over `front`
+  float front = 0;        ///< projected area of what faces it, scene units squared
+  float back = 0;         ///< likewise of what faces away
+  glm::vec3 radiance{0};  ///< mean over `front`
 };
 
 /// A way to describe a cluster by a few numbers.
 struct Payload {
   const char* name;
-  /// Of the stored form, a letter for each of: u ufloat16, n unorm16, h half; o octahedral8 and c rgbe
-  /// take three numbers.
+  /// Of the stored form, a letter for each of: u ufloat16, n unorm16, h half; o octahedral8 and c
+  /// rgbe take three numbers.
   std::string fields;
   /// @param below  the surfels of the node   @param out  count() numbers
   void (*fit)(const NodeSummary& node, std::span<const Surfel> below, float* out);
@@ -36,8 +36,8 @@ struct Payload {
   void round(float* numbers) const;
 };
 
-/// In the order of charts: a surfel, two lobes, the vector model, the cube of spec/nodes.md, spherical
-/// harmonics up to degree 0, 1, 2 and 4 (a clamped cosine has none of degree 3).
+/// In the order of charts: a surfel, two lobes, the vector model, the cube of spec/nodes.md,
+/// spherical harmonics up to degree 0, 1, 2 and 4 (a clamped cosine has none of degree 3).
 [[nodiscard]] const std::vector<Payload>& payloads();
 
 /// What payloads approximate: the sum over all surfels of the node, none in front of another.

@@ -20,7 +20,8 @@ namespace ptc::bench {
 namespace {
 
 constexpr float kPi = 3.14159265F;
-constexpr double kBoundsBytes = 22;  // of a child (spec/nodes.md): reference, mean, radius, cone, thickness
+constexpr double kBoundsBytes =
+    22;  // of a child (spec/nodes.md): reference, mean, radius, cone, thickness
 constexpr double kFloatNodeBytes = 8 + 34 * sizeof(float);  // reference and all numbers
 
 struct Node {
@@ -40,19 +41,24 @@ struct Cut {
   std::vector<std::uint64_t> points;
 };
 
-/// A container's octree in memory, built anew from its points: summaries as sums and bounds were found, or as they
-/// come back from a node page.
+/// A container's octree in memory, built anew from its points: summaries as sums and bounds were
+/// found, or as they come back from a node page.
 class Tree {
  public:
-  Tree(const ContainerReader& container, bool stored) : frame_(container.header().frame), stored_(stored) {
+  Tree(const ContainerReader& container, bool stored)
+      : frame_(container.header().frame), stored_(stored) {
     std::vector<PointRecord> points(static_cast<std::size_t>(container.superblock().points));
     static_cast<void>(ContainerPoints(container).next(points));
     SubtreeBuilder builder(container.superblock().leaf_points, frame_.unit());
-    root_ = builder.build(points, 0, 0, [this](const NodeGroup& group, std::uint64_t) { return add(group); }).ref;
+    root_ = builder
+                .build(points, 0, 0,
+                       [this](const NodeGroup& group, std::uint64_t) { return add(group); })
+                .ref;
   }
 
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
-  [[nodiscard]] Cut cut(std::span<const Surfel> surfels, const Receiver& receiver, float solid_angle) const;
+  [[nodiscard]] Cut cut(std::span<const Surfel> surfels, const Receiver& receiver,
+                        float solid_angle) const;
 
  private:
   ChildRef add(const NodeGroup& group) {
@@ -77,7 +83,8 @@ class Tree {
     for (int k = 0; k < 3; ++k) {
       const auto axis = static_cast<std::size_t>(k);
       node.mean[k] = frame_.origin[axis] + s.mean[axis] * unit;
-      if (s.area > 0) node.normal[k] = static_cast<float>((s.facing[2 * axis] - s.facing[2 * axis + 1]) / s.area);
+      if (s.area > 0)
+        node.normal[k] = static_cast<float>((s.facing[2 * axis] - s.facing[2 * axis + 1]) / s.area);
     }
     node.flatness = glm::length(node.normal);
     node.radius = static_cast<float>(unit * s.radius);
@@ -88,7 +95,8 @@ class Tree {
       std::tie(node.first_child, node.children) = groups_[child.ref.page];
       node.first_point = nodes_[node.first_child].first_point;
       node.points = 0;
-      for (std::uint32_t i = 0; i < node.children; ++i) node.points += nodes_[node.first_child + i].points;
+      for (std::uint32_t i = 0; i < node.children; ++i)
+        node.points += nodes_[node.first_child + i].points;
     }
     return node;
   }
@@ -96,7 +104,8 @@ class Tree {
   Frame frame_;
   bool stored_;
   std::vector<Node> nodes_;  // siblings next to each other, children before parents
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> groups_;  // first node, how many; by the page of a reference
+  std::vector<std::pair<std::uint32_t, std::uint32_t>>
+      groups_;  // first node, how many; by the page of a reference
   ChildRef root_;
 };
 
@@ -123,7 +132,8 @@ Cut Tree::cut(std::span<const Surfel> surfels, const Receiver& receiver, float s
       for (std::uint64_t k = node.first_point; k < node.first_point + node.points; ++k) {
         const Surfel& s = surfels[static_cast<std::size_t>(k)];
         const glm::vec3 away(s.position - receiver.position);
-        if (s.radius > 0 && height_of_top(away, receiver.normal, s.radius, s.normal, 0) > 0) cut.points.push_back(k);
+        if (s.radius > 0 && height_of_top(away, receiver.normal, s.radius, s.normal, 0) > 0)
+          cut.points.push_back(k);
       }
     }
   }
@@ -138,28 +148,33 @@ struct Disc {
 
 using See = std::function<Seen(std::uint32_t node, const glm::vec3& toward)>;
 
-std::uint32_t pack(const glm::vec3& colour) { return encode_rgbe({colour.r, colour.g, colour.b}); }
+std::uint32_t pack(const glm::vec3& colour) {
+  return encode_rgbe({colour.r, colour.g, colour.b});
+}
 
 /// A payload's numbers for every node of a tree.
-std::vector<float> fit_all(const Payload& payload, const Tree& tree, std::span<const Surfel> surfels,
-                           const Executor& executor) {
+std::vector<float> fit_all(const Payload& payload, const Tree& tree,
+                           std::span<const Surfel> surfels, const Executor& executor) {
   const std::vector<Node>& nodes = tree.nodes();
   std::vector<float> numbers(nodes.size() * payload.count());
   executor.for_each(nodes.size(), [&](std::size_t i, unsigned) {
-    payload.fit(nodes[i].summary, surfels.subspan(nodes[i].first_point, nodes[i].points), &numbers[i * payload.count()]);
+    payload.fit(nodes[i].summary, surfels.subspan(nodes[i].first_point, nodes[i].points),
+                &numbers[i * payload.count()]);
   });
   return numbers;
 }
 
 See seen_by(const Payload& payload, const std::vector<float>& numbers) {
-  return [&payload, &numbers, stride = payload.count()](std::uint32_t node, const glm::vec3& toward) {
-    return payload.see(&numbers[node * stride], toward);
-  };
+  return
+      [&payload, &numbers, stride = payload.count()](std::uint32_t node, const glm::vec3& toward) {
+        return payload.see(&numbers[node * stride], toward);
+      };
 }
 
 class Study {
  public:
-  Study(const BenchScene& scene, std::span<const Receiver> receivers, const ModelOptions& options, const Executor& executor)
+  Study(const BenchScene& scene, std::span<const Receiver> receivers, const ModelOptions& options,
+        const Executor& executor)
       : scene_(scene),
         receivers_(receivers),
         options_(options),
@@ -175,15 +190,18 @@ class Study {
   void set_cuts(const Tree& tree, float solid_angle) {
     tree_ = &tree;
     solid_angle_ = solid_angle;
-    cut_us_ = timed([&](std::size_t i) { cuts_[i] = tree.cut(scene_.surfels(), receivers_[i], solid_angle); });
+    cut_us_ = timed(
+        [&](std::size_t i) { cuts_[i] = tree.cut(scene_.surfels(), receivers_[i], solid_angle); });
   }
 
-  [[nodiscard]] ModelRow measure(const char* axis, const char* variant, const char* form, double bytes, const See& see) {
+  [[nodiscard]] ModelRow measure(const char* axis, const char* variant, const char* form,
+                                 double bytes, const See& see) {
     std::vector<double> evaluate, whole;
     std::vector<Shading> results(receivers_.size());
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
       evaluate.push_back(timed([&](std::size_t i) { add_discs(i, see); }));
-      whole.push_back(cut_us_ + evaluate.back() + timed([&](std::size_t i) { results[i] = draw(i); }));
+      whole.push_back(cut_us_ + evaluate.back() +
+                      timed([&](std::size_t i) { results[i] = draw(i); }));
     }
     ModelRow row{.scene = scene_.name(),
                  .axis = axis,
@@ -216,7 +234,8 @@ class Study {
       const Seen seen = see(at, toward);
       const float projected = std::max(seen.front, seen.back);
       if (!(projected > 0)) continue;
-      const ClusterShape shape{node.normal, static_cast<float>(node.summary.area), node.radius, node.thickness};
+      const ClusterShape shape{node.normal, static_cast<float>(node.summary.area), node.radius,
+                               node.thickness};
       const Splat splat = make_splat(shape, toward, projected, GatherOptions{}.inflation);
       const float lit = lit_area(splat, seen.front, projected);
       const float dim = lit > 0 ? seen.front / lit : 0;
@@ -257,20 +276,24 @@ class Study {
 
 }  // namespace
 
-std::vector<ModelRow> study_payloads(const BenchScene& scene, std::span<const Receiver> receivers, const ModelOptions& options,
-                                     const Executor& executor, Progress& progress) {
+std::vector<ModelRow> study_payloads(const BenchScene& scene, std::span<const Receiver> receivers,
+                                     const ModelOptions& options, const Executor& executor,
+                                     Progress& progress) {
   const std::span<const Surfel> surfels = scene.surfels();
   const Tree exact(scene.container(), false), stored(scene.container(), true);
-  progress.begin(scene.name() + ", payloads", options.solid_angles.size() * (payloads().size() + 1), "rows");
+  progress.begin(scene.name() + ", payloads", options.solid_angles.size() * (payloads().size() + 1),
+                 "rows");
   Study study(scene, receivers, options, executor);
   std::vector<std::vector<float>> floats, rounded;
   for (const Payload& payload : payloads()) {
     floats.push_back(fit_all(payload, exact, surfels, executor));
     rounded.push_back(floats.back());
-    for (std::size_t at = 0; at < rounded.back().size(); at += payload.count()) payload.round(&rounded.back()[at]);
+    for (std::size_t at = 0; at < rounded.back().size(); at += payload.count())
+      payload.round(&rounded.back()[at]);
   }
   const auto cube = static_cast<std::size_t>(
-      std::ranges::find(payloads(), std::string_view("cube"), [](const Payload& p) { return std::string_view(p.name); }) -
+      std::ranges::find(payloads(), std::string_view("cube"),
+                        [](const Payload& p) { return std::string_view(p.name); }) -
       payloads().begin());
   const std::vector<float> as_stored = fit_all(payloads()[cube], stored, surfels, executor);
 
@@ -283,16 +306,21 @@ std::vector<ModelRow> study_payloads(const BenchScene& scene, std::span<const Re
       const auto bytes = kBoundsBytes + static_cast<double>(p.stored_bytes());
       rows.push_back(study.measure("payload", p.name, "stored", bytes, seen_by(p, rounded[i])));
       rows.push_back(study.measure("payload", p.name, "float", float_bytes, seen_by(p, floats[i])));
-      if (i == cube) rows.push_back(study.measure("node", "all columns", "float", kFloatNodeBytes, seen_by(p, floats[i])));
+      if (i == cube)
+        rows.push_back(
+            study.measure("node", "all columns", "float", kFloatNodeBytes, seen_by(p, floats[i])));
       progress.advance(1);
     }
-    rows.push_back(study.measure("payload", "exact", "float", ModelRow::kNone, [&](std::uint32_t at, const glm::vec3& toward) {
-      const Node& node = exact.nodes()[at];
-      return see_exactly(surfels.subspan(node.first_point, node.points), toward);
-    }));
+    rows.push_back(study.measure("payload", "exact", "float", ModelRow::kNone,
+                                 [&](std::uint32_t at, const glm::vec3& toward) {
+                                   const Node& node = exact.nodes()[at];
+                                   return see_exactly(
+                                       surfels.subspan(node.first_point, node.points), toward);
+                                 }));
     study.set_cuts(stored, solid_angle);
     const double whole = kBoundsBytes + static_cast<double>(payloads()[cube].stored_bytes());
-    rows.push_back(study.measure("node", "all columns", "stored", whole, seen_by(payloads()[cube], as_stored)));
+    rows.push_back(study.measure("node", "all columns", "stored", whole,
+                                 seen_by(payloads()[cube], as_stored)));
     progress.advance(1);
   }
   progress.end();

@@ -23,7 +23,8 @@ float value_noise(const glm::vec3& p, std::uint64_t seed) {
     float weight = 1;
     for (int k = 0; k < 3; ++k) {
       const bool high = (corner >> k & 1) != 0;
-      hash = mix_bits(hash ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(low[k]) + (high ? 1 : 0)));
+      hash = mix_bits(
+          hash ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(low[k]) + (high ? 1 : 0)));
       weight *= high ? s[k] : 1 - s[k];
     }
     sum += weight * to_unit(static_cast<std::uint32_t>(hash >> 32));
@@ -42,14 +43,17 @@ float fractal_noise(glm::vec3 p, int octaves, std::uint64_t seed) {
   return sum;
 }
 
-void add_triangle(Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint16_t material) {
+void add_triangle(Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c,
+                  std::uint16_t material) {
   mesh.triangles.push_back({a, b, c});
   mesh.material_of.push_back(material);
 }
 
 constexpr float kWidth = 100;
 
-float terrain_height(float x, float z) { return 6 * fractal_noise({x / 14, 0.5F, z / 14}, 8, 1); }
+float terrain_height(float x, float z) {
+  return 6 * fractal_noise({x / 14, 0.5F, z / 14}, 8, 1);
+}
 
 /// @param side  quads along an edge
 void add_terrain(Mesh& mesh, unsigned side) {
@@ -77,8 +81,9 @@ struct Ball {
 };
 
 Ball make_ball(int rounds) {
-  Ball ball{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
-            {{2, 4, 0}, {2, 0, 5}, {2, 5, 1}, {2, 1, 4}, {3, 0, 4}, {3, 5, 0}, {3, 1, 5}, {3, 4, 1}}};
+  Ball ball{
+      {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
+      {{2, 4, 0}, {2, 0, 5}, {2, 5, 1}, {2, 1, 4}, {3, 0, 4}, {3, 5, 0}, {3, 1, 5}, {3, 4, 1}}};
   for (int round = 0; round < rounds; ++round) {
     std::map<std::array<std::uint32_t, 2>, std::uint32_t> middles;
     const auto middle = [&](std::uint32_t a, std::uint32_t b) {
@@ -97,14 +102,16 @@ Ball make_ball(int rounds) {
   return ball;
 }
 
-void add_ball(Mesh& mesh, const Ball& ball, const glm::vec3& centre, float radius, float roughness, std::uint64_t seed,
-              std::uint16_t material) {
+void add_ball(Mesh& mesh, const Ball& ball, const glm::vec3& centre, float radius, float roughness,
+              std::uint64_t seed, std::uint16_t material) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (const glm::vec3& direction : ball.corners) {
-    const float height = roughness > 0 ? 1 + roughness * fractal_noise(2.0F * direction + 40.0F, 5, seed) : 1;
+    const float height =
+        roughness > 0 ? 1 + roughness * fractal_noise(2.0F * direction + 40.0F, 5, seed) : 1;
     mesh.positions.push_back(centre + radius * height * direction);
   }
-  for (const auto& [a, b, c] : ball.triangles) add_triangle(mesh, first + a, first + b, first + c, material);
+  for (const auto& [a, b, c] : ball.triangles)
+    add_triangle(mesh, first + a, first + b, first + c, material);
 }
 
 /// A box, fronts outwards.
@@ -113,7 +120,8 @@ void add_box(Mesh& mesh, const glm::vec3& low, const glm::vec3& high, std::uint1
       {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}};
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (unsigned corner = 0; corner < 8; ++corner) {
-    mesh.positions.emplace_back((corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y,
+    mesh.positions.emplace_back((corner & 1) != 0 ? high.x : low.x,
+                                (corner & 2) != 0 ? high.y : low.y,
                                 (corner & 4) != 0 ? high.z : low.z);
   }
   for (const auto& [a, b, c, d] : kQuads) {
@@ -138,9 +146,10 @@ LitScene make_fractal(std::uint64_t triangles) {
   const SquarePoints places(17);
   for (std::uint32_t i = 0; i < balls; ++i) {
     const glm::vec2 at = (places.square(i) - 0.5F) * (0.96F * kWidth);
-    const float radius = 0.5F + 2.5F * static_cast<float>(places.line(i)) * static_cast<float>(places.line(i));
-    add_ball(scene.mesh, ball, {at.x, terrain_height(at.x, at.y) + 0.6F * radius, at.y}, radius, 0.3F, 100 + i,
-             static_cast<std::uint16_t>(1 + i % 2));
+    const float radius =
+        0.5F + 2.5F * static_cast<float>(places.line(i)) * static_cast<float>(places.line(i));
+    add_ball(scene.mesh, ball, {at.x, terrain_height(at.x, at.y) + 0.6F * radius, at.y}, radius,
+             0.3F, 100 + i, static_cast<std::uint16_t>(1 + i % 2));
   }
   scene.lights.suns.push_back({.to_sun = glm::normalize(glm::vec3(0.5F, 0.6F, 0.3F))});
   scene.lights.sky.radiance = {0.6F, 0.7F, 0.9F};
@@ -158,8 +167,9 @@ LitScene make_window_room() {
                     {.name = "ground", .albedo = {0.3F, 0.35F, 0.25F}}};
   const glm::vec3 size(6, 3, 4);
   constexpr float kWall = 0.25F;
-  add_box(mesh, {-kWall, -kWall, -kWall}, {size.x + kWall, 0, size.z + kWall}, 3);                // floor
-  add_box(mesh, {-kWall, size.y, -kWall}, {size.x + kWall, size.y + kWall, size.z + kWall}, 0);   // ceiling
+  add_box(mesh, {-kWall, -kWall, -kWall}, {size.x + kWall, 0, size.z + kWall}, 3);  // floor
+  add_box(mesh, {-kWall, size.y, -kWall}, {size.x + kWall, size.y + kWall, size.z + kWall},
+          0);  // ceiling
   add_box(mesh, {-kWall, 0, -kWall}, {0, size.y, size.z + kWall}, 1);
   add_box(mesh, {0, 0, -kWall}, {size.x, size.y, 0}, 0);
   add_box(mesh, {0, 0, size.z}, {size.x, size.y, size.z + kWall}, 2);
@@ -178,7 +188,8 @@ LitScene make_window_room() {
   add_ball(mesh, make_ball(5), {3.9F, 0.45F, 2.7F}, 0.45F, 0, 0, 0);
   add_ball(mesh, make_ball(4), {2.0F, 0.92F, 1.6F}, 0.18F, 0.3F, 5, 2);
   add_box(mesh, {size.x + kWall, -kWall, -4}, {size.x + 9, -kWall / 2, 8}, 4);  // what lies outside
-  scene.lights.suns.push_back({.to_sun = glm::normalize(glm::vec3(0.75F, 0.6F, 0.12F)), .irradiance = glm::vec3(30)});
+  scene.lights.suns.push_back(
+      {.to_sun = glm::normalize(glm::vec3(0.75F, 0.6F, 0.12F)), .irradiance = glm::vec3(30)});
   scene.lights.sky.radiance = {2.0F, 2.4F, 3.0F};
   scene.camera = {.position = {5.6, 1.7, 0.4},
                   .look_at = {1.4, 0.8, 2.6},
@@ -195,19 +206,23 @@ LitScene make_layers(unsigned layers) {
   mesh.materials = {{.name = "ground", .albedo = glm::vec3(0.6F)},
                     {.name = "red", .albedo = {0.6F, 0.2F, 0.15F}},
                     {.name = "blue", .albedo = {0.2F, 0.3F, 0.6F}}};
-  const auto add_tile = [&mesh](const glm::vec3& low, float width, bool up, std::uint16_t material) {
+  const auto add_tile = [&mesh](const glm::vec3& low, float width, bool up,
+                                std::uint16_t material) {
     const auto a = static_cast<std::uint32_t>(mesh.positions.size());
-    mesh.positions.insert(mesh.positions.end(), {low, low + glm::vec3(0, 0, width), low + glm::vec3(width, 0, width),
-                                                 low + glm::vec3(width, 0, 0)});
+    mesh.positions.insert(mesh.positions.end(),
+                          {low, low + glm::vec3(0, 0, width), low + glm::vec3(width, 0, width),
+                           low + glm::vec3(width, 0, 0)});
     add_triangle(mesh, a, up ? a + 1 : a + 2, up ? a + 2 : a + 1, material);
     add_triangle(mesh, a, up ? a + 2 : a + 3, up ? a + 3 : a + 2, material);
   };
   add_tile({0, 0, 0}, kTiles, true, 0);
   for (unsigned layer = 1; layer <= layers; ++layer) {
     for (int tile = 0; tile < kTiles * kTiles; ++tile) {
-      const std::uint64_t bits = mix_bits(std::uint64_t{layer} << 32 | static_cast<std::uint64_t>(tile));
+      const std::uint64_t bits =
+          mix_bits(std::uint64_t{layer} << 32 | static_cast<std::uint64_t>(tile));
       if ((bits & 1) != 0) continue;
-      const glm::vec3 at(static_cast<float>(tile % kTiles), static_cast<float>(layer), static_cast<float>(tile / kTiles));
+      const glm::vec3 at(static_cast<float>(tile % kTiles), static_cast<float>(layer),
+                         static_cast<float>(tile / kTiles));
       add_tile(at, 1, (bits & 2) != 0, (bits & 4) != 0 ? 1 : 2);
     }
   }

@@ -1,7 +1,5 @@
 #include "tools/bench/ray_baseline.h"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -14,6 +12,7 @@
 #include <type_traits>
 #include <vector>
 
+#include <embree3/rtcore.h>
 #include <glm/geometric.hpp>
 
 #include "engine/scene/directions.h"
@@ -25,8 +24,8 @@ namespace {
 
 constexpr unsigned kPacket = 16;
 
-/// Sample numbers of n Sobol points in an order in which neighbours point alike: by the box that they
-/// fall into. Owen's scramble keeps those who share a box together.
+/// Sample numbers of n Sobol points in an order in which neighbours point alike: by the box that
+/// they fall into. Owen's scramble keeps those who share a box together.
 std::vector<std::uint32_t> coherent_order(unsigned n) {
   // The points of a fixed seed: any scramble would do.
   const SquarePoints points(0);
@@ -35,7 +34,9 @@ std::vector<std::uint32_t> coherent_order(unsigned n) {
     const glm::vec2 p = points.square(i);
     std::uint32_t key = 0;
     for (unsigned bit = 0; bit < 16; ++bit) {
-      const auto digit = [&](float x) { return static_cast<std::uint32_t>(x * 65536.0F) >> bit & 1U; };
+      const auto digit = [&](float x) {
+        return static_cast<std::uint32_t>(x * 65536.0F) >> bit & 1U;
+      };
       key |= digit(p.x) << (2 * bit) | digit(p.y) << (2 * bit + 1);
     }
     keys[i] = {key, i};
@@ -68,11 +69,13 @@ struct RayBaseline::Impl {
     for (unsigned i = 0; i < args->N; ++i) {
       if (args->valid[i] != -1) continue;
       const Surfel& disc = impl.discs[RTCHitN_primID(args->hit, args->N, i)];
-      const glm::vec3 from(RTCRayN_org_x(args->ray, args->N, i), RTCRayN_org_y(args->ray, args->N, i),
+      const glm::vec3 from(RTCRayN_org_x(args->ray, args->N, i),
+                           RTCRayN_org_y(args->ray, args->N, i),
                            RTCRayN_org_z(args->ray, args->N, i));
       const glm::vec3 to = glm::vec3(disc.position - impl.origin) - from;
       const bool back = glm::dot(to, disc.normal) >= 0;
-      const bool clear = impl.sides == Sides::front || glm::dot(to, to) < 4 * disc.radius * disc.radius;
+      const bool clear =
+          impl.sides == Sides::front || glm::dot(to, to) < 4 * disc.radius * disc.radius;
       if (back && clear) args->valid[i] = 0;
     }
   }
@@ -104,7 +107,8 @@ struct RayBaseline::Impl {
 namespace {
 
 template <class T>
-T* new_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t bytes, std::size_t count) {
+T* new_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t bytes,
+              std::size_t count) {
   auto* buffer = static_cast<T*>(rtcSetNewGeometryBuffer(geometry, type, 0, format, bytes, count));
   if (count > 0 && !buffer) throw std::bad_alloc();
   return buffer;
@@ -112,7 +116,8 @@ T* new_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::s
 
 }  // namespace
 
-RayBaseline::RayBaseline(std::span<const Surfel> discs, Sides sides) : impl_(std::make_unique<Impl>()) {
+RayBaseline::RayBaseline(std::span<const Surfel> discs, Sides sides)
+    : impl_(std::make_unique<Impl>()) {
   impl_->discs = discs;
   impl_->sides = sides;
   impl_->begin();
@@ -120,8 +125,10 @@ RayBaseline::RayBaseline(std::span<const Surfel> discs, Sides sides) : impl_(std
   for (const Surfel& s : discs) bounds.add(s.position);
   if (!bounds.empty()) impl_->origin = (bounds.low + bounds.high) * 0.5;
   RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
-  auto* vertices = new_buffer<float>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, 16, discs.size());
-  auto* normals = new_buffer<float>(geometry, RTC_BUFFER_TYPE_NORMAL, RTC_FORMAT_FLOAT3, 12, discs.size());
+  auto* vertices =
+      new_buffer<float>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, 16, discs.size());
+  auto* normals =
+      new_buffer<float>(geometry, RTC_BUFFER_TYPE_NORMAL, RTC_FORMAT_FLOAT3, 12, discs.size());
   for (std::size_t i = 0; i < discs.size(); ++i) {
     const glm::vec3 c(discs[i].position - impl_->origin);
     for (int k = 0; k < 3; ++k) {
@@ -142,8 +149,10 @@ RayBaseline::RayBaseline(const Mesh& mesh, std::span<const Surfel> radiance, dou
   impl_->origin = mesh.origin;
   impl_->begin();
   RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = new_buffer<float>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, 12, mesh.positions.size());
-  auto* corners = new_buffer<unsigned>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, 12, mesh.triangles.size());
+  auto* vertices = new_buffer<float>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, 12,
+                                     mesh.positions.size());
+  auto* corners = new_buffer<unsigned>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, 12,
+                                       mesh.triangles.size());
   for (const glm::vec3& p : mesh.positions) {
     for (int k = 0; k < 3; ++k) *vertices++ = p[k];
   }
@@ -199,7 +208,8 @@ Sums occlude_single(RTCScene scene, const glm::vec3& from, Directions directions
   return sums;
 }
 
-constexpr std::array<int, kPacket> kAllValid{-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
+constexpr std::array<int, kPacket> kAllValid{-1, -1, -1, -1, -1, -1, -1, -1,
+                                             -1, -1, -1, -1, -1, -1, -1, -1};
 
 RTCIntersectContext coherent_context() {
   RTCIntersectContext context;
@@ -223,7 +233,8 @@ Sums occlude_packets(RTCScene scene, const glm::vec3& from, Directions direction
 
 /// @param light  of (primitive, u, v, normal, along)
 template <class Light>
-Sums intersect_single(RTCScene scene, const glm::vec3& from, Directions directions, const Light& light) {
+Sums intersect_single(RTCScene scene, const glm::vec3& from, Directions directions,
+                      const Light& light) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   Sums sums;
@@ -235,13 +246,15 @@ Sums intersect_single(RTCScene scene, const glm::vec3& from, Directions directio
     rtcIntersect1(scene, &context, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
     ++sums.covered;
-    sums.light += light(ray.hit.primID, ray.hit.u, ray.hit.v, {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z}, along);
+    sums.light += light(ray.hit.primID, ray.hit.u, ray.hit.v,
+                        {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z}, along);
   }
   return sums;
 }
 
 template <class Light>
-Sums intersect_packets(RTCScene scene, const glm::vec3& from, Directions directions, const Light& light) {
+Sums intersect_packets(RTCScene scene, const glm::vec3& from, Directions directions,
+                       const Light& light) {
   RTCIntersectContext context = coherent_context();
   alignas(64) const std::array<int, kPacket> valid = kAllValid;
   Sums sums;
@@ -256,8 +269,9 @@ Sums intersect_packets(RTCScene scene, const glm::vec3& from, Directions directi
     for (unsigned i = 0; i < kPacket; ++i) {
       if (ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
       ++sums.covered;
-      sums.light += light(ray.hit.primID[i], ray.hit.u[i], ray.hit.v[i],
-                          {ray.hit.Ng_x[i], ray.hit.Ng_y[i], ray.hit.Ng_z[i]}, directions[first + i]);
+      sums.light +=
+          light(ray.hit.primID[i], ray.hit.u[i], ray.hit.v[i],
+                {ray.hit.Ng_x[i], ray.hit.Ng_y[i], ray.hit.Ng_z[i]}, directions[first + i]);
     }
   }
   return sums;
@@ -278,12 +292,13 @@ Shading RayBaseline::trace(const Receiver& receiver, Job job, Packets packets, u
   std::ranges::transform(impl_->orders[exponent], directions.begin(), [&](std::uint32_t i) {
     return frame.to_world(cosine_direction(points.square(i)));
   });
-  const auto light = [&](unsigned primitive, float u, float v, const glm::vec3& normal, const glm::vec3& along) {
+  const auto light = [&](unsigned primitive, float u, float v, const glm::vec3& normal,
+                         const glm::vec3& along) {
     return impl_->radiance(primitive, u, v, normal, along);
   };
   const bool single = packets == Packets::single;
-  const Sums sums = job == Job::occlusion
-                        ? (single ? occlude_single : occlude_packets)(impl_->scene, from, directions)
+  const Sums sums = job == Job::occlusion ? (single ? occlude_single : occlude_packets)(
+                                                impl_->scene, from, directions)
                     : single ? intersect_single(impl_->scene, from, directions, light)
                              : intersect_packets(impl_->scene, from, directions, light);
   Shading shading;

@@ -1,4 +1,5 @@
-// What PTCX is measured against: a ray tracer on the same scene, as a user of Embree would write it.
+// What PTCX is measured against: a ray tracer on the same scene, as a user of Embree would write
+// it.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,8 @@
 
 namespace ptc::bench {
 
-/// Cosine-distributed Sobol-Owen rays at discs or triangles; light at hits is looked up, not computed,
-/// as in a bake. Threads: calls may be made concurrently.
+/// Cosine-distributed Sobol-Owen rays at discs or triangles; light at hits is looked up, not
+/// computed, as in a bake. Threads: calls may be made concurrently.
 class RayBaseline {
  public:
   enum class Job {
@@ -21,8 +22,8 @@ class RayBaseline {
   };
   enum class Packets { single, sixteen };
 
-  /// Oriented discs, their radiance on the front; backs as spec/shading.md#sides has them. Of coplanar
-  /// discs a ray meets either. They must outlive this.
+  /// Oriented discs, their radiance on the front; backs as spec/shading.md#sides has them. Of
+  /// coplanar discs a ray meets either. They must outlive this.
   RayBaseline(std::span<const Surfel> discs, Sides sides);
   /// Triangles with a lightmap: every texel, about `spacing` wide, has the radiance of the nearest
   /// surfel that faces its way. Backs are black.

@@ -25,7 +25,8 @@ std::size_t RecordFile::block_bytes(std::uint64_t block) const noexcept {
 void RecordFile::fill(std::uint64_t records) {
   const Arena noise(kBlockBytes);
   std::mt19937_64 random(1);
-  const std::span words(reinterpret_cast<std::uint64_t*>(noise.data()), kBlockBytes / sizeof(std::uint64_t));
+  const std::span words(reinterpret_cast<std::uint64_t*>(noise.data()),
+                        kBlockBytes / sizeof(std::uint64_t));
   std::ranges::generate(words, random);
   records_ = records;
   for_each_transfer(blocks_of(*this), [&](std::uint64_t block, std::size_t) {
@@ -40,7 +41,9 @@ void RecordFile::copy_to(RecordFile& other, std::uint64_t most) const {
     const std::span<std::byte> buffer(buffers.data() + copy * kBlockBytes, block_bytes(block));
     const std::uint64_t begin = block * kBlockBytes;
     file_->read_at(begin, buffer);
-    if (begin < most) other.file_->write_at(begin, buffer.first(std::min(buffer.size(), direct_blocks(most - begin))));
+    if (begin < most)
+      other.file_->write_at(begin,
+                            buffer.first(std::min(buffer.size(), direct_blocks(most - begin))));
   });
   other.records_ = most / sizeof(PointRecord);
 }
@@ -52,7 +55,9 @@ void RecordWriter::write(std::span<const PointRecord> records) {
     const std::size_t slot = next_ % writing_.size();
     if (filled_ == 0 && writing_[slot].valid()) writing_[slot].get();
     const std::size_t count = std::min(records.size(), RecordFile::kBlock - filled_);
-    std::ranges::copy(records.first(count), reinterpret_cast<PointRecord*>(buffers_.data() + slot * kBlockBytes) + filled_);
+    std::ranges::copy(
+        records.first(count),
+        reinterpret_cast<PointRecord*>(buffers_.data() + slot * kBlockBytes) + filled_);
     filled_ += count;
     records = records.subspan(count);
     if (filled_ == RecordFile::kBlock) flush();
@@ -61,8 +66,11 @@ void RecordWriter::write(std::span<const PointRecord> records) {
 
 void RecordWriter::flush() {
   const std::size_t slot = next_ % writing_.size();
-  const std::span<const std::byte> block(buffers_.data() + slot * kBlockBytes, direct_blocks(filled_ * sizeof(PointRecord)));
-  writing_[slot] = std::async(std::launch::async, [this, block, at = next_ * kBlockBytes] { file_.file_->write_at(at, block); });
+  const std::span<const std::byte> block(buffers_.data() + slot * kBlockBytes,
+                                         direct_blocks(filled_ * sizeof(PointRecord)));
+  writing_[slot] = std::async(std::launch::async, [this, block, at = next_ * kBlockBytes] {
+    file_.file_->write_at(at, block);
+  });
   file_.records_ += filled_;
   ++next_;
   filled_ = 0;
@@ -75,7 +83,8 @@ void RecordWriter::finish() {
   }
 }
 
-RecordReader::RecordReader(const RecordFile& file) : file_(file), buffers_(kTransfers * kBlockBytes) {
+RecordReader::RecordReader(const RecordFile& file)
+    : file_(file), buffers_(kTransfers * kBlockBytes) {
   while (ahead_ < kTransfers) read_ahead();
 }
 
@@ -86,7 +95,8 @@ void RecordReader::read_ahead() {
   if (block >= blocks_of(file_)) return;
   const std::size_t slot = block % reading_.size();
   reading_[slot] = std::async(std::launch::async, [this, block, slot] {
-    file_.file_->read_at(block * kBlockBytes, {buffers_.data() + slot * kBlockBytes, file_.block_bytes(block)});
+    file_.file_->read_at(block * kBlockBytes,
+                         {buffers_.data() + slot * kBlockBytes, file_.block_bytes(block)});
   });
 }
 
@@ -108,21 +118,24 @@ std::vector<MortonKey> sample_of(const RecordFile& input) {
   const std::uint64_t stride = input.records() / kSampleKeys + 1;
   std::uint64_t at = 0, begin = 0;
   for (std::span<const PointRecord> block = reader.next(); !block.empty(); block = reader.next()) {
-    for (; at < begin + block.size(); at += stride) sample.push_back(block[static_cast<std::size_t>(at - begin)].key);
+    for (; at < begin + block.size(); at += stride)
+      sample.push_back(block[static_cast<std::size_t>(at - begin)].key);
     begin += block.size();
   }
   return sample;
 }
 
-Frame for_each_city_record(std::uint64_t points, const std::function<void(std::span<const PointRecord>)>& sink) {
+Frame for_each_city_record(std::uint64_t points,
+                           const std::function<void(std::span<const PointRecord>)>& sink) {
   const Bounds bounds = city_bounds(points);
-  const Frame frame = frame_around({bounds.low.x, bounds.low.y, bounds.low.z}, {bounds.high.x, bounds.high.y, bounds.high.z});
+  const Frame frame = frame_around({bounds.low.x, bounds.low.y, bounds.low.z},
+                                   {bounds.high.x, bounds.high.y, bounds.high.z});
   const std::unique_ptr<PointSource> city = make_city(points);
   std::vector<Surfel> surfels(4096);
   std::vector<PointRecord> records(surfels.size());
   while (const std::size_t count = city->next(surfels)) {
-    std::transform(surfels.begin(), surfels.begin() + static_cast<std::ptrdiff_t>(count), records.begin(),
-                   [&](const Surfel& surfel) { return to_record(surfel, frame); });
+    std::transform(surfels.begin(), surfels.begin() + static_cast<std::ptrdiff_t>(count),
+                   records.begin(), [&](const Surfel& surfel) { return to_record(surfel, frame); });
     sink(std::span<const PointRecord>(records).first(count));
   }
   return frame;

@@ -21,7 +21,8 @@ namespace ptc::bench {
 /// A file without a name, gone with its object.
 class RecordFile {
  public:
-  explicit RecordFile(const std::filesystem::path& directory) : file_(std::make_unique<DirectFile>(directory)) {}
+  explicit RecordFile(const std::filesystem::path& directory)
+      : file_(std::make_unique<DirectFile>(directory)) {}
 
   /// Records that are transferred at once: whole blocks of the disk.
   static constexpr std::size_t kBlock = 200 * kPageRecords;
@@ -31,14 +32,17 @@ class RecordFile {
   [[nodiscard]] std::uint64_t bytes() const noexcept { return records_ * sizeof(PointRecord); }
   /// Writes so many records of noise from the file's beginning.
   void fill(std::uint64_t records);
-  /// Reads all and writes as many bytes again to another file, or in its own place, which then holds no more.
-  /// @param most  bytes to write when that is less; the other file's records are those that are whole in them
+  /// Reads all and writes as many bytes again to another file, or in its own place, which then
+  /// holds no more.
+  /// @param most  bytes to write when that is less; the other file's records are those that are
+  /// whole in them
   void copy_to(RecordFile& other, std::uint64_t most = ~std::uint64_t{0}) const;
 
  private:
   friend class RecordWriter;
   friend class RecordReader;
-  [[nodiscard]] std::size_t block_bytes(std::uint64_t block) const noexcept;  ///< rounded up to the disk's blocks
+  [[nodiscard]] std::size_t block_bytes(
+      std::uint64_t block) const noexcept;  ///< rounded up to the disk's blocks
 
   std::unique_ptr<DirectFile> file_;
   std::uint64_t records_ = 0;
@@ -82,6 +86,7 @@ class RecordReader {
 
 /// The procedural city in blocks of up to 4,096 records, in the order of its blocks of houses.
 /// @return the frame of their keys
-Frame for_each_city_record(std::uint64_t points, const std::function<void(std::span<const PointRecord>)>& sink);
+Frame for_each_city_record(std::uint64_t points,
+                           const std::function<void(std::span<const PointRecord>)>& sink);
 
 }  // namespace ptc::bench

@@ -24,7 +24,8 @@ double relative_rms(std::span<const float> ours, std::span<const float> referenc
 
 Reference make_reference(const ReceiverSet& set, const Checked& checked, const ReferenceRays& rays,
                          const TraceOne& trace, const Executor& executor) {
-  const auto trace_all = [&](const std::vector<std::size_t>& indices, unsigned count, std::uint64_t salt) {
+  const auto trace_all = [&](const std::vector<std::size_t>& indices, unsigned count,
+                             std::uint64_t salt) {
     std::vector<Shading> results(indices.size());
     executor.for_each(indices.size(), [&](std::size_t i, unsigned) {
       results[i] = trace(set.receivers[indices[i]], count, salt + indices[i]);

@@ -31,7 +31,8 @@ struct ReferenceRays {
 using TraceOne = std::function<Shading(const Receiver&, unsigned rays, std::uint64_t seed)>;
 
 /// Seeds are 2^40 and more: methods take others.
-[[nodiscard]] Reference make_reference(const ReceiverSet& set, const Checked& checked, const ReferenceRays& rays,
-                                       const TraceOne& trace, const Executor& executor);
+[[nodiscard]] Reference make_reference(const ReceiverSet& set, const Checked& checked,
+                                       const ReferenceRays& rays, const TraceOne& trace,
+                                       const Executor& executor);
 
 }  // namespace ptc::bench

@@ -25,7 +25,8 @@ std::string cell_of(const Json& value) {
   if (value.is_null()) return {};
   if (!value.is_string()) return value.dump();
   std::string cell = "\"";
-  for (const char c : value.get_ref<const std::string&>()) cell += c == '"' ? std::string("\"\"") : std::string(1, c);
+  for (const char c : value.get_ref<const std::string&>())
+    cell += c == '"' ? std::string("\"\"") : std::string(1, c);
   return cell + '"';
 }
 
@@ -35,25 +36,27 @@ std::string csv_of(const Json& rows) {
   for (const auto& [key, value] : rows.front().items()) text += (text.empty() ? "" : ",") + key;
   for (const Json& row : rows) {
     std::string separator = "\n";
-    for (const auto& [key, value] : row.items()) text += std::exchange(separator, ",") + cell_of(value);
+    for (const auto& [key, value] : row.items())
+      text += std::exchange(separator, ",") + cell_of(value);
   }
   return text + "\n";
 }
 
-std::filesystem::path with_ending(const std::filesystem::path& name, const char* ending) { return name.string() + ending; }
+std::filesystem::path with_ending(const std::filesystem::path& name, const char* ending) {
+  return name.string() + ending;
+}
 
 }  // namespace
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
 
 nlohmann::ordered_json time_facts(const Spread& wall, const Spread& cpu, std::uint64_t points) {
   const double ns = 1e9 / static_cast<double>(std::max<std::uint64_t>(1, points));
-  return {{"wall_seconds", wall.median},
-          {"wall_low", wall.low},
-          {"wall_high", wall.high},
-          {"cpu_ns_per_point", ns * cpu.median},
-          {"cpu_low", ns * cpu.low},
-          {"cpu_high", ns * cpu.high}};
+  return {{"wall_seconds", wall.median}, {"wall_low", wall.low},
+          {"wall_high", wall.high},      {"cpu_ns_per_point", ns * cpu.median},
+          {"cpu_low", ns * cpu.low},     {"cpu_high", ns * cpu.high}};
 }
 
 std::string or_dash(double value, const char* format) {

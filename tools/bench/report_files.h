@@ -15,10 +15,13 @@ namespace ptc::bench {
 /// null where there is no finite number.
 [[nodiscard]] nlohmann::ordered_json number(double value);
 
-/// Members of a row: seconds of wall time, nanoseconds of CPU time a point; medians, least and greatest.
-[[nodiscard]] nlohmann::ordered_json time_facts(const Spread& wall, const Spread& cpu, std::uint64_t points);
+/// Members of a row: seconds of wall time, nanoseconds of CPU time a point; medians, least and
+/// greatest.
+[[nodiscard]] nlohmann::ordered_json time_facts(const Spread& wall, const Spread& cpu,
+                                                std::uint64_t points);
 
-/// A number for a table that people read: by a format as "{:.1f}", or a dash where it is not finite.
+/// A number for a table that people read: by a format as "{:.1f}", or a dash where it is not
+/// finite.
 [[nodiscard]] std::string or_dash(double value, const char* format);
 
 /// The series of a panel that has this name, a new one if there is none.

@@ -42,7 +42,8 @@ void set_speedups(std::vector<AccuracyRow>& rows) {
   const auto speedup = [&](const AccuracyRow& row, const std::string& rival) {
     std::vector<TimedError> measured;
     for (const AccuracyRow& other : rows) {
-      if (other.method == rival && other.job == row.job) measured.push_back({other.error().rms, other.us_per_receiver.median});
+      if (other.method == rival && other.job == row.job)
+        measured.push_back({other.error().rms, other.us_per_receiver.median});
     }
     return time_at(measured, row.error().rms) / row.us_per_receiver.median;
   };

@@ -16,7 +16,8 @@ struct TimedError {
 /// Time at an error between those measured, by linear interpolation of logarithms; NaN outside.
 [[nodiscard]] double time_at(const std::vector<TimedError>& measured, double error);
 
-/// Of rays of one scene and set that went out single and in packets, all else equal, the faster stay.
+/// Of rays of one scene and set that went out single and in packets, all else equal, the faster
+/// stay.
 void keep_faster_packets(std::vector<AccuracyRow>& rows);
 
 /// Fills in the speedups of rows of one scene and set.

@@ -45,10 +45,12 @@ double value_at(const std::byte* at, std::size_t bytes) {
 
 void require_whole(const VerifyReport& report, std::uint64_t asked, std::uint64_t sorted) {
   if (!report.sound()) {
-    throw DataError(fmt::format("{} points: the container is not sound: {}", asked, line_of(report.findings.front())));
+    throw DataError(fmt::format("{} points: the container is not sound: {}", asked,
+                                line_of(report.findings.front())));
   }
   if (report.points != sorted) {
-    throw DataError(fmt::format("{} points: {} went through the sort, {} are in the container", asked, sorted, report.points));
+    throw DataError(fmt::format("{} points: {} went through the sort, {} are in the container",
+                                asked, sorted, report.points));
   }
   const std::uint64_t off = std::max(report.points, asked) - std::min(report.points, asked);
   if (off > asked / 20) throw DataError(fmt::format("{} points: {} came", asked, report.points));
@@ -76,7 +78,8 @@ std::uint64_t digest_of_values(const std::filesystem::path& ply, std::uint64_t p
   for (const Property& property : properties) row += property.bytes;
   const std::byte* at = bytes.data() + end + kEnd.size();
   const auto body = std::span(bytes).subspan(end + kEnd.size());
-  if (body.size() != points * row) throw DataError(fmt::format("{}: not the values of {} points", ply.string(), points));
+  if (body.size() != points * row)
+    throw DataError(fmt::format("{}: not the values of {} points", ply.string(), points));
   for (std::uint64_t point = 0; point < points; ++point) {
     for (const auto& [name, size] : properties) {
       if (!std::isfinite(value_at(at, size))) {

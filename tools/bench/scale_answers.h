@@ -26,9 +26,11 @@ void require_same(const ScaleAnswers& first, const ScaleAnswers& now);
 
 /// Digest of the points of a PLY as PlyWriter writes it.
 /// @param points  that it must hold
-/// @throws DataError naming file, point and property when a value is not finite, or the number of points differs;
+/// @throws DataError naming file, point and property when a value is not finite, or the number of
+/// points differs;
 ///         std::system_error
 /// Memory: that of the file.
-[[nodiscard]] std::uint64_t digest_of_values(const std::filesystem::path& ply, std::uint64_t points);
+[[nodiscard]] std::uint64_t digest_of_values(const std::filesystem::path& ply,
+                                             std::uint64_t points);
 
 }  // namespace ptc::bench

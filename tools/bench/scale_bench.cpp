@@ -23,7 +23,8 @@ namespace ptc::bench {
 namespace {
 
 constexpr std::uint64_t kVerifiedWhole = 2'000'000;
-constexpr std::size_t kCopiedBytes = std::size_t{64} << 20;  // at once: far more than processors cache
+constexpr std::size_t kCopiedBytes = std::size_t{64}
+                                     << 20;  // at once: far more than processors cache
 
 /// Runs of one stage, and what the disk gave in the last of them.
 struct StageRuns {
@@ -50,8 +51,8 @@ struct SizeRuns {
 
 class ScaleRun {
  public:
-  ScaleRun(const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run, Progress& progress,
-           const std::function<void(const std::vector<ScaleRow>&)>& report)
+  ScaleRun(const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run,
+           Progress& progress, const std::function<void(const std::vector<ScaleRow>&)>& report)
       : options_(options), work_(work), run_(run), progress_(progress), report_(report) {
     run_.temp_dirs = {work_};
   }
@@ -75,11 +76,15 @@ class ScaleRun {
   }
 
  private:
-  /// What a build spills goes as the container grows, so that the larger of both is the most there is at once.
+  /// What a build spills goes as the container grows, so that the larger of both is the most there
+  /// is at once.
   void tell_space(std::uint64_t points) {
-    const std::uint64_t spilled = points * kSpilledBytes * 21 / 20;  // a city has up to 5 % more points
+    const std::uint64_t spilled =
+        points * kSpilledBytes * 21 / 20;  // a city has up to 5 % more points
     require_room({&work_, 1}, spilled, fmt::format("{} points", points));
-    progress_.note(space_text(require_build_space(points, spilled, Profile::compact, {&work_, 1}, scene_), {&work_, 1}, scene_));
+    progress_.note(
+        space_text(require_build_space(points, spilled, Profile::compact, {&work_, 1}, scene_),
+                   {&work_, 1}, scene_));
   }
 
   template <class Body>
@@ -90,10 +95,13 @@ class ScaleRun {
 
   ScaleAnswers run_stages(std::uint64_t points, SizeRuns& runs, bool first) {
     Progress silent;
-    stage(runs.build, [&] { runs.built = build_container({.city_points = points, .run = run_}, scene_, silent); });
+    stage(runs.build, [&] {
+      runs.built = build_container({.city_points = points, .run = run_}, scene_, silent);
+    });
     forget(InputFile(scene_));
     VerifyReport report;
-    VerifyOptions verification{.level = VerifyLevel::payload, .memory_bytes = run_.memory_bytes, .threads = run_.threads};
+    VerifyOptions verification{
+        .level = VerifyLevel::payload, .memory_bytes = run_.memory_bytes, .threads = run_.threads};
     stage(runs.verify, [&] { report = verify_container(scene_, verification, silent); });
     require_whole(report, points, runs.built.sort.points);
     if (first) {
@@ -109,14 +117,16 @@ class ScaleRun {
     const ShadeRequest request{.scene = scene_, .count = options_.receivers, .run = run_};
     stage(runs.shade, [&] { runs.shaded = shade_container(request, lit_, silent); });
     std::filesystem::remove(scene_);
-    const std::uint64_t values = digest_of_values(lit_, std::min(options_.receivers, report.points));
+    const std::uint64_t values =
+        digest_of_values(lit_, std::min(options_.receivers, report.points));
     std::filesystem::remove(lit_);
     return {.points = report.points, .content = report.superblock->content_xxh3, .values = values};
   }
 
   /// The disk and the memory alone, without the container beside them.
   void run_limits(SizeRuns& runs) {
-    const std::uint64_t spilled = runs.built.sort.spilled_bytes, container = runs.built.superblock.file_bytes;
+    const std::uint64_t spilled = runs.built.sort.spilled_bytes,
+                        container = runs.built.superblock.file_bytes;
     RecordFile file(work_);
     stage(runs.build_floor, [&] {
       file.fill((spilled > 0 ? spilled : container) / sizeof(PointRecord));
@@ -134,7 +144,8 @@ class ScaleRun {
     });
   }
 
-  ScaleRow& add_row(const char* stage, const SizeRuns& all, const StageRuns& runs, unsigned threads) {
+  ScaleRow& add_row(const char* stage, const SizeRuns& all, const StageRuns& runs,
+                    unsigned threads) {
     return rows_.emplace_back(ScaleRow{.stage = stage,
                                        .points = all.answers.points,
                                        .threads = threads,
@@ -170,7 +181,8 @@ class ScaleRun {
     shade.cap_share = static_cast<double>(cache.frames) / made.page_count;
     add_row("build floor", runs, runs.build_floor, kTransfers).moved_bytes = moved;
     add_row("verify floor", runs, runs.verify_floor, kTransfers).moved_bytes = made.file_bytes;
-    add_row("memcpy", runs, runs.copy, 1).moved_bytes = 2 * runs.answers.points * sizeof(PointRecord);
+    add_row("memcpy", runs, runs.copy, 1).moved_bytes =
+        2 * runs.answers.points * sizeof(PointRecord);
   }
 
   const ScaleOptions& options_;
@@ -186,8 +198,9 @@ class ScaleRun {
 
 }  // namespace
 
-std::vector<ScaleRow> measure_scale(const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run,
-                                    Progress& progress, const std::function<void(const std::vector<ScaleRow>&)>& report) {
+std::vector<ScaleRow> measure_scale(
+    const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run,
+    Progress& progress, const std::function<void(const std::vector<ScaleRow>&)>& report) {
   return ScaleRun(options, work, run, progress, report).measure();
 }
 

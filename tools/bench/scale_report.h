@@ -29,8 +29,8 @@ struct ScaleLaw {
   double time_exponent = 0;      ///< of wall seconds of the whole stage, over all sizes
   double resident_exponent = 0;  ///< of most resident, likewise
   double predicted_seconds = 0;  ///< wall, of kPredictedPoints; NaN when as many were measured
-  /// Of the greatest size over that of the least of kLargePoints or more: wall time of a point (of "shade", a receiver),
-  /// and most resident.
+  /// Of the greatest size over that of the least of kLargePoints or more: wall time of a point (of
+  /// "shade", a receiver), and most resident.
   double time_ratio = 0, resident_ratio = 0;
 };
 
@@ -39,8 +39,8 @@ inline constexpr std::uint64_t kLargePoints = 20'000'000, kPredictedPoints = 1'7
 /// One for each of build, verify and shade. @param rows  of one or more sizes, ascending
 [[nodiscard]] std::vector<ScaleLaw> laws_of(const std::vector<ScaleRow>& rows);
 
-/// {"rows": [...], "laws": [...]}: a ScaleRow each, with `floor_share`, the floor's wall time over that of the stage; a
-/// ScaleLaw each. Rows have the same members, null where a stage has none.
+/// {"rows": [...], "laws": [...]}: a ScaleRow each, with `floor_share`, the floor's wall time over
+/// that of the stage; a ScaleLaw each. Rows have the same members, null where a stage has none.
 [[nodiscard]] nlohmann::ordered_json facts_of(const std::vector<ScaleRow>& rows);
 [[nodiscard]] std::string scale_text(const std::vector<ScaleRow>& rows);
 [[nodiscard]] Chart chart_of(const std::vector<ScaleRow>& rows);

@@ -12,11 +12,13 @@ namespace ptc::bench {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr ErrorStatistics kNoErrors{.rms = kNone, .bias = kNone, .percentile_99 = kNone, .reference_mean = kNone};
+constexpr ErrorStatistics kNoErrors{
+    .rms = kNone, .bias = kNone, .percentile_99 = kNone, .reference_mean = kNone};
 
 /// Room for all pages: nothing that is timed waits for the disk.
 CacheOptions whole_scene(const ContainerReader& container, unsigned threads) {
-  return {.memory_bytes = PageCache::bytes_for(container, threads, container.page_count()), .threads = threads};
+  return {.memory_bytes = PageCache::bytes_for(container, threads, container.page_count()),
+          .threads = threads};
 }
 
 /// Counts of a receiver in the mean, times a thousand.
@@ -33,8 +35,10 @@ GatherCounts mean_counts(const GatherCounts& counts) {
 }
 
 std::string setting_text(const GatherOptions& options) {
-  std::string text = fmt::format("{} sr, {} rad, R {}", options.solid_angle, options.parallax, options.resolution);
-  if (options.inflation != GatherOptions{}.inflation) text += fmt::format(", x {}", options.inflation);
+  std::string text =
+      fmt::format("{} sr, {} rad, R {}", options.solid_angle, options.parallax, options.resolution);
+  if (options.inflation != GatherOptions{}.inflation)
+    text += fmt::format(", x {}", options.inflation);
   return text;
 }
 
@@ -72,11 +76,13 @@ SetRun::~SetRun() = default;
 
 void SetRun::trace_references(const SceneRays& rays) {
   const auto with_window = [&](bool window) {
-    return ReferenceRays{.half = options_.reference_rays, .window = window ? options_.window_rays : 0};
+    return ReferenceRays{.half = options_.reference_rays,
+                         .window = window ? options_.window_rays : 0};
   };
   const auto trace_baseline = [&](const RayBaseline& baseline, bool window) {
     const auto trace = [&](const Receiver& receiver, unsigned count, std::uint64_t seed) {
-      return baseline.trace(receiver, RayBaseline::Job::bleeding, RayBaseline::Packets::sixteen, count, seed);
+      return baseline.trace(receiver, RayBaseline::Job::bleeding, RayBaseline::Packets::sixteen,
+                            count, seed);
     };
     return make_reference(set_, checked_, with_window(window), trace, executor_);
   };
@@ -87,7 +93,8 @@ void SetRun::trace_references(const SceneRays& rays) {
   ours_ = make_reference(set_, checked_, with_window(gathers), trace_oracle, executor_);
   if (rays.discs) discs_ = trace_baseline(*rays.discs, true);
   if (rays.mesh) mesh_ = trace_baseline(*rays.mesh, options_.measures("embree-mesh"));
-  has_light_ = std::ranges::any_of(ours_.mean, [](const Shading& s) { return s.irradiance != glm::vec3(0); });
+  has_light_ = std::ranges::any_of(ours_.mean,
+                                   [](const Shading& s) { return s.irradiance != glm::vec3(0); });
 }
 
 std::vector<Quantity> SetRun::both_jobs() const {
@@ -95,10 +102,10 @@ std::vector<Quantity> SetRun::both_jobs() const {
   return {Quantity::occlusion, Quantity::bleeding};
 }
 
-void SetRun::add(std::string method, std::string setting, std::vector<Quantity> jobs, const Reference& reference,
-                 std::unique_ptr<Method> run) {
-  entries_.push_back(std::make_unique<Entry>(
-      Entry{std::move(method), std::move(setting), std::move(jobs), &reference, std::move(run), {}, {}}));
+void SetRun::add(std::string method, std::string setting, std::vector<Quantity> jobs,
+                 const Reference& reference, std::unique_ptr<Method> run) {
+  entries_.push_back(std::make_unique<Entry>(Entry{
+      std::move(method), std::move(setting), std::move(jobs), &reference, std::move(run), {}, {}}));
 }
 
 void SetRun::add_gathers() {
@@ -107,7 +114,8 @@ void SetRun::add_gathers() {
       for (const Quantity job : both_jobs()) {
         options.bleeding = job == Quantity::bleeding;
         add("ptcx", setting_text(options), {job}, ours_,
-            make_gather(scene_.container(), scene_.lights().sky, set_, checked_, options, cache_, executor_));
+            make_gather(scene_.container(), scene_.lights().sky, set_, checked_, options, cache_,
+                        executor_));
       }
     }
   }
@@ -119,13 +127,15 @@ void SetRun::add_gathers() {
   }
 }
 
-void SetRun::add_rays(const std::string& name, const RayBaseline& baseline, const Reference& reference) {
+void SetRun::add_rays(const std::string& name, const RayBaseline& baseline,
+                      const Reference& reference) {
   using Packets = RayBaseline::Packets;
   for (const unsigned rays : options_.rays) {
     for (const Packets packets : {Packets::single, Packets::sixteen}) {
       const char* how = packets == Packets::single ? "single" : "packets";
       for (const Quantity job : both_jobs()) {
-        const auto kind = job == Quantity::occlusion ? RayBaseline::Job::occlusion : RayBaseline::Job::bleeding;
+        const auto kind =
+            job == Quantity::occlusion ? RayBaseline::Job::occlusion : RayBaseline::Job::bleeding;
         add(name, fmt::format("{} rays, {}", rays, how), {job}, reference,
             make_rays(baseline, set_, checked_, {kind, packets, rays}, executor_));
       }
@@ -182,7 +192,8 @@ void SetRun::compare(AccuracyRow& row) {
   if (!entry.result) entry.result = entry.run->result();
   const Shadings& result = *entry.result;
   const Reference& reference = *entry.reference;
-  row.flip = window_flip(set_, result.window, reference.window, row.job, scene_.lights().sky.radiance);
+  row.flip =
+      window_flip(set_, result.window, reference.window, row.job, scene_.lights().sky.radiance);
   const std::vector<float> occlusion = occlusion_of(result.checked);
   row.occlusion = over_mean(error_statistics(occlusion, occlusion_of(reference.mean)));
   if (mesh_) row.occlusion_rms_mesh = relative_rms(occlusion, occlusion_of(mesh_->mean));
@@ -194,7 +205,8 @@ void SetRun::compare(AccuracyRow& row) {
 }
 
 ReferenceNote SetRun::note() const {
-  const std::vector<float> occlusion = occlusion_of(ours_.mean), irradiance = irradiance_of(ours_.mean);
+  const std::vector<float> occlusion = occlusion_of(ours_.mean),
+                           irradiance = irradiance_of(ours_.mean);
   ReferenceNote note{.scene = scene_.name(),
                      .set = set_.name,
                      .receivers = checked_.receivers.size(),

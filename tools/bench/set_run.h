@@ -15,17 +15,18 @@ namespace ptc::bench {
 
 /// Rays at one scene, which outlive what is measured against them.
 struct SceneRays {
-  const DiscRays* oracle = nullptr;     ///< truth for ptcx and plain
-  const RayBaseline* discs = nullptr;   ///< null: not measured
-  const RayBaseline* mesh = nullptr;    ///< null for a cloud
+  const DiscRays* oracle = nullptr;    ///< truth for ptcx and plain
+  const RayBaseline* discs = nullptr;  ///< null: not measured
+  const RayBaseline* mesh = nullptr;   ///< null for a cloud
 };
 
-/// Measures everything in turn, as often as asked: what disturbs the machine for a while disturbs all.
+/// Measures everything in turn, as often as asked: what disturbs the machine for a while disturbs
+/// all.
 class SetRun {
  public:
   /// Traces the references. All arguments outlive this.
-  SetRun(const BenchScene& scene, const ReceiverSet& set, const AccuracyOptions& options, const SceneRays& rays,
-         const Executor& executor, Progress& progress);
+  SetRun(const BenchScene& scene, const ReceiverSet& set, const AccuracyOptions& options,
+         const SceneRays& rays, const Executor& executor, Progress& progress);
   ~SetRun();
 
   void measure(Progress& progress);
@@ -37,8 +38,8 @@ class SetRun {
   struct Entry;
 
   void trace_references(const SceneRays& rays);
-  void add(std::string method, std::string setting, std::vector<Quantity> jobs, const Reference& reference,
-           std::unique_ptr<Method> run);
+  void add(std::string method, std::string setting, std::vector<Quantity> jobs,
+           const Reference& reference, std::unique_ptr<Method> run);
   void add_gathers();
   void add_rays(const std::string& name, const RayBaseline& baseline, const Reference& reference);
   [[nodiscard]] std::vector<AccuracyRow> timed_rows() const;

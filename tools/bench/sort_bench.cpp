@@ -43,14 +43,16 @@ void generate(const std::string& order, std::uint64_t points, const Sink& sink) 
   std::uint64_t number = 0;
   const auto give = [&](std::size_t count) {
     for (std::size_t i = 0; i < count; ++i, ++number) {
-      block[i].radiance = {static_cast<std::uint16_t>(number >> 32), static_cast<std::uint16_t>(number >> 16),
+      block[i].radiance = {static_cast<std::uint16_t>(number >> 32),
+                           static_cast<std::uint16_t>(number >> 16),
                            static_cast<std::uint16_t>(number)};
     }
     sink(std::span<const PointRecord>(block).first(count));
   };
   if (order != "city") {
     for (std::uint64_t i = 0; i < points;) {
-      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(block.size(), points - i));
+      const auto count =
+          static_cast<std::size_t>(std::min<std::uint64_t>(block.size(), points - i));
       for (std::size_t k = 0; k < count; ++k, ++i) block[k].key = key_at(order, i, points);
       give(count);
     }
@@ -71,12 +73,14 @@ class Check {
  public:
   void add(const PointRecord& r) noexcept {
     sum_ += mixed(r.key.high ^ mixed(r.key.low ^ mixed(number_of(r))));
-    if (count_++ > 0) sorted_ &= last_.key < r.key || (last_.key == r.key && number_of(last_) < number_of(r));
+    if (count_++ > 0)
+      sorted_ &= last_.key < r.key || (last_.key == r.key && number_of(last_) < number_of(r));
     last_ = r;
   }
   void require_sorted(const Check& input, const char* method) const {
     if (!sorted_) throw DataError(fmt::format("{}: records are not in order", method));
-    if (sum_ != input.sum_ || count_ != input.count_) throw DataError(fmt::format("{}: other records came out", method));
+    if (sum_ != input.sum_ || count_ != input.count_)
+      throw DataError(fmt::format("{}: other records came out", method));
   }
 
  private:
@@ -85,13 +89,20 @@ class Check {
   PointRecord last_;
 };
 
-bool by_key(const PointRecord& a, const PointRecord& b) noexcept { return a.key < b.key; }
+bool by_key(const PointRecord& a, const PointRecord& b) noexcept {
+  return a.key < b.key;
+}
 
 class SortRun {
  public:
-  SortRun(const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run, Progress& progress,
-          const std::function<void(const std::vector<SortRow>&)>& report)
-      : options_(options), work_(work), run_(run), executor_(run.threads), progress_(progress), report_(report) {}
+  SortRun(const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
+          Progress& progress, const std::function<void(const std::vector<SortRow>&)>& report)
+      : options_(options),
+        work_(work),
+        run_(run),
+        executor_(run.threads),
+        progress_(progress),
+        report_(report) {}
 
   std::vector<SortRow> measure() {
     for (const std::string& panel : options_.panels) {
@@ -107,7 +118,8 @@ class SortRun {
   }
 
  private:
-  SortRow& add_row(const char* panel, const std::string& order, const char* method, std::uint64_t points, const TimedRuns& times) {
+  SortRow& add_row(const char* panel, const std::string& order, const char* method,
+                   std::uint64_t points, const TimedRuns& times) {
     return rows_.emplace_back(SortRow{.panel = panel,
                                       .order = order,
                                       .method = method,
@@ -130,12 +142,16 @@ class SortRun {
     TimedRuns ours, tbb, std_sort, copy;
     progress_.begin("sort in memory", options_.repeats, "runs");
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
-      copy.run([&] { std::memcpy(static_cast<void*>(records.data()), input.data(), input.size() * sizeof(PointRecord)); });
+      copy.run([&] {
+        std::memcpy(static_cast<void*>(records.data()), input.data(),
+                    input.size() * sizeof(PointRecord));
+      });
       ours.run([&] { radix_sort(records, scratch, executor_); });
       if (repeat == 0) require(records, expected);
       records = input;
       tbb.run([&] {
-        const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, executor_.threads());
+        const oneapi::tbb::global_control limit(
+            oneapi::tbb::global_control::max_allowed_parallelism, executor_.threads());
         oneapi::tbb::parallel_sort(records.begin(), records.end(), by_key);
       });
       records = input;
@@ -158,8 +174,10 @@ class SortRun {
   }
 
   void on_disk(const std::string& order, std::uint64_t points) {
-    constexpr std::uint64_t kFiles = 3;  // input, what is spilled or between copies, and output; a city has up to 5 % more points
-    require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20, fmt::format("{} records", points));
+    constexpr std::uint64_t kFiles = 3;  // input, what is spilled or between copies, and output; a
+                                         // city has up to 5 % more points
+    require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20,
+                 fmt::format("{} records", points));
     RecordFile input(work_);
     RecordWriter writer(input);
     Check expected;
@@ -197,11 +215,16 @@ class SortRun {
 
   /// @param check  of what comes out, or null
   /// @return bytes spilled
-  std::uint64_t sort_file(const RecordFile& input, std::span<const MortonKey> sample, Check* check) {
-    ExternalSorter sorter({.memory_bytes = run_.memory_bytes, .temp_dirs = {work_}, .expected = input.records()}, executor_, sample);
+  std::uint64_t sort_file(const RecordFile& input, std::span<const MortonKey> sample,
+                          Check* check) {
+    ExternalSorter sorter(
+        {.memory_bytes = run_.memory_bytes, .temp_dirs = {work_}, .expected = input.records()},
+        executor_, sample);
     {
       RecordReader reader(input);
-      for (std::span<const PointRecord> block = reader.next(); !block.empty(); block = reader.next()) sorter.add(block);
+      for (std::span<const PointRecord> block = reader.next(); !block.empty();
+           block = reader.next())
+        sorter.add(block);
     }
     const std::unique_ptr<PointStream> sorted = sorter.finish();
     RecordFile output(work_);
@@ -229,8 +252,10 @@ class SortRun {
 
 }  // namespace
 
-std::vector<SortRow> measure_sort(const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
-                                  Progress& progress, const std::function<void(const std::vector<SortRow>&)>& report) {
+std::vector<SortRow> measure_sort(const SortBenchOptions& options,
+                                  const std::filesystem::path& work, const RunOptions& run,
+                                  Progress& progress,
+                                  const std::function<void(const std::vector<SortRow>&)>& report) {
   return SortRun(options, work, run, progress, report).measure();
 }
 

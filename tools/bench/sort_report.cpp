@@ -13,17 +13,23 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr char kReading[] =
-    "Records of 40 bytes; medians of all runs. In memory: CPU time, all threads together; tbb is its parallel_sort, which like "
-    "std::sort is not stable. On disk: wall time from an input file of records to an output file, under the memory cap; the floor "
-    "is the time in which the same disk reads and writes these bytes twice, four blocks of 4 MB under way at once. Both go past the "
+    "Records of 40 bytes; medians of all runs. In memory: CPU time, all threads together; tbb is "
+    "its parallel_sort, which like "
+    "std::sort is not stable. On disk: wall time from an input file of records to an output file, "
+    "under the memory cap; the floor "
+    "is the time in which the same disk reads and writes these bytes twice, four blocks of 4 MB "
+    "under way at once. Both go past the "
     "system's cache.\n";
 
-double ns(double seconds, const SortRow& row) { return 1e9 * seconds / static_cast<double>(std::max<std::uint64_t>(1, row.points)); }
+double ns(double seconds, const SortRow& row) {
+  return 1e9 * seconds / static_cast<double>(std::max<std::uint64_t>(1, row.points));
+}
 
 /// The row of another method beside it.
 const SortRow* beside(const std::vector<SortRow>& rows, const SortRow& row, const char* method) {
   const auto found = std::ranges::find_if(rows, [&](const SortRow& r) {
-    return r.panel == row.panel && r.order == row.order && r.points == row.points && r.method == method;
+    return r.panel == row.panel && r.order == row.order && r.points == row.points &&
+           r.method == method;
   });
   return found == rows.end() ? nullptr : &*found;
 }
@@ -39,12 +45,8 @@ double speedup(const std::vector<SortRow>& rows, const SortRow& row) {
 }
 
 Json row_facts(const std::vector<SortRow>& rows, const SortRow& row) {
-  Json facts{{"panel", row.panel},
-             {"order", row.order},
-             {"method", row.method},
-             {"points", row.points},
-             {"threads", row.threads},
-             {"memory_bytes", row.memory_bytes}};
+  Json facts{{"panel", row.panel},   {"order", row.order},     {"method", row.method},
+             {"points", row.points}, {"threads", row.threads}, {"memory_bytes", row.memory_bytes}};
   facts.update(time_facts(row.wall, row.cpu, row.points));
   facts.update(Json{{"moved_bytes", row.moved_bytes},
                     {"resident_bytes", row.resident_bytes},
@@ -67,7 +69,9 @@ ChartPanel panel_of(const std::vector<SortRow>& rows, const std::string& name) {
     const double share = floor_share(rows, row);
     series.points.push_back({.x = static_cast<double>(row.points),
                              .y = ns(disk ? row.wall.median : row.cpu.median, row),
-                             .label = std::isfinite(share) ? fmt::format("{:.0f} % of the floor's rate", 100 * share) : std::string()});
+                             .label = std::isfinite(share)
+                                          ? fmt::format("{:.0f} % of the floor's rate", 100 * share)
+                                          : std::string()});
   }
   return panel;
 }
@@ -95,14 +99,18 @@ void write_reports(const std::filesystem::path& directory, const std::vector<Sor
 }
 
 std::string sort_text(const std::vector<SortRow>& rows) {
-  std::string text = fmt::format("{:<7} {:<9} {:<9} {:>10} {:>3} {:>8} {:>18} {:>8} {:>9} {:>8} {:>7} {:>7}\n", "panel", "order", "method",
-                                 "records", "thr", "wall s", "[low, high]", "cpu ns", "moved GB", "MiB", "floor %", "x sort");
+  std::string text =
+      fmt::format("{:<7} {:<9} {:<9} {:>10} {:>3} {:>8} {:>18} {:>8} {:>9} {:>8} {:>7} {:>7}\n",
+                  "panel", "order", "method", "records", "thr", "wall s", "[low, high]", "cpu ns",
+                  "moved GB", "MiB", "floor %", "x sort");
   for (const SortRow& row : rows) {
-    text += fmt::format("{:<7} {:<9} {:<9} {:>10} {:>3} {:>8.3f} {:>18} {:>8.1f} {:>9.2f} {:>8.0f} {:>7} {:>7}\n", row.panel, row.order,
-                        row.method, row.points, row.threads, row.wall.median,
-                        fmt::format("[{:.3f}, {:.3f}]", row.wall.low, row.wall.high), ns(row.cpu.median, row),
-                        static_cast<double>(row.moved_bytes) / 1e9, static_cast<double>(row.resident_bytes) / 1048576,
-                        or_dash(100 * floor_share(rows, row), "{:.0f}"), or_dash(speedup(rows, row), "{:.2f}"));
+    text += fmt::format(
+        "{:<7} {:<9} {:<9} {:>10} {:>3} {:>8.3f} {:>18} {:>8.1f} {:>9.2f} {:>8.0f} {:>7} {:>7}\n",
+        row.panel, row.order, row.method, row.points, row.threads, row.wall.median,
+        fmt::format("[{:.3f}, {:.3f}]", row.wall.low, row.wall.high), ns(row.cpu.median, row),
+        static_cast<double>(row.moved_bytes) / 1e9,
+        static_cast<double>(row.resident_bytes) / 1048576,
+        or_dash(100 * floor_share(rows, row), "{:.0f}"), or_dash(speedup(rows, row), "{:.2f}"));
   }
   return text;
 }

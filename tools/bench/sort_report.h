@@ -12,8 +12,9 @@
 
 namespace ptc::bench {
 
-/// {"rows": [...]}: a SortRow each, with nanoseconds of a point, and what it takes over its rivals: of the panel "disk"
-/// `floor_share`, the floor's wall time over that of the sort; in memory `speedup`, CPU time of std::sort over its own.
+/// {"rows": [...]}: a SortRow each, with nanoseconds of a point, and what it takes over its rivals:
+/// of the panel "disk" `floor_share`, the floor's wall time over that of the sort; in memory
+/// `speedup`, CPU time of std::sort over its own.
 [[nodiscard]] nlohmann::ordered_json facts_of(const std::vector<SortRow>& rows);
 [[nodiscard]] std::string sort_text(const std::vector<SortRow>& rows);
 [[nodiscard]] Chart chart_of(const std::vector<SortRow>& rows);

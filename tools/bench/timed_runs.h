@@ -14,7 +14,7 @@ namespace ptc::bench {
 /// Times of the runs of one method, and the most memory that one of them took.
 struct TimedRuns {
   std::vector<double> wall, cpu;  ///< seconds; CPU of all threads, user and system
-  std::uint64_t resident = 0;     ///< most bytes at once during a run, less what was there before it
+  std::uint64_t resident = 0;  ///< most bytes at once during a run, less what was there before it
 
   /// Calls body() and measures it.
   template <class Body>

@@ -9,8 +9,8 @@
 namespace ptc::bench {
 namespace {
 
-Image picture(const ReceiverSet& set, std::span<const Shading> shadings, Quantity job, const glm::vec3& sky,
-              float gain) {
+Image picture(const ReceiverSet& set, std::span<const Shading> shadings, Quantity job,
+              const glm::vec3& sky, float gain) {
   Image image{.width = set.window_width, .height = set.window_height};
   std::size_t next = 0;
   for (const Pixel& pixel : set.window) {
@@ -22,7 +22,8 @@ Image picture(const ReceiverSet& set, std::span<const Shading> shadings, Quantit
     if (job == Quantity::occlusion) {
       image.pixels.emplace_back(1 - s.occlusion);
     } else {
-      const glm::vec3 arriving = s.irradiance * std::numbers::inv_pi_v<float> + sky * (1 - s.occlusion);
+      const glm::vec3 arriving =
+          s.irradiance * std::numbers::inv_pi_v<float> + sky * (1 - s.occlusion);
       image.pixels.push_back(gain * (pixel.direct + pixel.albedo * arriving));
     }
   }
@@ -40,10 +41,11 @@ float exposure(const Image& image) {
 
 }  // namespace
 
-double window_flip(const ReceiverSet& set, std::span<const Shading> ours, std::span<const Shading> reference,
-                   Quantity job, const glm::vec3& sky) {
+double window_flip(const ReceiverSet& set, std::span<const Shading> ours,
+                   std::span<const Shading> reference, Quantity job, const glm::vec3& sky) {
   if (set.window.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const float gain = job == Quantity::occlusion ? 1 : exposure(picture(set, reference, job, sky, 1));
+  const float gain =
+      job == Quantity::occlusion ? 1 : exposure(picture(set, reference, job, sky, 1));
   return mean_flip(picture(set, ours, job, sky, gain), picture(set, reference, job, sky, gain));
 }
 
