@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "engine/base/error.h"
-#include "engine/io/image.h"
-#include "engine/io/mesh.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/image/image.h"
+#include "engine/io/mesh/mesh.h"
 #include "fuzz/memory_file.h"
 #include "fuzz/require.h"
 

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "engine/build/build.h"
-#include "engine/build/container_points.h"
-#include "engine/io/image.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/image/image.h"
+#include "engine/octree/build_pages.h"
+#include "engine/octree/container_points.h"
 #include "engine/verify/verify.h"
 #include "format/codec.h"
 #include "format/node_page.h"

@@ -79,15 +79,15 @@ class Layers(unittest.TestCase):
         def faults(path, line):
             return faults_of(path, "#pragma once\n" + line, self.table, lambda p: "missing" not in p)
 
-        self.assertEqual(faults("engine/build/a.cpp", '#include "engine/sort/b.h"'), [])
-        self.assertEqual(faults("engine/build/a.cpp", '#include "engine/build/b.h"'), [])
-        self.assertEqual(faults("engine/build/a.cpp", "#include <vector>"), [])
+        self.assertEqual(faults("engine/octree/a.cpp", '#include "engine/sort/b.h"'), [])
+        self.assertEqual(faults("engine/octree/a.cpp", '#include "engine/octree/b.h"'), [])
+        self.assertEqual(faults("engine/octree/a.cpp", "#include <vector>"), [])
         self.assertEqual(faults("tools/a.cpp", '#include "engine/shade/b.h"'), [])
-        for path, line in (("engine/build/a.cpp", '#include "engine/shade/b.h"'),
-                           ("engine/shade/a.cpp", '#  include "engine/build/b.h"'),
+        for path, line in (("engine/octree/a.cpp", '#include "engine/shade/b.h"'),
+                           ("engine/shade/a.cpp", '#  include "engine/octree/b.h"'),
                            ("format/a.h", '#include "engine/base/b.h"'),
-                           ("engine/io/a.h", '#include "engine/pipeline.h"'),
-                           ("engine/a.h", '#include "tools/b.h"'),
+                           ("engine/io/a.h", '#include "engine/pipeline/pipeline.h"'),
+                           ("engine/pipeline/a.h", '#include "tools/b.h"'),
                            ("engine/io/a.h", '#include "../base/b.h"'),
                            ("engine/io/a.h", '#include "missing.h"'),
                            ("engine/io/a.h", "#include <format/b.h>")):

@@ -16,7 +16,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "format/error.h"
 #include "format/text.h"
 #include "tools/values.h"

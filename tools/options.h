@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "engine/pipeline.h"
+#include "engine/pipeline/pipeline.h"
 
 namespace ptc {
 

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "engine/base/error.h"
-#include "engine/io/room.h"
+#include "engine/io/file/disk_space.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/accuracy_report.h"
 #include "tools/bench/build_report.h"

@@ -1,7 +1,7 @@
 // ptcbuild: meshes and clouds to a lit, sorted, hierarchical container.
 #include <fmt/format.h>
 
-#include "engine/append.h"
+#include "engine/pipeline/build/append.h"
 #include "format/node_page.h"
 #include "tools/common.h"
 #include "tools/options.h"

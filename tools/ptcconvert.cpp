@@ -1,8 +1,8 @@
 // ptcconvert: containers to clouds, clouds and meshes to containers, containers to containers.
 #include <fmt/format.h>
 
-#include "engine/convert.h"
-#include "engine/stages.h"
+#include "engine/pipeline/convert/convert.h"
+#include "engine/pipeline/stages.h"
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"

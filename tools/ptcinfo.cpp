@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "engine/io/file.h"
-#include "engine/stages.h"
+#include "engine/io/file/file.h"
+#include "engine/pipeline/stages.h"
 #include "engine/store/commit.h"
 #include "engine/store/reader.h"
 #include "tools/common.h"

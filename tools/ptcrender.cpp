@@ -2,7 +2,7 @@
 #include <set>
 
 #include "engine/base/error.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "engine/pipeline.h"
+#include "engine/pipeline/pipeline.h"
 
 namespace ptc {
 

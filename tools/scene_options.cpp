@@ -6,7 +6,7 @@
 
 #include <glm/trigonometric.hpp>
 
-#include "engine/io/image.h"
+#include "engine/io/image/image.h"
 #include "tools/common.h"
 #include "tools/values.h"
 

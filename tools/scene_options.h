@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "engine/scene/camera.h"
-#include "engine/scene/lights.h"
+#include "engine/scene/light/lights.h"
 
 namespace ptc {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "engine/io/direct_range.h"
-#include "engine/io/file.h"
+#include "engine/io/file/direct_range.h"
+#include "engine/io/file/file.h"
 
 namespace ptc {
 

@@ -12,7 +12,7 @@
 #include "engine/base/memory.h"
 #include "engine/cache/direct_descriptor.h"
 #include "engine/cache/uring_source.h"
-#include "engine/io/direct_range.h"
+#include "engine/io/file/direct_range.h"
 
 namespace ptc {
 namespace {

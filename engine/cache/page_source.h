@@ -6,7 +6,7 @@
 #include <memory>
 #include <span>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 
 namespace ptc {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "engine/io/image.h"
+#include "engine/io/image/image.h"
 
 namespace ptc {
 

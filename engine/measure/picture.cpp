@@ -12,7 +12,7 @@
 #include <cairo.h>
 #include <fmt/format.h>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 
 namespace ptc {
 namespace {

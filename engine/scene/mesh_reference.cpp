@@ -7,8 +7,8 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/scene/directions.h"
-#include "engine/scene/low_discrepancy.h"
+#include "engine/scene/sampling/directions.h"
+#include "engine/scene/sampling/low_discrepancy.h"
 #include "engine/scene/step_off.h"
 
 namespace ptc {

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "engine/scene/lights.h"
+#include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 
 namespace ptc {

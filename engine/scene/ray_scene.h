@@ -7,7 +7,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 
 namespace ptc {
 

@@ -15,7 +15,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/scene/directions.h"
+#include "engine/scene/sampling/directions.h"
 
 namespace ptc {
 namespace {

@@ -4,7 +4,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "engine/io/image.h"
+#include "engine/io/image/image.h"
 
 namespace ptc {
 

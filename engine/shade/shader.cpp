@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "engine/shade/receiver_cell.h"
+#include "engine/shade/gather/receiver_cell.h"
 
 namespace ptc {
 

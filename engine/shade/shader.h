@@ -8,7 +8,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/cache/page_cache.h"
-#include "engine/shade/gather.h"
+#include "engine/shade/gather/gather.h"
 
 namespace ptc {
 

@@ -9,8 +9,8 @@
 #include <span>
 #include <string>
 
-#include "engine/io/direct_range.h"
-#include "engine/io/file.h"
+#include "engine/io/file/direct_range.h"
+#include "engine/io/file/file.h"
 
 namespace ptc {
 

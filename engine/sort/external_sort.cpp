@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/base/memory.h"
-#include "engine/io/room.h"
+#include "engine/io/file/disk_space.h"
 #include "engine/sort/bucket_stream.h"
 #include "engine/sort/radix_sort.h"
 #include "engine/sort/sort_plan.h"

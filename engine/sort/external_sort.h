@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/base/executor.h"
-#include "engine/io/state_file.h"
+#include "engine/io/file/state_file.h"
 #include "format/point_record.h"
 
 namespace ptc {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "engine/sort/partition.h"
 #include "format/checksum.h"
 

@@ -11,7 +11,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/memory.h"
-#include "engine/io/state_file.h"
+#include "engine/io/file/state_file.h"
 #include "engine/sort/direct_file.h"
 #include "engine/sort/splitters.h"
 #include "engine/sort/transfers.h"

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/io/state_file.h"
+#include "engine/io/file/state_file.h"
 #include "format/morton.h"
 
 namespace ptc {

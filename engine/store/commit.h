@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "format/container.h"
 #include "format/error.h"
 

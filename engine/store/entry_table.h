@@ -7,7 +7,7 @@
 #include <mutex>
 #include <vector>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "format/container.h"
 
 namespace ptc {

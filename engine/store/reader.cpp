@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "engine/store/commit.h"
 #include "engine/store/page_content.h"
 #include "engine/store/structure.h"

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "engine/store/commit.h"
 #include "engine/store/entry_table.h"
 #include "engine/store/structure.h"

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/build/build.h"
-#include "engine/build/channel_pager.h"
+#include "engine/octree/build_pages.h"
+#include "engine/octree/channel_pager.h"
 #include "engine/store/writer.h"
 #include "engine/verify/surveyed_page.h"
 #include "format/bytes.h"

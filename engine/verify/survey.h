@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/base/progress.h"
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "engine/store/page_content.h"
 #include "engine/store/reader.h"
 #include "engine/verify/diagnose.h"

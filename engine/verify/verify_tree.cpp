@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/build/octree.h"
+#include "engine/octree/octree.h"
 #include "engine/verify/node_pages.h"
 #include "engine/verify/point_runs.h"
 #include "engine/verify/verify_node.h"

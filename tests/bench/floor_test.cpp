@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 
 #include "engine/scene/mesh_reference.h"
-#include "engine/scene/sampler.h"
-#include "engine/shade/brute_force.h"
+#include "engine/scene/sampling/sampler.h"
+#include "engine/shade/reference/brute_force.h"
 #include "tools/bench/procedural.h"
 
 using namespace ptc;

@@ -8,8 +8,8 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/shade/brute_force.h"
-#include "engine/shade/plain_gather.h"
+#include "engine/shade/reference/brute_force.h"
+#include "engine/shade/reference/plain_gather.h"
 #include "tests/support/scenes.h"
 #include "tools/bench/methods.h"
 #include "tools/bench/model_report.h"

@@ -10,8 +10,8 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/build/subtree.h"
-#include "engine/io/record.h"
+#include "engine/io/cloud/record.h"
+#include "engine/octree/subtree.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;

@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/measure/statistics.h"
-#include "engine/shade/brute_force.h"
+#include "engine/shade/reference/brute_force.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;

@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/scene/low_discrepancy.h"
+#include "engine/scene/sampling/low_discrepancy.h"
 #include "tools/bench/window.h"
 
 using namespace ptc;

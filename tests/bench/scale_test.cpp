@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
 #include "tools/bench/scale_answers.h"

@@ -1,5 +1,5 @@
 // Points added to a container.
-#include "engine/append.h"
+#include "engine/pipeline/build/append.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,10 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/build/container_points.h"
-#include "engine/build/merge.h"
-#include "engine/convert.h"
-#include "engine/io/record.h"
+#include "engine/io/cloud/record.h"
+#include "engine/octree/container_points.h"
+#include "engine/octree/merge.h"
+#include "engine/pipeline/convert/convert.h"
 #include "engine/verify/verify.h"
 #include "format/error.h"
 #include "tests/store/forge.h"

@@ -1,5 +1,5 @@
 // Light of several bounces, against a furnace and path tracing.
-#include "engine/bounces.h"
+#include "engine/pipeline/light/bounces.h"
 
 #include <cmath>
 #include <fstream>
@@ -9,12 +9,12 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/build/container_points.h"
-#include "engine/io/image.h"
-#include "engine/io/record.h"
+#include "engine/io/cloud/record.h"
+#include "engine/io/image/image.h"
 #include "engine/measure/statistics.h"
+#include "engine/octree/container_points.h"
+#include "engine/pipeline/stages.h"
 #include "engine/scene/mesh_reference.h"
-#include "engine/stages.h"
 #include "format/error.h"
 #include "tests/support/scenes.h"
 

@@ -1,12 +1,12 @@
 // What receivers are off, as estimated, against what they are.
-#include "engine/estimate.h"
+#include "engine/pipeline/quality/estimate.h"
 
 #include <algorithm>
 #include <string>
 
 #include <catch2/catch.hpp>
 
-#include "engine/pipeline.h"
+#include "engine/pipeline/pipeline.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;

@@ -6,8 +6,8 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/pipeline.h"
-#include "engine/stages.h"
+#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/stages.h"
 #include "engine/store/reader.h"
 #include "format/point_page.h"
 #include "tests/support/scenes.h"

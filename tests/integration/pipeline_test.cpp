@@ -1,14 +1,14 @@
 // The road end to end: mesh or cloud to container to shaded points and pictures.
-#include "engine/pipeline.h"
+#include "engine/pipeline/pipeline.h"
 
 #include <fstream>
 
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/image.h"
-#include "engine/io/points.h"
-#include "engine/stages.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/image/image.h"
+#include "engine/pipeline/stages.h"
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
 #include "tests/support/scenes.h"

@@ -1,5 +1,5 @@
 // The error that was asked for, against the error that is measured.
-#include "engine/tuning.h"
+#include "engine/pipeline/quality/tuning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/error_sums.h"
-#include "engine/pipeline.h"
-#include "engine/stages.h"
+#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/quality/error_sums.h"
+#include "engine/pipeline/stages.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;

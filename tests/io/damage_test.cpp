@@ -3,8 +3,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/io/mesh.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -14,7 +14,7 @@
 #include <half.h>
 
 #include "engine/base/error.h"
-#include "engine/io/image.h"
+#include "engine/io/image/image.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -1,5 +1,5 @@
 // Whole reads and writes, and publication by rename.
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 
 #include <sys/resource.h>
 #include <sys/stat.h>

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -1,5 +1,5 @@
 // 8-bit pictures: the sRGB curve, the formats, and what damaged files do.
-#include "engine/io/image.h"
+#include "engine/io/image/image.h"
 
 #include <cmath>
 #include <stdexcept>

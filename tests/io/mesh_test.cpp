@@ -1,5 +1,5 @@
 // Boxes, and joining meshes.
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 
 #include <stdexcept>
 

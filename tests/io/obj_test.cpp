@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -3,7 +3,7 @@
 #include <zlib.h>
 
 #include "engine/base/error.h"
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

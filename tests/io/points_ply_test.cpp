@@ -7,7 +7,7 @@
 #include <zlib.h>
 
 #include "engine/base/error.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

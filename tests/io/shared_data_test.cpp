@@ -7,9 +7,9 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/image.h"
-#include "engine/io/mesh.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/image/image.h"
+#include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -9,7 +9,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

@@ -1,5 +1,5 @@
 // States that are written whole, and refused when they are not.
-#include "engine/io/state_file.h"
+#include "engine/io/file/state_file.h"
 
 #include <fstream>
 #include <system_error>

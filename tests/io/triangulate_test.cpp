@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/io/mesh_soup.h"
+#include "engine/io/mesh/mesh_soup.h"
 
 using namespace ptc;
 

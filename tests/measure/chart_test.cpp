@@ -8,8 +8,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/io/image.h"
-#include "engine/io/srgb.h"
+#include "engine/io/image/image.h"
+#include "engine/io/image/srgb.h"
 #include "tests/io/files.h"
 
 using namespace ptc;

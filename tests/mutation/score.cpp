@@ -19,9 +19,9 @@
 
 #include <fmt/format.h>
 
-#include "engine/build/rounding.h"
-#include "engine/convert.h"
-#include "engine/pipeline.h"
+#include "engine/octree/rounding.h"
+#include "engine/pipeline/convert/convert.h"
+#include "engine/pipeline/pipeline.h"
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
 #include "tests/mutation/mutations.h"

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/lights.h"
+#include "engine/scene/light/lights.h"
 #include "tests/scene/meshes.h"
 
 using namespace ptc;

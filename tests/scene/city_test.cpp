@@ -1,5 +1,5 @@
 // The procedural city.
-#include "engine/scene/city.h"
+#include "engine/scene/procedural/city.h"
 
 #include <cmath>
 #include <set>
@@ -9,7 +9,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/city_block.h"
+#include "engine/scene/procedural/city_block.h"
 #include "engine/scene/ray_scene.h"
 #include "tests/scene/coverage.h"
 #include "tests/scene/meshes.h"

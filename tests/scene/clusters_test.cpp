@@ -1,5 +1,5 @@
 // Grouping surface points.
-#include "engine/scene/clusters.h"
+#include "engine/scene/sampling/clusters.h"
 
 #include <cmath>
 #include <set>

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "engine/base/surfel.h"
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 
 namespace ptc {
 

@@ -5,9 +5,9 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/directions.h"
-#include "engine/scene/lights.h"
+#include "engine/scene/light/lights.h"
 #include "engine/scene/mesh_reference.h"
+#include "engine/scene/sampling/directions.h"
 #include "engine/scene/step_off.h"
 #include "tests/scene/meshes.h"
 

@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/scene/lights.h"
+#include "engine/scene/light/lights.h"
 #include "tests/scene/meshes.h"
 
 using namespace ptc;

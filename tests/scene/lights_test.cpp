@@ -1,5 +1,5 @@
 // Suns, point lights and the constant sky, against formulas.
-#include "engine/scene/lights.h"
+#include "engine/scene/light/lights.h"
 
 #include <cmath>
 #include <limits>
@@ -9,7 +9,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/directions.h"
+#include "engine/scene/sampling/directions.h"
 #include "tests/scene/meshes.h"
 
 using namespace ptc;

@@ -1,5 +1,5 @@
 // Sample points.
-#include "engine/scene/low_discrepancy.h"
+#include "engine/scene/sampling/low_discrepancy.h"
 
 #include <cmath>
 #include <set>

@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/directions.h"
+#include "engine/scene/sampling/directions.h"
 #include "tests/scene/meshes.h"
 
 using namespace ptc;

@@ -7,8 +7,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "engine/io/mesh.h"
-#include "engine/io/points.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/mesh/mesh.h"
 
 namespace ptc {
 

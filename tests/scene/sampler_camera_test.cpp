@@ -4,8 +4,8 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/sampler.h"
-#include "engine/scene/spacing_field.h"
+#include "engine/scene/sampling/sampler.h"
+#include "engine/scene/sampling/spacing_field.h"
 #include "tests/scene/coverage.h"
 #include "tests/scene/meshes.h"
 

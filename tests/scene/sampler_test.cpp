@@ -1,5 +1,5 @@
 // Mesh to surfels: number, area, evenness, light.
-#include "engine/scene/sampler.h"
+#include "engine/scene/sampling/sampler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/directions.h"
+#include "engine/scene/sampling/directions.h"
 #include "tests/scene/coverage.h"
 #include "tests/scene/meshes.h"
 

@@ -1,5 +1,5 @@
 // Cutting a mesh into patches and spreading points over them.
-#include "engine/scene/surface_patches.h"
+#include "engine/scene/sampling/surface_patches.h"
 
 #include <cmath>
 #include <map>

@@ -1,5 +1,5 @@
 // Where a surface ends, and what lies inside a solid.
-#include "engine/scene/surroundings.h"
+#include "engine/scene/sampling/surroundings.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "engine/shade/direction_buffer.h"
+#include "engine/shade/gather/direction_buffer.h"
 
 #include <cmath>
 #include <numbers>

@@ -7,7 +7,7 @@
 #include <glm/mat3x3.hpp>
 #include <hwy/targets.h>
 
-#include "engine/shade/brute_force.h"
+#include "engine/shade/reference/brute_force.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;

@@ -1,5 +1,5 @@
 // Two gathers written apart: one receiver at a time they must agree.
-#include "engine/shade/plain_gather.h"
+#include "engine/shade/reference/plain_gather.h"
 
 #include <catch2/catch.hpp>
 

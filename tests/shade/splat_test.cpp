@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/shade/brute_force.h"
+#include "engine/shade/reference/brute_force.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;

@@ -1,5 +1,5 @@
 // Rays at a container part by part, against rays at all of it.
-#include "engine/shade/streamed_rays.h"
+#include "engine/shade/reference/streamed_rays.h"
 
 #include <catch2/catch.hpp>
 

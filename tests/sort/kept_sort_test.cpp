@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/direct_range.h"
+#include "engine/io/file/direct_range.h"
 #include "engine/sort/sort_plan.h"
 #include "engine/sort/spill.h"
 #include "tests/sort/records.h"

@@ -12,7 +12,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/io/record.h"
+#include "engine/io/cloud/record.h"
 #include "engine/store/writer.h"
 
 namespace ptc::test {

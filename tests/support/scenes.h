@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/base/surfel.h"
-#include "engine/build/build.h"
+#include "engine/octree/build_pages.h"
 #include "engine/sort/external_sort.h"
 
 namespace ptc::test {

@@ -11,8 +11,8 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/build/build.h"
-#include "engine/build/container_points.h"
+#include "engine/octree/build_pages.h"
+#include "engine/octree/container_points.h"
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"
 #include "format/point_page.h"

@@ -3,7 +3,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/build/octree.h"
+#include "engine/octree/octree.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
 #include "format/scalar.h"

@@ -5,14 +5,14 @@
 #include <set>
 #include <stdexcept>
 
-#include "engine/build/container_points.h"
-#include "engine/io/points.h"
-#include "engine/io/record.h"
-#include "engine/primary.h"
-#include "engine/scene/city.h"
-#include "engine/shade/brute_force.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/cloud/record.h"
+#include "engine/octree/container_points.h"
+#include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/stages.h"
+#include "engine/scene/procedural/city.h"
+#include "engine/shade/reference/brute_force.h"
 #include "engine/shade/shader.h"
-#include "engine/stages.h"
 #include "format/text.h"
 
 namespace ptc::bench {

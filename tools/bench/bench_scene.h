@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "engine/base/executor.h"
-#include "engine/io/mesh.h"
-#include "engine/pipeline.h"
+#include "engine/io/mesh/mesh.h"
+#include "engine/pipeline/pipeline.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
 #include "tools/bench/procedural.h"

@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/room.h"
-#include "engine/stages.h"
+#include "engine/io/file/disk_space.h"
+#include "engine/pipeline/stages.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"

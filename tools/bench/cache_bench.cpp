@@ -12,9 +12,9 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/room.h"
+#include "engine/io/file/disk_space.h"
+#include "engine/pipeline/stages.h"
 #include "engine/shade/shader.h"
-#include "engine/stages.h"
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/disk_reads.h"
 #include "tools/bench/growth.h"

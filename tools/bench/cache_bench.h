@@ -11,7 +11,7 @@
 
 #include "engine/base/progress.h"
 #include "engine/measure/statistics.h"
-#include "engine/pipeline.h"
+#include "engine/pipeline/pipeline.h"
 
 namespace ptc::bench {
 

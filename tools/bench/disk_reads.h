@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 
 namespace ptc::bench {
 

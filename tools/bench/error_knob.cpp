@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "engine/shade/brute_force.h"
-#include "engine/stages.h"
+#include "engine/pipeline/stages.h"
+#include "engine/shade/reference/brute_force.h"
 
 namespace ptc::bench {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/pipeline.h"
-#include "engine/tuning.h"
+#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/quality/tuning.h"
 #include "tools/bench/bench_scene.h"
 
 namespace ptc::bench {

@@ -9,11 +9,11 @@
 #include <fmt/format.h>
 
 #include "engine/base/memory.h"
-#include "engine/io/room.h"
-#include "engine/shade/brute_force.h"
+#include "engine/io/file/disk_space.h"
+#include "engine/pipeline/stages.h"
+#include "engine/shade/reference/brute_force.h"
 #include "engine/shade/shader.h"
 #include "engine/sort/spill.h"
-#include "engine/stages.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/methods.h"
 #include "tools/bench/reference.h"

@@ -9,7 +9,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/surfel.h"
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 
 namespace ptc::bench {
 

@@ -4,9 +4,9 @@
 #include <random>
 
 #include "engine/base/memory.h"
-#include "engine/shade/plain_gather.h"
-#include "engine/shade/receiver_cell.h"
-#include "engine/stages.h"
+#include "engine/pipeline/stages.h"
+#include "engine/shade/gather/receiver_cell.h"
+#include "engine/shade/reference/plain_gather.h"
 
 namespace ptc::bench {
 namespace {

@@ -6,10 +6,10 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
-#include "engine/build/build.h"
-#include "engine/build/container_points.h"
-#include "engine/shade/brute_force.h"
-#include "engine/stages.h"
+#include "engine/octree/build_pages.h"
+#include "engine/octree/container_points.h"
+#include "engine/pipeline/stages.h"
+#include "engine/shade/reference/brute_force.h"
 #include "tools/bench/methods.h"
 #include "tools/bench/reference.h"
 

@@ -8,10 +8,10 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/memory.h"
-#include "engine/build/container_points.h"
-#include "engine/build/subtree.h"
-#include "engine/shade/brute_force.h"
-#include "engine/shade/plain_gather.h"
+#include "engine/octree/container_points.h"
+#include "engine/octree/subtree.h"
+#include "engine/shade/reference/brute_force.h"
+#include "engine/shade/reference/plain_gather.h"
 #include "format/scalar.h"
 #include "tools/bench/model.h"
 #include "tools/bench/payload.h"

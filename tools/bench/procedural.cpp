@@ -7,7 +7,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/scene/low_discrepancy.h"
+#include "engine/scene/sampling/low_discrepancy.h"
 
 namespace ptc::bench {
 namespace {

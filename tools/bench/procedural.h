@@ -3,9 +3,9 @@
 
 #include <cstdint>
 
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 #include "engine/scene/camera.h"
-#include "engine/scene/lights.h"
+#include "engine/scene/light/lights.h"
 
 namespace ptc::bench {
 

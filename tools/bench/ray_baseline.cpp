@@ -15,8 +15,8 @@
 #include <embree3/rtcore.h>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/directions.h"
-#include "engine/scene/low_discrepancy.h"
+#include "engine/scene/sampling/directions.h"
+#include "engine/scene/sampling/low_discrepancy.h"
 #include "tools/bench/lightmap.h"
 
 namespace ptc::bench {

@@ -7,7 +7,7 @@
 #include <span>
 
 #include "engine/base/surfel.h"
-#include "engine/io/mesh.h"
+#include "engine/io/mesh/mesh.h"
 #include "engine/shade/shading.h"
 
 namespace ptc::bench {

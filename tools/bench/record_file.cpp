@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <random>
 
-#include "engine/io/record.h"
-#include "engine/scene/city.h"
+#include "engine/io/cloud/record.h"
+#include "engine/scene/procedural/city.h"
 
 namespace ptc::bench {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 
 namespace ptc::bench {
 namespace {

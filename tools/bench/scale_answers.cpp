@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/file.h"
+#include "engine/io/file/file.h"
 #include "format/checksum.h"
 
 namespace ptc::bench {

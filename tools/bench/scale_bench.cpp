@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/memory.h"
-#include "engine/build_space.h"
-#include "engine/io/room.h"
+#include "engine/io/file/disk_space.h"
+#include "engine/pipeline/build/build_space.h"
 #include "engine/sort/spill.h"
 #include "engine/verify/verify.h"
 #include "tools/bench/disk_reads.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/shade/brute_force.h"
+#include "engine/shade/reference/brute_force.h"
 #include "tools/bench/accuracy.h"
 #include "tools/bench/methods.h"
 #include "tools/bench/reference.h"

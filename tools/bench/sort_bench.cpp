@@ -10,7 +10,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
-#include "engine/io/room.h"
+#include "engine/io/file/disk_space.h"
 #include "tools/bench/record_file.h"
 #include "tools/bench/timed_runs.h"
 

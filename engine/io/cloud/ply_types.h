@@ -1,0 +1,20 @@
+// Inside the PLY reader: sizes of types and records.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "engine/io/cloud/ply.h"
+
+namespace ptc {
+
+[[nodiscard]] constexpr std::size_t ply_type_bytes(PlyType type) noexcept {
+  constexpr std::array<std::size_t, 8> kBytes = {1, 1, 2, 2, 4, 4, 4, 8};
+  return kBytes[static_cast<std::size_t>(type)];
+}
+
+/// Bytes of the smallest record: empty lists; in text one digit and one separator a value.
+[[nodiscard]] std::uint64_t ply_least_bytes(const PlyElement& element, bool ascii) noexcept;
+
+}  // namespace ptc

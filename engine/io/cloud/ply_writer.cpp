@@ -1,0 +1,109 @@
+// Clouds to PLY.
+#include <algorithm>
+#include <cctype>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "engine/io/cloud/points.h"
+#include "engine/io/file/buffered_output.h"
+
+namespace ptc {
+namespace {
+
+std::vector<std::string> suffixes(const PointColumn& column) {
+  if (column.components == 1) return {""};
+  if (column.components == 3) {
+    return column.vector ? std::vector<std::string>{"_x", "_y", "_z"}
+                         : std::vector<std::string>{"_r", "_g", "_b"};
+  }
+  std::vector<std::string> numbers;
+  for (unsigned i = 0; i < column.components; ++i)
+    numbers.push_back(std::string(1, '_').append(std::to_string(i)));
+  return numbers;
+}
+
+bool is_property_name(const std::string& name) {
+  return !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
+    return c < 128 && (std::isalnum(c) != 0 || c == '_');
+  });
+}
+
+std::string make_header(std::uint64_t count, const std::vector<PointColumn>& columns) {
+  std::string text =
+      "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(count) + "\n";
+  std::set<std::string> seen;
+  const auto add = [&](const char* type, const std::string& name) {
+    if (!is_property_name(name))
+      throw std::invalid_argument("PlyWriter: no property name: " + name);
+    if (!seen.insert(name).second) throw std::invalid_argument("PlyWriter: two properties " + name);
+    text += std::string("property ") + type + " " + name + "\n";
+  };
+  for (const char* name : {"x", "y", "z"}) add("double", name);
+  for (const char* name : {"nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b",
+                           "red", "green", "blue"}) {
+    add("float", name);
+  }
+  for (const PointColumn& column : columns) {
+    for (const std::string& suffix : suffixes(column)) add("float", column.name + suffix);
+  }
+  return text + "end_header\n";
+}
+
+}  // namespace
+
+struct PlyWriter::Impl {
+  Impl(const std::filesystem::path& target, std::uint64_t count, std::vector<PointColumn> extra)
+      : columns(std::move(extra)),
+        header(make_header(count, columns)),
+        announced(count),
+        out(target) {
+    for (const PointColumn& column : columns) values_a_point += column.components;
+    out.put(header.data(), header.size());
+  }
+
+  void put(const Surfel& surfel) {
+    out.put(&surfel.position, sizeof surfel.position);
+    out.put(&surfel.normal, sizeof surfel.normal);
+    out.put(&surfel.radius, sizeof surfel.radius);
+    out.put(&surfel.radiance, sizeof surfel.radiance);
+    out.put(&surfel.albedo, sizeof surfel.albedo);
+  }
+
+  std::vector<PointColumn> columns;
+  std::string header;  // made before the file: a bad column leaves none
+  std::uint64_t announced;
+  std::uint64_t came = 0;
+  std::size_t values_a_point = 0;
+  BufferedOutput out;
+};
+
+PlyWriter::PlyWriter(const std::filesystem::path& target, std::uint64_t count,
+                     std::vector<PointColumn> columns)
+    : impl_(std::make_unique<Impl>(target, count, std::move(columns))) {}
+
+PlyWriter::~PlyWriter() = default;
+
+void PlyWriter::write(std::span<const Surfel> surfels, std::span<const float> values) {
+  const std::size_t stride = impl_->values_a_point;
+  if (values.size() != surfels.size() * stride) {
+    throw std::invalid_argument("PlyWriter: " + std::to_string(values.size()) + " values for " +
+                                std::to_string(surfels.size()) + " points");
+  }
+  impl_->came += surfels.size();
+  if (impl_->came > impl_->announced) return;  // finish() says so
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    impl_->put(surfels[i]);
+    impl_->out.put(values.data() + i * stride, stride * sizeof(float));
+  }
+}
+
+void PlyWriter::finish() {
+  if (impl_->came != impl_->announced) {
+    throw std::invalid_argument("PlyWriter: " + std::to_string(impl_->came) +
+                                " points instead of " + std::to_string(impl_->announced));
+  }
+  impl_->out.publish();
+}
+
+}  // namespace ptc

@@ -1,0 +1,72 @@
+#include "engine/io/file/disk_space.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <set>
+#include <system_error>
+
+#include <fmt/format.h>
+
+namespace ptc {
+namespace {
+
+dev_t disk_of(const std::filesystem::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0)
+    throw std::system_error(errno, std::generic_category(), "stat " + path.string());
+  return status.st_dev;
+}
+
+}  // namespace
+
+std::uint64_t free_bytes(std::span<const std::filesystem::path> directories) {
+  std::set<dev_t> seen;
+  std::uint64_t free = 0;
+  for (const std::filesystem::path& directory : directories) {
+    if (seen.insert(disk_of(directory)).second) free += std::filesystem::space(directory).available;
+  }
+  return free;
+}
+
+const std::filesystem::path& roomiest(std::span<const std::filesystem::path> directories) {
+  return *std::ranges::max_element(directories, {}, [](const std::filesystem::path& directory) {
+    std::error_code unknown;  // who opens a file there tells what is wrong
+    const std::filesystem::space_info room = std::filesystem::space(directory, unknown);
+    return unknown ? 0 : room.available;
+  });
+}
+
+bool share_a_disk(std::span<const std::filesystem::path> directories,
+                  const std::filesystem::path& path) {
+  const dev_t disk = disk_of(path);
+  return std::ranges::any_of(
+      directories, [&](const std::filesystem::path& other) { return disk_of(other) == disk; });
+}
+
+void require_room(std::span<const std::filesystem::path> directories, std::uint64_t bytes,
+                  const std::string& what) {
+  const std::uint64_t free = free_bytes(directories);
+  if (bytes <= free) return;
+  throw std::system_error(
+      ENOSPC, std::generic_category(),
+      fmt::format("{} take up to {} in {}, with {} free; "
+                  "name other or more directories with --temp, or fewer points",
+                  what, giga_text(bytes), names_text(directories), giga_text(free)));
+}
+
+std::string names_text(std::span<const std::filesystem::path> paths) {
+  std::string text;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (i > 0) text += i + 1 < paths.size() ? ", " : " and ";
+    text += paths[i].string();
+  }
+  return text;
+}
+
+std::string giga_text(std::uint64_t bytes) {
+  return fmt::format("{:.1f} GB", static_cast<double>(bytes) / 1e9);
+}
+
+}  // namespace ptc

@@ -1,0 +1,354 @@
+// Positioned file access over POSIX calls; the registry of temporary names for signal handlers.
+#include "engine/io/file/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <limits>
+#include <list>
+#include <new>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "engine/base/error.h"
+
+namespace ptc {
+namespace {
+
+constexpr auto kOffsetLimit = static_cast<std::uint64_t>(std::numeric_limits<off_t>::max());
+
+[[noreturn]] void fail(int error, const char* call, const std::filesystem::path& path) {
+  throw std::system_error(error, std::generic_category(), std::string(call) + " " + path.string());
+}
+
+template <class Call>
+int retrying(Call&& call) {
+  int result = -1;
+  do {
+    result = call();
+  } while (result < 0 && errno == EINTR);
+  return result;
+}
+
+void read_whole(int fd, const std::filesystem::path& path, std::uint64_t offset,
+                std::span<std::byte> out) {
+  std::size_t done = 0;
+  while (done < out.size()) {
+    const std::uint64_t at = offset + done;
+    if (at < offset || at > kOffsetLimit) fail(EOVERFLOW, "pread", path);
+    const ssize_t count = ::pread(fd, out.data() + done, out.size() - done, static_cast<off_t>(at));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail(errno, "pread", path);
+    if (count == 0) {
+      throw DataError(path.string() + ": offset " + std::to_string(at) + ": the file ends here, " +
+                      std::to_string(out.size() - done) + " bytes are missing");
+    }
+    done += static_cast<std::size_t>(count);
+  }
+}
+
+void write_whole(int fd, const std::filesystem::path& path, std::uint64_t offset,
+                 std::span<const std::byte> bytes) {
+  if (offset > kOffsetLimit || bytes.size() > kOffsetLimit - offset) fail(EFBIG, "pwrite", path);
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t count =
+        ::pwrite(fd, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset + done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail(errno, "pwrite", path);
+    if (count == 0) fail(EIO, "pwrite", path);
+    done += static_cast<std::size_t>(count);
+  }
+}
+
+// Absolute temporary names that a fatal signal has to remove. The handler may run in any thread at
+// any time: whoever changes the list holds the lock with these signals blocked in its own thread,
+// so a handler that waits for the lock never waits for the thread it interrupted.
+constexpr std::array kFatalSignals = {SIGINT, SIGTERM, SIGHUP};
+std::atomic_flag registry_lock = ATOMIC_FLAG_INIT;
+
+struct Temporary {
+  const void* owner;
+  std::string name;
+};
+
+std::list<Temporary>& live_temporaries() {
+  // Outlives static destructors, and needs no memory when there is none left.
+  alignas(std::list<Temporary>) static std::byte room[sizeof(std::list<Temporary>)];
+  static auto* const names = new (room) std::list<Temporary>;
+  return *names;
+}
+
+// @return what was blocked before
+sigset_t block_fatal_signals() {
+  sigset_t fatal, before;
+  sigemptyset(&fatal);
+  for (const int signal : kFatalSignals) sigaddset(&fatal, signal);
+  pthread_sigmask(SIG_BLOCK, &fatal, &before);
+  return before;
+}
+
+class RegistryGuard {
+ public:
+  RegistryGuard() : before_(block_fatal_signals()) {
+    while (registry_lock.test_and_set(std::memory_order_acquire)) {
+    }
+  }
+  ~RegistryGuard() {
+    registry_lock.clear(std::memory_order_release);
+    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  RegistryGuard(const RegistryGuard&) = delete;
+  RegistryGuard& operator=(const RegistryGuard&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+// Creates and registers in one step that no handled signal can divide.
+int create_temporary(const void* owner, const std::filesystem::path& path) {
+  std::list<Temporary> entry{{owner, std::filesystem::absolute(path).string()}};
+  auto& names = live_temporaries();
+  const RegistryGuard guard;
+  const int fd = open_retrying(path, O_RDWR | O_CREAT | O_EXCL, 0666);
+  if (fd >= 0) names.splice(names.end(), entry);
+  return fd;
+}
+
+// Allocates nothing: it is called while an exception is on its way, perhaps for want of memory.
+void forget_temporary(const void* owner) noexcept {
+  std::list<Temporary> removed;  // freed after the guard
+  auto& names = live_temporaries();
+  const RegistryGuard guard;
+  for (auto it = names.begin(); it != names.end(); ++it) {
+    if (it->owner != owner) continue;
+    removed.splice(removed.end(), names, it);
+    return;
+  }
+}
+
+void unlink_and_reraise(int signal) {
+  remove_temporaries();
+  // SA_RESETHAND: the default action follows when this handler returns.
+  static_cast<void>(::raise(signal));
+}
+
+// ".NAME.tmp-PID-N"; a long NAME is cut so that the whole stays below 255 bytes.
+std::filesystem::path temporary_name(const std::filesystem::path& target) {
+  static std::atomic<std::uint64_t> counter = 0;
+  const std::string name = target.filename().string().substr(0, 200);
+  return target.parent_path() / ("." + name + ".tmp-" + std::to_string(::getpid()) + "-" +
+                                 std::to_string(counter.fetch_add(1)));
+}
+
+/// Permissions of a file that is to be replaced, nothing where there is none. @throws
+/// std::system_error where none can be
+std::optional<mode_t> mode_of(const std::filesystem::path& target) {
+  struct stat old {};
+  const bool exists = ::stat(target.c_str(), &old) == 0;
+  if (!exists && errno != ENOENT) fail(errno, "stat", target);
+  if ((exists && S_ISDIR(old.st_mode)) || target.filename().empty()) fail(EISDIR, "open", target);
+  if (exists && !S_ISREG(old.st_mode)) fail(EINVAL, "open", target);
+  return exists ? std::optional(old.st_mode & 0777) : std::nullopt;
+}
+
+}  // namespace
+
+int open_retrying(const std::filesystem::path& path, int flags, mode_t mode) noexcept {
+  return retrying([&] { return ::open(path.c_str(), flags | O_CLOEXEC, mode); });
+}
+
+std::filesystem::path directory_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+void sync_directory(const std::filesystem::path& file) {
+  const std::filesystem::path directory = directory_of(file);
+  const int fd = open_retrying(directory, O_RDONLY | O_DIRECTORY);
+  if (fd < 0) fail(errno, "open", directory);
+  const int error = retrying([&] { return ::fsync(fd); }) == 0 ? 0 : errno;
+  ::close(fd);
+  // Some file systems cannot sync a directory and say EINVAL.
+  if (error != 0 && error != EINVAL) fail(error, "fsync", directory);
+}
+
+void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept {
+  if (bytes == 0) return;
+  // Where that cannot be the blocks stay until the file goes.
+  static_cast<void>(::fallocate(fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE,
+                                static_cast<off_t>(offset), static_cast<off_t>(bytes)));
+}
+
+InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
+  // O_NONBLOCK: opening a pipe must not wait for its writer.
+  fd_ = open_retrying(path, O_RDONLY | O_NONBLOCK);
+  if (fd_ < 0) fail(errno, "open", path);
+  struct stat status {};
+  int error = ::fstat(fd_, &status) == 0 ? 0 : errno;
+  if (error == 0 && S_ISDIR(status.st_mode)) error = EISDIR;
+  if (error == 0 && !S_ISREG(status.st_mode)) error = ESPIPE;
+  if (error != 0) {
+    ::close(fd_);
+    fail(error, "open", path);
+  }
+  size_ = static_cast<std::uint64_t>(status.st_size);
+}
+
+InputFile::~InputFile() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+InputFile::InputFile(InputFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      fd_(std::exchange(other.fd_, -1)),
+      size_(std::exchange(other.size_, 0)) {}
+
+void InputFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {
+  read_whole(fd_, path_, offset, out);
+}
+
+void InputFile::read_ahead(std::uint64_t offset, std::uint64_t bytes) const noexcept {
+  ::posix_fadvise(fd_, static_cast<off_t>(offset), static_cast<off_t>(bytes), POSIX_FADV_WILLNEED);
+}
+
+OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
+  const std::optional<mode_t> old = mode_of(target);
+  if (old && std::filesystem::is_symlink(target)) target_ = std::filesystem::canonical(target);
+  do {
+    temporary_ = temporary_name(target_);
+    fd_ = create_temporary(this, temporary_);
+  } while (fd_ < 0 && errno == EEXIST);  // left behind by an earlier process of the same number
+  if (fd_ < 0) fail(errno, "open", temporary_);
+  if (old) static_cast<void>(::fchmod(fd_, *old));
+}
+
+OutputFile::OutputFile(const std::filesystem::path& target, const std::filesystem::path& partial)
+    : target_(target), temporary_(partial), stays_(true) {
+  const std::optional<mode_t> old = mode_of(target);
+  fd_ = open_retrying(partial, O_RDWR | O_CREAT, 0666);
+  if (fd_ < 0) fail(errno, "open", partial);
+  if (old) static_cast<void>(::fchmod(fd_, *old));
+}
+
+OutputFile::~OutputFile() {
+  if (fd_ >= 0) ::close(fd_);
+  if (published_ || stays_) return;
+  ::unlink(temporary_.c_str());
+  forget_temporary(this);
+}
+
+void OutputFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
+  write_whole(fd_, temporary_, offset, bytes);
+  const std::uint64_t end = offset + bytes.size();
+  std::uint64_t seen = size_.load(std::memory_order_relaxed);
+  while (seen < end && !size_.compare_exchange_weak(seen, end, std::memory_order_relaxed)) {
+  }
+}
+
+void OutputFile::append(std::span<const std::byte> bytes) {
+  write_at(size(), bytes);
+}
+
+void OutputFile::truncate(std::uint64_t bytes) {
+  if (retrying([&] { return ::ftruncate(fd_, static_cast<off_t>(bytes)); }) != 0)
+    fail(errno, "ftruncate", temporary_);
+  size_ = bytes;
+}
+
+void OutputFile::sync() {
+  if (retrying([&] { return ::fdatasync(fd_); }) != 0) fail(errno, "fdatasync", temporary_);
+}
+
+void OutputFile::publish() {
+  if (retrying([&] { return ::fsync(fd_); }) != 0) fail(errno, "fsync", temporary_);
+  // After EINTR the file is closed all the same, and what it holds is on the disk.
+  if (::close(std::exchange(fd_, -1)) != 0 && errno != EINTR) fail(errno, "close", temporary_);
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(errno, "rename", target_);
+  published_ = true;
+  forget_temporary(this);
+  sync_directory(target_);
+}
+
+TemporaryName::TemporaryName(const std::filesystem::path& path) : path_(path) {
+  std::list<Temporary> entry{{this, std::filesystem::absolute(path).string()}};
+  auto& names = live_temporaries();
+  const RegistryGuard guard;
+  names.splice(names.end(), entry);
+}
+
+TemporaryName::~TemporaryName() {
+  if (path_.empty()) return;
+  ::unlink(path_.c_str());
+  forget_temporary(this);
+}
+
+void TemporaryName::release() noexcept {
+  path_.clear();
+  forget_temporary(this);
+}
+
+// Keeps the lock: no other thread may make a file in the little time that is left.
+void remove_temporaries() noexcept {
+  block_fatal_signals();
+  while (registry_lock.test_and_set(std::memory_order_acquire)) {
+  }
+  for (const Temporary& temporary : live_temporaries()) ::unlink(temporary.name.c_str());
+}
+
+void remove_temporaries_on_signal() {
+  live_temporaries();  // made here, not in the handler
+  for (const int signal : kFatalSignals) {
+    struct sigaction before {};
+    ::sigaction(signal, nullptr, &before);
+    if (before.sa_handler == SIG_IGN) continue;
+    struct sigaction action {};
+    action.sa_handler = unlink_and_reraise;
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigemptyset(&action.sa_mask);
+    for (const int other : kFatalSignals) sigaddset(&action.sa_mask, other);
+    ::sigaction(signal, &action, nullptr);
+  }
+}
+
+TempFile::TempFile(const std::filesystem::path& directory) : directory_(directory) {
+  fd_ = open_retrying(directory, O_TMPFILE | O_RDWR, 0600);
+  if (fd_ >= 0) return;
+  if (errno != EOPNOTSUPP && errno != EISDIR) fail(errno, "open", directory);
+  do {  // a file system without O_TMPFILE
+    const std::filesystem::path name = temporary_name(directory / "spill");
+    fd_ = open_retrying(name, O_RDWR | O_CREAT | O_EXCL, 0600);
+    if (fd_ >= 0) ::unlink(name.c_str());
+  } while (fd_ < 0 && errno == EEXIST);
+  if (fd_ < 0) fail(errno, "open", directory);
+}
+
+TempFile::~TempFile() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+TempFile::TempFile(TempFile&& other) noexcept
+    : directory_(std::move(other.directory_)), fd_(std::exchange(other.fd_, -1)) {}
+
+void TempFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {
+  read_whole(fd_, directory_, offset, out);
+}
+
+void TempFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
+  write_whole(fd_, directory_, offset, bytes);
+}
+
+void TempFile::drop_cache() const noexcept {
+  ::posix_fadvise(fd_, 0, 0, POSIX_FADV_DONTNEED);
+}
+
+void TempFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept {
+  discard_blocks(fd_, offset, bytes);
+}
+
+}  // namespace ptc

@@ -1,0 +1,173 @@
+// 8-bit pictures through stb; the choice of the reader.
+#include "engine/io/image/image.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <stdexcept>
+
+#include <stb_image.h>
+#include <stb_image_write.h>
+
+#include "engine/base/error.h"
+#include "engine/io/file/file.h"
+#include "engine/io/image/image_formats.h"
+#include "engine/io/image/srgb.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kMostFileBytes = std::uint64_t{1} << 30;  // stb counts in int
+
+struct StbFree {
+  void operator()(void* pixels) const noexcept { stbi_image_free(pixels); }
+};
+
+[[noreturn]] void refuse(const std::string& name, const std::string& rule) {
+  throw DataError(name + ": " + rule);
+}
+
+const std::vector<float>& linear_of_16_bit() {
+  static const std::vector<float> table = [] {
+    std::vector<float> values(65536);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = static_cast<float>(srgb_to_linear(static_cast<double>(i) / 65535));
+    }
+    return values;
+  }();
+  return table;
+}
+
+// The most that deflate, JPEG's end-of-band runs and run lengths make of a byte is below 8448
+// pixels (a 1-bit PNG): a small file cannot ask for a large allocation.
+void check_size(int width, int height, std::size_t file_bytes, const std::string& name) {
+  if (width < 1 || height < 1) refuse(name, "a picture without pixels");
+  const auto w = static_cast<std::uint64_t>(width);
+  const auto h = static_cast<std::uint64_t>(height);
+  const std::string size = std::to_string(w) + " x " + std::to_string(h) + " pixels";
+  if (w > kMostImageSide || h > kMostImageSide || w * h > kMostPixels) {
+    refuse(name, size + " are more than this program takes");
+  }
+  if (w * h / 8448 > file_bytes) {
+    refuse(name, size + " cannot come from " + std::to_string(file_bytes) + " bytes");
+  }
+}
+
+glm::vec3 sane(glm::vec3 value) {
+  for (int i = 0; i < 3; ++i) {
+    if (!std::isfinite(value[i]) || value[i] < 0) value[i] = 0;
+  }
+  return value;
+}
+
+Image decode_hdr(const stbi_uc* data, int bytes, const std::string& name) {
+  int width = 0;
+  int height = 0;
+  const std::unique_ptr<float, StbFree> values(
+      stbi_loadf_from_memory(data, bytes, &width, &height, nullptr, 3));
+  if (!values) refuse(name, stbi_failure_reason());
+  Image image{static_cast<unsigned>(width), static_cast<unsigned>(height), {}};
+  image.pixels.resize(std::size_t{image.width} * image.height);
+  const float* from = values.get();
+  for (glm::vec3& pixel : image.pixels) {
+    pixel = sane({from[0], from[1], from[2]});
+    from += 3;
+  }
+  return image;
+}
+
+Image decode_integers(const stbi_uc* data, int bytes, const std::string& name) {
+  int width = 0;
+  int height = 0;
+  const std::unique_ptr<stbi_us, StbFree> values(
+      stbi_load_16_from_memory(data, bytes, &width, &height, nullptr, 3));
+  if (!values) refuse(name, stbi_failure_reason());
+  Image image{static_cast<unsigned>(width), static_cast<unsigned>(height), {}};
+  image.pixels.resize(std::size_t{image.width} * image.height);
+  const std::vector<float>& linear = linear_of_16_bit();
+  const stbi_us* from = values.get();
+  for (glm::vec3& pixel : image.pixels) {
+    pixel = {linear[from[0]], linear[from[1]], linear[from[2]]};
+    from += 3;
+  }
+  return image;
+}
+
+// stb calls back from C: what goes wrong is kept instead of thrown.
+struct EncodedBytes {
+  std::vector<std::byte> bytes;
+  bool out_of_memory = false;
+};
+
+void collect(void* context, void* data, int size) {
+  auto& encoded = *static_cast<EncodedBytes*>(context);
+  const auto* from = static_cast<const std::byte*>(data);
+  try {
+    encoded.bytes.insert(encoded.bytes.end(), from, from + size);
+  } catch (const std::bad_alloc&) {
+    encoded.out_of_memory = true;
+  }
+}
+
+std::uint8_t stored_8_bit(float linear) {
+  const double clamped = linear > 0 ? std::min(1.0, static_cast<double>(linear)) : 0.0;
+  return static_cast<std::uint8_t>(std::lround(255 * linear_to_srgb(clamped)));
+}
+
+}  // namespace
+
+Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
+  const RasterFormat format = raster_format(bytes, name);
+  if (format == RasterFormat::none) refuse(name, "not a PNG, JPEG, BMP, HDR, TGA or EXR picture");
+  if (bytes.size() > kMostFileBytes) refuse(name, "a picture of more than 1 GiB");
+  const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+  const int size = static_cast<int>(bytes.size());
+  int width = 0;
+  int height = 0;
+  if (stbi_info_from_memory(data, size, &width, &height, nullptr) == 0) {
+    refuse(name, stbi_failure_reason());
+  }
+  check_size(width, height, bytes.size(), name);
+  if (!raster_is_complete(bytes, format)) refuse(name, "the picture ends too early");
+  return format == RasterFormat::hdr ? decode_hdr(data, size, name)
+                                     : decode_integers(data, size, name);
+}
+
+Image read_image(const std::filesystem::path& path) {
+  const InputFile file(path);
+  constexpr std::array kExrMagic = {std::byte{0x76}, std::byte{0x2f}, std::byte{0x31},
+                                    std::byte{0x01}};
+  std::array<std::byte, 4> magic{};
+  if (file.size() >= magic.size()) file.read_at(0, magic);
+  if (magic == kExrMagic) return read_exr(path);
+  if (file.size() > kMostFileBytes) refuse(path.string(), "a picture of more than 1 GiB");
+  std::vector<std::byte> bytes(file.size());
+  file.read_at(0, bytes);
+  return decode_image(bytes, path.string());
+}
+
+void write_png(const std::filesystem::path& target, const Image& image) {
+  const std::size_t count = std::size_t{image.width} * image.height;
+  if (count == 0 || image.width > kMostImageSide || image.height > kMostImageSide ||
+      count > kMostPixels || image.pixels.size() != count) {
+    throw std::invalid_argument("write_png: size and number of pixels do not fit");
+  }
+  std::vector<std::uint8_t> stored;
+  stored.reserve(count * 3);
+  for (const glm::vec3& pixel : image.pixels) {
+    for (int i = 0; i < 3; ++i) stored.push_back(stored_8_bit(pixel[i]));
+  }
+  EncodedBytes encoded;
+  const int width = static_cast<int>(image.width);
+  const int done = stbi_write_png_to_func(collect, &encoded, width, static_cast<int>(image.height),
+                                          3, stored.data(), width * 3);
+  if (done == 0 || encoded.out_of_memory) throw std::bad_alloc();
+  OutputFile file(target);
+  file.append(encoded.bytes);
+  file.publish();
+}
+
+}  // namespace ptc

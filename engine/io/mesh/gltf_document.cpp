@@ -1,0 +1,306 @@
+// The container side of glTF.
+#include "engine/io/mesh/gltf_document.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/io/file/file.h"
+
+namespace ptc {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "glTF buffers are little-endian");
+
+constexpr std::uint32_t kGlbMagic = 0x46546c67;  // "glTF"
+constexpr std::uint32_t kJsonChunk = 0x4e4f534a;
+constexpr std::uint32_t kBinaryChunk = 0x004e4942;
+
+std::vector<std::byte> read_file(const std::filesystem::path& path) {
+  const InputFile file(path);
+  std::vector<std::byte> bytes(file.size());
+  file.read_at(0, bytes);
+  return bytes;
+}
+
+std::uint32_t u32_at(std::span<const std::byte> bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+}
+
+// Source: RFC 4648, section 4. Returns nothing for other characters.
+std::optional<std::vector<std::byte>> decode_base64(std::string_view text) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  while (text.ends_with('=')) text.remove_suffix(1);
+  std::array<std::uint8_t, 256> value{};
+  value.fill(255);
+  for (std::size_t i = 0; i < kDigits.size(); ++i) {
+    value[static_cast<unsigned char>(kDigits[i])] = static_cast<std::uint8_t>(i);
+  }
+  std::vector<std::byte> bytes;
+  bytes.reserve(text.size() / 4 * 3 + 3);
+  std::uint32_t bits = 0;
+  int held = 0;
+  for (const char c : text) {
+    const std::uint8_t digit = value[static_cast<unsigned char>(c)];
+    if (digit == 255) return std::nullopt;
+    bits = bits << 6 | digit;
+    held += 6;
+    if (held < 8) continue;
+    held -= 8;
+    bytes.push_back(static_cast<std::byte>(bits >> held & 255));
+  }
+  return bytes;
+}
+
+struct Component {
+  std::size_t bytes;
+  double scale;  // of normalised integers
+};
+
+// componentType of accessors, section 3.6.2.2.
+std::optional<Component> component_of(std::uint64_t type) {
+  switch (type) {
+    case 5120:
+      return Component{1, 127};
+    case 5121:
+      return Component{1, 255};
+    case 5122:
+      return Component{2, 32767};
+    case 5123:
+      return Component{2, 65535};
+    case 5125:
+      return Component{4, 4294967295.0};
+    case 5126:
+      return Component{4, 1};
+    default:
+      return std::nullopt;
+  }
+}
+
+template <typename T>
+double load_as(const std::byte* from) {
+  T value;
+  std::memcpy(&value, from, sizeof value);
+  return static_cast<double>(value);
+}
+
+double load(const std::byte* from, std::uint64_t type) {
+  switch (type) {
+    case 5120:
+      return load_as<std::int8_t>(from);
+    case 5121:
+      return load_as<std::uint8_t>(from);
+    case 5122:
+      return load_as<std::int16_t>(from);
+    case 5123:
+      return load_as<std::uint16_t>(from);
+    case 5125:
+      return load_as<std::uint32_t>(from);
+    default:
+      return load_as<float>(from);
+  }
+}
+
+std::size_t components_of(const std::string& type) {
+  if (type == "SCALAR") return 1;
+  if (type == "VEC2") return 2;
+  if (type == "VEC3") return 3;
+  return type == "VEC4" ? 4 : 0;
+}
+
+}  // namespace
+
+GltfDocument::GltfDocument(const std::filesystem::path& path) : path_(path) {
+  const std::vector<std::byte> file = read_file(path);
+  bytes_read_ = file.size();
+  if (file.size() >= 12 && u32_at(file, 0) == kGlbMagic) {
+    read_chunks(file);
+  } else {
+    parse(file);
+  }
+  buffers_.resize(count("buffers"));
+}
+
+void GltfDocument::fail(const std::string& rule) const {
+  throw DataError(path_.string() + ": " + rule);
+}
+
+void GltfDocument::parse(std::span<const std::byte> text) {
+  const auto* begin = reinterpret_cast<const char*>(text.data());
+  try {
+    root_ = Json::parse(begin, begin + text.size());
+  } catch (const Json::exception& error) {
+    fail(error.what());
+  }
+  if (!root_.is_object()) fail("a glTF is a JSON object");
+}
+
+// 12 bytes of header; then chunks of length, type and data: JSON, and at most one of binary data.
+void GltfDocument::read_chunks(std::span<const std::byte> file) {
+  if (u32_at(file, 4) != 2) fail("a GLB version other than 2");
+  if (u32_at(file, 8) != file.size()) fail("a GLB whose length is not that of the file");
+  std::size_t at = 12;
+  for (std::size_t chunk = 0; at < file.size(); ++chunk) {
+    if (file.size() - at < 8) fail("offset " + std::to_string(at) + ": a GLB chunk without header");
+    const std::uint32_t length = u32_at(file, at);
+    const std::uint32_t type = u32_at(file, at + 4);
+    at += 8;
+    if (length > file.size() - at) {
+      fail("offset " + std::to_string(at) + ": a GLB chunk past the end of the file");
+    }
+    const std::span<const std::byte> data = file.subspan(at, length);
+    if ((chunk == 0) != (type == kJsonChunk)) fail("the first chunk of a GLB is its JSON");
+    if (chunk == 0) parse(data);
+    if (chunk == 1 && type == kBinaryChunk) binary_chunk_.assign(data.begin(), data.end());
+    at += length;
+  }
+  if (root_.is_null()) fail("a GLB without JSON");
+}
+
+std::size_t GltfDocument::count(const char* array) const {
+  const auto found = root_.find(array);
+  if (found == root_.end()) return 0;
+  if (!found->is_array()) fail(std::string(array) + " is no array");
+  return found->size();
+}
+
+const GltfDocument::Json& GltfDocument::at(const char* array, std::uint64_t index) const {
+  if (index >= count(array)) fail(std::string(array) + " has no entry " + std::to_string(index));
+  const Json& entry = root_[array][index];
+  if (!entry.is_object()) fail(std::string(array) + " holds what is no object");
+  return entry;
+}
+
+std::optional<std::uint64_t> GltfDocument::unsigned_at(const Json& object, const char* key) const {
+  const auto found = object.find(key);
+  if (found == object.end()) return std::nullopt;
+  if (!found->is_number_unsigned()) fail(std::string(key) + " is no unsigned integer");
+  return found->get<std::uint64_t>();
+}
+
+double GltfDocument::number_at(const Json& object, const char* key, double otherwise) const {
+  const auto found = object.find(key);
+  if (found == object.end()) return otherwise;
+  if (!found->is_number() || !std::isfinite(found->get<double>())) {
+    fail(std::string(key) + " is no finite number");
+  }
+  return found->get<double>();
+}
+
+std::string GltfDocument::file_name(const std::string& uri) {
+  std::string name;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    const int high = uri[i] == '%' && i + 2 < uri.size() ? hex_digit(uri[i + 1]) : -1;
+    const int low = high >= 0 ? hex_digit(uri[i + 2]) : -1;
+    if (low < 0) {
+      name.push_back(uri[i]);
+      continue;
+    }
+    name.push_back(static_cast<char>(high * 16 + low));
+    i += 2;
+  }
+  return name;
+}
+
+std::vector<std::byte> GltfDocument::fetch(const std::string& uri) const {
+  if (!uri.starts_with("data:")) return read_file(path_.parent_path() / file_name(uri));
+  const std::size_t comma = uri.find(";base64,");
+  if (comma == std::string::npos) fail("a data URI that is not base64");
+  auto bytes = decode_base64(std::string_view(uri).substr(comma + 8));
+  if (!bytes) fail("a data URI with characters that base64 has not");
+  return std::move(*bytes);
+}
+
+std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
+  const Json& description = at("buffers", index);
+  auto& loaded = buffers_[index];
+  if (!loaded) {
+    const auto uri = description.find("uri");
+    if (uri == description.end()) {
+      loaded = index == 0 ? binary_chunk_ : std::vector<std::byte>();
+    } else if (uri->is_string()) {
+      loaded = fetch(uri->get<std::string>());
+    } else {
+      fail("a uri that is no string");
+    }
+    bytes_read_ += loaded->size();
+  }
+  // Binary chunks are padded: the declared length counts.
+  const std::uint64_t length = unsigned_at(description, "byteLength").value_or(0);
+  if (length > loaded->size()) {
+    fail("buffer " + std::to_string(index) + " has " + std::to_string(loaded->size()) +
+         " bytes of " + std::to_string(length));
+  }
+  return std::span(*loaded).first(length);
+}
+
+std::span<const std::byte> GltfDocument::view(std::uint64_t index) {
+  const Json& description = at("bufferViews", index);
+  const auto owner = unsigned_at(description, "buffer");
+  if (!owner) fail("a bufferView without buffer");
+  const std::span<const std::byte> bytes = buffer(*owner);
+  const std::uint64_t offset = unsigned_at(description, "byteOffset").value_or(0);
+  const std::uint64_t length = unsigned_at(description, "byteLength").value_or(0);
+  if (offset > bytes.size() || length > bytes.size() - offset) {
+    fail("bufferView " + std::to_string(index) + " reaches past its buffer");
+  }
+  return bytes.subspan(offset, length);
+}
+
+GltfDocument::Elements GltfDocument::read_accessor(std::uint64_t index, std::size_t components,
+                                                   std::optional<std::size_t> expected) {
+  const Json& accessor = at("accessors", index);
+  const std::string name = "accessor " + std::to_string(index);
+  if (accessor.contains("sparse")) fail(name + " is sparse, which is not supported");
+  const auto view_index = unsigned_at(accessor, "bufferView");
+  if (!view_index) fail(name + " has no bufferView");
+  const std::uint64_t type = unsigned_at(accessor, "componentType").value_or(0);
+  const std::optional<Component> component = component_of(type);
+  if (!component) fail(name + " has an unknown componentType");
+  const auto shape = accessor.find("type");
+  if (shape == accessor.end() || !shape->is_string() ||
+      components_of(shape->get<std::string>()) != components) {
+    fail(name + " is of the wrong type");
+  }
+  const auto flag = accessor.find("normalized");
+  const bool normalised = flag != accessor.end() && flag->is_boolean() && flag->get<bool>();
+
+  const std::span<const std::byte> bytes = view(*view_index);
+  const std::uint64_t offset = unsigned_at(accessor, "byteOffset").value_or(0);
+  const std::uint64_t element_bytes = component->bytes * components;
+  const std::uint64_t stride =
+      unsigned_at(at("bufferViews", *view_index), "byteStride").value_or(element_bytes);
+  const std::uint64_t elements = unsigned_at(accessor, "count").value_or(0);
+  if (expected && elements != *expected) fail(name + " has not as many elements as POSITION");
+  if (stride < element_bytes) fail(name + " has elements that overlap");
+  // (elements - 1) * stride + element_bytes <= bytes.size() - offset, without overflow.
+  if (elements > 0 && (offset > bytes.size() || element_bytes > bytes.size() - offset ||
+                       elements - 1 > (bytes.size() - offset - element_bytes) / stride)) {
+    fail(name + " reaches past its bufferView");
+  }
+  Elements read{elements, {}};
+  read.values.reserve(elements * components);
+  for (std::uint64_t i = 0; i < elements; ++i) {
+    for (std::size_t k = 0; k < components; ++k) {
+      const double value = load(&bytes[offset + i * stride + k * component->bytes], type);
+      read.values.push_back(normalised ? std::max(-1.0, value / component->scale) : value);
+    }
+  }
+  return read;
+}
+
+}  // namespace ptc

@@ -1,0 +1,175 @@
+// Meshes: the choice of the reader, joining, writing.
+#include "engine/io/mesh/mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/file/buffered_output.h"
+#include "engine/io/mesh/mesh_soup.h"
+#include "engine/io/text/text.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kMostMaterials = 65536;
+
+glm::vec3 flat_normal(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
+  const glm::dvec3 a(mesh.positions[triangle[0]]);
+  const glm::dvec3 cross = glm::cross(glm::dvec3(mesh.positions[triangle[1]]) - a,
+                                      glm::dvec3(mesh.positions[triangle[2]]) - a);
+  const double length = glm::length(cross);
+  return length > 0 ? glm::vec3(cross / length) : glm::vec3(0, 0, 1);
+}
+
+// Gives each triangle vertices of its own, with the normal of its plane.
+void flatten(Mesh& mesh) {
+  Mesh flat;
+  for (auto& triangle : mesh.triangles) {
+    const glm::vec3 normal = flat_normal(mesh, triangle);
+    for (std::uint32_t& vertex : triangle) {
+      flat.positions.push_back(mesh.positions[vertex]);
+      flat.normals.push_back(normal);
+      if (!mesh.uvs.empty()) flat.uvs.push_back(mesh.uvs[vertex]);
+      vertex = static_cast<std::uint32_t>(flat.positions.size() - 1);
+    }
+  }
+  mesh.positions = std::move(flat.positions);
+  mesh.normals = std::move(flat.normals);
+  mesh.uvs = std::move(flat.uvs);
+}
+
+// After this either both have normals or none, and texture coordinates likewise.
+void level_attributes(Mesh& a, Mesh& b) {
+  if (a.normals.empty() != b.normals.empty()) flatten(a.normals.empty() ? a : b);
+  if (a.uvs.empty() != b.uvs.empty()) {
+    Mesh& without = a.uvs.empty() ? a : b;
+    without.uvs.assign(without.positions.size(), glm::vec2(0));
+  }
+}
+
+bool is_finite(const glm::dmat4& m) {
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) {
+      if (!std::isfinite(m[column][row])) return false;
+    }
+  }
+  return true;
+}
+
+glm::dvec3 rounded_centre(const Bounds& bounds) {
+  return bounds.empty() ? glm::dvec3(0) : glm::round(bounds.low / 2.0 + bounds.high / 2.0);
+}
+
+// The world positions of `mesh`, transformed, relative to `origin`.
+void transform_positions(Mesh& mesh, const glm::dmat4& transform, const glm::dvec3& origin) {
+  for (glm::vec3& position : mesh.positions) {
+    const glm::dvec3 world = mesh.origin + glm::dvec3(position);
+    position = glm::vec3(glm::dvec3(transform * glm::dvec4(world, 1)) - origin);
+  }
+  mesh.origin = origin;
+}
+
+void transform_directions(Mesh& mesh, const glm::dmat4& transform) {
+  const glm::dmat3 turn = normal_transform(transform);
+  for (glm::vec3& normal : mesh.normals) {
+    const glm::dvec3 turned = turn * glm::dvec3(normal);
+    const double length = glm::length(turned);
+    if (length > 0) normal = glm::vec3(turned / length);
+  }
+  if (!mirrors(transform)) return;
+  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+}
+
+Bounds transformed_bounds(const Mesh& mesh, const glm::dmat4& transform) {
+  Bounds bounds;
+  for (const glm::vec3& position : mesh.positions) {
+    bounds.add(glm::dvec3(transform * glm::dvec4(mesh.origin + glm::dvec3(position), 1)));
+  }
+  return bounds;
+}
+
+}  // namespace
+
+Bounds Mesh::bounds() const {
+  Bounds bounds;
+  for (const glm::vec3& position : positions) bounds.add(origin + glm::dvec3(position));
+  return bounds;
+}
+
+MeshFile read_mesh(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  const std::string unpacked = extension == ".gz" ? lower_extension(path.stem()) : extension;
+  if (unpacked == ".ply") return read_ply_mesh(path);
+  if (unpacked == ".off") return read_off_mesh(path);
+  if (unpacked == ".obj") return read_obj_mesh(path);
+  if (extension == ".gltf" || extension == ".glb") return read_gltf_mesh(path);
+  if (extension == ".stl") return read_stl_mesh(path);
+  throw DataError(path.string() +
+                  ": not a mesh: the name ends in none of .obj .ply .off .gltf .glb .stl");
+}
+
+void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
+  const double determinant = glm::determinant(glm::dmat3(transform));
+  if (!is_finite(transform) || determinant == 0 || !std::isfinite(determinant)) {
+    throw std::invalid_argument("append_mesh: the transform is not finite and invertible");
+  }
+  if (mesh.materials.size() + other.materials.size() > kMostMaterials) {
+    throw std::invalid_argument("append_mesh: more than 65,536 materials");
+  }
+  Mesh added = other;
+  if (mesh.positions.empty()) mesh.origin = rounded_centre(transformed_bounds(other, transform));
+  transform_positions(added, transform, mesh.origin);
+  transform_directions(added, transform);
+  if (!mesh.positions.empty()) {
+    level_attributes(mesh, added);
+  } else {
+    mesh.normals.clear();
+    mesh.uvs.clear();
+  }
+  const std::size_t base = mesh.positions.size();
+  if (added.positions.size() > 0xffffffffU - base) {
+    throw std::invalid_argument("append_mesh: more than 2^32 vertices");
+  }
+  const std::size_t material_base = mesh.materials.size();
+  mesh.positions.insert(mesh.positions.end(), added.positions.begin(), added.positions.end());
+  mesh.normals.insert(mesh.normals.end(), added.normals.begin(), added.normals.end());
+  mesh.uvs.insert(mesh.uvs.end(), added.uvs.begin(), added.uvs.end());
+  for (const auto& triangle : added.triangles) {
+    auto& moved = mesh.triangles.emplace_back(triangle);
+    for (std::uint32_t& vertex : moved) vertex += static_cast<std::uint32_t>(base);
+  }
+  for (const std::uint16_t material : added.material_of) {
+    mesh.material_of.push_back(static_cast<std::uint16_t>(material_base + material));
+  }
+  mesh.materials.insert(mesh.materials.end(), added.materials.begin(), added.materials.end());
+}
+
+void write_mesh_ply(const std::filesystem::path& target, const Mesh& mesh) {
+  const std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex " +
+                             std::to_string(mesh.positions.size()) +
+                             "\nproperty double x\nproperty double y\nproperty double z\n"
+                             "element face " +
+                             std::to_string(mesh.triangles.size()) +
+                             "\nproperty list uchar uint vertex_indices\nend_header\n";
+  BufferedOutput out(target);
+  out.put(header.data(), header.size());
+  for (const glm::vec3& position : mesh.positions) {
+    const glm::dvec3 world = mesh.origin + glm::dvec3(position);
+    out.put(&world, sizeof world);
+  }
+  constexpr std::uint8_t kCorners = 3;
+  for (const auto& triangle : mesh.triangles) {
+    out.put(&kCorners, sizeof kCorners);
+    out.put(triangle.data(), sizeof triangle);
+  }
+  out.publish();
+}
+
+}  // namespace ptc

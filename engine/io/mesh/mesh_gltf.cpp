@@ -1,0 +1,395 @@
+// Meshes, materials and cameras from glTF 2.0.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/mesh/gltf_document.h"
+#include "engine/io/mesh/mesh_soup.h"
+
+namespace ptc {
+namespace {
+
+using Corner = MeshSoup::Corner;
+using Json = GltfDocument::Json;
+
+// What changes the meaning of a file and is understood or can be left out with little harm.
+constexpr std::array<std::string_view, 14> kKnownExtensions = {
+    "KHR_materials_emissive_strength",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_unlit",
+    "KHR_materials_clearcoat",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_materials_variants",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_lights_punctual",
+    "EXT_texture_webp"};
+
+const Json* member(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found == object.end() || !found->is_object() ? nullptr : &*found;
+}
+
+const Json* extension(const Json& object, const char* name) {
+  const Json* const extensions = member(object, "extensions");
+  return extensions == nullptr ? nullptr : member(*extensions, name);
+}
+
+// A material of the file, and how its texture is laid on.
+struct GltfMaterial {
+  std::size_t index = 0;  // in the soup
+  std::uint64_t uv_set = 0;
+  glm::dvec2 uv_offset{0};
+  glm::dvec2 uv_scale{1};
+  double uv_rotation = 0;
+};
+
+class GltfMesh {
+ public:
+  explicit GltfMesh(const std::filesystem::path& path)
+      : document_(path), textures_(path.parent_path(), warnings_) {}
+
+  MeshFile read() {
+    check_extensions();
+    visited_.resize(document_.count("nodes"));
+    walk_nodes();
+    if (!has_uvs_) soup_.drop_uvs();
+    if (document_.count("skins") > 0) warnings_.push_back(name() + ": skins are left out");
+    return {build_mesh(std::move(soup_), document_.path()), std::move(cameras_),
+            std::move(warnings_)};
+  }
+
+ private:
+  [[nodiscard]] std::string name() const { return document_.path().string(); }
+
+  void check_extensions() const {
+    for (std::size_t i = 0; i < document_.count("extensionsRequired"); ++i) {
+      const Json& required = document_.root()["extensionsRequired"][i];
+      const std::string text = required.is_string() ? required.get<std::string>() : "";
+      if (std::ranges::find(kKnownExtensions, text) == kKnownExtensions.end()) {
+        document_.fail("the extension '" + text + "' is not supported");
+      }
+    }
+  }
+
+  // The nodes of the default scene; of a file without scenes, those that are nobody's children.
+  std::vector<std::uint64_t> root_nodes() const {
+    if (document_.count("scenes") > 0) {
+      const std::uint64_t scene = document_.unsigned_at(document_.root(), "scene").value_or(0);
+      return node_list(document_.at("scenes", scene), "nodes");
+    }
+    std::vector<bool> child(document_.count("nodes"));
+    for (std::size_t i = 0; i < child.size(); ++i) {
+      for (const std::uint64_t c : node_list(document_.at("nodes", i), "children")) {
+        if (c < child.size()) child[c] = true;
+      }
+    }
+    std::vector<std::uint64_t> roots;
+    for (std::size_t i = 0; i < child.size(); ++i) {
+      if (!child[i]) roots.push_back(i);
+    }
+    return roots;
+  }
+
+  std::vector<std::uint64_t> node_list(const Json& object, const char* key) const {
+    const auto found = object.find(key);
+    if (found == object.end()) return {};
+    if (!found->is_array()) document_.fail(std::string(key) + " is no array");
+    std::vector<std::uint64_t> nodes;
+    for (const Json& index : *found) {
+      if (!index.is_number_unsigned()) document_.fail(std::string(key) + " holds what is no index");
+      nodes.push_back(index.get<std::uint64_t>());
+    }
+    return nodes;
+  }
+
+  void walk_nodes() {
+    std::vector<std::pair<std::uint64_t, glm::dmat4>> open;
+    const auto push = [&](std::vector<std::uint64_t> nodes, const glm::dmat4& parent) {
+      std::ranges::reverse(nodes);  // the last one pushed is the next one read
+      for (const std::uint64_t node : nodes) open.emplace_back(node, parent);
+    };
+    push(root_nodes(), glm::dmat4(1));
+    while (!open.empty()) {
+      const auto [index, parent] = open.back();
+      open.pop_back();
+      const Json& node = document_.at("nodes", index);
+      if (visited_[index]) {
+        document_.fail("node " + std::to_string(index) + " has two parents or is its own");
+      }
+      visited_[index] = true;
+      const glm::dmat4 world = parent * local_transform(node);
+      if (const auto mesh = document_.unsigned_at(node, "mesh")) add_mesh(*mesh, world);
+      if (const auto camera = document_.unsigned_at(node, "camera")) add_camera(*camera, world);
+      push(node_list(node, "children"), world);
+    }
+  }
+
+  glm::dmat4 local_transform(const Json& node) const {
+    if (const auto m = document_.numbers_at<16>(node, "matrix")) {
+      glm::dmat4 matrix;
+      for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = (*m)[static_cast<std::size_t>(i)];
+      return matrix;
+    }
+    const auto t = document_.numbers_at<3>(node, "translation").value_or(std::array{0.0, 0.0, 0.0});
+    const auto r =
+        document_.numbers_at<4>(node, "rotation").value_or(std::array{0.0, 0.0, 0.0, 1.0});
+    const auto s = document_.numbers_at<3>(node, "scale").value_or(std::array{1.0, 1.0, 1.0});
+    glm::dmat4 matrix = glm::mat4_cast(glm::normalize(glm::dquat(r[3], r[0], r[1], r[2])));
+    for (int i = 0; i < 3; ++i) matrix[i] *= s[static_cast<std::size_t>(i)];
+    matrix[3] = {t[0], t[1], t[2], 1};
+    return matrix;
+  }
+
+  void add_mesh(std::uint64_t index, const glm::dmat4& world) {
+    const Json& mesh = document_.at("meshes", index);
+    const auto primitives = mesh.find("primitives");
+    if (primitives == mesh.end() || !primitives->is_array())
+      document_.fail("a mesh without primitives");
+    for (const Json& primitive : *primitives) {
+      if (!primitive.is_object()) document_.fail("a primitive that is no object");
+      add_primitive(primitive, world);
+    }
+  }
+
+  void add_primitive(const Json& primitive, const glm::dmat4& world) {
+    const std::uint64_t mode = document_.unsigned_at(primitive, "mode").value_or(4);
+    if (mode < 4) return;  // points and lines
+    if (mode > 6) document_.fail("an unknown mode of a primitive");
+    if (extension(primitive, "KHR_draco_mesh_compression") != nullptr) {
+      document_.fail("Draco-compressed meshes are not supported");
+    }
+    const Json* const attributes = member(primitive, "attributes");
+    const auto position =
+        attributes == nullptr ? std::nullopt : document_.unsigned_at(*attributes, "POSITION");
+    if (!position) return;
+    const GltfMaterial& material = use_material(document_.unsigned_at(primitive, "material"));
+    const std::size_t base = soup_.positions.size();
+    const std::size_t count = add_vertices(*attributes, *position, material, world);
+    add_triangles(primitive, mode, base, count, material, mirrors(world));
+  }
+
+  // Appends positions, normals and texture coordinates in step; missing ones are 0.
+  std::size_t add_vertices(const Json& attributes, std::uint64_t position,
+                           const GltfMaterial& material, const glm::dmat4& world) {
+    const auto positions = document_.read_accessor(position, 3);
+    check_growth(positions.count);
+    for (std::size_t i = 0; i < positions.count; ++i) {
+      const double* const p = &positions.values[3 * i];
+      soup_.positions.emplace_back(world * glm::dvec4(p[0], p[1], p[2], 1));
+    }
+    add_normals(attributes, positions.count, world);
+    soup_.normals.resize(soup_.positions.size(), glm::vec3(0));
+    add_uvs(attributes, positions.count, material);
+    soup_.uvs.resize(soup_.positions.size(), glm::vec2(0));
+    return positions.count;
+  }
+
+  // Many nodes may show one mesh: what they make of a small file stays within reason.
+  void check_growth(std::size_t more) const {
+    const std::uint64_t most = (std::uint64_t{1} << 20) + 64 * document_.bytes_read();
+    if (more > most || soup_.positions.size() > most - more ||
+        more >= MeshSoup::kNone - soup_.positions.size() || soup_.corners.size() > most) {
+      document_.fail("its nodes repeat meshes to more vertices than this program takes");
+    }
+  }
+
+  void add_normals(const Json& attributes, std::size_t count, const glm::dmat4& world) {
+    const auto index = document_.unsigned_at(attributes, "NORMAL");
+    if (!index) return;
+    const auto normals = document_.read_accessor(*index, 3, count);
+    const glm::dmat3 turn = normal_transform(world);
+    for (std::size_t i = 0; i < normals.count; ++i) {
+      const double* const n = &normals.values[3 * i];
+      soup_.normals.emplace_back(turn * glm::dvec3(n[0], n[1], n[2]));
+    }
+  }
+
+  void add_uvs(const Json& attributes, std::size_t count, const GltfMaterial& material) {
+    const std::string key = "TEXCOORD_" + std::to_string(material.uv_set);
+    const auto index = document_.unsigned_at(attributes, key.c_str());
+    if (!index) return;
+    has_uvs_ = true;
+    const auto uvs = document_.read_accessor(*index, 2, count);
+    const double cosine = std::cos(material.uv_rotation);
+    const double sine = std::sin(material.uv_rotation);
+    for (std::size_t i = 0; i < uvs.count; ++i) {
+      const glm::dvec2 scaled =
+          material.uv_scale * glm::dvec2(uvs.values[2 * i], uvs.values[2 * i + 1]);
+      const double u = material.uv_offset.x + cosine * scaled.x + sine * scaled.y;
+      const double v = material.uv_offset.y - sine * scaled.x + cosine * scaled.y;
+      soup_.uvs.emplace_back(u, 1 - v);  // v of glTF grows downwards
+    }
+  }
+
+  void add_triangles(const Json& primitive, std::uint64_t mode, std::size_t base, std::size_t count,
+                     const GltfMaterial& material, bool mirrored) {
+    std::vector<std::uint32_t> order;
+    if (const auto accessor = document_.unsigned_at(primitive, "indices")) {
+      for (const double index : document_.read_accessor(*accessor, 1).values) {
+        if (!(index >= 0 && index < static_cast<double>(count))) {
+          document_.fail("an index that leads to no vertex");
+        }
+        order.push_back(static_cast<std::uint32_t>(index));
+      }
+    } else {
+      for (std::uint32_t i = 0; i < count; ++i) order.push_back(i);
+    }
+    const std::size_t step = mode == 4 ? 3 : 1;
+    for (std::size_t i = 0; i + 2 < order.size(); i += step) {
+      std::array<std::size_t, 3> at = {i, i + 1, i + 2};
+      if (mode == 5 && i % 2 == 1) std::swap(at[0], at[1]);  // strip
+      if (mode == 6) at[0] = 0;                              // fan
+      if (mirrored) std::swap(at[1], at[2]);
+      std::array<Corner, 3> triangle;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto vertex = static_cast<std::uint32_t>(base + order[at[k]]);
+        triangle[k] = {vertex, vertex, vertex};
+      }
+      soup_.add_polygon(triangle, material.index, document_.path());
+    }
+  }
+
+  const GltfMaterial& use_material(std::optional<std::uint64_t> index) {
+    const std::uint64_t key = index.value_or(std::numeric_limits<std::uint64_t>::max());
+    const auto known = materials_.find(key);
+    if (known != materials_.end()) return known->second;
+    GltfMaterial& made = materials_[key];
+    Material material;
+    material.albedo = glm::vec3(1);
+    if (index) read_material(document_.at("materials", *index), material, made);
+    made.index = soup_.add_material(std::move(material), document_.path());
+    return made;
+  }
+
+  void read_material(const Json& json, Material& material, GltfMaterial& made) {
+    const auto title = json.find("name");
+    if (title != json.end() && title->is_string()) material.name = title->get<std::string>();
+    const auto sides = json.find("doubleSided");
+    material.double_sided = sides != json.end() && sides->is_boolean() && sides->get<bool>();
+    if (const Json* const old = extension(json, "KHR_materials_pbrSpecularGlossiness")) {
+      read_base(*old, "diffuseFactor", "diffuseTexture", material, made);
+    } else if (const Json* const pbr = member(json, "pbrMetallicRoughness")) {
+      read_base(*pbr, "baseColorFactor", "baseColorTexture", material, made);
+    }
+    read_emission(json, material);
+  }
+
+  void read_base(const Json& json, const char* factor, const char* texture, Material& material,
+                 GltfMaterial& made) {
+    if (const auto colour = document_.numbers_at<4>(json, factor)) {
+      for (int i = 0; i < 3; ++i) {
+        material.albedo[i] =
+            static_cast<float>(std::clamp((*colour)[static_cast<std::size_t>(i)], 0.0, 1.0));
+      }
+    }
+    const Json* const info = member(json, texture);
+    if (info == nullptr) return;
+    material.texture = load_texture(*info);
+    made.uv_set = document_.unsigned_at(*info, "texCoord").value_or(0);
+    const Json* const transform = extension(*info, "KHR_texture_transform");
+    if (transform == nullptr) return;
+    made.uv_set = document_.unsigned_at(*transform, "texCoord").value_or(made.uv_set);
+    made.uv_rotation = document_.number_at(*transform, "rotation", 0);
+    if (const auto o = document_.numbers_at<2>(*transform, "offset"))
+      made.uv_offset = {(*o)[0], (*o)[1]};
+    if (const auto s = document_.numbers_at<2>(*transform, "scale"))
+      made.uv_scale = {(*s)[0], (*s)[1]};
+  }
+
+  // A texture of the emission counts by its mean, so that the emitted power is right.
+  void read_emission(const Json& json, Material& material) {
+    const auto factor = document_.numbers_at<3>(json, "emissiveFactor");
+    if (!factor) return;
+    double strength = 1;
+    if (const Json* const e = extension(json, "KHR_materials_emissive_strength")) {
+      strength = document_.number_at(*e, "emissiveStrength", 1);
+    }
+    glm::dvec3 mean(1);
+    const Json* const info = member(json, "emissiveTexture");
+    const auto image = info == nullptr ? nullptr : load_texture(*info);
+    if (image) {
+      mean = glm::dvec3(0);
+      for (const glm::vec3& pixel : image->pixels) mean += glm::dvec3(pixel);
+      mean /= static_cast<double>(image->pixels.size());
+      warnings_.push_back(name() + ": material '" + material.name +
+                          "': the mean of its emission texture is used");
+    }
+    for (int i = 0; i < 3; ++i) {
+      const double value = (*factor)[static_cast<std::size_t>(i)] * strength * mean[i];
+      material.emission[i] =
+          static_cast<float>(std::clamp<double>(value, 0, std::numeric_limits<float>::max()));
+    }
+  }
+
+  std::shared_ptr<const Image> load_texture(const Json& info) {
+    const auto texture = document_.unsigned_at(info, "index");
+    if (!texture) document_.fail("a texture without index");
+    const auto source = document_.unsigned_at(document_.at("textures", *texture), "source");
+    if (!source) {
+      warnings_.push_back(name() + ": texture " + std::to_string(*texture) +
+                          " left out: no source that is supported");
+      return nullptr;
+    }
+    const Json& image = document_.at("images", *source);
+    const auto uri = image.find("uri");
+    const std::string label = name() + " image " + std::to_string(*source);
+    if (uri != image.end() && uri->is_string()) {
+      const std::string text = uri->get<std::string>();
+      if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text));
+      return textures_.decode(label, document_.fetch(text));
+    }
+    const auto view = document_.unsigned_at(image, "bufferView");
+    if (!view) document_.fail("an image without uri and bufferView");
+    return textures_.decode(label, document_.view(*view));
+  }
+
+  // Cameras look along -z with y up (section 3.10).
+  void add_camera(std::uint64_t index, const glm::dmat4& world) {
+    const Json* const perspective = member(document_.at("cameras", index), "perspective");
+    if (perspective == nullptr) return;
+    const double vertical = document_.number_at(*perspective, "yfov", 0.7);
+    const double aspect = document_.number_at(*perspective, "aspectRatio", 16.0 / 9);
+    const auto camera =
+        make_camera(glm::dvec3(world[3]), -glm::dvec3(world[2]), glm::dvec3(world[1]),
+                    2 * std::atan(std::tan(vertical / 2) * aspect));
+    if (camera) {
+      cameras_.push_back(*camera);
+    } else {
+      warnings_.push_back(name() + ": camera " + std::to_string(index) + " left out: no view");
+    }
+  }
+
+  GltfDocument document_;
+  MeshSoup soup_;
+  std::vector<MeshCamera> cameras_;
+  std::vector<std::string> warnings_;
+  TextureLoader textures_;
+  std::map<std::uint64_t, GltfMaterial> materials_;
+  std::vector<bool> visited_;
+  bool has_uvs_ = false;
+};
+
+}  // namespace
+
+MeshFile read_gltf_mesh(const std::filesystem::path& path) {
+  try {
+    return GltfMesh(path).read();
+  } catch (const nlohmann::json::exception& error) {
+    throw DataError(path.string() + ": " + error.what());
+  }
+}
+
+}  // namespace ptc

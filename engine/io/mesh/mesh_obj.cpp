@@ -1,0 +1,182 @@
+// Meshes from Wavefront OBJ: polygons with materials. Source: Wavefront, "Object Files (.obj)",
+// Advanced Visualizer manual, appendix B1.
+#include <algorithm>
+#include <exception>
+#include <map>
+#include <new>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/io/mesh/mesh_soup.h"
+#include "engine/io/mesh/mtl.h"
+#include "engine/io/text/byte_stream.h"
+#include "engine/io/text/text.h"
+
+namespace ptc {
+namespace {
+
+using Corner = MeshSoup::Corner;
+
+class ObjMesh {
+ public:
+  explicit ObjMesh(const std::filesystem::path& path)
+      : path_(path), stream_(path), textures_(path.parent_path(), warnings_) {}
+
+  MeshFile read() {
+    std::string_view line;
+    while (next_logical_line(line)) read_line(line);
+    return {build_mesh(std::move(soup_), path_), {}, std::move(warnings_)};
+  }
+
+ private:
+  // A backslash at its end joins a line to the next.
+  bool next_logical_line(std::string_view& line) {
+    if (!stream_.next_line(line)) return false;
+    if (!line.ends_with('\\')) return true;
+    joined_.clear();
+    do {
+      joined_.append(line.substr(0, line.size() - (line.ends_with('\\') ? 1 : 0)));
+      if (joined_.size() > ByteStream::kMostBytesAtOnce) {
+        stream_.fail_at_line("a line of more than 64 MiB");
+      }
+      if (!line.ends_with('\\')) break;
+    } while (stream_.next_line(line));
+    line = joined_;
+    return true;
+  }
+
+  void read_line(std::string_view line) {
+    line = line.substr(0, line.find('#'));
+    Words words(line);
+    const std::string_view keyword = words.next();
+    if (keyword == "v") {
+      const auto p = read_numbers<3>(words, 3);
+      soup_.positions.emplace_back(p[0], p[1], p[2]);
+    } else if (keyword == "vn") {
+      const auto n = read_numbers<3>(words, 3);
+      soup_.normals.emplace_back(n[0], n[1], n[2]);
+    } else if (keyword == "vt") {
+      const auto t = read_numbers<2>(words, 1);
+      soup_.uvs.emplace_back(t[0], t[1]);
+    } else if (keyword == "f") {
+      read_face(words);
+    } else if (keyword == "usemtl") {
+      material_ = use_material(std::string(words.rest()));
+    } else if (keyword == "mtllib") {
+      read_libraries(words);
+    }
+  }
+
+  template <std::size_t N>
+  std::array<double, N> read_numbers(Words& words, std::size_t least) const {
+    std::array<double, N> numbers{};
+    for (std::size_t i = 0; i < N; ++i) {
+      const std::string_view word = words.next();
+      if (word.empty() && i >= least) break;
+      const auto number = parse_number(word);
+      if (!number)
+        stream_.fail_at_line(word.empty() ? "a vertex with too few values" : "not a number");
+      numbers[i] = *number;
+    }
+    return numbers;
+  }
+
+  // From 1 on, or backwards from the last one read: -1.
+  std::uint32_t resolve(std::string_view word, std::size_t count) const {
+    const auto index = parse_integer(word);
+    const auto limit = static_cast<std::int64_t>(count);
+    if (!index || *index == 0 || *index < -limit || *index >= std::int64_t{MeshSoup::kNone}) {
+      stream_.fail_at_line("an index that leads to no vertex");
+    }
+    return static_cast<std::uint32_t>(*index < 0 ? limit + *index : *index - 1);
+  }
+
+  // POSITION[/[UV][/NORMAL]]
+  Corner read_corner(std::string_view word) const {
+    Corner corner;
+    const std::size_t slash = word.find('/');
+    corner.position = resolve(word.substr(0, slash), soup_.positions.size());
+    if (slash == std::string_view::npos) return corner;
+    word.remove_prefix(slash + 1);
+    const std::size_t second = word.find('/');
+    const std::string_view uv = word.substr(0, second);
+    if (!uv.empty()) corner.uv = resolve(uv, soup_.uvs.size());
+    if (second == std::string_view::npos) return corner;
+    const std::string_view normal = word.substr(second + 1);
+    if (!normal.empty()) corner.normal = resolve(normal, soup_.normals.size());
+    return corner;
+  }
+
+  void read_face(Words& words) {
+    corners_.clear();
+    for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+      corners_.push_back(read_corner(word));
+    }
+    if (!material_) material_ = soup_.add_material({}, path_);
+    soup_.add_polygon(corners_, *material_, path_);
+  }
+
+  std::size_t use_material(const std::string& name) {
+    const auto used = used_.find(name);
+    if (used != used_.end()) return used->second;
+    const auto defined = defined_.find(name);
+    Material material;
+    material.name = name;
+    if (defined != defined_.end()) {
+      material = defined->second;
+    } else {
+      warnings_.push_back(path_.string() + ": material '" + name +
+                          "' is not defined, plain grey takes its place");
+    }
+    return used_[name] = soup_.add_material(std::move(material), path_);
+  }
+
+  // Names separated by blanks, or one name with blanks in it, which may be escaped.
+  void read_libraries(Words& words) {
+    std::string whole(words.rest());
+    std::ranges::replace(whole, '\\', '/');
+    std::error_code ignored;
+    if (std::filesystem::exists(path_.parent_path() / whole, ignored)) {
+      read_library(whole);
+      return;
+    }
+    for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+      std::string name(word);
+      while (name.ends_with('\\')) {
+        name.back() = ' ';
+        name.append(words.next());
+      }
+      std::ranges::replace(name, '\\', '/');
+      read_library(name);
+    }
+  }
+
+  void read_library(const std::string& name) {
+    try {
+      read_mtl(path_.parent_path() / name, textures_, defined_, warnings_);
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& error) {
+      warnings_.push_back("material library left out: " + std::string(error.what()));
+    }
+  }
+
+  std::filesystem::path path_;
+  ByteStream stream_;
+  std::string joined_;
+  MeshSoup soup_;
+  std::vector<std::string> warnings_;
+  TextureLoader textures_;
+  std::map<std::string, Material> defined_;
+  std::map<std::string, std::size_t> used_;
+  std::optional<std::size_t> material_;
+  std::vector<Corner> corners_;
+};
+
+}  // namespace
+
+MeshFile read_obj_mesh(const std::filesystem::path& path) {
+  return ObjMesh(path).read();
+}
+
+}  // namespace ptc

@@ -1,0 +1,130 @@
+// Meshes from OFF text. Source: Geomview manual, "OFF Files".
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/io/mesh/mesh_soup.h"
+#include "engine/io/text/byte_stream.h"
+#include "engine/io/text/text.h"
+
+namespace ptc {
+namespace {
+
+using Corner = MeshSoup::Corner;
+
+class OffMesh {
+ public:
+  explicit OffMesh(const std::filesystem::path& path) : path_(path), stream_(path) {}
+
+  MeshFile read() {
+    read_header();
+    for (std::uint64_t i = 0; i < vertices_; ++i) read_vertex();
+    for (std::uint64_t i = 0; i < faces_; ++i) read_face();
+    return {build_mesh(std::move(soup_), path_), {}, {}};
+  }
+
+ private:
+  // The next line with words, without its comment. It lies in the stream's buffer.
+  std::string_view next_content() {
+    std::string_view line;
+    do {
+      if (!stream_.next_line(line)) stream_.fail_at_line("the file ends too early");
+      line = line.substr(0, line.find('#'));
+    } while (Words(line).next().empty());
+    return line;
+  }
+
+  std::uint64_t count(Words& words) const {
+    const auto number = parse_integer(words.next());
+    if (!number || *number < 0) stream_.fail_at_line("OFF needs its counts of vertices and faces");
+    return static_cast<std::uint64_t>(*number);
+  }
+
+  // [ST][C][N]OFF, then the counts, on the same line or the next; the keyword may be missing.
+  void read_header() {
+    std::string_view line = next_content();
+    const std::size_t mark = line.find("OFF");
+    if (mark != std::string_view::npos) {
+      std::string_view prefix = Words(line.substr(0, mark)).rest();
+      has_uvs_ = take_prefix(prefix, "ST");
+      take_prefix(prefix, "C");
+      has_normals_ = take_prefix(prefix, "N");
+      if (!prefix.empty()) stream_.fail_at_line("an OFF of a kind that is not supported");
+      line = line.substr(mark + 3);
+      if (Words(line).next() == "BINARY") stream_.fail_at_line("binary OFF is not supported");
+      if (Words(line).next().empty()) line = next_content();
+    }
+    Words words(line);
+    vertices_ = count(words);
+    faces_ = count(words);
+    // "0 0 0" and the end of the line at least; "0" for a face.
+    const std::uint64_t left = stream_.most_left() + 1;
+    if (vertices_ > left / 6 || faces_ > (left - 6 * vertices_) / 2) {
+      stream_.fail_at_line("more vertices or faces than the file can hold");
+    }
+  }
+
+  static bool take_prefix(std::string_view& prefix, std::string_view part) {
+    if (!prefix.starts_with(part)) return false;
+    prefix.remove_prefix(part.size());
+    return true;
+  }
+
+  // x y z [nx ny nz] [colour] [s t]: the last two where there are texture coordinates, since a
+  // colour may have three or four components.
+  void read_vertex() {
+    std::array<double, 16> values{};
+    std::size_t n = 0;
+    Words words(next_content());
+    for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+      const auto value = parse_number(word);
+      if (!value) stream_.fail_at_line("not a number");
+      if (n == values.size()) stream_.fail_at_line("more values than a vertex can have");
+      values[n++] = *value;
+    }
+    const std::size_t least = 3U + (has_normals_ ? 3U : 0U) + (has_uvs_ ? 2U : 0U);
+    if (n < least) stream_.fail_at_line("a vertex with too few values");
+    soup_.positions.emplace_back(values[0], values[1], values[2]);
+    if (has_normals_) soup_.normals.emplace_back(values[3], values[4], values[5]);
+    if (has_uvs_) soup_.uvs.emplace_back(values[n - 2], values[n - 1]);
+  }
+
+  void read_face() {
+    Words words(next_content());
+    const auto size = parse_integer(words.next());
+    if (!size || *size < 0) stream_.fail_at_line("a face begins with its number of corners");
+    corners_.clear();
+    for (std::int64_t i = 0; i < *size; ++i) {
+      const std::string_view word = words.next();
+      const auto index = parse_integer(word);
+      if (word.empty()) stream_.fail_at_line("a face with fewer corners than it says");
+      if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= soup_.positions.size() ||
+          *index >= MeshSoup::kNone) {
+        stream_.fail_at_line("an index that leads to no vertex");
+      }
+      const auto at = static_cast<std::uint32_t>(*index);
+      corners_.push_back(
+          {at, has_normals_ ? at : MeshSoup::kNone, has_uvs_ ? at : MeshSoup::kNone});
+    }
+    soup_.add_polygon(corners_, 0, path_);
+  }
+
+  std::filesystem::path path_;
+  ByteStream stream_;
+  MeshSoup soup_;
+  std::uint64_t vertices_ = 0;
+  std::uint64_t faces_ = 0;
+  bool has_normals_ = false;
+  bool has_uvs_ = false;
+  std::vector<Corner> corners_;
+};
+
+}  // namespace
+
+MeshFile read_off_mesh(const std::filesystem::path& path) {
+  return OffMesh(path).read();
+}
+
+}  // namespace ptc

@@ -1,0 +1,67 @@
+// What the mesh readers share beside polygons: transforms, cameras, textures.
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <new>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/mesh/mesh_soup.h"
+
+namespace ptc {
+
+// The cofactor matrix is the inverse transpose times the determinant, and defined for all matrices.
+glm::dmat3 normal_transform(const glm::dmat4& transform) {
+  const glm::dmat3 m(transform);
+  const glm::dmat3 cofactor(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+  return mirrors(transform) ? -cofactor : cofactor;
+}
+
+bool mirrors(const glm::dmat4& transform) {
+  return glm::determinant(glm::dmat3(transform)) < 0;
+}
+
+std::optional<MeshCamera> make_camera(const glm::dvec3& position, const glm::dvec3& forward,
+                                      const glm::dvec3& up, double horizontal_fov) {
+  const double sum = position.x + position.y + position.z;
+  const double lengths = glm::length(forward) * glm::length(up);
+  if (!std::isfinite(sum) || !std::isfinite(lengths) || lengths == 0 || !(horizontal_fov > 0)) {
+    return std::nullopt;
+  }
+  return MeshCamera{position, glm::vec3(glm::normalize(forward)), glm::vec3(glm::normalize(up)),
+                    static_cast<float>(horizontal_fov)};
+}
+
+std::shared_ptr<const Image> TextureLoader::load(const std::string& name) {
+  const auto known = loaded_.find(name);
+  if (known != loaded_.end()) return known->second;
+  std::string relative = name;
+  std::ranges::replace(relative, '\\', '/');
+  std::shared_ptr<const Image> image;
+  try {
+    image = std::make_shared<const Image>(read_image(directory_ / relative));
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    warnings_.push_back("texture left out: " + std::string(error.what()));
+  }
+  return loaded_[name] = std::move(image);
+}
+
+std::shared_ptr<const Image> TextureLoader::decode(const std::string& name,
+                                                   std::span<const std::byte> bytes) {
+  const auto known = loaded_.find(name);
+  if (known != loaded_.end()) return known->second;
+  std::shared_ptr<const Image> image;
+  try {
+    image = std::make_shared<const Image>(decode_image(bytes, name));
+  } catch (const DataError& error) {
+    warnings_.push_back("texture left out: " + std::string(error.what()));
+  }
+  return loaded_[name] = std::move(image);
+}
+
+}  // namespace ptc

@@ -1,0 +1,134 @@
+// Meshes from PLY: faces or triangle strips.
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/io/cloud/ply.h"
+#include "engine/io/mesh/mesh_soup.h"
+
+namespace ptc {
+namespace {
+
+using Corner = MeshSoup::Corner;
+
+class PlyMesh {
+ public:
+  explicit PlyMesh(const std::filesystem::path& path) : path_(path), reader_(path) {
+    vertex_ = reader_.find("vertex");
+    if (vertex_ == nullptr) throw DataError(path.string() + ": a PLY file without vertices");
+    // Faces may come first and need to know what vertices will have.
+    position_ = find_all<3>({{{"x"}, {"y"}, {"z"}}});
+    if (!position_) throw DataError(path.string() + ": PLY vertices without x, y and z");
+    normal_ = find_all<3>({{{"nx", "normal_x"}, {"ny", "normal_y"}, {"nz", "normal_z"}}});
+    uv_ = find_all<2>({{{"u", "s", "texture_u"}, {"v", "t", "texture_v"}}});
+  }
+
+  MeshFile read() {
+    for (const PlyElement& element : reader_.elements()) {
+      if (element.name == "vertex") {
+        read_vertices(element);
+      } else if (element.name == "face") {
+        read_faces(element, false);
+      } else if (element.name == "tristrips") {
+        read_faces(element, true);
+      } else {
+        reader_.skip(element);
+      }
+    }
+    reader_.require_end();
+    return {build_mesh(std::move(soup_), path_), {}, {}};
+  }
+
+ private:
+  // The scalar properties that have one of the names each, if all are there.
+  template <std::size_t N>
+  std::optional<std::array<std::size_t, N>> find_all(
+      const std::array<std::initializer_list<std::string_view>, N>& names) const {
+    std::array<std::size_t, N> found{};
+    for (std::size_t i = 0; i < N; ++i) {
+      const auto index = vertex_->find_any(names[i]);
+      if (!index || vertex_->properties[*index].length_type) return std::nullopt;
+      found[i] = *index;
+    }
+    return found;
+  }
+
+  void read_vertices(const PlyElement& element) {
+    PlyRecord record;
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      reader_.read(element, record);
+      const auto value = [&](std::size_t at) { return record.scalars[at]; };
+      const auto& p = *position_;
+      soup_.positions.emplace_back(value(p[0]), value(p[1]), value(p[2]));
+      if (normal_) {
+        const auto& n = *normal_;
+        soup_.normals.emplace_back(value(n[0]), value(n[1]), value(n[2]));
+      }
+      if (uv_) soup_.uvs.emplace_back(value((*uv_)[0]), value((*uv_)[1]));
+    }
+  }
+
+  void read_faces(const PlyElement& element, bool strips) {
+    const auto indices = element.find_any({"vertex_indices", "vertex_index"});
+    const PlyProperty* const list = indices ? &element.properties[*indices] : nullptr;
+    if (list == nullptr || !list->length_type || list->type == PlyType::float32 ||
+        list->type == PlyType::float64) {
+      throw DataError(path_.string() + ": PLY element '" + element.name +
+                      "' without a list of integers vertex_indices");
+    }
+    PlyRecord record;
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      reader_.read(element, record);
+      if (strips) {
+        add_strip(record, record.lists[*indices]);
+      } else {
+        corners_.clear();
+        for (const double index : record.lists[*indices]) corners_.push_back(corner(record, index));
+        soup_.add_polygon(corners_, 0, path_);
+      }
+    }
+  }
+
+  // Each index makes a triangle with the two before it, every second one turned over; -1 begins a
+  // new strip.
+  void add_strip(const PlyRecord& record, const std::vector<double>& indices) {
+    corners_.clear();
+    for (const double index : indices) {
+      if (index == -1) {
+        corners_.clear();
+        continue;
+      }
+      corners_.push_back(corner(record, index));
+      const std::size_t n = corners_.size();
+      if (n < 3) continue;
+      const bool turned = n % 2 == 0;
+      const std::array<Corner, 3> triangle = {corners_[turned ? n - 2 : n - 3],
+                                              corners_[turned ? n - 3 : n - 2], corners_[n - 1]};
+      soup_.add_polygon(triangle, 0, path_);
+    }
+  }
+
+  Corner corner(const PlyRecord& record, double index) const {
+    if (!(index >= 0 && index < static_cast<double>(vertex_->count) && index < MeshSoup::kNone)) {
+      reader_.fail(record, "an index that leads to no vertex");
+    }
+    const auto at = static_cast<std::uint32_t>(index);
+    return {at, normal_ ? at : MeshSoup::kNone, uv_ ? at : MeshSoup::kNone};
+  }
+
+  std::filesystem::path path_;
+  PlyReader reader_;
+  const PlyElement* vertex_ = nullptr;
+  std::optional<std::array<std::size_t, 3>> position_;
+  std::optional<std::array<std::size_t, 3>> normal_;
+  std::optional<std::array<std::size_t, 2>> uv_;
+  MeshSoup soup_;
+  std::vector<Corner> corners_;
+};
+
+}  // namespace
+
+MeshFile read_ply_mesh(const std::filesystem::path& path) {
+  return PlyMesh(path).read();
+}
+
+}  // namespace ptc

@@ -1,0 +1,253 @@
+// Polygons to a mesh: checks, triangles, one index for all attributes.
+#include "engine/io/mesh/mesh_soup.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "engine/base/error.h"
+
+namespace ptc {
+namespace {
+
+using Corner = MeshSoup::Corner;
+using Triangle = std::array<Corner, 3>;
+
+constexpr std::uint32_t kNone = MeshSoup::kNone;
+constexpr std::size_t kMostMaterials = 65536;
+constexpr std::size_t kMostCorners = std::size_t{1} << 28;
+// Farther from the centre, squares of float distances leave the range of float.
+constexpr double kMostExtent = 1e18;
+
+struct Soup {
+  std::vector<Triangle> triangles;
+  std::vector<std::uint16_t> material_of;
+};
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& rule) {
+  throw DataError(path.string() + ": " + rule);
+}
+
+void check_corners(const MeshSoup& soup, const std::filesystem::path& path) {
+  const auto within = [](std::uint32_t index, std::size_t size) {
+    return index == kNone || index < size;
+  };
+  std::size_t corner = 0;
+  for (std::size_t i = 0; i < soup.polygon_sizes.size(); ++i) {
+    for (const std::size_t end = corner + soup.polygon_sizes[i]; corner < end; ++corner) {
+      const Corner& c = soup.corners[corner];
+      if (c.position >= soup.positions.size() || !within(c.normal, soup.normals.size()) ||
+          !within(c.uv, soup.uvs.size())) {
+        refuse(path, "polygon " + std::to_string(i) + ": an index leads to no vertex");
+      }
+    }
+  }
+}
+
+glm::dvec3 checked_origin(const MeshSoup& soup, const std::filesystem::path& path) {
+  Bounds bounds;
+  for (std::size_t i = 0; i < soup.positions.size(); ++i) {
+    const glm::dvec3& p = soup.positions[i];
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+      refuse(path, "vertex " + std::to_string(i) + ": a position that is not finite");
+    }
+    bounds.add(p);
+  }
+  if (bounds.empty()) return glm::dvec3(0);
+  const glm::dvec3 half = bounds.high / 2.0 - bounds.low / 2.0;
+  if (half.x > kMostExtent || half.y > kMostExtent || half.z > kMostExtent) {
+    refuse(path, "positions more than 2e18 apart");
+  }
+  return glm::round(bounds.low / 2.0 + bounds.high / 2.0);
+}
+
+// Without those that have no area once their positions are float.
+Soup make_triangles(const MeshSoup& soup, const std::vector<glm::vec3>& positions) {
+  Soup made;
+  made.triangles.reserve(soup.polygon_sizes.size());
+  made.material_of.reserve(soup.polygon_sizes.size());
+  std::vector<glm::dvec3> polygon;
+  std::vector<std::array<std::uint32_t, 3>> cut;
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < soup.polygon_sizes.size(); ++i) {
+    const auto corners = std::span(soup.corners).subspan(first, soup.polygon_sizes[i]);
+    first += soup.polygon_sizes[i];
+    polygon.clear();
+    for (const Corner& corner : corners) polygon.push_back(soup.positions[corner.position]);
+    cut.clear();
+    triangulate(polygon, cut);
+    for (const auto& [a, b, c] : cut) {
+      const glm::dvec3 at(positions[corners[a].position]);
+      const glm::dvec3 ab = glm::dvec3(positions[corners[b].position]) - at;
+      const glm::dvec3 ac = glm::dvec3(positions[corners[c].position]) - at;
+      if (glm::cross(ab, ac) == glm::dvec3(0)) continue;
+      made.triangles.push_back({corners[a], corners[b], corners[c]});
+      made.material_of.push_back(soup.material_of[i]);
+    }
+  }
+  return made;
+}
+
+// Unit normals; those that cannot be scaled become 0, which says that they are missing.
+void normalise(std::vector<glm::vec3>& normals) {
+  for (glm::vec3& normal : normals) {
+    const double length = glm::length(glm::dvec3(normal));
+    normal =
+        std::isfinite(length) && length > 0 ? glm::vec3(glm::dvec3(normal) / length) : glm::vec3(0);
+  }
+}
+
+// Either all corners have a normal afterwards or there are none.
+void complete_normals(MeshSoup& soup, std::vector<Triangle>& triangles,
+                      const std::vector<glm::vec3>& positions) {
+  normalise(soup.normals);
+  const auto missing = [&](const Corner& corner) {
+    return corner.normal == kNone || soup.normals[corner.normal] == glm::vec3(0);
+  };
+  const bool any = std::ranges::any_of(
+      triangles, [&](const Triangle& triangle) { return !std::ranges::all_of(triangle, missing); });
+  for (Triangle& triangle : triangles) {
+    if (!any) {
+      for (Corner& corner : triangle) corner.normal = kNone;
+    } else if (std::ranges::any_of(triangle, missing)) {
+      const glm::dvec3 a(positions[triangle[0].position]);
+      const glm::dvec3 flat = glm::cross(glm::dvec3(positions[triangle[1].position]) - a,
+                                         glm::dvec3(positions[triangle[2].position]) - a);
+      const auto index = static_cast<std::uint32_t>(soup.normals.size());
+      for (Corner& corner : triangle) {
+        if (missing(corner)) corner.normal = index;
+      }
+      soup.normals.emplace_back(flat / glm::length(flat));
+    }
+  }
+  if (!any) soup.normals.clear();
+}
+
+// Either all corners have texture coordinates afterwards or there are none.
+void complete_uvs(MeshSoup& soup, std::vector<Triangle>& triangles) {
+  for (glm::vec2& uv : soup.uvs) {
+    if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = glm::vec2(0);
+  }
+  const bool any = std::ranges::any_of(triangles, [](const Triangle& triangle) {
+    return std::ranges::any_of(triangle, [](const Corner& c) { return c.uv != kNone; });
+  });
+  if (!any) {
+    soup.uvs.clear();
+    return;
+  }
+  const auto zero = static_cast<std::uint32_t>(soup.uvs.size());
+  soup.uvs.emplace_back(0.0F, 0.0F);
+  for (Triangle& triangle : triangles) {
+    for (Corner& corner : triangle) {
+      if (corner.uv == kNone) corner.uv = zero;
+    }
+  }
+}
+
+// For each corner (three a triangle) the number of the first corner that equals it: by sorting, so
+// that the work does not depend on how many share a position.
+std::vector<std::uint32_t> first_equals(const std::vector<Triangle>& triangles) {
+  const auto corner = [&](std::uint32_t i) -> const Corner& { return triangles[i / 3][i % 3]; };
+  const auto key = [&](std::uint32_t i) {
+    const Corner& c = corner(i);
+    return std::tuple(c.position, c.normal, c.uv);
+  };
+  std::vector<std::uint32_t> order(triangles.size() * 3);
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
+    return std::tuple_cat(key(a), std::tuple(a)) < std::tuple_cat(key(b), std::tuple(b));
+  });
+  std::vector<std::uint32_t> first(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool same = i > 0 && key(order[i]) == key(order[i - 1]);
+    first[order[i]] = same ? first[order[i - 1]] : order[i];
+  }
+  return first;
+}
+
+// The same for meshes with one index for all attributes, without a sort.
+std::vector<std::uint32_t> first_equals_by_position(const std::vector<Triangle>& triangles,
+                                                    std::size_t positions) {
+  std::vector<std::uint32_t> first_of(positions, kNone);
+  std::vector<std::uint32_t> first(triangles.size() * 3);
+  for (std::uint32_t i = 0; i < first.size(); ++i) {
+    std::uint32_t& of = first_of[triangles[i / 3][i % 3].position];
+    if (of == kNone) of = i;
+    first[i] = of;
+  }
+  return first;
+}
+
+bool one_index(const std::vector<Triangle>& triangles) {
+  return std::ranges::all_of(triangles, [](const Triangle& triangle) {
+    return std::ranges::all_of(triangle, [](const Corner& c) {
+      return (c.normal == kNone || c.normal == c.position) && (c.uv == kNone || c.uv == c.position);
+    });
+  });
+}
+
+// One vertex for each different corner, numbered in the order of the triangles.
+void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles,
+                    const std::vector<glm::vec3>& positions, Mesh& mesh) {
+  const std::vector<std::uint32_t> first =
+      one_index(triangles) ? first_equals_by_position(triangles, positions.size())
+                           : first_equals(triangles);
+  std::vector<std::uint32_t> vertex_of(first.size());
+  mesh.triangles.resize(triangles.size());
+  for (std::uint32_t i = 0; i < first.size(); ++i) {
+    if (first[i] == i) {
+      const Corner& corner = triangles[i / 3][i % 3];
+      vertex_of[i] = static_cast<std::uint32_t>(mesh.positions.size());
+      mesh.positions.push_back(positions[corner.position]);
+      if (!soup.normals.empty()) mesh.normals.push_back(soup.normals[corner.normal]);
+      if (!soup.uvs.empty()) mesh.uvs.push_back(soup.uvs[corner.uv]);
+    }
+    mesh.triangles[i / 3][i % 3] = vertex_of[first[i]];
+  }
+}
+
+}  // namespace
+
+std::size_t MeshSoup::add_material(Material material, const std::filesystem::path& path) {
+  if (materials.size() == kMostMaterials) refuse(path, "more than 65,536 materials");
+  materials.push_back(std::move(material));
+  return materials.size() - 1;
+}
+
+void MeshSoup::add_polygon(std::span<const Corner> polygon, std::size_t material,
+                           const std::filesystem::path& path) {
+  if (polygon.size() > kMostCorners - corners.size()) refuse(path, "more than 2^28 corners");
+  corners.insert(corners.end(), polygon.begin(), polygon.end());
+  polygon_sizes.push_back(static_cast<std::uint32_t>(polygon.size()));
+  material_of.push_back(static_cast<std::uint16_t>(material));
+}
+
+void MeshSoup::drop_uvs() {
+  uvs.clear();
+  for (Corner& corner : corners) corner.uv = kNone;
+}
+
+Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path) {
+  check_corners(soup, path);
+  Mesh mesh;
+  mesh.origin = checked_origin(soup, path);
+  std::vector<glm::vec3> positions;
+  positions.reserve(soup.positions.size());
+  for (const glm::dvec3& position : soup.positions) positions.emplace_back(position - mesh.origin);
+  Soup made = make_triangles(soup, positions);
+  if (made.triangles.empty()) refuse(path, "no triangle");
+  complete_normals(soup, made.triangles, positions);
+  complete_uvs(soup, made.triangles);
+  share_vertices(soup, made.triangles, positions, mesh);
+  mesh.material_of = std::move(made.material_of);
+  mesh.materials = std::move(soup.materials);
+  if (mesh.materials.empty()) mesh.materials.emplace_back();
+  return mesh;
+}
+
+}  // namespace ptc

@@ -1,0 +1,93 @@
+// Inside the mesh readers: polygons as files have them, and the mesh that is made of them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "engine/io/mesh/mesh.h"
+
+namespace ptc {
+
+/// Polygons over positions, normals and texture coordinates that are indexed each on its own.
+/// Readers fill it; indices may run ahead of the vertices, build_mesh() checks them.
+struct MeshSoup {
+  static constexpr std::uint32_t kNone = 0xffffffff;
+  struct Corner {
+    std::uint32_t position = 0;
+    std::uint32_t normal = kNone;
+    std::uint32_t uv = kNone;
+  };
+
+  std::vector<glm::dvec3> positions;
+  std::vector<glm::vec3> normals;  ///< any length; zero and non-finite ones count as missing
+  std::vector<glm::vec2> uvs;
+  std::vector<Corner> corners;               ///< of all polygons, one after another
+  std::vector<std::uint32_t> polygon_sizes;  ///< corners of each
+  std::vector<std::uint16_t> material_of;    ///< per polygon
+  std::vector<Material> materials;           ///< empty: one of default values is used
+
+  /// @throws DataError when there are 65,536 already
+  std::size_t add_material(Material material, const std::filesystem::path& path);
+  /// @throws DataError when there are 2^28 corners already
+  void add_polygon(std::span<const Corner> polygon, std::size_t material,
+                   const std::filesystem::path& path);
+  /// For readers that gave every corner coordinates and then found that the file has none.
+  void drop_uvs();
+};
+
+/// @throws DataError when an index leads nowhere, a position is not finite or too far from the
+///         others, or no triangle is left
+[[nodiscard]] Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path);
+
+/// Splits a simple polygon into triangles of its corners' numbers, in its winding. Concave polygons
+/// are cut by ears; what no ear can be cut from (self-intersections) becomes a fan.
+void triangulate(std::span<const glm::dvec3> polygon,
+                 std::vector<std::array<std::uint32_t, 3>>& triangles);
+
+/// Takes normals through a transform: its inverse transpose, up to a positive factor.
+[[nodiscard]] glm::dmat3 normal_transform(const glm::dmat4& transform);
+[[nodiscard]] bool mirrors(const glm::dmat4& transform);
+
+/// Directions of any length. @return nothing when a value is not finite or has no direction
+[[nodiscard]] std::optional<MeshCamera> make_camera(const glm::dvec3& position,
+                                                    const glm::dvec3& forward, const glm::dvec3& up,
+                                                    double horizontal_fov);
+
+/// Loads each texture once; a failure becomes a warning and no texture.
+class TextureLoader {
+ public:
+  TextureLoader(std::filesystem::path directory, std::vector<std::string>& warnings)
+      : directory_(std::move(directory)), warnings_(warnings) {}
+
+  /// @param name  path relative to the directory, / or \ between its parts
+  [[nodiscard]] std::shared_ptr<const Image> load(const std::string& name);
+  /// A picture inside the file, known as `name` from now on.
+  [[nodiscard]] std::shared_ptr<const Image> decode(const std::string& name,
+                                                    std::span<const std::byte> bytes);
+
+ private:
+  std::filesystem::path directory_;
+  std::vector<std::string>& warnings_;
+  std::map<std::string, std::shared_ptr<const Image>> loaded_;
+};
+
+[[nodiscard]] MeshFile read_ply_mesh(const std::filesystem::path& path);
+[[nodiscard]] MeshFile read_off_mesh(const std::filesystem::path& path);
+[[nodiscard]] MeshFile read_obj_mesh(const std::filesystem::path& path);
+[[nodiscard]] MeshFile read_gltf_mesh(const std::filesystem::path& path);
+[[nodiscard]] MeshFile read_stl_mesh(const std::filesystem::path& path);
+
+}  // namespace ptc

@@ -1,0 +1,105 @@
+// Materials of OBJ files.
+#include "engine/io/mesh/mtl.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "engine/io/text/byte_stream.h"
+#include "engine/io/text/text.h"
+
+namespace ptc {
+namespace {
+
+class MtlReader {
+ public:
+  MtlReader(const std::filesystem::path& path, TextureLoader& textures,
+            std::map<std::string, Material>& materials, std::vector<std::string>& warnings)
+      : stream_(path), textures_(textures), materials_(materials), warnings_(warnings) {}
+
+  void read() {
+    std::string_view line;
+    while (stream_.next_line(line)) {
+      line = line.substr(0, line.find('#'));
+      Words words(line);
+      const std::string_view keyword = words.next();
+      if (keyword == "newmtl") {
+        begin(std::string(words.rest()));
+      } else if (current_ != nullptr) {
+        set(keyword, words);
+      }
+    }
+  }
+
+ private:
+  void begin(const std::string& name) {
+    const auto [at, is_new] = materials_.try_emplace(name);
+    current_ = is_new ? &at->second : nullptr;
+    if (is_new) current_->name = name;
+  }
+
+  void set(std::string_view keyword, Words& words) {
+    if (keyword == "Kd") {
+      read_colour(words, 1, current_->albedo);
+    } else if (keyword == "Ke") {
+      read_colour(words, std::numeric_limits<float>::max(), current_->emission);
+    } else if (keyword == "map_Kd") {
+      const std::string name = file_name(words);
+      if (!name.empty()) current_->texture = textures_.load(name);
+    } else if (keyword == "map_Ke") {
+      warnings_.push_back(stream_.path().string() + ": line " + std::to_string(stream_.line()) +
+                          ": map_Ke is left out");
+    }
+  }
+
+  // One number stands for all three; what is no number is a spectral curve or an xyz colour.
+  void read_colour(Words& words, float most, glm::vec3& colour) {
+    std::array<std::optional<double>, 3> values;
+    for (auto& value : values) value = parse_number(words.next());
+    if (!values[0]) {
+      warnings_.push_back(stream_.path().string() + ": line " + std::to_string(stream_.line()) +
+                          ": a colour other than r g b is left out");
+      return;
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double value = values[i].value_or(*values[0]);
+      const double limited = value > 0 ? std::min<double>(value, most) : 0;  // NaN becomes 0
+      colour[static_cast<int>(i)] = static_cast<float>(limited);
+    }
+  }
+
+  // What follows the options: -NAME and its values.
+  static std::string file_name(Words words) {
+    for (;;) {
+      Words ahead = words;
+      const std::string_view option = ahead.next();
+      if (option.size() < 2 || option[0] != '-') return std::string(words.rest());
+      int values = option == "-mm" ? 2 : 1;
+      if (option == "-o" || option == "-s" || option == "-t") values = 3;
+      for (int i = 0; i < values; ++i) {
+        Words after = ahead;
+        const std::string_view value = after.next();
+        // -o -s -t may have fewer than three numbers.
+        if (i > 0 && values == 3 && !parse_number(value)) break;
+        ahead = after;
+      }
+      words = ahead;
+    }
+  }
+
+  ByteStream stream_;
+  TextureLoader& textures_;
+  std::map<std::string, Material>& materials_;
+  std::vector<std::string>& warnings_;
+  Material* current_ = nullptr;
+};
+
+}  // namespace
+
+void read_mtl(const std::filesystem::path& path, TextureLoader& textures,
+              std::map<std::string, Material>& materials, std::vector<std::string>& warnings) {
+  MtlReader(path, textures, materials, warnings).read();
+}
+
+}  // namespace ptc

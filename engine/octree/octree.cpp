@@ -1,0 +1,243 @@
+#include "engine/octree/octree.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <type_traits>
+#include <utility>
+
+#include "engine/octree/page_order.h"
+
+namespace ptc {
+namespace {
+
+void save_child(const NodeChild& child, StateWriter& state) {
+  state.put(static_cast<std::uint8_t>(child.ref.interior));
+  state.put(child.ref.page);
+  state.put(child.ref.slot);
+  state.put(child.ref.first_point);
+  state.put(child.ref.point_count);
+  const NodeSummary& node = child.node;
+  for (const double value : node.mean) state.put(value);
+  for (const double value : {node.radius, node.area, node.thickness}) state.put(value);
+  for (const double value : node.facing) state.put(value);
+  for (const auto& flux : node.flux) state.put(flux);
+  for (const float value : node.cone_axis) state.put(value);
+  state.put(node.cone_cos);
+}
+
+NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t points) {
+  NodeChild child;
+  child.ref.interior = state.get<std::uint8_t>() != 0;
+  child.ref.page = state.get<std::uint32_t>();
+  child.ref.slot = state.get<std::uint16_t>();
+  child.ref.first_point = state.get_count(points);
+  child.ref.point_count = state.get<std::uint32_t>();
+  state.require(child.ref.interior ? child.ref.page < pages
+                                   : child.ref.point_count <= points - child.ref.first_point,
+                "a closed cell of the tree's state lies nowhere");
+  const auto load_number = [&](auto& value) {
+    value = state.get<std::remove_reference_t<decltype(value)>>();
+    state.require(std::isfinite(value), "a sum of the tree's state is not finite");
+  };
+  NodeSummary& node = child.node;
+  std::ranges::for_each(node.mean, load_number);
+  for (double* value : {&node.radius, &node.area, &node.thickness}) load_number(*value);
+  std::ranges::for_each(node.facing, load_number);
+  for (auto& flux : node.flux) std::ranges::for_each(flux, load_number);
+  std::ranges::for_each(node.cone_axis, load_number);
+  load_number(node.cone_cos);
+  return child;
+}
+
+}  // namespace
+
+OctreeBuilder::OctreeBuilder(GroupSink& sink, std::uint32_t leaf_points, double unit,
+                             const Executor& executor)
+    : sink_(sink),
+      executor_(executor),
+      leaf_points_(leaf_points),
+      piece_points_(std::max(leaf_points, kSubtreePoints)),
+      unit_(unit),
+      builders_(executor.threads(), SubtreeBuilder(leaf_points, unit)) {
+  assert(leaf_points >= 1 && leaf_points <= kMaxLeafPoints);
+}
+
+void OctreeBuilder::add(std::span<const PointRecord> points) {
+  window_.insert(window_.end(), points.begin(), points.end());
+  build(false);
+}
+
+/// Level of the smallest cell that holds the window's point `at`, whose rank is rank_, and a later
+/// one.
+int OctreeBuilder::common(std::size_t at, std::size_t other) const {
+  const int level = common_level(window_[at].key, window_[other].key);
+  return level < kLatticeBits ? level : level + common_rank_level(rank_, rank_ + (other - at));
+}
+
+/// The same of the point `at` and the one before.
+int OctreeBuilder::level_before(std::size_t at) const {
+  const int level = common_level(last_key_, window_[at].key);
+  return level < kLatticeBits ? level : level + common_rank_level(rank_ - 1, rank_);
+}
+
+OctreeBuilder::Piece& OctreeBuilder::new_piece() {
+  if (piece_count_ == pieces_.size()) pieces_.emplace_back();
+  return pieces_[piece_count_++];
+}
+
+/// Cuts the window's front into pieces: from each point on the largest cell that has no more than
+/// piece_points_ points and does not hold the point before. As a cell around it has more points
+/// than a leaf, it is a node.
+void OctreeBuilder::cut(bool last) {
+  piece_count_ = 0;
+  for (std::size_t at = 0; at < window_.size();) {
+    const std::size_t reach = window_.size() - at;
+    if (reach <= piece_points_ && !last) break;
+    const bool begins = window_first_ + at == 0;
+    rank_ = begins || window_[at].key != last_key_ ? 0 : last_rank_ + 1;
+    const int before = begins ? -1 : level_before(at);
+    const int level =
+        1 + (reach > piece_points_ ? std::max(before, common(at, at + piece_points_)) : before);
+    std::size_t inside = at;
+    for (std::size_t outside = at + std::min(reach, piece_points_); outside - inside > 1;) {
+      const std::size_t middle = inside + (outside - inside) / 2;
+      (common(at, middle) >= level ? inside : outside) = middle;
+    }
+    Piece& piece = new_piece();
+    piece.first = window_first_ + at;
+    piece.count = inside + 1 - at;
+    piece.rank = rank_;
+    piece.shared = before;
+    piece.before = last_key_;
+    last_key_ = window_[inside].key;
+    last_rank_ = rank_ + piece.count -
+                 1;  // of use only where this key goes on, and then the piece has no other
+    at = inside + 1;
+  }
+}
+
+void OctreeBuilder::build(bool last) {
+  cut(last);
+  executor_.for_each(piece_count_, [this](std::size_t i, unsigned thread) {
+    Piece& piece = pieces_[i];
+    piece.groups.clear();
+    const auto points = std::span(window_).subspan(
+        static_cast<std::size_t>(piece.first - window_first_), piece.count);
+    piece.top = builders_[thread].build(points, piece.first, piece.rank, piece.groups);
+  });
+  std::size_t done = 0;
+  for (Piece& piece : std::span(pieces_).first(piece_count_)) {
+    join(piece);
+    done += piece.count;
+  }
+  window_.erase(window_.begin(), window_.begin() + static_cast<std::ptrdiff_t>(done));
+  window_first_ += done;
+}
+
+/// Hands a piece's groups on, when the cells that end before it are closed.
+void OctreeBuilder::join(Piece& piece) {
+  if (piece.first > 0) {
+    while (!path_.empty() && path_.back().level > piece.shared) {
+      path_.back().children.push_back(current_);
+      current_ = close(piece.first);
+    }
+    if (path_.empty() || path_.back().level < piece.shared) {
+      path_.push_back({.cell = cell_of(piece.before, std::min(piece.shared, kLatticeBits)),
+                       .level = piece.shared});
+    }
+    path_.back().children.push_back(current_);
+  }
+  places_.clear();
+  const auto placed = [this](const ChildRef& ref) {
+    return ref.interior ? places_[ref.page] : ref;
+  };
+  for (const SubtreeGroups::Group& at : piece.groups.groups) {
+    const std::span<std::byte> group = std::span(piece.groups.bytes).subspan(at.begin, at.size);
+    const GroupView view(group.data());
+    for (int i = 0; i < view.size(); ++i) {
+      if (const ChildRef ref = view.child(i); ref.interior) set_reference(group, i, placed(ref));
+    }
+    places_.push_back(emit(group, at.end));
+  }
+  current_ = piece.top;
+  current_.ref = placed(current_.ref);
+  result_.points = piece.first + piece.count;
+}
+
+ChildRef OctreeBuilder::emit(std::span<std::byte> group, std::uint64_t end) {
+  const GroupView view(group.data());
+  result_.nodes += static_cast<unsigned>(view.size());
+  ++result_.groups;
+  result_.levels = std::max(result_.levels, view.level() + 1);
+  return sink_.add(view, end);
+}
+
+/// Closes the innermost open cell.
+NodeChild OctreeBuilder::close(std::uint64_t end) {
+  const NodeGroup group = std::move(path_.back());
+  path_.pop_back();
+  encoded_.clear();
+  append_group(group, encoded_);
+  return {emit(encoded_, end), summarise_children(group.children)};
+}
+
+void OctreeBuilder::save(StateWriter& state) const {
+  save_points(window_, state);
+  for (const std::uint64_t number :
+       {window_first_, last_key_.high, last_key_.low, last_rank_, result_.points, result_.nodes,
+        result_.groups, static_cast<std::uint64_t>(result_.levels)}) {
+    state.put(number);
+  }
+  save_child(current_, state);
+  state.put(std::uint64_t{path_.size()});
+  for (const NodeGroup& cell : path_) {
+    state.put(cell.cell.high);
+    state.put(cell.cell.low);
+    state.put(std::uint64_t{static_cast<unsigned>(cell.level)});
+    state.put(std::uint64_t{cell.children.size()});
+    for (const NodeChild& child : cell.children) save_child(child, state);
+  }
+}
+
+void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
+  window_ = load_points(state);
+  for (std::uint64_t* number : {&window_first_, &last_key_.high, &last_key_.low, &last_rank_,
+                                &result_.points, &result_.nodes, &result_.groups}) {
+    *number = state.get<std::uint64_t>();
+  }
+  result_.levels = static_cast<int>(state.get_count(kMaxLevel + 1));
+  state.require(
+      result_.points == window_first_ && (window_.empty() || last_key_ <= window_.front().key),
+      "the points of the tree's state do not follow each other");
+  current_ = load_child(state, pages, window_first_);
+  path_.resize(static_cast<std::size_t>(state.get_count(kMaxLevel + 1)));
+  int above = -1;
+  for (NodeGroup& cell : path_) {
+    cell.cell = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
+    cell.level = static_cast<int>(state.get_count(kMaxLevel));
+    state.require(cell.level > above,
+                  "the open cells of the tree's state do not lie in each other");
+    above = cell.level;
+    cell.children.resize(static_cast<std::size_t>(state.get_count(kMaxChildren - 1)));
+    for (NodeChild& child : cell.children) child = load_child(state, pages, window_first_);
+  }
+}
+
+OctreeBuilder::Result OctreeBuilder::finish() {
+  build(true);
+  if (result_.points == 0) return result_;
+  while (!path_.empty()) {
+    path_.back().children.push_back(current_);
+    current_ = close(result_.points);
+  }
+  if (!current_.ref.interior) {  // all points in one leaf: a root group with one child
+    path_.push_back({.level = 0, .children = {current_}});
+    current_ = close(result_.points);
+  }
+  result_.root = current_.ref;
+  result_.total = current_.node;
+  return result_;
+}
+
+}  // namespace ptc

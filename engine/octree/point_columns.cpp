@@ -1,0 +1,203 @@
+// Loops over points (point_columns.h).
+#include "engine/octree/point_columns.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "engine/octree/summary.h"
+#include "format/morton.h"
+#include "format/scalar.h"
+
+// This file is compiled once per instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/octree/point_columns.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace ptc::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<double, PointColumns::kMostLanes>;
+using V = hn::VFromD<D>;
+
+/// A whole number below 2^52: its bits as the fraction of 2^52 + v.
+inline double to_double(std::uint64_t v) {
+  return std::bit_cast<double>(v | 0x4330000000000000) - 0x1p52;
+}
+
+/// Columns of `count` points from `first` on; what of each is read together lies together for a
+/// while.
+void decode_points(const PointRecord* points, std::size_t count, double unit, double* columns,
+                   std::size_t stride) {
+  constexpr std::size_t kBlock = kPositionBlock;
+  constexpr double kGreatest =
+      1e150;  // spec/nodes.md#node-number: what is stored ends at 3e38 anyway
+  PositionBlock positions;
+  std::array<float, kBlock> radius;
+  std::array<std::int16_t, kBlock> u, v;
+  std::array<std::array<std::uint16_t, kBlock>, 3> radiance;
+  for (std::size_t first = 0; first < count; first += kBlock) {
+    const std::size_t n = std::min(kBlock, count - first);
+    for (std::size_t i = 0; i < n; ++i) {
+      const PointRecord& point = points[first + i];
+      radius[i] = point.radius;
+      u[i] = point.normal[0];
+      v[i] = point.normal[1];
+      for (std::size_t c = 0; c < 3; ++c) radiance[c][i] = point.radiance[c];
+    }
+    const auto out = [&](PointColumns::Column k) { return columns + k * stride + first; };
+    decode_positions({points + first, n}, positions);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < n; ++i)
+        columns[axis * stride + first + i] = to_double(positions[axis][i]);
+    }
+    double* const lattice_radius = out(PointColumns::kDiscRadius);
+    double* const area = out(PointColumns::kDiscArea);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double r = radius[i];
+      const double scaled = r / unit;
+      lattice_radius[i] = scaled < kGreatest ? scaled : kGreatest;
+      area[i] = 2.0 * r * r;
+    }
+    double* const x = out(PointColumns::kNormalX);
+    double* const y = out(PointColumns::kNormalY);
+    double* const z = out(PointColumns::kNormalZ);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::array<float, 3> normal = decode_octahedral(u[i], v[i]);
+      x[i] = normal[0];
+      y[i] = normal[1];
+      z[i] = normal[2];
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      double* const to = columns + (PointColumns::kRed + c) * stride + first;
+      for (std::size_t i = 0; i < n; ++i) to[i] = decode_half(radiance[c][i]);
+    }
+  }
+}
+
+/// What columns have of some points; beyond `end` anything.
+class Lanes {
+ public:
+  Lanes(const PointColumns& points, std::size_t first, std::size_t end)
+      : points_(points), first_(first), mask_(hn::FirstN(D(), end - first)) {}
+  [[nodiscard]] HWY_INLINE V operator[](PointColumns::Column k) const {
+    return hn::LoadU(D(), points_.column(k) + first_);
+  }
+  /// `value` where there is a point.
+  [[nodiscard]] HWY_INLINE V only(V value, V otherwise) const {
+    return hn::IfThenElse(mask_, value, otherwise);
+  }
+
+ private:
+  const PointColumns& points_;
+  std::size_t first_;
+  hn::Mask<D> mask_;
+};
+
+HWY_INLINE V dot(const V (&a)[3], const V (&b)[3]) {
+  return hn::Add(hn::Add(hn::Mul(a[0], b[0]), hn::Mul(a[1], b[1])), hn::Mul(a[2], b[2]));
+}
+
+/// Sphere, cone and slab about the mean and along the axis of the sums.
+void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeSummary& node) {
+  const D d;
+  const std::array<double, 3> slab_axis = slab_normal(node);
+  const bool has_axis = set_cone_axis(node, slab_axis);
+  const auto splat = [&](const auto& from, V(&to)[3]) {
+    for (std::size_t k = 0; k < 3; ++k) to[k] = hn::Set(d, static_cast<double>(from[k]));
+  };
+  V mean[3], slab[3], axis[3];
+  splat(node.mean, mean);
+  splat(slab_axis, slab);
+  splat(node.cone_axis, axis);
+  const V axis_squared = dot(axis, axis), zero = hn::Zero(d), one = hn::Set(d, 1.0);
+  V radius = zero, thickness = zero, cosine = one;
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    const Lanes point(points, i, end);
+    const V away[3] = {hn::Sub(point[PointColumns::kX], mean[0]),
+                       hn::Sub(point[PointColumns::kY], mean[1]),
+                       hn::Sub(point[PointColumns::kZ], mean[2])};
+    const V wide = point[PointColumns::kDiscRadius];
+    radius = hn::Max(radius, point.only(hn::Add(hn::Sqrt(dot(away, away)), wide), zero));
+    if (!has_axis) continue;
+    const V n[3] = {point[PointColumns::kNormalX], point[PointColumns::kNormalY],
+                    point[PointColumns::kNormalZ]};
+    const V squared = dot(n, n);
+    const V to_axis = hn::Div(dot(axis, n), hn::Sqrt(hn::Mul(axis_squared, squared)));
+    cosine = hn::Min(cosine, point.only(to_axis, one));
+    const V cross[3] = {hn::Sub(hn::Mul(slab[1], n[2]), hn::Mul(slab[2], n[1])),
+                        hn::Sub(hn::Mul(slab[2], n[0]), hn::Mul(slab[0], n[2])),
+                        hn::Sub(hn::Mul(slab[0], n[1]), hn::Mul(slab[1], n[0]))};
+    const V reach = hn::Div(hn::Mul(wide, hn::Sqrt(dot(cross, cross))), hn::Sqrt(squared));
+    thickness = hn::Max(thickness, point.only(hn::Add(hn::Abs(dot(slab, away)), reach), zero));
+  }
+  node.radius = hn::GetLane(hn::MaxOfLanes(d, radius));
+  set_bounds(node, has_axis, hn::GetLane(hn::MinOfLanes(d, cosine)),
+             hn::GetLane(hn::MaxOfLanes(d, thickness)));
+}
+
+NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t end) {
+  NodeSummary node;
+  const auto value = [&](PointColumns::Column k, std::size_t i) { return points.column(k)[i]; };
+  // Sums of offsets keep the lattice unit, sums of coordinates up to 2^42 lose it.
+  const std::array<double, 3> origin{value(PointColumns::kX, begin), value(PointColumns::kY, begin),
+                                     value(PointColumns::kZ, begin)};
+  double weight = 0;
+  bool has_area = false;
+  for (std::size_t i = begin; i < end; ++i) has_area |= value(PointColumns::kDiscArea, i) > 0;
+  std::array<std::array<double, 4>, 6> towards{};  // an axis: facing, flux
+  for (std::size_t i = begin; i < end; ++i) {
+    const double area = value(PointColumns::kDiscArea, i);
+    const double w = has_area ? area : 1.0;  // points without extent still have a middle
+    node.mean[0] += w * (value(PointColumns::kX, i) - origin[0]);
+    node.mean[1] += w * (value(PointColumns::kY, i) - origin[1]);
+    node.mean[2] += w * (value(PointColumns::kZ, i) - origin[2]);
+    weight += w;
+    node.area += area;
+    const std::array<double, 3> normal{value(PointColumns::kNormalX, i),
+                                       value(PointColumns::kNormalY, i),
+                                       value(PointColumns::kNormalZ, i)};
+    const std::array<double, 4> light{1, value(PointColumns::kRed, i),
+                                      value(PointColumns::kGreen, i),
+                                      value(PointColumns::kBlue, i)};
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double towards_axis = k % 2 == 0 ? normal[k / 2] : -normal[k / 2];
+      const double facing = area * (towards_axis > 0 ? towards_axis : 0.0);
+      for (std::size_t c = 0; c < 4; ++c) towards[k][c] += facing * light[c];
+    }
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    node.facing[k] = towards[k][0];
+    node.flux[k] = {towards[k][1], towards[k][2], towards[k][3]};
+  }
+  for (std::size_t k = 0; k < 3; ++k) node.mean[k] = origin[k] + node.mean[k] / weight;
+  bound(points, begin, end, node);
+  return node;
+}
+
+}  // namespace
+}  // namespace ptc::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ptc {
+
+HWY_EXPORT(decode_points);
+HWY_EXPORT(summarise);
+
+void PointColumns::assign(std::span<const PointRecord> points, double unit) {
+  stride_ = points.size() + kMostLanes;
+  values_.resize(kColumns * stride_);
+  HWY_DYNAMIC_DISPATCH(decode_points)(points.data(), points.size(), unit, values_.data(), stride_);
+}
+
+NodeSummary summarise_points(const PointColumns& points, std::size_t begin, std::size_t end) {
+  return HWY_DYNAMIC_DISPATCH(summarise)(points, begin, end);
+}
+
+}  // namespace ptc
+#endif

@@ -1,0 +1,104 @@
+#include "engine/octree/rounding.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+namespace ptc {
+namespace {
+
+/// To 8 bits behind the leading one.
+float rounded_radius(float radius) noexcept {
+  const std::uint32_t bits = (std::bit_cast<std::uint32_t>(radius + 0.0F) + 0x4000) & ~0x7fffU;
+  return std::bit_cast<float>(std::min(bits, 0x7f7f8000U));  // the greatest that is finite
+}
+
+/// To a multiple of 32; the ends of the range, which the axes lie on, stay.
+std::int16_t rounded_normal(std::int16_t component) noexcept {
+  const int size = std::min((std::abs(int{component}) + 16) / 32 * 32, 32767);
+  return static_cast<std::int16_t>(component < 0 ? -size : size);
+}
+
+/// A half to 7 bits behind the leading one.
+std::uint16_t rounded_radiance(std::uint16_t half) noexcept {
+  if (half == 0x8000) return 0;  // -0
+  return static_cast<std::uint16_t>(std::min((half + 4) & ~7, 0x7bf8));
+}
+
+class RoundedStream : public PointStream {
+ public:
+  RoundedStream(PointStream& sorted, double unit, const Executor& executor, const MortonKey& before)
+      : sorted_(sorted), unit_(unit), executor_(executor), last_(before) {}
+
+  std::size_t next(std::span<PointRecord> out) override {
+    const std::size_t count = sorted_.next(out);
+    exact_.resize(count);
+    executor_.for_ranges(count, kGrain, [&](std::size_t begin, std::size_t end) {
+      MortonKey before;  // as if nothing were
+      for (std::size_t i = begin; i < end; ++i) {
+        exact_[i] = out[i].key;
+        round(out[i], before);
+        before = out[i].key;
+      }
+    });
+    // Where pieces meet, what is before may move a point, and that one the next.
+    for (std::size_t begin = 0; begin < count; begin += kGrain) {
+      for (std::size_t i = begin; i < count; ++i) {
+        const MortonKey key =
+            rounded_key(exact_[i], out[i].radius, i == 0 ? last_ : out[i - 1].key);
+        if (key == out[i].key) break;
+        out[i].key = key;
+      }
+    }
+    if (count > 0) last_ = out[count - 1].key;
+    return count;
+  }
+
+ private:
+  static constexpr std::size_t kGrain = 2048;
+
+  void round(PointRecord& point, const MortonKey& before) const noexcept {
+    point.radius = rounded_radius(point.radius);
+    for (std::int16_t& component : point.normal) component = rounded_normal(component);
+    for (std::uint16_t& half : point.radiance) half = rounded_radiance(half);
+    point.key = rounded_key(point.key, point.radius, before);
+  }
+
+  /// The low corner of the largest cell around the point whose diagonal the radius allows. A
+  /// coarser cell than that of the point before may start in front of it: then a smaller one is
+  /// taken, at the end the point itself.
+  [[nodiscard]] MortonKey rounded_key(const MortonKey& key, float radius,
+                                      const MortonKey& before) const noexcept {
+    const double edge = static_cast<double>(radius) / unit_ * (kRoundedPosition / std::sqrt(3.0));
+    const int exponent = static_cast<int>(std::bit_cast<std::uint64_t>(edge) >> 52) - 1023;
+    int level = edge >= 1 ? std::max(kLatticeBits - exponent, 0) : kLatticeBits;
+    while (cell_of(key, level) < before) ++level;
+    return cell_of(key, level);
+  }
+
+  PointStream& sorted_;
+  double unit_;
+  const Executor& executor_;
+  std::vector<MortonKey> exact_;  ///< of the points being rounded
+  MortonKey last_;                ///< of the points handed out
+};
+
+}  // namespace
+
+Codec codec_of(Profile profile) noexcept {
+  if (profile == Profile::raw) return Codec::raw;
+  return profile == Profile::fast ? Codec::lz4 : Codec::zstd;
+}
+
+bool is_rounded(Profile profile) noexcept {
+  return profile == Profile::fast || profile == Profile::compact;
+}
+
+std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit,
+                                          const Executor& executor, const MortonKey& before) {
+  return std::make_unique<RoundedStream>(sorted, unit, executor, before);
+}
+
+}  // namespace ptc

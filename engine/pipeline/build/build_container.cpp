@@ -1,0 +1,302 @@
+// Scene to container (engine/pipeline/pipeline.h).
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <stdexcept>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/octree/container_points.h"
+#include "engine/octree/merge.h"
+#include "engine/octree/radius.h"
+#include "engine/pipeline/build/append.h"
+#include "engine/pipeline/build/build_inputs.h"
+#include "engine/pipeline/build/resume.h"
+#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/stages.h"
+#include "engine/sort/spill.h"
+#include "engine/store/reader.h"
+#include "engine/store/writer.h"
+#include "format/error.h"
+#include "format/point_page.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kCheckpointBytes = 8
+                                           << 20;  // of a checkpoint on its way, beside open pages
+constexpr std::uint64_t kOpenPages = 48;           // in it and in its copies
+
+std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Frame& frame) {
+  std::vector<MortonKey> keys;
+  keys.reserve(places.size());
+  for (const glm::dvec3& p : places) keys.push_back(encode_morton(frame.to_lattice(to_array(p))));
+  return keys;
+}
+
+Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double spacing) {
+  Meta meta;
+  std::string names;
+  for (const auto& input : request.inputs) {
+    if (!names.empty()) names += ' ';
+    names += input.filename().string();
+  }
+  if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
+  meta.text[kInputsKey] = names;
+  meta.text[kLightsKey] = to_json(inputs.lights);
+  if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
+  if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
+  if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
+  if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
+  return meta;
+}
+
+/// Equal points, settings and record give an equal file, so its name in the world is made of them.
+/// @param scene  that they are added to, or zeros
+Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildRequest& request,
+                  const Meta& meta, const Uuid& scene) {
+  std::string text = fmt::format(
+      "{:x} {:x} {} {} {} {} {} {} {} {}", sorter.digest()[0], sorter.digest()[1], frame.origin[0],
+      frame.origin[1], frame.origin[2], frame.edge, request.tree.leaf_points,
+      request.tree.levels_per_stream, request.page_shift, static_cast<int>(request.profile));
+  for (const auto& [key, value] : meta.text)
+    text.append("\n").append(key).append("=").append(value);
+  if (scene != Uuid{})
+    text.append("\n").append(reinterpret_cast<const char*>(scene.data()), scene.size());
+  return uuid_of(std::as_bytes(std::span(text)));
+}
+
+/// All points on their way through the sort, and what the container is made with.
+struct SortedPoints {
+  std::unique_ptr<ExternalSorter> sorter;
+  BuildPlan plan;
+};
+
+/// One build, from the request to the published container.
+class Build {
+ public:
+  Build(const BuildRequest& request, const std::filesystem::path& target, Progress& progress)
+      : request_(request), target_(target), progress_(progress), executor_(request.run.threads) {}
+
+  BuildReport run() {
+    if (!request_.append.empty()) open_scene();
+    if (request_.resume) resumption_ = std::make_unique<Resumption>(request_, target_);
+    if (resumption_ && resumption_->plan() && was_published()) return std::move(report_);
+    const bool goes_on = resumption_ && resumption_->plan();
+    SortedPoints points = goes_on ? SortedPoints{} : sort();
+    try {
+      if (goes_on) points = take_up();
+      build(points);
+    } catch (const DataError& error) {  // what was kept is not what it was
+      if (resumption_) resumption_->refuse(error);
+      throw;
+    }
+    report_.sort = points.sorter->statistics();
+    if (resumption_) resumption_->remove();
+    return std::move(report_);
+  }
+
+ private:
+  /// The scene that is added to.
+  void open_scene() {
+    std::error_code absent;
+    if (request_.resume && std::filesystem::equivalent(request_.append, target_, absent)) {
+      throw std::invalid_argument("what can be resumed is appended to another file than " +
+                                  target_.string());
+    }
+    if (request_.city_points > 0)
+      throw std::invalid_argument("the city cannot be appended to a scene");
+    scene_ = std::make_unique<ContainerReader>(request_.append);
+    check_extensible(*scene_);
+    if (scene_->meta().text.contains(kLightsKey)) request_.lights = recorded_lights(*scene_);
+  }
+
+  [[nodiscard]] std::uint64_t scene_points() const {
+    return scene_ ? scene_->superblock().points : 0;
+  }
+
+  [[nodiscard]] Frame frame_of(const Bounds& bounds) const {
+    if (bounds.empty()) return scene_->header().frame;
+    const std::array<double, 3> low = to_array(bounds.low), high = to_array(bounds.high);
+    return scene_points() > 0 ? grow_frame(scene_->header().frame, low, high)
+                              : frame_around(low, high);
+  }
+
+  /// Of points and nodes, whose pages are some 4 to each 10 of points where the scene is a city.
+  [[nodiscard]] std::uint64_t pages_of(std::uint64_t points) const {
+    return points / points_per_page({.page_shift = request_.page_shift}) * 3 / 2;
+  }
+
+  /// What the cap leaves for the sort, and, when that is done, for the directory.
+  [[nodiscard]] SortOptions sort_options(std::uint64_t taken, std::uint64_t expected) const {
+    const std::uint64_t pages = pages_of(expected + scene_points());
+    taken +=
+        kBufferBytes + ContainerWriter::writing_bytes(request_.page_shift, executor_.threads());
+    if (scene_) taken += ContainerReader::kMostPageBytes * scene_->page_count();
+    if (resumption_) taken += kCheckpointBytes + (kOpenPages << request_.page_shift);
+    const std::uint64_t least = std::max(kLeastSort, ContainerWriter::finish_bytes(pages));
+    SortOptions options{
+        .memory_bytes = memory_left(request_.run, taken, least, "this scene's build"),
+        .temp_dirs = temp_dirs(request_.run, target_),
+        .expected = expected};
+    if (resumption_) options.kept_files = resumption_->spills();
+    return options;
+  }
+
+  SortedPoints sort() {
+    BuildInputs inputs = read_inputs(request_, report_.seconds, progress_);
+    if (inputs.bounds.empty() && !scene_)
+      throw DataError("the input has no points and no triangles");
+    SortedPoints points{
+        .plan = {.frame = frame_of(inputs.bounds), .estimate_radii = inputs.clouds.estimate_radii}};
+    const Frame& frame = points.plan.frame;
+    std::uint64_t taken = request_.mesh ? mesh_bytes(*request_.mesh, nullptr) : 0;
+    if (const LitMesh* lit = inputs.lit.get()) {
+      taken +=
+          mesh_bytes(lit->mesh, &lit->rays) +
+          sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count, executor_.threads());
+    }
+    const std::uint64_t known = request_.city_points + inputs.clouds.points;
+    // A given spacing does not say how many points it makes of a mesh.
+    const bool by_spacing = inputs.lit && request_.sampling.spacing > 0;
+    const std::uint64_t expected =
+        by_spacing ? 0 : known + (inputs.lit ? request_.sampling.count : 0);
+    const SortOptions options = sort_options(taken, expected);
+    points.sorter =
+        std::make_unique<ExternalSorter>(options, executor_, keys_of(inputs.sample, frame));
+    tell_space(expected, points.sorter->expected_spill(), options.temp_dirs);
+    double spacing = 0;
+    {
+      const Stage stage(report_.seconds, progress_, inputs.lit ? "sample and light" : "partition",
+                        known, "points");
+      spacing = feed_inputs(inputs, request_, frame, *points.sorter, executor_, progress_);
+    }
+    points.plan.meta = make_meta(request_, inputs, spacing);
+    if (scene_) points.plan.meta = extended_meta(scene_->meta(), points.plan.meta);
+    points.plan.uuid = content_uuid(*points.sorter, frame, request_, points.plan.meta,
+                                    scene_ ? scene_->header().uuid : Uuid{});
+    if (resumption_) resumption_->keep(points.plan, *points.sorter);
+    return points;
+  }
+
+  void tell_space(std::uint64_t expected, std::uint64_t spilled,
+                  std::span<const std::filesystem::path> temps) {
+    report_.space =
+        require_build_space(expected + scene_points(), spilled, request_.profile, temps, target_);
+    if (spilled > 0) progress_.note(space_text(report_.space, temps, target_));
+  }
+
+  /// The points of an earlier build.
+  SortedPoints take_up() {
+    SortedPoints points{.plan = *resumption_->plan()};
+    StateReader state = resumption_->sorter_state();
+    std::uint64_t spilled = 0;
+    for (const auto& file : resumption_->spills()) spilled += std::filesystem::file_size(file);
+    points.sorter = std::make_unique<ExternalSorter>(sort_options(0, spilled / kSpilledBytes),
+                                                     executor_, state);
+    state.end();
+    if (const auto& checkpoint = resumption_->checkpoint())
+      report_.resumed_points = checkpoint->place.points;
+    progress_.note(fmt::format("going on with {} of {} points in {}", report_.resumed_points,
+                               scene_points() + points.sorter->statistics().points,
+                               resumption_->partial().string()));
+    return points;
+  }
+
+  /// True when an earlier build was killed between the container's publication and the removal of
+  /// what it had kept.
+  bool was_published() {
+    if (std::filesystem::file_size(resumption_->partial()) > 0 || !std::filesystem::exists(target_))
+      return false;
+    try {
+      const ContainerReader published(target_);
+      report_.superblock = published.superblock();
+      if (published.header().uuid != resumption_->plan()->uuid ||
+          report_.superblock.writer != writer_name())
+        return false;
+    } catch (const FormatError&) {
+      return false;  // what was there before
+    }
+    report_.resumed_points = report_.superblock.points;
+    resumption_->remove();
+    return true;
+  }
+
+  void build(SortedPoints& points) {
+    const BuildPlan& plan = points.plan;
+    const std::uint64_t all = scene_points() + points.sorter->statistics().points;
+    const Stage stage(report_.seconds, progress_, "sort and build", all, "points");
+    WriterOptions options{.page_shift = request_.page_shift,
+                          .codec = codec_of(request_.profile),
+                          .uuid = plan.uuid,
+                          .frame = plan.frame};
+    if (resumption_) options.partial = resumption_->partial();
+    const Checkpoint* const from =
+        resumption_ && resumption_->checkpoint() ? &*resumption_->checkpoint() : nullptr;
+    ContainerWriter writer =
+        from ? ContainerWriter(target_, options, from->writer) : ContainerWriter(target_, options);
+    const BuildPlace place = from ? from->place : BuildPlace{};
+    progress_.advance(place.points);
+
+    // Of an extended scene a build goes on where it ended by merging once more what was merged.
+    const std::uint64_t first = scene_ ? 0 : place.points;
+    const auto needed = scene_                ? first_of_all
+                        : plan.estimate_radii ? first_for_radii
+                                              : first_for_itself;
+    const std::unique_ptr<PointStream> sorted = points.sorter->finish(needed(first));
+    std::unique_ptr<PointStream> with_radii, old, moved, merged, rounded;
+    PointStream* stream = sorted.get();
+    if (plan.estimate_radii)
+      stream = (with_radii = estimate_radii(*stream, plan.frame.unit(), first)).get();
+    if (scene_) {
+      old = std::make_unique<ContainerPoints>(*scene_);
+      moved = move_points(
+          *old, LatticeMove(scene_points() > 0 ? scene_->header().frame : plan.frame, plan.frame));
+      stream = (merged = merge_points(*moved, *stream)).get();
+      pass_over(*stream, place.points);
+    }
+    if (is_rounded(request_.profile)) {
+      stream =
+          (rounded = round_points(*stream, plan.frame.unit(), executor_, place.last_key)).get();
+    }
+    report_.superblock =
+        writer.finish(plan.meta, build_from(*stream, writer, *points.sorter, needed));
+  }
+
+  Superblock build_from(PointStream& points, ContainerWriter& writer, ExternalSorter& sorter,
+                        std::uint64_t (*needed)(std::uint64_t)) {
+    if (!resumption_) return build_pages(points, writer, request_.tree, executor_, progress_);
+    CheckpointSaver saver(*resumption_, writer, sorter, needed);
+    Checkpoints checkpoints{.interval = request_.checkpoint_points,
+                            .save = [&](const BuildPlace& at, std::vector<std::byte> state) {
+                              saver.save(at, std::move(state));
+                            }};
+    if (!resumption_->checkpoint())
+      return build_pages(points, writer, request_.tree, executor_, progress_, checkpoints);
+    StateReader state = resumption_->build_state();
+    checkpoints.from = &state;
+    return build_pages(points, writer, request_.tree, executor_, progress_, checkpoints);
+  }
+
+  static std::uint64_t first_for_itself(std::uint64_t point) { return point; }
+  static std::uint64_t first_of_all(std::uint64_t /*point*/) { return 0; }
+
+  BuildRequest request_;
+  const std::filesystem::path& target_;
+  Progress& progress_;
+  const Executor executor_;
+  BuildReport report_;
+  std::unique_ptr<ContainerReader> scene_;  ///< that the points are added to; null: none
+  std::unique_ptr<Resumption> resumption_;
+};
+
+}  // namespace
+
+BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
+                            Progress& progress) {
+  return Build(request, target, progress).run();
+}
+
+}  // namespace ptc

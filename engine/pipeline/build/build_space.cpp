@@ -1,0 +1,64 @@
+#include "engine/pipeline/build/build_space.h"
+
+#include <cerrno>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "engine/io/file/disk_space.h"
+#include "engine/pipeline/stages.h"
+
+namespace ptc {
+namespace {
+
+/// Bytes that a point takes in the file.
+struct PointBytes {
+  double least;  ///< less than in any scene that was measured, without nodes
+  double usual;  ///< in the city, with its share of nodes
+};
+
+PointBytes point_bytes(Profile profile) noexcept {
+  switch (profile) {
+    case Profile::raw:
+      return {34, 46};
+    case Profile::exact:
+      return {10, 18};
+    case Profile::fast:
+      return {6, 17};
+    case Profile::compact:
+      return {5, 13};
+  }
+  return {};
+}
+
+}  // namespace
+
+BuildSpace require_build_space(std::uint64_t points, std::uint64_t temp_bytes, Profile profile,
+                               std::span<const std::filesystem::path> temp_dirs,
+                               const std::filesystem::path& target) {
+  if (points == 0) return {};
+  const PointBytes bytes = point_bytes(profile);
+  const std::filesystem::path directory = directory_of(target);
+  const auto all = [points](double each) {
+    return static_cast<std::uint64_t>(each * static_cast<double>(points));
+  };
+  const BuildSpace space{temp_bytes, free_bytes(temp_dirs), all(bytes.usual),
+                         free_bytes({&directory, 1})};
+  if (all(bytes.least) > space.output_free_bytes) {
+    throw std::system_error(ENOSPC, std::generic_category(),
+                            fmt::format("some {} points take about {} in {}, with {} free", points,
+                                        giga_text(space.output_bytes), directory.string(),
+                                        giga_text(space.output_free_bytes)));
+  }
+  return space;
+}
+
+std::string space_text(const BuildSpace& space, std::span<const std::filesystem::path> temp_dirs,
+                       const std::filesystem::path& target) {
+  return fmt::format("{} of temporary files in {}, {} free; about {} for {}, {} free",
+                     giga_text(space.temp_bytes), names_text(temp_dirs),
+                     giga_text(space.temp_free_bytes), giga_text(space.output_bytes),
+                     target.string(), giga_text(space.output_free_bytes));
+}
+
+}  // namespace ptc

@@ -1,0 +1,72 @@
+// A stage for a mesh: ground below it, a red wall beside it.
+#include <algorithm>
+#include <utility>
+
+#include "engine/io/cloud/points.h"
+#include "engine/pipeline/pipeline.h"
+
+namespace ptc {
+namespace {
+
+/// Appends a box as 12 triangles, front sides outwards, relative to the mesh's origin.
+void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Material& material) {
+  Mesh box;
+  box.origin = low;
+  box.materials.push_back(material);
+  const glm::vec3 size(high - low);
+  for (int corner = 0; corner < 8; ++corner) {
+    box.positions.emplace_back(corner & 1 ? size.x : 0, corner & 2 ? size.y : 0,
+                               corner & 4 ? size.z : 0);
+  }
+  constexpr std::uint32_t kQuads[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                          {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  for (const auto& q : kQuads) {
+    box.triangles.push_back({q[0], q[1], q[2]});
+    box.triangles.push_back({q[0], q[2], q[3]});
+    box.material_of.insert(box.material_of.end(), 2, 0);
+  }
+  append_mesh(mesh, box, glm::dmat4(1));
+}
+
+void add_backdrop(Mesh& mesh) {
+  const Bounds bounds = mesh.bounds();
+  const glm::dvec3 extent = bounds.high - bounds.low;
+  const double size = std::max({extent.x, extent.y, extent.z});
+  const glm::dvec3 middle = (bounds.low + bounds.high) * 0.5;
+  const double floor = bounds.low.y;
+  const double wall = bounds.low.x - 0.15 * size;
+  add_box(mesh, {middle.x - 1.6 * size, floor - 0.04 * size, middle.z - 1.6 * size},
+          {middle.x + 1.6 * size, floor, middle.z + 1.6 * size},
+          {.name = "ground", .albedo = glm::vec3(0.6F)});
+  add_box(mesh, {wall - 0.05 * size, floor, middle.z - 0.8 * size},
+          {wall, floor + 0.9 * size, middle.z + 0.8 * size},
+          {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)});
+}
+
+}  // namespace
+
+Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
+                 std::vector<MeshCamera>* cameras) {
+  Mesh mesh;
+  const auto join = [&mesh]<class M>(M&& other) {
+    if (mesh.triangles.empty()) {
+      mesh = std::forward<M>(other);
+    } else {
+      append_mesh(mesh, other, glm::dmat4(1));
+    }
+  };
+  for (const std::filesystem::path& input : inputs) {
+    if (is_point_file(input)) continue;
+    MeshFile file = read_mesh(input);
+    if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
+    join(std::move(file.mesh));
+  }
+  if (also) {
+    check_mesh(*also);
+    join(*also);
+  }
+  if (backdrop && !mesh.triangles.empty()) add_backdrop(mesh);
+  return mesh;
+}
+
+}  // namespace ptc

@@ -1,0 +1,234 @@
+#include "engine/pipeline/build/resume.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/io/file/disk_space.h"
+#include "engine/pipeline/stages.h"
+#include "format/checksum.h"
+
+namespace ptc {
+namespace {
+
+/// A line for each thing that the bytes of the container follow from.
+std::string text_of(const BuildRequest& request) {
+  std::string text;
+  const auto line = [&](const char* name, const auto& value) {
+    text += fmt::format("{}: {}\n", name, value);
+  };
+  line("the program", writer_name());
+  const auto file = [&](const char* name, const std::filesystem::path& path) {
+    const auto changed = std::filesystem::last_write_time(path).time_since_epoch().count();
+    const std::string whole = std::filesystem::absolute(path).string();
+    line(name,
+         fmt::format("{}, {} bytes, changed {}", whole, std::filesystem::file_size(path), changed));
+  };
+  for (const std::filesystem::path& input : request.inputs) file("an input", input);
+  if (!request.append.empty()) file("--append", request.append);
+  const SamplingOptions& sampling = request.sampling;
+  line("--city", request.city_points);
+  line("--backdrop", request.backdrop);
+  line("the lights", request.lights ? to_json(*request.lights) : "of the scene");
+  line("--points", sampling.count);
+  line("--spacing", sampling.spacing);
+  line("the camera", sampling.camera ? to_json(*sampling.camera) : "none");
+  line("--pixels-per-surfel", sampling.pixels_per_surfel);
+  line("--finest", sampling.finest);
+  const LightSampling& rays = sampling.lights;
+  line("the rays to lights", fmt::format("{} {} {}", rays.sun_rays, rays.area_rays, rays.sky_rays));
+  line("--leaf", request.tree.leaf_points);
+  line("--levels-per-stream", request.tree.levels_per_stream);
+  line("--page-size", 1U << request.page_shift);
+  line("--profile", static_cast<int>(request.profile));
+  return text;
+}
+
+/// The first line of `now` that is another in `before`, up to its colon.
+std::string difference(const std::string& before, const std::string& now) {
+  std::istringstream old_lines(before), new_lines(now);
+  std::string old_line, new_line;
+  while (std::getline(new_lines, new_line)) {
+    if (!std::getline(old_lines, old_line) || old_line != new_line) break;
+  }
+  return fmt::format("'{}', not '{}'", old_line, new_line);
+}
+
+std::filesystem::path with_ending(const std::filesystem::path& path, const char* ending) {
+  return path.parent_path() / (path.filename().string() + ending);
+}
+
+void remove_file(const std::filesystem::path& path) noexcept {
+  ::unlink(path.c_str());
+}
+
+void put_plan(const BuildPlan& plan, StateWriter& state) {
+  state.put(plan.frame.origin);
+  state.put(plan.frame.edge);
+  state.put_bytes(plan.uuid);
+  state.put_bytes(encode_meta(plan.meta));
+  state.put(static_cast<std::uint8_t>(plan.estimate_radii));
+}
+
+BuildPlan get_plan(StateReader& state) {
+  BuildPlan plan;
+  plan.frame.origin = state.get<std::array<double, 3>>();
+  plan.frame.edge = state.get<double>();
+  const std::span<const std::byte> uuid = state.get_bytes();
+  state.require(uuid.size() == plan.uuid.size(), "a container's name of another length");
+  std::ranges::copy(uuid, plan.uuid.begin());
+  plan.meta = decode_meta(state.get_bytes());
+  plan.estimate_radii = state.get<std::uint8_t>() != 0;
+  return plan;
+}
+
+}  // namespace
+
+Resumption::Resumption(const BuildRequest& request, const std::filesystem::path& target)
+    : manifest_(with_ending(target, ".resume")),
+      pages_(with_ending(target, ".resume-pages")),
+      at_(with_ending(target, ".resume-at")),
+      request_(text_of(request)) {
+  if (request.mesh) throw std::invalid_argument("a build from a mesh in memory cannot be resumed");
+  const std::string whole = std::filesystem::absolute(target).lexically_normal().string();
+  const std::uint64_t name = xxh3_64(
+      std::as_bytes(std::span(whole)));  // two outputs may share a directory for temporary files
+  for (const std::filesystem::path& directory : temp_dirs(request.run, target)) {
+    spills_.push_back(directory / fmt::format("{}.resume-spill-{:016x}-{}",
+                                              target.filename().string(), name, spills_.size()));
+  }
+  lock_ = std::make_unique<FileLock>(pages_);
+  try {
+    if (std::filesystem::exists(manifest_)) load_manifest();
+    if (plan_ && std::filesystem::exists(at_)) load_checkpoint();
+  } catch (const DataError& error) {
+    if (std::filesystem::file_size(pages_) == 0) remove_file(pages_);  // perhaps the lock's own
+    refuse(error);
+  }
+  if (!plan_) begin();
+}
+
+void Resumption::refuse(const DataError& error) const {
+  std::vector<std::filesystem::path> files{manifest_, at_, pages_};
+  files.insert(files.end(), spills_.begin(), spills_.end());
+  throw DataError(fmt::format("{}; to start anew, remove {}", error.what(), names_text(files)));
+}
+
+void Resumption::load_manifest() {
+  const std::vector<std::byte> bytes = read_state(manifest_);
+  StateReader state(bytes, manifest_.string());
+  const std::string request = state.get_text();
+  if (request != request_) {
+    throw DataError(fmt::format("{}: it is of another build: {}", manifest_.string(),
+                                difference(request, request_)));
+  }
+  std::vector<std::filesystem::path> spills;
+  for (std::uint64_t count = state.get_count(1 << 10); count > 0; --count)
+    spills.emplace_back(state.get_text());
+  const std::span<const std::byte> sorted = state.get_bytes();
+  state.end();
+  if (sorted.empty()) {  // killed in the sort
+    std::ranges::for_each(spills, remove_file);
+    return;
+  }
+  spills_ = std::move(spills);
+  StateReader rest(sorted, manifest_.string());
+  plan_ = get_plan(rest);
+  const std::span<const std::byte> sorter = rest.get_bytes();
+  rest.end();
+  sorter_.assign(sorter.begin(), sorter.end());
+  id_ = xxh3_64(sorted);
+}
+
+void Resumption::load_checkpoint() {
+  const std::vector<std::byte> bytes = read_state(at_);
+  StateReader state(bytes, at_.string());
+  if (state.get<std::uint64_t>() != id_) return;  // of an earlier build: this one had none yet
+  Checkpoint& checkpoint = checkpoint_.emplace();
+  checkpoint.place.points = state.get<std::uint64_t>();
+  checkpoint.place.last_key = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
+  checkpoint.writer = {state.get<std::uint32_t>(), state.get<std::uint64_t>()};
+  const std::span<const std::byte> build = state.get_bytes();
+  checkpoint.build.assign(build.begin(), build.end());
+  state.end();
+}
+
+void Resumption::begin() {
+  remove_file(at_);
+  for (const auto& path : {manifest_, pages_, at_, state_temporary(manifest_)}) {
+    unsorted_.push_back(std::make_unique<TemporaryName>(path));
+  }
+  for (const auto& path : spills_) unsorted_.push_back(std::make_unique<TemporaryName>(path));
+  write_manifest({});
+}
+
+void Resumption::write_manifest(const std::vector<std::byte>& sorted) const {
+  StateWriter state;
+  state.put_text(request_);
+  state.put(std::uint64_t{spills_.size()});
+  for (const std::filesystem::path& spill : spills_)
+    state.put_text(std::filesystem::absolute(spill).string());
+  state.put_bytes(sorted);
+  write_state(manifest_, state.take());
+}
+
+void Resumption::keep(const BuildPlan& plan, ExternalSorter& sorter) {
+  StateWriter sorted, state;
+  put_plan(plan, sorted);
+  sorter.keep(state);
+  sorted.put_bytes(state.take());
+  const std::vector<std::byte> bytes = sorted.take();
+  write_manifest(bytes);
+  id_ = xxh3_64(bytes);
+  for (const auto& name : unsorted_) name->release();
+}
+
+void Resumption::save(const Checkpoint& checkpoint) const {
+  StateWriter state;
+  state.put(id_);
+  state.put(checkpoint.place.points);
+  state.put(checkpoint.place.last_key.high);
+  state.put(checkpoint.place.last_key.low);
+  state.put(checkpoint.writer.pages);
+  state.put(checkpoint.writer.end);
+  state.put_bytes(checkpoint.build);
+  write_state(at_, state.take());
+}
+
+// The manifest last: what is left of a removal that was cut short is known by it.
+void Resumption::remove() noexcept {
+  std::ranges::for_each(spills_, remove_file);
+  remove_file(state_temporary(at_));
+  remove_file(state_temporary(manifest_));
+  remove_file(at_);
+  remove_file(pages_);
+  remove_file(manifest_);
+}
+
+CheckpointSaver::CheckpointSaver(const Resumption& resumption, ContainerWriter& writer,
+                                 ExternalSorter& sorter,
+                                 std::uint64_t (*first_needed)(std::uint64_t))
+    : resumption_(resumption), writer_(writer), sorter_(sorter), first_needed_(first_needed) {}
+
+CheckpointSaver::~CheckpointSaver() {
+  if (saving_.valid()) saving_.wait();
+}
+
+void CheckpointSaver::save(const BuildPlace& place, std::vector<std::byte> build) {
+  if (saving_.valid()) saving_.get();
+  Checkpoint checkpoint{place, writer_.state(), std::move(build)};
+  saving_ = std::async(std::launch::async, [this, checkpoint = std::move(checkpoint)] {
+    writer_.sync();
+    resumption_.save(checkpoint);
+    sorter_.discard_before(first_needed_(checkpoint.place.points));
+  });
+}
+
+}  // namespace ptc

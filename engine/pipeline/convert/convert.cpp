@@ -1,0 +1,311 @@
+// Containers to clouds and to other containers (engine/pipeline/convert/convert.h).
+#include "engine/pipeline/convert/convert.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <iterator>
+#include <numeric>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "engine/io/cloud/points.h"
+#include "engine/io/cloud/record.h"
+#include "engine/io/file/file.h"
+#include "engine/octree/build_pages.h"
+#include "engine/octree/channel_pager.h"
+#include "engine/octree/container_points.h"
+#include "engine/pipeline/stages.h"
+#include "engine/store/writer.h"
+#include "format/point_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kTextBytes = std::size_t{1} << 20;
+
+std::vector<std::uint16_t> groups_of(const ContainerReader& container) {
+  std::set<std::uint16_t> groups;
+  for (const Channel& channel : container.meta().channels) groups.insert(channel.group);
+  return {groups.begin(), groups.end()};
+}
+
+float load_value(ChannelType type, const std::byte* at) {
+  const auto load = [at]<class T>(T value) {
+    std::memcpy(&value, at, sizeof value);
+    return value;
+  };
+  switch (type) {
+    case ChannelType::u8:
+      return static_cast<float>(load(std::uint8_t{}));
+    case ChannelType::u16:
+      return static_cast<float>(load(std::uint16_t{}));
+    case ChannelType::half:
+      return decode_half(load(std::uint16_t{}));
+    case ChannelType::f32:
+      return load(float{});
+  }
+  return 0;
+}
+
+/// Fills the place of `channels`, all of one group, in rows of `stride` floats: one row a point.
+/// @param payload  of an attribute page: one column of `count` values for each component
+void spread_columns(std::span<const Channel> channels, const std::byte* payload, std::size_t count,
+                    float* rows, std::size_t stride) {
+  for (const Channel& channel : channels) {
+    const std::size_t width = channel_bytes(channel.type);
+    for (std::size_t c = 0; c < channel.components; ++c, ++rows) {
+      for (std::size_t i = 0; i < count; ++i, payload += width) {
+        rows[i * stride] = load_value(channel.type, payload);
+      }
+    }
+  }
+}
+
+/// Point pages one after another with the values of all channels.
+class PageCursor {
+ public:
+  explicit PageCursor(const ContainerReader& container)
+      : container_(container), payload_(container.page_payload_limit()) {
+    for (const Channel& channel : container.meta().channels) floats_ += channel.components;
+  }
+
+  /// Reads the next page; false at the end.
+  bool next() {
+    if (page_ == container_.point_pages().size()) return false;
+    const std::uint32_t count = read(container_.point_pages()[page_]);
+    const PointPage points(payload_.data(), count);
+    surfels.clear();
+    for (std::uint32_t i = 0; i < count; ++i) {
+      surfels.push_back(to_surfel(points[i], container_.header().frame));
+    }
+    read_channels(count);
+    ++page_;
+    return true;
+  }
+
+  std::vector<Surfel> surfels;
+  std::vector<float> values;  ///< of all channels, point by point
+
+ private:
+  std::uint32_t read(std::uint32_t page) {
+    return container_.read_page(page, payload_, decoder_).record_count;
+  }
+
+  void read_channels(std::uint32_t count) {
+    values.resize(count * floats_);
+    std::span<const Channel> rest = container_.meta().channels;
+    float* place = values.data();
+    while (!rest.empty()) {  // channels are by group
+      const std::uint16_t group = rest.front().group;
+      const auto last =
+          std::ranges::find_if(rest, [&](const Channel& c) { return c.group != group; });
+      const auto channels = rest.first(static_cast<std::size_t>(last - rest.begin()));
+      read(container_.attribute_pages(group)[page_]);
+      spread_columns(channels, payload_.data(), count, place, floats_);
+      for (const Channel& channel : channels) place += channel.components;
+      rest = rest.subspan(channels.size());
+    }
+  }
+
+  const ContainerReader& container_;
+  PageDecoder decoder_;
+  std::vector<std::byte> payload_;
+  std::size_t floats_ = 0;  ///< a point
+  std::size_t page_ = 0;
+};
+
+/// A channel as PLY columns: dots become '_', as do ends of names that PlyWriter uses itself.
+std::vector<PointColumn> columns_of(const Meta& meta) {
+  static const std::set<std::string> kTaken{"x",      "y",   "z",     "nx",   "ny",      "nz",
+                                            "radius", "red", "green", "blue", "radiance"};
+  std::set<std::string> seen = kTaken;
+  std::vector<PointColumn> columns;
+  for (const Channel& channel : meta.channels) {
+    PointColumn column{.name = channel.name, .components = channel.components};
+    std::ranges::replace(column.name, '.', '_');
+    while (!seen.insert(column.name).second) column.name += '_';
+    column.vector = column.name.find("normal") != std::string::npos;
+    columns.push_back(column);
+  }
+  return columns;
+}
+
+/// Numbers as text that reads back to the same bits.
+void append_line(std::string& text, const Surfel& s) {
+  fmt::format_to(std::back_inserter(text), "{} {} {} {} {} {} {} {} {} {}\n", s.position.x,
+                 s.position.y, s.position.z, s.normal.x, s.normal.y, s.normal.z, s.radius,
+                 s.radiance.r, s.radiance.g, s.radiance.b);
+}
+
+/// A name of its own for the copy: pages of the original must not pass for its pages.
+Uuid derived_uuid(const ContainerReader& container, Profile profile, std::uint8_t page_shift) {
+  std::array<std::byte, sizeof(Uuid) + 2> text;
+  std::ranges::copy(container.header().uuid, text.begin());
+  text[sizeof(Uuid)] = static_cast<std::byte>(profile);
+  text[sizeof(Uuid) + 1] = static_cast<std::byte>(page_shift);
+  return uuid_of(text);
+}
+
+/// All pages but the meta page under their numbers, in the order in which they lie in the file.
+void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progress& progress) {
+  std::vector<std::uint32_t> order(container.page_count());
+  std::iota(order.begin(), order.end(), 0U);
+  std::erase(order, container.superblock().meta_page);
+  for (std::size_t i = 0; i < order.size(); ++i) static_cast<void>(writer.reserve_page());
+  std::ranges::sort(order, {}, [&](std::uint32_t page) { return container.entry(page).offset; });
+  PageDecoder decoder;
+  std::vector<std::byte> payload(container.page_payload_limit());
+  for (const std::uint32_t page : order) {
+    const PageHeader header = container.read_page(page, payload, decoder);
+    writer.write_page(page, ContainerWriter::facts_of(header),
+                      std::span(payload).first(header.raw_bytes),
+                      container.attribute_columns(header.group));
+    if (header.type == PageType::point) progress.advance(header.record_count);
+  }
+}
+
+void repage_channels(const ContainerReader& container, ContainerWriter& writer) {
+  const std::uint32_t full = points_per_page(writer.header());
+  for (const std::uint16_t group : groups_of(container)) {
+    PageDecoder decoder;
+    auto pages = container.attribute_pages(group);
+    const auto next_page = [&](std::span<std::byte> payload) {
+      const std::uint32_t page = pages.front();
+      pages = pages.subspan(1);
+      return container.read_page(page, payload, decoder).record_count;
+    };
+    ChannelPager pager(container.attribute_columns(group), container.page_payload_limit(),
+                       next_page);
+    for (std::uint64_t left = container.superblock().points; left > 0;) {
+      const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
+      writer.write_page(writer.reserve_page(),
+                        {.type = PageType::attribute, .group = group, .record_count = count},
+                        pager.next(count), container.attribute_columns(group));
+      left -= count;
+    }
+  }
+}
+
+Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round,
+                         const Executor& executor, Progress& progress) {
+  const Superblock& from = container.superblock();
+  ContainerPoints points(container);
+  const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
+  const std::unique_ptr<PointStream> rounded =
+      round ? round_points(points, container.header().frame.unit(), executor) : nullptr;
+  const Superblock superblock =
+      build_pages(rounded ? *rounded : points, writer, tree, executor, progress);
+  repage_channels(container, writer);
+  return superblock;
+}
+
+void write_ply(const ContainerReader& container, const std::filesystem::path& target,
+               Progress& progress) {
+  PlyWriter writer(target, container.superblock().points, columns_of(container.meta()));
+  PageCursor cursor(container);
+  while (cursor.next()) {
+    writer.write(cursor.surfels, cursor.values);
+    progress.advance(cursor.surfels.size());
+  }
+  writer.finish();
+}
+
+void write_xyz(const ContainerReader& container, const std::filesystem::path& target,
+               Progress& progress) {
+  OutputFile file(target);
+  std::string text = "# x y z nx ny nz radius radiance_r radiance_g radiance_b\n";
+  ContainerPoints points(container);
+  std::vector<PointRecord> block(4096);
+  while (const std::size_t count = points.next(block)) {
+    for (std::size_t i = 0; i < count; ++i) {
+      append_line(text, to_surfel(block[i], container.header().frame));
+    }
+    progress.advance(count);
+    if (text.size() < kTextBytes) continue;
+    file.append(std::as_bytes(std::span(text)));
+    text.clear();
+  }
+  file.append(std::as_bytes(std::span(text)));
+  file.publish();
+}
+
+Superblock write_container(const ContainerReader& container, const std::filesystem::path& target,
+                           const RecodeOptions& options, Progress& progress) {
+  const FileHeader& from = container.header();
+  const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
+  const Executor executor(options.run.threads);
+  const std::uint64_t pages =
+      (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) +
+      container.page_count();
+  const std::uint64_t taken =
+      open_bytes(container) + ContainerWriter::memory_bytes(pages, page_shift, executor.threads());
+  static_cast<void>(memory_left(options.run, kBufferBytes + taken, 0, "this conversion"));
+  ContainerWriter writer(target, {.page_shift = page_shift,
+                                  .codec = codec_of(options.profile),
+                                  .uuid = derived_uuid(container, options.profile, page_shift),
+                                  .frame = from.frame});
+  Meta meta = container.meta();
+  const bool round =
+      is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
+  // finish() numbers the meta page last: where it was not, the others cannot keep their numbers.
+  const bool same_pages = page_shift == from.page_shift && !round &&
+                          container.superblock().meta_page == container.page_count() - 1;
+  Superblock superblock = container.superblock();
+  if (same_pages) {
+    copy_pages(container, writer, progress);
+  } else {
+    superblock = rebuild_pages(container, writer, round, executor, progress);
+  }
+  superblock.writer.clear();
+  return writer.finish(meta, superblock);
+}
+
+}  // namespace
+
+bool is_container(const std::filesystem::path& path) {
+  if (path.extension() == ".ptcx") return true;
+  static const Block example = encode_file_header({});
+  std::array<std::byte, 8> magic{};
+  const InputFile file(path);
+  if (file.size() < magic.size()) return false;
+  file.read_at(0, magic);
+  return std::equal(magic.begin(), magic.end(), example.begin());
+}
+
+ConvertReport container_to_ply(const ContainerReader& container,
+                               const std::filesystem::path& target, Progress& progress) {
+  ConvertReport report{.points = container.superblock().points};
+  {
+    const Stage stage(report.seconds, progress, "convert", report.points, "points");
+    write_ply(container, target, progress);
+  }
+  return report;
+}
+
+ConvertReport container_to_xyz(const ContainerReader& container,
+                               const std::filesystem::path& target, Progress& progress) {
+  ConvertReport report{.points = container.superblock().points};
+  {
+    const Stage stage(report.seconds, progress, "convert", report.points, "points");
+    write_xyz(container, target, progress);
+  }
+  return report;
+}
+
+ConvertReport recode_container(const ContainerReader& container,
+                               const std::filesystem::path& target, const RecodeOptions& options,
+                               Progress& progress) {
+  ConvertReport report{.points = container.superblock().points};
+  {
+    const Stage stage(report.seconds, progress, "convert", report.points, "points");
+    report.superblock = write_container(container, target, options, progress);
+  }
+  return report;
+}
+
+}  // namespace ptc

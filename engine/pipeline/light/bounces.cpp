@@ -1,0 +1,131 @@
+#include "engine/pipeline/light/bounces.h"
+
+#include <algorithm>
+#include <numbers>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "engine/base/memory.h"
+#include "engine/io/cloud/record.h"
+#include "engine/octree/container_points.h"
+#include "engine/pipeline/stages.h"
+#include "engine/store/writer.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kBatch = 16 * Shader::kBlock;  // points in memory at once
+
+/// Coarser settings for the bounces before the last: a receiver sees many points, over which their
+/// errors average out.
+GatherOptions coarser(const GatherOptions& gather) {
+  GatherOptions coarse = gather;
+  coarse.solid_angle *= 3;
+  coarse.parallax *= 2;
+  coarse.resolution = std::max(16U, gather.resolution / 32 * 16);
+  return coarse;
+}
+
+/// The points of a scene as first lit, with what a shader finds added to their radiance.
+class BouncedPoints : public PointStream {
+ public:
+  BouncedPoints(const ContainerReader& first, Shader& shader, float lift, Progress& progress)
+      : frame_(first.header().frame),
+        points_(first),
+        shader_(shader),
+        lift_(lift),
+        progress_(progress),
+        records_(kBatch),
+        receivers_(kBatch),
+        results_(kBatch) {}
+
+  std::size_t next(std::span<PointRecord> out) override {
+    if (at_ == count_) shade_batch();
+    const std::size_t count = std::min(out.size(), count_ - at_);
+    std::copy_n(records_.begin() + static_cast<std::ptrdiff_t>(at_), count, out.begin());
+    at_ += count;
+    return count;
+  }
+
+  [[nodiscard]] double cpu_seconds() const { return cpu_; }
+
+ private:
+  void shade_batch() {
+    at_ = 0;
+    count_ = points_.next(records_);
+    for (std::size_t i = 0; i < count_; ++i)
+      receivers_[i] = lifted(to_surfel(records_[i], frame_), lift_);
+    const double before = ptc::cpu_seconds();
+    shader_.shade(std::span(receivers_).first(count_), std::span(results_).first(count_),
+                  progress_);
+    cpu_ += ptc::cpu_seconds() - before;
+    for (std::size_t i = 0; i < count_; ++i) {
+      PointRecord& record = records_[i];
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float reflects =
+            static_cast<float>(record.albedo[c]) * (std::numbers::inv_pi_v<float> / 255);
+        const float bounced =
+            reflects * std::max(0.0F, results_[i].irradiance[static_cast<int>(c)]);
+        record.radiance[c] = encode_half(decode_half(record.radiance[c]) + bounced);
+      }
+    }
+  }
+
+  Frame frame_;
+  ContainerPoints points_;
+  Shader& shader_;
+  float lift_;
+  Progress& progress_;
+  std::vector<PointRecord> records_;
+  std::vector<Receiver> receivers_;
+  std::vector<Shading> results_;
+  std::size_t count_ = 0, at_ = 0;  // of the batch
+  double cpu_ = 0;
+};
+
+}  // namespace
+
+std::uint64_t bounce_bytes(const ContainerReader& scene, unsigned bounces,
+                           unsigned threads) noexcept {
+  if (bounces < 2) return 0;
+  return open_bytes(scene) +
+         ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads);
+}
+
+std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
+                                              const BounceOptions& options,
+                                              const Executor& executor, ShadeReport& report,
+                                              Progress& progress) {
+  if (options.bounces > 1 && lit_by_emitters(scene)) {
+    throw std::invalid_argument(
+        "more than one bounce would count the light of the scene's emissive triangles twice: "
+        "build the container with --area-rays 0");
+  }
+  ShadeOptions shade = options.shade;
+  shade.sky = {};
+  shade.gather = coarser(shade.gather);
+  shade.variants = 1;
+  const Superblock& from = scene.superblock();
+  std::unique_ptr<ContainerReader> lit;
+  for (unsigned bounce = 1; bounce < options.bounces; ++bounce) {
+    const Stage stage(report.seconds, progress, fmt::format("bounce {}", bounce), from.points,
+                      "points");
+    const auto write = [&](const std::filesystem::path& path) {
+      Shader shader(lit ? *lit : scene, shade, executor);
+      BouncedPoints points(scene, shader, options.lift, progress);
+      ContainerWriter writer(
+          path, {.page_shift = scene.header().page_shift, .frame = scene.header().frame});
+      Progress silent;
+      const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
+      writer.finish({}, build_pages(points, writer, tree, executor, silent));
+      report.bounce_cpu_seconds += points.cpu_seconds();
+    };
+    lit = make_temporary(options.temp_dir, write);
+  }
+  return lit;
+}
+
+}  // namespace ptc

@@ -1,0 +1,79 @@
+#include "engine/pipeline/quality/check.h"
+
+#include "engine/base/memory.h"
+#include "engine/pipeline/quality/error_sums.h"
+#include "engine/pipeline/quality/estimate.h"
+#include "engine/pipeline/stages.h"
+#include "engine/scene/mesh_reference.h"
+#include "engine/shade/reference/streamed_rays.h"
+
+namespace ptc {
+namespace {
+
+/// @param traced  two of each, side by side
+CheckError errors(std::span<const Shading> ours, std::span<const Shading> traced) {
+  ErrorSums sums;
+  for (std::size_t i = 0; i < ours.size(); ++i) sums.add(ours[i], traced[2 * i], traced[2 * i + 1]);
+  return sums.error();
+}
+
+/// Calls body() and returns the CPU microseconds of one of `count`.
+template <class Body>
+double timed(std::size_t count, const Body& body) {
+  const double before = cpu_seconds();
+  body();
+  return (cpu_seconds() - before) * 1e6 / static_cast<double>(count);
+}
+
+}  // namespace
+
+void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shading> results,
+                      std::span<const ErrorEstimate> estimates) {
+  if (request_.receivers == 0) return;
+  for (std::size_t i = 0; i < receivers.size(); ++i) {
+    const bool filling = receivers_.size() < request_.receivers;
+    const std::uint64_t slot = filling ? receivers_.size() : bits_() % (seen_ + 1);
+    ++seen_;
+    if (slot >= request_.receivers || apart_.contains(receivers[i])) continue;
+    if (filling) {
+      receivers_.emplace_back();
+      results_.emplace_back();
+      if (!estimates.empty()) estimates_.emplace_back();
+    }
+    receivers_[slot] = receivers[i];
+    results_[slot] = results[i];
+    if (!estimates.empty()) estimates_[slot] = estimates[i];
+  }
+}
+
+CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const Sky& sky,
+                                 const DirectLight* light, const RayScene* mesh,
+                                 const LightPaths& paths, std::uint64_t memory_bytes,
+                                 const Executor& executor, Progress& progress) const {
+  CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
+  if (receivers_.empty()) return report;
+  const std::vector<Receiver> twice = two_of_each(receivers_);
+  const unsigned half = (request_.rays + 1) / 2;
+  std::vector<Shading> traced(twice.size());
+  {
+    StreamedRays discs(scene, sides, sky_function(sky), memory_bytes);
+    report.disc_microseconds =
+        timed(receivers_.size(), [&] { discs.trace(twice, half, 0, traced, executor, progress); });
+  }
+  if (paths.bounces == 0) leave_out_bleeding(traced);
+  report.discs = errors(results_, traced);
+  if (!estimates_.empty()) report.estimate = check_estimates(estimates_, results_, traced);
+  if (!light || !mesh) return report;
+  report.mesh_microseconds = timed(receivers_.size(), [&] {
+    executor.for_each(twice.size(), [&](std::size_t i, unsigned) {
+      const RayTraced seen =
+          trace_mesh(*mesh, *light, twice[i].position, twice[i].normal, half, paths, i);
+      traced[i] = {.occlusion = seen.occlusion, .irradiance = seen.irradiance, .sky = seen.sky};
+      progress.advance(1);
+    });
+  });
+  report.mesh = errors(results_, traced);
+  return report;
+}
+
+}  // namespace ptc

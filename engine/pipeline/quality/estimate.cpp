@@ -1,0 +1,269 @@
+#include "engine/pipeline/quality/estimate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "engine/base/memory.h"
+#include "engine/pipeline/quality/error_sums.h"
+#include "engine/shade/reference/streamed_rays.h"
+
+namespace ptc {
+namespace {
+
+/// One quantity of a shading, as up to three numbers whose squares are averaged.
+struct Quantity {
+  std::size_t components = 1;
+  std::array<double, 3> values{};
+};
+
+Quantity occlusion_of(const Shading& s) {
+  return {1, {static_cast<double>(s.occlusion)}};
+}
+Quantity irradiance_of(const Shading& s) {
+  const glm::dvec3 v(s.irradiance);
+  return {3, {v.r, v.g, v.b}};
+}
+
+/// Mean over components of (ours - a) (ours - b).
+double product(const Quantity& ours, const Quantity& a, const Quantity& b) {
+  double sum = 0;
+  for (std::size_t c = 0; c < ours.components; ++c)
+    sum += (ours.values[c] - a.values[c]) * (ours.values[c] - b.values[c]);
+  return sum / static_cast<double>(ours.components);
+}
+
+double squared_difference(const Quantity& a, const Quantity& b) {
+  return product(a, b, b);
+}
+
+/// Ranks from 0; equal values have the mean of theirs.
+std::vector<double> ranks_of(std::span<const double> values) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::sort(order, {}, [&](std::size_t i) { return values[i]; });
+  std::vector<double> ranks(values.size());
+  for (std::size_t i = 0; i < order.size();) {
+    std::size_t end = i;
+    while (end < order.size() && values[order[end]] == values[order[i]]) ++end;
+    for (std::size_t k = i; k < end; ++k) ranks[order[k]] = static_cast<double>(i + end - 1) / 2;
+    i = end;
+  }
+  return ranks;
+}
+
+double correlation(std::span<const double> a, std::span<const double> b) {
+  const auto n = static_cast<double>(a.size());
+  const double mean_a = std::accumulate(a.begin(), a.end(), 0.0) / n,
+               mean_b = std::accumulate(b.begin(), b.end(), 0.0) / n;
+  double ab = 0, aa = 0, bb = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ab += (a[i] - mean_a) * (b[i] - mean_b);
+    aa += (a[i] - mean_a) * (a[i] - mean_a);
+    bb += (b[i] - mean_b) * (b[i] - mean_b);
+  }
+  return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
+}
+
+/// A receiver that was checked.
+struct Checked {
+  double estimate = 0;
+  double error = 0;   ///< absolute, against the mean of both halves of its rays
+  double square = 0;  ///< of the error, without bias
+};
+
+/// RMS error of some of them.
+double rms_of(std::span<const Checked> checked) {
+  double sum = 0;
+  for (const Checked& c : checked) sum += c.square;
+  return std::sqrt(std::max(0.0, sum) /
+                   static_cast<double>(std::max<std::size_t>(1, checked.size())));
+}
+
+EstimateWorth worth_of(std::vector<Checked> checked) {
+  EstimateWorth worth;
+  const double all = rms_of(checked);
+  if (!(all > 0)) return worth;
+  std::vector<double> estimates, errors;
+  double squares = 0;
+  std::size_t within = 0;
+  for (const Checked& c : checked) {
+    estimates.push_back(c.estimate);
+    errors.push_back(c.error);
+    squares += c.estimate * c.estimate;
+    if (c.error <= 2 * c.estimate) ++within;
+  }
+  const auto count = static_cast<double>(checked.size());
+  worth.rank = correlation(ranks_of(estimates), ranks_of(errors));
+  worth.rms = std::sqrt(squares / count) / all;
+  worth.within_twice = static_cast<double>(within) / count;
+  std::ranges::stable_sort(checked, {}, &Checked::estimate);
+  const std::span<const Checked> sorted(checked);
+  const std::size_t tenth = (sorted.size() + 9) / 10, third = (sorted.size() + 2) / 3;
+  worth.top_tenth = rms_of(sorted.last(tenth)) / all;
+  worth.bottom_tenth = rms_of(sorted.first(tenth)) / all;
+  worth.top_third = rms_of(sorted.last(third)) / all;
+  worth.bottom_third = rms_of(sorted.first(third)) / all;
+  return worth;
+}
+
+template <class QuantityOf>
+EstimateWorth worth_of(std::span<const ErrorEstimate> estimates, float ErrorEstimate::*which,
+                       std::span<const Shading> ours, std::span<const Shading> traced,
+                       const QuantityOf& quantity_of) {
+  std::vector<Checked> checked;
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    const Quantity a = quantity_of(traced[2 * i]), b = quantity_of(traced[2 * i + 1]),
+                   us = quantity_of(ours[i]);
+    Quantity mean = a;
+    for (std::size_t c = 0; c < mean.components; ++c)
+      mean.values[c] = (a.values[c] + b.values[c]) / 2;
+    checked.push_back({.estimate = static_cast<double>(estimates[i].*which),
+                       .error = std::sqrt(squared_difference(us, mean)),
+                       .square = product(us, a, b)});
+  }
+  return worth_of(std::move(checked));
+}
+
+template <class QuantityOf>
+ErrorLine line_of(std::span<const Shading> shaded, std::span<const Shading> other,
+                  std::span<const Shading> traced, const QuantityOf& quantity_of) {
+  std::vector<ErrorSample> samples;
+  for (std::size_t i = 0; i < shaded.size(); ++i) {
+    const Quantity ours = quantity_of(shaded[i]);
+    samples.push_back({.squared_difference = squared_difference(ours, quantity_of(other[i])),
+                       .squared_error = product(ours, quantity_of(traced[2 * i]),
+                                                quantity_of(traced[2 * i + 1]))});
+  }
+  return fit_errors(samples);
+}
+
+std::vector<Receiver> compared_of(std::span<const Pilot> pilots) {
+  std::vector<Receiver> receivers;
+  for (const Pilot& pilot : pilots) {
+    for (std::size_t k = 0; k < pilot.compared(); ++k)
+      receivers.push_back(pilot.receivers[pilot.compared_at(k)]);
+  }
+  return receivers;
+}
+
+}  // namespace
+
+ErrorLine fit_errors(std::span<const ErrorSample> samples) {
+  const auto n = static_cast<double>(samples.size());
+  double d = 0, e = 0, dd = 0, de = 0;
+  for (const ErrorSample& s : samples) {
+    d += s.squared_difference;
+    e += s.squared_error;
+    dd += s.squared_difference * s.squared_difference;
+    de += s.squared_difference * s.squared_error;
+  }
+  if (!(e > 0)) return {};
+  const ErrorLine flat{.constant = e / n};
+  if (!(dd > 0)) return flat;
+  const double determinant = n * dd - d * d;
+  ErrorLine line;
+  if (determinant > 1e-12 * n * dd) {
+    line.slope = (n * de - d * e) / determinant;
+    line.constant = (e - line.slope * d) / n;
+  }
+  if (!(line.slope > 0)) return flat;
+  if (line.constant < 0) line = {.constant = 0, .slope = e / d};
+  return line;
+}
+
+void check_estimate_request(bool estimate, const std::optional<double>& error,
+                            const CheckRequest& check) {
+  if (!estimate || error || check.receivers > 0) return;
+  throw std::invalid_argument("--estimate needs rays to go by: give --error or --check, too");
+}
+
+std::vector<Shading> trace_pilots(const ContainerReader& scene, const ShadeOptions& options,
+                                  std::span<const Pilot> pilots, unsigned rays,
+                                  const Executor& executor, Progress& progress,
+                                  ReceiverPlaces& compared) {
+  const std::vector<Receiver> receivers = compared_of(pilots);
+  for (const Receiver& receiver : receivers) compared.add(receiver);
+  const std::vector<Receiver> twice = two_of_each(receivers);
+  std::vector<Shading> traced(twice.size());
+  {
+    StreamedRays discs(scene, options.gather.sides, {}, options.cache_bytes);
+    discs.trace(twice, (rays + 1) / 2, 0, traced, executor, progress);
+  }
+  return_freed_memory();
+  if (!options.gather.bleeding) leave_out_bleeding(traced);
+  return traced;
+}
+
+Estimator::Estimator(const ContainerReader& scene, const ShadeOptions& options,
+                     std::span<const Pilot> pilots, std::span<const Shading> traced,
+                     const Executor& executor)
+    : options_(options),
+      cache_(std::make_unique<PageCache>(scene, CacheOptions{.memory_bytes = options.cache_bytes,
+                                                             .threads = readers_of(executor, true),
+                                                             .back_end = options.back_end})) {
+  options_.cache = cache_.get();
+  options_.sky = {};  // no estimate of it
+  options_.variants = std::max(2U, options.variants);
+  report_.pilots = traced.size() / 2;
+  const double before = cpu_seconds();
+  const SceneView view(scene);
+  const std::vector<Shading> ours = shade_compared(view, pilots, 0, executor);
+  const std::vector<Shading> other = shade_compared(view, pilots, 1, executor);
+  report_.cpu_seconds = cpu_seconds() - before;
+  occlusion_ = line_of(ours, other, traced, occlusion_of);
+  irradiance_ = line_of(ours, other, traced, irradiance_of);
+  other_ = std::make_unique<Shader>(scene, options_, executor);
+}
+
+std::vector<Shading> Estimator::shade_compared(const SceneView& view, std::span<const Pilot> pilots,
+                                               unsigned turn, const Executor& executor) const {
+  std::vector<std::unique_ptr<DirectionGrid>> grids;
+  for (unsigned i = 0; i < options_.variants; ++i) {
+    grids.push_back(std::make_unique<DirectionGrid>(options_.gather.resolution, nullptr, i));
+  }
+  std::vector<std::unique_ptr<Gather>> gathers(executor.threads());
+  std::vector<std::vector<Shading>> compared(pilots.size());
+  executor.for_each(pilots.size(), [&](std::size_t i, unsigned thread) {
+    if (!gathers[thread])
+      gathers[thread] = std::make_unique<Gather>(view, *cache_, options_.gather);
+    const Pilot& pilot = pilots[i];
+    std::vector<Shading> results(pilot.receivers.size());
+    gathers[thread]->shade(pilot.receivers, results, *grids[(pilot.variant + turn) % grids.size()]);
+    for (std::size_t k = 0; k < pilot.compared(); ++k)
+      compared[i].push_back(results[pilot.compared_at(k)]);
+  });
+  std::vector<Shading> all;
+  for (const std::vector<Shading>& some : compared) all.insert(all.end(), some.begin(), some.end());
+  return all;
+}
+
+std::span<const ErrorEstimate> Estimator::estimate(std::span<const Receiver> receivers,
+                                                   std::span<const Shading> results,
+                                                   unsigned variant) {
+  shaded_.resize(receivers.size());
+  estimates_.resize(receivers.size());
+  Progress silent;
+  const double before = cpu_seconds();
+  other_->shade(receivers, shaded_, silent, variant + 1);
+  report_.cpu_seconds += cpu_seconds() - before;
+  for (std::size_t i = 0; i < receivers.size(); ++i) {
+    const double occlusion = squared_difference(occlusion_of(results[i]), occlusion_of(shaded_[i]));
+    const double irradiance =
+        squared_difference(irradiance_of(results[i]), irradiance_of(shaded_[i]));
+    estimates_[i] = {.occlusion = static_cast<float>(std::sqrt(occlusion_.at(occlusion))),
+                     .irradiance = static_cast<float>(std::sqrt(irradiance_.at(irradiance)))};
+  }
+  return estimates_;
+}
+
+EstimateCheck check_estimates(std::span<const ErrorEstimate> estimates,
+                              std::span<const Shading> ours, std::span<const Shading> traced) {
+  return {
+      .occlusion = worth_of(estimates, &ErrorEstimate::occlusion, ours, traced, occlusion_of),
+      .irradiance = worth_of(estimates, &ErrorEstimate::irradiance, ours, traced, irradiance_of)};
+}
+
+}  // namespace ptc

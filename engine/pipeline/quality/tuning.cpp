@@ -1,0 +1,277 @@
+#include "engine/pipeline/quality/tuning.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "engine/base/memory.h"
+#include "engine/pipeline/quality/error_sums.h"
+#include "engine/shade/reference/streamed_rays.h"
+
+namespace ptc {
+namespace {
+
+/// None of them is slower and less exact than another on most scenes. Usual errors: means over
+/// terrain, city and dragon.
+constexpr std::array kLadder{
+    Rung{0.4F, 0.8F, 16, 0.114},     Rung{0.2F, 0.4F, 16, 0.075},
+    Rung{0.1F, 0.4F, 16, 0.074},     Rung{0.06F, 0.3F, 16, 0.063},
+    Rung{0.06F, 0.3F, 32, 0.051},    Rung{0.03F, 0.2F, 32, 0.036},
+    Rung{0.02F, 0.15F, 32, 0.027},   Rung{0.014F, 0.12F, 32, 0.024},
+    Rung{0.014F, 0.12F, 48, 0.020},  Rung{0.01F, 0.1F, 48, 0.019},
+    Rung{0.007F, 0.085F, 48, 0.017}, Rung{0.005F, 0.07F, 48, 0.015},
+    Rung{0.003F, 0.06F, 48, 0.0134}, Rung{0.002F, 0.05F, 64, 0.0117},
+    Rung{0.001F, 0.03F, 64, 0.010},
+};
+
+constexpr unsigned kResamples = 200;
+constexpr unsigned kBelow = 190;  // of them, sorted: errors of 19 in 20 samples of pilots are below
+
+/// Sides of squares of rays: how a reference begins, and the most that its noise may lead to.
+constexpr unsigned kFirstSide = 16, kMostSide = 128;
+constexpr double kNoise = 0.7;  // of a half, over what is asked
+
+class Tuner {
+ public:
+  Tuner(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots,
+        const Executor& executor)
+      : scene_(scene),
+        options_(options),
+        pilots_(pilots),
+        executor_(executor),
+        errors_(ladder().size()) {
+    for (const Pilot& pilot : pilots) {
+      for (std::size_t k = 0; k < pilot.compared(); ++k)
+        compared_.push_back(pilot.receivers[pilot.compared_at(k)]);
+    }
+  }
+
+  /// Traces as many rays as it takes for each half of a reference to be off by less than what is
+  /// asked: squares of errors add up, so that the mean over some hundred receivers hardly suffers.
+  /// @return  rays of a half
+  unsigned trace_for(double asked, Progress& progress) {
+    StreamedRays discs(scene_, options_.gather.sides, {}, options_.cache_bytes);
+    unsigned side = kFirstSide;
+    trace(discs, side, progress);
+    const double noise = noise_of_half();
+    if (noise > kNoise * asked) {
+      side = static_cast<unsigned>(
+          std::min<double>(kMostSide, std::ceil(side * noise / (kNoise * asked))));
+      trace(discs, side, progress);
+    }
+    return side * side;
+  }
+
+  /// @param side  of the square of rays of a half
+  void trace(StreamedRays& discs, unsigned side, Progress& progress) {
+    const std::vector<Receiver> twice = two_of_each(compared_);
+    traced_.resize(twice.size());
+    discs.trace(twice, side * side, 0, traced_, executor_, progress);
+    if (!options_.gather.bleeding) leave_out_bleeding(traced_);
+  }
+
+  /// Makes room for pages; no rays are traced any more.
+  void begin_shading() {
+    return_freed_memory();
+    cache_ = std::make_unique<PageCache>(scene_, CacheOptions{.memory_bytes = options_.cache_bytes,
+                                                              .threads = executor_.threads(),
+                                                              .back_end = options_.back_end});
+  }
+
+  /// The cheapest rung that all pilots hold for good enough; the ladder's size when there is none.
+  std::size_t choose(double asked) {
+    std::size_t rung = cheapest(asked);
+    while (rung < ladder().size() && bound(rung, kConfirming) > asked) ++rung;
+    return rung;
+  }
+
+  /// @param all  of both parts, not of those alone that confirm
+  CheckError measure(std::size_t rung, bool all) {
+    ErrorSums sums;
+    for (const std::size_t part : {kChoosing, kConfirming}) {
+      if (!all && part == kChoosing) continue;
+      for (const ErrorSums& pilot : errors_of(rung, part)) sums.add(pilot);
+    }
+    return sums.error();
+  }
+
+  [[nodiscard]] std::uint64_t shaded() const { return shaded_; }
+  [[nodiscard]] std::span<const Receiver> compared() const { return compared_; }
+  [[nodiscard]] std::span<const Shading> traced() const { return traced_; }
+
+ private:
+  static constexpr std::size_t kChoosing = 0, kConfirming = 1;  // even and odd pilots
+
+  /// The cheapest rung that the choosing pilots hold for good enough, if errors fall along the
+  /// ladder; its size when none is.
+  std::size_t cheapest(double asked) {
+    std::size_t low = 0,
+                high = ladder().size();  // below low: too coarse; from high on: good enough
+    std::size_t at = rung_of(asked);
+    while (low < high) {
+      at = std::clamp(at, low, high - 1);
+      const double error = bound(at, kChoosing);
+      if (error <= asked) {
+        high = at;
+      } else {
+        low = at + 1;
+      }
+      at = error > 0 ? rung_of(ladder()[at].usual_error * asked / error) : 0;
+    }
+    return high;
+  }
+
+  /// What one half of a reference is off, as CheckError::relative().
+  [[nodiscard]] double noise_of_half() const {
+    ErrorSums sums;
+    for (std::size_t i = 0; i < compared_.size(); ++i)
+      sums.add(traced_[2 * i], traced_[2 * i], traced_[2 * i + 1]);
+    return std::sqrt(2) * sums.error().relative_noise();
+  }
+
+  /// The first rung whose usual error is at most so much.
+  static std::size_t rung_of(double error) {
+    const auto found =
+        std::ranges::find_if(ladder(), [&](const Rung& rung) { return rung.usual_error <= error; });
+    return static_cast<std::size_t>(found - ladder().begin());
+  }
+
+  /// An error that the run's is below with some confidence: a quantile over samples of the pilots
+  /// with replacement (Efron 1979).
+  double bound(std::size_t rung, std::size_t part) {
+    const std::vector<ErrorSums>& errors = errors_of(rung, part);
+    if (errors.empty()) return 0;
+    std::mt19937_64 bits;  // its default seed
+    std::vector<double> samples(kResamples);
+    for (double& sample : samples) {
+      ErrorSums sums;
+      for (std::size_t i = 0; i < errors.size(); ++i) sums.add(errors[bits() % errors.size()]);
+      sample = sums.error().relative();
+    }
+    std::ranges::nth_element(samples, samples.begin() + kBelow);
+    return samples[kBelow];
+  }
+
+  /// Errors of each pilot of a part.
+  const std::vector<ErrorSums>& errors_of(std::size_t rung, std::size_t part) {
+    std::vector<ErrorSums>& errors = errors_[rung][part];
+    if (errors.empty()) errors = shade(ladder()[rung].options(options_.gather), part);
+    return errors;
+  }
+
+  std::vector<ErrorSums> shade(const GatherOptions& gather, std::size_t part) {
+    const SceneView view(scene_);
+    std::vector<std::unique_ptr<DirectionGrid>> grids;
+    for (unsigned i = 0; i < std::max(1U, options_.variants); ++i) {
+      grids.push_back(std::make_unique<DirectionGrid>(gather.resolution, nullptr, i));
+    }
+    std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
+    std::vector<ErrorSums> errors((pilots_.size() + 1 - part) / 2);
+    executor_.for_each(errors.size(), [&](std::size_t i, unsigned thread) {
+      if (!gathers[thread]) gathers[thread] = std::make_unique<Gather>(view, *cache_, gather);
+      const std::size_t index = 2 * i + part;
+      const Pilot& pilot = pilots_[index];
+      std::vector<Shading> results(pilot.receivers.size());
+      gathers[thread]->shade(pilot.receivers, results, *grids[pilot.variant % grids.size()]);
+      errors[i] = compare(index, results);
+    });
+    for (std::size_t i = part; i < pilots_.size(); i += 2) shaded_ += pilots_[i].receivers.size();
+    return errors;
+  }
+
+  [[nodiscard]] ErrorSums compare(std::size_t index, std::span<const Shading> results) const {
+    std::size_t first = 0;  // of this pilot's in traced_
+    for (std::size_t i = 0; i < index; ++i) first += 2 * pilots_[i].compared();
+    ErrorSums sums;
+    for (std::size_t k = 0; k < pilots_[index].compared(); ++k) {
+      const Shading* rays = &traced_[first + 2 * k];
+      sums.add(results[pilots_[index].compared_at(k)], rays[0], rays[1]);
+    }
+    return sums;
+  }
+
+  const ContainerReader& scene_;
+  const ShadeOptions& options_;
+  std::span<const Pilot> pilots_;
+  const Executor& executor_;
+  std::unique_ptr<PageCache> cache_;
+  std::vector<Receiver> compared_;  // of all pilots, in order
+  std::vector<Shading> traced_;     // two of each
+  std::vector<std::array<std::vector<ErrorSums>, 2>>
+      errors_;  // by rung and part; empty: not yet shaded
+  std::uint64_t shaded_ = 0;
+};
+
+}  // namespace
+
+std::span<const Rung> ladder() {
+  return kLadder;
+}
+
+PilotPlan plan_pilots(std::uint64_t receivers) {
+  constexpr std::uint64_t kFewest = 64, kMost = 128;       // pilots
+  constexpr std::uint64_t kShortest = 64, kLongest = 256;  // receivers of each
+  constexpr std::uint64_t kLeastStride = 16;               // fewer pilots sooner than shorter ones
+  constexpr std::uint64_t kShare = 16;  // of a run's: one in so many is a pilot's
+  if (receivers == 0) return {};
+  const std::uint64_t room =
+      std::max(std::min<std::uint64_t>(receivers, 2), receivers / kLeastStride);
+  const std::uint64_t count =
+      std::min(std::clamp(receivers / (kShare * kLongest), kFewest, kMost), room);
+  const std::uint64_t stride = receivers / count;
+  const std::uint64_t length = std::clamp(stride / kShare, kShortest, kLongest);
+  return {.count = static_cast<std::size_t>(count),
+          .stride = stride,
+          .receivers = static_cast<std::size_t>(std::min(stride, length))};
+}
+
+TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
+                  std::span<const Pilot> pilots, const Executor& executor, Progress& progress,
+                  ReceiverPlaces& compared, std::vector<Shading>& traced) {
+  Tuner tuner(scene, options, pilots, executor);
+  for (const Receiver& receiver : tuner.compared()) compared.add(receiver);
+  const double before = cpu_seconds();
+  const unsigned rays = tuner.trace_for(asked, progress);
+  const double tracing_done = cpu_seconds();
+  tuner.begin_shading();
+  const std::size_t chosen = tuner.choose(asked);
+  const bool met = chosen < ladder().size();
+  const std::size_t rung = std::min(chosen, ladder().size() - 1);
+  TuningReport report{.asked = asked,
+                      .met = met,
+                      .gather = ladder()[rung].options(options.gather),
+                      .setting = static_cast<unsigned>(rung),
+                      .settings = static_cast<unsigned>(ladder().size()),
+                      .measured = tuner.measure(rung, !met || pilots.size() < 2),
+                      .pilots = tuner.compared().size(),
+                      .rays = 2 * rays,
+                      .shaded = tuner.shaded(),
+                      .ray_cpu_seconds = tracing_done - before};
+  report.shade_cpu_seconds = cpu_seconds() - tracing_done;
+  traced.assign(tuner.traced().begin(), tuner.traced().end());
+  return report;
+}
+
+std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& options,
+                             std::span<const Pilot> pilots, unsigned rays, const Executor& executor,
+                             Progress& progress) {
+  Tuner tuner(scene, options, pilots, executor);
+  {
+    StreamedRays discs(scene, options.gather.sides, {}, options.cache_bytes);
+    tuner.trace(discs, static_cast<unsigned>(std::sqrt(static_cast<double>(rays))), progress);
+  }
+  tuner.begin_shading();
+  std::vector<RungError> rungs;
+  for (std::size_t rung = 0; rung < ladder().size(); ++rung) {
+    const std::uint64_t shaded = tuner.shaded();
+    const double before = cpu_seconds();
+    const CheckError error = tuner.measure(rung, true);
+    const auto count = static_cast<double>(std::max<std::uint64_t>(1, tuner.shaded() - shaded));
+    rungs.push_back({error, (cpu_seconds() - before) * 1e6 / count});
+  }
+  return rungs;
+}
+
+}  // namespace ptc

@@ -1,0 +1,114 @@
+#include "engine/pipeline/render/primary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+
+#include "engine/pipeline/stages.h"
+
+namespace ptc {
+namespace {
+
+class MeshView : public PrimaryView {
+ public:
+  MeshView(const RayScene& scene, const DirectLight& light, const LightSampling& sampling,
+           const Camera& camera, unsigned side, float lift)
+      : scene_(scene),
+        light_(light),
+        sampling_(sampling),
+        camera_(camera),
+        side_(side),
+        lift_(lift) {}
+
+  [[nodiscard]] std::optional<PrimaryHit> at(unsigned x, unsigned y) const override {
+    const float scale = 1.0F / static_cast<float>(side_);
+    const glm::vec3 direction = camera_.direction((static_cast<float>(x) + 0.5F) * scale,
+                                                  (static_cast<float>(y) + 0.5F) * scale);
+    const auto hit =
+        scene_.closest(camera_.position, direction, 0, std::numeric_limits<double>::infinity());
+    if (!hit) return std::nullopt;
+    const float turn = hit->front ? 1.0F : -1.0F;
+    PrimaryHit primary{.position = hit->position,
+                       .normal = hit->normal * turn,
+                       .lift = lift_,
+                       .offset_normal = hit->geometric_normal * turn,
+                       .albedo = hit->albedo};
+    const std::uint64_t seed = std::uint64_t{y} << 32 | x;
+    const DirectLight::Result light =
+        light_.irradiance(primary.position + glm::dvec3(primary.offset_normal) * scene_.epsilon(),
+                          primary.normal, sampling_, seed);
+    primary.direct = primary.albedo * light.local * std::numbers::inv_pi_v<float>;
+    if (hit->front) primary.direct += hit->emission;
+    return primary;
+  }
+
+ private:
+  const RayScene& scene_;
+  const DirectLight& light_;
+  LightSampling sampling_;
+  Camera camera_;
+  unsigned side_;
+  float lift_;
+};
+
+/// A view of everything from the front, the right and above: as near as all corners of the bounds
+/// allow. A backdrop is larger than what stands on it and may leave the picture.
+Camera overview(const Superblock& superblock, bool backdrop,
+                const std::optional<std::array<unsigned, 2>>& size) {
+  const glm::dvec3 low(superblock.bounds_low[0], superblock.bounds_low[1],
+                       superblock.bounds_low[2]);
+  const glm::dvec3 high(superblock.bounds_high[0], superblock.bounds_high[1],
+                        superblock.bounds_high[2]);
+  Camera camera;
+  if (size) {
+    camera.width = (*size)[0];
+    camera.height = (*size)[1];
+  }
+  camera.look_at = (low + high) * 0.5;
+  const glm::dvec3 away = glm::normalize(glm::dvec3(0.45, 0.35, 1));
+  camera.position = camera.look_at + away;
+  const CameraAxes axes = axes_of(camera);
+  const double tall = std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * 0.95;
+  const double wide = tall * camera.width / camera.height;
+  double distance = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    glm::dvec3 p;
+    for (int axis = 0; axis < 3; ++axis)
+      p[axis] = ((corner >> axis & 1) != 0 ? high : low)[axis] - camera.look_at[axis];
+    const double aside =
+        std::max(std::abs(glm::dot(p, axes.right)) / wide, std::abs(glm::dot(p, axes.up)) / tall);
+    distance = std::max(distance, aside - glm::dot(p, axes.forward));
+  }
+  camera.position =
+      camera.look_at + away * (distance > 0 ? distance * (backdrop ? 0.5 : 1.0) : 1.0);
+  return camera;
+}
+
+}  // namespace
+
+std::unique_ptr<PrimaryView> view_mesh(const RayScene& scene, const DirectLight& light,
+                                       const LightSampling& sampling, const Camera& camera,
+                                       unsigned side, float lift) {
+  return std::make_unique<MeshView>(scene, light, sampling, camera, side, lift);
+}
+
+Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> cameras,
+                      bool backdrop, const std::optional<std::array<unsigned, 2>>& size) {
+  const auto& text = scene.meta().text;
+  if (const auto recorded = text.find(kCameraKey); recorded != text.end())
+    return camera_from_json(recorded->second);
+  if (cameras.empty()) return overview(scene.superblock(), backdrop, size);
+  Camera camera;
+  const MeshCamera& from = cameras.front();
+  const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
+  camera.position = from.position;
+  camera.look_at = from.position + glm::dvec3(from.forward);
+  camera.up = from.up;
+  camera.vertical_fov = 2 * std::atan(std::tan(from.horizontal_fov * 0.5F) / aspect);
+  return camera;
+}
+
+}  // namespace ptc

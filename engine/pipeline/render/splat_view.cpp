@@ -1,0 +1,195 @@
+// Primary visibility without a mesh: a perspective depth buffer of discs
+// (engine/pipeline/render/primary.h).
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+
+#include "engine/io/cloud/record.h"
+#include "engine/pipeline/render/primary.h"
+#include "format/point_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kPagesAtOnce = 64;
+constexpr unsigned kBandRows = 16;  // samples: rows that one thread draws
+
+/// What a sample keeps of the surfel it sees.
+struct Payload {
+  std::uint32_t radiance = 0;  // rgbe
+  std::array<std::int16_t, 2> normal{};
+  std::uint16_t radius = 0;  // ufloat16
+  std::array<std::uint8_t, 3> albedo{};
+};
+
+/// A disc in front of the camera, in its axes: x to the right, y down, z forward.
+struct Projected {
+  glm::vec3 centre{0}, normal{0};
+  float radius = 0;
+  unsigned x0 = 0, x1 = 0, y0 = 0, y1 = 0;  // samples that it may cover
+  Payload payload;
+};
+
+class SurfelView : public PrimaryView {
+ public:
+  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift,
+             LostPages* lost, const Executor& executor, Progress& progress)
+      : position_(camera.position),
+        width_(camera.width * side),
+        height_(camera.height * side),
+        lift_(lift),
+        samples_(std::size_t{width_} * height_) {
+    const CameraAxes axes = axes_of(camera);
+    axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
+    focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
+    const std::span<const std::uint32_t> pages = scene.point_pages();
+    for (std::size_t first = 0; first < pages.size(); first += kPagesAtOnce) {
+      draw(scene, pages.subspan(first, std::min(kPagesAtOnce, pages.size() - first)), lost,
+           executor, progress);
+    }
+  }
+
+  [[nodiscard]] std::optional<PrimaryHit> at(unsigned x, unsigned y) const override {
+    const Sample& s = samples_[std::size_t{y} * width_ + x];
+    if (s.depth == std::numeric_limits<float>::infinity()) return std::nullopt;
+    const glm::vec3 along = axes_ * ray(x, y);
+    const std::array<float, 3> n = decode_octahedral(s.payload.normal[0], s.payload.normal[1]);
+    const std::array<float, 3> radiance = decode_rgbe(s.payload.radiance);
+    glm::vec3 normal(n[0], n[1], n[2]);
+    const bool back = glm::dot(normal, along) > 0;
+    if (back) normal = -normal;
+    PrimaryHit hit{.position = position_ + glm::dvec3(along) * static_cast<double>(s.depth),
+                   .normal = normal,
+                   .lift = lift_ * decode_ufloat16(s.payload.radius),
+                   .offset_normal = normal,
+                   .sky_included = true};
+    for (int c = 0; c < 3; ++c) {
+      hit.albedo[c] = static_cast<float>(s.payload.albedo[static_cast<std::size_t>(c)]) / 255;
+    }
+    if (!back) hit.direct = glm::vec3(radiance[0], radiance[1], radiance[2]);
+    return hit;
+  }
+
+ private:
+  struct Sample {
+    float depth = std::numeric_limits<float>::infinity();  // t of t (x, y, 1)
+    Payload payload;
+  };
+
+  /// The ray of a sample, in the camera's axes.
+  [[nodiscard]] glm::vec3 ray(unsigned x, unsigned y) const {
+    return {(static_cast<float>(x) + 0.5F - 0.5F * static_cast<float>(width_)) / focal_,
+            (static_cast<float>(y) + 0.5F - 0.5F * static_cast<float>(height_)) / focal_, 1};
+  }
+
+  /// Pages are projected side by side, then bands of rows drawn side by side, in the order of
+  /// points.
+  void draw(const ContainerReader& scene, std::span<const std::uint32_t> pages, LostPages* lost,
+            const Executor& executor, Progress& progress) {
+    std::vector<std::vector<Projected>> discs(pages.size());
+    executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
+      std::vector<std::byte> payload(scene.page_payload_limit());
+      PageDecoder decoder;
+      progress.advance(scene.entry(pages[i]).record_count);
+      if (!read_unless_lost(scene, pages[i], payload, decoder, lost)) return;
+      const PointPage points(payload.data(), scene.entry(pages[i]).record_count);
+      for (std::uint32_t k = 0; k < points.size(); ++k) {
+        project(to_surfel(points[k], scene.header().frame), discs[i]);
+      }
+    });
+    executor.for_each((height_ + kBandRows - 1) / kBandRows, [&](std::size_t band, unsigned) {
+      const auto first = static_cast<unsigned>(band) * kBandRows;
+      const unsigned last = std::min(height_, first + kBandRows);
+      for (const auto& page : discs) {
+        for (const Projected& disc : page) {
+          if (disc.y0 < last && disc.y1 > first)
+            cover(disc, std::max(disc.y0, first), std::min(disc.y1, last));
+        }
+      }
+    });
+  }
+
+  void project(const Surfel& surfel, std::vector<Projected>& discs) const {
+    Projected disc{
+        .centre = glm::vec3(surfel.position - position_) * axes_,  // times the transpose
+        .normal = surfel.normal * axes_,
+        .radius = surfel.radius,
+        .payload = {
+            .radiance = encode_rgbe({surfel.radiance.r, surfel.radiance.g, surfel.radiance.b}),
+            .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
+            .radius = encode_ufloat16(surfel.radius)}};
+    if (!(disc.radius > 0) || disc.centre.z + disc.radius <= 0) return;
+    span(disc, 0, width_, disc.x0, disc.x1);
+    span(disc, 1, height_, disc.y0, disc.y1);
+    if (disc.x0 >= disc.x1 || disc.y0 >= disc.y1) return;
+    for (int c = 0; c < 3; ++c) {
+      disc.payload.albedo[static_cast<std::size_t>(c)] =
+          static_cast<std::uint8_t>(std::lround(surfel.albedo[c] * 255));
+    }
+    discs.push_back(disc);
+  }
+
+  /// Samples along an axis whose centres lie within the disc's projection, exactly; all of them
+  /// when it reaches behind the camera.
+  void span(const Projected& disc, int axis, unsigned size, unsigned& first, unsigned& last) const {
+    const float r2 = disc.radius * disc.radius;
+    const glm::vec3& c = disc.centre;
+    const glm::vec3& n = disc.normal;
+    const float p = c.z * c.z - r2 * std::max(0.0F, 1 - n.z * n.z);
+    first = 0;
+    last = size;
+    if (c.z <= 0 || p <= 1e-4F * r2) return;
+    // (c_a - u c_z)^2 = r^2 |k|^2 - r^2 (n.k)^2 with k = (1, -u) along the axis and z.
+    const float across = c.z * n[axis] - c[axis] * n.z;
+    const float other = n[1 - axis];
+    const float square = c.z * c.z + c[axis] * c[axis] - across * across - r2 * other * other;
+    const float middle = (c[axis] * c.z + r2 * n[axis] * n.z) / p;
+    const float half = disc.radius * std::sqrt(std::max(0.0F, square)) / p;
+    const auto end = static_cast<float>(size);
+    const float low = (middle - half) * focal_ + 0.5F * end - 0.5F - 1e-3F;
+    const float high = (middle + half) * focal_ + 0.5F * end + 0.5F + 1e-3F;
+    first = static_cast<unsigned>(std::ceil(std::clamp(low, 0.0F, end)));
+    last = static_cast<unsigned>(std::clamp(high, 0.0F, end));
+  }
+
+  void cover(const Projected& disc, unsigned y0, unsigned y1) {
+    const float height = glm::dot(disc.centre, disc.normal);
+    const float square = disc.radius * disc.radius;
+    for (unsigned y = y0; y < y1; ++y) {
+      for (unsigned x = disc.x0; x < disc.x1; ++x) {
+        const glm::vec3 along = ray(x, y);
+        const float t = height / glm::dot(along, disc.normal);
+        const glm::vec3 off = along * t - disc.centre;
+        const float distance = glm::dot(off, off);
+        if (!(t > 0 && distance < square)) continue;
+        // The nearest centre wins where coplanar discs overlap, as in the gather.
+        const float bumped = t + 0.01F / disc.radius * distance;
+        Sample& sample = samples_[std::size_t{y} * width_ + x];
+        if (bumped < sample.depth) sample = {bumped, disc.payload};
+      }
+    }
+  }
+
+  glm::dvec3 position_;
+  glm::mat3 axes_{1};  // columns: right, down, forward
+  unsigned width_, height_;
+  float lift_;
+  float focal_ = 1;  // in samples
+  std::vector<Sample> samples_;
+};
+
+}  // namespace
+
+std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
+                                          unsigned side, float lift, LostPages* lost,
+                                          const Executor& executor, Progress& progress) {
+  return std::make_unique<SurfelView>(scene, camera, side, lift, lost, executor, progress);
+}
+
+}  // namespace ptc

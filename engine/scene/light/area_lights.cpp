@@ -1,0 +1,228 @@
+// Choosing emissive triangles and places on them.
+#include "engine/scene/light/area_lights.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kChoices = 64;
+constexpr double kPiWide = 3.14159265358979323846;
+
+double brightness(const glm::vec3& c) {
+  return static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
+}
+
+// An emitter seen from a point: unit directions to its corners.
+struct View {
+  std::array<glm::dvec3, 3> corner;
+  std::array<glm::dvec3, 3> direction;
+  glm::dvec3 normal;  // unit, of the emitting side
+  double area = 0;
+  double solid_angle = 0;
+};
+
+// Source: Van Oosterom and Strackee 1983, The solid angle of a plane triangle.
+double solid_angle(const std::array<glm::dvec3, 3>& d) {
+  const double volume = std::abs(glm::dot(d[0], glm::cross(d[1], d[2])));
+  const double base = 1 + glm::dot(d[0], d[1]) + glm::dot(d[1], d[2]) + glm::dot(d[2], d[0]);
+  return 2 * std::atan2(volume, base);
+}
+
+// False when no light goes from the emitter's front to the point, or the point lies in its plane.
+bool look_at(const Emitter& emitter, const glm::vec3& position, View& view) {
+  const glm::dvec3 eye(position);
+  for (std::size_t i = 0; i < 3; ++i) view.corner[i] = glm::dvec3(emitter.corner[i]) - eye;
+  const glm::dvec3 twice =
+      glm::cross(view.corner[1] - view.corner[0], view.corner[2] - view.corner[0]);
+  const double length = glm::length(twice);
+  if (!(length > 0) || !(glm::dot(twice, view.corner[0]) < 0)) return false;
+  view.normal = twice / length;
+  view.area = 0.5 * length;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double distance = glm::length(view.corner[i]);
+    if (!(distance > 0)) return false;
+    view.direction[i] = view.corner[i] / distance;
+  }
+  view.solid_angle = solid_angle(view.direction);
+  return view.solid_angle > 0;
+}
+
+// Positive exactly where the emitter may give light to the point.
+double expected_light(const Emitter& emitter, const glm::vec3& position, const glm::vec3& normal) {
+  View view;
+  if (!look_at(emitter, position, view)) return 0;
+  const glm::dvec3 n(normal);
+  double best = 0;  // a triangle is above the horizon where one of its corners is
+  for (const glm::dvec3& d : view.direction) best = std::max(best, glm::dot(n, d));
+  if (best <= 0) return 0;
+  const glm::dvec3 middle = view.corner[0] + view.corner[1] + view.corner[2];
+  best = std::max({best, 0.05, glm::dot(n, middle) / std::max(glm::length(middle), 1e-300)});
+  return brightness(emitter.radiance) * view.solid_angle * best;
+}
+
+glm::dvec3 square_to(const glm::dvec3& v, const glm::dvec3& axis) {
+  return glm::normalize(v - glm::dot(v, axis) * axis);
+}
+
+// A direction uniform in the spherical triangle.
+// Source: Arvo 1995, Stratified sampling of spherical triangles.
+glm::dvec3 sample_solid_angle(const std::array<glm::dvec3, 3>& d, const glm::vec2& square) {
+  const glm::dvec3 ab = glm::normalize(glm::cross(d[0], d[1]));
+  const glm::dvec3 bc = glm::normalize(glm::cross(d[1], d[2]));
+  const glm::dvec3 ca = glm::normalize(glm::cross(d[2], d[0]));
+  const auto angle = [](const glm::dvec3& a, const glm::dvec3& b) {
+    return std::acos(std::clamp(-glm::dot(a, b), -1.0, 1.0));
+  };
+  const double alpha = angle(ab, ca);
+  const double excess = alpha + angle(bc, ab) + angle(ca, bc) - kPiWide;
+  const double part = static_cast<double>(square.x) * excess;
+  const double s = std::sin(part - alpha);
+  const double t = std::cos(part - alpha);
+  const double u = t - std::cos(alpha);
+  const double v = s + std::sin(alpha) * glm::dot(d[0], d[1]);
+  const double q = std::clamp(
+      ((v * t - u * s) * std::cos(alpha) - v) / ((v * s + u * t) * std::sin(alpha)), -1.0, 1.0);
+  const glm::dvec3 c = q * d[0] + std::sqrt(1 - q * q) * square_to(d[2], d[0]);
+  const double z = 1 - static_cast<double>(square.y) * (1 - glm::dot(c, d[1]));
+  return z * d[1] + std::sqrt(std::max(0.0, 1 - z * z)) * square_to(c, d[1]);
+}
+
+glm::dvec3 sample_area(const std::array<glm::dvec3, 3>& corner, const glm::vec2& square) {
+  const double root = std::sqrt(static_cast<double>(square.x));
+  const double v = root * static_cast<double>(square.y);
+  return (1 - root) * corner[0] + (root - v) * corner[1] + v * corner[2];
+}
+
+// A place on the emitter, and cosine times solid angle it stands for.
+struct Place {
+  glm::dvec3 offset{0};  // from the eye
+  double weight = 0;
+};
+
+Place sample_place(const View& view, const glm::dvec3& normal, const glm::vec2& square) {
+  // Below this the two differ by little, and the spherical excess loses its digits.
+  constexpr double kSmall = 1e-3;
+  if (view.solid_angle > kSmall) {
+    const glm::dvec3 d = sample_solid_angle(view.direction, square);
+    const double slope = glm::dot(d, view.normal);
+    const double distance = glm::dot(view.corner[0], view.normal) / slope;
+    if (slope < 0 && std::isfinite(distance)) {
+      return {d * distance, std::max(0.0, glm::dot(normal, d)) * view.solid_angle};
+    }
+  }
+  const glm::dvec3 offset = sample_area(view.corner, square);
+  const double distance = glm::length(offset);
+  if (!(distance > 0)) return {};
+  const glm::dvec3 d = offset / distance;
+  return {offset, std::max(0.0, glm::dot(normal, d)) * std::max(0.0, -glm::dot(view.normal, d)) *
+                      view.area / (distance * distance)};
+}
+
+}  // namespace
+
+AreaLights::AreaLights(const Mesh& mesh) {
+  std::vector<double> power;
+  double total = 0;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const glm::vec3& radiance = mesh.materials[mesh.material_of[i]].emission;
+    const auto& c = mesh.triangles[i];
+    const Emitter emitter{{mesh.positions[c[0]], mesh.positions[c[1]], mesh.positions[c[2]]},
+                          radiance};
+    const glm::dvec3 a(emitter.corner[0]);
+    const double area = glm::length(
+        glm::cross(glm::dvec3(emitter.corner[1]) - a, glm::dvec3(emitter.corner[2]) - a));
+    const double given = area * brightness(radiance);
+    if (!(given > 0) || !std::isfinite(given)) continue;
+    emitters_.push_back(emitter);
+    power.push_back(given);
+    total += given;
+  }
+  // Walker 1977, in Vose's form: columns below the mean are filled up from those above it.
+  const std::size_t count = emitters_.size();
+  table_.resize(count);
+  std::vector<std::uint32_t> small, large;
+  for (std::size_t i = 0; i < count; ++i) {
+    share_.push_back(static_cast<float>(power[i] / total));
+    power[i] *= static_cast<double>(count) / total;
+    (power[i] < 1 ? small : large).push_back(static_cast<std::uint32_t>(i));
+  }
+  while (!small.empty() && !large.empty()) {
+    const std::uint32_t low = small.back();
+    const std::uint32_t high = large.back();
+    small.pop_back();
+    table_[low] = {static_cast<float>(power[low]), high};
+    power[high] -= 1 - power[low];
+    if (power[high] >= 1) continue;
+    large.pop_back();
+    small.push_back(high);
+  }
+}
+
+std::uint32_t AreaLights::draw(double unit) const {
+  const double scaled = unit * static_cast<double>(table_.size());
+  const auto column =
+      static_cast<std::uint32_t>(std::min(static_cast<std::size_t>(scaled), table_.size() - 1));
+  const double rest = scaled - static_cast<double>(column);
+  return rest < static_cast<double>(table_[column].keep) ? column : table_[column].other;
+}
+
+void AreaLights::choose_all(const glm::vec3& position, const glm::vec3& normal,
+                            std::vector<Choice>& out) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < emitters_.size(); ++i) {
+    const double expected = expected_light(emitters_[i], position, normal);
+    if (!(expected > 0)) continue;
+    sum += expected;
+    out.push_back({static_cast<std::uint32_t>(i), expected, sum});
+  }
+}
+
+void AreaLights::choose_by_power(const glm::vec3& position, const glm::vec3& normal,
+                                 std::uint64_t seed, std::vector<Choice>& out) const {
+  const SquarePoints points(seed);
+  double sum = 0;
+  for (std::uint32_t i = 0; i < kChoices; ++i) {
+    const std::uint32_t drawn = draw(points.line(i));
+    const double expected = expected_light(emitters_[drawn], position, normal);
+    if (!(expected > 0)) continue;
+    sum += expected / (static_cast<double>(kChoices) * static_cast<double>(share_[drawn]));
+    out.push_back({drawn, expected, sum});
+  }
+}
+
+void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsigned count,
+                        std::uint64_t seed, std::vector<EmitterSample>& out) const {
+  out.clear();
+  thread_local std::vector<Choice> choices;
+  choices.clear();
+  if (emitters_.size() <= kChoices) {
+    choose_all(position, normal, choices);
+  } else {
+    choose_by_power(position, normal, seed ^ 1, choices);
+  }
+  if (choices.empty()) return;
+  const SquarePoints points(seed);
+  const double total = choices.back().sum;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double wanted = points.line(i) * total;
+    const auto chosen = std::min(
+        std::upper_bound(choices.begin(), choices.end(), wanted,
+                         [](double value, const Choice& choice) { return value < choice.sum; }),
+        choices.end() - 1);
+    const Emitter& emitter = emitters_[chosen->emitter];
+    View view;
+    if (!look_at(emitter, position, view)) continue;
+    const Place place = sample_place(view, glm::dvec3(normal), points.square(i));
+    if (!(place.weight > 0)) continue;
+    const double scale = place.weight / chosen->expected * total / count;
+    out.push_back({position + glm::vec3(place.offset), glm::vec3(view.normal),
+                   emitter.radiance * static_cast<float>(scale)});
+  }
+}
+
+}  // namespace ptc

@@ -1,0 +1,235 @@
+// Direct irradiance: suns, point lights, emissive triangles and the sky, by shadow rays.
+#include "engine/scene/light/lights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+
+#include "engine/scene/light/area_lights.h"
+#include "engine/scene/light/sky_map.h"
+#include "engine/scene/sampling/directions.h"
+#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/scene/step_off.h"
+
+namespace ptc {
+namespace {
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+// A place where light is received.
+struct Receiver {
+  glm::dvec3 position;
+  glm::dvec3 origin;  // of rays: clear of the surface
+  glm::vec3 normal;
+  std::uint64_t seed;
+
+  // Sample points of one kind of light, unrelated to those of another.
+  [[nodiscard]] SquarePoints points(std::uint64_t kind) const {
+    return SquarePoints(mix_bits(seed) + kind);
+  }
+};
+
+enum Kind : std::uint64_t { kSky = 1, kSkyMap, kArea, kFirstSun };
+
+bool is_finite(const glm::vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+bool is_light(const glm::vec3& v) {
+  return is_finite(v) && v.x >= 0 && v.y >= 0 && v.z >= 0;
+}
+
+glm::vec3 checked_direction(const glm::vec3& v) {
+  const glm::vec3 unit = glm::normalize(v);
+  if (!is_finite(unit))
+    throw std::invalid_argument("DirectLight: a direction is zero or not finite");
+  return unit;
+}
+
+LightRig checked(LightRig rig) {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("DirectLight: ") + what);
+  };
+  for (Sun& sun : rig.suns) {
+    sun.to_sun = checked_direction(sun.to_sun);
+    require(is_light(sun.irradiance), "a sun's irradiance is negative or not finite");
+    require(sun.angular_radius >= 0 && sun.angular_radius < 1.58f,
+            "a sun's radius is out of range");
+  }
+  for (const PointLight& point : rig.points) {
+    require(is_light(point.intensity), "a point's intensity is negative or not finite");
+    require(std::isfinite(glm::dot(point.position, point.position)), "a point is not finite");
+  }
+  rig.sky.up = checked_direction(rig.sky.up);
+  require(is_light(rig.sky.radiance), "the sky's radiance is negative or not finite");
+  if (const Image* map = rig.sky.map.get()) {
+    require(map->pixels.size() == std::size_t{map->width} * map->height,
+            "the sky's map is not whole");
+  }
+  return rig;
+}
+
+bool is_lit(const glm::vec3& light) {
+  return light.x > 0 || light.y > 0 || light.z > 0;
+}
+
+}  // namespace
+
+glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees) {
+  const double azimuth = glm::radians(azimuth_degrees);
+  const double elevation = glm::radians(elevation_degrees);
+  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+          std::cos(azimuth) * std::cos(elevation)};
+}
+
+LightRig default_rig() {
+  LightRig rig;
+  rig.suns.push_back({.to_sun = sun_direction(40, 50), .irradiance = glm::vec3(3)});
+  rig.sky.radiance = 0.8F * glm::vec3(0.85F, 0.93F, 1.0F);
+  return rig;
+}
+
+struct DirectLight::Impl {
+  Impl(const RayScene& s, LightRig r) : scene(s), rig(checked(std::move(r))), area(s.mesh()) {
+    if (rig.sky.map && !rig.sky.map->pixels.empty() && is_lit(rig.sky.radiance)) {
+      sky_density.emplace(rig.sky);
+    }
+    sky_is_black = !is_lit(rig.sky.radiance) || (sky_density && sky_density->is_black());
+  }
+
+  [[nodiscard]] glm::vec3 from_sun(const Sun& sun, const Receiver& at, const SquarePoints& points,
+                                   unsigned rays) const;
+  [[nodiscard]] glm::vec3 from_point(const PointLight& point, const Receiver& at) const;
+  [[nodiscard]] glm::vec3 from_emitters(const Receiver& at, unsigned rays) const;
+  [[nodiscard]] bool is_hidden(const Receiver& at, const glm::dvec3& end) const;
+  [[nodiscard]] glm::vec3 from_sky(const Receiver& at, unsigned rays) const;
+  [[nodiscard]] glm::vec3 along_sky_ray(const Receiver& at, const glm::vec3& direction,
+                                        float cosine_rays, float map_rays, float map_density) const;
+
+  const RayScene& scene;
+  LightRig rig;
+  AreaLights area;
+  std::optional<SkyDensity> sky_density;  // when there is a map
+  bool sky_is_black = true;
+};
+
+// The disc of the sun is uniform, so directions are drawn by the cosine to its middle, which is the
+// measure of "irradiance on a surface that faces it": each ray stands for the same share of it.
+glm::vec3 DirectLight::Impl::from_sun(const Sun& sun, const Receiver& at,
+                                      const SquarePoints& points, unsigned rays) const {
+  const float widest = std::sin(std::min(sun.angular_radius, 0.5f * kPi));
+  if (rays == 0 || glm::dot(at.normal, sun.to_sun) <= -widest) return glm::vec3(0);
+  if (widest == 0) rays = 1;
+  const Basis frame(sun.to_sun);
+  float sum = 0;
+  for (std::uint32_t i = 0; i < rays; ++i) {
+    const glm::vec3 local =
+        widest > 0 ? cosine_direction(points.square(i), widest) : glm::vec3(0, 0, 1);
+    const glm::vec3 direction = frame.to_world(local);
+    const float cosine = glm::dot(at.normal, direction);
+    if (cosine <= 0 || local.z <= 0 || scene.occluded(at.origin, direction, 0, kFar)) continue;
+    sum += cosine / local.z;
+  }
+  return sun.irradiance * (sum / static_cast<float>(rays));
+}
+
+// Distances and angles are those at the surface; only the ray begins off it.
+glm::vec3 DirectLight::Impl::from_point(const PointLight& point, const Receiver& at) const {
+  const glm::dvec3 offset = point.position - at.position;
+  const double distance = glm::length(offset);
+  if (!(distance > scene.epsilon())) return glm::vec3(0);
+  const double cosine = glm::dot(glm::dvec3(at.normal), offset) / distance;
+  if (cosine <= 0 || is_hidden(at, point.position)) return glm::vec3(0);
+  return point.intensity * static_cast<float>(cosine / (distance * distance));
+}
+
+glm::vec3 DirectLight::Impl::from_emitters(const Receiver& at, unsigned rays) const {
+  if (area.empty() || rays == 0) return glm::vec3(0);
+  thread_local std::vector<EmitterSample> samples;
+  const glm::vec3 local(at.position - scene.mesh().origin);
+  area.sample(local, at.normal, rays, mix_bits(at.seed) + kArea, samples);
+  glm::vec3 sum(0);
+  for (const EmitterSample& sample : samples) {
+    // The ray ends before the emitter, as it begins off the receiver.
+    const glm::dvec3 end = scene.mesh().origin + glm::dvec3(sample.position) +
+                           2 * scene.epsilon() * glm::dvec3(sample.normal);
+    if (!is_hidden(at, end)) sum += sample.irradiance;
+  }
+  return sum;
+}
+
+bool DirectLight::Impl::is_hidden(const Receiver& at, const glm::dvec3& end) const {
+  const glm::dvec3 offset = end - at.origin;
+  const double distance = glm::length(offset);
+  return distance > 0 && scene.occluded(at.origin, glm::vec3(offset / distance), 0, distance);
+}
+
+// The balance heuristic: a direction counts once, by the sum of all densities that could have
+// brought it (Veach and Guibas 1995).
+glm::vec3 DirectLight::Impl::along_sky_ray(const Receiver& at, const glm::vec3& direction,
+                                           float cosine_rays, float map_rays,
+                                           float map_density) const {
+  const float cosine = glm::dot(at.normal, direction);
+  if (cosine <= 0) return glm::vec3(0);
+  const glm::vec3 light = rig.sky.at(direction);
+  if (!is_lit(light) || scene.occluded(at.origin, direction, 0, kFar)) return glm::vec3(0);
+  return light * (cosine / (cosine_rays * cosine / kPi + map_rays * map_density));
+}
+
+glm::vec3 DirectLight::Impl::from_sky(const Receiver& at, unsigned rays) const {
+  if (sky_is_black || rays == 0) return glm::vec3(0);
+  const unsigned map_rays = sky_density ? rays / 2 : 0;
+  const unsigned cosine_rays = rays - map_rays;
+  const auto by_cosine = static_cast<float>(cosine_rays);
+  const auto by_map = static_cast<float>(map_rays);
+  const Basis frame(at.normal);
+  glm::vec3 sum(0);
+  const SquarePoints hemisphere = at.points(kSky);
+  for (std::uint32_t i = 0; i < cosine_rays; ++i) {
+    const glm::vec3 direction = frame.to_world(cosine_direction(hemisphere.square(i)));
+    const float density = map_rays > 0 ? sky_density->density(direction) : 0;
+    sum += along_sky_ray(at, direction, by_cosine, by_map, density);
+  }
+  const SquarePoints map = at.points(kSkyMap);
+  for (std::uint32_t i = 0; i < map_rays; ++i) {
+    const SkyDensity::Sample sample = sky_density->sample(map.square(i));
+    sum += along_sky_ray(at, sample.direction, by_cosine, by_map, sample.density);
+  }
+  return sum;
+}
+
+DirectLight::DirectLight(const RayScene& scene, LightRig rig)
+    : impl_(std::make_unique<Impl>(scene, std::move(rig))) {}
+DirectLight::~DirectLight() = default;
+
+const LightRig& DirectLight::rig() const noexcept {
+  return impl_->rig;
+}
+
+DirectLight::Result DirectLight::irradiance(const glm::dvec3& position, const glm::vec3& normal,
+                                            const LightSampling& sampling,
+                                            std::uint64_t seed) const {
+  const glm::vec3 unit = glm::normalize(normal);
+  if (!is_finite(unit) || !std::isfinite(glm::dot(position, position))) return {};
+  const std::optional<glm::dvec3> origin = step_off(impl_->scene, position, unit);
+  if (!origin) return {};
+  const Receiver at{position, *origin, unit, seed};
+  Result result;
+  for (std::size_t i = 0; i < impl_->rig.suns.size(); ++i) {
+    result.local +=
+        impl_->from_sun(impl_->rig.suns[i], at, at.points(kFirstSun + i), sampling.sun_rays);
+  }
+  for (const PointLight& point : impl_->rig.points) result.local += impl_->from_point(point, at);
+  result.local += impl_->from_emitters(at, sampling.area_rays);
+  result.sky = impl_->from_sky(at, sampling.sky_rays);
+  if (!is_finite(result.local)) result.local = glm::vec3(0);
+  if (!is_finite(result.sky)) result.sky = glm::vec3(0);
+  return result;
+}
+
+}  // namespace ptc

@@ -1,0 +1,111 @@
+// Lights and what they do to a surface point.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "engine/io/image/image.h"
+#include "engine/scene/ray_scene.h"
+
+namespace ptc {
+
+struct Sun {
+  glm::vec3 to_sun{0, 1, 0};        ///< unit
+  glm::vec3 irradiance{3};          ///< on a surface that faces it
+  float angular_radius = 0.00465f;  ///< radians, at most pi / 2; 0: a sharp shadow
+};
+
+/// Towards a sun: azimuth 0 is +z, 90 is +x; elevation 90 is +y.
+[[nodiscard]] glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees);
+
+struct PointLight {
+  glm::dvec3 position{0};
+  glm::vec3 intensity{1};  ///< W / sr
+};
+
+/// Light from infinitely far away: a constant, or a latitude-longitude map.
+///
+/// The map is laid as OpenEXR's ENVMAP_LATLONG: with +y up, the middle column looks along +z, and
+/// seen from inside, the columns to the right of it turn to -x; rows go from the zenith (the upper
+/// border) to the nadir, evenly in angle.
+///
+///     column   0      1/4     1/2     3/4     1  of the width
+///     looks   -z      +x      +z      -x     -z
+///
+/// Another `up` turns the map by the smallest rotation that takes +y to it (by half a turn about x
+/// for -y). Between pixel centres the radiance is bilinear, across the seam too.
+struct Sky {
+  glm::vec3 radiance{0};             ///< multiplies the map
+  std::shared_ptr<const Image> map;  ///< none: `radiance` from everywhere
+  std::string map_path;              ///< for the file's record
+  glm::vec3 up{0, 1, 0};             ///< unit
+
+  /// Radiance that arrives from `direction` (unit, away from the surface).
+  [[nodiscard]] glm::vec3 at(const glm::vec3& direction) const;
+};
+
+/// All lights of a scene; area lights are the mesh's emissive triangles.
+struct LightRig {
+  std::vector<Sun> suns;
+  std::vector<PointLight> points;
+  Sky sky;
+};
+
+/// What lights a scene that brings no light of its own: a sun and a bluish sky.
+[[nodiscard]] LightRig default_rig();
+
+/// JSON text of a rig (the map by its path), for the container's record:
+/// {"suns": [{"to_sun": [x, y, z], "irradiance": [r, g, b], "angular_radius": a}, ...],
+///  "points": [{"position": [x, y, z], "intensity": [r, g, b]}, ...],
+///  "sky": {"radiance": [r, g, b], "map": "path", "up": [x, y, z]}}
+/// @throws std::invalid_argument when a number is not finite or the path is not UTF-8
+[[nodiscard]] std::string to_json(const LightRig& rig);
+/// The inverse of to_json, exact; members that are absent keep their defaults. The map is named,
+/// not read: see load_sky_map(). Directions that are not unit are made so.
+/// @throws DataError when it is no JSON, a member is unknown or of the wrong type, or out of range
+[[nodiscard]] LightRig light_rig_from_json(const std::string& text);
+/// Reads the picture that `sky.map_path` names, if any, relative to `directory`.
+/// @throws DataError, std::system_error as read_image()
+void load_sky_map(Sky& sky, const std::filesystem::path& directory);
+
+/// Numbers of shadow rays for one surface point; 0 leaves these lights out.
+struct LightSampling {
+  unsigned sun_rays = 4;    ///< for each sun; 1 when the sun is a point
+  unsigned area_rays = 16;  ///< over all emissive triangles, by what each may give to the point
+  unsigned sky_rays = 64;   ///< cosine-distributed; with a map, half of them by its brightness
+};
+
+/// Direct irradiance by shadow rays. Deterministic: the seed fixes the sample points.
+/// Threads: may be called concurrently.
+/// Memory: 60 bytes an emissive triangle, 4 bytes a pixel of the sky map.
+class DirectLight {
+ public:
+  /// @param scene  must outlive this
+  /// @throws std::invalid_argument when a direction is zero or a number not finite or negative
+  DirectLight(const RayScene& scene, LightRig rig);
+  ~DirectLight();
+
+  /// Irradiance at a point, split by where it comes from.
+  struct Result {
+    glm::vec3 local{0};  ///< suns, points, emissive triangles
+    glm::vec3 sky{0};
+  };
+  /// @param position  on the surface: rays begin a few epsilons off it, see step_off()
+  /// @param normal    of any length; without a direction there is no light
+  /// Unbiased but for the steps off the surface; finite whatever the arguments.
+  [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::vec3& normal,
+                                  const LightSampling& sampling, std::uint64_t seed) const;
+  [[nodiscard]] const LightRig& rig() const noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ptc

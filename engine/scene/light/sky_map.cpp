@@ -1,0 +1,141 @@
+// The sky map's geometry, and sampling it by inverting its cumulated brightness: rows first, then
+// the pixel in the row, then a place around the pixel as far as its light spreads.
+#include "engine/scene/light/sky_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <glm/geometric.hpp>
+
+#include "engine/scene/texture.h"
+
+namespace ptc {
+namespace {
+
+constexpr double kPiWide = 3.14159265358979323846;
+
+bool has_map(const Sky& sky) {
+  return sky.map && !sky.map->pixels.empty();
+}
+
+double brightness(const glm::vec3& c) {
+  const double sum = static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
+  return sum > 0 && std::isfinite(sum) ? sum : 0;
+}
+
+// An offset from a pixel's centre, in pixels, that is likely as bilinear interpolation weighs it:
+// the density falls from 1 at the centre to 0 at the neighbours'.
+double tent(double unit) {
+  return unit < 0.5 ? std::sqrt(2 * unit) - 1 : 1 - std::sqrt(2 - 2 * unit);
+}
+
+// Which interval of a list of cumulated shares holds a value, and where in it, in [0, 1].
+struct Found {
+  std::size_t index;
+  double within;
+};
+
+template <typename Iterator>
+Found find_share(Iterator first, Iterator last, double value) {
+  const auto at = std::min(std::upper_bound(first, last, value), last - 1);
+  const double begin = at == first ? 0 : static_cast<double>(*(at - 1));
+  const double width = static_cast<double>(*at) - begin;
+  return {static_cast<std::size_t>(at - first),
+          width > 0 ? std::clamp((value - begin) / width, 0.0, 1.0) : 0.5};
+}
+
+}  // namespace
+
+SkyOrientation::SkyOrientation(const glm::vec3& up) : y_(glm::normalize(glm::dvec3(up))) {
+  // The smallest rotation that takes +y to u, applied to +x and +z: v -> v + k x v + k x (k x v) /
+  // (1 + u.y), with k = y x u; for u = -y half a turn about x.
+  if (y_.y < -1 + 1e-12) {
+    x_ = {1, 0, 0};
+    z_ = {0, 0, -1};
+    return;
+  }
+  const double a = 1 / (1 + y_.y);
+  x_ = {1 - a * y_.x * y_.x, -y_.x, -a * y_.x * y_.z};
+  z_ = {-a * y_.x * y_.z, -y_.z, 1 - a * y_.z * y_.z};
+}
+
+glm::dvec2 SkyOrientation::place_of(const glm::vec3& direction) const {
+  const glm::dvec3 d(direction);
+  const double turn = 0.5 - std::atan2(glm::dot(d, x_), glm::dot(d, z_)) / (2 * kPiWide);
+  const double rise = std::acos(std::clamp(glm::dot(d, y_), -1.0, 1.0)) / kPiWide;
+  return {turn < 1 ? turn : 0, rise};
+}
+
+glm::vec3 SkyOrientation::direction_at(const glm::dvec2& place) const {
+  const double longitude = (0.5 - place.x) * 2 * kPiWide;
+  const double polar = place.y * kPiWide;
+  const double flat = std::sin(polar);
+  return glm::vec3(flat * std::sin(longitude) * x_ + std::cos(polar) * y_ +
+                   flat * std::cos(longitude) * z_);
+}
+
+glm::vec3 Sky::at(const glm::vec3& direction) const {
+  if (!has_map(*this)) return radiance;
+  const glm::dvec2 place = SkyOrientation(up).place_of(direction);
+  return radiance * sample_panorama(*map, place.x * map->width, place.y * map->height);
+}
+
+SkyDensity::SkyDensity(const Sky& sky) : orientation_(sky.up), map_(sky.map) {
+  rows_.reserve(map_->height);
+  columns_.reserve(map_->pixels.size());
+  double total = 0;
+  std::vector<double> sums(map_->width);
+  for (unsigned row = 0; row < map_->height; ++row) {
+    sines_.push_back(std::sin(kPiWide * (row + 0.5) / map_->height));
+    double sum = 0;
+    for (unsigned column = 0; column < map_->width; ++column) {
+      sums[column] = sum += weight(column, row);
+    }
+    for (const double part : sums) columns_.push_back(static_cast<float>(sum > 0 ? part / sum : 0));
+    rows_.push_back(total += sum);
+  }
+}
+
+double SkyDensity::weight(unsigned column, unsigned row) const {
+  return brightness(map_->at(column, row)) * sines_[row];
+}
+
+// The weights, interpolated as the map is, over their sum; from places to solid angle by the sine.
+float SkyDensity::density_at(const glm::dvec2& place) const {
+  const double x = place.x * map_->width - 0.5;
+  const double y = place.y * map_->height - 0.5;
+  const double share_x = x - std::floor(x);
+  const double share_y = y - std::floor(y);
+  const auto column = static_cast<unsigned>(std::floor(x) + map_->width) % map_->width;
+  const unsigned next = (column + 1) % map_->width;
+  const double most = map_->height - 1.0;
+  const auto upper = static_cast<unsigned>(std::clamp(std::floor(y), 0.0, most));
+  const auto lower = static_cast<unsigned>(std::clamp(std::floor(y) + 1, 0.0, most));
+  const double value =
+      (1 - share_y) * ((1 - share_x) * weight(column, upper) + share_x * weight(next, upper)) +
+      share_y * ((1 - share_x) * weight(column, lower) + share_x * weight(next, lower));
+  const double sine = std::max(std::sin(kPiWide * place.y), 1e-9);
+  return static_cast<float>(value / rows_.back() * map_->width * map_->height /
+                            (2 * kPiWide * kPiWide * sine));
+}
+
+SkyDensity::Sample SkyDensity::sample(const glm::vec2& square) const {
+  const Found row =
+      find_share(rows_.begin(), rows_.end(), static_cast<double>(square.y) * rows_.back());
+  const auto first = columns_.begin() + static_cast<std::ptrdiff_t>(row.index * map_->width);
+  const Found column = find_share(first, first + map_->width, static_cast<double>(square.x));
+  const double x = static_cast<double>(column.index) + 0.5 + tent(column.within);
+  const double y = static_cast<double>(row.index) + 0.5 + tent(row.within);
+  // Columns wrap around; beyond the first and the last row, the map goes on as it is there.
+  const double turn = x / map_->width - std::floor(x / map_->width);
+  const double rise = std::abs(y) / map_->height;
+  const glm::dvec2 place(turn < 1 ? turn : 0, rise > 1 ? 2 - rise : rise);
+  return {orientation_.direction_at(place), density_at(place)};
+}
+
+float SkyDensity::density(const glm::vec3& direction) const {
+  return density_at(orientation_.place_of(direction));
+}
+
+}  // namespace ptc

@@ -1,0 +1,294 @@
+// Surfels from a mesh, a patch of some thousand at a time: spread points, group them, place a
+// surfel in each group, light it.
+#include "engine/scene/sampling/sampler.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "engine/scene/sampling/clusters.h"
+#include "engine/scene/sampling/directions.h"
+#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/scene/sampling/spacing_field.h"
+#include "engine/scene/sampling/surface_patches.h"
+#include "engine/scene/sampling/surroundings.h"
+
+namespace ptc {
+namespace {
+
+constexpr double kPatchSurfels = 8192;
+constexpr unsigned kPointsPerSurfel = 16;
+constexpr unsigned kRounds = 6;
+constexpr unsigned kLitPoints = 4;    // of a surfel's points, evenly spread
+constexpr double kLeastNormal = 0.1;  // length of a mean normal that means something
+constexpr double kMostAcross = 3e5;   // spacings along the side of a square as large as the mesh
+
+// What each of some points takes of a number of rays.
+unsigned share(unsigned rays) {
+  return (rays + kLitPoints - 1) / kLitPoints;
+}
+
+double sides_of(const Mesh& mesh, std::uint32_t triangle) {
+  return mesh.materials[mesh.material_of[triangle]].double_sided ? 2 : 1;
+}
+
+glm::vec3 finite_or_black(const glm::vec3& c) {
+  return std::isfinite(c.x + c.y + c.z) ? c : glm::vec3(0);
+}
+
+SamplingOptions resolved(const Mesh& mesh, SamplingOptions options) {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("sample_mesh: ") + what);
+  };
+  require(options.spacing >= 0 && std::isfinite(options.spacing),
+          "spacing is negative or not finite");
+  if (options.spacing == 0) options.spacing = spacing_for(mesh, options.count);
+  // Memory follows the number of surfels, if slowly.
+  const double side = spacing_for(mesh, 1);
+  require(side == 0 || side / options.spacing <= kMostAcross,
+          "the spacing is too small for the mesh");
+  if (options.camera) {
+    require(options.pixels_per_surfel > 0 && std::isfinite(options.pixels_per_surfel),
+            "pixels per surfel is not positive");
+    require(options.finest > 0 && options.finest <= 1, "the finest share is not in (0, 1]");
+    require(options.camera->width > 0 && options.camera->height > 0, "the camera has no pixels");
+  }
+  return options;
+}
+
+// Barycentric coordinates of the triangle's point nearest to p.
+// Source: Ericson 2005, Real-time collision detection, section 5.1.5.
+glm::vec2 nearest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
+                              const glm::dvec3& c) {
+  const glm::dvec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+  const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return {0, 0};
+  const double d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return {1, 0};
+  const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return {0, 1};
+  const double across_c = d1 * d4 - d3 * d2;
+  if (across_c <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
+  const double across_b = d5 * d2 - d1 * d6;
+  if (across_b <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 / (d2 - d6)};
+  const double across_a = d3 * d6 - d5 * d4;
+  if (across_a <= 0 && d4 >= d3 && d5 >= d6) {
+    const double v = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {1 - v, v};
+  }
+  const double sum = across_a + across_b + across_c;
+  return {across_b / sum, across_c / sum};
+}
+
+// What a group of points says of its surfel.
+struct Group {
+  double area = 0;  // one side's
+  glm::dvec3 albedo{0};
+  glm::dvec3 emission{0};
+  glm::dvec3 normal{0};
+  std::vector<std::uint32_t> members;  // ascending, so neighbours follow each other
+  std::uint32_t nearest = 0;           // the point nearest to the middle
+  float distance = std::numeric_limits<float>::infinity();
+};
+
+class MeshSource final : public PointSource {
+ public:
+  MeshSource(const DirectLight& light, const RayScene& scene, const SamplingOptions& options,
+             const Executor& executor)
+      : light_(light),
+        scene_(scene),
+        options_(resolved(scene.mesh(), options)),
+        lit_point_{share(options.lights.sun_rays), share(options.lights.area_rays),
+                   share(options.lights.sky_rays)},
+        executor_(executor),
+        field_(options_),
+        patches_(scene.mesh(), field_, kPatchSurfels) {}
+
+  std::size_t next(std::span<Surfel> out) override {
+    std::size_t filled = 0;
+    while (filled < out.size()) {
+      if (patch_ == ready_.size() && !fetch()) break;
+      const std::vector<Surfel>& from = ready_[patch_];
+      const std::size_t count = std::min(out.size() - filled, from.size() - taken_);
+      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(taken_), count,
+                  out.begin() + static_cast<std::ptrdiff_t>(filled));
+      filled += count;
+      taken_ += count;
+      if (taken_ == from.size()) {
+        ++patch_;
+        taken_ = 0;
+      }
+    }
+    return filled;
+  }
+
+ private:
+  // Makes the next patches, a few for each thread so that none waits long for the others.
+  bool fetch() {
+    const std::size_t count =
+        std::min<std::size_t>(patches_.size() - done_, std::size_t{4} * executor_.threads());
+    if (count == 0) return false;
+    ready_.assign(count, {});
+    patch_ = 0;
+    executor_.for_each(count, [&](std::size_t i, unsigned) { ready_[i] = make_patch(done_ + i); });
+    done_ += count;
+    return true;
+  }
+
+  [[nodiscard]] std::vector<Surfel> make_patch(std::size_t index) const;
+  [[nodiscard]] std::vector<Group> sum_up(const std::vector<SurfacePoint>& points,
+                                          const std::vector<std::uint32_t>& owners,
+                                          const std::vector<Cluster>& clusters) const;
+  [[nodiscard]] Surfel place(const Group& group, const SurfacePoint& nearest,
+                             const Cluster& cluster) const;
+  [[nodiscard]] std::optional<glm::vec3> reflected(const Group& group,
+                                                   std::span<const SurfacePoint> points, float side,
+                                                   std::uint64_t seed) const;
+
+  const DirectLight& light_;
+  const RayScene& scene_;
+  SamplingOptions options_;
+  LightSampling lit_point_;  // for each of a surfel's points
+  const Executor& executor_;
+  SpacingField field_;
+  SurfacePatches patches_;
+  std::size_t done_ = 0;                    // patches made so far
+  std::vector<std::vector<Surfel>> ready_;  // patches made and not yet all given away
+  std::size_t patch_ = 0;                   // of ready_, the one being given away
+  std::size_t taken_ = 0;                   // surfels of it that are gone
+};
+
+std::vector<Group> MeshSource::sum_up(const std::vector<SurfacePoint>& points,
+                                      const std::vector<std::uint32_t>& owners,
+                                      const std::vector<Cluster>& clusters) const {
+  std::vector<Group> groups(clusters.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const SurfacePoint& p = points[i];
+    Group& group = groups[owners[i]];
+    const SurfaceHit surface = scene_.surface(p.triangle, p.uv.x, p.uv.y);
+    group.area += p.area;
+    group.members.push_back(i);
+    group.albedo += glm::dvec3(surface.albedo);
+    group.emission += glm::dvec3(surface.emission);
+    group.normal += glm::dvec3(surface.normal);
+    const float distance = glm::distance(p.position, clusters[owners[i]].position);
+    if (distance < group.distance) {
+      group.distance = distance;
+      group.nearest = i;
+    }
+  }
+  return groups;
+}
+
+// A surfel at the middle of its group, on the triangle of the point nearest to that, across the
+// group's mean normal; away from edges that it sticks out over.
+Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest,
+                         const Cluster& cluster) const {
+  const Mesh& mesh = scene_.mesh();
+  const auto& c = mesh.triangles[nearest.triangle];
+  glm::vec2 uv =
+      nearest_on_triangle(glm::dvec3(cluster.position), glm::dvec3(mesh.positions[c[0]]),
+                          glm::dvec3(mesh.positions[c[1]]), glm::dvec3(mesh.positions[c[2]]));
+  if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = nearest.uv;
+  const SurfaceHit at = scene_.surface(nearest.triangle, uv.x, uv.y);
+  const auto count = static_cast<double>(group.members.size());
+  const double length = glm::length(group.normal);
+  Surfel surfel;
+  surfel.normal = length > kLeastNormal * count ? glm::vec3(group.normal / length) : at.normal;
+  surfel.radius = static_cast<float>(std::sqrt(0.5 * group.area));
+  surfel.albedo = finite_or_black(glm::vec3(group.albedo / count));
+  surfel.position =
+      at.position + glm::dvec3(move_inwards(scene_, at.position, surfel.normal, surfel.radius));
+  return surfel;
+}
+
+// Light reflected by a group in the mean: by those of a few points that are not buried. Nothing
+// when all are.
+std::optional<glm::vec3> MeshSource::reflected(const Group& group,
+                                               std::span<const SurfacePoint> points, float side,
+                                               std::uint64_t seed) const {
+  const std::size_t size = group.members.size(), count = std::min<std::size_t>(kLitPoints, size);
+  glm::vec3 sum(0);
+  float lit = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const SurfacePoint& point = points[group.members[(2 * i + 1) * size / (2 * count)]];
+    const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
+    const std::uint64_t own_seed = kLitPoints * seed + i;
+    if (is_buried(scene_, at.position, side * at.geometric_normal, own_seed)) continue;
+    const DirectLight::Result direct =
+        light_.irradiance(at.position, side * at.normal, lit_point_, own_seed);
+    sum += finite_or_black(at.albedo / kPi * (direct.local + direct.sky));
+    lit += 1;
+  }
+  if (lit == 0) return {};
+  return sum / lit;
+}
+
+std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
+  const SurfacePatch patch = patches_.spread(index, kPointsPerSurfel);
+  std::vector<std::uint32_t> owners;
+  const std::vector<Cluster> clusters =
+      cluster_points(patch.points, patch.surfels, kRounds, owners);
+  const std::vector<Group> groups = sum_up(patch.points, owners, clusters);
+
+  std::vector<Surfel> surfels;
+  double covered = 0;  // sum of 2 r^2, with those that are buried
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    const Group& group = groups[i];
+    const SurfacePoint& nearest = patch.points[group.nearest];
+    const double sides = sides_of(scene_.mesh(), nearest.triangle);
+    covered += group.area * sides;
+    const auto front = reflected(group, patch.points, 1, 2 * (patch.first + i));
+    const auto back =
+        sides == 1 ? std::nullopt : reflected(group, patch.points, -1, 2 * (patch.first + i) + 1);
+    if (!front && !back) continue;
+    Surfel surfel = place(group, nearest, clusters[i]);
+    const glm::vec3 emission =
+        finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
+    surfel.radiance = emission + front.value_or(glm::vec3(0));
+    surfels.push_back(surfel);
+    if (sides == 1) continue;
+    surfel.normal = -surfel.normal;
+    surfel.radiance = back.value_or(glm::vec3(0));
+    surfels.push_back(surfel);
+  }
+  const auto scale = static_cast<float>(std::sqrt(patch.area / covered));
+  for (Surfel& surfel : surfels) surfel.radius *= scale;
+  return surfels;
+}
+
+}  // namespace
+
+double spacing_for(const Mesh& mesh, std::uint64_t count) {
+  if (count == 0) throw std::invalid_argument("spacing_for: no surfel is wanted");
+  double area = 0;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& c = mesh.triangles[i];
+    const glm::dvec3 a(mesh.positions[c[0]]);
+    const double twice = glm::length(
+        glm::cross(glm::dvec3(mesh.positions[c[1]]) - a, glm::dvec3(mesh.positions[c[2]]) - a));
+    area += 0.5 * sides_of(mesh, i) * twice;
+  }
+  return std::sqrt(area / static_cast<double>(count));
+}
+
+std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels,
+                             unsigned threads) noexcept {
+  return 24 * std::max(triangles, surfels / 1000) + (std::uint64_t{20} << 20) * threads;
+}
+
+std::unique_ptr<PointSource> sample_mesh(const DirectLight& light, const RayScene& scene,
+                                         const SamplingOptions& options, const Executor& executor) {
+  return std::make_unique<MeshSource>(light, scene, options, executor);
+}
+
+}  // namespace ptc

@@ -1,0 +1,89 @@
+// Short rays around a surfel (surroundings.h).
+#include "engine/scene/sampling/surroundings.h"
+
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+#include "engine/scene/sampling/directions.h"
+#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/scene/step_off.h"
+
+namespace ptc {
+namespace {
+
+constexpr int kDirections = 16;
+constexpr int kHalvings = 4;
+constexpr float kOwnHeight = 0.2F;  // radii: the surface lies within it at the centre,
+constexpr float kSteepness = 0.7F;  // and rises or falls by so much more of the distance
+constexpr float kClearance =
+    0.1F;  // radii over the surface where the way to an edge is looked along
+
+// A disc at d radii from a straight edge lacks, to first order, the moment
+//   m = sin a - d^2 log((1 + sin a) / cos a),  cos a = d,
+// and sticks out as much as it leaves open between its like at d = 0.909, the mean half chord over
+// the square that it circumscribes: 0.909 - d is 0.76 m within 0.04 for all d from 0.2 on.
+constexpr float kMovePerMoment = 0.76F;
+
+constexpr unsigned kBuriedRays = 8;
+
+// Whether there is surface over or under the place at `distance` from the centre.
+bool goes_on(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
+             const glm::vec3& direction, float distance, float radius) {
+  const float height = kSteepness * distance + kOwnHeight * radius;
+  const glm::dvec3 above =
+      position + glm::dvec3(direction * distance) + glm::dvec3(normal * height);
+  return scene.occluded(above, -normal, 0, 2 * static_cast<double>(height));
+}
+
+// Distance at which the surface ends in a direction; the radius where it does not, or something is
+// before it.
+float reach(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
+            const glm::vec3& direction, float radius) {
+  if (goes_on(scene, position, normal, direction, radius, radius)) return radius;
+  const glm::dvec3 over = position + glm::dvec3(normal * (kClearance * radius));
+  if (scene.occluded(over, direction, 0, static_cast<double>(radius))) return radius;
+  float low = 0, high = radius;
+  for (int i = 0; i < kHalvings; ++i) {
+    const float middle = 0.5F * (low + high);
+    (goes_on(scene, position, normal, direction, middle, radius) ? low : high) = middle;
+  }
+  return 0.5F * (low + high);
+}
+
+}  // namespace
+
+glm::vec3 move_inwards(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
+                       float radius) {
+  const Basis frame(normal);
+  glm::vec3 moment(0);
+  for (int i = 0; i < kDirections; ++i) {
+    const float turn = 2 * kPi * static_cast<float>(i) / kDirections;
+    const glm::vec3 direction = frame.x * std::cos(turn) + frame.y * std::sin(turn);
+    const float distance = reach(scene, position, normal, direction, radius);
+    moment += direction * ((radius - distance) * (radius + distance) / radius);
+  }
+  return moment * (-kMovePerMoment * kPi / kDirections);
+}
+
+bool is_buried(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
+               std::uint64_t seed) {
+  const Mesh& mesh = scene.mesh();
+  const auto origin = step_off(scene, position, normal);
+  if (!origin) return true;
+  const Basis frame(normal);
+  const SquarePoints points(seed);
+  bool front = false;
+  for (std::uint32_t i = 0; i < kBuriedRays; ++i) {
+    const auto hit = scene.closest(*origin, frame.to_world(cosine_direction(points.square(i))), 0,
+                                   std::numeric_limits<double>::infinity());
+    if (!hit) return false;
+    if (!hit->front && !mesh.materials[mesh.material_of[hit->triangle]].double_sided) continue;
+    if (front) return false;
+    front = true;
+  }
+  return true;
+}
+
+}  // namespace ptc

@@ -1,0 +1,150 @@
+#include "engine/shade/gather/direction_buffer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+namespace ptc {
+namespace {
+
+constexpr float kPi = 3.14159265F;
+
+/// Solid angle of the part of a cube face below and left of (u, v), up to a constant.
+double corner_solid_angle(double u, double v) {
+  return std::atan2(u * v, std::sqrt(u * u + v * v + 1));
+}
+
+/// A rotation far from every symmetry of the axes; other variants turn on about a fixed axis by the
+/// golden angle, which comes near no multiple of a quarter soon.
+glm::mat3 tilted_frame(unsigned variant) {
+  const glm::vec3 z = glm::normalize(glm::vec3(0.36F, 0.48F, 0.8F));
+  const glm::vec3 x = glm::normalize(glm::cross(glm::vec3(0.2F, 1.0F, 0.1F), z));
+  const glm::mat3 tilt = glm::transpose(glm::mat3(x, glm::cross(z, x), z));
+  const float angle = 2.3999632F * static_cast<float>(variant);
+  return tilt * glm::mat3_cast(glm::angleAxis(angle, glm::normalize(glm::vec3(0.5F, -0.7F, 0.4F))));
+}
+
+/// Rows of each face with a pixel (1, u, v) of which axis . (1, u, v) + cone_sin |(1, u, v)| > 0.
+FaceRows rows_over(const CubeGeometry& cube, const Horizon& horizon) {
+  const glm::vec3 n = cube.rotation * horizon.axis;
+  const float slack = horizon.cone_sin * 1.7320509F;  // the longest (1, u, v)
+  FaceRows rows{};
+  for (int face = 0; face < 6; ++face) {
+    const CubeFace a(face);
+    const float best = n[a.w] * a.sign + std::abs(n[a.u]) + slack;
+    int first = 0, end = cube.resolution;
+    while (first < end && best + n[a.v] * cube.centre[first] <= 0) ++first;
+    while (first < end && best + n[a.v] * cube.centre[end - 1] <= 0) --end;
+    rows.first[face] = first;
+    rows.end[face] = end;
+  }
+  return rows;
+}
+
+}  // namespace
+
+DirectionGrid::DirectionGrid(unsigned resolution,
+                             const std::function<glm::vec3(const glm::vec3&)>& sky,
+                             unsigned variant)
+    : variant_(variant) {
+  if (resolution == 0 || resolution > kMostResolution || resolution % 16 != 0) {
+    throw std::invalid_argument("DirectionGrid: the resolution is 16, 32, 48 or 64");
+  }
+  const double step = 2.0 / resolution;
+  for (unsigned i = 0; i < resolution; ++i)
+    centre_.push_back(static_cast<float>((i + 0.5) * step - 1));
+  centre_.resize(resolution + DiscQueue::kReadLanes, std::numeric_limits<float>::quiet_NaN());
+  for (unsigned y = 0; y < resolution; ++y) {
+    for (unsigned x = 0; x < resolution; ++x) {
+      const double u = x * step - 1, v = y * step - 1;
+      const double solid_angle = corner_solid_angle(u, v) - corner_solid_angle(u + step, v) -
+                                 corner_solid_angle(u, v + step) +
+                                 corner_solid_angle(u + step, v + step);
+      const float length = std::sqrt(1 + centre_[x] * centre_[x] + centre_[y] * centre_[y]);
+      inverse_length_.push_back(1 / length);
+      weight_.push_back(static_cast<float>(solid_angle) / length);
+    }
+  }
+  edge_u_.resize(weight_.size());
+  edge_v_.resize(weight_.size());
+  for (std::size_t at = 0; at < weight_.size(); ++at) {
+    if ((at + 1) % resolution != 0) edge_u_[at] = 0.5F * (weight_[at] + weight_[at + 1]);
+    if (at + resolution < weight_.size())
+      edge_v_[at] = 0.5F * (weight_[at] + weight_[at + resolution]);
+  }
+  geometry_ = {.centre = centre_.data(),
+               .inverse_length = inverse_length_.data(),
+               .weight = weight_.data(),
+               .edge_u = edge_u_.data(),
+               .edge_v = edge_v_.data(),
+               .resolution = static_cast<int>(resolution),
+               .rotation = tilted_frame(variant)};
+  if (!sky) return;
+  const glm::mat3 to_world = glm::transpose(geometry_.rotation);
+  const std::size_t plane = std::size_t{resolution} * resolution;
+  sky_.resize(6 * 3 * plane);
+  for (int face = 0; face < 6; ++face) {
+    const CubeFace a(face);
+    for (std::size_t pixel = 0; pixel < plane; ++pixel) {
+      // Four samples a pixel: maps are sharper than pixels.
+      glm::vec3 sum(0);
+      for (int sub = 0; sub < 4; ++sub) {
+        const float shift = static_cast<float>(step) * 0.25F;
+        glm::vec3 direction;
+        direction[a.w] = a.sign;
+        direction[a.u] = centre_[pixel % resolution] + (sub % 2 == 0 ? -shift : shift);
+        direction[a.v] = centre_[pixel / resolution] + (sub / 2 == 0 ? -shift : shift);
+        sum += sky(glm::normalize(to_world * direction));
+      }
+      for (int c = 0; c < 3; ++c)
+        sky_[static_cast<std::size_t>(3 * face + c) * plane + pixel] = sum[c] * 0.25F;
+    }
+  }
+}
+
+DirectionBuffer::DirectionBuffer(unsigned resolution, bool coloured)
+    : nearness_(std::size_t{6} * resolution * resolution + std::size_t{4} * resolution, 0),
+      rgbe_(coloured ? nearness_.size() : 0, 0) {}
+
+void DirectionBuffer::clear() noexcept {
+  std::ranges::fill(nearness_, 0.0F);
+  std::ranges::fill(rgbe_, 0);
+}
+
+void DirectionBuffer::copy(const DirectionBuffer& other) noexcept {
+  std::ranges::copy(other.nearness_, nearness_.begin());
+  std::ranges::copy(other.rgbe_, rgbe_.begin());
+}
+
+void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides,
+                           unsigned viewpoint, const Horizon& horizon) noexcept {
+  draw_discs(grid.geometry_, {nearness_.data(), rgbe_.data()}, rows_over(grid.geometry_, horizon),
+             discs, sides, viewpoint);
+}
+
+Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
+                                 std::span<const glm::vec3> offsets) const noexcept {
+  const glm::mat3& rotation = grid.geometry_.rotation;
+  ViewOffsets turned{};
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    const glm::vec3 offset = rotation * offsets[i];
+    for (int k = 0; k < 3; ++k) turned.axis[k][i] = offset[k];
+  }
+  PixelSums sums;
+  sum_pixels(grid.geometry_, {nearness_.data(), rgbe_.data()},
+             grid.sky_.empty() ? nullptr : grid.sky_.data(), rotation * normal,
+             offsets.empty() ? nullptr : &turned, sums);
+  Shading shading;
+  shading.occlusion = sums.covered / sums.total;
+  shading.irradiance = sums.light * (kPi / sums.total);
+  shading.sky = sums.sky * (kPi / sums.total);
+  const float length = glm::length(sums.open);
+  shading.bent_normal = length > 0 ? glm::transpose(rotation) * (sums.open / length) : normal;
+  return shading;
+}
+
+}  // namespace ptc

@@ -1,0 +1,60 @@
+#include "engine/shade/gather/receiver_cell.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace ptc {
+
+MortonKey receiver_key(const Frame& frame, const glm::dvec3& position, unsigned variant) {
+  LatticePoint q = frame.to_lattice({position.x, position.y, position.z});
+  if (variant == 0) return encode_morton(q);
+  // Half the lattice, moved by up to the other half: multiples of the roots of x^4 = x + 1, modulo
+  // 1 (Roberts 2018), spread evenly.
+  constexpr std::array<double, 3> kStep{0.8191725134, 0.6710436067, 0.5497004779};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double whole = 0;
+    const double shift = std::modf(kStep[axis] * variant, &whole);
+    q[axis] = q[axis] / 2 + static_cast<std::uint64_t>(shift * 0x1p41);
+  }
+  return encode_morton(q);
+}
+
+ReceiverCell::ReceiverCell(std::span<const PlacedReceiver> receivers, double unit) {
+  if (receivers.size() == 1) {
+    centre = receivers[0].position;
+    axis = receivers[0].normal;
+    cone_cos = 1;
+    has_horizon = true;
+    return;
+  }
+  glm::vec3 normals(0);
+  // Sums relative to the first, so that far-off scenes lose nothing.
+  const glm::dvec3 origin = receivers[0].position;
+  glm::dvec3 offsets(0);
+  for (const PlacedReceiver& r : receivers) {
+    offsets += r.position - origin;
+    normals += r.normal;
+  }
+  centre = origin + offsets / static_cast<double>(receivers.size());
+  const float length = std::sqrt(glm::dot(normals, normals));
+  axis = length > 0 ? normals / length : glm::vec3(0, 0, 1);
+  cone_cos = length > 0 ? 1.0F : -1.0F;
+  double farthest = 0;
+  double lowest = 0;
+  for (const PlacedReceiver& r : receivers) {
+    const glm::dvec3 d = r.position - centre;
+    farthest = std::max(farthest, glm::dot(d, d));
+    cone_cos = std::min(cone_cos, glm::dot(axis, r.normal));
+    lowest = std::min(lowest, glm::dot(d, glm::dvec3(r.normal)));
+  }
+  radius = static_cast<float>(std::sqrt(farthest) * unit);
+  depth = static_cast<float>(-lowest * unit);
+  cone_cos = std::max(cone_cos, -1.0F);
+  cone_sin = std::sqrt(std::max(0.0F, 1 - cone_cos * cone_cos));
+  has_horizon = cone_cos > 0.1F;
+}
+
+}  // namespace ptc

@@ -1,0 +1,68 @@
+#include "engine/shade/gather/scene_view.h"
+
+#include <array>
+
+#include "format/error.h"
+
+namespace ptc {
+
+SceneView::SceneView(const ContainerReader& container, LostPages* lost)
+    : container_(&container),
+      lost_(lost),
+      frame_(container.header().frame),
+      points_(container.superblock().points),
+      groups_(container.superblock().node_groups),
+      points_per_page_(container.superblock().points_per_page) {
+  const Superblock& superblock = container.superblock();
+  root_.interior = superblock.root_page != kNoPage;
+  root_.page = superblock.root_page;
+  root_.slot = superblock.root_slot;
+}
+
+void SceneView::fail(const char* clause, const char* text) const {
+  throw FormatError(container_->superblock().file_bytes - 2 * kBlockBytes, clause, text)
+      .rebased(0, container_->path().string());
+}
+
+GroupView SceneReader::group(std::uint32_t page, std::uint16_t slot) {
+  const PageReader::Page view = pages_.get(page);
+  const NodePage nodes(view.payload, view.record_count);
+  if (slot >= nodes.size()) {
+    view_.fail("spec/nodes.md#references", "a node refers to a group that its page does not hold");
+  }
+  return nodes[slot];
+}
+
+unsigned SceneReader::lost_children(std::uint32_t page, std::uint16_t slot) {
+  const GroupView view = group(page, slot);
+  std::array<ChildRef, 8> children;
+  const int count = view.size();
+  for (int i = 0; i < count; ++i) children[static_cast<std::size_t>(i)] = view.child(i);
+  unsigned lost = 0;
+  for (int i = 0; i < count; ++i)
+    lost |= (is_lost(children[static_cast<std::size_t>(i)]) ? 1U : 0U) << i;
+  return lost;
+}
+
+bool SceneReader::is_lost(const ChildRef& child) {
+  if (child.interior) return view_.lost()->contains(child.page, pages_);
+  const std::uint64_t end = child.first_point + child.point_count,
+                      per_page = view_.points_per_page();
+  for (std::uint64_t point = child.first_point; point < end;
+       point = (point / per_page + 1) * per_page) {
+    if (view_.lost()->contains(view_.point_page(point), pages_)) return true;
+  }
+  return false;
+}
+
+void WalkLimit::take_group() {
+  if (groups_-- == 0) view_.fail("spec/nodes.md#references", "a group is the child of two nodes");
+}
+
+void WalkLimit::take_points(std::uint64_t count) {
+  if (count > points_)
+    view_.fail("spec/nodes.md#node-leaf", "leaves hold more points than there are");
+  points_ -= count;
+}
+
+}  // namespace ptc

@@ -1,0 +1,429 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "engine/shade/kernels/gather_kernels.h"
+
+// This file is compiled once per instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/shade/kernels/gather_clusters.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "engine/shade/kernels/gather-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ptc::HWY_NAMESPACE {
+namespace {
+
+constexpr float kPi = 3.14159265F;
+
+/// Clusters relative to a cell's centre.
+struct Clusters {
+  Vec to;
+  VF radius, thickness;
+  Vec mean;    // normal over area, not unit
+  VF length;   // of the mean: 1 where all surfels face one way
+  Vec normal;  // unit; NaN where the mean is zero
+  VF distance2;
+};
+
+HWY_INLINE void set_derived(Clusters& c) {
+  c.length = hn::Sqrt(dot(c.mean, c.mean));
+  c.normal = scaled(c.mean, hn::Div(hn::Set(F(), 1.0F), c.length));
+  c.distance2 = dot(c.to, c.to);
+}
+
+/// How far they may reach over the horizon of some receiver; not above it where negative.
+HWY_INLINE VF top(const CellTest& test, const Clusters& c) {
+  const Vec axis = spread(test.cell.axis);
+  // What lies in the sphere and in the slab; of a mean normal of zero, NaN, the sphere alone.
+  auto rise = greatest_rise(test.cell, dot(c.normal, axis), c.thickness, c.radius);
+  rise = hn::IfThenElse(hn::Lt(rise, c.radius), rise, c.radius);
+  return hn::Add(highest(test.cell, c.distance2, dot(c.to, axis)), rise);
+}
+
+HWY_INLINE MF over_horizon(const CellTest& test, const Clusters& c) {
+  return hn::Gt(top(test, c), hn::Zero(F()));
+}
+
+struct Verdict {
+  MF drawn, open, keep;
+  MF stand_in;  ///< of those drawn: not small enough, but closed
+};
+
+/// What becomes of clusters over the horizon.
+/// @param closed  those that are not to be opened, however large they are
+HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wanted, MF closed) {
+  const F f;
+  const auto limit = hn::Set(f, test.limit), rho = hn::Set(f, test.cell.radius),
+             shared_from = hn::Set(f, test.shared_from);
+  const auto nearest = hn::Max(hn::Zero(f), hn::Sub(d, rho));
+  const auto r2 = hn::Mul(c.radius, c.radius);
+  const auto fine = hn::Lt(r2, hn::Mul(limit, hn::Mul(nearest, nearest)));  // for every receiver
+  const auto small = hn::And(wanted, hn::Or(fine, closed));
+  const auto large = hn::AndNot(small, wanted);
+  const auto drawn = hn::And(small, hn::Ge(d, shared_from));
+  const auto stand_in = hn::AndNot(fine, drawn);
+  if (test.last) return {drawn, large, hn::FirstN(f, 0), stand_in};
+  // Open now what the children would open anyway, or what opens into shared parts.
+  const auto farthest = hn::Add(d, rho);
+  const auto opens = hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from),
+                            hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
+  // Of what faces many ways, some part is always seen from the front.
+  const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), c.length), hn::Zero(f)));
+  const auto height = hn::Max(hn::Abs(dot(c.to, c.mean)), scattered);
+  const auto above = hn::Add(dot(c.to, spread(test.cell.axis)), hn::Add(c.radius, rho));
+  const auto band = hn::Lt(d, seam_end(test, height, above, d));
+  return {drawn, hn::And(large, opens), hn::Or(hn::AndNot(opens, large), hn::And(small, band)),
+          stand_in};
+}
+
+/// Counts clusters drawn in place of their children, and what these may cover of a receiver's
+/// hemisphere, weighted by the cosine (spec/shading.md#damage): no more than the cluster's sphere,
+/// nor than a wedge as wide as the sphere and as high as the cluster reaches over the horizon.
+HWY_INLINE void count_stand_ins(const CellTest& test, MF mask, const Clusters& c, VF d,
+                                CellOutput& out) {
+  const F f;
+  if (hn::AllFalse(f, mask)) return;
+  const auto one = hn::Set(f, 1.0F);
+  const auto nearest = hn::Max(hn::Zero(f), hn::Sub(d, hn::Set(f, test.cell.radius)));
+  const auto wide = hn::Div(c.radius, nearest);
+  auto share = hn::Mul(wide, wide);
+  if (test.cell.has_horizon) {
+    const auto high = hn::Min(hn::Div(top(test, c), hn::Sub(nearest, c.radius)), one);
+    share = hn::Min(share, hn::Mul(hn::Mul(hn::Set(f, 0.5F), wide), hn::Mul(high, high)));
+  }
+  share = hn::IfThenElse(hn::Lt(c.radius, nearest), share, one);
+  out.stand_ins += static_cast<unsigned>(hn::CountTrue(f, mask));
+  out.stand_in_share += hn::GetLane(hn::SumOfLanes(f, hn::IfThenElseZero(mask, share)));
+}
+
+/// Clusters all of whose surfels show their backs to every receiver.
+HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test, const Vec& to,
+                         VF distance2, VF radius) {
+  const F f;
+  const I i;
+  const auto cosine = hn::Mul(
+      hn::ConvertTo(f, hn::PromoteTo(i, hn::LoadU(I16(), reinterpret_cast<const std::int16_t*>(
+                                                             group.cone_cos() + 2 * first)))),
+      hn::Set(f, 1.0F / 32767));
+  const auto packed = hn::BitCast(i, load_u16(group.cone_axis() + 2 * first));
+  const auto coordinate = [&](auto bits) {
+    return hn::Max(hn::Mul(hn::ConvertTo(f, hn::ShiftRight<24>(bits)), hn::Set(f, 1.0F / 127)),
+                   hn::Set(f, -1.0F));
+  };
+  const Vec axis =
+      unfold(coordinate(hn::ShiftLeft<24>(packed)), coordinate(hn::ShiftLeft<16>(packed)));
+  const auto reach = hn::Add(radius, hn::Set(f, test.cell.radius));
+  const auto clear = hn::NegMulAdd(reach, reach, distance2);
+  auto sine = hn::Sqrt(hn::Max(hn::NegMulAdd(cosine, cosine, hn::Set(f, 1.0F)), hn::Zero(f)));
+  sine = hn::Add(sine, hn::Set(f, 0.02F));  // the axis is rounded
+  const auto least = hn::MulAdd(sine, hn::Sqrt(hn::Max(clear, hn::Zero(f))), reach);
+  return hn::And(hn::And(hn::Gt(cosine, hn::Set(f, 0.05F)), hn::Gt(clear, hn::Zero(f))),
+                 hn::Gt(dot(axis, to), least));
+}
+
+/// Appends clusters as discs (spec/shading.md#splats).
+/// @param cube  share() of the area that faces along an axis, radiance() of it as rgbe; against the
+/// axis where the
+///     mask says so
+template <class Cube>
+HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, VF distance,
+                              VF area, const Cube& cube, DiscQueue& queue) {
+  const F f;
+  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
+  const VF along_axis[3] = {toward.x, toward.y, toward.z};
+  VF weight[3], front = zero;
+  for (int k = 0; k < 3; ++k) {
+    weight[k] = hn::Mul(hn::Abs(along_axis[k]), cube.share(k, hn::Lt(along_axis[k], zero)));
+    front = hn::Add(front, weight[k]);
+  }
+  // Fronts less backs are the mean normal's.
+  const auto projected =
+      test.sides == Sides::both ? hn::Max(front, hn::Sub(front, dot(c.mean, toward))) : front;
+  mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
+
+  // The silhouette of an ellipsoid is that of a disc across it, turned towards the receiver.
+  const auto flat = hn::Gt(c.length, hn::Set(f, kFlat)),
+             directed = hn::Gt(c.length, hn::Set(f, kDirected));
+  const Vec normal{hn::IfThenElseZero(directed, c.normal.x),
+                   hn::IfThenElseZero(directed, c.normal.y),
+                   hn::IfThenElseZero(directed, c.normal.z)};
+  const auto cosine = dot(normal, toward);
+  const auto ratio = hn::Mul(hn::Set(f, kSlim), hn::Div(c.thickness, c.radius));
+  const auto slim = hn::IfThenElse(hn::And(directed, hn::Lt(ratio, one)), ratio, one);
+  const auto lean2 = hn::NegMulAdd(slim, slim, one);
+  const auto foreshortened =
+      hn::Sqrt(hn::MulAdd(lean2, hn::Mul(cosine, cosine), hn::Mul(slim, slim)));
+  const auto turn = hn::IfThenElse(flat, one, hn::CopySign(hn::Sqrt(lean2), cosine));
+  const auto rest = hn::IfThenElse(flat, zero, hn::NegMulAdd(turn, cosine, foreshortened));
+  const Vec disc_normal{hn::MulAdd(turn, normal.x, hn::Mul(rest, toward.x)),
+                        hn::MulAdd(turn, normal.y, hn::Mul(rest, toward.y)),
+                        hn::MulAdd(turn, normal.z, hn::Mul(rest, toward.z))};
+  const auto seen =
+      hn::Mul(hn::Set(f, test.inflation / kPi), hn::Div(hn::Mul(area, projected), foreshortened));
+  const auto wanted = hn::IfThenElse(flat, hn::Mul(area, hn::Set(f, 0.5F)), seen);
+  const auto most =
+      hn::Mul(hn::IfThenElse(flat, one, hn::Set(f, kSolid)), hn::Mul(c.radius, c.radius));
+  const auto radius2 = hn::IfThenElse(hn::Lt(wanted, most), wanted, most);
+
+  VU colour = hn::Zero(U());
+  if (test.bleeding) {
+    // What is not flat is dimmed by its backs, of which most are hidden; a flat disc has a black
+    // one.
+    const auto over =
+        hn::IfThenElse(flat, front, hn::Max(front, hn::Mul(hn::Set(f, kDark), projected)));
+    const auto mix = hn::IfThenElse(hn::Gt(over, zero), hn::Div(one, over), zero);
+    VF light[3] = {zero, zero, zero};
+    for (int k = 0; k < 3; ++k) {
+      const UnpackedRgbe<F> radiance =
+          unpack_rgbe(f, cube.radiance(k, hn::Lt(along_axis[k], zero)));
+      const auto scale = hn::Mul(radiance.scale, hn::Mul(weight[k], mix));
+      for (int channel = 0; channel < 3; ++channel)
+        light[channel] = hn::MulAdd(radiance.byte[channel], scale, light[channel]);
+    }
+    colour = pack_rgbe(light[0], light[1], light[2]);
+  }
+  push(queue, mask, c.to, disc_normal, hn::Sqrt(radius2), colour);
+}
+
+/// Appends clusters to those left to the children. Positions are rounded to their distance, so the
+/// bounds grow by that.
+HWY_INLINE void leave(NearClusters& left, MF mask, const Clusters& c, VF distance, VU payload) {
+  const F f;
+  const U u;
+  const std::size_t at = left.size;
+  const auto rounding = hn::Mul(distance, hn::Set(f, kRounding));
+  append(c.to.x, mask, f, left.x.data() + at);
+  append(c.to.y, mask, f, left.y.data() + at);
+  append(c.to.z, mask, f, left.z.data() + at);
+  append(hn::Add(c.radius, rounding), mask, f, left.radius.data() + at);
+  append(hn::Add(c.thickness, rounding), mask, f, left.thickness.data() + at);
+  append(c.mean.x, mask, f, left.mean_x.data() + at);
+  append(c.mean.y, mask, f, left.mean_y.data() + at);
+  append(c.mean.z, mask, f, left.mean_z.data() + at);
+  left.size += append(payload, hn::RebindMask(u, mask), u, left.payload.data() + at);
+}
+
+/// Eight children of a group from `first` on, in columns of the page.
+class GroupLanes {
+ public:
+  GroupLanes(const GroupView& group, const CellTest& test)
+      : group_(group), corner_(decode_morton(group.cell())), test_(test) {
+    const int level = group.level();
+    const double edge = level < kLatticeBits
+                            ? static_cast<double>(std::uint64_t{1} << (kLatticeBits - level))
+                            : 1.0;
+    step_ = static_cast<float>(edge * test.unit / 65536);
+  }
+
+  HWY_INLINE Clusters load(int first) {
+    const F f;
+    const int at = 2 * first;
+    const auto step = hn::Set(f, step_), unit = hn::Set(f, static_cast<float>(test_.unit));
+    const auto offset = [&](std::size_t k, double centre) {
+      return hn::Set(f,
+                     static_cast<float>((static_cast<double>(corner_[k]) - centre) * test_.unit));
+    };
+    const glm::dvec3& centre = test_.cell.centre;
+    for (int k = 0; k < 6; ++k) {
+      share_[k] = hn::Mul(to_float(load_u16(group_.facing(k) + at)), hn::Set(f, 1.0F / 65535));
+    }
+    Clusters c{
+        .to = {hn::MulAdd(step, to_float(load_u16(group_.mean_x() + at)), offset(0, centre.x)),
+               hn::MulAdd(step, to_float(load_u16(group_.mean_y() + at)), offset(1, centre.y)),
+               hn::MulAdd(step, to_float(load_u16(group_.mean_z() + at)), offset(2, centre.z))},
+        .radius = hn::Mul(unit, load_ufloat16(group_.radius() + at)),
+        .thickness = hn::Mul(unit, load_ufloat16(group_.thickness() + at)),
+        .mean = {hn::Sub(share_[0], share_[1]), hn::Sub(share_[2], share_[3]),
+                 hn::Sub(share_[4], share_[5])}};
+    set_derived(c);
+    return c;
+  }
+
+  HWY_INLINE void draw(int first, MF mask, const Clusters& c, VF distance, DiscQueue& queue) const {
+    draw_clusters(test_, mask, c, distance, load_ufloat16(group_.area() + 2 * first),
+                  Cube{*this, first}, queue);
+  }
+
+ private:
+  struct Cube {
+    const GroupLanes& lanes;
+    int first;
+
+    HWY_INLINE VF share(int axis, MF negative) const {
+      return hn::IfThenElse(negative, lanes.share_[2 * axis + 1], lanes.share_[2 * axis]);
+    }
+    HWY_INLINE VU radiance(int axis, MF negative) const {
+      const U u;
+      const auto load = [&](int k) {
+        return hn::LoadU(
+            u, reinterpret_cast<const std::uint32_t*>(lanes.group_.radiance(k) + 4 * first));
+      };
+      return hn::IfThenElse(hn::RebindMask(u, negative), load(2 * axis + 1), load(2 * axis));
+    }
+  };
+
+  const GroupView& group_;
+  LatticePoint corner_;
+  const CellTest& test_;
+  float step_;
+  VF share_[6];
+};
+
+/// Payloads of clusters that a cell left, one a lane.
+class PayloadLanes {
+ public:
+  /// @param index  of each among the payloads
+  PayloadLanes(const ClusterPayload* payloads, VU index)
+      : base_(reinterpret_cast<const float*>(payloads)),
+        word_(hn::ShiftLeft<4>(hn::BitCast(I(), index))) {}
+
+  HWY_INLINE MF closed() const {
+    const U u;
+    const auto kind = hn::BitCast(u, hn::GatherIndex(F(), base_ + 15, word_));
+    return hn::RebindMask(F(), hn::TestBit(kind, hn::Set(u, kClosed)));
+  }
+  HWY_INLINE VF area() const { return hn::GatherIndex(F(), base_ + 12, word_); }
+  HWY_INLINE VF share(int axis, MF negative) const {
+    return hn::GatherIndex(F(), base_ + 6 + 2 * axis, face(negative));
+  }
+  HWY_INLINE VU radiance(int axis, MF negative) const {
+    return hn::BitCast(U(), hn::GatherIndex(F(), base_ + 2 * axis, face(negative)));
+  }
+
+ private:
+  HWY_INLINE hn::VFromD<I> face(MF negative) const {
+    const I i;
+    return hn::Add(word_, hn::IfThenElseZero(hn::RebindMask(i, negative), hn::Set(i, 1)));
+  }
+
+  const float* base_;
+  hn::VFromD<I> word_;
+};
+
+/// The payload of a child.
+ClusterPayload payload_of(const GroupView& group, int i, bool closed) {
+  ClusterPayload payload;
+  for (int k = 0; k < 6; ++k) {
+    std::memcpy(&payload.rgbe[k], group.radiance(k) + 4 * std::ptrdiff_t{i},
+                sizeof payload.rgbe[k]);
+    payload.share[k] = static_cast<float>(GroupView::u16_at(group.facing(k), i)) * (1.0F / 65535);
+  }
+  payload.area = std::bit_cast<float>(std::uint32_t{GroupView::u16_at(group.area(), i)} << 15);
+  const std::uint64_t reference = group.reference(i);
+  payload.reference[0] = static_cast<std::uint32_t>(reference);
+  payload.reference[1] = static_cast<std::uint32_t>(reference >> 32);
+  payload.kind = (group.interior_mask() >> i & kInterior) | (closed ? kClosed : 0);
+  return payload;
+}
+
+}  // namespace
+
+unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& test,
+                      CellOutput& out) {
+  const F f;
+  const U u;
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  GroupLanes loader(group, test);
+  unsigned opened = 0;
+  for (int first = 0; first < group.size(); first += lanes) {
+    auto wanted = hn::FirstN(f, static_cast<std::size_t>(group.size() - first));
+    const Clusters c = loader.load(first);
+    if (test.cell.has_horizon) wanted = hn::And(wanted, over_horizon(test, c));
+    if (test.sides == Sides::front)
+      wanted = hn::AndNot(faces_away(group, first, test, c.to, c.distance2, c.radius), wanted);
+    if (hn::AllFalse(f, wanted)) continue;
+    const auto d = hn::Sqrt(c.distance2);
+    const MF shut = mask_of(closed >> first);
+    const Verdict verdict = judge(test, c, d, wanted, shut);
+    if (closed != 0) count_stand_ins(test, verdict.stand_in, c, d, out);
+    if (!hn::AllFalse(f, verdict.drawn)) loader.draw(first, verdict.drawn, c, d, out.queue);
+    opened |= bits_of(f, verdict.open) << first;
+    if (hn::AllFalse(f, verdict.keep)) continue;
+    const auto next = static_cast<std::uint32_t>(out.payloads.size());
+    unsigned rest = bits_of(f, verdict.keep);
+    alignas(64) std::uint32_t index[kListLanes] = {};
+    for (std::uint32_t count = 0; rest != 0; rest &= rest - 1) {
+      const int lane = std::countr_zero(rest);
+      index[lane] = next + count++;
+      out.payloads.push_back(payload_of(group, first + lane, (closed >> (first + lane) & 1) != 0));
+    }
+    out.left->clusters.make_room(kListLanes);
+    leave(out.left->clusters, verdict.keep, c, d, hn::LoadU(u, index));
+  }
+  return opened;
+}
+
+std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move,
+                            const CellTest& test, CellOutput& out,
+                            std::vector<std::uint32_t>& opened) {
+  const F f;
+  const U u;
+  const std::size_t lanes = hn::Lanes(f);
+  const Vec moved = spread(move);
+  for (; from < near.size && !out.queue.full(); from += lanes) {
+    const auto load = [&](const std::vector<float>& column) {
+      return hn::LoadU(f, column.data() + from);
+    };
+    Clusters c{.to = {hn::Add(load(near.x), moved.x), hn::Add(load(near.y), moved.y),
+                      hn::Add(load(near.z), moved.z)},
+               .radius = load(near.radius),
+               .thickness = load(near.thickness),
+               .mean = {load(near.mean_x), load(near.mean_y), load(near.mean_z)}};
+    set_derived(c);
+    auto wanted = hn::FirstN(f, near.size - from);
+    if (test.cell.has_horizon) wanted = hn::And(wanted, over_horizon(test, c));
+    if (hn::AllFalse(f, wanted)) continue;
+    const auto d = hn::Sqrt(c.distance2);
+    const auto payload = hn::LoadU(u, near.payload.data() + from);
+    MF shut = hn::FirstN(f, 0);
+    if (test.damaged) {
+      shut = hn::And(wanted, PayloadLanes(out.payloads.data(),
+                                          hn::IfThenElseZero(hn::RebindMask(u, wanted), payload))
+                                 .closed());
+    }
+    const Verdict verdict = judge(test, c, d, wanted, shut);
+    if (test.damaged) count_stand_ins(test, verdict.stand_in, c, d, out);
+    if (!hn::AllFalse(f, verdict.drawn)) {
+      const PayloadLanes cube(out.payloads.data(),
+                              hn::IfThenElseZero(hn::RebindMask(u, verdict.drawn), payload));
+      draw_clusters(test, verdict.drawn, c, d, cube.area(), cube, out.queue);
+    }
+    if (!hn::AllFalse(f, verdict.open)) {
+      opened.resize(opened.size() + lanes);
+      const std::size_t count = append(payload, hn::RebindMask(u, verdict.open), u,
+                                       opened.data() + opened.size() - lanes);
+      opened.resize(opened.size() - lanes + count);
+    }
+    if (!hn::AllFalse(f, verdict.keep)) leave(out.left->clusters, verdict.keep, c, d, payload);
+  }
+  return std::min(from, near.size);
+}
+
+}  // namespace ptc::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ptc {
+
+HWY_EXPORT(gather_group);
+HWY_EXPORT(gather_clusters);
+
+unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& test,
+                      CellOutput& out) {
+  return HWY_DYNAMIC_DISPATCH(gather_group)(group, closed, test, out);
+}
+
+std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move,
+                            const CellTest& test, CellOutput& out,
+                            std::vector<std::uint32_t>& opened) {
+  if (out.left) out.left->clusters.make_room(near.size - from);
+  return HWY_DYNAMIC_DISPATCH(gather_clusters)(near, from, move, test, out, opened);
+}
+
+}  // namespace ptc
+#endif

@@ -1,0 +1,183 @@
+#include <algorithm>
+#include <cmath>
+
+#include "engine/shade/kernels/gather_kernels.h"
+
+// This file is compiled once per instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/shade/kernels/gather_surfels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "engine/shade/kernels/gather-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ptc::HWY_NAMESPACE {
+namespace {
+
+/// Surfels relative to a cell's centre.
+struct Surfels {
+  Vec to, normal;
+  VF radius;
+};
+
+/// Draws, leaves or drops surfels.
+/// @param colour  gives their rgbe, when it is needed
+template <class Colour>
+HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const Colour& colour,
+                       CellOutput& out) {
+  const F f;
+  const U u;
+  const ReceiverCell& cell = test.cell;
+  const Vec axis = spread(cell.axis);
+  const auto d2 = dot(s.to, s.to);
+  wanted = hn::And(wanted, hn::Gt(s.radius, hn::Zero(f)));
+  if (cell.has_horizon) {
+    const auto rise =
+        hn::Min(greatest_rise(cell, dot(s.normal, axis), hn::Zero(f), s.radius), s.radius);
+    wanted =
+        hn::And(wanted, hn::Gt(hn::Add(highest(cell, d2, dot(s.to, axis)), rise), hn::Zero(f)));
+  }
+  const auto height = dot(s.to, s.normal);
+  if (test.sides == Sides::front) wanted = hn::And(wanted, hn::Lt(height, hn::Set(f, cell.radius)));
+  if (hn::AllFalse(f, wanted)) return;
+  // Distance of the disc's nearest point: who stands on a disc sees it change with every step,
+  // however far its middle.
+  const auto aside = hn::Sqrt(hn::Max(hn::NegMulAdd(height, height, d2), hn::Zero(f)));
+  const auto beyond = hn::Max(hn::Sub(aside, s.radius), hn::Zero(f));
+  const auto d = hn::Sqrt(hn::MulAdd(beyond, beyond, hn::Mul(height, height)));
+  auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
+  auto keep = hn::FirstN(f, 0);
+  if (!test.last) {
+    const auto rho = hn::Set(f, cell.radius);
+    const auto above = hn::Add(dot(s.to, axis), hn::Add(s.radius, rho));
+    keep = hn::And(wanted, hn::Lt(d, seam_end(test, hn::Abs(height), above, d)));
+    // Backs are clear within two radii: of a disc's, that may be so for some receivers of the cell
+    // alone.
+    const auto reach = hn::Add(s.radius, s.radius), middle = hn::Sqrt(d2);
+    const auto clear_to_some =
+        hn::And(hn::Lt(hn::Sub(middle, rho), reach), hn::Gt(height, hn::Neg(rho)));
+    const auto clear_to_all = hn::And(hn::Lt(hn::Add(middle, rho), reach), hn::Gt(height, rho));
+    const auto divided = hn::AndNot(clear_to_all, clear_to_some);
+    drawn = hn::AndNot(divided, drawn);
+    keep = hn::Or(keep, hn::And(wanted, divided));
+  }
+  if (hn::AllFalse(f, hn::Or(drawn, keep))) return;
+  const VU rgbe = test.bleeding ? colour() : hn::Zero(u);
+  if (!hn::AllFalse(f, drawn)) push(out.queue, drawn, s.to, s.normal, s.radius, rgbe);
+  if (hn::AllFalse(f, keep)) return;
+  NearSurfels& left = out.left->surfels;
+  const std::size_t at = left.size;
+  append(s.to.x, keep, f, left.x.data() + at);
+  append(s.to.y, keep, f, left.y.data() + at);
+  append(s.to.z, keep, f, left.z.data() + at);
+  append(s.normal.x, keep, f, left.nx.data() + at);
+  append(s.normal.y, keep, f, left.ny.data() + at);
+  append(s.normal.z, keep, f, left.nz.data() + at);
+  append(s.radius, keep, f, left.radius.data() + at);
+  left.size += append(rgbe, hn::RebindMask(u, keep), u, left.rgbe.data() + at);
+}
+
+/// Coordinates of a page relative to a centre, in scene units.
+HWY_INLINE VF relative(VU low, VU high10, double centre, double unit) {
+  const F f;
+  const I i;
+  const U u;
+  // Lattice coordinates have 42 bits: 26 high and 16 low ones are exact in 32-bit arithmetic. A
+  // receiver far outside the frame keeps its distance in the float that is taken off last.
+  const double whole = std::floor(std::clamp(centre, -0x1p46, 0x1p46));
+  const auto integer = static_cast<std::int64_t>(whole);
+  const auto upper = hn::Or(hn::ShiftRight<16>(low), hn::ShiftLeft<16>(high10));
+  const auto lower = hn::And(low, hn::Set(u, 0xffffU));
+  const auto dh =
+      hn::Sub(hn::BitCast(i, upper), hn::Set(i, static_cast<std::int32_t>(integer >> 16)));
+  const auto dl =
+      hn::Sub(hn::BitCast(i, lower), hn::Set(i, static_cast<std::int32_t>(integer & 0xffff)));
+  const auto rest = hn::Sub(hn::ConvertTo(f, dl), hn::Set(f, static_cast<float>(centre - whole)));
+  const auto units = hn::MulAdd(hn::ConvertTo(f, dh), hn::Set(f, 65536.0F), rest);
+  return hn::Mul(units, hn::Set(f, static_cast<float>(unit)));
+}
+
+}  // namespace
+
+void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first,
+                         unsigned number, const CellTest& test, CellOutput& out) {
+  const F f;
+  const I i;
+  const U u;
+  const auto lanes = static_cast<unsigned>(hn::Lanes(f));
+  const std::size_t n = count;
+  for (unsigned from = 0; from < number; from += lanes) {
+    const std::size_t k = first + std::size_t{from};
+    const auto word = [&](std::size_t bytes_before) {
+      return hn::LoadU(u,
+                       reinterpret_cast<const std::uint32_t*>(payload + bytes_before * n + 4 * k));
+    };
+    const auto high = word(12);
+    const auto ten = hn::Set(u, 1023U);
+    const glm::dvec3& centre = test.cell.centre;
+    const auto coordinate = [&](std::size_t bytes_before) {
+      const auto bits = hn::LoadU(
+          I16(), reinterpret_cast<const std::int16_t*>(payload + bytes_before * n + 2 * k));
+      return hn::Max(hn::Mul(hn::ConvertTo(f, hn::PromoteTo(i, bits)), hn::Set(f, 1.0F / 32767)),
+                     hn::Set(f, -1.0F));
+    };
+    const Surfels s{
+        .to = {relative(word(0), hn::And(high, ten), centre.x, test.unit),
+               relative(word(4), hn::And(hn::ShiftRight<10>(high), ten), centre.y, test.unit),
+               relative(word(8), hn::And(hn::ShiftRight<20>(high), ten), centre.z, test.unit)},
+        .normal = unfold(coordinate(20), coordinate(22)),
+        .radius = hn::BitCast(f, word(16))};
+    const auto half = [&](std::size_t bytes_before) {
+      return hn::PromoteTo(f, hn::LoadU(F16(), reinterpret_cast<const hwy::float16_t*>(
+                                                   payload + bytes_before * n + 2 * k)));
+    };
+    settle(
+        test, s, hn::FirstN(f, number - from),
+        [&] { return pack_rgbe(half(24), half(26), half(28)); }, out);
+  }
+}
+
+std::size_t gather_surfels(const NearSurfels& near, std::size_t from, const glm::vec3& move,
+                           const CellTest& test, CellOutput& out) {
+  const F f;
+  const Vec moved = spread(move);
+  const std::size_t lanes = hn::Lanes(f);
+  for (; from < near.size && !out.queue.full(); from += lanes) {
+    const auto load = [&](const std::vector<float>& column) {
+      return hn::LoadU(f, column.data() + from);
+    };
+    const Surfels s{.to = {hn::Add(load(near.x), moved.x), hn::Add(load(near.y), moved.y),
+                           hn::Add(load(near.z), moved.z)},
+                    .normal = {load(near.nx), load(near.ny), load(near.nz)},
+                    .radius = load(near.radius)};
+    settle(
+        test, s, hn::FirstN(f, near.size - from),
+        [&] { return hn::LoadU(U(), near.rgbe.data() + from); }, out);
+  }
+  return std::min(from, near.size);
+}
+
+}  // namespace ptc::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ptc {
+
+HWY_EXPORT(gather_page_surfels);
+HWY_EXPORT(gather_surfels);
+
+void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first,
+                         unsigned number, const CellTest& test, CellOutput& out) {
+  if (out.left) out.left->surfels.make_room(number);
+  HWY_DYNAMIC_DISPATCH(gather_page_surfels)(payload, count, first, number, test, out);
+}
+
+std::size_t gather_surfels(const NearSurfels& near, std::size_t from, const glm::vec3& move,
+                           const CellTest& test, CellOutput& out) {
+  if (out.left) out.left->surfels.make_room(near.size - from);
+  return HWY_DYNAMIC_DISPATCH(gather_surfels)(near, from, move, test, out);
+}
+
+}  // namespace ptc
+#endif

@@ -1,0 +1,213 @@
+// Sums over the pixels of a direction buffer (direction_kernels.h).
+#include <cmath>
+
+#include "engine/shade/kernels/direction_kernels.h"
+
+// This file is compiled once per instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/shade/kernels/sum_pixels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "engine/shade/kernels/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ptc::HWY_NAMESPACE {
+namespace {
+
+using W = hn::CappedTag<float, 16>;
+using WI = hn::RebindToSigned<W>;
+using WU = hn::RebindToUnsigned<W>;
+using VW = hn::VFromD<W>;
+
+constexpr float kMostShift = 4;  // pixels: beyond it the first order says nothing
+
+/// An entry of a table of kViewpoints for each lane.
+HWY_INLINE VW look_up(const float* table, hn::VFromD<WI> index) {
+  const W f;
+  if constexpr (hn::MaxLanes(f) == 16) {
+    return hn::TableLookupLanes(hn::Load(f, table), hn::IndicesFromVec(f, index));
+  } else if constexpr (hn::MaxLanes(f) == 8) {
+    const WI i;
+    const auto low = hn::IndicesFromVec(f, hn::And(index, hn::Set(i, 7)));
+    const auto upper = hn::RebindMask(f, hn::Gt(index, hn::Set(i, 7)));
+    return hn::IfThenElse(upper, hn::TableLookupLanes(hn::Load(f, table + 8), low),
+                          hn::TableLookupLanes(hn::Load(f, table), low));
+  } else {
+    return hn::GatherIndex(f, table, index);
+  }
+}
+
+/// Sums, a lane each.
+struct LaneSums {
+  VW total, covered, light[3], sky[3], open[3];
+};
+
+/// A face: pixels, and the receiver's normal and places in its axes.
+struct FaceView {
+  const CubeGeometry& cube;
+  const float* nearness;
+  const std::uint32_t* rgbe;  ///< or null
+  const float* sky;           ///< 3 planes, or null
+  float nw, nu, nv;
+  alignas(64) float offset_w[kViewpoints], offset_u[kViewpoints], offset_v[kViewpoints];
+
+  /// Cosine to a row of directions (1, u, v), without what u adds.
+  [[nodiscard]] float cosine(float v) const { return nw + nv * v; }
+  [[nodiscard]] bool sees(int y) const { return cosine(cube.centre[y]) + std::abs(nu) > 0; }
+  HWY_INLINE VW cosine(VW u, float row) const {
+    const W f;
+    return hn::Max(hn::Zero(f), hn::MulAdd(hn::Set(f, nu), u, hn::Set(f, row)));
+  }
+
+  /// How far the edge between two pixels moves towards the second, in pixels: as the nearer of them
+  /// does.
+  /// @param at      coordinate of the edge along the axis
+  /// @param offset  of the receiver along the axis, by viewpoint
+  HWY_INLINE VW shift_of(VW a, VW b, VW at, const float* offset) const {
+    const W f;
+    const WI i;
+    const auto near = hn::Max(a, b);
+    const auto viewpoint = hn::And(hn::BitCast(i, near), hn::Set(i, kViewpoints - 1));
+    const auto move = hn::MulSub(at, look_up(offset_w, viewpoint), look_up(offset, viewpoint));
+    const auto pixels =
+        hn::Mul(hn::Mul(near, move), hn::Set(f, 0.5F * static_cast<float>(cube.resolution)));
+    return hn::Max(hn::Min(pixels, hn::Set(f, kMostShift)), hn::Set(f, -kMostShift));
+  }
+};
+
+/// Adds up a row.
+/// @tparam kMoves  the nearer of two neighbours takes over weight as it moves
+/// @param last  no row below is seen
+/// @param down  weights that come from the row above; then those that pass to the row below
+template <bool kMoves>
+HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTRICT down,
+                        LaneSums& sums) {
+  const W f;
+  const auto zero = hn::Zero(f);
+  const CubeGeometry& cube = face.cube;
+  const std::size_t plane =
+      static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
+  const float row = face.cosine(cube.centre[y]);
+  const float half_step = 1 / static_cast<float>(cube.resolution),
+              edge = cube.centre[y] + half_step;
+  const auto first_lane = hn::FirstN(f, 1);
+  const auto one_up =
+      hn::IndicesFromVec(f, hn::And(hn::Sub(hn::Iota(WI(), 0), hn::Set(WI(), 1)),
+                                    hn::Set(WI(), static_cast<int>(hn::Lanes(f)) - 1)));
+  auto carried = zero, row_open = zero;
+  for (int x = 0; x < cube.resolution; x += static_cast<int>(hn::Lanes(f))) {
+    const auto at = static_cast<std::size_t>(y * cube.resolution + x);
+    const float* here = face.nearness + at;
+    const auto near = hn::LoadU(f, here), pu = hn::LoadU(f, cube.centre + x);
+    const auto own = hn::Mul(face.cosine(pu, row), hn::LoadU(f, cube.weight + at));
+    auto weight = own;
+    if constexpr (kMoves) {
+      const auto u = hn::Add(pu, hn::Set(f, half_step));
+      const auto right = hn::Mul(face.shift_of(near, hn::LoadU(f, here + 1), u, face.offset_u),
+                                 hn::Mul(face.cosine(u, row), hn::LoadU(f, cube.edge_u + at)));
+      const auto turned = hn::TableLookupLanes(right, one_up);
+      const auto from_left = hn::IfThenElse(first_lane, carried, turned);
+      carried = turned;
+      auto below = zero;
+      if (!last) {
+        below =
+            hn::Mul(face.shift_of(near, hn::LoadU(f, here + cube.resolution), hn::Set(f, edge),
+                                  face.offset_v),
+                    hn::Mul(face.cosine(pu, face.cosine(edge)), hn::LoadU(f, cube.edge_v + at)));
+      }
+      weight =
+          hn::Add(own, hn::Add(hn::Sub(right, from_left), hn::Sub(below, hn::LoadU(f, down + x))));
+      hn::StoreU(below, f, down + x);
+    }
+    const auto empty = hn::Eq(near, zero);
+    const auto covered = hn::IfThenZeroElse(empty, weight);
+    sums.total = hn::Add(sums.total, own);
+    sums.covered = hn::Add(sums.covered, covered);
+    if (face.rgbe) {
+      const UnpackedRgbe<W> rgbe = unpack_rgbe(f, hn::LoadU(WU(), face.rgbe + at));
+      const auto scale = hn::Mul(rgbe.scale, covered);
+      for (int k = 0; k < 3; ++k) sums.light[k] = hn::MulAdd(rgbe.byte[k], scale, sums.light[k]);
+    }
+    for (std::size_t k = 0; face.sky && k < 3; ++k) {
+      sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at),
+                               sums.sky[k]);
+    }
+    const auto direction =
+        hn::IfThenElseZero(empty, hn::Mul(own, hn::LoadU(f, cube.inverse_length + at)));
+    row_open = hn::Add(row_open, direction);
+    sums.open[1] = hn::MulAdd(direction, pu, sums.open[1]);
+  }
+  sums.open[0] = hn::Add(sums.open[0], row_open);
+  sums.open[2] = hn::MulAdd(row_open, hn::Set(f, cube.centre[y]), sums.open[2]);
+}
+
+template <bool kMoves>
+HWY_INLINE void add_face(const FaceView& face, LaneSums& sums) {
+  alignas(64) float down[kMostResolution] = {};
+  int y = 0, end = face.cube.resolution;
+  while (y < end && !face.sees(y)) ++y;
+  while (y < end && !face.sees(end - 1)) --end;
+  for (; y < end; ++y) add_row<kMoves>(face, y, y + 1 == end, down, sums);
+}
+
+}  // namespace
+
+void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
+                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums) {
+  const W f;
+  const auto zero = hn::Zero(f);
+  LaneSums lane{zero, zero, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+  VW open[3] = {zero, zero, zero};
+  const std::size_t plane =
+      static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
+  for (int i = 0; i < 6; ++i) {
+    const CubeFace axes(i);
+    FaceView face{.cube = cube,
+                  .nearness = pixels.nearness + static_cast<std::size_t>(i) * plane,
+                  .rgbe = pixels.rgbe ? pixels.rgbe + static_cast<std::size_t>(i) * plane : nullptr,
+                  .sky = sky ? sky + static_cast<std::size_t>(3 * i) * plane : nullptr,
+                  .nw = axes.sign * normal[axes.w],
+                  .nu = normal[axes.u],
+                  .nv = normal[axes.v]};
+    if (face.nw + std::abs(face.nu) + std::abs(face.nv) <= 0) continue;
+    for (auto& sum : lane.open) sum = zero;
+    if (offsets) {
+      for (std::size_t k = 0; k < kViewpoints; ++k) {
+        face.offset_w[k] = axes.sign * offsets->axis[axes.w][k];
+        face.offset_u[k] = offsets->axis[axes.u][k];
+        face.offset_v[k] = offsets->axis[axes.v][k];
+      }
+      add_face<true>(face, lane);
+    } else {
+      add_face<false>(face, lane);
+    }
+    open[axes.w] = hn::MulAdd(hn::Set(f, axes.sign), lane.open[0], open[axes.w]);
+    open[axes.u] = hn::Add(open[axes.u], lane.open[1]);
+    open[axes.v] = hn::Add(open[axes.v], lane.open[2]);
+  }
+  const auto total = [&](VW lanes) { return hn::GetLane(hn::SumOfLanes(f, lanes)); };
+  sums.total = total(lane.total);
+  sums.covered = total(lane.covered);
+  for (int k = 0; k < 3; ++k) {
+    sums.light[k] = total(lane.light[k]);
+    sums.sky[k] = total(lane.sky[k]);
+    sums.open[k] = total(open[k]);
+  }
+}
+
+}  // namespace ptc::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ptc {
+
+HWY_EXPORT(sum_pixels);
+
+void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
+                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums) {
+  HWY_DYNAMIC_DISPATCH(sum_pixels)(cube, pixels, sky, normal, offsets, sums);
+}
+
+}  // namespace ptc
+#endif

@@ -1,0 +1,227 @@
+// Embree rays at oriented discs (engine/shade/reference/brute_force.h).
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include <embree3/rtcore.h>
+#include <glm/geometric.hpp>
+
+#include "engine/shade/reference/brute_force.h"
+
+namespace ptc {
+namespace {
+
+constexpr float kPi = 3.14159265F;
+constexpr float kBump = 0.01F;  // height of the paraboloid over the disc's radius, as draw_discs()
+
+/// SplitMix64 (Steele, Lea and Flood 2014): a stream of uniform numbers in [0, 1).
+class Uniform {
+ public:
+  explicit Uniform(std::uint64_t seed) : state_(seed) {}
+  float operator()() {
+    std::uint64_t z = state_ += 0x9e3779b97f4a7c15;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+    return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-24F;
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+}  // namespace
+
+struct DiscRays::Impl {
+  struct Context {
+    RTCIntersectContext embree;  // first: Embree hands back a pointer to it
+    const Impl* discs;
+    bool choose = false;  // second pass: keep the disc with the least bumped depth
+    float best = 0;
+    unsigned best_disc = RTC_INVALID_GEOMETRY_ID;
+  };
+
+  std::span<const Surfel> surfels;
+  Sides sides;
+  std::function<glm::vec3(const glm::vec3&)> sky;
+  glm::dvec3 origin{0};
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+
+  ~Impl() {
+    if (scene) rtcReleaseScene(scene);
+    if (device) rtcReleaseDevice(device);
+  }
+
+  [[nodiscard]] glm::vec3 centre(unsigned i) const {
+    return glm::vec3(surfels[i].position - origin);
+  }
+
+  /// One candidate of one ray: whether the disc stops it, and which of overlapping discs wins.
+  static void filter(const RTCFilterFunctionNArguments* args) {
+    if (args->valid[0] != -1) return;
+    const auto& ray = *reinterpret_cast<const RTCRay*>(args->ray);
+    const auto& hit = *reinterpret_cast<const RTCHit*>(args->hit);
+    auto& context = *reinterpret_cast<Context*>(args->context);
+    const Surfel& disc = context.discs->surfels[hit.primID];
+    const glm::vec3 from(ray.org_x, ray.org_y, ray.org_z), along(ray.dir_x, ray.dir_y, ray.dir_z);
+    const glm::vec3 to = context.discs->centre(hit.primID) - from;
+    const bool back = glm::dot(to, disc.normal) >= 0;
+    if (back && (context.discs->sides == Sides::front ||
+                 glm::dot(to, to) < 4 * disc.radius * disc.radius)) {
+      args->valid[0] = 0;
+      return;
+    }
+    if (!context.choose) return;
+    const glm::vec3 off = along * ray.tfar - to;
+    const float depth = ray.tfar + kBump / disc.radius * glm::dot(off, off);
+    if (depth < context.best) {
+      context.best = depth;
+      context.best_disc = hit.primID;
+    }
+    args->valid[0] = 0;
+  }
+
+  [[nodiscard]] static RTCRayHit make_ray(const glm::vec3& from, const glm::vec3& along, float near,
+                                          float far) {
+    RTCRayHit ray{};
+    ray.ray.org_x = from.x;
+    ray.ray.org_y = from.y;
+    ray.ray.org_z = from.z;
+    ray.ray.dir_x = along.x;
+    ray.ray.dir_y = along.y;
+    ray.ray.dir_z = along.z;
+    ray.ray.tnear = near;
+    ray.ray.tfar = far;
+    ray.ray.mask = ~0U;
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    return ray;
+  }
+
+  /// Replaces what a ray met before where a disc here is met before that.
+  void meet(const glm::vec3& from, const glm::vec3& along, DiscHit& met) const {
+    Context context{};
+    rtcInitIntersectContext(&context.embree);
+    context.discs = this;
+    RTCRayHit ray = make_ray(from, along, 0, met.depth);
+    rtcIntersect1(scene, &context.embree, &ray);
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+    const float t = ray.ray.tfar;
+    const float slack = 1e-6F * t;
+    const float deepest = t + kBump * surfels[ray.hit.primID].radius + slack;
+    context.choose = true;
+    context.best = met.depth;
+    RTCRayHit again = make_ray(from, along, t - slack, std::min(deepest, met.depth));
+    rtcIntersect1(scene, &context.embree, &again);
+    if (context.best_disc == RTC_INVALID_GEOMETRY_ID) {
+      if (deepest >= met.depth) return;
+      context.best = deepest;
+      context.best_disc = ray.hit.primID;
+    }
+    const Surfel& disc = surfels[context.best_disc];
+    met = {context.best, glm::dot(along, disc.normal) < 0 ? disc.radiance : glm::vec3(0)};
+  }
+};
+
+DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
+                   std::function<glm::vec3(const glm::vec3&)> sky,
+                   const std::optional<glm::dvec3>& origin)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->surfels = surfels;
+  impl_->sides = sides;
+  impl_->sky = std::move(sky);
+  Bounds bounds;
+  for (const Surfel& s : surfels) bounds.add(s.position);
+  if (!bounds.empty()) impl_->origin = origin ? *origin : (bounds.low + bounds.high) * 0.5;
+  impl_->device = rtcNewDevice(nullptr);
+  if (!impl_->device) throw std::runtime_error("Embree: no device");
+  impl_->scene = rtcNewScene(impl_->device);
+  RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 16, surfels.size()));
+  auto* normals = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_NORMAL, 0, RTC_FORMAT_FLOAT3, 12, surfels.size()));
+  if (surfels.size() > 0 && (!vertices || !normals)) throw std::bad_alloc();
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    const glm::vec3 c = impl_->centre(static_cast<unsigned>(i));
+    for (int k = 0; k < 3; ++k) {
+      vertices[4 * i + static_cast<std::size_t>(k)] = c[k];
+      normals[3 * i + static_cast<std::size_t>(k)] = surfels[i].normal[k];
+    }
+    vertices[4 * i + 3] = surfels[i].radius;
+  }
+  rtcSetGeometryIntersectFilterFunction(geometry, &Impl::filter);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(impl_->scene, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(impl_->scene);
+}
+
+DiscRays::~DiscRays() = default;
+
+namespace {
+
+/// Calls body(i, along) for cosine-distributed directions, one in each cell of a square.
+/// @param side  of the square
+template <class Body>
+void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const Body& body) {
+  const glm::vec3 tangent =
+      glm::normalize(glm::cross(n, std::abs(n.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
+  const glm::vec3 bitangent = glm::cross(n, tangent);
+  Uniform uniform(seed);
+  for (unsigned j = 0; j < side; ++j) {
+    for (unsigned i = 0; i < side; ++i) {
+      const float u = (static_cast<float>(i) + uniform()) / static_cast<float>(side);
+      const float angle = 2 * kPi * (static_cast<float>(j) + uniform()) / static_cast<float>(side);
+      const float sine = std::sqrt(u);
+      body(std::size_t{j} * side + i, tangent * (sine * std::cos(angle)) +
+                                          bitangent * (sine * std::sin(angle)) +
+                                          n * std::sqrt(std::max(0.0F, 1 - u)));
+    }
+  }
+}
+
+unsigned side_of(std::size_t rays) {
+  return static_cast<unsigned>(std::sqrt(static_cast<double>(rays)));
+}
+
+}  // namespace
+
+void DiscRays::meet(const Receiver& receiver, std::uint64_t seed, std::span<DiscHit> hits) const {
+  const glm::vec3 from(receiver.position - impl_->origin);
+  for_each_ray(receiver.normal, side_of(hits.size()), seed,
+               [&](std::size_t i, const glm::vec3& along) { impl_->meet(from, along, hits[i]); });
+}
+
+Shading DiscRays::sum(const Receiver& receiver, std::uint64_t seed, std::span<const DiscHit> hits,
+                      const std::function<glm::vec3(const glm::vec3&)>& sky_at) {
+  const unsigned side = side_of(hits.size());
+  unsigned covered = 0;
+  glm::dvec3 light(0), sky(0), open(0);
+  for_each_ray(receiver.normal, side, seed, [&](std::size_t i, const glm::vec3& along) {
+    if (hits[i].met()) {
+      ++covered;
+      light += hits[i].radiance;
+    } else {
+      open += along;
+      if (sky_at) sky += sky_at(along);
+    }
+  });
+  const double count = static_cast<double>(side) * side;
+  Shading shading;
+  shading.occlusion = static_cast<float>(covered / count);
+  shading.irradiance = glm::vec3(light * (std::numbers::pi / count));
+  shading.sky = glm::vec3(sky * (std::numbers::pi / count));
+  const double length = glm::length(open);
+  shading.bent_normal = length > 0 ? glm::vec3(open / length) : receiver.normal;
+  return shading;
+}
+
+Shading DiscRays::trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const {
+  std::vector<DiscHit> hits(std::size_t{side_of(rays)} * side_of(rays));
+  meet(receiver, seed, hits);
+  return sum(receiver, seed, hits, impl_->sky);
+}
+
+}  // namespace ptc

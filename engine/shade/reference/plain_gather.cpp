@@ -1,0 +1,188 @@
+#include "engine/shade/reference/plain_gather.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include <glm/geometric.hpp>
+
+#include "engine/io/cloud/record.h"
+#include "format/node_layout.h"
+#include "format/point_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr float kPi = 3.14159265F;
+
+/// A child of a group, relative to a receiver, in scene units.
+struct Cluster {
+  glm::vec3 to{0};
+  float radius = 0;
+  float area = 0;
+  float thickness = 0;
+  std::array<float, 6> facing{};  // shares of the area
+  glm::vec3 mean{0};              // normal over area, not unit
+  float flatness = 0;             // its length
+};
+
+float share_at(const GroupView& group, int axis, int child) {
+  return static_cast<float>(GroupView::u16_at(group.facing(axis), child)) /
+         static_cast<float>(kFacingSteps);
+}
+
+Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const glm::dvec3& from) {
+  const LatticePoint corner = decode_morton(group.cell());
+  const double step = cell_edge(group.level()) / kMeanSteps;
+  const std::array<const std::byte*, 3> columns{group.mean_x(), group.mean_y(), group.mean_z()};
+  Cluster c;
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    const double at =
+        static_cast<double>(corner[axis]) + step * GroupView::u16_at(columns[axis], i);
+    c.to[k] = static_cast<float>(frame.origin[axis] + at * frame.unit() - from[k]);
+  }
+  const auto unit = static_cast<float>(frame.unit());
+  c.radius = unit * decode_ufloat16(GroupView::u16_at(group.radius(), i));
+  c.thickness = unit * decode_ufloat16(GroupView::u16_at(group.thickness(), i));
+  c.area = decode_ufloat16(GroupView::u16_at(group.area(), i));
+  for (int k = 0; k < 6; ++k) c.facing[static_cast<std::size_t>(k)] = share_at(group, k, i);
+  c.mean = {c.facing[0] - c.facing[1], c.facing[2] - c.facing[3], c.facing[4] - c.facing[5]};
+  c.flatness = glm::length(c.mean);
+  return c;
+}
+
+/// What leaves towards a receiver by the three faces of the ambient cube that look at it, over the
+/// cluster's area.
+struct Front {
+  float area = 0;
+  glm::vec3 radiance{0};  ///< times area
+};
+
+Front front_of(const GroupView& group, int i, const Cluster& c, const glm::vec3& toward) {
+  Front front;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int face = 2 * axis + (toward[axis] < 0 ? 1 : 0);
+    std::uint32_t rgbe = 0;
+    std::memcpy(&rgbe, group.radiance(face) + 4 * std::ptrdiff_t{i}, sizeof rgbe);
+    const std::array<float, 3> colour = decode_rgbe(rgbe);
+    const float weight = std::abs(toward[axis]) * c.facing[static_cast<std::size_t>(face)];
+    front.radiance += weight * glm::vec3(colour[0], colour[1], colour[2]);
+    front.area += weight;
+  }
+  return front;
+}
+
+std::uint32_t pack(const glm::vec3& colour) {
+  return encode_rgbe({colour.r, colour.g, colour.b});
+}
+
+void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options,
+                  DiscQueue& queue) {
+  const glm::vec3 toward = -glm::normalize(c.to);
+  const Front front = front_of(group, i, c, toward);
+  const float back = front.area - glm::dot(c.mean, toward);
+  const float projected = options.sides == Sides::both ? std::max(front.area, back) : front.area;
+  if (!(c.area * projected > 0)) return;
+  const Splat splat = make_splat({c.mean, c.area, c.radius, c.thickness}, toward,
+                                 c.area * projected, options.inflation);
+  const float over = lit_area(splat, front.area, projected);
+  const glm::vec3 colour = over > 0 ? front.radiance / over : glm::vec3(0);
+  queue.push(c.to, splat.normal, splat.radius, pack(colour));
+}
+
+}  // namespace
+
+Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float projected,
+                 float inflation) {
+  const float length = glm::length(shape.mean);
+  if (length > kFlat)
+    return {shape.mean / length, std::min(shape.radius, std::sqrt(shape.area / 2)), true};
+  // The silhouette of an ellipsoid is that of a disc across it, turned towards the receiver.
+  Splat splat{.normal = toward};
+  float foreshortened = 1;
+  if (length > kDirected) {
+    const glm::vec3 axis = shape.mean / length;
+    const float cosine = glm::dot(axis, toward);
+    const float slim = std::min(1.0F, kSlim * shape.thickness / shape.radius);
+    const float lean = std::sqrt(1 - slim * slim);
+    foreshortened = std::sqrt(lean * lean * cosine * cosine + slim * slim);
+    const float turn = std::copysign(lean, cosine);
+    splat.normal = turn * axis + (foreshortened - turn * cosine) * toward;
+  }
+  const float seen = projected * inflation / (kPi * foreshortened);
+  splat.radius = std::sqrt(std::min(seen, kSolid * shape.radius * shape.radius));
+  return splat;
+}
+
+float height_of_top(const glm::vec3& to, const glm::vec3& normal, float radius,
+                    const glm::vec3& slab_normal, float thickness) {
+  const float height = glm::dot(to, normal);
+  const float cosine = glm::dot(slab_normal, normal);
+  const float tilt = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
+  return height + std::min(radius, thickness + radius * tilt);
+}
+
+Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) {
+  grid_ = &grid;
+  buffer_.clear();
+  queue_.size = 0;
+  stack_.assign(1, scene_.view().root());
+  WalkLimit limit(scene_.view());
+  while (!stack_.empty()) {
+    const ChildRef next = stack_.back();
+    stack_.pop_back();
+    if (next.interior) {
+      limit.take_group();
+      visit_group(next, receiver);
+    } else {
+      limit.take_points(next.point_count);
+      visit_points(next, receiver);
+    }
+  }
+  buffer_.draw(grid, queue_, options_.sides);
+  ++counts_.receivers;
+  return buffer_.resolve(grid, receiver.normal);
+}
+
+void PlainGather::visit_group(const ChildRef& reference, const Receiver& receiver) {
+  ++counts_.groups;
+  const GroupView group = scene_.group(reference.page, reference.slot);
+  for (int i = 0; i < group.size(); ++i) {
+    const Cluster c = read_cluster(group, i, scene_.view().frame(), receiver.position);
+    const glm::vec3 slab = c.flatness > 0 ? c.mean / c.flatness : glm::vec3(0);
+    if (height_of_top(c.to, receiver.normal, c.radius, slab, c.thickness) <= 0) continue;
+    if (kPi * c.radius * c.radius >= options_.solid_angle * glm::dot(c.to, c.to)) {
+      stack_.push_back(group.child(i));
+      continue;
+    }
+    ++counts_.clusters;
+    draw_cluster(group, i, c, options_, queue_);
+    if (!queue_.full()) continue;
+    buffer_.draw(*grid_, queue_, options_.sides);
+    queue_.size = 0;
+  }
+}
+
+void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
+  const std::uint32_t per_page = scene_.view().points_per_page();
+  for (std::uint64_t k = run.first_point; k < run.first_point + run.point_count; ++k) {
+    const PageReader::Page page = scene_.points(k);
+    const PointPage points(page.payload, page.record_count);
+    const Surfel surfel =
+        to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
+    const glm::vec3 to(surfel.position - receiver.position);
+    if (!(surfel.radius > 0) ||
+        height_of_top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0)
+      continue;
+    ++counts_.surfels;
+    queue_.push(to, surfel.normal, surfel.radius, pack(surfel.radiance));
+    if (!queue_.full()) continue;
+    buffer_.draw(*grid_, queue_, options_.sides);
+    queue_.size = 0;
+  }
+}
+
+}  // namespace ptc

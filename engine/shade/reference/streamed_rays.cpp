@@ -1,0 +1,68 @@
+#include "engine/shade/reference/streamed_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kSurfelBytes = sizeof(Surfel) + DiscRays::kBytes;
+
+}  // namespace
+
+StreamedRays::StreamedRays(const ContainerReader& scene, Sides sides,
+                           std::function<glm::vec3(const glm::vec3&)> sky,
+                           std::uint64_t memory_bytes)
+    : scene_(scene), sides_(sides), sky_(std::move(sky)) {
+  const std::uint64_t for_hits = std::min<std::uint64_t>(memory_bytes / 4, std::uint64_t{64} << 20);
+  hit_count_ = static_cast<std::size_t>(for_hits / sizeof(DiscHit));
+  const std::uint64_t page_bytes = kSurfelBytes * std::max(1U, scene.superblock().points_per_page);
+  pages_of_part_ =
+      static_cast<std::size_t>(std::max<std::uint64_t>(1, (memory_bytes - for_hits) / page_bytes));
+  parts_ = (scene.point_pages().size() + pages_of_part_ - 1) / pages_of_part_;
+  if (parts_ > 0) load(0);
+}
+
+void StreamedRays::load(std::size_t part) {
+  if (rays_ && loaded_ == part) return;
+  rays_.reset();
+  const auto pages = scene_.point_pages().subspan(
+      part * pages_of_part_,
+      std::min(pages_of_part_, scene_.point_pages().size() - part * pages_of_part_));
+  surfels_.clear();
+  surfels_.reserve(pages.size() * scene_.superblock().points_per_page);
+  append_surfels(scene_, pages, surfels_);
+  const Superblock& whole = scene_.superblock();
+  const glm::dvec3 low(whole.bounds_low[0], whole.bounds_low[1], whole.bounds_low[2]);
+  const glm::dvec3 high(whole.bounds_high[0], whole.bounds_high[1], whole.bounds_high[2]);
+  rays_.emplace(surfels_, sides_, sky_, (low + high) * 0.5);
+  loaded_ = part;
+}
+
+void StreamedRays::trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
+                         std::span<Shading> results, const Executor& executor, Progress& progress) {
+  const auto side = static_cast<std::size_t>(std::sqrt(static_cast<double>(rays)));
+  const std::size_t rays_of_each = side * side;
+  const std::size_t batch = std::clamp<std::size_t>(hit_count_ / rays_of_each, 1,
+                                                    std::max<std::size_t>(1, receivers.size()));
+  std::vector<DiscHit> hits(batch * rays_of_each);
+  const auto hits_of = [&](std::size_t i) {
+    return std::span(hits).subspan(i * rays_of_each, rays_of_each);
+  };
+  for (std::size_t first = 0; first < receivers.size(); first += batch) {
+    const std::size_t count = std::min(batch, receivers.size() - first);
+    std::ranges::fill(hits, DiscHit{});
+    for (std::size_t part = 0; part < parts_; ++part) {
+      load(part);
+      executor.for_each(count, [&](std::size_t i, unsigned) {
+        rays_->meet(receivers[first + i], seed + first + i, hits_of(i));
+        if (part + 1 == parts_) progress.advance(1);
+      });
+    }
+    executor.for_each(count, [&](std::size_t i, unsigned) {
+      results[first + i] = DiscRays::sum(receivers[first + i], seed + first + i, hits_of(i), sky_);
+    });
+  }
+}
+
+}  // namespace ptc
