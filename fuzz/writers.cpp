@@ -11,7 +11,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/image/image.h"
 #include "engine/octree/build_pages.h"
-#include "engine/octree/container_points.h"
+#include "engine/store/container_points.h"
 #include "engine/verify/verify.h"
 #include "format/codec.h"
 #include "format/node_page.h"

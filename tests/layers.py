@@ -86,7 +86,7 @@ class Layers(unittest.TestCase):
         for path, line in (("engine/octree/a.cpp", '#include "engine/shade/b.h"'),
                            ("engine/shade/a.cpp", '#  include "engine/octree/b.h"'),
                            ("format/a.h", '#include "engine/base/b.h"'),
-                           ("engine/io/a.h", '#include "engine/pipeline/pipeline.h"'),
+                           ("engine/io/a.h", '#include "engine/ptc.h"'),
                            ("engine/pipeline/a.h", '#include "tools/b.h"'),
                            ("engine/io/a.h", '#include "../base/b.h"'),
                            ("engine/io/a.h", '#include "missing.h"'),

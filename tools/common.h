@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/progress.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 
 namespace ptc {
 

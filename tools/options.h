@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 
 namespace ptc {
 

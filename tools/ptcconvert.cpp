@@ -1,8 +1,9 @@
 // ptcconvert: containers to clouds, clouds and meshes to containers, containers to containers.
 #include <fmt/format.h>
 
+#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/convert/convert.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/run.h"
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"
@@ -55,8 +56,9 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
     if (arguments.page_size_given) options.page_shift = arguments.page_shift;
     return ptc::recode_container(container, arguments.output, options, progress);
   }
-  static_cast<void>(
-      ptc::memory_left(run, ptc::kBufferBytes + ptc::open_bytes(container), 0, "this conversion"));
+  ptc::MemoryBudget budget = ptc::budget_of(run.memory_bytes, "this conversion");
+  ptc::charge_directory(budget, container);
+  budget.require();
   const auto to_cloud =
       ptc::has_ending(arguments.output, ".ply") ? ptc::container_to_ply : ptc::container_to_xyz;
   return to_cloud(container, arguments.output, progress);

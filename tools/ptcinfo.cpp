@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include "engine/io/file/file.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/run.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/store/commit.h"
 #include "engine/store/reader.h"
 #include "tools/common.h"
@@ -119,8 +121,10 @@ void require_memory(const std::filesystem::path& path, const ptc::RunOptions& ru
   const ptc::InputFile file(path);
   const ptc::Superblock superblock = ptc::read_superblock(file, ptc::read_file_header(file));
   const std::uint64_t texts = kTexts << superblock.header.page_shift;
-  static_cast<void>(ptc::memory_left(
-      run, texts, ptc::ContainerReader::kMostPageBytes * superblock.page_count, "this file"));
+  ptc::MemoryBudget budget(run.memory_bytes, "this file");
+  budget.charge("its record", texts);
+  budget.charge("its directory", ptc::ContainerReader::kMostPageBytes * superblock.page_count);
+  budget.require();
 }
 
 /// Text of a file as people may see it: in quotes, with no character that a terminal would obey.

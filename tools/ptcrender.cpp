@@ -106,7 +106,7 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   if (arguments.lights.given()) request.lights = arguments.lights.rig();
   std::vector<ptc::PictureTarget> targets = arguments.layers;
   for (const auto& output : arguments.outputs) targets.push_back({.path = output});
-  const ptc::ShadeReport report = ptc::render_picture(request, targets, progress);
+  const ptc::LightingReport report = ptc::render_picture(request, targets, progress);
   std::vector<std::string> names;
   for (const ptc::PictureTarget& target : targets) names.push_back(target.path.string());
   nlohmann::ordered_json facts{{"outputs", names}};

@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     request.run = command.run_options();
     if (lights.sky_given()) request.sky = lights.sky();
-    const ptc::ShadeReport report = ptc::shade_container(request, output, progress);
+    const ptc::LightingReport report = ptc::shade_container(request, output, progress);
     nlohmann::ordered_json facts{{"output", output.string()}};
     facts.update(ptc::facts_of(report));
     return {facts, ptc::shade_text(output.string(), report)};

@@ -156,13 +156,13 @@ ordered_json facts_of(const CheckReport& check) {
 }
 
 /// Over all receivers of a run.
-double mean_bound(const ShadeReport& report) {
+double mean_bound(const LightingReport& report) {
   const double sum =
       static_cast<double>(report.damage->stand_ins.bounds) * DamageCounts::kBoundUnit;
   return report.receivers == 0 ? 0 : sum / static_cast<double>(report.receivers);
 }
 
-ordered_json damage_facts(const ShadeReport& report) {
+ordered_json damage_facts(const LightingReport& report) {
   const DamageReport& damage = *report.damage;
   ordered_json pages = ordered_json::array();
   for (const auto& [page, why] : damage.pages) pages.push_back({{"page", page}, {"text", why}});
@@ -175,7 +175,7 @@ ordered_json damage_facts(const ShadeReport& report) {
           {"mean_bound", mean_bound(report)}};
 }
 
-std::string damage_text(const ShadeReport& report) {
+std::string damage_text(const LightingReport& report) {
   const DamageReport& damage = *report.damage;
   if (damage.pages.empty()) return "  no page that was needed is damaged\n";
   const auto& [page, why] = *damage.pages.begin();
@@ -193,7 +193,7 @@ std::string damage_text(const ShadeReport& report) {
   return text;
 }
 
-ordered_json facts_of(const ShadeReport& report) {
+ordered_json facts_of(const LightingReport& report) {
   ordered_json facts{{"receivers", report.receivers},
                      {"bounces", report.bounces},
                      {"shade_cpu_seconds", report.shade_cpu_seconds},
@@ -208,7 +208,7 @@ ordered_json facts_of(const ShadeReport& report) {
   return facts;
 }
 
-std::string shade_text(const std::string& output, const ShadeReport& report) {
+std::string shade_text(const std::string& output, const LightingReport& report) {
   std::string text = fmt::format("{}: {} receivers, {:.2f} s, {:.2f} % cache hits\n{}", output,
                                  report.receivers, total_seconds(report.seconds),
                                  100 * report.cache.hit_rate(), stages_text(report.seconds));

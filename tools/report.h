@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 
 namespace ptc {
 
@@ -17,11 +17,11 @@ namespace ptc {
 [[nodiscard]] nlohmann::ordered_json facts_of(const GatherCounts& counts);
 [[nodiscard]] nlohmann::ordered_json facts_of(const StageSeconds& seconds);
 [[nodiscard]] nlohmann::ordered_json facts_of(const CheckReport& check);
-[[nodiscard]] nlohmann::ordered_json facts_of(const ShadeReport& report);
+[[nodiscard]] nlohmann::ordered_json facts_of(const LightingReport& report);
 
 /// "lit.ply: 1000 receivers, 1.20 s, 99.1 % cache hits", the stages, and the check if there was
 /// one.
-[[nodiscard]] std::string shade_text(const std::string& output, const ShadeReport& report);
+[[nodiscard]] std::string shade_text(const std::string& output, const LightingReport& report);
 /// Sum over all stages.
 [[nodiscard]] double total_seconds(const StageSeconds& seconds);
 /// "1.23 MB", powers of 1000.

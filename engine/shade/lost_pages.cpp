@@ -25,21 +25,14 @@ void LostPages::add(std::uint32_t page, const char* why) {
   states_.at(page).store(kLost, std::memory_order_relaxed);
 }
 
-bool read_unless_lost(const ContainerReader& container, std::uint32_t page,
-                      std::span<std::byte> out, PageDecoder& decoder, LostPages* lost) {
-  try {
-    static_cast<void>(container.read_page(page, out, decoder));
-  } catch (const FormatError& error) {
-    if (lost == nullptr) throw;
-    lost->add(page, error.what());
-    return false;
-  }
-  return true;
-}
-
 std::map<std::uint32_t, std::string> LostPages::list() const {
   const std::lock_guard lock(mutex_);
   return why_;
+}
+
+PointScan::OnDamage noted_in(LostPages* lost) {
+  if (!lost) return {};
+  return [lost](std::uint32_t page, const FormatError& error) { lost->add(page, error.what()); };
 }
 
 }  // namespace ptc

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/cache/page_cache.h"
+#include "engine/store/point_scan.h"
 
 namespace ptc {
 
@@ -35,12 +36,8 @@ class LostPages {
   std::map<std::uint32_t, std::string> why_;  ///< guarded by mutex_
 };
 
-/// Reads a page past the cache.
-/// @param lost  where a damaged page is told; null: it is an error
-/// @return  false when it is damaged
-/// @throws as ContainerReader::read_page(), FormatError without `lost` alone
-[[nodiscard]] bool read_unless_lost(const ContainerReader& container, std::uint32_t page,
-                                    std::span<std::byte> out, PageDecoder& decoder,
-                                    LostPages* lost);
+/// Notes damaged pages of a scan in `lost`.
+/// @param lost  null: damaged pages are errors
+[[nodiscard]] PointScan::OnDamage noted_in(LostPages* lost);
 
 }  // namespace ptc

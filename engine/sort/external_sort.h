@@ -9,18 +9,11 @@
 #include <vector>
 
 #include "engine/base/executor.h"
+#include "engine/base/stream.h"
 #include "engine/io/file/state_file.h"
 #include "format/point_record.h"
 
 namespace ptc {
-
-/// Point records by ascending key, one block after another.
-class PointStream {
- public:
-  virtual ~PointStream() = default;
-  /// Fills the front of `out`. @return how many; 0 at the end
-  virtual std::size_t next(std::span<PointRecord> out) = 0;
-};
 
 /// Reads past so many points of a stream, or to its end.
 void pass_over(PointStream& points, std::uint64_t count);

@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include "engine/octree/container_points.h"
 #include "engine/octree/octree.h"
+#include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "engine/verify/node_pages.h"
 #include "format/checksum.h"

@@ -10,9 +10,10 @@
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/record.h"
-#include "engine/octree/container_points.h"
 #include "engine/octree/merge.h"
 #include "engine/pipeline/convert/convert.h"
+#include "engine/ptc.h"
+#include "engine/store/container_points.h"
 #include "engine/verify/verify.h"
 #include "format/error.h"
 #include "tests/store/forge.h"
@@ -181,7 +182,7 @@ TEST_CASE("append: what is damaged, shaded or too far away is refused, and the o
   std::ofstream(place.dir / "a.ptcx", std::ios::binary)
       .write(old.data(), static_cast<std::streamsize>(old.size()));
   const RunOptions run{.memory_bytes = std::uint64_t{256} << 20, .threads = 2};
-  shade_container({.scene = place.dir / "a.ptcx", .run = run}, place.dir / "lit.ptcx",
+  shade_container({{.scene = place.dir / "a.ptcx", .run = run}}, place.dir / "lit.ptcx",
                   place.silent);
   request.append = place.dir / "lit.ptcx";
   CHECK_THROWS_WITH(build_container(request, place.dir / "b.ptcx", place.silent),

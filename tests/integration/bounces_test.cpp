@@ -12,9 +12,10 @@
 #include "engine/io/cloud/record.h"
 #include "engine/io/image/image.h"
 #include "engine/measure/statistics.h"
-#include "engine/octree/container_points.h"
-#include "engine/pipeline/stages.h"
+#include "engine/ptc.h"
 #include "engine/scene/mesh_reference.h"
+#include "engine/shade/shading.h"
+#include "engine/store/container_points.h"
 #include "format/error.h"
 #include "tests/support/scenes.h"
 
@@ -47,7 +48,7 @@ std::vector<Surfel> furnace(bool round, float albedo) {
 
 struct Lit {
   std::unique_ptr<ContainerReader> bounced;
-  ShadeReport report;
+  LightingReport report;
 };
 
 Lit bounce(const ContainerReader& scene, unsigned bounces, const TemporaryDirectory& dir,
@@ -275,16 +276,16 @@ TEST_CASE("bounces: threads and cap change no byte, and nothing is left behind",
   Progress silent;
   std::vector<char> first;
   for (const unsigned threads : {1U, 2U, 5U}) {
-    ShadeRequest request{.scene = dir / "box.ptcx", .bounces = 3};
+    ShadeRequest request{{.scene = dir / "box.ptcx", .bounces = 3}};
     request.run = {.memory_bytes = std::uint64_t{50 + 17 * threads} << 20, .threads = threads};
-    const ShadeReport report = shade_container(request, dir / "lit.ptcx", silent);
+    const LightingReport report = shade_container(request, dir / "lit.ptcx", silent);
     CHECK(report.bounces == 3);
     if (first.empty()) first = bytes_of(dir / "lit.ptcx");
     CHECK(bytes_of(dir / "lit.ptcx") == first);
     CHECK(entries_in(dir) == 2);
   }
   CHECK(ContainerReader(dir / "lit.ptcx").meta().text.at("shading").ends_with(" bounces 3"));
-  ShadeRequest once{.scene = dir / "box.ptcx"};
+  ShadeRequest once{{.scene = dir / "box.ptcx"}};
   shade_container(once, dir / "lit.ptcx", silent);
   CHECK(ContainerReader(dir / "lit.ptcx").meta().text.at("shading").find("bounces") ==
         std::string::npos);
@@ -295,17 +296,19 @@ TEST_CASE("bounces: another cloud's points and a picture see them", "[integratio
   write_scene(dir / "box.ptcx", furnace(false, 0.5F));
   std::ofstream(dir / "probe.xyz") << "0 0 0 0 1 0\n0.1 0 0 0 1 0\n";
   Progress silent;
-  ShadeRequest request{.scene = dir / "box.ptcx", .receivers = dir / "probe.xyz", .bounces = 2};
+  ShadeRequest request{{.scene = dir / "box.ptcx", .bounces = 2}};
+  request.receivers = dir / "probe.xyz";
   request.check = {.receivers = 2, .rays = 256};
-  const ShadeReport report = shade_container(request, dir / "probe.ply", silent);
+  const LightingReport report = shade_container(request, dir / "probe.ply", silent);
   CHECK(report.receivers == 2);
   CHECK(report.check->discs.irradiance_mean == Approx(1.5 * std::numbers::pi).epsilon(0.02));
   CHECK(report.check->discs.irradiance_rms < 0.02);
-  RenderRequest picture{.scene = dir / "box.ptcx", .samples = 1, .bounces = 2};
+  RenderRequest picture{{.scene = dir / "box.ptcx", .bounces = 2}};
+  picture.samples = 1;
   picture.camera =
       Camera{.position = {0, 0, 0.9}, .look_at = {0, 0, -1}, .width = 16, .height = 16};
   picture.check = {.receivers = 50, .rays = 256};
-  const ShadeReport render =
+  const LightingReport render =
       render_picture(picture, std::array{PictureTarget{dir / "a.png"}}, silent);
   CHECK(render.check->discs.irradiance_mean == Approx(1.5 * std::numbers::pi).epsilon(0.02));
   CHECK(entries_in(dir) == 4);
@@ -332,8 +335,9 @@ TEST_CASE("bounces: an emitter lights a picture once", "[integration][bounces][r
   build.sampling.lights.area_rays = 0;
   Progress silent;
   build_container(build, dir / "furnace.ptcx", silent);
-  RenderRequest request{
-      .scene = dir / "furnace.ptcx", .meshes = {dir / "furnace.obj"}, .samples = 1};
+  RenderRequest request{{.scene = dir / "furnace.ptcx"}};
+  request.meshes = {dir / "furnace.obj"};
+  request.samples = 1;
   request.camera =
       Camera{.position = {0, 0, 0.9}, .look_at = {0, 0, -1}, .width = 16, .height = 16};
   double expected = 1;
@@ -354,7 +358,7 @@ TEST_CASE("bounces: a run that fails leaves nothing", "[integration][bounces]") 
   std::fstream(dir / "box.ptcx", std::ios::in | std::ios::out | std::ios::binary)
       .seekp(static_cast<std::streamoff>(middle))
       .write("damage", 6);
-  const ShadeRequest request{.scene = dir / "box.ptcx", .bounces = 2};
+  const ShadeRequest request{{.scene = dir / "box.ptcx", .bounces = 2}};
   CHECK_THROWS_AS(shade_container(request, dir / "lit.ply", silent), FormatError);
   CHECK(entries_in(dir) == 1);
 }

@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;
@@ -15,12 +15,12 @@ using namespace ptc::test;
 namespace {
 
 ShadeRequest request_of(const Scene& scene, bool estimate) {
-  ShadeRequest request{.scene = scene.dir / "scene.ptcx", .error = 0.05, .estimate = estimate};
+  ShadeRequest request{{.scene = scene.dir / "scene.ptcx", .error = 0.05, .estimate = estimate}};
   request.run.threads = 1;
   return request;
 }
 
-ShadeReport shade(const Scene& scene, const ShadeRequest& request, const char* name) {
+LightingReport shade(const Scene& scene, const ShadeRequest& request, const char* name) {
   Progress silent;
   return shade_container(request, scene.dir / name, silent);
 }
@@ -80,7 +80,7 @@ TEST_CASE(
       request.gather = {.solid_angle = 0.05F, .parallax = 0.25F, .resolution = 16};
     }
     request.check = {.receivers = 1500, .rays = 1024};
-    const ShadeReport report = shade(scene, request, "a.ply");
+    const LightingReport report = shade(scene, request, "a.ply");
     REQUIRE(report.check->estimate);
     CHECK(report.estimate->pilots >= 400);
     CAPTURE(tuned);
@@ -92,8 +92,8 @@ TEST_CASE(
 TEST_CASE("estimate: channels are there when asked for and change no other",
           "[integration][estimate]") {
   const Scene scene(small_scene(0.04));
-  const ShadeReport without = shade(scene, request_of(scene, false), "without.ptcx");
-  const ShadeReport with = shade(scene, request_of(scene, true), "with.ptcx");
+  const LightingReport without = shade(scene, request_of(scene, false), "without.ptcx");
+  const LightingReport with = shade(scene, request_of(scene, true), "with.ptcx");
   CHECK_FALSE(without.estimate);
   CHECK(with.estimate->cpu_seconds > 0);
   std::vector<std::string> expected = channels_of(scene.dir / "without.ptcx");
@@ -108,12 +108,12 @@ TEST_CASE("estimate: channels are there when asked for and change no other",
     shade(scene, request_of(scene, estimate), "a.ply");
     CHECK(names(scene.dir / "a.ply",
                 "property float occlusion_error\nproperty float irradiance_error\n") == estimate);
-    RenderRequest picture{
-        .scene = scene.dir / "scene.ptcx", .samples = 1, .error = 0.1, .estimate = estimate};
+    RenderRequest picture{{.scene = scene.dir / "scene.ptcx", .error = 0.1, .estimate = estimate}};
+    picture.samples = 1;
     picture.size = {{64, 48}};
     Progress silent;
     const std::vector<PictureTarget> targets{{scene.dir / "a.exr", ""}};
-    const ShadeReport report = render_picture(picture, targets, silent);
+    const LightingReport report = render_picture(picture, targets, silent);
     CHECK(report.estimate.has_value() == estimate);
     CHECK(names(scene.dir / "a.exr", "occlusion_error.V") == estimate);
     CHECK(names(scene.dir / "a.exr", "irradiance_error.V") == estimate);
@@ -129,7 +129,8 @@ TEST_CASE("estimate: channels are there when asked for and change no other",
 TEST_CASE("estimate: neither threads nor the cap change a byte", "[integration][estimate]") {
   const Scene scene(small_scene(0.03));
   ShadeRequest request = request_of(scene, true);
-  RenderRequest picture{.scene = request.scene, .samples = 4, .error = 0.05, .estimate = true};
+  RenderRequest picture{{.scene = request.scene, .error = 0.05, .estimate = true}};
+  picture.samples = 4;
   picture.size = {{64, 48}};
   const auto run = [&](unsigned threads, std::uint64_t mebibytes, const std::string& name) {
     request.run = picture.run = {.memory_bytes = mebibytes << 20, .threads = threads};
@@ -152,7 +153,7 @@ TEST_CASE("estimate: runs that compare nothing with rays are refused, empty ones
   CHECK_THROWS_AS(shade(scene, request, "a.ply"), std::invalid_argument);
   request.check = {.receivers = 10, .rays = 64};
   CHECK_NOTHROW(shade(scene, request, "a.ply"));
-  RenderRequest picture{.scene = request.scene, .estimate = true};
+  RenderRequest picture{{.scene = request.scene, .estimate = true}};
   picture.size = {{16, 12}};
   Progress silent;
   CHECK_THROWS_WITH(

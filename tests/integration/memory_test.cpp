@@ -6,8 +6,8 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/pipeline/pipeline.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/ptc.h"
 #include "engine/store/reader.h"
 #include "format/point_page.h"
 #include "tests/support/scenes.h"
@@ -76,7 +76,7 @@ TEST_CASE(
                       more = 120'000'000;
   const auto directory = [&](std::uint64_t points) { return 80 * (points / per_page * 3 / 2); };
   CHECK(building(more, 12, 1) - building(some, 12, 1) == directory(more) - directory(some));
-  CHECK(building(some, 12, 1) - least == directory(some) - kLeastSort);
+  CHECK(building(some, 12, 1) - least == directory(some) - kMinSortBytes);
 }
 
 TEST_CASE("memory: a cap for shading holds the directory of each container that is open",
@@ -90,7 +90,7 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
   Progress silent;
   const auto shading = [&](const char* scene, const char* receivers) {
     return least_cap([&](std::uint64_t bytes) {
-      ShadeRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}};
+      ShadeRequest request{{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}}};
       request.count = 1;
       if (*receivers != 0) request.receivers = dir / receivers;
       shade_container(request, dir / "o.ply", silent);
@@ -102,8 +102,8 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
   CHECK(shading("few.ptcx", "many.ptcx") == least + 36 * many);
   const auto lit = [&](const char* scene, unsigned bounces, unsigned threads) {
     return least_cap([&](std::uint64_t bytes) {
-      ShadeRequest request{.scene = dir / scene,
-                           .run = {.memory_bytes = bytes, .threads = threads}};
+      ShadeRequest request{
+          {.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = threads}}};
       request.bounces = bounces;
       shade_container(request, dir / "o.ptcx", silent);
     });
@@ -114,7 +114,7 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
         (512 << 10) + (36 + 80) * few);  // and an encoder
   const auto picture = [&](const char* scene) {
     return least_cap([&](std::uint64_t bytes) {
-      RenderRequest request{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}};
+      RenderRequest request{{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}}};
       request.camera = Camera{.width = 2, .height = 2};
       render_picture(request, std::array{PictureTarget{dir / "o.png"}}, silent);
     });

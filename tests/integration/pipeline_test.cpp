@@ -1,6 +1,4 @@
 // The road end to end: mesh or cloud to container to shaded points and pictures.
-#include "engine/pipeline/pipeline.h"
-
 #include <fstream>
 
 #include <catch2/catch.hpp>
@@ -8,7 +6,8 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/image/image.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/scene_record.h"
+#include "engine/ptc.h"
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
 #include "tests/support/scenes.h"
@@ -155,7 +154,7 @@ TEST_CASE("pipeline: shading adds channels, keeps the points and verifies",
   write_cube(dir / "cube.obj");
   Progress silent;
   build_container(cube_request(dir / "cube.obj"), dir / "scene.ptcx", silent);
-  ShadeRequest request{.scene = dir / "scene.ptcx"};
+  ShadeRequest request{{.scene = dir / "scene.ptcx"}};
   request.run = {.memory_bytes = std::uint64_t{128} << 20, .threads = 2};
   const std::vector<char> before = bytes_of(dir / "scene.ptcx");
   shade_container(request, dir / "shaded.ptcx", silent);
@@ -189,8 +188,9 @@ TEST_CASE("pipeline: another cloud's points can be shaded by a scene", "[integra
   Progress silent;
   build_container(cube_request(dir / "cube.obj"), dir / "scene.ptcx", silent);
   std::ofstream(dir / "probes.xyz") << "0.5 1.5 0.5 0 -1 0\n-0.02 0.5 0.5 -1 0 0\n";
-  ShadeRequest request{.scene = dir / "scene.ptcx", .receivers = dir / "probes.xyz"};
-  const ShadeReport report = shade_container(request, dir / "probes.ply", silent);
+  ShadeRequest request{{.scene = dir / "scene.ptcx"}};
+  request.receivers = dir / "probes.xyz";
+  const LightingReport report = shade_container(request, dir / "probes.ply", silent);
   CHECK(report.receivers == 2);
   std::size_t entries = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(dir.path()))
@@ -204,8 +204,10 @@ TEST_CASE("pipeline: a picture has the layers it promises, with and without a me
   write_cube(dir / "cube.obj");
   Progress silent;
   build_container(cube_request(dir / "cube.obj"), dir / "scene.ptcx", silent);
-  RenderRequest request{
-      .scene = dir / "scene.ptcx", .meshes = {dir / "cube.obj"}, .backdrop = true, .samples = 1};
+  RenderRequest request{{.scene = dir / "scene.ptcx"}};
+  request.meshes = {dir / "cube.obj"};
+  request.backdrop = true;
+  request.samples = 1;
   request.size = {{64, 48}};
   const std::vector<PictureTarget> targets{
       {dir / "a.exr", ""}, {dir / "a.png", "beauty"}, {dir / "o.png", "occlusion"}};

@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
 

@@ -7,9 +7,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/pipeline/pipeline.h"
 #include "engine/pipeline/quality/error_sums.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/run.h"
+#include "engine/ptc.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;
@@ -58,9 +58,9 @@ std::vector<double> errors_along_ladder(const Scene& scene) {
   return errors;
 }
 
-ShadeReport shade_with(const Scene& scene, double error, const RunOptions& run = {},
-                       const char* name = "o.ply") {
-  ShadeRequest request{.scene = scene.dir / "scene.ptcx", .error = error, .run = run};
+LightingReport shade_with(const Scene& scene, double error, const RunOptions& run = {},
+                          const char* name = "o.ply") {
+  ShadeRequest request{{.scene = scene.dir / "scene.ptcx", .error = error, .run = run}};
   request.check = {.receivers = 1000, .rays = 2048};
   Progress silent;
   return shade_container(request, scene.dir / name, silent);
@@ -131,7 +131,7 @@ TEST_CASE("tuning: an error that was asked for is met at receivers that had no p
     const Scene scene(surfels);
     unsigned setting = 0;
     for (const double asked : {0.1, 0.05, 0.03}) {
-      const ShadeReport report = shade_with(scene, asked);
+      const LightingReport report = shade_with(scene, asked);
       REQUIRE(report.tuning);
       CAPTURE(asked, report.tuning->setting, report.tuning->measured.relative());
       CHECK(report.tuning->met);
@@ -146,7 +146,7 @@ TEST_CASE("tuning: an error that was asked for is met at receivers that had no p
 TEST_CASE("tuning: below the floor the finest setting is taken and the floor told",
           "[integration][error]") {
   const Scene scene(lit_balls());
-  const ShadeReport report = shade_with(scene, 1e-4);
+  const LightingReport report = shade_with(scene, 1e-4);
   CHECK_FALSE(report.tuning->met);
   CHECK(report.tuning->setting == ladder().size() - 1);
   CHECK(report.tuning->measured.relative() > 1e-4);
@@ -157,14 +157,14 @@ TEST_CASE("tuning: neither threads nor the cap change the choice or a byte",
           "[integration][error]") {
   const Scene scene(lit_balls());
   const auto bytes = [&](const char* name) { return bytes_of(scene.dir / name); };
-  const ShadeReport one =
+  const LightingReport one =
       shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ptcx");
-  const ShadeReport two =
+  const LightingReport two =
       shade_with(scene, 0.04, {.memory_bytes = std::uint64_t{81} << 20, .threads = 2}, "two.ptcx");
   CHECK(one.tuning->setting == two.tuning->setting);
   CHECK(one.tuning->measured.relative() == two.tuning->measured.relative());
   CHECK(bytes("one.ptcx") == bytes("two.ptcx"));
-  const ShadeReport other = shade_with(scene, 0.1, {}, "other.ptcx");
+  const LightingReport other = shade_with(scene, 0.1, {}, "other.ptcx");
   CHECK(other.tuning->setting < one.tuning->setting);
   CHECK(bytes("other.ptcx") != bytes("one.ptcx"));
 }
@@ -173,14 +173,15 @@ TEST_CASE("tuning: runs of few receivers and scenes of few surfels have pilots t
           "[integration][error]") {
   const Scene scene(lit_balls());
   for (const std::uint64_t count : {1U, 2U, 5U, 40U}) {
-    ShadeRequest request{.scene = scene.dir / "scene.ptcx", .count = count, .error = 0.1};
+    ShadeRequest request{{.scene = scene.dir / "scene.ptcx", .error = 0.1}};
+    request.count = count;
     Progress silent;
-    const ShadeReport report = shade_container(request, scene.dir / "few.ply", silent);
+    const LightingReport report = shade_container(request, scene.dir / "few.ply", silent);
     CHECK(report.tuning->pilots >= 1);
     CHECK(report.tuning->pilots <= count);
   }
   const Scene empty({});
-  const ShadeReport report = shade_with(empty, 0.1);
+  const LightingReport report = shade_with(empty, 0.1);
   CHECK(report.receivers == 0);
   CHECK(report.tuning->met);
   CHECK(report.tuning->setting == 0);

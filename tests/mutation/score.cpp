@@ -21,7 +21,7 @@
 
 #include "engine/octree/rounding.h"
 #include "engine/pipeline/convert/convert.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
 #include "tests/mutation/mutations.h"
@@ -62,7 +62,7 @@ Subject make_subject(const TemporaryDirectory& directory, const std::string& nam
   const std::filesystem::path scene = directory / "scene.ptcx", lit = directory / "lit.ptcx";
   write_scene(scene, random_surfels(150, 3), {}, 12, Codec::raw);
   if (shaded) {
-    ShadeRequest request{.scene = scene};
+    ShadeRequest request{{.scene = scene}};
     request.run.threads = 1;
     shade_container(request, lit, silent);
   }

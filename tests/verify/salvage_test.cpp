@@ -12,7 +12,7 @@
 
 #include "engine/base/error.h"
 #include "engine/octree/build_pages.h"
-#include "engine/octree/container_points.h"
+#include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"
 #include "format/point_page.h"

@@ -7,12 +7,16 @@
 
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
-#include "engine/octree/container_points.h"
+#include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/render/primary.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/run.h"
+#include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/temporary_container.h"
 #include "engine/scene/procedural/city.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/shader.h"
+#include "engine/shade/shading.h"
+#include "engine/store/container_points.h"
 #include "format/text.h"
 
 namespace ptc::bench {
@@ -131,7 +135,7 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
 BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options,
                        const std::filesystem::path& work, const RunOptions& run, Progress& progress)
     : name_(choice.name) {
-  container_ = make_temporary(work, [&](const std::filesystem::path& path) {
+  container_ = make_temporary_container(work, [&](const std::filesystem::path& path) {
     lit_ = build_scene(choice, options, path, run, progress);
   });
   if (options.rays) surfels_ = load_surfels(*container_, kMostSurfels);

@@ -9,7 +9,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/io/mesh/mesh.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
 #include "tools/bench/procedural.h"

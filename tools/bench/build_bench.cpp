@@ -10,7 +10,8 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/run.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"
@@ -131,9 +132,8 @@ class BuildRun {
 
   [[nodiscard]] Built build(const Input& input, Profile profile, std::uint64_t cap) {
     Built built;
-    RunOptions run = run_;
-    run.memory_bytes = cap;
-    ExternalSorter sorter({.memory_bytes = memory_left(run, kBufferBytes, kLeastSort, "this build"),
+    const MemoryBudget budget = budget_of(cap, "this build");
+    ExternalSorter sorter({.memory_bytes = budget.rest("the sort", kMinSortBytes),
                            .temp_dirs = {work_},
                            .expected = input.file.records()},
                           executor_, input.sample);

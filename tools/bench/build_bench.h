@@ -9,7 +9,7 @@
 
 #include "engine/base/progress.h"
 #include "engine/measure/statistics.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 
 namespace ptc::bench {
 

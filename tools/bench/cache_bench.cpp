@@ -13,7 +13,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/run.h"
 #include "engine/shade/shader.h"
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/disk_reads.h"

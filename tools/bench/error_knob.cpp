@@ -4,8 +4,10 @@
 
 #include <cmath>
 
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/run.h"
 #include "engine/shade/reference/brute_force.h"
+#include "engine/shade/shading.h"
 
 namespace ptc::bench {
 namespace {
@@ -27,7 +29,7 @@ class WorkFile {
   std::filesystem::path path_;
 };
 
-ErrorRow row_of(const std::string& scene, const char* set, const ShadeReport& report) {
+ErrorRow row_of(const std::string& scene, const char* set, const LightingReport& report) {
   const double pilots = report.tuning->ray_cpu_seconds + report.tuning->shade_cpu_seconds;
   const auto receivers = static_cast<double>(std::max<std::uint64_t>(1, report.receivers));
   return {.scene = scene,
@@ -82,15 +84,13 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   const WorkFile scene(work, ".ptcx"), points(work, ".ply"), picture(work, ".exr");
   const LitScene lit = build_scene(choice, options.scene, scene.path(), run, progress);
   const CheckRequest check{.receivers = options.checked, .rays = options.rays};
-  ShadeRequest shade{.scene = scene.path(), .lift = options.scene.lift, .check = check, .run = run};
+  ShadeRequest shade{
+      {.scene = scene.path(), .lift = options.scene.lift, .check = check, .run = run}};
   RenderRequest render{
-      .scene = scene.path(),
-      .mesh = lit.mesh.triangles.empty() ? nullptr : std::make_shared<const Mesh>(lit.mesh),
-      .camera = lit.camera,
-      .samples = 1,
-      .lift = options.scene.lift,
-      .check = check,
-      .run = run};
+      {.scene = scene.path(), .lift = options.scene.lift, .check = check, .run = run}};
+  render.mesh = lit.mesh.triangles.empty() ? nullptr : std::make_shared<const Mesh>(lit.mesh);
+  render.camera = lit.camera;
+  render.samples = 1;
   const PictureTarget target{.path = picture.path()};
   SceneErrors errors{.name = choice.name};
   for (const double asked : options.asked) {
@@ -104,8 +104,8 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   const Executor executor(run.threads);
   errors.surfels = container.superblock().points;
   const ShadeOptions settings{.cache_bytes =
-                                  cache_bytes_left(run, kBufferBytes, container, executor.threads(),
-                                                   BackEnd::pread, "the ladder")};
+                                  cache_bytes_left(budget_of(run.memory_bytes, "the ladder"),
+                                                   container, executor.threads(), BackEnd::pread)};
   const std::vector<Pilot> blocks = blocks_of(container, options.climbed, options.scene.lift);
   progress.begin(choice.name + ", the ladder", 0, "receivers");
   errors.rungs = climb(container, settings, blocks, options.rays / 2, executor, progress);

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/pipeline/pipeline.h"
 #include "engine/pipeline/quality/tuning.h"
+#include "engine/ptc.h"
 #include "tools/bench/bench_scene.h"
 
 namespace ptc::bench {

@@ -10,7 +10,8 @@
 
 #include "engine/base/memory.h"
 #include "engine/io/file/disk_space.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/run.h"
+#include "engine/scene/light/lights.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/shader.h"
 #include "engine/sort/spill.h"

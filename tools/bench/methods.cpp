@@ -4,7 +4,7 @@
 #include <random>
 
 #include "engine/base/memory.h"
-#include "engine/pipeline/stages.h"
+#include "engine/scene/light/lights.h"
 #include "engine/shade/gather/receiver_cell.h"
 #include "engine/shade/reference/plain_gather.h"
 

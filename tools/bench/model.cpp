@@ -7,9 +7,9 @@
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/octree/build_pages.h"
-#include "engine/octree/container_points.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/temporary_container.h"
 #include "engine/shade/reference/brute_force.h"
+#include "engine/store/container_points.h"
 #include "tools/bench/methods.h"
 #include "tools/bench/reference.h"
 
@@ -27,7 +27,7 @@ double stored_bytes(const ContainerReader& container) {
 /// The same points under another tree.
 std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::uint32_t leaf_points,
                                              const std::filesystem::path& work) {
-  return make_temporary(work, [&](const std::filesystem::path& path) {
+  return make_temporary_container(work, [&](const std::filesystem::path& path) {
     ContainerPoints points(from);
     ContainerWriter writer(path,
                            {.page_shift = from.header().page_shift, .frame = from.header().frame});

@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/memory.h"
-#include "engine/octree/container_points.h"
 #include "engine/octree/rounding.h"
+#include "engine/store/container_points.h"
 #include "format/point_page.h"
 #include "tools/bench/model.h"
 

@@ -8,10 +8,10 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/memory.h"
-#include "engine/octree/container_points.h"
 #include "engine/octree/subtree.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/reference/plain_gather.h"
+#include "engine/store/container_points.h"
 #include "format/scalar.h"
 #include "tools/bench/model.h"
 #include "tools/bench/payload.h"

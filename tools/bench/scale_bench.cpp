@@ -44,7 +44,7 @@ struct SizeRuns {
   StageRuns build, verify, shade, build_floor, verify_floor, copy;
   BuildReport built;
   StoredBytes stored;
-  ShadeReport shaded;
+  LightingReport shaded;
   bool rebuilt = false;
   ScaleAnswers answers;  ///< of the first
 };
@@ -114,7 +114,8 @@ class ScaleRun {
       runs.stored = stored_bytes(ContainerReader(scene_));
     }
     forget(InputFile(scene_));
-    const ShadeRequest request{.scene = scene_, .count = options_.receivers, .run = run_};
+    ShadeRequest request{{.scene = scene_, .run = run_}};
+    request.count = options_.receivers;
     stage(runs.shade, [&] { runs.shaded = shade_container(request, lit_, silent); });
     std::filesystem::remove(scene_);
     const std::uint64_t values =

@@ -10,18 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/stream.h"
 #include "engine/base/surfel.h"
 
 namespace ptc {
-
-/// Surfels one block after another.
-class PointSource {
- public:
-  virtual ~PointSource() = default;
-  /// Fills the front of `out` with the next surfels. @return how many; 0 at the end
-  /// @throws DataError naming file and offset (binary) or line (text) of the point at fault
-  virtual std::size_t next(std::span<Surfel> out) = 0;
-};
 
 /// What a point file says of itself before its points are read.
 struct PointFileInfo {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "engine/base/error.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/scene_record.h"
 
 namespace ptc {
 namespace {

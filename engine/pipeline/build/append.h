@@ -2,7 +2,7 @@
 #pragma once
 
 #include "engine/octree/rounding.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/build/build_container.h"
 #include "engine/store/reader.h"
 
 namespace ptc {

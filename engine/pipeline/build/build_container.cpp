@@ -1,4 +1,5 @@
-// Scene to container (engine/pipeline/pipeline.h).
+#include "engine/pipeline/build/build_container.h"
+
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -8,15 +9,15 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/octree/container_points.h"
 #include "engine/octree/merge.h"
 #include "engine/octree/radius.h"
+#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/append.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/resume.h"
-#include "engine/pipeline/pipeline.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/sort/spill.h"
+#include "engine/store/container_points.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "format/error.h"
@@ -129,18 +130,29 @@ class Build {
     return points / points_per_page({.page_shift = request_.page_shift}) * 3 / 2;
   }
 
-  /// What the cap leaves for the sort, and, when that is done, for the directory.
-  [[nodiscard]] SortOptions sort_options(std::uint64_t taken, std::uint64_t expected) const {
+  [[nodiscard]] MemoryBudget build_budget() const {
+    return budget_of(request_.run.memory_bytes, "this scene's build");
+  }
+
+  /// Gives the sort what the cap leaves. When the sort is done, the directory takes its place.
+  /// @param budget  charged with the inputs
+  [[nodiscard]] SortOptions sort_options(MemoryBudget budget, std::uint64_t expected) const {
     const std::uint64_t pages = pages_of(expected + scene_points());
-    taken +=
-        kBufferBytes + ContainerWriter::writing_bytes(request_.page_shift, executor_.threads());
-    if (scene_) taken += ContainerReader::kMostPageBytes * scene_->page_count();
-    if (resumption_) taken += kCheckpointBytes + (kOpenPages << request_.page_shift);
-    const std::uint64_t least = std::max(kLeastSort, ContainerWriter::finish_bytes(pages));
-    SortOptions options{
-        .memory_bytes = memory_left(request_.run, taken, least, "this scene's build"),
-        .temp_dirs = temp_dirs(request_.run, target_),
-        .expected = expected};
+    budget.charge("pages that are written",
+                  ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()));
+    if (scene_) {
+      budget.charge("the directory of " + scene_->path().filename().string(),
+                    ContainerReader::kMostPageBytes * scene_->page_count());
+    }
+    if (resumption_) {
+      budget.charge("checkpoints", kCheckpointBytes + (kOpenPages << request_.page_shift));
+    }
+    const std::uint64_t directory_bytes = ContainerWriter::finish_bytes(pages);
+    SortOptions options{.memory_bytes = directory_bytes > kMinSortBytes
+                                            ? budget.rest("the output's directory", directory_bytes)
+                                            : budget.rest("the sort", kMinSortBytes),
+                        .temp_dirs = temp_dirs(request_.run, target_),
+                        .expected = expected};
     if (resumption_) options.kept_files = resumption_->spills();
     return options;
   }
@@ -152,18 +164,19 @@ class Build {
     SortedPoints points{
         .plan = {.frame = frame_of(inputs.bounds), .estimate_radii = inputs.clouds.estimate_radii}};
     const Frame& frame = points.plan.frame;
-    std::uint64_t taken = request_.mesh ? mesh_bytes(*request_.mesh, nullptr) : 0;
+    MemoryBudget budget = build_budget();
+    if (request_.mesh) charge_mesh(budget, *request_.mesh, nullptr);
     if (const LitMesh* lit = inputs.lit.get()) {
-      taken +=
-          mesh_bytes(lit->mesh, &lit->rays) +
-          sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count, executor_.threads());
+      charge_mesh(budget, lit->mesh, &lit->rays);
+      budget.charge("sampling", sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count,
+                                               executor_.threads()));
     }
     const std::uint64_t known = request_.city_points + inputs.clouds.points;
     // A given spacing does not say how many points it makes of a mesh.
     const bool by_spacing = inputs.lit && request_.sampling.spacing > 0;
     const std::uint64_t expected =
         by_spacing ? 0 : known + (inputs.lit ? request_.sampling.count : 0);
-    const SortOptions options = sort_options(taken, expected);
+    const SortOptions options = sort_options(std::move(budget), expected);
     points.sorter =
         std::make_unique<ExternalSorter>(options, executor_, keys_of(inputs.sample, frame));
     tell_space(expected, points.sorter->expected_spill(), options.temp_dirs);
@@ -194,8 +207,8 @@ class Build {
     StateReader state = resumption_->sorter_state();
     std::uint64_t spilled = 0;
     for (const auto& file : resumption_->spills()) spilled += std::filesystem::file_size(file);
-    points.sorter = std::make_unique<ExternalSorter>(sort_options(0, spilled / kSpilledBytes),
-                                                     executor_, state);
+    points.sorter = std::make_unique<ExternalSorter>(
+        sort_options(build_budget(), spilled / kSpilledBytes), executor_, state);
     state.end();
     if (const auto& checkpoint = resumption_->checkpoint())
       report_.resumed_points = checkpoint->place.points;

@@ -10,7 +10,8 @@
 #include "engine/base/memory.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/run.h"
 #include "engine/scene/procedural/city.h"
 
 namespace ptc {

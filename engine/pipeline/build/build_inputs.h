@@ -11,7 +11,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/io/mesh/mesh.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/build/build_container.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 #include "engine/sort/external_sort.h"

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/io/file/disk_space.h"
-#include "engine/pipeline/stages.h"
+#include "engine/io/file/file.h"
 
 namespace ptc {
 namespace {

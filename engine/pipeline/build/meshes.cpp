@@ -1,9 +1,11 @@
-// A stage for a mesh: ground below it, a red wall beside it.
+#include "engine/pipeline/build/meshes.h"
+
 #include <algorithm>
 #include <utility>
 
+#include "engine/base/surfel.h"
 #include "engine/io/cloud/points.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/scene/ray_scene.h"
 
 namespace ptc {
 namespace {
@@ -28,6 +30,7 @@ void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Ma
   append_mesh(mesh, box, glm::dmat4(1));
 }
 
+/// Puts a ground below the mesh and a red wall to its left.
 void add_backdrop(Mesh& mesh) {
   const Bounds bounds = mesh.bounds();
   const glm::dvec3 extent = bounds.high - bounds.low;

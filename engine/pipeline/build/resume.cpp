@@ -12,7 +12,6 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
-#include "engine/pipeline/stages.h"
 #include "format/checksum.h"
 
 namespace ptc {

@@ -20,7 +20,7 @@
 #include "engine/io/file/file.h"
 #include "engine/io/file/state_file.h"
 #include "engine/octree/build_pages.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/build/build_container.h"
 #include "engine/sort/external_sort.h"
 #include "engine/store/writer.h"
 #include "format/schema.h"

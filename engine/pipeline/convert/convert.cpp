@@ -17,8 +17,9 @@
 #include "engine/io/file/file.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
-#include "engine/octree/container_points.h"
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/scene_record.h"
+#include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -70,21 +71,19 @@ void spread_columns(std::span<const Channel> channels, const std::byte* payload,
 class PageCursor {
  public:
   explicit PageCursor(const ContainerReader& container)
-      : container_(container), payload_(container.page_payload_limit()) {
+      : container_(container), scan_(container), payload_(container.page_payload_limit()) {
     for (const Channel& channel : container.meta().channels) floats_ += channel.components;
   }
 
   /// Reads the next page; false at the end.
   bool next() {
-    if (page_ == container_.point_pages().size()) return false;
-    const std::uint32_t count = read(container_.point_pages()[page_]);
-    const PointPage points(payload_.data(), count);
+    if (!scan_.next()) return false;
+    const PointPage points = scan_.points();
     surfels.clear();
-    for (std::uint32_t i = 0; i < count; ++i) {
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
       surfels.push_back(to_surfel(points[i], container_.header().frame));
     }
-    read_channels(count);
-    ++page_;
+    read_channels(points.size());
     return true;
   }
 
@@ -92,10 +91,6 @@ class PageCursor {
   std::vector<float> values;  ///< of all channels, point by point
 
  private:
-  std::uint32_t read(std::uint32_t page) {
-    return container_.read_page(page, payload_, decoder_).record_count;
-  }
-
   void read_channels(std::uint32_t count) {
     values.resize(count * floats_);
     std::span<const Channel> rest = container_.meta().channels;
@@ -105,7 +100,8 @@ class PageCursor {
       const auto last =
           std::ranges::find_if(rest, [&](const Channel& c) { return c.group != group; });
       const auto channels = rest.first(static_cast<std::size_t>(last - rest.begin()));
-      read(container_.attribute_pages(group)[page_]);
+      const std::uint32_t page = container_.attribute_pages(group)[scan_.index()];
+      static_cast<void>(container_.read_page(page, payload_, decoder_));
       spread_columns(channels, payload_.data(), count, place, floats_);
       for (const Channel& channel : channels) place += channel.components;
       rest = rest.subspan(channels.size());
@@ -113,10 +109,10 @@ class PageCursor {
   }
 
   const ContainerReader& container_;
+  PointScan scan_;
   PageDecoder decoder_;
-  std::vector<std::byte> payload_;
-  std::size_t floats_ = 0;  ///< a point
-  std::size_t page_ = 0;
+  std::vector<std::byte> payload_;  ///< of an attribute page
+  std::size_t floats_ = 0;          ///< a point
 };
 
 /// A channel as PLY columns: dots become '_', as do ends of names that PlyWriter uses itself.
@@ -242,9 +238,11 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   const std::uint64_t pages =
       (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) +
       container.page_count();
-  const std::uint64_t taken =
-      open_bytes(container) + ContainerWriter::memory_bytes(pages, page_shift, executor.threads());
-  static_cast<void>(memory_left(options.run, kBufferBytes + taken, 0, "this conversion"));
+  MemoryBudget budget = budget_of(options.run.memory_bytes, "this conversion");
+  charge_directory(budget, container);
+  budget.charge("pages that are written",
+                ContainerWriter::memory_bytes(pages, page_shift, executor.threads()));
+  budget.require();
   ContainerWriter writer(target, {.page_shift = page_shift,
                                   .codec = codec_of(options.profile),
                                   .uuid = derived_uuid(container, options.profile, page_shift),

@@ -5,7 +5,8 @@
 #include <optional>
 
 #include "engine/base/progress.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/octree/rounding.h"
+#include "engine/pipeline/run.h"
 #include "engine/store/reader.h"
 
 namespace ptc {

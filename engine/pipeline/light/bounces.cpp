@@ -9,8 +9,10 @@
 
 #include "engine/base/memory.h"
 #include "engine/io/cloud/record.h"
-#include "engine/octree/container_points.h"
-#include "engine/pipeline/stages.h"
+#include "engine/octree/build_pages.h"
+#include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/temporary_container.h"
+#include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "format/scalar.h"
 
@@ -88,16 +90,18 @@ class BouncedPoints : public PointStream {
 
 }  // namespace
 
-std::uint64_t bounce_bytes(const ContainerReader& scene, unsigned bounces,
-                           unsigned threads) noexcept {
-  if (bounces < 2) return 0;
-  return open_bytes(scene) +
-         ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads);
+void charge_bounces(MemoryBudget& budget, const ContainerReader& scene, unsigned bounces,
+                    unsigned threads) {
+  if (bounces < 2) return;
+  budget.charge("the bounce that is read", ContainerReader::kPageBytes * scene.page_count());
+  budget.charge(
+      "the bounce that is written",
+      ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads));
 }
 
 std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
                                               const BounceOptions& options,
-                                              const Executor& executor, ShadeReport& report,
+                                              const Executor& executor, LightingReport& report,
                                               Progress& progress) {
   if (options.bounces > 1 && lit_by_emitters(scene)) {
     throw std::invalid_argument(
@@ -123,7 +127,7 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
       writer.finish({}, build_pages(points, writer, tree, executor, silent));
       report.bounce_cpu_seconds += points.cpu_seconds();
     };
-    lit = make_temporary(options.temp_dir, write);
+    lit = make_temporary_container(options.temp_dir, write);
   }
   return lit;
 }

@@ -4,7 +4,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "engine/pipeline/pipeline.h"
+#include "engine/base/memory_budget.h"
+#include "engine/pipeline/light/lighting.h"
 #include "engine/shade/shader.h"
 #include "engine/store/reader.h"
 
@@ -18,9 +19,10 @@ struct BounceOptions {
   std::filesystem::path temp_dir;
 };
 
-/// What two temporary containers take while one is read and the next written.
-[[nodiscard]] std::uint64_t bounce_bytes(const ContainerReader& scene, unsigned bounces,
-                                         unsigned threads) noexcept;
+/// Charges the two temporary containers of which one is read while the next is written; nothing for
+/// one bounce or none.
+void charge_bounces(MemoryBudget& budget, const ContainerReader& scene, unsigned bounces,
+                    unsigned threads);
 
 /// What receivers look at to see light of `bounces` bounces: the points and the tree of `scene`,
 /// with the radiance of every point as first lit plus albedo / pi times its irradiance of a bounce
@@ -33,11 +35,11 @@ struct BounceOptions {
 /// @throws std::invalid_argument when the surfels are lit by emissive triangles that are surfels
 /// too;
 ///         FormatError, std::system_error
-/// Memory: the cache of `shade`, bounce_bytes(), and within kBufferBytes.
+/// Memory: the cache of `shade`, what charge_bounces() charges, and buffers within kBufferBytes.
 [[nodiscard]] std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
                                                             const BounceOptions& options,
                                                             const Executor& executor,
-                                                            ShadeReport& report,
+                                                            LightingReport& report,
                                                             Progress& progress);
 
 }  // namespace ptc

@@ -2,9 +2,6 @@
 
 #include "engine/base/memory.h"
 #include "engine/pipeline/quality/error_sums.h"
-#include "engine/pipeline/quality/estimate.h"
-#include "engine/pipeline/stages.h"
-#include "engine/scene/mesh_reference.h"
 #include "engine/shade/reference/streamed_rays.h"
 
 namespace ptc {
@@ -46,29 +43,32 @@ void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shadi
   }
 }
 
-CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const Sky& sky,
-                                 const DirectLight* light, const RayScene* mesh,
-                                 const LightPaths& paths, std::uint64_t memory_bytes,
-                                 const Executor& executor, Progress& progress) const {
+CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const CheckScene& seen,
+                                 std::uint64_t memory_bytes, const Executor& executor,
+                                 Progress& progress) const {
   CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
   if (receivers_.empty()) return report;
   const std::vector<Receiver> twice = two_of_each(receivers_);
   const unsigned half = (request_.rays + 1) / 2;
   std::vector<Shading> traced(twice.size());
+
+  // Rays at the surfels
   {
-    StreamedRays discs(scene, sides, sky_function(sky), memory_bytes);
+    StreamedRays discs(scene, sides, sky_function(seen.sky), memory_bytes);
     report.disc_microseconds =
         timed(receivers_.size(), [&] { discs.trace(twice, half, 0, traced, executor, progress); });
   }
-  if (paths.bounces == 0) leave_out_bleeding(traced);
+  if (seen.paths.bounces == 0) leave_out_bleeding(traced);
   report.discs = errors(results_, traced);
   if (!estimates_.empty()) report.estimate = check_estimates(estimates_, results_, traced);
-  if (!light || !mesh) return report;
+
+  // Rays at the mesh
+  if (!seen.light || !seen.mesh) return report;
   report.mesh_microseconds = timed(receivers_.size(), [&] {
     executor.for_each(twice.size(), [&](std::size_t i, unsigned) {
-      const RayTraced seen =
-          trace_mesh(*mesh, *light, twice[i].position, twice[i].normal, half, paths, i);
-      traced[i] = {.occlusion = seen.occlusion, .irradiance = seen.irradiance, .sky = seen.sky};
+      const RayTraced found = trace_mesh(*seen.mesh, *seen.light, twice[i].position,
+                                         twice[i].normal, half, seen.paths, i);
+      traced[i] = {.occlusion = found.occlusion, .irradiance = found.irradiance, .sky = found.sky};
       progress.advance(1);
     });
   });

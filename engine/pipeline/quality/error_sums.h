@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/pipeline/pipeline.h"
+#include "engine/pipeline/quality/check_error.h"
 #include "engine/shade/shading.h"
 
 namespace ptc {

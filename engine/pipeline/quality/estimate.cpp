@@ -140,15 +140,6 @@ ErrorLine line_of(std::span<const Shading> shaded, std::span<const Shading> othe
   return fit_errors(samples);
 }
 
-std::vector<Receiver> compared_of(std::span<const Pilot> pilots) {
-  std::vector<Receiver> receivers;
-  for (const Pilot& pilot : pilots) {
-    for (std::size_t k = 0; k < pilot.compared(); ++k)
-      receivers.push_back(pilot.receivers[pilot.compared_at(k)]);
-  }
-  return receivers;
-}
-
 }  // namespace
 
 ErrorLine fit_errors(std::span<const ErrorSample> samples) {
@@ -172,12 +163,6 @@ ErrorLine fit_errors(std::span<const ErrorSample> samples) {
   if (!(line.slope > 0)) return flat;
   if (line.constant < 0) line = {.constant = 0, .slope = e / d};
   return line;
-}
-
-void check_estimate_request(bool estimate, const std::optional<double>& error,
-                            const CheckRequest& check) {
-  if (!estimate || error || check.receivers > 0) return;
-  throw std::invalid_argument("--estimate needs rays to go by: give --error or --check, too");
 }
 
 std::vector<Shading> trace_pilots(const ContainerReader& scene, const ShadeOptions& options,

@@ -41,12 +41,8 @@ class Tuner {
         options_(options),
         pilots_(pilots),
         executor_(executor),
-        errors_(ladder().size()) {
-    for (const Pilot& pilot : pilots) {
-      for (std::size_t k = 0; k < pilot.compared(); ++k)
-        compared_.push_back(pilot.receivers[pilot.compared_at(k)]);
-    }
-  }
+        compared_(compared_of(pilots)),
+        errors_(ladder().size()) {}
 
   /// Traces as many rays as it takes for each half of a reference to be off by less than what is
   /// asked: squares of errors add up, so that the mean over some hundred receivers hardly suffers.
@@ -208,23 +204,6 @@ class Tuner {
 
 std::span<const Rung> ladder() {
   return kLadder;
-}
-
-PilotPlan plan_pilots(std::uint64_t receivers) {
-  constexpr std::uint64_t kFewest = 64, kMost = 128;       // pilots
-  constexpr std::uint64_t kShortest = 64, kLongest = 256;  // receivers of each
-  constexpr std::uint64_t kLeastStride = 16;               // fewer pilots sooner than shorter ones
-  constexpr std::uint64_t kShare = 16;  // of a run's: one in so many is a pilot's
-  if (receivers == 0) return {};
-  const std::uint64_t room =
-      std::max(std::min<std::uint64_t>(receivers, 2), receivers / kLeastStride);
-  const std::uint64_t count =
-      std::min(std::clamp(receivers / (kShare * kLongest), kFewest, kMost), room);
-  const std::uint64_t stride = receivers / count;
-  const std::uint64_t length = std::clamp(stride / kShare, kShortest, kLongest);
-  return {.count = static_cast<std::size_t>(count),
-          .stride = stride,
-          .receivers = static_cast<std::size_t>(std::min(stride, length))};
 }
 
 TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,

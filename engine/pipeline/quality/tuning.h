@@ -1,23 +1,23 @@
-// The cheapest setting of the gather that meets an error (spec/shading.md#error).
+// Finds the cheapest settings of the gather that meet an error (spec/shading.md#error).
 #pragma once
 
-#include <algorithm>
+#include <cstdint>
 #include <span>
 #include <vector>
 
-#include "engine/pipeline/pipeline.h"
-#include "engine/pipeline/quality/check.h"
+#include "engine/pipeline/quality/check_error.h"
+#include "engine/pipeline/quality/pilots.h"
 #include "engine/shade/shader.h"
 
 namespace ptc {
 
-/// A setting, and the error that scenes have with it in the middle.
+/// One setting of the ladder, with the error that scenes usually have with it.
 struct Rung {
-  float solid_angle, parallax;
-  unsigned resolution;
-  double usual_error;
+  float solid_angle, parallax;  ///< as in GatherOptions
+  unsigned resolution;          ///< as in GatherOptions
+  double usual_error;           ///< as CheckError::relative()
 
-  /// @param run  says which sides of surfels stop light, and whether colours bleed
+  /// The setting for a run that gives its own sides and bleeding.
   [[nodiscard]] GatherOptions options(const GatherOptions& run) const {
     return {.solid_angle = solid_angle,
             .parallax = parallax,
@@ -27,41 +27,30 @@ struct Rung {
   }
 };
 
-/// From coarse and cheap to fine.
+/// All settings to choose from, from coarse and cheap to fine.
 [[nodiscard]] std::span<const Rung> ladder();
 
-/// Neighbours among the receivers of a run: shaded together, some of them compared with rays.
-struct Pilot {
-  static constexpr std::size_t kCompared = 8;  ///< evenly spread; all of fewer
-
-  std::vector<Receiver> receivers;
-  unsigned variant = 0;  ///< as Shader::shade()
-
-  /// How many are compared.
-  [[nodiscard]] std::size_t compared() const noexcept {
-    return std::min(kCompared, receivers.size());
-  }
-  /// Place of the k-th of those.
-  [[nodiscard]] std::size_t compared_at(std::size_t k) const noexcept {
-    return (2 * k + 1) * receivers.size() / (2 * compared());
-  }
+/// What became of an error that was asked for (spec/shading.md#error).
+struct TuningReport {
+  double asked = 0;       ///< as CheckError::relative()
+  bool met = false;       ///< false: the finest setting was taken, and `measured` is its error
+  GatherOptions gather;   ///< the setting that was chosen
+  unsigned setting = 0;   ///< its index in ladder()
+  unsigned settings = 0;  ///< size of ladder()
+  CheckError measured;  ///< at the pilots that did not choose it; at all pilots when it is not met
+  std::size_t pilots = 0;        ///< number of receivers compared with rays
+  unsigned rays = 0;             ///< rays for each of them
+  std::uint64_t shaded = 0;      ///< receivers shaded to choose, over all settings that were tried
+  double ray_cpu_seconds = 0;    ///< all threads, loading the surfels included
+  double shade_cpu_seconds = 0;  ///< all threads
 };
 
-/// How many pilots stand for a run, and how long they are.
-struct PilotPlan {
-  std::size_t count = 0;      ///< 0 only for an empty run
-  std::uint64_t stride = 0;   ///< from the beginning of one to that of the next
-  std::size_t receivers = 0;  ///< of each, at most `stride`
-};
-/// @param receivers  of the run
-[[nodiscard]] PilotPlan plan_pilots(std::uint64_t receivers);
-
-/// Compares pilots with rays at the same surfels, finds the cheapest setting.
-/// @param options  but for its gather, of which only the sides count; its cache_bytes are the cap
-/// of the
-///                 rays too, StreamedRays::kLeastBytes at least
-/// @param compared  the pilots' receivers that were, appended
-/// @param traced    gets two by rays of each of them, side by side and pilot by pilot
+/// Compares pilots with rays at the same surfels and finds the cheapest setting that meets `asked`.
+/// @param options   of the run. Of its gather only sides and bleeding count. Its cache_bytes, at
+///                  least StreamedRays::kLeastBytes, are the cap of the rays too
+/// @param compared  gets the receivers of the pilots that were compared
+/// @param traced    gets two results by rays for each compared receiver, side by side, pilot by
+/// pilot
 [[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options,
                                 double asked, std::span<const Pilot> pilots,
                                 const Executor& executor, Progress& progress,
@@ -70,11 +59,11 @@ struct PilotPlan {
 /// What a setting of the ladder gives and costs.
 struct RungError {
   CheckError error;
-  double us_per_receiver = 0;  ///< CPU time
+  double us_per_receiver = 0;  ///< CPU time in microseconds
 };
 
 /// Compares pilots with rays at every setting of the ladder.
-/// @param options  as tune()
+/// @param options  as for tune()
 /// @param rays     for each half of a reference, a square number
 [[nodiscard]] std::vector<RungError> climb(const ContainerReader& scene,
                                            const ShadeOptions& options,

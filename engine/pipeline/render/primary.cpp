@@ -7,7 +7,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/pipeline/stages.h"
+#include "engine/pipeline/scene_record.h"
 
 namespace ptc {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/render/primary.h"
-#include "format/point_page.h"
+#include "engine/store/point_scan.h"
 #include "format/scalar.h"
 
 namespace ptc {
@@ -94,11 +94,11 @@ class SurfelView : public PrimaryView {
             const Executor& executor, Progress& progress) {
     std::vector<std::vector<Projected>> discs(pages.size());
     executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
-      std::vector<std::byte> payload(scene.page_payload_limit());
-      PageDecoder decoder;
-      progress.advance(scene.entry(pages[i]).record_count);
-      if (!read_unless_lost(scene, pages[i], payload, decoder, lost)) return;
-      const PointPage points(payload.data(), scene.entry(pages[i]).record_count);
+      PointScan scan(scene, pages.subspan(i, 1), noted_in(lost));
+      scan.next();
+      progress.advance(scan.count());
+      if (!scan.whole()) return;
+      const PointPage points = scan.points();
       for (std::uint32_t k = 0; k < points.size(); ++k) {
         project(to_surfel(points[k], scene.header().frame), discs[i]);
       }

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "engine/base/surfel.h"
-#include "engine/pipeline/quality/check.h"
+#include "engine/pipeline/quality/estimate.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -49,6 +50,9 @@ struct Sky {
   /// Radiance that arrives from `direction` (unit, away from the surface).
   [[nodiscard]] glm::vec3 at(const glm::vec3& direction) const;
 };
+
+/// Sky::at() as a function for a gather; empty when the sky is black.
+[[nodiscard]] std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky);
 
 /// All lights of a scene; area lights are the mesh's emissive triangles.
 struct LightRig {

@@ -138,4 +138,9 @@ float SkyDensity::density(const glm::vec3& direction) const {
   return density_at(orientation_.place_of(direction));
 }
 
+std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky) {
+  if (sky.radiance == glm::vec3(0)) return {};
+  return [sky](const glm::vec3& direction) { return sky.at(direction); };
+}
+
 }  // namespace ptc

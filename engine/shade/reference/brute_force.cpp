@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/io/cloud/record.h"
-#include "format/point_page.h"
+#include "engine/store/point_scan.h"
 #include "format/scalar.h"
 
 namespace ptc {
@@ -26,13 +26,12 @@ std::vector<Surfel> load_surfels(const ContainerReader& container, std::uint64_t
 
 void append_surfels(const ContainerReader& container, std::span<const std::uint32_t> pages,
                     std::vector<Surfel>& surfels) {
-  std::vector<std::byte> payload(container.page_payload_limit());
-  PageDecoder decoder;
-  for (const std::uint32_t page : pages) {
-    const PageHeader header = container.read_page(page, payload, decoder);
-    const PointPage points(payload.data(), header.record_count);
-    for (std::uint32_t i = 0; i < points.size(); ++i)
+  PointScan scan(container, pages);
+  while (scan.next()) {
+    const PointPage points = scan.points();
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
       surfels.push_back(to_surfel(points[i], container.header().frame));
+    }
   }
 }
 

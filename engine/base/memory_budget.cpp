@@ -1,0 +1,38 @@
+#include "engine/base/memory_budget.h"
+
+#include <algorithm>
+
+#include "engine/base/error.h"
+
+namespace ptc {
+namespace {
+
+std::string mebibytes(std::uint64_t bytes) {
+  constexpr std::uint64_t kMebibyte = std::uint64_t{1} << 20;
+  return std::to_string(bytes / kMebibyte + (bytes % kMebibyte != 0 ? 1 : 0)) + "M";
+}
+
+}  // namespace
+
+MemoryBudget::MemoryBudget(std::uint64_t cap_bytes, std::string job)
+    : cap_(cap_bytes), job_(std::move(job)) {}
+
+void MemoryBudget::charge(std::string part, std::uint64_t bytes) {
+  charged_ += bytes;
+  if (bytes > 0) parts_.emplace_back(std::move(part), bytes);
+}
+
+std::uint64_t MemoryBudget::rest(const std::string& part, std::uint64_t least_bytes) const {
+  if (cap_ >= charged_ && cap_ - charged_ >= least_bytes) return cap_ - charged_;
+  auto parts = parts_;
+  if (least_bytes > 0) parts.emplace_back(part, least_bytes);
+  std::ranges::stable_sort(parts, std::greater{}, &decltype(parts)::value_type::second);
+  std::string list;
+  for (const auto& [name, bytes] : parts) {
+    list += (list.empty() ? "" : ", ") + mebibytes(bytes) + " for " + name;
+  }
+  throw LimitError("the memory cap is too small for " + job_ + ": the least that works is " +
+                   mebibytes(charged_ + least_bytes) + " (" + list + ")");
+}
+
+}  // namespace ptc

@@ -1,0 +1,135 @@
+#include "engine/pipeline/light/lighting.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include "engine/base/memory.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/light/bounces.h"
+
+namespace ptc {
+namespace {
+
+void check_request(const LightingRequest& request) {
+  const bool traces_rays = request.error || request.check.receivers > 0;
+  if (request.estimate && !traces_rays) {
+    throw std::invalid_argument("--estimate needs rays to go by: give --error or --check, too");
+  }
+  if (!request.tolerate_damage) return;
+  if (request.bounces > 1) {
+    throw std::invalid_argument(
+        "--tolerate-damage goes with one bounce: more need every point, so salvage the scene "
+        "first");
+  }
+  if (traces_rays) {
+    throw std::invalid_argument(
+        "--tolerate-damage goes without --error and --check: rays need every point, so salvage "
+        "the scene first");
+  }
+}
+
+DamageReport damage_report(const ContainerReader& scene, const LostPages& lost,
+                           const DamageCounts& stand_ins) {
+  DamageReport report{.pages = lost.list(), .stand_ins = stand_ins};
+  for (const auto& [page, why] : report.pages) {
+    const DirectoryEntry& entry = scene.entry(page);
+    if (entry.type == PageType::point) report.points += entry.record_count;
+    if (entry.type == PageType::node) ++report.node_pages;
+  }
+  return report;
+}
+
+const LightingRequest& checked(const LightingRequest& request) {
+  check_request(request);
+  return request;
+}
+
+}  // namespace
+
+Lighting::Lighting(const LightingRequest& request, LightingReport& report, Progress& progress)
+    : request_(checked(request)),
+      report_(report),
+      progress_(progress),
+      executor_(request.run.threads),
+      scene_(request.scene) {
+  if (request.tolerate_damage) lost_ = std::make_unique<LostPages>(scene_);
+  report_.bounces = request.bounces;
+}
+
+Lighting::~Lighting() = default;
+
+void Lighting::prepare(MemoryBudget budget, const Sky& sky, unsigned variants,
+                       const std::filesystem::path& target) {
+  charge_bounces(budget, scene_, request_.bounces, executor_.threads());
+  options_ = {
+      .cache_bytes = cache_bytes_left(std::move(budget), scene_,
+                                      readers_of(executor_, request_.estimate), request_.back_end),
+      .back_end = request_.back_end,
+      .gather = request_.gather,
+      .sky = sky_function(sky),
+      .lost = lost_.get(),
+      .variants = variants};
+  options_.gather.bleeding = request_.bounces > 0;
+  bounced_ = bounce_light(
+      scene_, {request_.bounces, options_, request_.lift, roomiest_temp_dir(request_.run, target)},
+      executor_, report_, progress_);
+}
+
+void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
+  ReceiverPlaces compared;
+  if (request_.error || request_.estimate) {
+    const std::vector<Pilot> pilots = find_pilots();
+    std::vector<Shading> traced;  // two results by rays of each compared receiver
+    if (request_.error) {
+      const Stage stage(report_.seconds, progress_, "tune", 0, "receivers");
+      report_.tuning = ptc::tune(lit(), options_, *request_.error, pilots, executor_, progress_,
+                                 compared, traced);
+      options_.gather = report_.tuning->gather;
+    }
+    if (request_.estimate) {
+      const Stage stage(report_.seconds, progress_, "estimate", 0, "receivers");
+      if (!request_.error) {
+        traced = trace_pilots(lit(), options_, pilots, request_.check.rays, executor_, progress_,
+                              compared);
+      }
+      estimator_ = std::make_unique<Estimator>(lit(), options_, pilots, traced, executor_);
+      options_.cache = &estimator_->cache();
+    }
+  }
+  sample_.emplace(request_.check, std::move(compared));
+  shader_ = std::make_unique<Shader>(lit(), options_, executor_);
+}
+
+LitReceivers Lighting::shade(std::span<const Receiver> receivers, unsigned variant) {
+  results_.resize(receivers.size());
+  const double before = cpu_seconds();
+  shader_->shade(receivers, results_, progress_, variant);
+  report_.shade_cpu_seconds += cpu_seconds() - before;
+  LitReceivers lit{.shading = results_};
+  if (estimator_) lit.estimates = estimator_->estimate(receivers, results_, variant);
+  sample_->add(receivers, lit.shading, lit.estimates);
+  return lit;
+}
+
+void Lighting::finish() {
+  report_.gather = shader_->counts();
+  report_.receivers = report_.gather.receivers;
+  report_.cache = shader_->cache_statistics();
+  if (estimator_) {
+    report_.cache = estimator_->cache_statistics();
+    report_.estimate = estimator_->report();
+  }
+  if (lost_) report_.damage = damage_report(scene_, *lost_, report_.gather.damage);
+  estimator_.reset();
+  shader_.reset();
+}
+
+void Lighting::check(const CheckScene& seen) {
+  if (request_.check.receivers == 0) return;
+  const std::uint64_t references = (seen.mesh ? 4 : 2) * std::uint64_t{request_.check.receivers};
+  const Stage stage(report_.seconds, progress_, "check", references, "references");
+  report_.check = sample_->compare(lit(), request_.gather.sides, seen, options_.cache_bytes,
+                                   executor_, progress_);
+}
+
+}  // namespace ptc

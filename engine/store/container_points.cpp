@@ -1,0 +1,31 @@
+#include "engine/store/container_points.h"
+
+#include "format/error.h"
+
+namespace ptc {
+
+std::size_t ContainerPoints::next(std::span<PointRecord> out) {
+  std::size_t filled = 0;
+  while (filled < out.size()) {
+    if (at_ == scan_.count()) {
+      if (!scan_.next()) break;
+      at_ = 0;
+      if (scan_.points()[0].key < last_) refuse_order();
+    }
+    const PointPage points = scan_.points();
+    while (at_ < points.size() && filled < out.size()) out[filled++] = points[at_++];
+    last_ = out[filled - 1].key;
+  }
+  return filled;
+}
+
+// The reader has checked the order within each page. What is built from the stream also relies on
+// the order of the pages.
+void ContainerPoints::refuse_order() const {
+  const std::uint32_t page = container_.point_pages()[scan_.index()];
+  throw FormatError(kPageHeaderBytes, "spec/points.md#point-order",
+                    "the first point of the page precedes the one before")
+      .rebased(container_.entry(page).offset, container_.path().string());
+}
+
+}  // namespace ptc

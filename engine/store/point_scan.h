@@ -1,0 +1,66 @@
+// Reads the point pages of a container one after another.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "engine/store/reader.h"
+#include "format/error.h"
+#include "format/point_page.h"
+
+namespace ptc {
+
+/// A pass over point pages. Memory: one page.
+///
+///     PointScan scan(container);
+///     while (scan.next()) use(scan.points());
+class PointScan {
+ public:
+  /// Is told the number of a damaged page and what is wrong with it.
+  using OnDamage = std::function<void(std::uint32_t page, const FormatError& error)>;
+
+  /// A scan over all point pages, in order.
+  /// @param container  must outlive the scan
+  /// @param on_damage  when given, a damaged page is no error: it is reported here, and whole() is
+  ///                   false
+  explicit PointScan(const ContainerReader& container, OnDamage on_damage = {})
+      : PointScan(container, container.point_pages(), std::move(on_damage)) {}
+  /// A scan over some point pages.
+  /// @param pages  numbers of point pages; must outlive the scan
+  PointScan(const ContainerReader& container, std::span<const std::uint32_t> pages,
+            OnDamage on_damage = {});
+
+  /// Reads the next page.
+  /// @return false at the end
+  /// @throws FormatError for a damaged page when there is no `on_damage`; std::system_error
+  bool next();
+  /// Passes over pages without reading them, at most to the end.
+  void skip(std::size_t pages) noexcept;
+
+  /// Number of points on the page that next() would read; 0 at the end.
+  [[nodiscard]] std::uint32_t next_count() const noexcept;
+
+  /// Index of the page that next() read, among those of the scan.
+  [[nodiscard]] std::size_t index() const noexcept { return next_ - 1; }
+  /// Number of points on that page.
+  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
+  /// False when that page is damaged, so that it has no points().
+  [[nodiscard]] bool whole() const noexcept { return whole_; }
+  /// The points of that page, valid until the next call of next().
+  [[nodiscard]] PointPage points() const { return {payload_.data(), count_}; }
+
+ private:
+  const ContainerReader& container_;
+  std::span<const std::uint32_t> pages_;
+  OnDamage on_damage_;
+  std::vector<std::byte> payload_;
+  PageDecoder decoder_;
+  std::size_t next_ = 0;
+  std::uint32_t count_ = 0;
+  bool whole_ = true;
+};
+
+}  // namespace ptc
