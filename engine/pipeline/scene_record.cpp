@@ -2,13 +2,39 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+
+#include "engine/base/error.h"
+#include "engine/io/file/file.h"
 
 namespace ptc {
 
-LightRig recorded_lights(const ContainerReader& container) {
+LightRig recorded_lights(const ContainerReader& container, Progress& progress) {
   const auto& text = container.meta().text;
   const auto found = text.find(kLightsKey);
-  return found == text.end() ? LightRig{} : light_rig_from_json(found->second);
+  if (found == text.end()) return {};
+  LightRig rig = light_rig_from_json(found->second);
+  const std::string file = container.path().string();
+  try {
+    if (load_sky_map(rig.sky, directory_of(container.path())) == SkyMap::changed) {
+      progress.note(file + ": the sky picture " + rig.sky.map_path +
+                    " has changed since it lit the scene's surfels");
+    }
+  } catch (const DataError& error) {
+    throw DataError(file + ": " + error.what());
+  }
+  return rig;
+}
+
+std::string lights_record(LightRig rig) {
+  if (rig.sky.map && rig.sky.map_path.empty()) {
+    throw std::invalid_argument("a sky picture needs its path, by which the container records it");
+  }
+  if (!rig.sky.map_path.empty()) {
+    rig.sky.map_path = std::filesystem::absolute(rig.sky.map_path).lexically_normal().string();
+  }
+  return to_json(rig);
 }
 
 bool lit_by_emitters(const ContainerReader& container) {

@@ -1,6 +1,9 @@
 // What a container's meta page records of the scene, by key, and its typed values.
 #pragma once
 
+#include <string>
+
+#include "engine/base/progress.h"
 #include "engine/scene/light/lights.h"
 #include "engine/store/reader.h"
 
@@ -13,9 +16,16 @@ inline constexpr const char* kSpacingKey = "spacing";    ///< between surfels on
 inline constexpr const char* kInputsKey = "inputs";      ///< file names, separated by spaces
 inline constexpr const char* kRoundingKey = "rounding";  ///< kRounding when points were rounded
 
-/// The lights that a container was built with; none when it records none.
-/// @throws DataError when the record is no light rig
-[[nodiscard]] LightRig recorded_lights(const ContainerReader& container);
+/// The lights that a container was built with, the picture of their sky included; no lights when
+/// the container records none.
+/// @param progress  gets a note when the picture is no longer the one that was recorded
+/// @throws DataError when the record is no light rig, or names a picture that does not exist or is
+///         damaged; std::system_error
+[[nodiscard]] LightRig recorded_lights(const ContainerReader& container, Progress& progress);
+
+/// The rig as it is recorded: the path of its sky picture is made absolute.
+/// @throws std::invalid_argument when the sky has a picture and no path
+[[nodiscard]] std::string lights_record(LightRig rig);
 
 /// True when emissive triangles lit the surfels, so that the radiance of the surfels around an
 /// emitter includes the light that it gave them.

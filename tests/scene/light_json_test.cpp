@@ -132,8 +132,10 @@ TEST_CASE("light rig: what JSON cannot say is not written", "[scene][lights]") {
 
 TEST_CASE("light rig: a map that is not there is an error, no map is none", "[scene][lights]") {
   Sky sky;
-  load_sky_map(sky, "/");
+  CHECK(load_sky_map(sky, "/") == SkyMap::none);
   CHECK(!sky.map);
-  sky.map_path = "no-such-map.exr";
-  CHECK_THROWS(load_sky_map(sky, "/no-such-folder"));
+  sky.map_path = "/no-such-place/no-such-map.exr";
+  CHECK_THROWS_WITH(load_sky_map(sky, "/no-such-folder"),
+                    Catch::Contains("/no-such-place/no-such-map.exr") &&
+                        Catch::Contains("/no-such-folder/no-such-map.exr"));
 }

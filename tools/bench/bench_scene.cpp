@@ -122,7 +122,7 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
   }
   build_container(request, target, progress);
   const ContainerReader container(target);
-  lit.lights = recorded_lights(container);
+  lit.lights = recorded_lights(container, progress);
   if (!procedural) {
     lit.camera = default_camera(container, cameras, choice.backdrop,
                                 std::array{options.width, options.height});

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/points.h"
 #include "engine/octree/merge.h"
 #include "engine/octree/radius.h"
 #include "engine/pipeline/budgets.h"
@@ -46,7 +47,7 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double sp
   }
   if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
   meta.text[kInputsKey] = names;
-  meta.text[kLightsKey] = to_json(inputs.lights);
+  meta.text[kLightsKey] = lights_record(inputs.lights);
   if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
   if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
   if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
@@ -111,7 +112,14 @@ class Build {
       throw std::invalid_argument("the city cannot be appended to a scene");
     scene_ = std::make_unique<ContainerReader>(request_.append);
     check_extensible(*scene_);
-    if (scene_->meta().text.contains(kLightsKey)) request_.lights = recorded_lights(*scene_);
+    // The record of the scene stays; without meshes to light, its sky picture is not needed.
+    if (scene_->meta().text.contains(kLightsKey)) {
+      request_.lights = has_meshes() ? recorded_lights(*scene_, progress_) : LightRig{};
+    }
+  }
+
+  [[nodiscard]] bool has_meshes() const {
+    return request_.mesh || !std::ranges::all_of(request_.inputs, is_point_file);
   }
 
   [[nodiscard]] std::uint64_t scene_points() const {

@@ -224,7 +224,8 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   check_targets(request, targets);
   Subject subject{.side = side_of(request.samples)};
   Lighting lighting(request, report, progress);
-  const LightRig lights = request.lights ? *request.lights : recorded_lights(lighting.scene());
+  const LightRig lights =
+      request.lights ? *request.lights : recorded_lights(lighting.scene(), progress);
   load_subject(subject, request, lighting.scene());
   make_view(subject, request, lights, lighting, report, progress);
 

@@ -189,7 +189,7 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   Lighting lighting(request, report, progress);
   const OpenReceivers receivers(request, target, lighting, progress);
   check_count(receivers, target);
-  const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene()).sky;
+  const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene(), progress).sky;
 
   // Divide the memory, bring the light of earlier bounces, choose the settings
   MemoryBudget budget = budget_of(request.run.memory_bytes, "shading");

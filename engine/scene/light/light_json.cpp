@@ -1,13 +1,18 @@
 // The light rig as JSON, and the picture it names.
+#include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/json_fields.h"
 #include "engine/scene/light/lights.h"
+#include "format/checksum.h"
 
 namespace ptc {
 namespace {
@@ -57,11 +62,30 @@ PointLight read_point(const Json& json, const std::string& where) {
   return point;
 }
 
+std::uint64_t parse_digest(const std::string& text, const JsonFields& fields) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+  if (error != std::errc() || end != text.data() + text.size() || text.size() != 16) {
+    fields.fail("map_xxh3 must be 16 hexadecimal digits");
+  }
+  return value;
+}
+
+std::string digest_text(std::uint64_t digest) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (int shift = 60; shift >= 0; shift -= 4) text += kDigits[digest >> shift & 15];
+  return text;
+}
+
 Sky read_sky(const Json& json, const std::string& where) {
   JsonFields fields(json, where);
   Sky sky;
   fields.read("radiance", sky.radiance, kLight);
   fields.read("map", sky.map_path);
+  std::string digest;
+  fields.read("map_xxh3", digest);
+  if (!digest.empty()) sky.map_xxh3 = parse_digest(digest, fields);
   fields.read("up", sky.up, kFinite);
   fields.finish();
   make_unit(sky.up, "up", fields);
@@ -94,7 +118,11 @@ std::string to_json(const LightRig& rig) {
                       {"intensity", to_json_array(point.intensity)}});
   }
   Json sky{{"radiance", to_json_array(rig.sky.radiance)}, {"up", to_json_array(rig.sky.up)}};
-  if (!rig.sky.map_path.empty()) sky["map"] = rig.sky.map_path;
+  if (!rig.sky.map_path.empty()) {
+    sky["map"] = rig.sky.map_path;
+    const std::uint64_t digest = rig.sky.map ? image_xxh3(*rig.sky.map) : rig.sky.map_xxh3;
+    if (digest != 0) sky["map_xxh3"] = digest_text(digest);
+  }
   const Json json{{"suns", suns}, {"points", points}, {"sky", sky}};
   require_finite(json);
   return dump_json(json, "light rig");
@@ -111,9 +139,25 @@ LightRig light_rig_from_json(const std::string& text) {
   return rig;
 }
 
-void load_sky_map(Sky& sky, const std::filesystem::path& directory) {
-  if (sky.map_path.empty()) return;
-  sky.map = std::make_shared<const Image>(read_image(directory / sky.map_path));
+std::uint64_t image_xxh3(const Image& image) {
+  const std::uint64_t seed = std::uint64_t{image.width} << 32 | image.height;
+  return std::max<std::uint64_t>(1, xxh3_64(std::as_bytes(std::span(image.pixels)), seed));
+}
+
+SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory) {
+  if (sky.map_path.empty()) return SkyMap::none;
+  const std::filesystem::path recorded(sky.map_path);
+  const std::filesystem::path beside = directory / recorded.filename();
+  std::error_code absent;
+  const bool is_there = std::filesystem::exists(recorded, absent);
+  if (!is_there && !std::filesystem::exists(beside, absent)) {
+    throw DataError("the sky picture " + recorded.string() +
+                    " that lit the scene does not exist, and neither does " + beside.string() +
+                    ": put it there, or give a sky");
+  }
+  sky.map = std::make_shared<const Image>(read_image(is_there ? recorded : beside));
+  const bool same = sky.map_xxh3 == 0 || sky.map_xxh3 == image_xxh3(*sky.map);
+  return same ? SkyMap::same : SkyMap::changed;
 }
 
 }  // namespace ptc

@@ -44,8 +44,11 @@ struct PointLight {
 struct Sky {
   glm::vec3 radiance{0};             ///< multiplies the map
   std::shared_ptr<const Image> map;  ///< none: `radiance` from everywhere
-  std::string map_path;              ///< for the file's record
-  glm::vec3 up{0, 1, 0};             ///< unit
+  /// The file of the map. A container records it as an absolute path, so that programs find the map
+  /// again.
+  std::string map_path;
+  std::uint64_t map_xxh3 = 0;  ///< image_xxh3() of the map when it was recorded; 0: not known
+  glm::vec3 up{0, 1, 0};       ///< unit
 
   /// Radiance that arrives from `direction` (unit, away from the surface).
   [[nodiscard]] glm::vec3 at(const glm::vec3& direction) const;
@@ -67,16 +70,30 @@ struct LightRig {
 /// JSON text of a rig (the map by its path), for the container's record:
 /// {"suns": [{"to_sun": [x, y, z], "irradiance": [r, g, b], "angular_radius": a}, ...],
 ///  "points": [{"position": [x, y, z], "intensity": [r, g, b]}, ...],
-///  "sky": {"radiance": [r, g, b], "map": "path", "up": [x, y, z]}}
+///  "sky": {"radiance": [r, g, b], "map": "path", "map_xxh3": "16 hex digits", "up": [x, y, z]}}
+/// A sky with a map gets the map's own digest, not Sky::map_xxh3.
 /// @throws std::invalid_argument when a number is not finite or the path is not UTF-8
 [[nodiscard]] std::string to_json(const LightRig& rig);
 /// The inverse of to_json, exact; members that are absent keep their defaults. The map is named,
-/// not read: see load_sky_map(). Directions that are not unit are made so.
+/// not read: load_sky_map() reads it. Directions that are not unit are made so.
 /// @throws DataError when it is no JSON, a member is unknown or of the wrong type, or out of range
 [[nodiscard]] LightRig light_rig_from_json(const std::string& text);
-/// Reads the picture that `sky.map_path` names, if any, relative to `directory`.
-/// @throws DataError, std::system_error as read_image()
-void load_sky_map(Sky& sky, const std::filesystem::path& directory);
+
+/// XXH3 of the pixels of an image; never 0.
+[[nodiscard]] std::uint64_t image_xxh3(const Image& image);
+
+/// What became of the map of a recorded sky.
+enum class SkyMap {
+  none,     ///< the sky has no map
+  same,     ///< the map is the one that was recorded, or the record does not tell
+  changed,  ///< the file was found, and its picture differs from the recorded one
+};
+
+/// Reads the picture that `sky.map_path` names, if any. Where that file does not exist, a file of
+/// the same name in `directory` takes its place.
+/// @param directory  that of the container with the record
+/// @throws DataError when there is neither, and as read_image(); std::system_error
+SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory);
 
 /// Numbers of shadow rays for one surface point; 0 leaves these lights out.
 struct LightSampling {
