@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "engine/base/numbers.h"
 #include "tools/values.h"
 
 namespace ptc::bench {
@@ -29,14 +30,13 @@ GatherOptions parse_setting(const std::string& text) {
   constexpr char kExpected[] =
       "SR,RAD,R or SR,RAD,R,X: a solid angle from 1e-6 to 4 pi, a parallax from 0 to pi, "
       "16, 32, 48 or 64 pixels along a cube edge, an inflation from 0.01 to 100";
-  constexpr double kPi = std::numbers::pi;
   const std::vector<double> n = parse_numbers("--setting", text, {3, 4}, kExpected);
   const bool pixels = n[2] == 16 || n[2] == 32 || n[2] == 48 || n[2] == 64;
   GatherOptions options{.solid_angle = static_cast<float>(n[0]),
                         .parallax = static_cast<float>(n[1]),
                         .resolution = static_cast<unsigned>(n[2])};
   if (n.size() > 3) options.inflation = static_cast<float>(n[3]);
-  if (n[0] < 1e-6 || n[0] > 4 * kPi || n[1] < 0 || n[1] > kPi || !pixels ||
+  if (n[0] < 1e-6 || n[0] > 4 * kPiDouble || n[1] < 0 || n[1] > kPiDouble || !pixels ||
       options.inflation < 0.01F || options.inflation > 100) {
     refuse("--setting", text, kExpected);
   }

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/base/numbers.h"
 #include "tools/values.h"
 
 namespace ptc {
@@ -58,11 +59,10 @@ CLI::Option* add_bounces(CLI::App& app, unsigned& bounces) {
 
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
   constexpr char kGroup[] = "Expert";
-  constexpr double kPi = 3.141592653589793;
-  add_number(app, "--solid-angle", gather.solid_angle, 1e-6, 4 * kPi,
+  add_number(app, "--solid-angle", gather.solid_angle, 1e-6, 4 * kPiDouble,
              "Clusters below it are not opened, sr")
       ->group(kGroup);
-  add_number(app, "--parallax", gather.parallax, 0, kPi,
+  add_number(app, "--parallax", gather.parallax, 0, kPiDouble,
              "Receivers that see a cluster within this angle share it, rad")
       ->group(kGroup);
   add_number(app, "--inflation", gather.inflation, 0.01, 100,

@@ -7,6 +7,8 @@
 
 #include <nanoflann.hpp>
 
+#include "engine/base/numbers.h"
+
 namespace ptc {
 namespace {
 
@@ -101,9 +103,9 @@ class RadiusStream : public PointStream {
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t found =
           tree.knnSearch(cloud.points[i].data(), index.size(), index.data(), squared.data());
-      radii.push_back(
-          found > 1 ? std::sqrt(squared[found - 1] * M_PI / (2.0 * static_cast<double>(found - 1)))
-                    : 0);
+      radii.push_back(found > 1 ? std::sqrt(squared[found - 1] * kPiDouble /
+                                            (2.0 * static_cast<double>(found - 1)))
+                                : 0);
     }
     return radii;
   }

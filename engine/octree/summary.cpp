@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "engine/octree/point_columns.h"
 
 namespace ptc {
@@ -94,7 +95,7 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
   for (std::size_t k = 0; k < 3; ++k) sum.mean[k] = origin[k] + sum.mean[k] / weight;
   const Vec3 slab = slab_normal(sum);
   const bool has_axis = set_cone_axis(sum, slab);
-  double angle = has_axis ? 0 : M_PI;
+  double angle = has_axis ? 0 : kPiDouble;
   for (const NodeSummary* node : nodes) {
     sum.radius = std::max(sum.radius, distance(node->mean, sum.mean) + node->radius);
     const double half = std::acos(std::clamp(static_cast<double>(node->cone_cos), -1.0, 1.0));
@@ -103,7 +104,7 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
     sum.thickness = std::max(
         sum.thickness, offset_along(slab, node->mean, sum.mean) + std::min(reach, node->radius));
   }
-  set_bounds(sum, has_axis, angle >= M_PI ? -1.0 : std::cos(angle), sum.thickness);
+  set_bounds(sum, has_axis, angle >= kPiDouble ? -1.0 : std::cos(angle), sum.thickness);
   return sum;
 }
 

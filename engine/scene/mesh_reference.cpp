@@ -37,7 +37,7 @@ glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const Sur
   glm::vec3 radiance = hit.albedo / kPi * (direct.local + direct.sky);
   if (hit.front && emits) radiance += hit.emission;
   if (paths.bounces <= 1) return radiance;
-  const std::uint64_t next_seed = mix_bits(seed);
+  const std::uint64_t next_seed = splitmix64(seed);
   if (const auto next = follow(scene, hit, normal, next_seed)) {
     const LightPaths rest{paths.sampling, paths.bounces - 1};
     radiance += hit.albedo *
@@ -68,7 +68,7 @@ RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm:
     if (hit) {
       ++hits;
       if (paths.bounces > 0)
-        result.irradiance += radiance_of(scene, light, *hit, paths, true, mix_bits(seed) + i);
+        result.irradiance += radiance_of(scene, light, *hit, paths, true, splitmix64(seed) + i);
     } else {
       result.sky += light.rig().sky.at(direction);
     }

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/base/numbers.h"
 #include "engine/io/file/file.h"
 #include "engine/sort/partition.h"
 #include "format/checksum.h"
@@ -24,10 +25,7 @@ constexpr std::size_t kPieceBytes = std::size_t{2} << 20;  // of a write
 // records that repeat with a period must not fool the sample. The same for the same arguments.
 std::uint64_t sample_position(std::uint64_t i, std::uint64_t count, std::uint64_t size) noexcept {
   const std::uint64_t begin = i * size / count, end = (i + 1) * size / count;
-  std::uint64_t mixed = (i + size) * 0x9e3779b97f4a7c15;  // splitmix64 (Steele et al. 2014)
-  mixed = (mixed ^ mixed >> 30) * 0xbf58476d1ce4e5b9;
-  mixed = (mixed ^ mixed >> 27) * 0x94d049bb133111eb;
-  return begin + (mixed ^ mixed >> 31) % (end - begin);
+  return begin + splitmix64((i + size - 1) * kSplitMixStep) % (end - begin);
 }
 
 /// A disk, a quota or what the file system allows a file is used up: another directory may have

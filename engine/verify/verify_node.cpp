@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/base/numbers.h"
 #include "format/scalar.h"
 
 namespace ptc {
@@ -146,7 +147,7 @@ std::optional<Fault> compare_cone(const NodeSummary& stored, const NodeSummary& 
                  fmt::format("cone's axis is {} rad off the mean normal of its points", turned)};
   }
   const double half = std::acos(std::clamp(static_cast<double>(exact.cone_cos), -1.0, 1.0));
-  const double needed = half + turned >= M_PI ? -1.0 : std::cos(half + turned);
+  const double needed = half + turned >= kPiDouble ? -1.0 : std::cos(half + turned);
   const auto found = static_cast<double>(stored.cone_cos);
   if (found <= needed + kCosSlack && found >= needed - 1.0 / 32767 - kCosSlack) return {};
   return Fault{kCone, fmt::format("cone's cosine {} is not that of its points, {}", found, needed)};

@@ -15,7 +15,7 @@ namespace {
 
 /// Evenly spread in [-1, 1).
 float noise(std::uint64_t seed) {
-  return 2 * to_unit(static_cast<std::uint32_t>(mix_bits(seed) >> 32)) - 1;
+  return 2 * to_unit(static_cast<std::uint32_t>(splitmix64(seed) >> 32)) - 1;
 }
 
 /// A window of 16 x 16 pixels in which every fourth sees nothing.

@@ -9,19 +9,19 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/numbers.h"
 #include "format/error.h"
 
 namespace ptc::test {
 
-/// SplitMix64 (Steele, Lea and Flood 2014): the same sequence on every machine.
+/// Random numbers by SplitMix64: the same sequence on every machine.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
   std::uint64_t bits() {
-    std::uint64_t z = state_ += 0x9e3779b97f4a7c15;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
-    z = (z ^ z >> 27) * 0x94d049bb133111eb;
-    return z ^ z >> 31;
+    const std::uint64_t value = splitmix64(state_);
+    state_ += kSplitMixStep;
+    return value;
   }
   std::uint64_t below(std::uint64_t limit) { return bits() % limit; }
   /// In [0, 1).

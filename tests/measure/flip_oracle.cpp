@@ -8,12 +8,13 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
+#include "engine/base/numbers.h"
+
 namespace ptc {
 namespace {
 
 using Colours = std::vector<glm::dvec3>;
 
-constexpr double kPi = 3.14159265358979323846;
 // IEC 61966-2-1, rows X, Y, Z, and its inverse; white is the sum of each row.
 constexpr double kXyz[3][3] = {{0.4123907992659595, 0.3575843393838780, 0.1804807884018343},
                                {0.2126390058715104, 0.7151686787677559, 0.0721923153607337},
@@ -82,12 +83,12 @@ struct Oracle {
 
   // Section "spatial filtering".
   [[nodiscard]] glm::dvec3 seen(int x, int y) const {
-    const int radius =
-        static_cast<int>(std::ceil(3 * std::sqrt(0.04 / (2 * kPi * kPi)) * pixels_per_degree));
+    const int radius = static_cast<int>(
+        std::ceil(3 * std::sqrt(0.04 / (2 * kPiDouble * kPiDouble)) * pixels_per_degree));
     const auto weight = [this](int i, int j) {
       const double square = (i * i + j * j) / (pixels_per_degree * pixels_per_degree);
       const auto g = [square](double a, double b) {
-        return a * std::sqrt(kPi / b) * std::exp(-kPi * kPi / b * square);
+        return a * std::sqrt(kPiDouble / b) * std::exp(-kPiDouble * kPiDouble / b * square);
       };
       return glm::dvec3(g(1, 0.0047), g(1, 0.0053), g(34.1, 0.04) + g(13.5, 0.025));
     };

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/scene/light/lights.h"
 #include "tests/scene/meshes.h"
 
@@ -12,7 +13,6 @@ using namespace ptc;
 namespace {
 
 const glm::vec3 kUp(0, 1, 0);
-constexpr double kPiWide = 3.14159265358979;
 
 // Form factor from a small patch to a parallel rectangle a x b at distance c, a corner over it.
 // Source: Howell, A catalog of radiation heat transfer configuration factors, B-4.
@@ -21,7 +21,7 @@ double corner_factor(double a, double b, double c) {
   const double y = b / c;
   const double hx = std::sqrt(1 + x * x);
   const double hy = std::sqrt(1 + y * y);
-  return (x / hx * std::atan(y / hx) + y / hy * std::atan(x / hy)) / (2 * kPiWide);
+  return (x / hx * std::atan(y / hx) + y / hy * std::atan(x / hy)) / (2 * kPiDouble);
 }
 
 // A square lamp of half width h at a height, which looks down, made of n x n quads.
@@ -66,7 +66,7 @@ TEST_CASE("area light: a square overhead gives pi times radiance times its form 
       const Mesh mesh = lamp(1, height, n, {2, 3, 4});
       const RayScene scene(mesh);
       const DirectLight light(scene, {});
-      const double expected = 2 * kPiWide * 4 * corner_factor(1, 1, static_cast<double>(height));
+      const double expected = 2 * kPiDouble * 4 * corner_factor(1, 1, static_cast<double>(height));
       const Spread found = irradiance(light, {0, 0, 0}, kUp, 400);
       // Of many emitters, few are drawn that are near: noise, until all are near or all are far.
       const bool is_noisy = n == 12 && height < 0.1f;
@@ -83,7 +83,7 @@ TEST_CASE("area light: beside and beyond the lamp it is exact as well", "[scene]
   for (const double x : {0.5, 1.0, 2.0, 6.0}) {
     // Rectangles with a corner over the point: to x + 1, less to x - 1 (its sign included).
     const double near = std::copysign(corner_factor(std::abs(x - 1), 1, 1), x - 1);
-    const double expected = kPiWide * 2 * (corner_factor(x + 1, 1, 1) - (x == 1 ? 0 : near));
+    const double expected = kPiDouble * 2 * (corner_factor(x + 1, 1, 1) - (x == 1 ? 0 : near));
     CHECK(irradiance(light, {x, 0, 0}, kUp, 400).mean == Approx(expected).epsilon(0.02));
   }
 }
@@ -101,8 +101,8 @@ TEST_CASE("area light: a wall that the lamp stands on gets its part above the ho
   // B-5): (atan(b / c) - c / sqrt(a^2 + c^2) atan(b / sqrt(a^2 + c^2))) / 2 pi; twice, for both
   // sides.
   const double diagonal = std::sqrt(5.0);
-  const double factor = (std::atan(1.0) - std::atan(1 / diagonal) / diagonal) / kPiWide;
-  CHECK(irradiance(light, {0, 0, 0}, kUp, 400).mean == Approx(kPiWide * factor).epsilon(0.02));
+  const double factor = (std::atan(1.0) - std::atan(1 / diagonal) / diagonal) / kPiDouble;
+  CHECK(irradiance(light, {0, 0, 0}, kUp, 400).mean == Approx(kPiDouble * factor).epsilon(0.02));
 }
 
 TEST_CASE("area light: it shines on its front side only", "[scene][lights]") {
@@ -120,7 +120,7 @@ TEST_CASE("area light: what stands between hides it", "[scene][lights]") {
   add_quad(mesh, {-5, 1, -5}, {5, 0, 0}, {0, 0, 10});  // the half x < 0
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
-  const double whole = kPiWide * 4 * corner_factor(1, 1, 2);
+  const double whole = kPiDouble * 4 * corner_factor(1, 1, 2);
   CHECK(irradiance(light, {0, 0, 0}, kUp, 400).mean == Approx(whole / 2).epsilon(0.03));
   CHECK(light.irradiance({-3, 0, 0}, kUp, {}, 1).local == glm::vec3(0));
 }

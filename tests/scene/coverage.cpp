@@ -45,8 +45,8 @@ class Neighbours {
     return glm::i64vec3(glm::floor(p / (1.5 * spacing_)));
   }
   static std::uint64_t key(const glm::i64vec3& c) {
-    return mix_bits(
-        mix_bits(mix_bits(static_cast<std::uint64_t>(c.x)) ^ static_cast<std::uint64_t>(c.y)) ^
+    return splitmix64(
+        splitmix64(splitmix64(static_cast<std::uint64_t>(c.x)) ^ static_cast<std::uint64_t>(c.y)) ^
         static_cast<std::uint64_t>(c.z));
   }
 

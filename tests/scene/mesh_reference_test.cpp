@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/scene/sampling/directions.h"
 #include "tests/scene/meshes.h"
 
@@ -13,7 +14,6 @@ using namespace ptc;
 
 namespace {
 
-constexpr double kPiWide = 3.14159265358979;
 const glm::vec3 kUp(0, 1, 0);
 
 // Form factor from a patch to a rectangle, by its definition: the integral of cos cos' / (pi d^2).
@@ -30,7 +30,7 @@ double factor(const glm::dvec3& at, const glm::dvec3& normal, const glm::dvec3& 
       if (glm::dot(normal, d) > 0 && cosines > 0) sum += cosines / (square * square);
     }
   }
-  return sum / (kPiWide * n * n);
+  return sum / (kPiDouble * n * n);
 }
 
 Mesh emitting_quad(const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v) {
@@ -56,10 +56,10 @@ void check_factor(const glm::vec3& corner, const glm::vec3& u, const glm::vec3& 
   const double noise = 3 * std::sqrt(expected * (1 - expected) / rays);
   CHECK(static_cast<double>(result.occlusion) == Approx(expected).margin(noise));
   CHECK(static_cast<double>(result.irradiance.x) ==
-        Approx(kPiWide * expected).margin(kPiWide * noise));
+        Approx(kPiDouble * expected).margin(kPiDouble * noise));
   CHECK(result.irradiance.z == Approx(4 * result.irradiance.x));
   CHECK(static_cast<double>(result.sky.x) ==
-        Approx(3 * kPiWide * (1 - expected)).margin(10 * noise));
+        Approx(3 * kPiDouble * (1 - expected)).margin(10 * noise));
 }
 
 /// A closed box that emits 1 and reflects half.
@@ -129,7 +129,7 @@ TEST_CASE("trace_mesh: in a furnace the irradiance is pi times emission plus one
   const DirectLight light(scene, {});
   const RayTraced result = trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 1024, {{1, 16, 1}}, 1);
   CHECK(result.occlusion == 1);
-  CHECK(result.irradiance.x == Approx(1.5 * kPiWide).epsilon(0.01));
+  CHECK(result.irradiance.x == Approx(1.5 * kPiDouble).epsilon(0.01));
   CHECK(result.sky == glm::vec3(0));
 }
 
@@ -146,7 +146,7 @@ TEST_CASE(
       const RayTraced result =
           trace_mesh(scene, light, {0.2, -1, 0.3}, kUp, 4096, {{1, area_rays, 1}, n}, 1);
       INFO(area_rays << " area rays, " << n << " bounces");
-      CHECK(result.irradiance.x == Approx(expected * kPiWide).epsilon(0.01));
+      CHECK(result.irradiance.x == Approx(expected * kPiDouble).epsilon(0.01));
     }
   }
 }
@@ -164,8 +164,8 @@ TEST_CASE("trace_mesh: a lit surface sends albedo over pi times its direct light
   const DirectLight light(scene, rig);
   const RayTraced result = trace_mesh(scene, light, {0, 0, 0}, kUp, 1024, {}, 1);
   CHECK(result.occlusion == Approx(1).epsilon(1e-3));
-  CHECK(result.irradiance.x == Approx(0.5 * (2 + kPiWide)).epsilon(0.01));
-  CHECK(result.irradiance.y == Approx(0.25 * (2 + kPiWide)).epsilon(0.01));
+  CHECK(result.irradiance.x == Approx(0.5 * (2 + kPiDouble)).epsilon(0.01));
+  CHECK(result.irradiance.y == Approx(0.25 * (2 + kPiDouble)).epsilon(0.01));
 }
 
 TEST_CASE("trace_mesh: a back side hides and is black, unless it is double-sided",

@@ -88,7 +88,7 @@ std::vector<Surfel> drain(PointSource& source, std::size_t block) {
 }
 
 double Random::unit() {
-  state_ = mix_bits(state_);
+  state_ = splitmix64(state_);
   return static_cast<double>(state_ >> 11) * 0x1p-53;
 }
 

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/light/sky_map.h"
 #include "engine/scene/sampling/directions.h"
@@ -13,8 +14,6 @@
 using namespace ptc;
 
 namespace {
-
-constexpr double kPiWide = 3.14159265358979;
 
 std::shared_ptr<Image> black(unsigned width, unsigned height) {
   return std::make_shared<Image>(
@@ -27,9 +26,9 @@ void set(Image& image, unsigned x, unsigned y, const glm::vec3& value) {
 
 // Solid angle of a pixel.
 double pixel_sr(const Image& image, unsigned y) {
-  const double top = std::cos(kPiWide * y / image.height);
-  const double bottom = std::cos(kPiWide * (y + 1) / image.height);
-  return (top - bottom) * 2 * kPiWide / image.width;
+  const double top = std::cos(kPiDouble * y / image.height);
+  const double bottom = std::cos(kPiDouble * (y + 1) / image.height);
+  return (top - bottom) * 2 * kPiDouble / image.width;
 }
 
 Image noise(unsigned width, unsigned height, Random& random) {
@@ -49,13 +48,13 @@ glm::dvec3 integral(const Sky& sky, const glm::vec3& normal) {
     const double y = 1 - 2 * (i + 0.5) / rows;
     const double flat = std::sqrt(1 - y * y);
     for (int j = 0; j < 2 * rows; ++j) {
-      const double turn = kPiWide * (j + 0.5) / rows;
+      const double turn = kPiDouble * (j + 0.5) / rows;
       const glm::vec3 d(glm::dvec3(flat * std::sin(turn), y, flat * std::cos(turn)));
       const double cosine = static_cast<double>(glm::dot(d, normal));
       if (cosine > 0) sum += cosine * glm::dvec3(sky.at(d));
     }
   }
-  return sum * (4 * kPiWide / (2.0 * rows * rows));
+  return sum * (4 * kPiDouble / (2.0 * rows * rows));
 }
 
 }  // namespace
@@ -118,7 +117,7 @@ TEST_CASE("sky map: place and direction are inverse to each other", "[scene][sky
     const glm::dvec2 place = orientation.place_of(direction);
     CHECK((place.x >= 0 && place.x < 1 && place.y >= 0 && place.y <= 1));
     CHECK(glm::distance(orientation.direction_at(place), direction) < 1e-5f);
-    CHECK(std::cos(kPiWide * place.y) ==
+    CHECK(std::cos(kPiDouble * place.y) ==
           Approx(static_cast<double>(glm::dot(up, direction))).margin(1e-6));
   }
 }
@@ -140,7 +139,7 @@ TEST_CASE("sky map: one bright pixel gives its radiance times solid angle times 
     rig.sky.radiance = glm::vec3(1, 2, 3);
     rig.sky.map = map;
     const DirectLight light(scene, rig);
-    const double cosine = std::cos(kPiWide * (row + 0.5) / 64);
+    const double cosine = std::cos(kPiDouble * (row + 0.5) / 64);
     const double expected = 1000 * pixel_sr(*map, row) * cosine;
     double mean = 0;
     double squares = 0;
@@ -200,7 +199,7 @@ TEST_CASE("sky density: it integrates to 1, and samples have the density they sa
   double integral_of_one = 0;
   for (int i = 0; i < count; ++i) {
     integral_of_one +=
-        static_cast<double>(density.density(random.direction())) * 4 * kPiWide / count;
+        static_cast<double>(density.density(random.direction())) * 4 * kPiDouble / count;
   }
   CHECK(integral_of_one == Approx(1).epsilon(0.02));
   for (int i = 0; i < 2000; ++i) {

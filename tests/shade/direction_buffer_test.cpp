@@ -8,13 +8,12 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "format/scalar.h"
 
 using namespace ptc;
 
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 glm::vec3 random_direction(std::mt19937& bits) {
   std::normal_distribution<float> normal;

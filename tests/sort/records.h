@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/numbers.h"
 #include "engine/sort/external_sort.h"
 #include "format/morton.h"
 #include "format/point_record.h"
@@ -35,7 +36,7 @@ inline PointRecord numbered(const MortonKey& key, std::size_t place) {
   for (std::size_t i = 0; i < r.radiance.size(); ++i)
     r.radiance[i] = static_cast<std::uint16_t>(place >> 16 * i);
   const std::size_t mixed =
-      (place + 1) * 0x9e3779b97f4a7c15;  // every byte but the reserved ones, which are 0
+      (place + 1) * kSplitMixStep;  // every byte but the reserved ones, which are 0
   r.normal = {static_cast<std::int16_t>(mixed), static_cast<std::int16_t>(mixed >> 16)};
   for (std::size_t i = 0; i < r.albedo.size(); ++i)
     r.albedo[i] = static_cast<std::uint8_t>(mixed >> (32 + 8 * i));

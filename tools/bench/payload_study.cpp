@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/memory.h"
+#include "engine/base/numbers.h"
 #include "engine/octree/subtree.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/reference/plain_gather.h"
@@ -19,7 +20,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr float kPi = 3.14159265F;
 constexpr double kBoundsBytes =
     22;  // of a child (spec/nodes.md): reference, mean, radius, cone, thickness
 constexpr double kFloatNodeBytes = 8 + 34 * sizeof(float);  // reference and all numbers

@@ -23,7 +23,7 @@ float value_noise(const glm::vec3& p, std::uint64_t seed) {
     float weight = 1;
     for (int k = 0; k < 3; ++k) {
       const bool high = (corner >> k & 1) != 0;
-      hash = mix_bits(
+      hash = splitmix64(
           hash ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(low[k]) + (high ? 1 : 0)));
       weight *= high ? s[k] : 1 - s[k];
     }
@@ -219,7 +219,7 @@ LitScene make_layers(unsigned layers) {
   for (unsigned layer = 1; layer <= layers; ++layer) {
     for (int tile = 0; tile < kTiles * kTiles; ++tile) {
       const std::uint64_t bits =
-          mix_bits(std::uint64_t{layer} << 32 | static_cast<std::uint64_t>(tile));
+          splitmix64(std::uint64_t{layer} << 32 | static_cast<std::uint64_t>(tile));
       if ((bits & 1) != 0) continue;
       const glm::vec3 at(static_cast<float>(tile % kTiles), static_cast<float>(layer),
                          static_cast<float>(tile / kTiles));

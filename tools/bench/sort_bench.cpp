@@ -10,6 +10,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
+#include "engine/base/numbers.h"
 #include "engine/io/file/disk_space.h"
 #include "tools/bench/record_file.h"
 #include "tools/bench/timed_runs.h"
@@ -17,11 +18,8 @@
 namespace ptc::bench {
 namespace {
 
-std::uint64_t mixed(std::uint64_t i) noexcept {  // splitmix64 (Steele et al. 2014)
-  std::uint64_t z = (i + 1) * 0x9e3779b97f4a7c15;
-  z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
-  z = (z ^ z >> 27) * 0x94d049bb133111eb;
-  return z ^ z >> 31;
+std::uint64_t mixed(std::uint64_t i) noexcept {
+  return splitmix64(i * kSplitMixStep);
 }
 
 constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;

@@ -7,11 +7,12 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
+
 namespace ptc {
 namespace {
 
 constexpr std::size_t kChoices = 64;
-constexpr double kPiWide = 3.14159265358979323846;
 
 double brightness(const glm::vec3& c) {
   return static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
@@ -79,7 +80,7 @@ glm::dvec3 sample_solid_angle(const std::array<glm::dvec3, 3>& d, const glm::vec
     return std::acos(std::clamp(-glm::dot(a, b), -1.0, 1.0));
   };
   const double alpha = angle(ab, ca);
-  const double excess = alpha + angle(bc, ab) + angle(ca, bc) - kPiWide;
+  const double excess = alpha + angle(bc, ab) + angle(ca, bc) - kPiDouble;
   const double part = static_cast<double>(square.x) * excess;
   const double s = std::sin(part - alpha);
   const double t = std::cos(part - alpha);

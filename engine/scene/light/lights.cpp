@@ -30,7 +30,7 @@ struct Receiver {
 
   // Sample points of one kind of light, unrelated to those of another.
   [[nodiscard]] SquarePoints points(std::uint64_t kind) const {
-    return SquarePoints(mix_bits(seed) + kind);
+    return SquarePoints(splitmix64(seed) + kind);
   }
 };
 
@@ -152,7 +152,7 @@ glm::vec3 DirectLight::Impl::from_emitters(const Receiver& at, unsigned rays) co
   if (area.empty() || rays == 0) return glm::vec3(0);
   thread_local std::vector<EmitterSample> samples;
   const glm::vec3 local(at.position - scene.mesh().origin);
-  area.sample(local, at.normal, rays, mix_bits(at.seed) + kArea, samples);
+  area.sample(local, at.normal, rays, splitmix64(at.seed) + kArea, samples);
   glm::vec3 sum(0);
   for (const EmitterSample& sample : samples) {
     // The ray ends before the emitter, as it begins off the receiver.

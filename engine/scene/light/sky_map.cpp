@@ -8,12 +8,11 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/scene/texture.h"
 
 namespace ptc {
 namespace {
-
-constexpr double kPiWide = 3.14159265358979323846;
 
 bool has_map(const Sky& sky) {
   return sky.map && !sky.map->pixels.empty();
@@ -62,14 +61,14 @@ SkyOrientation::SkyOrientation(const glm::vec3& up) : y_(glm::normalize(glm::dve
 
 glm::dvec2 SkyOrientation::place_of(const glm::vec3& direction) const {
   const glm::dvec3 d(direction);
-  const double turn = 0.5 - std::atan2(glm::dot(d, x_), glm::dot(d, z_)) / (2 * kPiWide);
-  const double rise = std::acos(std::clamp(glm::dot(d, y_), -1.0, 1.0)) / kPiWide;
+  const double turn = 0.5 - std::atan2(glm::dot(d, x_), glm::dot(d, z_)) / (2 * kPiDouble);
+  const double rise = std::acos(std::clamp(glm::dot(d, y_), -1.0, 1.0)) / kPiDouble;
   return {turn < 1 ? turn : 0, rise};
 }
 
 glm::vec3 SkyOrientation::direction_at(const glm::dvec2& place) const {
-  const double longitude = (0.5 - place.x) * 2 * kPiWide;
-  const double polar = place.y * kPiWide;
+  const double longitude = (0.5 - place.x) * 2 * kPiDouble;
+  const double polar = place.y * kPiDouble;
   const double flat = std::sin(polar);
   return glm::vec3(flat * std::sin(longitude) * x_ + std::cos(polar) * y_ +
                    flat * std::cos(longitude) * z_);
@@ -87,7 +86,7 @@ SkyDensity::SkyDensity(const Sky& sky) : orientation_(sky.up), map_(sky.map) {
   double total = 0;
   std::vector<double> sums(map_->width);
   for (unsigned row = 0; row < map_->height; ++row) {
-    sines_.push_back(std::sin(kPiWide * (row + 0.5) / map_->height));
+    sines_.push_back(std::sin(kPiDouble * (row + 0.5) / map_->height));
     double sum = 0;
     for (unsigned column = 0; column < map_->width; ++column) {
       sums[column] = sum += weight(column, row);
@@ -115,9 +114,9 @@ float SkyDensity::density_at(const glm::dvec2& place) const {
   const double value =
       (1 - share_y) * ((1 - share_x) * weight(column, upper) + share_x * weight(next, upper)) +
       share_y * ((1 - share_x) * weight(column, lower) + share_x * weight(next, lower));
-  const double sine = std::max(std::sin(kPiWide * place.y), 1e-9);
+  const double sine = std::max(std::sin(kPiDouble * place.y), 1e-9);
   return static_cast<float>(value / rows_.back() * map_->width * map_->height /
-                            (2 * kPiWide * kPiWide * sine));
+                            (2 * kPiDouble * kPiDouble * sine));
 }
 
 SkyDensity::Sample SkyDensity::sample(const glm::vec2& square) const {

@@ -138,7 +138,7 @@ void sample_facet(const Facet& facet, const FacetRows& rows, const glm::dvec3& b
   for (std::uint32_t row = 0; row < rows.rows(); ++row) {
     const std::uint32_t count = row == 0 && rows.rows() == 1 ? rows.count() : rows.in_row(row);
     for (std::uint32_t i = 0; i < count; ++i) {
-      seed = mix_bits(seed);
+      seed = splitmix64(seed);
       const float b = rows.height(row, jitter(static_cast<std::uint32_t>(seed)));
       const float a = (static_cast<float>(i) + jitter(static_cast<std::uint32_t>(seed >> 32))) /
                       static_cast<float>(count) * rows.width(b);
@@ -174,7 +174,7 @@ class CitySource final : public PointSource {
       const BlockPlace place = block_place(block_);
       const glm::dvec3 corner = block_corner(place);
       float carry = 0.5f;
-      std::uint64_t seed = mix_bits(block_);
+      std::uint64_t seed = splitmix64(block_);
       for (const Facet& facet : build_block(place)) {
         const FacetRows rows(facet, static_cast<float>(layout_.spacing), carry);
         sample_facet(facet, rows, corner, ++seed, points_);

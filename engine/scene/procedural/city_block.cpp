@@ -53,8 +53,8 @@ static_assert(2 * kGroundCells * kGroundCells == kGroundTriangles);
 class Dice {
  public:
   explicit Dice(const BlockPlace& place)
-      : state_(mix_bits(mix_bits(static_cast<std::uint64_t>(place.column)) ^
-                        static_cast<std::uint64_t>(place.row))) {}
+      : state_(splitmix64(splitmix64(static_cast<std::uint64_t>(place.column)) ^
+                          static_cast<std::uint64_t>(place.row))) {}
 
   float between(float low, float high) {
     return low + (high - low) * to_unit(static_cast<std::uint32_t>(next() >> 32));
@@ -65,7 +65,7 @@ class Dice {
   }
 
  private:
-  std::uint64_t next() { return state_ = mix_bits(state_); }
+  std::uint64_t next() { return state_ = splitmix64(state_); }
   std::uint64_t state_;
 };
 

@@ -182,7 +182,7 @@ class ClusterGrid {
   }
 
   std::uint32_t* slot(std::uint64_t key) {
-    std::size_t i = mix_bits(key) & (table_.size() - 1);
+    std::size_t i = splitmix64(key) & (table_.size() - 1);
     while (table_[i] != kEmpty && entries_[table_[i]].first != key) {
       i = (i + 1) & (table_.size() - 1);
     }

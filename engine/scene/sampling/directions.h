@@ -8,9 +8,9 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-namespace ptc {
+#include "engine/base/numbers.h"
 
-inline constexpr float kPi = 3.14159265358979f;
+namespace ptc {
 
 /// A right-handed frame whose third axis is a given unit vector.
 /// Source: Duff et al. 2017, Building an orthonormal basis, revisited.

@@ -5,16 +5,9 @@
 
 #include <glm/vec2.hpp>
 
-namespace ptc {
+#include "engine/base/numbers.h"
 
-/// A 64-bit hash: neighbouring numbers give unrelated ones.
-/// Source: Steele, Lea and Flood 2014, Fast splittable pseudorandom number generators (SplitMix64).
-[[nodiscard]] constexpr std::uint64_t mix_bits(std::uint64_t x) noexcept {
-  x += 0x9E3779B97F4A7C15u;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-  return x ^ (x >> 31);
-}
+namespace ptc {
 
 /// The top 24 bits as a number in [0, 1).
 [[nodiscard]] constexpr float to_unit(std::uint32_t bits) noexcept {
@@ -47,7 +40,7 @@ namespace ptc {
 /// Source: Sobol 1967; Owen 1995; Burley 2020, Practical hash-based Owen scrambling.
 class SquarePoints {
  public:
-  explicit constexpr SquarePoints(std::uint64_t seed) noexcept : seed_(mix_bits(seed)) {}
+  explicit constexpr SquarePoints(std::uint64_t seed) noexcept : seed_(splitmix64(seed)) {}
 
   [[nodiscard]] constexpr glm::vec2 square(std::uint32_t index) const noexcept {
     return {to_unit(reverse_bits(scramble_reversed(index, low(seed_)))),
@@ -58,11 +51,11 @@ class SquarePoints {
   /// A further coordinate, evenly spread by itself and independent of square(); of 53 bits, to
   /// choose from very many.
   [[nodiscard]] constexpr double line(std::uint32_t index) const noexcept {
-    const std::uint64_t seed = mix_bits(seed_);
+    const std::uint64_t seed = splitmix64(seed_);
     // A shuffle that keeps blocks of 2^k together.
     const std::uint32_t shuffled = reverse_bits(scramble_reversed(reverse_bits(index), low(seed)));
     const std::uint64_t upper = reverse_bits(scramble_reversed(shuffled, high(seed)));
-    const std::uint64_t bits = upper << 32 | high(mix_bits(seed + index));
+    const std::uint64_t bits = upper << 32 | high(splitmix64(seed + index));
     return static_cast<double>(bits >> 11) * 0x1p-53;
   }
 

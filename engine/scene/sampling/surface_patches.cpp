@@ -178,7 +178,7 @@ class Spread {
   }
 
   void put(const SubTriangle& shape, std::size_t k) {
-    const std::uint64_t hash = mix_bits(seed_ + k);
+    const std::uint64_t hash = splitmix64(seed_ + k);
     double a = static_cast<double>(to_unit(static_cast<std::uint32_t>(hash)));
     double b = static_cast<double>(to_unit(static_cast<std::uint32_t>(hash >> 32)));
     if (a + b > 1) {

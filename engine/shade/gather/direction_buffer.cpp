@@ -8,10 +8,10 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "engine/base/numbers.h"
+
 namespace ptc {
 namespace {
-
-constexpr float kPi = 3.14159265F;
 
 /// Solid angle of the part of a cube face below and left of (u, v), up to a constant.
 double corner_solid_angle(double u, double v) {

@@ -6,12 +6,11 @@
 #include <limits>
 #include <vector>
 
+#include "engine/base/numbers.h"
 #include "engine/shade/kernels/gather_kernels.h"
 
 namespace ptc {
 namespace {
-
-constexpr float kPi = 3.14159265F;
 
 /// One depth of receiver cells: what the current cell there draws and leaves.
 struct Level {

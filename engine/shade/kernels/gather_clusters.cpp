@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "engine/base/numbers.h"
 #include "engine/shade/kernels/gather_kernels.h"
 
 // This file is compiled once per instruction set.
@@ -16,8 +17,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
-
-constexpr float kPi = 3.14159265F;
 
 /// Clusters relative to a cell's centre.
 struct Clusters {

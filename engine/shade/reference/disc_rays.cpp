@@ -7,23 +7,22 @@
 #include <embree3/rtcore.h>
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/shade/reference/brute_force.h"
 
 namespace ptc {
 namespace {
 
-constexpr float kPi = 3.14159265F;
 constexpr float kBump = 0.01F;  // height of the paraboloid over the disc's radius, as draw_discs()
 
-/// SplitMix64 (Steele, Lea and Flood 2014): a stream of uniform numbers in [0, 1).
+/// A stream of uniform numbers in [0, 1).
 class Uniform {
  public:
   explicit Uniform(std::uint64_t seed) : state_(seed) {}
   float operator()() {
-    std::uint64_t z = state_ += 0x9e3779b97f4a7c15;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-    return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-24F;
+    const std::uint64_t bits = splitmix64(state_);
+    state_ += kSplitMixStep;
+    return static_cast<float>(bits >> 40) * 0x1p-24F;
   }
 
  private:

@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/io/cloud/record.h"
 #include "format/node_layout.h"
 #include "format/point_page.h"
@@ -14,8 +15,6 @@
 
 namespace ptc {
 namespace {
-
-constexpr float kPi = 3.14159265F;
 
 /// A child of a group, relative to a receiver, in scene units.
 struct Cluster {
