@@ -45,10 +45,13 @@ class SystemFailure(ProgramTest):
         (self.here / "o.ptcx").unlink()
         command += ["--resume", "--checkpoint", "50k"]
         died = gone_on = 0
-        for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT) * 4:
+        checkpoint = self.here / "o.ptcx.resume-at"
+        for turn, number in enumerate((signal.SIGKILL, signal.SIGTERM, signal.SIGINT) * 4):
             process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
                                        stderr=subprocess.PIPE, text=True)
-            time.sleep(0.05 + 0.03 * died)
+            time.sleep(0.05 + 0.03 * died)  # at any moment, every other time behind a checkpoint
+            while turn % 2 and process.poll() is None and not checkpoint.exists():
+                time.sleep(0.001)
             process.send_signal(number)
             told = process.communicate(timeout=60)[1]
             died += process.returncode == -number
