@@ -17,8 +17,8 @@
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/io/file/file.h"
+#include "engine/io/text/text.h"
 #include "format/error.h"
-#include "format/text.h"
 #include "tools/values.h"
 
 namespace ptc {
@@ -77,17 +77,6 @@ std::function<std::string(const std::string&)> ends_in(const std::vector<std::st
 [[maybe_unused]] const std::new_handler before_main = std::set_new_handler(end_without_memory);
 
 }  // namespace
-
-std::string printable(std::string_view text) {
-  const bool utf8 = is_utf8(text);
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool plain = (byte >= 0x20 && byte < 0x7f) || (byte >= 0x80 && utf8) || c == '\n';
-    out += plain ? std::string(1, c) : fmt::format("\\x{:02x}", byte);
-  }
-  return out;
-}
 
 void check_input(const std::filesystem::path& path) {
   try {

@@ -5,7 +5,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -97,10 +96,6 @@ class Command {
 /// file's fault, unless the machine is out of means.
 /// @throws DataError, std::system_error
 void check_input(const std::filesystem::path& path);
-
-/// Text that may hold bytes of a file, fit for a terminal: control characters become \xNN, and so
-/// do all bytes beyond ASCII when they are not UTF-8.
-[[nodiscard]] std::string printable(std::string_view text);
 
 /// True when the name ends so, in upper or lower case.
 [[nodiscard]] bool has_ending(const std::filesystem::path& path, const std::string& ending);

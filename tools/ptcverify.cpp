@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/io/text/text.h"
 #include "engine/verify/salvage.h"
 #include "engine/verify/verify.h"
 #include "tools/common.h"

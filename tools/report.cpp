@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/progress_text.h"
+#include "engine/io/text/text.h"
 #include "tools/common.h"
 
 namespace ptc {

@@ -18,7 +18,8 @@ class Progress {
                      const std::string& /*unit*/) {}
   virtual void advance(std::uint64_t /*count*/) {}
   virtual void end() {}
-  /// Something to know before long work, e.g. the room that it takes; between stages.
+  /// Something to know, e.g. the room that long work takes or a texture that is missing. A stage
+  /// that is under way ends.
   virtual void note(const std::string& /*text*/) {}
 };
 

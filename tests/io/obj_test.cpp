@@ -92,10 +92,12 @@ TEST_CASE("obj: materials come from the library, textures from files beside it",
   std::string warnings;
   for (const std::string& warning : file.warnings) warnings += warning + "\n";
   CHECK(file.warnings.size() == 4);
-  CHECK_THAT(warnings, Contains("line 10: a colour other than r g b is left out") &&
-                           Contains("line 11: map_Ke is left out") &&
-                           Contains("texture left out: open ") && Contains("none.png") &&
-                           Contains("material 'missing' is not defined"));
+  CHECK_THAT(warnings, Contains("a colour that is not R G B is left out") &&
+                           Contains("a b.mtl: line 10") && Contains("an emission map (map_Ke)") &&
+                           Contains("a b.mtl: line 11") &&
+                           Contains("a texture is left out, the plain colour of its material is "
+                                    "used: none.png: No such file") &&
+                           Contains("a material is not defined, plain grey is used: 'missing'"));
 }
 
 TEST_CASE("obj: several libraries on a line, escaped blanks and missing ones", "[io][mesh]") {
@@ -109,7 +111,19 @@ TEST_CASE("obj: several libraries on a line, escaped blanks and missing ones", "
   CHECK(file.mesh.materials[0].albedo == glm::vec3(1, 0, 0));
   CHECK(file.mesh.materials[1].albedo == glm::vec3(0, 1, 0));
   REQUIRE(file.warnings.size() == 1);
-  CHECK_THAT(file.warnings[0], Contains("material library left out: open "));
+  CHECK_THAT(file.warnings[0],
+             Contains("a material library is left out") && Contains("grey: none.mtl: No such"));
+}
+
+TEST_CASE("obj: a texture that is no picture is named once, with the reason", "[io][mesh]") {
+  const Scratch scratch;
+  scratch.file("a.png", "no picture");
+  scratch.file("a.mtl", "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd a.png\n");
+  const MeshFile file =
+      read(scratch, kSquare + "mtllib a.mtl\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n");
+  REQUIRE(file.warnings.size() == 1);
+  CHECK_THAT(file.warnings[0], EndsWith("is used: a.png: not a PNG, JPEG, BMP, HDR, TGA or EXR "
+                                        "picture"));
 }
 
 TEST_CASE("obj: files that break a rule are refused by line", "[io][mesh]") {

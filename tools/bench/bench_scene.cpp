@@ -118,7 +118,8 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
     request.mesh = std::make_shared<const Mesh>(lit.mesh);
   } else {
     request.inputs.push_back(choice.file);
-    lit.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, &cameras);
+    Progress silent;  // the build reads the file once more and notes what is left out
+    lit.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, silent, &cameras);
   }
   build_container(request, target, progress);
   const ContainerReader container(target);

@@ -54,8 +54,8 @@ struct MeshCamera {
 struct MeshFile {
   Mesh mesh;  ///< all meshes of the file, world transforms applied
   std::vector<MeshCamera> cameras;
-  std::vector<std::string>
-      warnings;  ///< what was left out or replaced, a sentence each, for stderr
+  /// What was left out or replaced: a line for each kind, without the name of the file.
+  std::vector<std::string> warnings;
 };
 
 /// Reads OBJ with MTL, PLY, OFF, STL and glTF 2.0 (.gltf, .glb); positions and transforms are kept

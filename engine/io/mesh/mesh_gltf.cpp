@@ -66,14 +66,13 @@ class GltfMesh {
     visited_.resize(document_.count("nodes"));
     walk_nodes();
     if (!has_uvs_) soup_.drop_uvs();
-    if (document_.count("skins") > 0) warnings_.push_back(name() + ": skins are left out");
-    return {build_mesh(std::move(soup_), document_.path()), std::move(cameras_),
-            std::move(warnings_)};
+    for (std::size_t i = 0; i < document_.count("skins"); ++i) {
+      warnings_.add(kSkinLeftOut, "skin " + std::to_string(i));
+    }
+    return {build_mesh(std::move(soup_), document_.path()), std::move(cameras_), warnings_.lines()};
   }
 
  private:
-  [[nodiscard]] std::string name() const { return document_.path().string(); }
-
   void check_extensions() const {
     for (std::size_t i = 0; i < document_.count("extensionsRequired"); ++i) {
       const Json& required = document_.root()["extensionsRequired"][i];
@@ -324,8 +323,7 @@ class GltfMesh {
       mean = glm::dvec3(0);
       for (const glm::vec3& pixel : image->pixels) mean += glm::dvec3(pixel);
       mean /= static_cast<double>(image->pixels.size());
-      warnings_.push_back(name() + ": material '" + material.name +
-                          "': the mean of its emission texture is used");
+      warnings_.add(kEmissionAveraged, "material '" + material.name + "'");
     }
     for (int i = 0; i < 3; ++i) {
       const double value = (*factor)[static_cast<std::size_t>(i)] * strength * mean[i];
@@ -339,13 +337,13 @@ class GltfMesh {
     if (!texture) document_.fail("a texture without index");
     const auto source = document_.unsigned_at(document_.at("textures", *texture), "source");
     if (!source) {
-      warnings_.push_back(name() + ": texture " + std::to_string(*texture) +
-                          " left out: no source that is supported");
+      warnings_.add(kTextureLeftOut,
+                    "texture " + std::to_string(*texture) + ": no source that is supported");
       return nullptr;
     }
     const Json& image = document_.at("images", *source);
     const auto uri = image.find("uri");
-    const std::string label = name() + " image " + std::to_string(*source);
+    const std::string label = "image " + std::to_string(*source);
     if (uri != image.end() && uri->is_string()) {
       const std::string text = uri->get<std::string>();
       if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text));
@@ -368,14 +366,14 @@ class GltfMesh {
     if (camera) {
       cameras_.push_back(*camera);
     } else {
-      warnings_.push_back(name() + ": camera " + std::to_string(index) + " left out: no view");
+      warnings_.add(kCameraLeftOut, "camera " + std::to_string(index));
     }
   }
 
   GltfDocument document_;
   MeshSoup soup_;
   std::vector<MeshCamera> cameras_;
-  std::vector<std::string> warnings_;
+  MeshWarnings warnings_;
   TextureLoader textures_;
   std::map<std::uint64_t, GltfMaterial> materials_;
   std::vector<bool> visited_;

@@ -25,7 +25,7 @@ class ObjMesh {
   MeshFile read() {
     std::string_view line;
     while (next_logical_line(line)) read_line(line);
-    return {build_mesh(std::move(soup_), path_), {}, std::move(warnings_)};
+    return {build_mesh(std::move(soup_), path_), {}, warnings_.lines()};
   }
 
  private:
@@ -125,8 +125,7 @@ class ObjMesh {
     if (defined != defined_.end()) {
       material = defined->second;
     } else {
-      warnings_.push_back(path_.string() + ": material '" + name +
-                          "' is not defined, plain grey takes its place");
+      warnings_.add(kMaterialUndefined, "'" + name + "'");
     }
     return used_[name] = soup_.add_material(std::move(material), path_);
   }
@@ -152,12 +151,13 @@ class ObjMesh {
   }
 
   void read_library(const std::string& name) {
+    const std::filesystem::path path = path_.parent_path() / name;
     try {
-      read_mtl(path_.parent_path() / name, textures_, defined_, warnings_);
+      read_mtl(path, textures_, defined_, warnings_);
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception& error) {
-      warnings_.push_back("material library left out: " + std::string(error.what()));
+      warnings_.add(kLibraryLeftOut, reason_for(name, path, error));
     }
   }
 
@@ -165,7 +165,7 @@ class ObjMesh {
   ByteStream stream_;
   std::string joined_;
   MeshSoup soup_;
-  std::vector<std::string> warnings_;
+  MeshWarnings warnings_;
   TextureLoader textures_;
   std::map<std::string, Material> defined_;
   std::map<std::string, std::size_t> used_;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <exception>
 #include <new>
+#include <system_error>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -35,18 +36,29 @@ std::optional<MeshCamera> make_camera(const glm::dvec3& position, const glm::dve
                     static_cast<float>(horizontal_fov)};
 }
 
+std::string reason_for(const std::string& name, const std::filesystem::path& path,
+                       const std::exception& error) {
+  if (const auto* system = dynamic_cast<const std::system_error*>(&error)) {
+    return name + ": " + system->code().message();
+  }
+  const std::string_view what = error.what();
+  const std::string prefix = path.string() + ": ";
+  return name + ": " + std::string(what.starts_with(prefix) ? what.substr(prefix.size()) : what);
+}
+
 std::shared_ptr<const Image> TextureLoader::load(const std::string& name) {
   const auto known = loaded_.find(name);
   if (known != loaded_.end()) return known->second;
   std::string relative = name;
   std::ranges::replace(relative, '\\', '/');
+  const std::filesystem::path path = directory_ / relative;
   std::shared_ptr<const Image> image;
   try {
-    image = std::make_shared<const Image>(read_image(directory_ / relative));
+    image = std::make_shared<const Image>(read_image(path));
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
-    warnings_.push_back("texture left out: " + std::string(error.what()));
+    warnings_.add(kTextureLeftOut, reason_for(name, path, error));
   }
   return loaded_[name] = std::move(image);
 }
@@ -59,7 +71,7 @@ std::shared_ptr<const Image> TextureLoader::decode(const std::string& name,
   try {
     image = std::make_shared<const Image>(decode_image(bytes, name));
   } catch (const DataError& error) {
-    warnings_.push_back("texture left out: " + std::string(error.what()));
+    warnings_.add(kTextureLeftOut, error.what());
   }
   return loaded_[name] = std::move(image);
 }

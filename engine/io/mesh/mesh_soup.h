@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -18,6 +19,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/io/mesh/mesh.h"
+#include "engine/io/mesh/mesh_warnings.h"
 
 namespace ptc {
 
@@ -66,10 +68,16 @@ void triangulate(std::span<const glm::dvec3> polygon,
                                                     const glm::dvec3& forward, const glm::dvec3& up,
                                                     double horizontal_fov);
 
+/// Why a file that a mesh names could not be read, for a warning: "NAME: REASON".
+/// @param name  as the mesh has it
+/// @param path  under which it was opened; an error that begins with it says so once
+[[nodiscard]] std::string reason_for(const std::string& name, const std::filesystem::path& path,
+                                     const std::exception& error);
+
 /// Loads each texture once; a failure becomes a warning and no texture.
 class TextureLoader {
  public:
-  TextureLoader(std::filesystem::path directory, std::vector<std::string>& warnings)
+  TextureLoader(std::filesystem::path directory, MeshWarnings& warnings)
       : directory_(std::move(directory)), warnings_(warnings) {}
 
   /// @param name  path relative to the directory, / or \ between its parts
@@ -80,7 +88,7 @@ class TextureLoader {
 
  private:
   std::filesystem::path directory_;
-  std::vector<std::string>& warnings_;
+  MeshWarnings& warnings_;
   std::map<std::string, std::shared_ptr<const Image>> loaded_;
 };
 

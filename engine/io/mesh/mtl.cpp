@@ -15,7 +15,7 @@ namespace {
 class MtlReader {
  public:
   MtlReader(const std::filesystem::path& path, TextureLoader& textures,
-            std::map<std::string, Material>& materials, std::vector<std::string>& warnings)
+            std::map<std::string, Material>& materials, MeshWarnings& warnings)
       : stream_(path), textures_(textures), materials_(materials), warnings_(warnings) {}
 
   void read() {
@@ -48,9 +48,12 @@ class MtlReader {
       const std::string name = file_name(words);
       if (!name.empty()) current_->texture = textures_.load(name);
     } else if (keyword == "map_Ke") {
-      warnings_.push_back(stream_.path().string() + ": line " + std::to_string(stream_.line()) +
-                          ": map_Ke is left out");
+      warnings_.add(kEmissionMapLeftOut, place());
     }
+  }
+
+  [[nodiscard]] std::string place() const {
+    return stream_.path().filename().string() + ": line " + std::to_string(stream_.line());
   }
 
   // One number stands for all three; what is no number is a spectral curve or an xyz colour.
@@ -58,8 +61,7 @@ class MtlReader {
     std::array<std::optional<double>, 3> values;
     for (auto& value : values) value = parse_number(words.next());
     if (!values[0]) {
-      warnings_.push_back(stream_.path().string() + ": line " + std::to_string(stream_.line()) +
-                          ": a colour other than r g b is left out");
+      warnings_.add(kColourLeftOut, place());
       return;
     }
     for (std::size_t i = 0; i < 3; ++i) {
@@ -91,14 +93,14 @@ class MtlReader {
   ByteStream stream_;
   TextureLoader& textures_;
   std::map<std::string, Material>& materials_;
-  std::vector<std::string>& warnings_;
+  MeshWarnings& warnings_;
   Material* current_ = nullptr;
 };
 
 }  // namespace
 
 void read_mtl(const std::filesystem::path& path, TextureLoader& textures,
-              std::map<std::string, Material>& materials, std::vector<std::string>& warnings) {
+              std::map<std::string, Material>& materials, MeshWarnings& warnings) {
   MtlReader(path, textures, materials, warnings).read();
 }
 

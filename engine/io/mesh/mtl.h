@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <map>
 #include <string>
-#include <vector>
 
 #include "engine/io/mesh/mesh_soup.h"
 
@@ -14,6 +13,6 @@ namespace ptc {
 /// the first library that defines it wins.
 /// @throws DataError, std::system_error
 void read_mtl(const std::filesystem::path& path, TextureLoader& textures,
-              std::map<std::string, Material>& materials, std::vector<std::string>& warnings);
+              std::map<std::string, Material>& materials, MeshWarnings& warnings);
 
 }  // namespace ptc

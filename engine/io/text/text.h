@@ -1,4 +1,4 @@
-// Words and numbers in lines of text; file name endings.
+// Words and numbers in lines of text; file name endings; text that is shown.
 #pragma once
 
 #include <cstdint>
@@ -29,5 +29,9 @@ class Words {
 
 /// The ending of a file name in lower case, with its dot.
 [[nodiscard]] std::string lower_extension(const std::filesystem::path& path);
+
+/// Text that may hold bytes of a file, fit for a terminal: control characters but '\n' become \xNN,
+/// and so do all bytes beyond ASCII when they are not UTF-8.
+[[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace ptc

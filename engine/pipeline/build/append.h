@@ -1,4 +1,4 @@
-// Points added to a container (engine/pipeline/pipeline.h, BuildRequest::append).
+// Points added to a container (engine/ptc.h, BuildRequest::append).
 #pragma once
 
 #include "engine/octree/rounding.h"

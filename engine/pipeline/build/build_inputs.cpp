@@ -120,7 +120,7 @@ BuildInputs read_files(const BuildRequest& request, Progress& progress) {
   }
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
-  Mesh mesh = load_meshes(request.inputs, request.mesh.get(), request.backdrop);
+  Mesh mesh = load_meshes(request.inputs, request.mesh.get(), request.backdrop, progress);
   if (request.lights) inputs.lights = *request.lights;
   if (mesh.triangles.empty()) return inputs;
   inputs.emitters = has_emitters(mesh);

@@ -5,6 +5,7 @@
 
 #include "engine/base/surfel.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/text/text.h"
 #include "engine/scene/ray_scene.h"
 
 namespace ptc {
@@ -49,7 +50,7 @@ void add_backdrop(Mesh& mesh) {
 }  // namespace
 
 Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
-                 std::vector<MeshCamera>* cameras) {
+                 Progress& progress, std::vector<MeshCamera>* cameras) {
   Mesh mesh;
   const auto join = [&mesh]<class M>(M&& other) {
     if (mesh.triangles.empty()) {
@@ -61,6 +62,9 @@ Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* a
   for (const std::filesystem::path& input : inputs) {
     if (is_point_file(input)) continue;
     MeshFile file = read_mesh(input);
+    for (const std::string& warning : file.warnings) {
+      progress.note(printable(input.string()) + ": " + warning);
+    }
     if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
     join(std::move(file.mesh));
   }

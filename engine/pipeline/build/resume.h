@@ -1,4 +1,4 @@
-// A build that goes on where another ended (engine/pipeline/pipeline.h, BuildRequest::resume).
+// A build that goes on where another ended (engine/ptc.h, BuildRequest::resume).
 //
 //   OUT.resume        what is built from what; once all points are sorted by range, also the table
 //   of the temporary files OUT.resume-pages  the container as far as it got OUT.resume-at     the

@@ -44,9 +44,11 @@ unsigned side_of(unsigned samples) {
 }
 
 /// Loads the meshes and finds the camera.
-void load_subject(Subject& subject, const RenderRequest& request, const ContainerReader& scene) {
+void load_subject(Subject& subject, const RenderRequest& request, const ContainerReader& scene,
+                  Progress& progress) {
   std::vector<MeshCamera> cameras;
-  subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, &cameras);
+  subject.mesh =
+      load_meshes(request.meshes, request.mesh.get(), request.backdrop, progress, &cameras);
   subject.camera = request.camera ? *request.camera
                                   : default_camera(scene, cameras, request.backdrop, request.size);
   if (!request.size) return;
@@ -226,7 +228,7 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   Lighting lighting(request, report, progress);
   const LightRig lights =
       request.lights ? *request.lights : recorded_lights(lighting.scene(), progress);
-  load_subject(subject, request, lighting.scene());
+  load_subject(subject, request, lighting.scene(), progress);
   make_view(subject, request, lights, lighting, report, progress);
 
   // Divide the memory, bring the light of earlier bounces, choose the settings

@@ -1,0 +1,68 @@
+// What mesh readers leave out or replace is told to whoever waits for the run.
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "engine/ptc.h"
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::test;
+using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
+
+namespace {
+
+class Notes : public Progress {
+ public:
+  void note(const std::string& text) override { texts.push_back(text); }
+  std::vector<std::string> texts;
+};
+
+/// A triangle whose texture is missing.
+void write_bare(const std::filesystem::path& directory, const std::string& name) {
+  std::ofstream(directory / (name + ".mtl")) << "newmtl wood\nmap_Kd " << name << ".png\n";
+  std::ofstream(directory / (name + ".obj")) << "mtllib " << name << ".mtl\nusemtl wood\n"
+                                             << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+}
+
+void check_note(const Notes& notes, const std::filesystem::path& mesh) {
+  CHECK(std::ranges::count_if(notes.texts, [&](const std::string& text) {
+          return text.starts_with(mesh.string() + ": a texture is left out") &&
+                 text.find(mesh.stem().string() + ".png: No such file") != std::string::npos;
+        }) == 1);
+}
+
+}  // namespace
+
+TEST_CASE("warnings: build, append and render note once what each mesh file lacks",
+          "[integration]") {
+  const TemporaryDirectory dir;
+  write_bare(dir.path(), "a");
+  write_bare(dir.path(), "b");
+  BuildRequest request{.inputs = {dir / "a.obj", dir / "b.obj"}};
+  request.sampling.count = 500;
+  request.run.threads = 1;
+  Notes build;
+  build_container(request, dir / "ab.ptcx", build);
+  CHECK(build.texts.size() == 2);
+  check_note(build, dir / "a.obj");
+  check_note(build, dir / "b.obj");
+
+  request.inputs.pop_back();
+  request.append = dir / "ab.ptcx";
+  Notes append;
+  build_container(request, dir / "aba.ptcx", append);
+  CHECK(append.texts.size() == 1);
+  check_note(append, dir / "a.obj");
+
+  RenderRequest picture{.scene = dir / "ab.ptcx", .meshes = {dir / "b.obj"}};
+  picture.size = {8, 8};
+  picture.samples = 1;
+  picture.run.threads = 1;
+  Notes render;
+  const PictureTarget target{.path = dir / "b.png"};
+  render_picture(picture, {&target, 1}, render);
+  CHECK(render.texts.size() == 1);
+  check_note(render, dir / "b.obj");
+}
