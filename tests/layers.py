@@ -1,7 +1,8 @@
 """Reads every #include "..." of the sources against the table in tools/cmake/PtcLayers.cmake.
 
 A file may include its own layer and those that the table names, always by the path from the root of
-the tree. Needs the standard library only.
+the tree. Every package that the project requires is linked by some target. Needs the standard
+library only.
 """
 
 import re
@@ -52,6 +53,14 @@ def faults_of(path, text, table, exists):
     return faults
 
 
+def packages_not_linked(root_list, other_lists):
+    """Packages that the list at the root requires and that no other list links a target of."""
+    required = re.findall(r"^\s*find_package\((\w+) [^)]*\bCONFIG\b", root_list, re.MULTILINE)
+    required += re.findall(r"^\s*pkg_check_modules\((\w+)", root_list, re.MULTILINE)
+    words = set(re.split(r"[\s():]+", " ".join(other_lists)))
+    return [name for name in required if name not in words]
+
+
 class Layers(unittest.TestCase):
     def setUp(self):
         self.table = read_table((ROOT / "tools/cmake/PtcLayers.cmake").read_text())
@@ -74,6 +83,16 @@ class Layers(unittest.TestCase):
             for other in allowed:
                 if other != layer:
                     self.assertNotIn(layer, self.table[other], f"{layer} and {other}")
+
+    def test_every_package_that_is_required_is_linked(self):
+        root_list = (ROOT / "CMakeLists.txt").read_text()
+        others = [path.read_text() for folder in FOLDERS + ["tests", "fuzz"]
+                  for pattern in ("CMakeLists.txt", "*.cmake") for path in (ROOT / folder).rglob(pattern)]
+        self.assertEqual(packages_not_linked(root_list, others), [])
+        self.assertGreater(len(packages_not_linked(root_list, [])), 10)
+        self.assertEqual(packages_not_linked("find_package(one CONFIG REQUIRED)\nfind_package(two 3 CONFIG)\n"
+                                             "  pkg_check_modules(three REQUIRED three)", ["two::two", "threes"]),
+                         ["one", "three"])
 
     def test_what_the_table_forbids_is_found(self):
         def faults(path, line):
