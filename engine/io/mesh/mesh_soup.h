@@ -54,10 +54,21 @@ struct MeshSoup {
 ///         others, or no triangle is left
 [[nodiscard]] Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path);
 
+/// What it took to triangulate a polygon.
+struct TriangulationCounts {
+  std::uint64_t looks = 0;      ///< at corners and at boxes around them
+  std::size_t fan_corners = 0;  ///< of what became a fan; 0 for a simple polygon
+};
+
 /// Splits a simple polygon into triangles of its corners' numbers, in its winding. Concave polygons
 /// are cut by ears; what no ear can be cut from (self-intersections) becomes a fan.
-void triangulate(std::span<const glm::dvec3> polygon,
-                 std::vector<std::array<std::uint32_t, 3>>& triangles);
+///
+/// The work is about n log n looks for n corners; where long triangles lie among evenly spread
+/// corners it is up to n sqrt(n).
+/// @param most_looks  after which the rest becomes a fan; usually n (1024 + 8 sqrt(n))
+TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
+                                std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                std::optional<std::uint64_t> most_looks = {});
 
 /// Takes normals through a transform: its inverse transpose, up to a positive factor.
 [[nodiscard]] glm::dmat3 normal_transform(const glm::dmat4& transform);
