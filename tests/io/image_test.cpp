@@ -85,6 +85,38 @@ std::string coded_hdr() {
   return "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n" + row + row;
 }
 
+struct GreyJpeg {
+  int side = 8;
+  int scans = 1;
+  int comments = 0;  // bytes
+  bool progressive = true;
+};
+
+// A marker and its segment.
+std::string segment(char marker, const std::string& bytes) {
+  const std::size_t length = bytes.size() + 2;
+  return std::string{'\xff', marker, static_cast<char>(length >> 8), static_cast<char>(length)} +
+         bytes;
+}
+
+// Every scan is empty: what is missing is read as zeros, each the code of "no change".
+std::string grey_jpeg(const GreyJpeg& jpeg) {
+  const std::string code = std::string("\1") + std::string(16, '\0');
+  const std::string side{static_cast<char>(jpeg.side >> 8), static_cast<char>(jpeg.side)};
+  std::string bytes = "\xff\xd8" + segment('\xdb', std::string(1, '\0') + std::string(64, '\1'));
+  bytes += segment(jpeg.progressive ? '\xc2' : '\xc0',
+                   "\x08" + side + side + std::string("\1\1\x11\0", 4));
+  bytes += segment('\xc4', std::string(1, '\0') + code) + segment('\xc4', "\x10" + code);
+  if (jpeg.comments > 0) {
+    bytes += segment('\xfe', std::string(static_cast<std::size_t>(jpeg.comments), ' '));
+  }
+  for (int i = 0; i < jpeg.scans; ++i) {
+    bytes += segment('\xda', std::string("\1\1\0\0", 4) + (jpeg.progressive ? '\0' : '\x3f') +
+                                 std::string(1, '\0'));
+  }
+  return bytes + "\xff\xd9";
+}
+
 Image gradient() {
   Image image{16, 16, {}};
   for (int i = 0; i < 256; ++i) {
@@ -184,6 +216,30 @@ TEST_CASE("image: an HDR of empty runs, or of a size that is told two ways, is r
   CHECK_THROWS_AS(decode(third.insert(pixels - 1, " 9"), "a"), DataError);
   std::string ended = whole.substr(0, pixels + 6) + "\n\n-Y 1 +X 1\n1234";
   CHECK_THROWS_AS(decode(ended.insert(ended.find("\n\n") + 1, "\0x", 2), "a"), DataError);
+}
+
+TEST_CASE("jpeg: as many scans as encoders write are read, more are refused by offset",
+          "[io][image]") {
+  for (const bool progressive : {true, false}) {
+    CHECK(decode(grey_jpeg({.scans = 10, .progressive = progressive}), "a").width == 8);
+    CHECK(decode(grey_jpeg({.scans = 100, .progressive = progressive}), "a").width == 8);
+    const std::string whole = grey_jpeg({.scans = 101, .progressive = progressive});
+    CHECK_THROWS_WITH(decode(whole, "a.jpg"), "a.jpg: offset " +
+                                                  std::to_string(whole.rfind("\xff\xda")) +
+                                                  ": a JPEG of more than 100 scans");
+    CHECK_THROWS_AS(decode(grey_jpeg({.scans = 20'000, .progressive = progressive}), "a"),
+                    DataError);
+  }
+}
+
+TEST_CASE("jpeg: scans of a large picture are refused when they add up to 2^32 pixels",
+          "[io][image]") {
+  // The comments are what a picture of this size needs at least.
+  const std::string whole =
+      grey_jpeg({.side = 16'384, .scans = 17, .comments = 40'000, .progressive = true});
+  CHECK_THROWS_WITH(decode(whole, "a.jpg"), "a.jpg: offset " +
+                                                std::to_string(whole.rfind("\xff\xda")) +
+                                                ": a JPEG of more than 2^32 pixels in all scans");
 }
 
 TEST_CASE("image: a small file cannot ask for many pixels", "[io][image]") {

@@ -131,7 +131,8 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
     refuse(name, stbi_failure_reason());
   }
   check_size(width, height, bytes.size(), name);
-  if (!raster_is_complete(bytes, format)) refuse(name, "the picture ends too early");
+  const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+  check_raster(bytes, format, pixels, name);
   return format == RasterFormat::hdr ? decode_hdr(data, size, name)
                                      : decode_integers(data, size, name);
 }

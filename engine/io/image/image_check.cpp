@@ -1,20 +1,37 @@
-// Which raster format bytes are, and whether the end is missing. stb takes a missing end for zeros,
-// so a picture cut short would be read as one with a black part.
+// Which raster format bytes are, whether the end is missing, and whether they ask for more work
+// than a picture takes. stb takes a missing end for zeros, so a picture cut short would be read as
+// one with a black part.
 #include <algorithm>
 #include <optional>
 #include <string_view>
 
+#include "engine/base/error.h"
 #include "engine/io/image/image_formats.h"
 #include "engine/io/text/text.h"
 
 namespace ptc {
 namespace {
 
+// stb decodes each scan over the whole picture, even an empty one. Encoders write some ten scans;
+// libjpeg's cjpeg reads scripts of at most 100 (rdswitch.c).
+constexpr std::uint64_t kMostScans = 100;
+// Ten scans of the largest picture fit; they take about half a minute.
+constexpr std::uint64_t kMostScannedPixels = std::uint64_t{1} << 32;
+
+constexpr char kTooEarly[] = "the picture ends too early";
+
+// What bytes of a picture are refused for.
+struct Fault {
+  std::size_t offset;
+  const char* rule;
+};
+
 // Reads bytes front to back; past the end it gives zeros and remembers that it did.
 class Cursor {
  public:
   Cursor(std::span<const std::byte> bytes, std::size_t at) : bytes_(bytes), at_(at) {}
 
+  [[nodiscard]] std::size_t offset() const noexcept { return at_; }
   [[nodiscard]] bool past_end() const noexcept { return past_end_ || at_ > bytes_.size(); }
   unsigned u8() {
     if (at_ >= bytes_.size()) {
@@ -64,23 +81,30 @@ class Cursor {
 
 // Segments up to the end-of-image marker; after a start of scan, entropy-coded bytes in which FF is
 // followed by 00 or a restart marker. Source: ITU-T T.81, B.1.1.
-bool jpeg_is_complete(std::span<const std::byte> bytes) {
+std::optional<Fault> jpeg_fault(std::span<const std::byte> bytes, std::uint64_t pixels) {
+  constexpr unsigned kStartOfScan = 0xda;
   Cursor at(bytes, 2);
-  bool scan = false;
+  std::uint64_t scans = 0;
+  bool in_scan = false;
   while (!at.past_end()) {
+    const std::size_t offset = at.offset();
     if (at.u8() != 0xff) {
-      if (!scan) return true;  // not a marker: the decoder will say so
+      if (!in_scan) return std::nullopt;  // not a marker: the decoder will say so
       continue;
     }
     unsigned marker = at.u8();
     while (marker == 0xff) marker = at.u8();
-    if (marker == 0xd9) return !at.past_end();
+    if (marker == 0xd9 && !at.past_end()) return std::nullopt;
     if (marker == 0 || (marker >= 0xd0 && marker <= 0xd7)) continue;
+    in_scan = marker == kStartOfScan;
+    if (in_scan && ++scans > kMostScans) return Fault{offset, "a JPEG of more than 100 scans"};
+    if (in_scan && scans * pixels > kMostScannedPixels) {
+      return Fault{offset, "a JPEG of more than 2^32 pixels in all scans"};
+    }
     const unsigned length = at.u16_big();
     at.skip(std::max(2U, length) - 2);
-    scan = marker == 0xda;
   }
-  return false;
+  return Fault{bytes.size(), kTooEarly};
 }
 
 // Chunks of length, type, data and checksum, up to the one that ends the picture. Source: W3C, PNG,
@@ -216,22 +240,33 @@ RasterFormat raster_format(std::span<const std::byte> bytes, const std::string& 
   return lower_extension(name) == ".tga" ? RasterFormat::tga : RasterFormat::none;
 }
 
-bool raster_is_complete(std::span<const std::byte> bytes, RasterFormat format) {
+void check_raster(std::span<const std::byte> bytes, RasterFormat format, std::uint64_t pixels,
+                  const std::string& name) {
+  const auto complete = [&](bool whole) {
+    return whole ? std::nullopt : std::optional(Fault{bytes.size(), kTooEarly});
+  };
+  std::optional<Fault> fault;
   switch (format) {
     case RasterFormat::jpeg:
-      return jpeg_is_complete(bytes);
+      fault = jpeg_fault(bytes, pixels);
+      break;
     case RasterFormat::tga:
-      return tga_is_complete(bytes);
+      fault = complete(tga_is_complete(bytes));
+      break;
     case RasterFormat::bmp:
-      return bmp_is_complete(bytes);
+      fault = complete(bmp_is_complete(bytes));
+      break;
     case RasterFormat::hdr:
-      return hdr_is_complete(bytes);
+      fault = complete(hdr_is_complete(bytes));
+      break;
     case RasterFormat::png:
-      return png_is_complete(bytes);
+      fault = complete(png_is_complete(bytes));
+      break;
     case RasterFormat::none:
       break;
   }
-  return true;
+  if (!fault) return;
+  throw DataError(name + ": offset " + std::to_string(fault->offset) + ": " + fault->rule);
 }
 
 }  // namespace ptc

@@ -24,7 +24,11 @@ enum class RasterFormat { none, png, jpeg, bmp, hdr, tga };
 /// By the first bytes; TGA has no mark and is believed when `name` ends in ".tga".
 [[nodiscard]] RasterFormat raster_format(std::span<const std::byte> bytes, const std::string& name);
 
-/// Whether all bytes that the format needs are there: stb fills what is missing with zeros.
-[[nodiscard]] bool raster_is_complete(std::span<const std::byte> bytes, RasterFormat format);
+/// Refuses bytes that end before the picture does, which stb would fill with zeros, and a JPEG of
+/// more scans than encoders write, each of which stb decodes over the whole picture.
+/// @param pixels  of the picture, at most kMostPixels
+/// @throws DataError
+void check_raster(std::span<const std::byte> bytes, RasterFormat format, std::uint64_t pixels,
+                  const std::string& name);
 
 }  // namespace ptc
