@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <nanoflann.hpp>
@@ -17,7 +19,7 @@ constexpr std::size_t kHalo = std::size_t{1} << 13;
 constexpr std::size_t kNeighbours = 6;
 constexpr double kLargest = 3;  // times the chunk's median
 
-/// Positions of a window for the k-d tree, relative to its first point, in lattice units.
+/// Positions for the k-d tree, in lattice units.
 struct Cloud {
   std::vector<std::array<double, 3>> points;
   [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
@@ -32,10 +34,59 @@ struct Cloud {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud,
                                                  3, std::size_t>;
 
+/// The different positions of a window. Points of one place follow each other on the curve; a tree
+/// that held each of them would not be one, for it cannot split them.
+class Places {
+ public:
+  explicit Places(std::span<const PointRecord> window) {
+    of.reserve(window.size());
+    for (std::size_t i = 0; i < window.size(); ++i) {
+      if (i == 0 || window[i].key != window[i - 1].key) {
+        const LatticePoint q = decode_morton(window[i].key);
+        cloud_.points.push_back(
+            {static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])});
+        points_at_.push_back(0);
+      }
+      ++points_at_.back();
+      of.push_back(points_at_.size() - 1);
+    }
+    tree_.emplace(3, cloud_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  }
+
+  [[nodiscard]] std::size_t count() const noexcept { return points_at_.size(); }
+
+  /// Squared distance to the nth of the nearest points, or places, beginning with the place's own.
+  /// @param n     1 to kNeighbours + 1, at most so many as there are
+  /// @param each  whether the points of a place count each or as one
+  [[nodiscard]] double distance_to(std::size_t place, std::size_t n, bool each) const {
+    std::array<std::size_t, kNeighbours + 1> index{};
+    std::array<double, kNeighbours + 1> squared{};
+    tree_->knnSearch(cloud_.points[place].data(), n, index.data(), squared.data());
+    std::size_t last = 0;
+    for (std::size_t seen = 0;; ++last) {
+      seen += each ? points_at_[index[last]] : 1;
+      if (seen >= n) return squared[last];
+    }
+  }
+
+  std::vector<std::size_t> of;  ///< the place of each point of the window
+
+ private:
+  Cloud cloud_;
+  std::vector<std::size_t> points_at_;  ///< of each place
+  std::optional<Tree> tree_;
+};
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
 class RadiusStream : public PointStream {
  public:
-  RadiusStream(PointStream& sorted, double unit, std::uint64_t first)
-      : sorted_(sorted), unit_(unit) {
+  RadiusStream(PointStream& sorted, double unit, std::uint64_t first, RadiusCounts& counts)
+      : sorted_(sorted), unit_(unit), counts_(counts) {
     at_ = chunk_end_ = static_cast<std::size_t>(first / kChunk * kChunk - first_for_radii(first));
     fill(chunk_end_);
     pass_over(*this, first % kChunk);
@@ -76,42 +127,50 @@ class RadiusStream : public PointStream {
   void estimate(std::size_t begin, std::size_t end) {
     const auto chunk = std::span(window_).subspan(begin, end - begin);
     if (std::ranges::none_of(chunk, [](const PointRecord& p) { return p.radius == 0; })) return;
-    std::vector<double> radii = neighbour_radii(begin, end);
-    std::vector<double> sorted = radii;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::ranges::nth_element(sorted, middle);
+    const Places places(window_);
+    std::vector<double> radii = neighbour_radii(places, begin, end, true);
+    double middle = median(radii);
+    if (middle == 0) {  // most of the chunk lies in stacks of points: each counts as one
+      radii = neighbour_radii(places, begin, end, false);
+      std::vector<double> once;
+      for (std::size_t i = begin; i < end; ++i) {
+        if (i == begin || places.of[i] != places.of[i - 1]) once.push_back(radii[i - begin]);
+      }
+      middle = median(std::move(once));
+    }
     for (std::size_t i = 0; i < chunk.size(); ++i) {
       if (chunk[i].radius != 0) continue;
-      const double radius = radii[i] > 0 ? std::min(radii[i], kLargest * *middle) : *middle;
+      const double radius = radii[i] > 0 ? std::min(radii[i], kLargest * middle) : middle;
       chunk[i].radius = static_cast<float>(radius * unit_);
+      if (chunk[i].radius == 0) ++counts_.without_radius;
     }
   }
 
-  [[nodiscard]] std::vector<double> neighbour_radii(std::size_t begin, std::size_t end) const {
-    Cloud cloud;
-    cloud.points.reserve(window_.size());
-    for (const PointRecord& p : window_) {
-      const LatticePoint q = decode_morton(p.key);
-      cloud.points.push_back(
-          {static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])});
-    }
-    const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
-    std::array<std::size_t, kNeighbours + 1> index{};
-    std::array<double, kNeighbours + 1> squared{};
+  /// Of the points from begin to end.
+  /// @param each  whether the points of a place count each or as one
+  std::vector<double> neighbour_radii(const Places& places, std::size_t begin, std::size_t end,
+                                      bool each) {
+    const std::size_t all = each ? window_.size() : places.count();
+    const std::size_t wanted = std::min(kNeighbours + 1, all);
     std::vector<double> radii;
     radii.reserve(end - begin);
     for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t found =
-          tree.knnSearch(cloud.points[i].data(), index.size(), index.data(), squared.data());
-      radii.push_back(found > 1 ? std::sqrt(squared[found - 1] * kPiDouble /
-                                            (2.0 * static_cast<double>(found - 1)))
-                                : 0);
+      const std::size_t place = places.of[i];
+      if (i > begin && place == places.of[i - 1]) {
+        radii.push_back(radii.back());
+        continue;
+      }
+      ++counts_.searches;
+      const double squared = places.distance_to(place, wanted, each);
+      const auto neighbours = static_cast<double>(wanted - 1);
+      radii.push_back(wanted > 1 ? std::sqrt(squared * kPiDouble / (2.0 * neighbours)) : 0);
     }
     return radii;
   }
 
   PointStream& sorted_;
   double unit_;
+  RadiusCounts& counts_;
   std::vector<PointRecord> window_;
   std::size_t at_ = 0;         // next point to hand out
   std::size_t chunk_end_ = 0;  // points before it have their radii
@@ -119,8 +178,9 @@ class RadiusStream : public PointStream {
 
 }  // namespace
 
-std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit, std::uint64_t first) {
-  return std::make_unique<RadiusStream>(sorted, unit, first);
+std::unique_ptr<PointStream> estimate_radii(PointStream& sorted, double unit, RadiusCounts& counts,
+                                            std::uint64_t first) {
+  return std::make_unique<RadiusStream>(sorted, unit, first, counts);
 }
 
 std::uint64_t first_for_radii(std::uint64_t first) noexcept {

@@ -1,4 +1,5 @@
 // What mesh readers leave out or replace is told to whoever waits for the run.
+#include <algorithm>
 #include <fstream>
 
 #include <catch2/catch.hpp>
@@ -9,7 +10,6 @@
 using namespace ptc;
 using namespace ptc::test;
 using Catch::Matchers::Contains;
-using Catch::Matchers::StartsWith;
 
 namespace {
 
@@ -65,4 +65,21 @@ TEST_CASE("warnings: build, append and render note once what each mesh file lack
   render_picture(picture, {&target, 1}, render);
   CHECK(render.texts.size() == 1);
   check_note(render, dir / "b.obj");
+}
+
+TEST_CASE("warnings: points whose radius cannot be estimated are noted with their number",
+          "[integration]") {
+  const TemporaryDirectory dir;
+  const auto notes_of = [&](const char* text) {
+    std::ofstream(dir / "a.xyz") << text;
+    BuildRequest request{.inputs = {dir / "a.xyz"}};
+    request.run.threads = 1;
+    Notes notes;
+    build_container(request, dir / "a.ptcx", notes);
+    return notes.texts;
+  };
+  const std::vector<std::string> lone = notes_of("1 2 3 0 0 1\n1 2 3 0 0 1\n");
+  REQUIRE(lone.size() == 1);
+  CHECK_THAT(lone[0], Contains("for 2 points they cannot be estimated"));
+  CHECK(notes_of("1 2 3 0 0 1\n1 2 4 0 0 1\n").empty());
 }

@@ -47,7 +47,8 @@ class Rebuild {
     const auto begin = scene_.records.begin() + static_cast<std::ptrdiff_t>(first_for_radii(first));
     VectorStream points({begin, scene_.records.end()});
     const double unit = scene_.frame.unit();
-    const auto radii = estimate_radii(points, unit, first);
+    RadiusCounts counts;
+    const auto radii = estimate_radii(points, unit, counts, first);
     const auto rounded =
         round_points(*radii, unit, executor_, from ? from->place.last_key : MortonKey{});
     Checkpoints checkpoints{.interval = 1,

@@ -97,6 +97,7 @@ class Build {
     }
     report_.sort = points.sorter->statistics();
     if (resumption_) resumption_->remove();
+    tell_lone_points();
     return std::move(report_);
   }
 
@@ -209,6 +210,15 @@ class Build {
     if (spilled > 0) progress_.note(space_text(report_.space, temps, target_));
   }
 
+  /// Points that were built before a build was resumed are not counted.
+  void tell_lone_points() const {
+    if (radius_counts_.without_radius == 0) return;
+    progress_.note(fmt::format(
+        "the input gives no radii, and for {} points they cannot be estimated: all points "
+        "near them lie in the same place; their radius is 0 and they are not seen",
+        radius_counts_.without_radius));
+  }
+
   /// The points of an earlier build.
   SortedPoints take_up() {
     SortedPoints points{.plan = *resumption_->plan()};
@@ -270,7 +280,8 @@ class Build {
     std::unique_ptr<PointStream> with_radii, old, moved, merged, rounded;
     PointStream* stream = sorted.get();
     if (plan.estimate_radii)
-      stream = (with_radii = estimate_radii(*stream, plan.frame.unit(), first)).get();
+      stream =
+          (with_radii = estimate_radii(*stream, plan.frame.unit(), radius_counts_, first)).get();
     if (scene_) {
       old = std::make_unique<ContainerPoints>(*scene_);
       moved = move_points(
@@ -309,6 +320,7 @@ class Build {
   Progress& progress_;
   const Executor executor_;
   BuildReport report_;
+  RadiusCounts radius_counts_;
   std::unique_ptr<ContainerReader> scene_;  ///< that the points are added to; null: none
   std::unique_ptr<Resumption> resumption_;
 };
