@@ -56,7 +56,9 @@ TEST_CASE("warnings: build, append and render note once what each mesh file lack
   CHECK(append.texts.size() == 1);
   check_note(append, dir / "a.obj");
 
-  RenderRequest picture{.scene = dir / "ab.ptcx", .meshes = {dir / "b.obj"}};
+  RenderRequest picture;
+  picture.scene = dir / "ab.ptcx";
+  picture.meshes = {dir / "b.obj"};
   picture.size = {8, 8};
   picture.samples = 1;
   picture.run.threads = 1;

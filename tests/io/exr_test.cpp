@@ -83,6 +83,15 @@ void check_picture(const Image& image, const std::array<float, 3>& base) {
 
 }  // namespace
 
+TEST_CASE("exr: a picture of more pixels than the caller allows is refused", "[io][exr]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.exr";
+  write_exr(path, 10, 20, {{.values = std::vector<float>(600, 1.0F)}});
+  CHECK(read_image(path, 200).width == 10);
+  CHECK_THROWS_WITH(static_cast<void>(read_image(path, 199)),
+                    Catch::EndsWith("EXR: more pixels than the 199 that are left"));
+}
+
 TEST_CASE("exr: a float colour layer comes back bit for bit", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";

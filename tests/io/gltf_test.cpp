@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/gltf_document.h"
 #include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
 
@@ -224,6 +225,70 @@ TEST_CASE("gltf: materials have factor, texture, emission and sides", "[io][gltf
   CHECK_FALSE(plain.mesh.materials[0].texture);
   REQUIRE(plain.warnings.size() == 1);
   CHECK_THAT(plain.warnings[0], Contains("none.png"));
+}
+
+TEST_CASE("gltf: images of one file or one bufferView are one picture", "[io][gltf]") {
+  const Files files;
+  write_png(files.scratch.path() / "t.png", {1, 1, {glm::vec3(1, 0, 0)}});
+  const std::string png = slurp(files.scratch.path() / "t.png");
+  files.scratch.file("t.bin", png);
+  Json json = document();
+  json["buffers"].push_back({{"uri", "t.bin"}, {"byteLength", png.size()}});
+  json["bufferViews"].push_back({{"buffer", 1}, {"byteLength", png.size()}});
+  json["images"] = Json::parse(
+      R"([{"bufferView": 3}, {"bufferView": 3}, {"uri": "t.png"}, {"uri": "./t.png"}])");
+  json["materials"] = Json::array();
+  const Json triangle = json["meshes"][0]["primitives"][0];
+  json["meshes"][0]["primitives"] = Json::array();
+  for (int i = 0; i < 4; ++i) {
+    json["textures"].push_back({{"source", i}});
+    json["materials"].push_back({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", i}}}}}});
+    json["meshes"][0]["primitives"].push_back(triangle);
+    json["meshes"][0]["primitives"][static_cast<std::size_t>(i)]["material"] = i;
+  }
+  const std::vector<Material> materials = files.read(json).mesh.materials;
+  REQUIRE(materials.size() == 4);
+  for (const Material& material : materials) REQUIRE(material.texture);
+  CHECK(materials[0].texture == materials[1].texture);
+  CHECK(materials[2].texture == materials[3].texture);
+}
+
+// Five minutes, were the mean taken for each material.
+TEST_CASE("gltf: 30,000 materials that emit by one texture need its mean once", "[io][gltf]") {
+  const Files files;
+  constexpr unsigned kSide = 2048;
+  write_png(files.scratch.path() / "t.png",
+            {kSide, kSide, std::vector<glm::vec3>(kSide * kSide, glm::vec3(1, 0, 0))});
+  Json json = document();
+  json["images"] = Json::parse(R"([{"uri": "t.png"}])");
+  json["textures"] = Json::parse(R"([{"source": 0}])");
+  Json primitive = json["meshes"][0]["primitives"][0];
+  json["meshes"][0]["primitives"] = Json::array();
+  for (int i = 0; i < 30'000; ++i) {
+    json["materials"].push_back(
+        {{"emissiveFactor", {1, 1, 1}}, {"emissiveTexture", {{"index", 0}}}});
+    primitive["material"] = i;
+    json["meshes"][0]["primitives"].push_back(primitive);
+  }
+  const MeshFile file = files.read(json);
+  REQUIRE(file.mesh.materials.size() == 30'000);
+  CHECK(file.mesh.materials[29'999].emission == glm::vec3(1, 0, 0));
+  CHECK(file.warnings.size() == 1);
+}
+
+TEST_CASE("gltf: buffers of one file are read once", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  for (const char* name : {"./a%20b.bin", "x/../a%20b.bin"}) {
+    json["buffers"].push_back({{"uri", name}, {"byteLength", 68}});
+  }
+  json["bufferViews"][1]["buffer"] = 1;
+  json["bufferViews"][2]["buffer"] = 2;
+  const std::string text = json.dump();
+  GltfDocument document(files.scratch.file("a.gltf", text));
+  for (std::uint64_t view = 0; view < 3; ++view) static_cast<void>(document.view(view));
+  CHECK(document.bytes_read() == text.size() + 68);
+  CHECK(files.read(json).mesh.triangles.size() == 1);
 }
 
 TEST_CASE("gltf: a texture transform moves the coordinates", "[io][gltf]") {

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/mesh/mesh.h"
+#include "engine/io/mesh/mesh_soup.h"
 #include "tests/io/files.h"
 
 using namespace ptc;
@@ -124,6 +124,61 @@ TEST_CASE("obj: a texture that is no picture is named once, with the reason", "[
   REQUIRE(file.warnings.size() == 1);
   CHECK_THAT(file.warnings[0], EndsWith("is used: a.png: not a PNG, JPEG, BMP, HDR, TGA or EXR "
                                         "picture"));
+}
+
+TEST_CASE("obj: a texture that is named in several ways is one picture", "[io][mesh]") {
+  const Scratch scratch;
+  write_png(scratch.path() / "a.png", {1, 1, {glm::vec3(1, 0, 0)}});
+  scratch.file("a.mtl", "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd .\\././x/..//a.png\n");
+  const Mesh mesh =
+      read(scratch, kSquare + "mtllib a.mtl\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n").mesh;
+  REQUIRE(mesh.materials.size() == 2);
+  REQUIRE(mesh.materials[0].texture);
+  CHECK(mesh.materials[0].texture == mesh.materials[1].texture);
+}
+
+// Ten minutes, were the library read for each of the lines.
+TEST_CASE("obj: a library that is named on 30,000 lines is read once", "[io][mesh]") {
+  const Scratch scratch;
+  std::string library = "newmtl a\nKd 1 0 0\n";
+  for (int i = 0; i < 40'000; ++i) library += "newmtl m" + std::to_string(i) + "\nKd 1 1 1\n";
+  scratch.file("a.mtl", library);
+  std::string lines;
+  for (int i = 0; i < 15'000; ++i) lines += "mtllib a.mtl\nmtllib ./a.mtl none.mtl\n";
+  const MeshFile file = read(scratch, kSquare + lines + "usemtl a\nf 1 2 3\n");
+  CHECK(file.mesh.materials[0].albedo == glm::vec3(1, 0, 0));
+  REQUIRE(file.warnings.size() == 1);
+  CHECK_THAT(file.warnings[0], Contains("a material library is left out"));
+}
+
+TEST_CASE("textures: pixels beyond what the bytes of their files justify are left out",
+          "[io][mesh]") {
+  const Scratch scratch;
+  const Image white{100, 100, std::vector<glm::vec3>(10'000, glm::vec3(1))};
+  std::vector<std::string> pictures;
+  for (const char* name : {"a.png", "b.png", "c.png"}) {
+    write_png(scratch.path() / name, white);
+    pictures.push_back(slurp(scratch.path() / name));
+  }
+  const std::uint64_t bytes = pictures[0].size();
+  REQUIRE(256 * bytes > 10'000);  // so that one more is justified by its own bytes, as in a file
+  MeshWarnings warnings;
+  TextureLoader loader(scratch.path(), warnings, 0);
+  for (const char* name : {"a.png", "./a.png", "b.png", "c.png"}) CHECK(loader.load(name));
+  CHECK(warnings.lines().empty());
+
+  const auto decode = [&](TextureLoader& from, const std::string& name) {
+    return from.decode(name, std::as_bytes(std::span(pictures[0])), 0);
+  };
+  TextureLoader poor(scratch.path(), warnings, 25'000);
+  CHECK(decode(poor, "image 0"));
+  CHECK(decode(poor, "image 1"));
+  CHECK_FALSE(decode(poor, "image 2"));
+  CHECK(decode(poor, "image 1"));
+  REQUIRE(warnings.lines().size() == 1);
+  CHECK_THAT(warnings.lines()[0],
+             EndsWith("image 2: 100 x 100 pixels are more than the 5000 that are left"));
+  CHECK(poor.load("a.png"));  // by its own bytes
 }
 
 TEST_CASE("obj: files that break a rule are refused by line", "[io][mesh]") {

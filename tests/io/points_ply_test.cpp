@@ -355,6 +355,21 @@ TEST_CASE("ply: a gzip file of several members, with or without padding, is read
   }
 }
 
+TEST_CASE("ply: a gzip file that unpacks to more than 64 MiB and 256 times its size is refused",
+          "[io][ply]") {
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.ply.gz";
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float nx\nproperty float ny\nproperty float nz\nend_header\n";
+  const std::string point = "1 2 3 0 0 1\n";
+  gzipped(path, header + std::string(60 << 20, '\n') + point);
+  CHECK(read_all(path).size() == 1);
+  gzipped(path, header + std::string(100 << 20, '\n') + point);
+  CHECK_THROWS_WITH(read_all(path), Contains("a.ply.gz: offset ") &&
+                                        Contains("unpack to more than 256 times their size"));
+}
+
 TEST_CASE("ply: every truncation and every flipped byte of a gzip file is refused",
           "[io][points]") {
   const Scratch scratch;

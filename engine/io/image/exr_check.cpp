@@ -55,8 +55,8 @@ bool suits(std::string_view type, std::uint32_t size) {
 
 class HeaderWalk {
  public:
-  explicit HeaderWalk(const std::filesystem::path& path)
-      : stream_(path), bytes_(stream_.most_left()) {}
+  HeaderWalk(const std::filesystem::path& path, std::uint64_t most_pixels)
+      : stream_(path), bytes_(stream_.most_left()), most_pixels_(most_pixels) {}
 
   void run() {
     stream_.skip(4);  // the magic number was read
@@ -154,8 +154,11 @@ class HeaderWalk {
     const auto [width, height] = window_;
     if (width < 1 || height < 1) fail("a picture without pixels");
     if (width > kMostImageSide || height > kMostImageSide ||
-        static_cast<std::uint64_t>(width * height) > kMostPixels) {
+        static_cast<std::uint64_t>(width * height) > kMostImagePixels) {
       fail("more pixels than this program takes");
+    }
+    if (static_cast<std::uint64_t>(width * height) > most_pixels_) {
+      fail("more pixels than the " + std::to_string(most_pixels_) + " that are left");
     }
     const auto [tile_width, tile_height] = tile_;
     if (tile_width == 0 && tile_height == 0) return;
@@ -174,14 +177,15 @@ class HeaderWalk {
 
   ByteStream stream_;
   std::uint64_t bytes_;
+  std::uint64_t most_pixels_;
   std::array<std::int64_t, 2> window_{};
   std::array<std::int64_t, 2> tile_{};
 };
 
 }  // namespace
 
-void check_exr_headers(const std::filesystem::path& path) {
-  HeaderWalk(path).run();
+void check_exr_headers(const std::filesystem::path& path, std::uint64_t most_pixels) {
+  HeaderWalk(path, most_pixels).run();
 }
 
 }  // namespace ptc

@@ -43,13 +43,17 @@ const std::vector<float>& linear_of_16_bit() {
 
 // The most that deflate, JPEG's end-of-band runs and run lengths make of a byte is below 8448
 // pixels (a 1-bit PNG): a small file cannot ask for a large allocation.
-void check_size(int width, int height, std::size_t file_bytes, const std::string& name) {
+void check_size(int width, int height, std::size_t file_bytes, std::uint64_t most_pixels,
+                const std::string& name) {
   if (width < 1 || height < 1) refuse(name, "a picture without pixels");
   const auto w = static_cast<std::uint64_t>(width);
   const auto h = static_cast<std::uint64_t>(height);
   const std::string size = std::to_string(w) + " x " + std::to_string(h) + " pixels";
-  if (w > kMostImageSide || h > kMostImageSide || w * h > kMostPixels) {
+  if (w > kMostImageSide || h > kMostImageSide || w * h > kMostImagePixels) {
     refuse(name, size + " are more than this program takes");
+  }
+  if (w * h > most_pixels) {
+    refuse(name, size + " are more than the " + std::to_string(most_pixels) + " that are left");
   }
   if (w * h / 8448 > file_bytes) {
     refuse(name, size + " cannot come from " + std::to_string(file_bytes) + " bytes");
@@ -119,7 +123,8 @@ std::uint8_t stored_8_bit(float linear) {
 
 }  // namespace
 
-Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
+Image decode_image(std::span<const std::byte> bytes, const std::string& name,
+                   std::uint64_t most_pixels) {
   const RasterFormat format = raster_format(bytes, name);
   if (format == RasterFormat::none) refuse(name, "not a PNG, JPEG, BMP, HDR, TGA or EXR picture");
   if (bytes.size() > kMostFileBytes) refuse(name, "a picture of more than 1 GiB");
@@ -130,30 +135,30 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
   if (stbi_info_from_memory(data, size, &width, &height, nullptr) == 0) {
     refuse(name, stbi_failure_reason());
   }
-  check_size(width, height, bytes.size(), name);
+  check_size(width, height, bytes.size(), most_pixels, name);
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
   check_raster(bytes, format, pixels, name);
   return format == RasterFormat::hdr ? decode_hdr(data, size, name)
                                      : decode_integers(data, size, name);
 }
 
-Image read_image(const std::filesystem::path& path) {
+Image read_image(const std::filesystem::path& path, std::uint64_t most_pixels) {
   const InputFile file(path);
   constexpr std::array kExrMagic = {std::byte{0x76}, std::byte{0x2f}, std::byte{0x31},
                                     std::byte{0x01}};
   std::array<std::byte, 4> magic{};
   if (file.size() >= magic.size()) file.read_at(0, magic);
-  if (magic == kExrMagic) return read_exr(path);
+  if (magic == kExrMagic) return read_exr(path, most_pixels);
   if (file.size() > kMostFileBytes) refuse(path.string(), "a picture of more than 1 GiB");
   std::vector<std::byte> bytes(file.size());
   file.read_at(0, bytes);
-  return decode_image(bytes, path.string());
+  return decode_image(bytes, path.string(), most_pixels);
 }
 
 void write_png(const std::filesystem::path& target, const Image& image) {
   const std::size_t count = std::size_t{image.width} * image.height;
   if (count == 0 || image.width > kMostImageSide || image.height > kMostImageSide ||
-      count > kMostPixels || image.pixels.size() != count) {
+      count > kMostImagePixels || image.pixels.size() != count) {
     throw std::invalid_argument("write_png: size and number of pixels do not fit");
   }
   std::vector<std::uint8_t> stored;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -10,6 +11,9 @@
 #include <glm/vec3.hpp>
 
 namespace ptc {
+
+/// More pixels than this are never read or written.
+inline constexpr std::uint64_t kMostImagePixels = std::uint64_t{1} << 28;
 
 /// Linear RGB, row by row from the top.
 struct Image {
@@ -28,13 +32,17 @@ struct Image {
 ///
 /// An EXR gives the data window of its first part: channels R G B, or Y as grey; deep parts are
 /// refused.
-/// @throws DataError when it is no such picture or ends too early; std::system_error
+/// @param most_pixels  at most kMostImagePixels
+/// @throws DataError when it is no such picture, ends too early or has more pixels;
+///         std::system_error
 /// Memory: 12 bytes a pixel, and what the decoder takes.
-[[nodiscard]] Image read_image(const std::filesystem::path& path);
+[[nodiscard]] Image read_image(const std::filesystem::path& path,
+                               std::uint64_t most_pixels = kMostImagePixels);
 
 /// The same for a PNG, JPEG, TGA, BMP or HDR in memory.
 /// @param name  what errors call it; a name that ends in ".tga" says that it is a TGA
-[[nodiscard]] Image decode_image(std::span<const std::byte> bytes, const std::string& name);
+[[nodiscard]] Image decode_image(std::span<const std::byte> bytes, const std::string& name,
+                                 std::uint64_t most_pixels = kMostImagePixels);
 
 /// One layer of an EXR file: channel names are "R" "G" "B" for the empty name, else "NAME.R" ... ;
 /// one-component layers have the channel "NAME.V"; three-component vectors "NAME.X" "NAME.Y"

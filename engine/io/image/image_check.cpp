@@ -185,7 +185,7 @@ std::optional<std::array<std::uint64_t, 2>> hdr_size(std::string_view line) {
   bool in_number = false;
   for (const char c : line) {
     const bool digit = c >= '0' && c <= '9';
-    if (digit && part < 2 && size[part] < kMostPixels) {
+    if (digit && part < 2 && size[part] < kMostImagePixels) {
       size[part] = size[part] * 10 + static_cast<std::uint64_t>(c - '0');
     }
     if (in_number && !digit) ++part;

@@ -12,12 +12,12 @@
 namespace ptc {
 
 inline constexpr unsigned kMostImageSide = 1U << 16;
-inline constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 28;
 
-/// Refuses an EXR whose headers ask for more memory than the file can justify.
+/// Refuses an EXR whose headers ask for more memory than the file can justify, or for more pixels
+/// than `most_pixels`.
 /// @throws DataError, std::system_error
-void check_exr_headers(const std::filesystem::path& path);
-[[nodiscard]] Image read_exr(const std::filesystem::path& path);
+void check_exr_headers(const std::filesystem::path& path, std::uint64_t most_pixels);
+[[nodiscard]] Image read_exr(const std::filesystem::path& path, std::uint64_t most_pixels);
 
 enum class RasterFormat { none, png, jpeg, bmp, hdr, tga };
 
@@ -26,7 +26,7 @@ enum class RasterFormat { none, png, jpeg, bmp, hdr, tga };
 
 /// Refuses bytes that end before the picture does, which stb would fill with zeros, and a JPEG of
 /// more scans than encoders write, each of which stb decodes over the whole picture.
-/// @param pixels  of the picture, at most kMostPixels
+/// @param pixels  of the picture, at most kMostImagePixels
 /// @throws DataError
 void check_raster(std::span<const std::byte> bytes, RasterFormat format, std::uint64_t pixels,
                   const std::string& name);

@@ -227,15 +227,22 @@ std::vector<std::byte> GltfDocument::fetch(const std::string& uri) const {
 
 std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
   const Json& description = at("buffers", index);
-  auto& loaded = buffers_[index];
+  const auto uri = description.find("uri");
+  const bool has_uri = uri != description.end();
+  if (has_uri && !uri->is_string()) fail("a uri that is no string");
+  const std::string none;
+  const std::string& text = has_uri ? uri->get_ref<const std::string&>() : none;
+  std::uint64_t owner = index;
+  if (has_uri && !text.starts_with("data:")) {
+    const std::string name = std::filesystem::path(file_name(text)).lexically_normal().string();
+    owner = buffer_of_file_.try_emplace(name, index).first->second;
+  }
+  auto& loaded = buffers_[owner];
   if (!loaded) {
-    const auto uri = description.find("uri");
-    if (uri == description.end()) {
-      loaded = index == 0 ? binary_chunk_ : std::vector<std::byte>();
-    } else if (uri->is_string()) {
-      loaded = fetch(uri->get<std::string>());
+    if (has_uri) {
+      loaded = fetch(text);
     } else {
-      fail("a uri that is no string");
+      loaded = index == 0 ? binary_chunk_ : std::vector<std::byte>();
     }
     bytes_read_ += loaded->size();
   }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -69,6 +70,7 @@ class GltfDocument {
   Json root_;
   std::vector<std::byte> binary_chunk_;
   std::vector<std::optional<std::vector<std::byte>>> buffers_;  // read when first needed
+  std::map<std::string, std::uint64_t> buffer_of_file_;         // the first one of several
   std::uint64_t bytes_read_ = 0;
 };
 

@@ -320,9 +320,7 @@ class GltfMesh {
     const Json* const info = member(json, "emissiveTexture");
     const auto image = info == nullptr ? nullptr : load_texture(*info);
     if (image) {
-      mean = glm::dvec3(0);
-      for (const glm::vec3& pixel : image->pixels) mean += glm::dvec3(pixel);
-      mean /= static_cast<double>(image->pixels.size());
+      mean = mean_of(image);
       warnings_.add(kEmissionAveraged, "material '" + material.name + "'");
     }
     for (int i = 0; i < 3; ++i) {
@@ -330,6 +328,16 @@ class GltfMesh {
       material.emission[i] =
           static_cast<float>(std::clamp<double>(value, 0, std::numeric_limits<float>::max()));
     }
+  }
+
+  // Many materials may emit by one texture.
+  glm::dvec3 mean_of(const std::shared_ptr<const Image>& image) {
+    const auto [at, is_new] = means_.try_emplace(image, 0);
+    if (is_new) {
+      for (const glm::vec3& pixel : image->pixels) at->second += glm::dvec3(pixel);
+      at->second /= static_cast<double>(image->pixels.size());
+    }
+    return at->second;
   }
 
   std::shared_ptr<const Image> load_texture(const Json& info) {
@@ -341,17 +349,26 @@ class GltfMesh {
                     "texture " + std::to_string(*texture) + ": no source that is supported");
       return nullptr;
     }
-    const Json& image = document_.at("images", *source);
+    const auto [at, is_new] = images_.try_emplace(*source);
+    if (is_new) at->second = load_image(*source);
+    return at->second;
+  }
+
+  // Several images may be one file or one bufferView.
+  std::shared_ptr<const Image> load_image(std::uint64_t source) {
+    const Json& image = document_.at("images", source);
     const auto uri = image.find("uri");
-    const std::string label = "image " + std::to_string(*source);
+    const auto label = [](std::uint64_t index) { return "image " + std::to_string(index); };
     if (uri != image.end() && uri->is_string()) {
       const std::string text = uri->get<std::string>();
       if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text));
-      return textures_.decode(label, document_.fetch(text));
+      return textures_.decode(label(source), document_.fetch(text), document_.bytes_read());
     }
     const auto view = document_.unsigned_at(image, "bufferView");
     if (!view) document_.fail("an image without uri and bufferView");
-    return textures_.decode(label, document_.view(*view));
+    const std::uint64_t first = image_of_view_.try_emplace(*view, source).first->second;
+    const std::span<const std::byte> bytes = document_.view(*view);
+    return textures_.decode(label(first), bytes, document_.bytes_read());
   }
 
   // Cameras look along -z with y up (section 3.10).
@@ -376,6 +393,9 @@ class GltfMesh {
   MeshWarnings warnings_;
   TextureLoader textures_;
   std::map<std::uint64_t, GltfMaterial> materials_;
+  std::map<std::uint64_t, std::shared_ptr<const Image>> images_;
+  std::map<std::uint64_t, std::uint64_t> image_of_view_;
+  std::map<std::shared_ptr<const Image>, glm::dvec3> means_;
   std::vector<bool> visited_;
   bool has_uvs_ = false;
 };

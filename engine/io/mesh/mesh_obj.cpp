@@ -4,6 +4,7 @@
 #include <exception>
 #include <map>
 #include <new>
+#include <set>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -151,7 +152,8 @@ class ObjMesh {
   }
 
   void read_library(const std::string& name) {
-    const std::filesystem::path path = path_.parent_path() / name;
+    const std::filesystem::path path = (path_.parent_path() / name).lexically_normal();
+    if (!libraries_.insert(path.string()).second) return;  // it would define nothing new
     try {
       read_mtl(path, textures_, defined_, warnings_);
     } catch (const std::bad_alloc&) {
@@ -167,6 +169,7 @@ class ObjMesh {
   MeshSoup soup_;
   MeshWarnings warnings_;
   TextureLoader textures_;
+  std::set<std::string> libraries_;  // that were read
   std::map<std::string, Material> defined_;
   std::map<std::string, std::size_t> used_;
   std::optional<std::size_t> material_;

@@ -10,6 +10,7 @@
 #include <glm/matrix.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/file/file.h"
 #include "engine/io/mesh/mesh_soup.h"
 
 namespace ptc {
@@ -46,30 +47,45 @@ std::string reason_for(const std::string& name, const std::filesystem::path& pat
   return name + ": " + std::string(what.starts_with(prefix) ? what.substr(prefix.size()) : what);
 }
 
+std::uint64_t TextureLoader::pixels_left() const {
+  constexpr std::uint64_t kPixelsOfByte = 256;
+  const std::uint64_t most = free_pixels_ + kPixelsOfByte * (texture_bytes_ + mesh_bytes_);
+  return std::min(most - pixels_, kMostImagePixels);
+}
+
+std::shared_ptr<const Image> TextureLoader::keep(Image image) {
+  pixels_ += image.pixels.size();
+  return std::make_shared<const Image>(std::move(image));
+}
+
 std::shared_ptr<const Image> TextureLoader::load(const std::string& name) {
-  const auto known = loaded_.find(name);
-  if (known != loaded_.end()) return known->second;
   std::string relative = name;
   std::ranges::replace(relative, '\\', '/');
-  const std::filesystem::path path = directory_ / relative;
+  // One file has many names: a.png and ./a.png.
+  const std::filesystem::path path = (directory_ / relative).lexically_normal();
+  const auto known = loaded_.find(path.string());
+  if (known != loaded_.end()) return known->second;
   std::shared_ptr<const Image> image;
   try {
-    image = std::make_shared<const Image>(read_image(path));
+    texture_bytes_ += InputFile(path).size();
+    image = keep(read_image(path, pixels_left()));
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
     warnings_.add(kTextureLeftOut, reason_for(name, path, error));
   }
-  return loaded_[name] = std::move(image);
+  return loaded_[path.string()] = std::move(image);
 }
 
 std::shared_ptr<const Image> TextureLoader::decode(const std::string& name,
-                                                   std::span<const std::byte> bytes) {
+                                                   std::span<const std::byte> bytes,
+                                                   std::uint64_t mesh_bytes) {
   const auto known = loaded_.find(name);
   if (known != loaded_.end()) return known->second;
+  mesh_bytes_ = std::max(mesh_bytes_, mesh_bytes);
   std::shared_ptr<const Image> image;
   try {
-    image = std::make_shared<const Image>(decode_image(bytes, name));
+    image = keep(decode_image(bytes, name, pixels_left()));
   } catch (const DataError& error) {
     warnings_.add(kTextureLeftOut, error.what());
   }

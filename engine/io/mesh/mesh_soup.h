@@ -65,7 +65,7 @@ struct TriangulationCounts {
 ///
 /// The work is about n log n looks for n corners; where long triangles lie among evenly spread
 /// corners it is up to n sqrt(n).
-/// @param most_looks  after which the rest becomes a fan; usually n (1024 + 8 sqrt(n))
+/// @param most_looks  after which the rest becomes a fan; usually n (1024 + 8 sqrt(n)) or 2^34
 TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
                                 std::vector<std::array<std::uint32_t, 3>>& triangles,
                                 std::optional<std::uint64_t> most_looks = {});
@@ -86,20 +86,34 @@ TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
                                      const std::exception& error);
 
 /// Loads each texture once; a failure becomes a warning and no texture.
+///
+/// All textures of a mesh have at most `free_pixels` and 256 for each byte of the files that they
+/// are in, and one beyond that fails: a small file cannot ask for much memory. Photographs have
+/// less than 100 pixels a byte, only pictures of a single colour have more.
 class TextureLoader {
  public:
-  TextureLoader(std::filesystem::path directory, MeshWarnings& warnings)
-      : directory_(std::move(directory)), warnings_(warnings) {}
+  TextureLoader(std::filesystem::path directory, MeshWarnings& warnings,
+                std::uint64_t free_pixels = kMostImagePixels)
+      : directory_(std::move(directory)), warnings_(warnings), free_pixels_(free_pixels) {}
 
   /// @param name  path relative to the directory, / or \ between its parts
   [[nodiscard]] std::shared_ptr<const Image> load(const std::string& name);
-  /// A picture inside the file, known as `name` from now on.
+  /// A picture inside the mesh's own files, known as `name` from now on.
+  /// @param mesh_bytes  of these files, as far as they were read
   [[nodiscard]] std::shared_ptr<const Image> decode(const std::string& name,
-                                                    std::span<const std::byte> bytes);
+                                                    std::span<const std::byte> bytes,
+                                                    std::uint64_t mesh_bytes);
 
  private:
+  [[nodiscard]] std::uint64_t pixels_left() const;
+  std::shared_ptr<const Image> keep(Image image);
+
   std::filesystem::path directory_;
   MeshWarnings& warnings_;
+  std::uint64_t free_pixels_;
+  std::uint64_t pixels_ = 0;
+  std::uint64_t texture_bytes_ = 0;  // of the files that load() read
+  std::uint64_t mesh_bytes_ = 0;
   std::map<std::string, std::shared_ptr<const Image>> loaded_;
 };
 

@@ -43,9 +43,10 @@ constexpr std::uint32_t kNone = 0xffffffff;
 
 // Looks before what is left becomes a fan. A line meets some sqrt(n) boxes of a k-d tree over n
 // evenly spread points, which is what the worst simple polygons that we know take for each corner.
+// 2^34 looks take about a minute.
 std::uint64_t usual_most_looks(std::size_t corners) {
   const auto n = static_cast<double>(corners);
-  return static_cast<std::uint64_t>(n * (1024 + 8 * std::sqrt(n)));
+  return static_cast<std::uint64_t>(std::min(n * (1024 + 8 * std::sqrt(n)), 0x1p34));
 }
 
 // Numbers below `members` in lists, each in one at most.
