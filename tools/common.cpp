@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -231,6 +232,7 @@ int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>&
   try {
     add_common_options();
     remove_temporaries_on_signal();
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
     int exit_code = kDone;
     return parse(argc, argv, exit_code) ? perform(body) : exit_code;
   } catch (const CLI::ParseError& error) {  // of the body: what only it could judge

@@ -70,7 +70,8 @@ void DirectFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes
     const ssize_t n =
         ::pwrite(fd_, bytes.data(), std::min(bytes.size(), kMostBytes), static_cast<off_t>(offset));
     if (n == 0) errno = EIO;
-    if (n == 0 || (n < 0 && errno != EINTR && !give_up_direct(direct))) fail("pwrite", name_);
+    if (n == 0 || (n < 0 && errno != EINTR && !give_up_direct(direct)))
+      fail_write(errno, name_, offset + bytes.size());
     if (n < 0) continue;
     offset += static_cast<std::uint64_t>(n);
     bytes = bytes.subspan(static_cast<std::size_t>(n));

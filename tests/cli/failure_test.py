@@ -23,20 +23,48 @@ class SystemFailure(ProgramTest):
             self.assertIn(str(path), self.fail_with(3, program, *operands, path))
             path.rmdir()
 
-    def test_a_full_disk_leaves_nothing(self):
-        def limit():  # what is written beyond fails with EFBIG
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+    def test_a_limit_on_the_size_of_files_leaves_nothing(self):
+        """The system sends SIGXFSZ, by which a program ends that does not ignore it."""
+        picture = ["--size", "200x200", "--camera", "0,0,3,0,0,0", "--samples", "1"]
+        spilling = ["--city", "700k", "--page-size", "1M", "--profile", "raw", "-o", self.here / "o.ptcx"]
+        for program, operands, kib in (("ptcbuild", [self.cloud, "-o", self.here / "o.ptcx"], 8),
+                                       ("ptcbuild", [*spilling, "--memory=86M"], 1024), ("ptcbuild", [*spilling, "--memory=200M", "--resume"], 1024),
+                                       ("ptcbuild", [self.cloud, "--resume", "-o", self.here / "o.ptcx"], 0),
+                                       ("ptcbuild", [self.cloud, "--append", self.scene, "-o", self.here / "o.ptcx"], 8),
+                                       ("ptcshade", [self.scene, "-o", self.here / "o.ply"], 8),
+                                       ("ptcshade", [self.scene, "-o", self.here / "o.ptcx"], 8),
+                                       ("ptcshade", [self.scene, "-o", self.here / "o.ply", "--bounces", "2"], 8),
+                                       ("ptcrender", [self.scene, "-o", self.here / "o.exr", *picture], 8),
+                                       ("ptcrender", [self.scene, "-o", self.here / "o.png", *picture], 1),
+                                       ("ptcconvert", [self.scene, self.here / "o.ply"], 8),
+                                       ("ptcconvert", [self.scene, self.here / "o.xyz"], 8),
+                                       ("ptcconvert", [self.scene, self.here / "o.ptcx"], 8),
+                                       ("ptcconvert", [self.cloud, self.here / "o.ptcx"], 8),
+                                       ("ptcverify", [self.scene, "--salvage", self.here / "o.ptcx"], 8),
+                                       ("ptcverify", [self.scene, "--map", self.here / "o.svg"], 1)):
+            limit = 1024 * kib
+            message = self.fail_with(3, program, *operands, preexec_fn=lambda: resource.setrlimit(
+                resource.RLIMIT_FSIZE, (limit, limit)))
+            self.assertRegex(message, rf"{self.here}.*: it needs \d+ bytes or more, but a file of this process may have "
+                                      rf"only {limit} \(ulimit -f\): File too large", operands)
 
-        for program, operands in (("ptcbuild", [self.cloud, "-o", self.here / "o.ptcx"]),
-                                  ("ptcshade", [self.scene, "-o", self.here / "o.ply"]),
-                                  ("ptcshade", [self.scene, "-o", self.here / "o.ptcx"]),
-                                  ("ptcrender", [self.scene, "-o", self.here / "o.exr", "--size", "200x200",
-                                                 "--camera", "0,0,3,0,0,0", "--samples", "1"]),
-                                  ("ptcconvert", [self.scene, self.here / "o.ply"]),
-                                  ("ptcconvert", [self.scene, self.here / "o.xyz"]),
-                                  ("ptcconvert", [self.scene, self.here / "o.ptcx"])):
-            self.fail_with(3, program, *operands, preexec_fn=limit)
+    def test_a_build_that_met_a_limit_on_the_size_of_files_goes_on_without_it(self):
+        temps = [self.here / name for name in ("t1", "t2")]
+        command = ["ptcbuild", "--city", "600k", "--memory", "100M", "--profile", "raw", "-o", self.here / "o.ptcx"]
+        self.succeed(*command)
+        whole = (self.here / "o.ptcx").read_bytes()
+        (self.here / "o.ptcx").unlink()
+        for temp in temps:  # half of the points has room in each, the container has not
+            temp.mkdir()
+            command += ["--temp", temp]
+        command += ["--resume", "--checkpoint", "50k"]
+        limited = run(*command, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (14 << 20, 14 << 20)))
+        self.assertEqual(limited.returncode, 3, limited.stderr)
+        self.assertRegex(limited.stderr, r"o\.ptcx\.resume-pages: it needs \d+ bytes or more")
+        self.assertFalse((self.here / "o.ptcx").exists())
+        self.assertIn("going on with", self.succeed(*command).stderr)
+        self.assertEqual((self.here / "o.ptcx").read_bytes(), whole)
+        self.assertEqual(sorted(path.name for path in self.here.rglob("*")), ["o.ptcx", "t1", "t2"])
 
     def test_a_build_that_was_killed_goes_on_to_the_same_bytes(self):
         command = ["ptcbuild", "--city", "600k", "--memory", "100M", "-o", self.here / "o.ptcx"]

@@ -2,6 +2,7 @@
 #include "engine/io/file/file.h"
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -56,12 +57,13 @@ void read_whole(int fd, const std::filesystem::path& path, std::uint64_t offset,
 void write_whole(int fd, const std::filesystem::path& path, std::uint64_t offset,
                  std::span<const std::byte> bytes) {
   if (offset > kOffsetLimit || bytes.size() > kOffsetLimit - offset) fail(EFBIG, "pwrite", path);
+  const std::uint64_t end = offset + bytes.size();
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t count =
         ::pwrite(fd, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset + done));
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail(errno, "pwrite", path);
+    if (count < 0) fail_write(errno, path, end);
     if (count == 0) fail(EIO, "pwrite", path);
     done += static_cast<std::size_t>(count);
   }
@@ -159,6 +161,17 @@ std::optional<mode_t> mode_of(const std::filesystem::path& target) {
 }
 
 }  // namespace
+
+void fail_write(int error, const std::filesystem::path& path, std::uint64_t end) {
+  rlimit limit{};
+  const bool limited = error == EFBIG && ::getrlimit(RLIMIT_FSIZE, &limit) == 0 &&
+                       limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < end;
+  if (!limited) fail(error, "pwrite", path);
+  throw std::system_error(error, std::generic_category(),
+                          "pwrite " + path.string() + ": it needs " + std::to_string(end) +
+                              " bytes or more, but a file of this process may have only " +
+                              std::to_string(limit.rlim_cur) + " (ulimit -f)");
+}
 
 int open_retrying(const std::filesystem::path& path, int flags, mode_t mode) noexcept {
   return retrying([&] { return ::open(path.c_str(), flags | O_CLOEXEC, mode); });

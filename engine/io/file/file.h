@@ -101,6 +101,14 @@ class TemporaryName {
 /// fsync of the directory that a file is in: its name is on the disk.
 void sync_directory(const std::filesystem::path& file);
 
+/// Says that a write failed. Where a limit on the size of files (RLIMIT_FSIZE) is the reason, the
+/// text names what the file needs and the limit.
+///
+/// A program under such a limit must ignore SIGXFSZ, which else ends it before a write can fail.
+/// @param error  errno   @param end  bytes that the file would have
+/// @throws std::system_error
+[[noreturn]] void fail_write(int error, const std::filesystem::path& path, std::uint64_t end);
+
 /// open() of a descriptor that programs begun from this one do not get, EINTR retried. @return -1
 /// and errno as open()
 [[nodiscard]] int open_retrying(const std::filesystem::path& path, int flags,
