@@ -154,8 +154,10 @@ void write_damage_map(const std::filesystem::path& target, const std::string& na
     canvas.fill({0, 0, picture.width, picture.height}, {1, 1, 1});
     canvas.text({kMargin, 22}, shortened(picture.title), {.size = 13, .bold = true});
     canvas.text({kMargin, 40},
-                fmt::format("{} in {} pages, {} of them damaged; a square is {} bytes",
-                            bytes_text(report.file_bytes), report.pages, report.damaged_pages,
+                fmt::format("{}{}; a square is {} bytes", bytes_text(report.file_bytes),
+                            report.pages ? fmt::format(" in {} pages, {} of them damaged",
+                                                       *report.pages, *report.damaged_pages)
+                                         : std::string(),
                             parts.bytes()),
                 {.size = 10});
     draw_cells(canvas, parts);

@@ -2,6 +2,7 @@
 // it?
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -30,11 +31,46 @@ constexpr char kExamples[] =
     "  ptcverify broken.ptcx --map damage.svg --json\n"
     "  ptcverify broken.ptcx --salvage kept.ptcx\n";
 constexpr char kVerifyCodes[] =
-    "0 sound, 1 damaged, 2 usage, 3 I/O error, 4 version or feature not supported,\n"
-    "5 limit too small, 6 unfinished or truncated.";
+    "0 sound, 1 damaged, 2 usage, 3 system, 4 format not supported, 5 limit too small,\n"
+    "6 unfinished or truncated, 7 internal error.";
 constexpr std::size_t kMostLines = 20;
 
-/// Of several the one that a script has to know first.
+const char* text_of(ptc::Remedy remedy) {
+  switch (remedy) {
+    case ptc::Remedy::replace:
+      return "take a good copy of the file, or keep what is whole with --salvage";
+    case ptc::Remedy::test_machines:
+      return "test memory and disk of the machines it went through; take a good copy, or use "
+             "--salvage";
+    case ptc::Remedy::copy_again:
+      return "copy the file again, or use --salvage";
+    case ptc::Remedy::write_again:
+      return "run it again, or keep what it wrote with --salvage";
+    case ptc::Remedy::transfer:
+      return "transfer the file again, or use --salvage";
+    case ptc::Remedy::transfer_bare:
+      return "transfer the file again, as binary";
+    case ptc::Remedy::cut:
+      return "cut the file to the length given, or use --salvage";
+    case ptc::Remedy::rescue:
+      return "copy what can be read elsewhere, then use --salvage on the copy";
+    case ptc::Remedy::other_file:
+      return "this is another kind of file";
+    case ptc::Remedy::newer_program:
+      return "use the program that wrote it, or a newer one of this";
+    case ptc::Remedy::report:
+      return "write it again with another version, and report this";
+  }
+  return "";
+}
+
+/// What happened, where that is known, and what to do about it.
+std::string hint_of(const ptc::Finding& finding) {
+  const std::string happened = ptc::explanation_of(finding.cause);
+  return (happened.empty() ? "" : happened + ": ") + text_of(finding.remedy());
+}
+
+/// The exit code of the most important finding.
 ptc::ExitCode exit_code_of(const ptc::VerifyReport& report) {
   const auto any = [&](auto... causes) {
     return std::ranges::any_of(report.findings,
@@ -58,7 +94,7 @@ ordered_json line_for(const ptc::Finding& finding) {
   if (!finding.expected.empty()) line["expected"] = finding.expected;
   if (!finding.actual.empty()) line["actual"] = finding.actual;
   line["rule"] = finding.rule;
-  line["hint"] = ptc::hint_of(finding.cause);
+  line["hint"] = hint_of(finding);
   return line;
 }
 
@@ -74,21 +110,41 @@ std::string findings_text(const std::string& name, const ptc::VerifyReport& repo
   return text;
 }
 
+/// "1 page", "2 pages".
+std::string counted(std::uint64_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// What was looked at, as far as the check came.
+std::string looked_at(const ptc::VerifyReport& report, int level) {
+  if (!report.pages) return "header, superblocks and length";
+  if (level == 1) return "directory and headers of " + counted(*report.pages, "page");
+  if (!report.nodes) return "checksums of " + counted(*report.pages, "page");
+  std::string text = fmt::format("{}, {}, {} in {}", counted(*report.pages, "page"),
+                                 counted(*report.points, "point"), counted(*report.nodes, "node"),
+                                 counted(*report.groups, "group"));
+  return report.tree_digest ? text + ", the tree built again" : text;
+}
+
 std::string verdict_text(const std::string& name, const ptc::VerifyReport& report, int level,
                          double seconds) {
-  const std::string over = fmt::format("{} pages, {} points, {} nodes in {} groups, {}, {:.2f} s",
-                                       report.pages, report.points, report.nodes, report.groups,
+  const std::string over = fmt::format("{}, {}, {:.2f} s", looked_at(report, level),
                                        ptc::bytes_text(report.file_bytes), seconds);
   if (report.sound()) return fmt::format("{}: valid at level {}: {}\n", name, level, over);
-  return fmt::format("ptcverify: {}: damaged: {} faults in {} of {} pages at level {}: {}\n", name,
-                     report.damage, report.damaged_pages, report.pages, level,
-                     ptc::hint_of(report.findings.front().cause));
+  std::string faults = counted(report.damage, "fault");
+  if (report.pages)
+    faults += fmt::format(" in {} of {}", *report.damaged_pages, counted(*report.pages, "page"));
+  return fmt::format("ptcverify: {}: damaged: {} at level {}: {}\n", name, faults, level,
+                     hint_of(report.findings.front()));
+}
+
+/// The value, or null where there is none.
+template <class T>
+ordered_json or_null(const std::optional<T>& value) {
+  return value ? ordered_json(*value) : ordered_json();
 }
 
 ordered_json facts_of(const ptc::SalvageReport& kept) {
-  const auto or_null = [](const auto& value) {
-    return value ? ordered_json(*value) : ordered_json();
-  };
   return {{"points", kept.points},
           {"points_before", or_null(kept.points_before)},
           {"point_pages", kept.point_pages},
@@ -175,12 +231,12 @@ int main(int argc, char** argv) {
                      {"level", level},
                      {"damage", report.damage},
                      {"warnings", report.warnings},
-                     {"pages", report.pages},
-                     {"damaged_pages", report.damaged_pages},
-                     {"points", report.points},
-                     {"nodes", report.nodes},
-                     {"node_groups", report.groups},
-                     {"levels", report.levels},
+                     {"pages", or_null(report.pages)},
+                     {"damaged_pages", or_null(report.damaged_pages)},
+                     {"points", or_null(report.points)},
+                     {"nodes", or_null(report.nodes)},
+                     {"node_groups", or_null(report.groups)},
+                     {"levels", or_null(report.levels)},
                      {"tree_checked", report.tree_checked},
                      {"bytes", report.file_bytes},
                      {"seconds", seconds}};

@@ -1,4 +1,4 @@
-// Names and hints of causes (engine/verify/finding.h).
+// Names, explanations and remedies of causes (engine/verify/finding.h).
 #include "engine/verify/finding.h"
 
 #include <array>
@@ -11,44 +11,43 @@ namespace {
 
 struct CauseText {
   const char* name;
-  const char* hint;
+  const char* explanation;
+  Remedy remedy;
 };
-
-constexpr char kCopyOrSalvage[] =
-    "take a good copy of the file, or keep what is whole with --salvage";
 
 constexpr std::array kCauses{
-    CauseText{"unknown", kCopyOrSalvage},
-    CauseText{
-        "bit-flip",
-        "test memory and disk of the machines it went through; take a good copy, or use --salvage"},
-    CauseText{"zeroed",
-              "blocks were lost in a copy or by the disk: copy the file again, or use --salvage"},
-    CauseText{"swapped",
-              "blocks were written to the wrong place: copy the file again, or use --salvage"},
-    CauseText{"stale", "blocks of an older or other file: copy the file again, or use --salvage"},
-    CauseText{"unfinished",
-              "its writer was stopped: run it again, or keep what it wrote with --salvage"},
-    CauseText{"truncated", "the end is missing: transfer the file again, or use --salvage"},
-    CauseText{"appended", "cut the file to the length given, or use --salvage"},
-    CauseText{"text-mode", "transfer the file again, as binary"},
-    CauseText{"unreadable",
-              "the disk fails: copy what can be read elsewhere, then use --salvage on the copy"},
-    CauseText{"foreign", "this is another kind of file"},
-    CauseText{"newer", "use the program that wrote it, or a newer one of this"},
-    CauseText{
-        "writer",
-        "the file is as its writer made it: write it again with another version, and report this"},
+    CauseText{"unknown", "", Remedy::replace},
+    CauseText{"bit-flip", "", Remedy::test_machines},
+    CauseText{"zeroed", "blocks were lost in a copy or by the disk", Remedy::copy_again},
+    CauseText{"swapped", "blocks were written to the wrong place", Remedy::copy_again},
+    CauseText{"stale", "blocks are of an older or other file", Remedy::copy_again},
+    CauseText{"unfinished", "its writer was stopped", Remedy::write_again},
+    CauseText{"truncated", "the end is missing", Remedy::transfer},
+    CauseText{"appended", "", Remedy::cut},
+    CauseText{"text-mode", "", Remedy::transfer_bare},
+    CauseText{"unreadable", "the disk fails", Remedy::rescue},
+    CauseText{"foreign", "", Remedy::other_file},
+    CauseText{"newer", "", Remedy::newer_program},
+    CauseText{"writer", "the file is as its writer made it", Remedy::report},
 };
+static_assert(kCauses.size() == static_cast<std::size_t>(Cause::writer) + 1);
+
+const CauseText& text_of(Cause cause) noexcept {
+  return kCauses[static_cast<std::size_t>(cause)];
+}
 
 }  // namespace
 
 const char* name_of(Cause cause) noexcept {
-  return kCauses[static_cast<std::size_t>(cause)].name;
+  return text_of(cause).name;
 }
 
-const char* hint_of(Cause cause) noexcept {
-  return kCauses[static_cast<std::size_t>(cause)].hint;
+const char* explanation_of(Cause cause) noexcept {
+  return text_of(cause).explanation;
+}
+
+Remedy remedy_of(Cause cause) noexcept {
+  return text_of(cause).remedy;
 }
 
 Finding finding_of(const FormatError& error, int level) {

@@ -31,8 +31,24 @@ enum class Cause : std::uint8_t {
 
 /// The name that --json prints, e.g. "bit-flip".
 [[nodiscard]] const char* name_of(Cause cause) noexcept;
-/// What to do about it: a sentence.
-[[nodiscard]] const char* hint_of(Cause cause) noexcept;
+/// What happened, in words, e.g. "the end is missing"; empty where the name says it all.
+[[nodiscard]] const char* explanation_of(Cause cause) noexcept;
+
+/// What to do about damage; a program says it in words of its own.
+enum class Remedy : std::uint8_t {
+  replace,        ///< take a good copy, or salvage what is whole
+  test_machines,  ///< test memory and disk that it went through, then as replace
+  copy_again,     ///< copy it again, or salvage
+  write_again,    ///< run its writer again, or salvage what that wrote
+  transfer,       ///< transfer it again, or salvage
+  transfer_bare,  ///< transfer it again, as binary
+  cut,            ///< cut it to the length given, or salvage
+  rescue,         ///< copy what can be read elsewhere, then salvage the copy
+  other_file,     ///< none: it is another kind of file
+  newer_program,  ///< read it with the program that wrote it, or a newer one of this
+  report,         ///< write it again with another version of its writer, and report this
+};
+[[nodiscard]] Remedy remedy_of(Cause cause) noexcept;
 
 enum class Severity : std::uint8_t {
   damage,   ///< the file is not sound
@@ -51,6 +67,8 @@ struct Finding {
   std::string text;
   std::string expected;  ///< empty where the text says it all
   std::string actual;
+
+  [[nodiscard]] Remedy remedy() const noexcept { return remedy_of(cause); }
 };
 
 /// The finding that an error of the format amounts to; its cause is to be filled in.

@@ -63,10 +63,10 @@ class FileCheck {
     report_.damage = findings_.damage();
     report_.warnings = findings_.warnings();
     report_.file_bytes = file_.size();
-    report_.pages = survey_.sites.size();
-    report_.damaged_pages =
-        static_cast<std::uint64_t>(std::ranges::count(survey_.sites, false, &PageSite::sound));
-    if (survey_.superblock) report_.points = survey_.superblock->points;
+    if (report_.pages) {
+      report_.damaged_pages =
+          static_cast<std::uint64_t>(std::ranges::count(survey_.sites, false, &PageSite::sound));
+    }
     report_.superblock = survey_.superblock;
     report_.sites = std::move(survey_.sites);
     return std::move(report_);
@@ -102,6 +102,7 @@ class FileCheck {
     progress.begin("check pages", survey_.sites.size(), "pages");
     std::vector<std::unique_ptr<SurveyedPage>> pages(executor_.threads());
     std::vector<std::optional<Finding>> found(kPagesAtOnce);
+    report_.pages = 0;
     for (std::size_t first = 0; first < survey_.sites.size(); first += kPagesAtOnce) {
       const std::size_t count = std::min(kPagesAtOnce, survey_.sites.size() - first);
       read_ahead(first + count);
@@ -110,6 +111,7 @@ class FileCheck {
         found[i] = pages[thread]->check(survey_.sites[first + i], static_cast<int>(options_.level),
                                         flips_);
       });
+      *report_.pages += count;
       for (std::size_t i = 0; i < count; ++i) {
         if (!found[i]) continue;
         survey_.sites[first + i].sound = false;
@@ -176,6 +178,11 @@ class FileCheck {
     const TreeCounts tree =
         verify_tree(*survey_.container, damaged, cached_pages_, findings_, progress);
     progress.end();
+    report_.points = 0;
+    for (const PageSite& site : survey_.sites) {
+      if (site.sound && site.entry.type == PageType::point)
+        *report_.points += site.entry.record_count;
+    }
     report_.nodes = tree.nodes;
     report_.groups = tree.groups;
     report_.levels = tree.levels;

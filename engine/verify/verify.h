@@ -32,18 +32,19 @@ struct VerifyOptions {
   std::uint64_t flip_budget = std::uint64_t{1} << 38;
 };
 
-/// What a check went over and found.
+/// What a check went over and found. What was not counted, because the level does not look at it or
+/// a fault stands before it, is empty.
 struct VerifyReport {
   std::vector<Finding> findings;  ///< by level; of one level as they lie in the file
   std::uint64_t damage = 0;       ///< findings that make the file unsound, with those not kept
   std::uint64_t warnings = 0;
   std::uint64_t file_bytes = 0;
-  std::uint64_t pages = 0;          ///< that are listed or were found
-  std::uint64_t damaged_pages = 0;  ///< of these
-  std::uint64_t points = 0;
-  std::uint64_t nodes = 0;  ///< in groups that were reached
-  std::uint64_t groups = 0;
-  int levels = 0;
+  std::optional<std::uint64_t> pages;          ///< whose headers at least were checked; level 1
+  std::optional<std::uint64_t> damaged_pages;  ///< of these
+  std::optional<std::uint64_t> points;         ///< of whole pages that were decoded; level 3
+  std::optional<std::uint64_t> nodes;          ///< in groups that were reached; level 3
+  std::optional<std::uint64_t> groups;
+  std::optional<int> levels;
   bool tree_checked = false;  ///< and whole: false where damage hides part of it
   std::optional<std::array<std::uint64_t, 2>>
       tree_digest;              ///< of the stored tree (spec/nodes.md#tree-digest), level 4

@@ -1,6 +1,7 @@
 """What the programs tell, and that it does not depend on threads or memory."""
 
 import json
+import re
 import struct
 import unittest
 from pathlib import Path
@@ -82,7 +83,7 @@ class Facts(ProgramTest):
         # On one disk, whose room is counted once.
         self.assertLess(abs(space["temp_free_bytes"] - space["output_free_bytes"]), 0.5 * space["output_free_bytes"])
         told = self.succeed(*command, "--progress").stderr
-        for text in (f"ptcbuild: 0.0 GB of temporary files in {first} and {second}, ", " GB free; about 0.0 GB for "):
+        for text in (f"ptcbuild: 23.8 MB of temporary files in {first} and {second}, ", " GB free; about 9.1 MB for "):
             self.assertIn(text, told)
             self.assertIn(text, result.stderr)
         self.assertLess(told.index("temporary files"), told.index("partition"))
@@ -193,6 +194,36 @@ class Verify(ProgramTest):
     def test_whole_containers_are_valid(self):
         self.assertIn("valid", self.succeed("ptcverify", self.scene).stdout)
         self.assertIn("valid", self.succeed("ptcverify", self.box, "--threads", "1").stdout)
+
+    def test_a_verification_tells_what_its_level_looked_at_and_nothing_else(self):
+        whole = json.loads(self.succeed("ptcinfo", self.scene, "--json").stdout)
+        counted = {"points": whole["points"], "nodes": whole["nodes"], "node_groups": whole["node_groups"],
+                   "levels": whole["levels"]}
+        pages = whole["pages"]
+        texts = ["header, superblocks and length", f"directory and headers of {pages} pages", f"checksums of {pages} pages",
+                 f"{pages} pages, 600 points, {whole['nodes']} nodes in {whole['node_groups']} groups",
+                 f"{pages} pages, 600 points, {whole['nodes']} nodes in {whole['node_groups']} groups, the tree built again"]
+        for level, text in enumerate(texts):
+            command = ["ptcverify", self.scene, "--level", str(level)]
+            told = self.succeed(*command).stdout
+            self.assertRegex(told, rf": valid at level {level}: {re.escape(text)}, [0-9.]+ KB, [0-9.]+ s\n$")
+            facts = json.loads(self.succeed(*command, "--json").stdout)
+            self.assertEqual((facts["pages"], facts["damaged_pages"]), (pages, 0) if level > 0 else (None, None))
+            for name, value in counted.items():
+                self.assertEqual(facts[name], value if level > 2 else None, (level, name))
+        path = self.here / "wrong.ptcx"
+        content = bytearray(self.scene.read_bytes())
+        content[4096 + 100] ^= 1  # the first page
+        path.write_bytes(content)
+        for level in (2, 3, 4):
+            told = run("ptcverify", path, "--level", level).stderr
+            self.assertIn(f"damaged: 1 fault in 1 of {pages} pages at level {level}: test memory and disk", told)
+        content[-2000] ^= 1  # a superblock
+        path.write_bytes(content)
+        self.assertRegex(run("ptcverify", path, "--level", "0").stderr, r"damaged: 1 fault at level 0: ")
+        self.assertRegex(run("ptcverify", path, "--level", "3").stderr, rf"damaged: 2 faults in 1 of {pages} pages at level 3: ")
+        facts = json.loads(run("ptcverify", path, "--level", "3", "--json").stdout.splitlines()[-1])
+        self.assertEqual((facts["points"], facts["damaged_pages"]), (0, 1))
 
     def test_a_flipped_byte_is_named_by_offset_and_rule(self):
         whole = self.scene.read_bytes()

@@ -165,7 +165,7 @@ class BuildRun {
     const VerifyReport report =
         verify_container(target_, {.level = level, .threads = run_.threads}, silent);
     if (!report.sound()) throw DataError(fmt::format("{}: the container is not sound", profile));
-    if (report.points != input.file.records())
+    if (report.superblock->points != input.file.records())
       throw DataError(fmt::format("{}: points were lost", profile));
     const auto [known, is_new] =
         contents_.try_emplace({input.file.records(), profile}, built.content);

@@ -48,12 +48,13 @@ void require_whole(const VerifyReport& report, std::uint64_t asked, std::uint64_
     throw DataError(fmt::format("{} points: the container is not sound: {}", asked,
                                 line_of(report.findings.front())));
   }
-  if (report.points != sorted) {
+  const std::uint64_t points = report.superblock->points;
+  if (points != sorted) {
     throw DataError(fmt::format("{} points: {} went through the sort, {} are in the container",
-                                asked, sorted, report.points));
+                                asked, sorted, points));
   }
-  const std::uint64_t off = std::max(report.points, asked) - std::min(report.points, asked);
-  if (off > asked / 20) throw DataError(fmt::format("{} points: {} came", asked, report.points));
+  const std::uint64_t off = std::max(points, asked) - std::min(points, asked);
+  if (off > asked / 20) throw DataError(fmt::format("{} points: {} came", asked, points));
 }
 
 void require_same(const ScaleAnswers& first, const ScaleAnswers& now) {

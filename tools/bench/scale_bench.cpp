@@ -104,8 +104,9 @@ class ScaleRun {
         .level = VerifyLevel::payload, .memory_bytes = run_.memory_bytes, .threads = run_.threads};
     stage(runs.verify, [&] { report = verify_container(scene_, verification, silent); });
     require_whole(report, points, runs.built.sort.points);
+    const std::uint64_t made = report.superblock->points;
     if (first) {
-      if (report.points <= kVerifiedWhole) {
+      if (made <= kVerifiedWhole) {
         verification.level = VerifyLevel::rebuild;
         report = verify_container(scene_, verification, silent);
         require_whole(report, points, runs.built.sort.points);
@@ -118,10 +119,9 @@ class ScaleRun {
     request.count = options_.receivers;
     stage(runs.shade, [&] { runs.shaded = shade_container(request, lit_, silent); });
     std::filesystem::remove(scene_);
-    const std::uint64_t values =
-        digest_of_values(lit_, std::min(options_.receivers, report.points));
+    const std::uint64_t values = digest_of_values(lit_, std::min(options_.receivers, made));
     std::filesystem::remove(lit_);
-    return {.points = report.points, .content = report.superblock->content_xxh3, .values = values};
+    return {.points = made, .content = report.superblock->content_xxh3, .values = values};
   }
 
   /// The disk and the memory alone, without the container beside them.
