@@ -1,8 +1,10 @@
-"""Reads every #include "..." of the sources against the table in tools/cmake/PtcLayers.cmake.
+"""Reads every #include "..." of the sources against the table in tools/cmake/PtcLayers.cmake, and
+every string literal of the library for words that are the programs' own.
 
 A file may include its own layer and those that the table names, always by the path from the root of
-the tree. Every package that the project requires is linked by some target. Needs the standard
-library only.
+the tree. Every package that the project requires is linked by some target. The library names no
+option of a command line: its messages name fields of requests in backquotes, for which
+tools/field_names.cpp has the options. Needs the standard library only.
 """
 
 import re
@@ -59,6 +61,62 @@ def packages_not_linked(root_list, other_lists):
     required += re.findall(r"^\s*pkg_check_modules\((\w+)", root_list, re.MULTILINE)
     words = set(re.split(r"[\s():]+", " ".join(other_lists)))
     return [name for name in required if name not in words]
+
+
+TOKEN = re.compile(r'''//[^\n]*|/\*.*?\*/|R"(?P<mark>[^(\s]*)\((?P<raw>.*?)\)(?P=mark)"|"(?P<text>(?:[^"\\\n]|\\.)*)"'''
+                   r"|'(?:[^'\\\n]|\\.)+'(?!\w)|(?P<code>[^\s])", re.S)
+
+
+def literals_of(text):
+    """String literals of a source with their lines; adjacent ones are one, as the compiler has it."""
+    found, joined = [], False
+    for token in TOKEN.finditer(text):
+        if token["code"]:
+            joined = False
+        elif token["text"] is not None or token["raw"] is not None:
+            content = token["text"] if token["text"] is not None else token["raw"]
+            if joined:
+                found[-1] = (found[-1][0], found[-1][1] + content)
+            else:
+                found.append((text.count("\n", 0, token.start()) + 1, content))
+            joined = True
+    return found
+
+
+def word_faults_of(path, text, fields):
+    """Literals that name an option of a command line, or a field in backquotes that no program has an option for."""
+    faults = []
+    for line, literal in literals_of(text):
+        if re.search(r"--[a-z]", literal):
+            faults.append(f"{path}:{line}: an option of a command line: {literal}")
+        for field in re.findall(r"`([a-z_.]+)`", literal):
+            if field not in fields:
+                faults.append(f"{path}:{line}: tools/field_names.cpp does not know `{field}`")
+    return faults
+
+
+class Words(unittest.TestCase):
+    FIELDS = set(re.findall(r'FieldName\{"([^"]+)", "--[a-z-]+"\}', (ROOT / "tools/field_names.cpp").read_text()))
+
+    def test_the_library_names_fields_and_no_options(self):
+        faults, literals = [], 0
+        for folder in ["format", "engine"]:
+            for path in sorted((ROOT / folder).rglob("*")):
+                if path.suffix in (".h", ".cpp"):
+                    text = path.read_text()
+                    literals += len(literals_of(text))
+                    faults += word_faults_of(path.relative_to(ROOT).as_posix(), text, self.FIELDS)
+        self.assertEqual(faults, [])
+        self.assertGreater(literals, 1000)
+        self.assertGreater(len(self.FIELDS), 20)
+
+    def test_options_and_unknown_fields_are_found(self):
+        for source in ('f("use --salvage");', 'f("a " // --b\n  "-"\n "-salvage");', 'f(R"(--x)");', "g('\"'); f(\"--x\");",
+                       'f("`no_such_field`");', 'f("`sampling."\n  "spacings`");'):
+            self.assertEqual(len(word_faults_of("a.cpp", source, {"sampling.spacing"})), 1, source)
+        for source in ('// "--salvage"', 'f(a[0]--, --b);', 'f("--", "salvage");', '/* "--x" */', "f(a--b, '-');",
+                       'f("`sampling." "spacing` and 1\'000 --- or - -x");', "g(1'000); f(\"--1\"); // \"--x\""):
+            self.assertEqual(word_faults_of("a.cpp", source, {"sampling.spacing"}), [], source)
 
 
 class Layers(unittest.TestCase):

@@ -20,6 +20,8 @@
 #include "engine/io/file/file.h"
 #include "engine/io/text/text.h"
 #include "format/error.h"
+#include "format/text.h"
+#include "tools/field_names.h"
 #include "tools/values.h"
 
 namespace ptc {
@@ -218,15 +220,16 @@ int Command::perform(const std::function<Outcome(Progress&)>& body) const {
     }
     print(text + outcome.facts.dump(indent, ' ', false, kReplace) + "\n");
   } else if (!quiet_ && outcome.exit_code == kDone) {
-    print(outcome.summary);
+    print(printable(outcome.summary));
   }
-  if (outcome.exit_code != kDone) std::fputs(outcome.summary.c_str(), stderr);
+  if (outcome.exit_code != kDone) std::fputs(printable(outcome.summary).c_str(), stderr);
   return outcome.exit_code;
 }
 
 int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>& body) {
   const auto fail = [&](ExitCode code, const std::string& text) {
-    std::fprintf(stderr, "%s: %s\n", app_.get_name().c_str(), printable(text).c_str());
+    std::fprintf(stderr, "%s: %s\n", app_.get_name().c_str(),
+                 printable(with_options(text)).c_str());
     return code;
   };
   try {
@@ -243,12 +246,15 @@ int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>&
     return fail(kInvalidData, error.what());
   } catch (const LimitError& error) {
     return fail(kLimit, error.what());
-  } catch (const std::invalid_argument& error) {
+  } catch (const RequestError& error) {
     return fail(kUsage, error.what());
   } catch (const std::bad_alloc&) {
     return fail(kSystem, "out of memory");
-  } catch (const std::exception& error) {
+  } catch (const std::runtime_error& error) {  // std::system_error, and what libraries refuse
     return fail(kSystem, error.what());
+  } catch (const std::exception& error) {  // a precondition was broken, by no fault of the user
+    return fail(kInternal, std::string("internal error: ") + error.what() +
+                               "; this is a defect of the program, please report it");
   }
 }
 

@@ -15,15 +15,16 @@
 
 namespace ptc {
 
-/// What a program's exit code says.
+/// What a program's exit code says (spec/errors.md#exit-codes).
 enum ExitCode : int {
   kDone = 0,
   kInvalidData = 1,  ///< an input is missing, damaged or not what it should be; data differ
-  kUsage = 2,        ///< the command line asks for what there is not
+  kUsage = 2,        ///< the command line asks for what cannot be
   kSystem = 3,       ///< the machine refused: disk full, no memory
   kUnsupported = 4,  ///< a version or feature of the format that this program does not know
   kLimit = 5,        ///< a cap that the user set is too small
   kUnfinished = 6,   ///< ptcverify: the file is unfinished or truncated
+  kInternal = 7,     ///< a defect of the program: a precondition of the engine was broken
 };
 
 /// What a program tells when it is done.
@@ -38,8 +39,8 @@ struct Outcome {
 
 /// What the exit codes mean, for --help.
 inline constexpr char kExitCodes[] =
-    "0 done, 1 data invalid or different, 2 usage, 3 system, 4 format not supported, 5 limit too "
-    "small.";
+    "0 done, 1 data invalid or different, 2 usage, 3 system, 4 format not supported,\n"
+    "5 limit too small, 7 internal error.";
 
 /// A command line program: declare options on app(), then run().
 class Command {

@@ -1,8 +1,11 @@
-// Errors that belong to no single layer.
+// Errors that belong to no single layer. What else the engine throws: FormatError (format/error.h)
+// for bytes that are no valid container, std::system_error for what the system refuses,
+// std::invalid_argument for a broken precondition, which is a bug of the caller.
 #pragma once
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace ptc {
 
@@ -13,11 +16,27 @@ class DataError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A limit that the user set is too small for the job; what() names the least that works. Programs
-/// exit with 5.
-class LimitError : public std::invalid_argument {
+/// The caller asked for something that cannot be, e.g. for settings that contradict each other.
+/// what() is a sentence in which names of fields stand in backquotes, so that a program can put its
+/// own words for them in their place. Programs exit with 2.
+class RequestError : public std::runtime_error {
  public:
-  using std::invalid_argument::invalid_argument;
+  /// @param field  the member of the request that is to be changed, with the members that lead to
+  ///               it: "estimate", "sampling.count", "run.memory_bytes"
+  RequestError(std::string field, const std::string& text)
+      : std::runtime_error(text), field_(std::move(field)) {}
+
+  [[nodiscard]] const std::string& field() const noexcept { return field_; }
+
+ private:
+  std::string field_;
+};
+
+/// The memory cap is too small for the job; what() names the least that works. Programs exit
+/// with 5.
+class LimitError : public RequestError {
+ public:
+  explicit LimitError(const std::string& text) : RequestError("run.memory_bytes", text) {}
 };
 
 }  // namespace ptc

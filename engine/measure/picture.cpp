@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "engine/io/file/file.h"
+#include "engine/io/text/text.h"
 
 namespace ptc {
 namespace {
@@ -91,7 +92,7 @@ std::string png_of(const Picture& picture) {
 }  // namespace
 
 void write_picture(const std::filesystem::path& target, const Picture& picture) {
-  const std::string ending = target.extension().string();
+  const std::string ending = lower_extension(target);
   if (ending != ".svg" && ending != ".png") {
     throw std::invalid_argument("write_picture: neither .svg nor .png: " + target.string());
   }

@@ -87,9 +87,9 @@ Frame grow_frame(const Frame& old, const std::array<double, 3>& low,
       fits[axis] = holds(grown, axis, low[axis], high[axis]);
     if (std::ranges::all_of(fits, [](bool fit) { return fit; })) return grown;
     if (doublings > kMostDoublings) {
-      throw LimitError(
-          "the new points lie so far from the scene that its cube would grow more than 65536 "
-          "times: build all anew");
+      throw RequestError("append",
+                         "the new points lie so far from the scene that its cube would grow more "
+                         "than 65536 times: build all anew, without `append`");
     }
     const Frame before = grown;
     grown.edge = 2 * before.edge;

@@ -14,8 +14,8 @@ inline constexpr int kMostDoublings = 16;
 
 /// The cube of `old`, doubled until it holds a box, too: at each step it becomes an octant of the
 /// new one, so that keys keep their order. The old frame when it holds the box.
-/// @throws std::invalid_argument as frame_around(); LimitError when more than kMostDoublings would
-/// be needed
+/// @throws std::invalid_argument as frame_around(); RequestError when more than kMostDoublings
+/// would be needed
 [[nodiscard]] Frame grow_frame(const Frame& old, const std::array<double, 3>& low,
                                const std::array<double, 3>& high);
 

@@ -3,7 +3,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
@@ -29,12 +30,24 @@ LightRig recorded_lights(const ContainerReader& container, Progress& progress) {
 
 std::string lights_record(LightRig rig) {
   if (rig.sky.map && rig.sky.map_path.empty()) {
-    throw std::invalid_argument("a sky picture needs its path, by which the container records it");
+    throw RequestError("lights",
+                       "a sky with a picture needs its path, by which containers record it");
   }
   if (!rig.sky.map_path.empty()) {
     rig.sky.map_path = std::filesystem::absolute(rig.sky.map_path).lexically_normal().string();
   }
   return to_json(rig);
+}
+
+void check_meta(const Meta& meta, std::uint8_t page_shift) {
+  const std::size_t bytes = encode_meta(meta).size();
+  const std::size_t most = (std::size_t{1} << page_shift) - kPageHeaderBytes;
+  if (bytes <= most) return;
+  throw RequestError("page_shift",
+                     fmt::format("the record of lights, inputs and channels takes {} bytes, and a "
+                                 "page holds {}: make the container with larger pages, by "
+                                 "`page_shift`",
+                                 bytes, most));
 }
 
 bool lit_by_emitters(const ContainerReader& container) {

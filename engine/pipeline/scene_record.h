@@ -24,8 +24,11 @@ inline constexpr const char* kRoundingKey = "rounding";  ///< kRounding when poi
 [[nodiscard]] LightRig recorded_lights(const ContainerReader& container, Progress& progress);
 
 /// The rig as it is recorded: the path of its sky picture is made absolute.
-/// @throws std::invalid_argument when the sky has a picture and no path
+/// @throws RequestError when the sky has a picture and no path
 [[nodiscard]] std::string lights_record(LightRig rig);
+
+/// @throws RequestError when the texts and channels of a meta page take more than a page
+void check_meta(const Meta& meta, std::uint8_t page_shift);
 
 /// True when emissive triangles lit the surfels, so that the radiance of the surfels around an
 /// emitter includes the light that it gave them.

@@ -3,10 +3,10 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/json_fields.h"
 
 namespace ptc {
@@ -56,7 +56,7 @@ float Camera::pixel_angle() const {
 std::string to_json(const Camera& camera) {
   if (!is_finite(camera.position) || !is_finite(camera.look_at) ||
       !is_finite(glm::dvec3(camera.up)) || !std::isfinite(camera.vertical_fov)) {
-    throw std::invalid_argument("camera: a member is not finite");
+    throw RequestError("camera", "a number of the `camera` is not finite");
   }
   return dump_json(Json{{"position", to_json_array(camera.position)},
                         {"look_at", to_json_array(camera.look_at)},

@@ -30,7 +30,7 @@ struct CameraAxes {
 };
 [[nodiscard]] CameraAxes axes_of(const Camera& camera);
 
-/// @throws std::invalid_argument when a member is not finite
+/// @throws RequestError when a member is not finite
 [[nodiscard]] std::string to_json(const Camera& camera);
 /// Members that are absent keep their defaults. camera_from_json(to_json(c)) equals c exactly.
 /// @throws DataError when it is no JSON, a member is unknown or of the wrong type, or out of range

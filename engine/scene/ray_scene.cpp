@@ -15,6 +15,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/texture.h"
 
 namespace ptc {
@@ -112,7 +113,7 @@ Stretch inside_box(const glm::dvec3& origin, const glm::dvec3& direction, const 
 void check_mesh(const Mesh& mesh) {
   const std::size_t vertices = mesh.positions.size();
   const auto require = [](bool holds, const char* what) {
-    if (!holds) throw std::invalid_argument(std::string("mesh: ") + what);
+    if (!holds) throw RequestError("mesh", std::string("mesh: ") + what);
   };
   require(mesh.normals.empty() || mesh.normals.size() == vertices,
           "normals are not one per vertex");

@@ -11,7 +11,7 @@
 
 namespace ptc {
 
-/// @throws std::invalid_argument when an index is out of range, an array has the wrong length or a
+/// @throws RequestError when an index is out of range, an array has the wrong length or a
 ///         position is beyond 1e18
 void check_mesh(const Mesh& mesh);
 
@@ -35,7 +35,7 @@ struct SurfaceHit {
 class RayScene {
  public:
   /// @param mesh  must outlive this and not change
-  /// @throws std::invalid_argument as check_mesh()
+  /// @throws RequestError as check_mesh()
   explicit RayScene(const Mesh& mesh);
   ~RayScene();
 

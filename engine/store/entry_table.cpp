@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <array>
-#include <stdexcept>
+
+#include "engine/base/error.h"
 
 namespace ptc {
 
 std::uint32_t EntryTable::add(std::uint32_t pages) {
   const std::lock_guard lock(mutex_);
   if (pages > kMaxPages - has_.size())
-    throw std::length_error("entry table: more pages than a container has");
+    throw RequestError("page_shift",
+                       "more pages than a container can have: take larger ones, by "
+                       "`page_shift`");
   const auto first = static_cast<std::uint32_t>(has_.size());
   has_.resize(has_.size() + pages);
   return first;

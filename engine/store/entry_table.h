@@ -21,7 +21,7 @@ class EntryTable {
   explicit EntryTable(const std::filesystem::path& directory) : file_(directory) {}
 
   /// Makes it longer by pages that have no entry yet.
-  /// @return  number of the first. @throws std::length_error when that would be more than kMaxPages
+  /// @return  number of the first. @throws RequestError when that would be more than kMaxPages
   std::uint32_t add(std::uint32_t pages);
   [[nodiscard]] std::uint32_t size() const;
   /// True when set() was called for the page. @throws std::out_of_range for a page that was not

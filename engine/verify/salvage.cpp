@@ -5,7 +5,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <stdexcept>
 #include <system_error>
 #include <vector>
 
@@ -297,7 +296,8 @@ SalvageReport salvage_container(const std::filesystem::path& path,
                                 Progress& progress) {
   std::error_code absent;
   if (std::filesystem::equivalent(path, target, absent)) {
-    throw std::invalid_argument("what is salvaged goes into another file than " + path.string());
+    throw RequestError("target", "what is salvaged goes into another file than " + path.string() +
+                                     ", which stays as it is");
   }
   return Salvage(path, options, progress).run(target);
 }

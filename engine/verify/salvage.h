@@ -34,7 +34,7 @@ struct SalvageReport {
 /// Writes a new container from every point page and attribute page that proves itself, or does with
 /// one bit flipped back (spec/recovery.md#salvage). The octree is built again from the points, with
 /// the usual leaves where no superblock says which. Channel values that are lost are 0.
-/// @throws std::invalid_argument when the target is the file itself; FormatError when neither
+/// @throws RequestError when the target is the file itself; FormatError when neither
 /// header nor a superblock is whole, when features
 ///         forbid it or no point is left; LimitError naming the least cap; std::system_error
 /// Memory: 320 bytes a page of the file, and what build_pages() takes.

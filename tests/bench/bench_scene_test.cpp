@@ -2,10 +2,10 @@
 #include "tools/bench/bench_scene.h"
 
 #include <set>
-#include <stdexcept>
 
 #include <catch2/catch.hpp>
 
+#include "engine/base/error.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -57,13 +57,13 @@ TEST_CASE("scene: a backdrop is taken off a file's name and refused behind a wor
   CHECK(choice.backdrop);
   CHECK(parse_scene("a+backdrop.obj").file == "a+backdrop.obj");
   for (const char* word : {"fractal", "window", "city"}) {
-    CHECK_THROWS_AS(parse_scene(std::string(word) + "+backdrop"), std::invalid_argument);
+    CHECK_THROWS_AS(parse_scene(std::string(word) + "+backdrop"), RequestError);
   }
 }
 
 TEST_CASE("scene: nothing is no scene", "[bench][scene]") {
-  CHECK_THROWS_AS(parse_scene(""), std::invalid_argument);
-  CHECK_THROWS_AS(parse_scene("+backdrop"), std::invalid_argument);
+  CHECK_THROWS_AS(parse_scene(""), RequestError);
+  CHECK_THROWS_AS(parse_scene("+backdrop"), RequestError);
 }
 
 TEST_CASE("scene: no two have one name", "[bench][scene]") {

@@ -144,7 +144,7 @@ TEST_CASE("growth: a disk without room is told before anything is built", "[benc
   CHECK_THROWS_AS(measure_growth(options, dir.path(), {.threads = 1}, silent), std::system_error);
   CHECK_THROWS_WITH(measure_growth(options, dir.path(), {.threads = 1}, silent),
                     Catch::Contains(dir.path().string()) && Catch::Contains("GB free") &&
-                        Catch::Contains("--temp"));
+                        Catch::Contains("`run.temp_dirs`"));
 }
 
 TEST_CASE("growth: a build stays below the bytes that it was said to take", "[bench][growth]") {

@@ -108,7 +108,7 @@ std::filesystem::path write_values(const std::filesystem::path& target, float se
 
 VerifyReport report_of(std::uint64_t points) {
   VerifyReport report;
-  report.points = points;
+  report.superblock.emplace().points = points;
   return report;
 }
 
@@ -192,7 +192,7 @@ TEST_CASE("scale: a disk without room for the largest is told before anything is
   CHECK_THROWS_AS(measure_scale(options, dir.path(), {.threads = 1}, progress), std::system_error);
   CHECK_THROWS_WITH(measure_scale(options, dir.path(), {.threads = 1}, progress),
                     Catch::Contains(dir.path().string()) && Catch::Contains("GB free") &&
-                        Catch::Contains("--temp"));
+                        Catch::Contains("`run.temp_dirs`"));
   CHECK(progress.total() == 0);
   CHECK(std::filesystem::is_empty(dir.path()));
 }

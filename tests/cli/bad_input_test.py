@@ -125,7 +125,7 @@ class BadInput(ProgramTest):
 
     def test_points_with_impossible_numbers(self):
         good = ball(50)
-        for name, value in (("x", math.nan), ("z", math.inf), ("nx", math.nan), ("radius", -1.0),
+        for name, value in (("x", math.nan), ("z", math.inf), ("y", -1e302), ("nx", math.nan), ("radius", -1.0),
                             ("radius", math.nan), ("radius", math.inf), ("radiance_g", -0.5),
                             ("radiance_b", math.nan)):
             for place in (0, 49):
@@ -150,6 +150,7 @@ class BadInput(ProgramTest):
     def test_meshes_with_impossible_numbers(self):
         path = self.here / "bad.obj"
         for bad in (BOX.replace("v 1 0 1", "v nan 0 1"), BOX.replace("f 4 3 2 1", "f 4 3 2 99"),
+                    BOX.replace(" 0 ", " 1e302 "),
                     BOX.split("f ")[0], "f 1 2 3\n"):
             path.write_text(bad)
             self.refuse("mesh", path)

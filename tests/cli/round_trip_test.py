@@ -68,6 +68,16 @@ class RoundTrip(ProgramTest):
                 self.succeed("ptcconvert", other, back)
                 self.assertEqual(back.read_bytes(), reference.read_bytes())
 
+    def test_shading_and_converting_name_channels_of_a_ply_alike(self):
+        self.succeed("ptcshade", self.scene, "-o", self.here / "lit.ptcx", "--check", "9", "--estimate")
+        self.succeed("ptcconvert", self.here / "lit.ptcx", self.here / "converted.ply")
+        self.succeed("ptcshade", self.scene, "-o", self.here / "shaded.ply", "--check", "9", "--estimate")
+        converted, shaded = read_ply(self.here / "converted.ply")[0], read_ply(self.here / "shaded.ply")[0]
+        self.assertEqual(shaded, converted)
+        self.assertEqual(shaded[len(CORE):], [
+            "occlusion", "bent_normal_x", "bent_normal_y", "bent_normal_z", "irradiance_r", "irradiance_g", "irradiance_b",
+            "sky_r", "sky_g", "sky_b", "indirect_r", "indirect_g", "indirect_b", "occlusion_error", "irradiance_error"])
+
     def test_profiles_round_as_they_say(self):
         exact = self.here / "exact.ptcx"
         self.succeed("ptcconvert", self.cloud, exact)  # keeps what it is given

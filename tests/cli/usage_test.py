@@ -1,8 +1,15 @@
 """The command line: help, version, usage errors."""
 
+import os
+import re
+import shutil
+import time
 import unittest
+from pathlib import Path
 
-from programs import PROGRAMS, SMALL_PICTURE, ProgramTest
+from programs import CORE, PROGRAMS, SMALL_PICTURE, ProgramTest, ball, read_ply, write_ply
+
+ROOT = Path(__file__).resolve().parent.parent.parent
 
 
 class Usage(ProgramTest):
@@ -103,6 +110,79 @@ class Usage(ProgramTest):
                 self.assertIn("--error or --check", message)
         message = self.fail_with(2, "ptcrender", self.scene, "-o", self.here / "o.png", "--estimate", "--check", "9")
         self.assertIn(".exr", message)
+
+    def test_requests_that_the_library_refuses_are_told_in_options(self):
+        shade = ["ptcshade", self.scene, "-o", self.here / "o.ply"]
+        for options, text in ((["--tolerate-damage", "--bounces", "2"], "--tolerate-damage allows at most one bounce: "),
+                              (["--tolerate-damage", "--check", "9"], "--tolerate-damage goes without --error and --check: "),
+                              (["--estimate"], "--estimate needs rays to go by: ask for --error or --check, too")):
+            self.assertIn("ptcshade: " + text, self.fail_with(2, *shade, *options))
+        to_container = ["ptcshade", self.scene, "-o", self.here / "o.ptcx"]
+        self.assertIn("--count goes with a .ply as output", self.fail_with(2, *to_container, "--count", "9"))
+        self.assertIn("--tolerate-damage goes with a .ply as output", self.fail_with(2, *to_container, "--tolerate-damage"))
+        build = ["ptcbuild", self.mesh, "-o", self.here / "o.ptcx"]
+        self.assertIn("--spacing is too small", self.fail_with(2, *build, "--spacing", "1e-30"))
+        self.assertIn("a sun is negative or not finite", self.fail_with(2, *build, "--sun=1,2,1e30", "--sun-colour=1e30"))
+        self.assertIn("a point light is not finite", self.fail_with(2, *build, "--point=1e300,0,0,1,1,1"))
+        scene = self.here / "s.ptcx"
+        shutil.copy(self.scene, scene)
+        message = self.fail_with(2, "ptcbuild", self.cloud, "--append", scene, "--resume", "-o", scene)
+        self.assertIn("--resume with --append goes into another file", message)
+
+    def test_options_that_messages_name_exist(self):
+        helps = "".join(self.succeed(program, "--help").stdout for program in PROGRAMS)
+        options = re.findall(r'FieldName\{"[^"]+", "(--[a-z-]+)"\}', (ROOT / "tools/field_names.cpp").read_text())
+        self.assertGreater(len(options), 20)
+        for option in options:
+            self.assertRegex(helps, rf"{option}\b")
+
+    def test_pictures_that_are_too_large_are_refused_before_work_begins(self):
+        picture = ["ptcrender", self.scene, "-o", self.here / "o.png"]
+        for size in ("65536x65536", "65536x4097"):
+            self.assertIn("--size is " + size.replace("x", " x "), self.fail_with(2, *picture, "--size", size))
+        begin = time.monotonic()
+        self.assertIn("the least that works is", self.fail_with(5, *picture, "--size", "16384x16384"))
+        self.assertLess(time.monotonic() - begin, 10)
+
+    def test_a_record_that_no_page_holds_is_refused_before_work_begins(self):
+        lights = [f"--point=1.234567{i},2.345678{i},3.456789{i},1,2,3" for i in range(100)]
+        build = ["ptcbuild", self.mesh, *lights, "-o", self.here / "o.ptcx"]
+        message = self.fail_with(2, *build, "--page-size", "4K", "--points", "100G")
+        self.assertRegex(message, r"record of lights, inputs and channels takes \d+ bytes.*--page-size")
+        self.succeed(*build, "--points", "1k")
+        message = self.fail_with(2, "ptcconvert", self.here / "o.ptcx", self.here / "small.ptcx", "--page-size", "4K")
+        self.assertRegex(message, r"--page-size")
+
+    def test_more_names_of_inputs_than_a_page_holds_are_cut(self):
+        names = [self.here / f"a-cloud-of-many-with-a-long-name-{i}.ply" for i in range(60)]
+        for name in names:
+            write_ply(name, ball(9))
+        self.succeed("ptcbuild", *names, "-o", self.here / "o.ptcx", "--page-size", "4K")
+        text = self.succeed("ptcinfo", self.here / "o.ptcx", "--json").stdout
+        self.assertRegex(text, r'"inputs": "a-cloud-of-many-with-a-long-name-0\.ply .*\.ply \.\.\."')
+
+    def test_names_that_are_no_utf_8_are_taken(self):
+        name = os.fsencode(self.here) + b"/ball\xff.ply"
+        shutil.copy(self.cloud, name)
+        self.succeed("ptcbuild", os.fsdecode(name), "-o", self.here / "o.ptcx")
+        self.assertIn(r"ball\\xff.ply", self.succeed("ptcinfo", self.here / "o.ptcx", "--json").stdout)
+        sky = os.fsdecode(os.fsencode(self.here) + b"/sky\xff.png")
+        self.succeed("ptcrender", self.scene, *SMALL_PICTURE, "-o", sky)
+        message = self.fail_with(2, "ptcbuild", self.mesh, "-o", self.here / "p.ptcx", "--sky", sky, errors="replace")
+        self.assertIn("no UTF-8", message)
+
+    def test_endings_in_capitals_mean_what_small_ones_do(self):
+        self.succeed("ptcshade", self.scene, "-o", self.here / "o.PLY")
+        self.assertEqual(read_ply(self.here / "o.PLY")[0][:len(CORE)], CORE)
+        self.succeed("ptcshade", self.scene, "--receivers", self.scene, "--count", "9", "-o", self.here / "o.Ply")
+        self.succeed("ptcrender", self.scene, *SMALL_PICTURE, "-o", self.here / "o.EXR", "-o", self.here / "o.PNG",
+                     "--layer", f"occlusion={self.here}/a.Png")
+        self.assertEqual((self.here / "o.EXR").read_bytes()[:4], b"\x76\x2f\x31\x01")
+        for name in ("o.PNG", "a.Png"):
+            self.assertEqual((self.here / name).read_bytes()[:4], b"\x89PNG")
+        self.succeed("ptcconvert", self.scene, self.here / "o.PTCX")
+        self.succeed("ptcconvert", self.here / "o.PTCX", self.here / "p.PLY")
+        self.succeed("ptcverify", self.scene, "--map", self.here / "map.SVG")
 
     def test_names_of_outputs_must_tell_their_kind(self):
         for program, operands in (("ptcbuild", [self.mesh, "-o"]), ("ptcshade", [self.scene, "-o"]),

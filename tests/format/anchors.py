@@ -1,5 +1,5 @@
 """Every clause that the sources cite exists in the spec; every rule is listed in errors.md and has a
-vector; released versions are frozen; what security.md names exists.
+vector; released versions are frozen; what security.md names exists; exit codes are told alike.
 
 anchors.py SOURCE_DIR: collects "spec/FILE.md#anchor" and "spec/FILE.md" in sources and documents.
 """
@@ -91,6 +91,43 @@ def check_security(root, text):
                 yield f"spec/security.md: A{k}: there is no test {name}"
 
 
+def exit_codes(errors):
+    """Names of the exit codes in the table of errors.md, by code."""
+    section = errors.split("## Exit codes")[1].split("## ")[0]
+    return {int(code): name for code, name in re.findall(r"^\| (\d+) \| ([a-z ]+) \|", section, re.M)}
+
+
+def check_exit_codes(root, documents):
+    """Faults: codes of the programs, their help, the README or a document that are not those of errors.md."""
+    names = exit_codes(documents["errors.md"])
+    if len(names) < 6:
+        yield "spec/errors.md: hardly any exit codes found: the search is broken"
+
+    def read(path):
+        with open(os.path.join(root, path), encoding="utf-8") as file:
+            return file.read()
+
+    header = read("tools/common.h")
+    declared = {int(code) for code in re.findall(r"^  k[A-Za-z]+ = (\d+),", header, re.M)}
+    for code in sorted(declared ^ set(names)):
+        yield f"tools/common.h and spec/errors.md do not agree on exit code {code}"
+    texts = {"README.md": read("README.md").split("Exit codes: ")[1].split("\n\n")[0]}
+    for path, name in (("tools/common.h", "kExitCodes"), ("tools/ptcverify.cpp", "kVerifyCodes")):
+        literal = read(path).split(f"char {name}[] =")[1].split(";\n")[0]
+        texts[f"{path}: {name}"] = "".join(re.findall(r'"([^"]*)"', literal)).replace("\\n", " ")
+    for where, text in texts.items():
+        told = {int(code): name for code, name in re.findall(r"\b(\d),? ([a-z ]+)", " ".join(text.split()))}
+        for code in sorted((set(names) - {6}) ^ (set(told) - {6})):
+            yield f"{where} and spec/errors.md do not agree on exit code {code}"
+        for code, name in told.items():  # a verifier has names of its own for 0 and 1
+            if code > 1 and names.get(code, name) != name:
+                yield f"{where}: exit code {code} is '{name}', in spec/errors.md '{names[code]}'"
+    for document, text in documents.items():
+        for code, name in re.findall(r"\bexits? (?:with|code) (\d+)(?: \(([^)]*)\))?", text):
+            if names.get(int(code)) != name:
+                yield f"spec/{document}: exit code {code} without the name '{names.get(int(code))}' in brackets behind it"
+
+
 def main(root):
     spec = os.path.join(root, "spec")
     documents = {}
@@ -129,6 +166,7 @@ def main(root):
                     faults.append(f"spec/errors.md does not list {rule} of {name}")
     faults.extend(check_vectors(spec, documents["errors.md"]))
     faults.extend(check_versions(spec, documents["versions.md"]))
+    faults.extend(check_exit_codes(root, documents))
     faults.extend(check_security(root, documents["security.md"]))
     if cited < 100:
         faults.append(f"only {cited} citations found: the search is broken")

@@ -156,8 +156,7 @@ TEST_CASE("append: twice, in place, under other caps and interrupted gives the s
   request.run.threads = 1;
   build_container(request, place.dir / "again.ptcx", place.silent);
   CHECK(bytes_of(place.dir / "again.ptcx") == bytes_of(place.dir / "s.ptcx"));
-  CHECK_THROWS_AS(build_container(request, place.dir / "two.ptcx", place.silent),
-                  std::invalid_argument);
+  CHECK_THROWS_AS(build_container(request, place.dir / "two.ptcx", place.silent), RequestError);
 }
 
 TEST_CASE("append: what is damaged, shaded or too far away is refused, and the old file stays",
@@ -279,5 +278,5 @@ TEST_CASE("append: a cube grows by doublings that keep positions and the order o
       CHECK(worst < grown.unit());
     }
   }
-  CHECK_THROWS_AS(grow_frame(old, {0.3, -7, 1000}, {5e8, -6.5, 1001}), LimitError);
+  CHECK_THROWS_AS(grow_frame(old, {0.3, -7, 1000}, {5e8, -6.5, 1001}), RequestError);
 }

@@ -375,5 +375,5 @@ TEST_CASE("bounces: emitters that lit the surfels are refused, those that did no
   build_container(request, dir / "rooms.ptcx", silent);
   CHECK_NOTHROW(bounce(ContainerReader(dir / "rooms.ptcx"), 1, dir));
   CHECK_THROWS_WITH(bounce(ContainerReader(dir / "rooms.ptcx"), 2, dir),
-                    Catch::Contains("--area-rays 0"));
+                    Catch::Contains("`sampling.lights.area_rays` 0"));
 }

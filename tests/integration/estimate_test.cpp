@@ -6,6 +6,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/base/error.h"
 #include "engine/ptc.h"
 #include "tests/shade/gather_scene.h"
 
@@ -150,7 +151,7 @@ TEST_CASE("estimate: runs that compare nothing with rays are refused, empty ones
   const Scene scene(small_scene(0.1));
   ShadeRequest request = request_of(scene, true);
   request.error.reset();
-  CHECK_THROWS_AS(shade(scene, request, "a.ply"), std::invalid_argument);
+  CHECK_THROWS_AS(shade(scene, request, "a.ply"), RequestError);
   request.check = {.receivers = 10, .rays = 64};
   CHECK_NOTHROW(shade(scene, request, "a.ply"));
   RenderRequest picture{{.scene = request.scene, .estimate = true}};
@@ -158,7 +159,7 @@ TEST_CASE("estimate: runs that compare nothing with rays are refused, empty ones
   Progress silent;
   CHECK_THROWS_WITH(
       render_picture(picture, std::vector<PictureTarget>{{scene.dir / "a.exr", ""}}, silent),
-      Catch::Contains("--error or --check"));
+      Catch::Contains("`error` or `check`"));
   picture.error = 0.1;
   CHECK_THROWS_WITH(
       render_picture(picture, std::vector<PictureTarget>{{scene.dir / "a.png"}}, silent),

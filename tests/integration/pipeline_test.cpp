@@ -112,7 +112,7 @@ TEST_CASE("pipeline: a mesh in memory is built as its file is", "[integration][b
   broken.triangles[0][2] = 3;
   from_memory.inputs.clear();
   from_memory.mesh = std::make_shared<const Mesh>(broken);
-  CHECK_THROWS_AS(build_container(from_memory, dir / "broken.ptcx", silent), std::invalid_argument);
+  CHECK_THROWS_AS(build_container(from_memory, dir / "broken.ptcx", silent), RequestError);
   CHECK_FALSE(std::filesystem::exists(dir / "broken.ptcx"));
 }
 

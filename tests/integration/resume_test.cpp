@@ -139,11 +139,12 @@ TEST_CASE("resume: what is left of another request or of changed inputs is refus
   BuildRequest other = place.request;
   other.tree.leaf_points = 9;
   CHECK_THROWS_WITH(build_container(other, place.out, silent),
-                    Catch::Contains("--leaf: 16") && Catch::Contains("--leaf: 9") &&
+                    Catch::Contains("`tree.leaf_points` was '16', not '9'") &&
                         Catch::Contains("to start anew, remove"));
   other = place.request;
   other.profile = Profile::raw;
-  CHECK_THROWS_WITH(build_container(other, place.out, silent), Catch::Contains("--profile"));
+  CHECK_THROWS_WITH(build_container(other, place.out, silent),
+                    Catch::Contains("`profile` was 'compact', not 'raw'"));
   other = place.request;
   other.inputs.push_back(place.dir / "c.xyz");
   CHECK_THROWS_AS(build_container(other, place.out, silent), DataError);

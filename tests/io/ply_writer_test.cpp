@@ -108,3 +108,25 @@ TEST_CASE("ply writer: names that are none or are taken are refused", "[io][writ
   CHECK_THROWS_AS(make({{"a", 1}, {"a", 1}}), std::invalid_argument);
   CHECK(scratch.listing().empty());
 }
+
+TEST_CASE("ply writer: channels get names that are free, vectors with x, y and z", "[io][writer]") {
+  const auto channel = [](const char* name, std::uint8_t components) {
+    return Channel{name, ChannelType::half, components, 1};
+  };
+  const std::vector<Channel> channels{
+      channel("bent_normal", 3), channel("sky", 3),    channel("a.b", 1),      channel("a_b", 1),
+      channel("c_r", 1),         channel("c", 3),      channel("radiance", 3), channel("radius", 1),
+      channel("pair", 2),        channel("pair_1", 1), channel("radiance_", 1)};
+  const std::vector<PointColumn> columns = ply_columns(channels);
+  std::vector<std::string> names;
+  for (const PointColumn& column : columns) names.push_back(column.name);
+  CHECK(names == std::vector<std::string>{"bent_normal", "sky", "a_b", "a_b_", "c_r", "c_",
+                                          "radiance_", "radius_", "pair", "pair_1_", "radiance__"});
+  CHECK(columns[0].vector);
+  CHECK_FALSE(columns[1].vector);
+  const Scratch scratch;
+  const auto path = scratch.path() / "a.ply";
+  PlyWriter(path, 0, columns).finish();
+  CHECK_THAT(slurp(path), Contains("property float bent_normal_x\nproperty float bent_normal_y\n"));
+  CHECK_THAT(slurp(path), Contains("property float sky_r\n"));
+}

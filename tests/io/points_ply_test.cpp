@@ -229,7 +229,7 @@ TEST_CASE("ply: a point that breaks a rule is named with its place", "[io][point
   }
   for (const char* r : {"-1", "nan", "inf", "1e39"}) {
     CHECK_THAT(fault(scratch, one_point(with_radius, std::string("0 0 0 ") + r)),
-               EndsWith("a radius that is negative or no number"));
+               EndsWith("a radius that is negative, no number or beyond floats"));
   }
   const std::string colours =
       std::string(kXyz) + "property float red\nproperty float green\nproperty float blue\n";
@@ -242,7 +242,8 @@ TEST_CASE("ply: a point that breaks a rule is named with its place", "[io][point
   const std::size_t second = binary.size() - 2 * record;
   binary.replace(second + 36, 4, raw(-1.0F));  // its radius
   CHECK(fault(scratch, binary) ==
-        "offset " + std::to_string(second) + ": point 1: a radius that is negative or no number");
+        "offset " + std::to_string(second) +
+            ": point 1: a radius that is negative, no number or beyond floats");
 }
 
 TEST_CASE("ply: headers that break a rule are refused by line", "[io][points]") {

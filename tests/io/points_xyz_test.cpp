@@ -72,9 +72,9 @@ TEST_CASE("xyz: lines at fault are named", "[io][points]") {
   CHECK_THAT(fault(scratch, "1 2 nan\n"),
              EndsWith("line 1: point 0: a position that is not finite"));
   CHECK_THAT(fault(scratch, "1 2 3 0 0 1 -4\n"),
-             EndsWith("point 0: a radius that is negative or no number"));
+             EndsWith("point 0: a radius that is negative, no number or beyond floats"));
   CHECK_THAT(fault(scratch, "1 2 3 0 0 1 4 1 1 -1\n"),
-             EndsWith("point 0: a radiance that is negative or no number"));
+             EndsWith("point 0: a radiance that is negative, no number or beyond floats"));
 }
 
 TEST_CASE("xyz: every truncation gives points or a refusal that names the file", "[io][points]") {

@@ -122,5 +122,5 @@ TEST_CASE("camera: JSON that makes no camera is refused with the member's name",
 TEST_CASE("camera: what is not finite is not written", "[scene][camera]") {
   Camera camera;
   camera.position.y = std::numeric_limits<double>::quiet_NaN();
-  CHECK_THROWS_AS(to_json(camera), std::invalid_argument);
+  CHECK_THROWS_AS(to_json(camera), RequestError);
 }

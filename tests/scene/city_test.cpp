@@ -3,12 +3,12 @@
 
 #include <cmath>
 #include <set>
-#include <stdexcept>
 #include <utility>
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/procedural/city_block.h"
 #include "engine/scene/ray_scene.h"
 #include "tests/scene/coverage.h"
@@ -181,5 +181,5 @@ TEST_CASE("city: points come block by block", "[scene][city]") {
 }
 
 TEST_CASE("city: a mesh too large for its indices is refused", "[scene][city]") {
-  CHECK_THROWS_AS(city_mesh(std::uint64_t{1} << 62), std::invalid_argument);
+  CHECK_THROWS_AS(city_mesh(std::uint64_t{1} << 62), RequestError);
 }

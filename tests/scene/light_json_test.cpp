@@ -124,10 +124,10 @@ TEST_CASE("light rig: what JSON cannot say is not written", "[scene][lights]") {
   LightRig rig;
   rig.points.push_back({});
   rig.points[0].position.x = std::numeric_limits<double>::infinity();
-  CHECK_THROWS_AS(to_json(rig), std::invalid_argument);
+  CHECK_THROWS_AS(to_json(rig), RequestError);
   rig.points.clear();
   rig.sky.map_path = "\xFF\xFE.exr";
-  CHECK_THROWS_AS(to_json(rig), std::invalid_argument);
+  CHECK_THROWS_AS(to_json(rig), RequestError);
 }
 
 TEST_CASE("light rig: a map that is not there is an error, no map is none", "[scene][lights]") {

@@ -3,12 +3,12 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/sampling/directions.h"
 #include "tests/scene/meshes.h"
 
@@ -207,7 +207,7 @@ TEST_CASE("direct light: a rig that makes no sense is refused", "[scene][lights]
     LightRig rig = one_sun(kUp, 0);
     rig.points.emplace_back();
     spoil(rig);
-    CHECK_THROWS_AS(DirectLight(scene, rig), std::invalid_argument);
+    CHECK_THROWS_AS(DirectLight(scene, rig), RequestError);
   };
   refuses([](LightRig& r) { r.suns[0].to_sun = glm::vec3(0); });
   refuses([&](LightRig& r) { r.suns[0].irradiance.y = nan; });

@@ -9,6 +9,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "tests/scene/meshes.h"
 
 using namespace ptc;
@@ -234,7 +235,7 @@ TEST_CASE("ray scene: a mesh that is not consistent is refused", "[scene][rays]"
   const auto refuses = [&](auto&& spoil) {
     Mesh mesh = sound;
     spoil(mesh);
-    CHECK_THROWS_AS(RayScene(mesh), std::invalid_argument);
+    CHECK_THROWS_AS(RayScene(mesh), RequestError);
   };
   CHECK_NOTHROW(RayScene(sound));
   refuses([](Mesh& m) { m.triangles[1][2] = 6; });

@@ -6,11 +6,11 @@
 #include <cstring>
 #include <limits>
 #include <memory>
-#include <stdexcept>
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/sampling/directions.h"
 #include "tests/scene/coverage.h"
 #include "tests/scene/meshes.h"
@@ -402,7 +402,7 @@ TEST_CASE("sampler: the spacing for a number of surfels is the root of area over
   CHECK(spacing_for(mesh, 600) == Approx(0.1));
   mesh.materials[0].double_sided = true;
   CHECK(spacing_for(mesh, 1200) == Approx(0.1));
-  CHECK_THROWS_AS(spacing_for(mesh, 0), std::invalid_argument);
+  CHECK_THROWS_AS(spacing_for(mesh, 0), RequestError);
 }
 
 TEST_CASE("sampler: options that make no sense are refused", "[scene][sampler]") {
@@ -411,7 +411,7 @@ TEST_CASE("sampler: options that make no sense are refused", "[scene][sampler]")
     SamplingOptions options;
     options.camera.emplace();
     spoil(options);
-    CHECK_THROWS_AS(sample(mesh, options), std::invalid_argument);
+    CHECK_THROWS_AS(sample(mesh, options), RequestError);
   };
   refuses([](SamplingOptions& o) { o.count = 0; });
   refuses([](SamplingOptions& o) { o.spacing = -1; });

@@ -6,6 +6,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "tests/store/sample.h"
 
@@ -54,7 +55,7 @@ TEST_CASE("entry table: entries set in any order are encoded in that of pages",
   CHECK((table.encoded() == encoded_entries(4)));
   CHECK_THROWS_AS(table.set(4, entry(4)), std::out_of_range);
   CHECK_THROWS_AS(table.has(4), std::out_of_range);
-  CHECK_THROWS_AS(table.add(kMaxPages - 3), std::length_error);
+  CHECK_THROWS_AS(table.add(kMaxPages - 3), RequestError);
 }
 
 TEST_CASE("entry table: pages are added and set by several threads", "[store][entries]") {

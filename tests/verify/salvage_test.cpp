@@ -291,7 +291,7 @@ TEST_CASE("salvage: where nothing proves itself nothing is written", "[verify][s
     for (const std::uint32_t page : patient.points) patient.spoil(b, page);
   });
   patient.damage([](Bytes&) {});
-  CHECK_THROWS_AS(salvage_container(patient.path, patient.path, {}, silent), std::invalid_argument);
+  CHECK_THROWS_AS(salvage_container(patient.path, patient.path, {}, silent), RequestError);
   CHECK(read_file(patient.path) == patient.whole);
   CHECK_THROWS_AS(
       salvage_container(patient.path, patient.target, {.memory_bytes = 1 << 20}, silent),

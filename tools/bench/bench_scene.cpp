@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numbers>
 #include <set>
-#include <stdexcept>
 
+#include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/build/meshes.h"
@@ -72,10 +72,10 @@ SceneChoice parse_scene(const std::string& text) {
     rest.resize(rest.size() - kBackdrop.size());
     choice.backdrop = true;
   }
-  if (rest.empty()) throw std::invalid_argument("'" + text + "': a scene without a name");
+  if (rest.empty()) throw RequestError("scenes", "'" + text + "': a scene without a name");
   choice.name = rest;
   if (rest == "fractal" || rest == "window" || rest == "city") {
-    if (choice.backdrop) throw std::invalid_argument(text + ": a backdrop is for files of meshes");
+    if (choice.backdrop) throw RequestError("scenes", text + ": a backdrop is for files of meshes");
     return choice;
   }
   choice.file = rest;

@@ -24,7 +24,7 @@ struct SceneChoice {
   unsigned layers = 0;         ///< of make_layers(), instead of a word or a file
 };
 /// @param text  a word, or a path with "+backdrop" appended where wanted
-/// @throws std::invalid_argument when a word has a backdrop, or there is neither word nor path
+/// @throws RequestError when a word has a backdrop, or there is neither word nor path
 [[nodiscard]] SceneChoice parse_scene(const std::string& text);
 /// Likewise; where names are equal the later ones end in "-2", "-3" and so on.
 [[nodiscard]] std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts);
@@ -63,7 +63,7 @@ struct SceneOptions {
 
 /// Builds a scene's container.
 /// @return  its mesh (empty for a cloud), the light and the camera that belong to it
-/// @throws DataError, std::system_error, std::invalid_argument as build_container()
+/// @throws DataError, RequestError, std::system_error as build_container()
 [[nodiscard]] LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
                                    const std::filesystem::path& target, const RunOptions& run,
                                    Progress& progress);
@@ -72,7 +72,7 @@ struct SceneOptions {
 class BenchScene {
  public:
   /// @param work  a directory with room for the container, which has no name there once it is open
-  /// @throws DataError, std::system_error, std::invalid_argument as build_container()
+  /// @throws DataError, RequestError, std::system_error as build_container()
   BenchScene(const SceneChoice& choice, const SceneOptions& options,
              const std::filesystem::path& work, const RunOptions& run, Progress& progress);
 

@@ -46,7 +46,7 @@ struct SceneErrors {
 
 /// Builds the scene, shades its points and its picture once for each error asked.
 /// @param work  a directory with room for the container and what is shaded, which go again
-/// @throws DataError, std::system_error, std::invalid_argument as build_container()
+/// @throws DataError, RequestError, std::system_error as build_container()
 [[nodiscard]] SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,
                                          const std::filesystem::path& work, const RunOptions& run,
                                          Progress& progress);

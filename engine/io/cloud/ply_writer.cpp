@@ -23,6 +23,12 @@ std::vector<std::string> suffixes(const PointColumn& column) {
   return numbers;
 }
 
+std::vector<std::string> names_of(const PointColumn& column) {
+  std::vector<std::string> names;
+  for (const std::string& suffix : suffixes(column)) names.push_back(column.name + suffix);
+  return names;
+}
+
 bool is_property_name(const std::string& name) {
   return !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
     return c < 128 && (std::isalnum(c) != 0 || c == '_');
@@ -45,12 +51,35 @@ std::string make_header(std::uint64_t count, const std::vector<PointColumn>& col
     add("float", name);
   }
   for (const PointColumn& column : columns) {
-    for (const std::string& suffix : suffixes(column)) add("float", column.name + suffix);
+    for (const std::string& name : names_of(column)) add("float", name);
   }
   return text + "end_header\n";
 }
 
 }  // namespace
+
+std::vector<PointColumn> ply_columns(std::span<const Channel> channels) {
+  std::set<std::string> taken{"x",        "y",          "z",          "nx",        "ny",
+                              "nz",       "radius",     "red",        "green",     "blue",
+                              "radiance", "radiance_r", "radiance_g", "radiance_b"};
+  std::vector<PointColumn> columns;
+  for (const Channel& channel : channels) {
+    PointColumn column{.name = channel.name,
+                       .components = channel.components,
+                       .vector = channel.name.find("normal") != std::string::npos};
+    std::ranges::replace(column.name, '.', '_');
+    const auto is_taken = [&] {
+      return taken.contains(column.name) ||
+             std::ranges::any_of(names_of(column),
+                                 [&](const std::string& name) { return taken.contains(name); });
+    };
+    while (is_taken()) column.name += '_';
+    taken.insert(column.name);
+    for (const std::string& name : names_of(column)) taken.insert(name);
+    columns.push_back(column);
+  }
+  return columns;
+}
 
 struct PlyWriter::Impl {
   Impl(const std::filesystem::path& target, std::uint64_t count, std::vector<PointColumn> extra)

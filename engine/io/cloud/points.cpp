@@ -7,6 +7,9 @@
 #include <limits>
 #include <utility>
 
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
+
 #include "engine/base/error.h"
 #include "engine/io/cloud/ply.h"
 #include "engine/io/cloud/surfel_check.h"
@@ -197,9 +200,12 @@ bool all_within(const glm::dvec3& v, double most) {
 std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out) {
   constexpr double kMostFloat = std::numeric_limits<float>::max();
   if (!all_finite(raw.position)) return "a position that is not finite";
+  if (glm::any(glm::greaterThan(glm::abs(raw.position), glm::dvec3(kMostCoordinate))))
+    return "a position beyond 2^999";
   if (!(raw.radius >= 0 && raw.radius <= kMostFloat))
-    return "a radius that is negative or no number";
-  if (!all_within(raw.radiance, kMostFloat)) return "a radiance that is negative or no number";
+    return "a radius that is negative, no number or beyond floats";
+  if (!all_within(raw.radiance, kMostFloat))
+    return "a radiance that is negative, no number or beyond floats";
   if (!all_within(raw.albedo, 1)) return "a colour outside its range";
   out.position = raw.position;
   out.normal = glm::vec3(0);

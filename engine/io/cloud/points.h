@@ -12,6 +12,7 @@
 
 #include "engine/base/stream.h"
 #include "engine/base/surfel.h"
+#include "format/schema.h"
 
 namespace ptc {
 
@@ -39,9 +40,10 @@ struct PointFile {
 /// XYZ text (.xyz .xyzn .asc .txt): lines "x y z [nx ny nz [radius [r g b]]]", r g b the linear
 /// radiance, # comments; all lines have as many values as the first.
 ///
-/// Every surfel is checked: finite position, normal of non-zero finite length (it is normalised),
-/// radius finite and not negative, radiance finite and not negative, albedo in [0, 1]. A PLY that
-/// ends early, counts more than it can hold, or goes on after its last element is refused.
+/// Every surfel is checked: position finite and within kMostCoordinate, normal of non-zero finite
+/// length (it is normalised), radius finite and not negative, radiance finite and not negative,
+/// albedo in [0, 1]. A PLY that ends early, counts more than it can hold, or goes on after its last
+/// element is refused.
 /// @throws DataError naming file, offset (binary) or line (text) and point; std::system_error
 /// Memory: below 1 MiB, for packed files and lines over 256 KiB more (see ByteStream).
 [[nodiscard]] PointFile open_points(const std::filesystem::path& path);
@@ -56,6 +58,10 @@ struct PointColumn {
   unsigned components = 1;  ///< 1: the name as it is; 3: with _r _g _b; else with _0 _1 ...
   bool vector = false;      ///< three components get _x _y _z instead
 };
+
+/// Channels as columns of a PLY, with the names that spec/points.md#ply gives them: none is a
+/// property of the surfel, and none is there twice.
+[[nodiscard]] std::vector<PointColumn> ply_columns(std::span<const Channel> channels);
 
 /// Writes binary little-endian PLY: x y z (double), nx ny nz, radius, radiance_rgb, albedo as
 /// red green blue (float), then the columns (float). Published when finish() returns.

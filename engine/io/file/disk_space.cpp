@@ -52,8 +52,8 @@ void require_room(std::span<const std::filesystem::path> directories, std::uint6
   throw std::system_error(
       ENOSPC, std::generic_category(),
       fmt::format("{} take up to {} in {}, with {} free; "
-                  "name other or more directories with --temp, or fewer points",
-                  what, giga_text(bytes), names_text(directories), giga_text(free)));
+                  "name other or more directories in `run.temp_dirs`, or fewer points",
+                  what, amount_text(bytes), names_text(directories), amount_text(free)));
 }
 
 std::string names_text(std::span<const std::filesystem::path> paths) {
@@ -65,8 +65,10 @@ std::string names_text(std::span<const std::filesystem::path> paths) {
   return text;
 }
 
-std::string giga_text(std::uint64_t bytes) {
-  return fmt::format("{:.1f} GB", static_cast<double>(bytes) / 1e9);
+std::string amount_text(std::uint64_t bytes) {
+  const auto count = static_cast<double>(bytes);
+  return bytes < 999'950'000 ? fmt::format("{:.1f} MB", count / 1e6)
+                             : fmt::format("{:.1f} GB", count / 1e9);
 }
 
 }  // namespace ptc

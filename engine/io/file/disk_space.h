@@ -28,7 +28,7 @@ void require_room(std::span<const std::filesystem::path> directories, std::uint6
 /// "a", "a and b" or "a, b and c", for messages.
 [[nodiscard]] std::string names_text(std::span<const std::filesystem::path> paths);
 
-/// "12.3 GB", for messages.
-[[nodiscard]] std::string giga_text(std::uint64_t bytes);
+/// "12.3 GB", or "45.6 MB" below one, for messages.
+[[nodiscard]] std::string amount_text(std::uint64_t bytes);
 
 }  // namespace ptc

@@ -18,7 +18,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x4554'4154'5358'5450;  // "PTXSTATE"
-constexpr std::uint64_t kVersion = 2;
+constexpr std::uint64_t kVersion = 3;
 constexpr std::size_t kHeadBytes = 32;
 
 }  // namespace

@@ -12,7 +12,8 @@
 
 namespace ptc {
 
-/// More pixels than this are never read or written.
+/// The largest pictures that are read and written, in pixels.
+inline constexpr unsigned kMostImageSide = 1U << 16;
 inline constexpr std::uint64_t kMostImagePixels = std::uint64_t{1} << 28;
 
 /// Linear RGB, row by row from the top.

@@ -11,8 +11,6 @@
 
 namespace ptc {
 
-inline constexpr unsigned kMostImageSide = 1U << 16;
-
 /// Refuses an EXR whose headers ask for more memory than the file can justify, or for more pixels
 /// than `most_pixels`.
 /// @throws DataError, std::system_error

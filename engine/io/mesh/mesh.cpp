@@ -121,7 +121,7 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
     throw std::invalid_argument("append_mesh: the transform is not finite and invertible");
   }
   if (mesh.materials.size() + other.materials.size() > kMostMaterials) {
-    throw std::invalid_argument("append_mesh: more than 65,536 materials");
+    throw RequestError("inputs", "the meshes have more than 65,536 materials together");
   }
   Mesh added = other;
   if (mesh.positions.empty()) mesh.origin = rounded_centre(transformed_bounds(other, transform));
@@ -135,7 +135,7 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
   }
   const std::size_t base = mesh.positions.size();
   if (added.positions.size() > 0xffffffffU - base) {
-    throw std::invalid_argument("append_mesh: more than 2^32 vertices");
+    throw RequestError("inputs", "the meshes have 2^32 vertices or more together");
   }
   const std::size_t material_base = mesh.materials.size();
   mesh.positions.insert(mesh.positions.end(), added.positions.begin(), added.positions.end());

@@ -77,8 +77,8 @@ struct MeshFile {
 /// texture coordinates, the other gets flat normals and (0, 0). A mirroring transform turns the
 /// triangles, so that fronts stay fronts.
 /// @param transform  affine, of world positions
-/// @throws std::invalid_argument when the transform is not finite and invertible, or there are more
-///         than 65,536 materials or 2^32 vertices
+/// @throws std::invalid_argument when the transform is not finite and invertible; RequestError when
+///         both have more than 65,536 materials or 2^32 vertices together
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform);
 
 /// Writes a binary PLY of positions (double) and triangles, for tests and for looking at what was

@@ -9,6 +9,7 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "engine/base/error.h"
 
@@ -55,6 +56,9 @@ glm::dvec3 checked_origin(const MeshSoup& soup, const std::filesystem::path& pat
     const glm::dvec3& p = soup.positions[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
       refuse(path, "vertex " + std::to_string(i) + ": a position that is not finite");
+    }
+    if (glm::any(glm::greaterThan(glm::abs(p), glm::dvec3(kMostCoordinate)))) {
+      refuse(path, "vertex " + std::to_string(i) + ": a position beyond 2^999");
     }
     bounds.add(p);
   }

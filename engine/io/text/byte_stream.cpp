@@ -9,6 +9,7 @@
 #include <zlib.h>
 
 #include "engine/base/error.h"
+#include "engine/io/text/text.h"
 
 namespace ptc {
 namespace {
@@ -82,7 +83,7 @@ struct ByteStream::Gunzip {
 };
 
 ByteStream::ByteStream(const std::filesystem::path& path) : file_(path), buffer_(kBufferBytes) {
-  if (path.extension() != ".gz") return;
+  if (lower_extension(path) != ".gz") return;
   constexpr std::array kMagic = {std::byte{0x1f}, std::byte{0x8b}};
   std::array<std::byte, 2> begin{};
   if (file_.size() >= begin.size()) file_.read_at(0, begin);

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <stdexcept>
 #include <system_error>
 
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/text/text.h"
 #include "engine/octree/merge.h"
 #include "engine/octree/radius.h"
 #include "engine/pipeline/budgets.h"
@@ -43,7 +43,7 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double sp
   std::string names;
   for (const auto& input : request.inputs) {
     if (!names.empty()) names += ' ';
-    names += input.filename().string();
+    names += printable(input.filename().string());
   }
   if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
   meta.text[kInputsKey] = names;
@@ -53,6 +53,14 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double sp
   if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;
+}
+
+/// Names of inputs, of which no more are kept than a quarter of a page holds.
+std::string shortened(const std::string& names, std::uint8_t page_shift) {
+  const std::size_t most = std::size_t{1} << page_shift >> 2;
+  if (names.size() <= most) return names;
+  const std::size_t end = names.rfind(' ', most);
+  return end == std::string::npos ? std::string("...") : names.substr(0, end) + " ...";
 }
 
 /// Equal points, settings and record give an equal file, so its name in the world is made of them.
@@ -106,11 +114,16 @@ class Build {
   void open_scene() {
     std::error_code absent;
     if (request_.resume && std::filesystem::equivalent(request_.append, target_, absent)) {
-      throw std::invalid_argument("what can be resumed is appended to another file than " +
-                                  target_.string());
+      throw RequestError("resume",
+                         "`resume` with `append` goes into another file than the scene: the same "
+                         "command could not begin anew once " +
+                             target_.string() + " is replaced");
     }
-    if (request_.city_points > 0)
-      throw std::invalid_argument("the city cannot be appended to a scene");
+    if (request_.city_points > 0) {
+      throw RequestError("append",
+                         "`append` goes without `city_points`: what is added is read "
+                         "from files");
+    }
     scene_ = std::make_unique<ContainerReader>(request_.append);
     check_extensible(*scene_);
     // The record of the scene stays; without meshes to light, its sky picture is not needed.
@@ -132,6 +145,15 @@ class Build {
     const std::array<double, 3> low = to_array(bounds.low), high = to_array(bounds.high);
     return scene_points() > 0 ? grow_frame(scene_->header().frame, low, high)
                               : frame_around(low, high);
+  }
+
+  /// What the meta page says.
+  [[nodiscard]] Meta record(const BuildInputs& inputs, double spacing) const {
+    Meta meta = make_meta(request_, inputs, spacing);
+    if (scene_) meta = extended_meta(scene_->meta(), meta);
+    std::string& names = meta.text[kInputsKey];
+    names = shortened(names, request_.page_shift);
+    return meta;
   }
 
   /// Of points and nodes, whose pages are some 4 to each 10 of points where the scene is a city.
@@ -170,6 +192,7 @@ class Build {
     BuildInputs inputs = read_inputs(request_, report_.seconds, progress_);
     if (inputs.bounds.empty() && !scene_)
       throw DataError("the input has no points and no triangles");
+    check_meta(record(inputs, 1e-300), request_.page_shift);
     SortedPoints points{
         .plan = {.frame = frame_of(inputs.bounds), .estimate_radii = inputs.clouds.estimate_radii}};
     const Frame& frame = points.plan.frame;
@@ -195,8 +218,7 @@ class Build {
                         known, "points");
       spacing = feed_inputs(inputs, request_, frame, *points.sorter, executor_, progress_);
     }
-    points.plan.meta = make_meta(request_, inputs, spacing);
-    if (scene_) points.plan.meta = extended_meta(scene_->meta(), points.plan.meta);
+    points.plan.meta = record(inputs, spacing);
     points.plan.uuid = content_uuid(*points.sorter, frame, request_, points.plan.meta,
                                     scene_ ? scene_->header().uuid : Uuid{});
     if (resumption_) resumption_->keep(points.plan, *points.sorter);

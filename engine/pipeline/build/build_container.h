@@ -56,9 +56,9 @@ struct BuildReport {
 /// on the disk when it is known beforehand that the points go through temporary files, and refuses
 /// it when there is no room.
 /// @throws DataError for bad input and for what an earlier build left when it is damaged or of
-/// another request,
-///         std::invalid_argument as check_mesh() for the mesh in memory and for a cap that is too
-///         small (the text names the least that works), std::system_error
+///         another request; RequestError for a request that cannot be fulfilled; LimitError for a
+///         cap that is too small (the text names the least that works); std::system_error, also
+///         when a file may not grow so large: see fail_write() of limits on the size of files
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
                             Progress& progress);
 

@@ -47,8 +47,8 @@ BuildSpace require_build_space(std::uint64_t points, std::uint64_t temp_bytes, P
   if (all(bytes.least) > space.output_free_bytes) {
     throw std::system_error(ENOSPC, std::generic_category(),
                             fmt::format("some {} points take about {} in {}, with {} free", points,
-                                        giga_text(space.output_bytes), directory.string(),
-                                        giga_text(space.output_free_bytes)));
+                                        amount_text(space.output_bytes), directory.string(),
+                                        amount_text(space.output_free_bytes)));
   }
   return space;
 }
@@ -56,9 +56,9 @@ BuildSpace require_build_space(std::uint64_t points, std::uint64_t temp_bytes, P
 std::string space_text(const BuildSpace& space, std::span<const std::filesystem::path> temp_dirs,
                        const std::filesystem::path& target) {
   return fmt::format("{} of temporary files in {}, {} free; about {} for {}, {} free",
-                     giga_text(space.temp_bytes), names_text(temp_dirs),
-                     giga_text(space.temp_free_bytes), giga_text(space.output_bytes),
-                     target.string(), giga_text(space.output_free_bytes));
+                     amount_text(space.temp_bytes), names_text(temp_dirs),
+                     amount_text(space.temp_free_bytes), amount_text(space.output_bytes),
+                     target.string(), amount_text(space.output_free_bytes));
 }
 
 }  // namespace ptc

@@ -14,7 +14,7 @@ namespace ptc {
 /// @param backdrop  sets the meshes on a ground before a red wall
 /// @param progress  gets the warnings of each file as notes that begin with its name
 /// @param cameras   gets the cameras of the files; may be null
-/// @throws DataError, std::system_error; std::invalid_argument as check_mesh() for `also`
+/// @throws DataError, std::system_error; RequestError as check_mesh() of `also`
 [[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also,
                                bool backdrop, Progress& progress,
                                std::vector<MeshCamera>* cameras = nullptr);

@@ -17,7 +17,22 @@
 namespace ptc {
 namespace {
 
-/// A line for each thing that the bytes of the container follow from.
+const char* name_of(Profile profile) {
+  switch (profile) {
+    case Profile::raw:
+      return "raw";
+    case Profile::exact:
+      return "exact";
+    case Profile::fast:
+      return "fast";
+    case Profile::compact:
+      return "compact";
+  }
+  return "unknown";
+}
+
+/// A line "NAME: VALUE" for each thing that the bytes of the container follow from; names of fields
+/// stand in backquotes, as in a RequestError.
 std::string text_of(const BuildRequest& request) {
   std::string text;
   const auto line = [&](const char* name, const auto& value) {
@@ -31,33 +46,40 @@ std::string text_of(const BuildRequest& request) {
          fmt::format("{}, {} bytes, changed {}", whole, std::filesystem::file_size(path), changed));
   };
   for (const std::filesystem::path& input : request.inputs) file("an input", input);
-  if (!request.append.empty()) file("--append", request.append);
+  if (!request.append.empty()) file("`append`", request.append);
   const SamplingOptions& sampling = request.sampling;
-  line("--city", request.city_points);
-  line("--backdrop", request.backdrop);
+  line("`city_points`", request.city_points);
+  line("`backdrop`", request.backdrop);
   line("the lights", request.lights ? to_json(*request.lights) : "of the scene");
-  line("--points", sampling.count);
-  line("--spacing", sampling.spacing);
+  line("`sampling.count`", sampling.count);
+  line("`sampling.spacing`", sampling.spacing);
   line("the camera", sampling.camera ? to_json(*sampling.camera) : "none");
-  line("--pixels-per-surfel", sampling.pixels_per_surfel);
-  line("--finest", sampling.finest);
+  line("`sampling.pixels_per_surfel`", sampling.pixels_per_surfel);
+  line("`sampling.finest`", sampling.finest);
   const LightSampling& rays = sampling.lights;
   line("the rays to lights", fmt::format("{} {} {}", rays.sun_rays, rays.area_rays, rays.sky_rays));
-  line("--leaf", request.tree.leaf_points);
-  line("--levels-per-stream", request.tree.levels_per_stream);
-  line("--page-size", 1U << request.page_shift);
-  line("--profile", static_cast<int>(request.profile));
+  line("`tree.leaf_points`", request.tree.leaf_points);
+  line("`tree.levels_per_stream`", request.tree.levels_per_stream);
+  line("`page_shift`", fmt::format("{} bytes", 1U << request.page_shift));
+  line("`profile`", name_of(request.profile));
   return text;
 }
 
-/// The first line of `now` that is another in `before`, up to its colon.
+/// What the first line of `now` that is another in `before` says.
 std::string difference(const std::string& before, const std::string& now) {
   std::istringstream old_lines(before), new_lines(now);
   std::string old_line, new_line;
   while (std::getline(new_lines, new_line)) {
-    if (!std::getline(old_lines, old_line) || old_line != new_line) break;
+    if (!std::getline(old_lines, old_line)) old_line.clear();
+    if (old_line != new_line) break;
   }
-  return fmt::format("'{}', not '{}'", old_line, new_line);
+  const auto name_end = new_line.find(": ");
+  const std::string name = new_line.substr(0, name_end);
+  if (!old_line.starts_with(name + ": ")) {
+    return fmt::format("'{}', where this one has '{}'", old_line, new_line);
+  }
+  return fmt::format("{} was '{}', not '{}'", name, old_line.substr(name_end + 2),
+                     new_line.substr(name_end + 2));
 }
 
 std::filesystem::path with_ending(const std::filesystem::path& path, const char* ending) {
@@ -95,7 +117,11 @@ Resumption::Resumption(const BuildRequest& request, const std::filesystem::path&
       pages_(with_ending(target, ".resume-pages")),
       at_(with_ending(target, ".resume-at")),
       request_(text_of(request)) {
-  if (request.mesh) throw std::invalid_argument("a build from a mesh in memory cannot be resumed");
+  if (request.mesh) {
+    throw RequestError("resume",
+                       "`resume` goes with inputs from files: a mesh in memory is gone "
+                       "when a build is taken up");
+  }
   const std::string whole = std::filesystem::absolute(target).lexically_normal().string();
   const std::uint64_t name = xxh3_64(
       std::as_bytes(std::span(whole)));  // two outputs may share a directory for temporary files

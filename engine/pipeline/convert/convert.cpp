@@ -15,6 +15,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/io/file/file.h"
+#include "engine/io/text/text.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
 #include "engine/pipeline/budgets.h"
@@ -115,22 +116,6 @@ class PageCursor {
   std::size_t floats_ = 0;          ///< a point
 };
 
-/// A channel as PLY columns: dots become '_', as do ends of names that PlyWriter uses itself.
-std::vector<PointColumn> columns_of(const Meta& meta) {
-  static const std::set<std::string> kTaken{"x",      "y",   "z",     "nx",   "ny",      "nz",
-                                            "radius", "red", "green", "blue", "radiance"};
-  std::set<std::string> seen = kTaken;
-  std::vector<PointColumn> columns;
-  for (const Channel& channel : meta.channels) {
-    PointColumn column{.name = channel.name, .components = channel.components};
-    std::ranges::replace(column.name, '.', '_');
-    while (!seen.insert(column.name).second) column.name += '_';
-    column.vector = column.name.find("normal") != std::string::npos;
-    columns.push_back(column);
-  }
-  return columns;
-}
-
 /// Numbers as text that reads back to the same bits.
 void append_line(std::string& text, const Surfel& s) {
   fmt::format_to(std::back_inserter(text), "{} {} {} {} {} {} {} {} {} {}\n", s.position.x,
@@ -202,7 +187,7 @@ Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writ
 
 void write_ply(const ContainerReader& container, const std::filesystem::path& target,
                Progress& progress) {
-  PlyWriter writer(target, container.superblock().points, columns_of(container.meta()));
+  PlyWriter writer(target, container.superblock().points, ply_columns(container.meta().channels));
   PageCursor cursor(container);
   while (cursor.next()) {
     writer.write(cursor.surfels, cursor.values);
@@ -234,6 +219,10 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
                            const RecodeOptions& options, Progress& progress) {
   const FileHeader& from = container.header();
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
+  Meta meta = container.meta();
+  const bool round =
+      is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
+  check_meta(meta, page_shift);
   const Executor executor(options.run.threads);
   const std::uint64_t pages =
       (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) +
@@ -247,9 +236,6 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
                                   .codec = codec_of(options.profile),
                                   .uuid = derived_uuid(container, options.profile, page_shift),
                                   .frame = from.frame});
-  Meta meta = container.meta();
-  const bool round =
-      is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
   // finish() numbers the meta page last: where it was not, the others cannot keep their numbers.
   const bool same_pages = page_shift == from.page_shift && !round &&
                           container.superblock().meta_page == container.page_count() - 1;
@@ -266,7 +252,7 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
 }  // namespace
 
 bool is_container(const std::filesystem::path& path) {
-  if (path.extension() == ".ptcx") return true;
+  if (lower_extension(path) == ".ptcx") return true;
   static const Block example = encode_file_header({});
   std::array<std::byte, 8> magic{};
   const InputFile file(path);

@@ -43,7 +43,9 @@ ConvertReport container_to_xyz(const ContainerReader& container,
 /// What was rounded stays so. While the page size stays and points are not rounded, pages keep
 /// their order and numbers; else the octree is built again from the points. The same input gives
 /// the same bytes.
-/// @throws FormatError, std::system_error, LimitError for a cap that is too small
+/// @throws FormatError, std::system_error, LimitError for a cap that is too small; RequestError
+/// when
+///         the record does not fit a page of the new size
 ConvertReport recode_container(const ContainerReader& container,
                                const std::filesystem::path& target, const RecodeOptions& options,
                                Progress& progress);

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <numbers>
-#include <stdexcept>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/io/cloud/record.h"
 #include "engine/octree/build_pages.h"
@@ -104,9 +104,9 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
                                               const Executor& executor, LightingReport& report,
                                               Progress& progress) {
   if (options.bounces > 1 && lit_by_emitters(scene)) {
-    throw std::invalid_argument(
-        "more than one bounce would count the light of the scene's emissive triangles twice: "
-        "build the container with --area-rays 0");
+    throw RequestError("bounces",
+                       "more than one of `bounces` would count the light of the scene's emissive "
+                       "triangles twice: build the container with `sampling.lights.area_rays` 0");
   }
   ShadeOptions shade = options.shade;
   shade.sky = {};

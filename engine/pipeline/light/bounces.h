@@ -32,7 +32,7 @@ void charge_bounces(MemoryBudget& budget, const ContainerReader& scene, unsigned
 /// bounce, two at once. Depends on neither threads nor cap.
 /// @param report  gets a stage and the CPU time of every pass
 /// @return        null for one bounce or none: the scene itself
-/// @throws std::invalid_argument when the surfels are lit by emissive triangles that are surfels
+/// @throws RequestError when the surfels are lit by emissive triangles that are surfels
 /// too;
 ///         FormatError, std::system_error
 /// Memory: the cache of `shade`, what charge_bounces() charges, and buffers within kBufferBytes.

@@ -1,8 +1,8 @@
 #include "engine/pipeline/light/lighting.h"
 
-#include <stdexcept>
 #include <utility>
 
+#include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/bounces.h"
@@ -13,18 +13,19 @@ namespace {
 void check_request(const LightingRequest& request) {
   const bool traces_rays = request.error || request.check.receivers > 0;
   if (request.estimate && !traces_rays) {
-    throw std::invalid_argument("--estimate needs rays to go by: give --error or --check, too");
+    throw RequestError("estimate",
+                       "`estimate` needs rays to go by: ask for `error` or `check`, too");
   }
   if (!request.tolerate_damage) return;
   if (request.bounces > 1) {
-    throw std::invalid_argument(
-        "--tolerate-damage goes with one bounce: more need every point, so salvage the scene "
-        "first");
+    throw RequestError("tolerate_damage",
+                       "`tolerate_damage` allows at most one bounce: further bounces read every "
+                       "point. Salvage the scene first");
   }
   if (traces_rays) {
-    throw std::invalid_argument(
-        "--tolerate-damage goes without --error and --check: rays need every point, so salvage "
-        "the scene first");
+    throw RequestError("tolerate_damage",
+                       "`tolerate_damage` goes without `error` and `check`: their rays read every "
+                       "point. Salvage the scene first");
   }
 }
 

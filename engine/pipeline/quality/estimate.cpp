@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 
+#include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/pipeline/quality/error_sums.h"
 #include "engine/shade/reference/streamed_rays.h"

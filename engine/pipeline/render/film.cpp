@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "engine/io/image/image.h"
+#include "engine/io/text/text.h"
 
 namespace ptc {
 namespace {
@@ -57,7 +58,7 @@ void Film::finish() {
 
 void Film::write(std::span<const PictureTarget> targets, float exposure) const {
   for (const PictureTarget& target : targets) {
-    if (target.path.extension() == ".exr") {
+    if (lower_extension(target.path) == ".exr") {
       write_exr(target.path);
     } else {
       write_png(target, exposure);

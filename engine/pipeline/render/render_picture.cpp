@@ -3,10 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
+#include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
 #include "engine/base/memory.h"
+#include "engine/io/image/image.h"
+#include "engine/io/text/text.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/render/primary.h"
@@ -37,10 +42,22 @@ struct Subject {
 /// The side of the grid on which a pixel's samples lie.
 unsigned side_of(unsigned samples) {
   const auto side = static_cast<unsigned>(std::lround(std::sqrt(samples)));
-  if (side * side != samples) {
-    throw std::invalid_argument("samples per pixel must be a square number");
+  if (side == 0 || side * side != samples) {
+    throw RequestError("samples", fmt::format("`samples` is {}: it must be a square number, such "
+                                              "as 1, 4, 9 or 16",
+                                              samples));
   }
   return side;
+}
+
+void check_size(const Camera& camera) {
+  const std::uint64_t pixels = std::uint64_t{camera.width} * camera.height;
+  const unsigned longer = std::max(camera.width, camera.height);
+  if (pixels > 0 && pixels <= kMostImagePixels && longer <= kMostImageSide) return;
+  throw RequestError("size",
+                     fmt::format("`size` is {} x {}: a picture has 1 to {} pixels along each "
+                                 "side, and at most {} in all",
+                                 camera.width, camera.height, kMostImageSide, kMostImagePixels));
 }
 
 /// Loads the meshes and finds the camera.
@@ -51,27 +68,31 @@ void load_subject(Subject& subject, const RenderRequest& request, const Containe
       load_meshes(request.meshes, request.mesh.get(), request.backdrop, progress, &cameras);
   subject.camera = request.camera ? *request.camera
                                   : default_camera(scene, cameras, request.backdrop, request.size);
-  if (!request.size) return;
-  subject.camera.width = (*request.size)[0];
-  subject.camera.height = (*request.size)[1];
+  if (request.size) {
+    subject.camera.width = (*request.size)[0];
+    subject.camera.height = (*request.size)[1];
+  }
+  check_size(subject.camera);
 }
 
-/// Makes the view of a subject: rays at its mesh, or its surfels drawn into a depth buffer.
-void make_view(Subject& subject, const RenderRequest& request, const LightRig& lights,
-               Lighting& lighting, LightingReport& report, Progress& progress) {
-  const ContainerReader& scene = lighting.scene();
-  if (subject.mesh.triangles.empty()) {
-    const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
-    subject.view = view_surfels(scene, subject.camera, subject.side, request.lift, lighting.lost(),
-                                lighting.executor(), progress);
-    return;
-  }
+/// Makes the view of a subject's mesh, by rays.
+void make_mesh_view(Subject& subject, const RenderRequest& request, const ContainerReader& scene,
+                    const LightRig& lights) {
   const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
   subject.rays = std::make_unique<RayScene>(subject.mesh);
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
   return_freed_memory();  // what reading the files and building the rays' tree took
   subject.view = view_mesh(*subject.rays, *subject.light, request.light_sampling, subject.camera,
                            subject.side, request.lift * static_cast<float>(surfel_radius));
+}
+
+/// Makes the view of the scene's surfels, drawn into a depth buffer.
+void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
+                      LightingReport& report, Progress& progress) {
+  const ContainerReader& scene = lighting.scene();
+  const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
+  subject.view = view_surfels(scene, subject.camera, subject.side, lift, lighting.lost(),
+                              lighting.executor(), progress);
 }
 
 /// What rendering takes besides the gather.
@@ -210,10 +231,20 @@ class TileRenderer {
   std::vector<Receiver> receivers_;
 };
 
-void check_targets(const RenderRequest& request, std::span<const PictureTarget> targets) {
-  const auto is_exr = [](const PictureTarget& t) { return t.path.extension() == ".exr"; };
-  if (request.estimate && std::ranges::none_of(targets, is_exr)) {
-    throw std::invalid_argument("estimates are layers of an .exr: name one to write");
+/// @throws RequestError when a picture's ending is neither .exr nor .png
+void check_targets(std::span<const PictureTarget> targets, bool estimate) {
+  bool exr = false;
+  for (const PictureTarget& target : targets) {
+    const std::string ending = lower_extension(target.path);
+    if (ending != ".exr" && ending != ".png") {
+      throw RequestError("targets", "the name of a picture ends in .exr or .png, not as in " +
+                                        target.path.string());
+    }
+    exr |= ending == ".exr";
+  }
+  if (estimate && !exr) {
+    throw RequestError("estimate",
+                       "`estimate` adds layers, which an .exr has alone: name one to write");
   }
 }
 
@@ -223,18 +254,20 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
                               Progress& progress) {
   // Open the scene, load what the camera sees
   LightingReport report;
-  check_targets(request, targets);
+  check_targets(targets, request.estimate);
   Subject subject{.side = side_of(request.samples)};
   Lighting lighting(request, report, progress);
   const LightRig lights =
       request.lights ? *request.lights : recorded_lights(lighting.scene(), progress);
   load_subject(subject, request, lighting.scene(), progress);
-  make_view(subject, request, lights, lighting, report, progress);
+  const bool sees_mesh = !subject.mesh.triangles.empty();
+  if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
 
   // Divide the memory, bring the light of earlier bounces, choose the settings
-  Film film(subject.camera.width, subject.camera.height, request.estimate);
   lighting.prepare(picture_budget(request, subject), lights.sky,
                    std::min(request.samples, kMaxVariants), targets.front().path);
+  if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
+  Film film(subject.camera.width, subject.camera.height, request.estimate);
   lighting.tune([&] { return pilots_of(subject, lighting.executor()); });
 
   // Render all samples into the film and write it

@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <memory>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "engine/base/error.h"
 #include "engine/io/cloud/record.h"
+#include "engine/io/text/text.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/scene_record.h"
@@ -116,7 +117,7 @@ struct OpenReceivers {
                                                const std::filesystem::path& target,
                                                Progress& progress) {
     if (request.receivers.empty()) return nullptr;
-    if (request.receivers.extension() == ".ptcx") {
+    if (lower_extension(request.receivers) == ".ptcx") {
       return std::make_unique<ContainerReader>(request.receivers);
     }
     const BuildRequest build{.inputs = {request.receivers},
@@ -138,17 +139,19 @@ struct OpenReceivers {
 };
 
 void check_target(const ShadeRequest& request, const std::filesystem::path& target) {
-  if (target.extension() == ".ply") return;
+  if (lower_extension(target) == ".ply") return;
   if (request.tolerate_damage && request.receivers.empty()) {
-    throw std::invalid_argument(
-        "a container would keep what is damaged: name a .ply, or salvage the scene first");
+    throw RequestError("tolerate_damage",
+                       "`tolerate_damage` goes with a .ply as output: a copy of the container "
+                       "would keep what is damaged. Name a .ply, or salvage the scene first");
   }
 }
 
 void check_count(const OpenReceivers& receivers, const std::filesystem::path& target) {
-  if (receivers.wanted == receivers.all() || target.extension() == ".ply") return;
-  throw std::invalid_argument(
-      "a container of some of the points cannot be written: name a .ply, or shade them all");
+  if (receivers.wanted == receivers.all() || lower_extension(target) == ".ply") return;
+  throw RequestError("count",
+                     "`count` goes with a .ply as output: a container holds all points of the "
+                     "receivers. Name a .ply, or shade them all");
 }
 
 /// Runs of points that stand for all that are shaded.

@@ -6,7 +6,10 @@
 #include <numbers>
 #include <vector>
 
+#include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/text/text.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -31,11 +34,6 @@ struct ShadedChannels {
     channels.push_back({"occlusion_error", ChannelType::half, 1, kGroup});
     channels.push_back({"irradiance_error", ChannelType::half, 1, kGroup});
     return channels;
-  }
-  static std::vector<PointColumn> columns(bool estimates) {
-    std::vector<PointColumn> columns;
-    for (const Channel& c : channels(estimates)) columns.push_back({c.name, c.components});
-    return columns;
   }
   static std::size_t count(bool estimates) { return estimates ? kFloats : kPlain; }
 };
@@ -66,7 +64,7 @@ class PlySink : public ShadedSink {
  public:
   PlySink(const std::filesystem::path& target, std::uint64_t count, bool estimates)
       : floats_(ShadedChannels::count(estimates)),
-        writer_(target, count, ShadedChannels::columns(estimates)) {}
+        writer_(target, count, ply_columns(ShadedChannels::channels(estimates))) {}
   void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
              std::span<const ErrorEstimate> estimates) override {
     std::vector<float> values;
@@ -99,8 +97,15 @@ class ContainerSink : public ShadedSink {
                          .frame = from.header().frame}) {
     std::erase_if(meta_.channels, [](const Channel& c) { return c.group == kGroup; });
     const std::vector<Channel> added = ShadedChannels::channels(estimates);
+    for (const Channel& channel : added) {
+      if (std::ranges::find(meta_.channels, channel.name, &Channel::name) == meta_.channels.end())
+        continue;
+      throw DataError(from.path().string() + ": its channel " + channel.name +
+                      " has the name of one that shading adds: name a .ply as output");
+    }
     meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());
     meta_.text["shading"] = settings;
+    check_meta(meta_, from.header().page_shift);
     columns_ = packed_group_columns(meta_.channels, kGroup);
     copy_pages();
   }
@@ -176,7 +181,7 @@ class ContainerSink : public ShadedSink {
 
 std::uint64_t sink_bytes(const std::filesystem::path& target,
                          const ContainerReader& receivers) noexcept {
-  if (target.extension() == ".ply") return 0;
+  if (lower_extension(target) == ".ply") return 0;
   // An attribute page for each page at the most.
   return ContainerWriter::memory_bytes(2 * std::uint64_t{receivers.page_count()},
                                        receivers.header().page_shift, 1);
@@ -185,7 +190,8 @@ std::uint64_t sink_bytes(const std::filesystem::path& target,
 std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
                                              const ContainerReader& receivers, std::uint64_t points,
                                              const std::string& settings, bool estimates) {
-  if (target.extension() == ".ply") return std::make_unique<PlySink>(target, points, estimates);
+  if (lower_extension(target) == ".ply")
+    return std::make_unique<PlySink>(target, points, estimates);
   return std::make_unique<ContainerSink>(target, receivers, settings, estimates);
 }
 

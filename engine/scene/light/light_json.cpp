@@ -13,14 +13,14 @@
 #include "engine/scene/json_fields.h"
 #include "engine/scene/light/lights.h"
 #include "format/checksum.h"
+#include "format/text.h"
 
 namespace ptc {
 namespace {
 
 constexpr double kMost = std::numeric_limits<float>::max();
 constexpr Range kFinite{-kMost, kMost};
-constexpr Range kFiniteWide{-std::numeric_limits<double>::max(),
-                            std::numeric_limits<double>::max()};
+constexpr Range kPlace{-kMostLightDistance, kMostLightDistance};
 constexpr Range kLight{0, kMost};
 constexpr Range kAngle{0, 1.5707964};
 
@@ -29,7 +29,7 @@ void require_finite(const Json& json) {
   for (const Json& value : json) {
     if (value.is_structured()) require_finite(value);
     if (value.is_number_float() && !std::isfinite(value.get<double>())) {
-      throw std::invalid_argument("light rig: a number is not finite");
+      throw RequestError("lights", "a number of the lights is not finite");
     }
   }
 }
@@ -56,7 +56,7 @@ Sun read_sun(const Json& json, const std::string& where) {
 PointLight read_point(const Json& json, const std::string& where) {
   JsonFields fields(json, where);
   PointLight point;
-  fields.read("position", point.position, kFiniteWide);
+  fields.read("position", point.position, kPlace);
   fields.read("intensity", point.intensity, kLight);
   fields.finish();
   return point;
@@ -118,6 +118,11 @@ std::string to_json(const LightRig& rig) {
                       {"intensity", to_json_array(point.intensity)}});
   }
   Json sky{{"radiance", to_json_array(rig.sky.radiance)}, {"up", to_json_array(rig.sky.up)}};
+  if (!is_utf8(rig.sky.map_path)) {
+    throw RequestError("lights",
+                       "the name of the sky's picture is no UTF-8, as records of lights "
+                       "are: rename it");
+  }
   if (!rig.sky.map_path.empty()) {
     sky["map"] = rig.sky.map_path;
     const std::uint64_t digest = rig.sky.map ? image_xxh3(*rig.sky.map) : rig.sky.map_xxh3;

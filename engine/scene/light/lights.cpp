@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/light/area_lights.h"
 #include "engine/scene/light/sky_map.h"
 #include "engine/scene/sampling/directions.h"
@@ -47,29 +48,32 @@ bool is_light(const glm::vec3& v) {
 glm::vec3 checked_direction(const glm::vec3& v) {
   const glm::vec3 unit = glm::normalize(v);
   if (!is_finite(unit))
-    throw std::invalid_argument("DirectLight: a direction is zero or not finite");
+    throw RequestError("lights", "a direction of the lights is zero or not finite");
   return unit;
 }
 
 LightRig checked(LightRig rig) {
   const auto require = [](bool holds, const char* what) {
-    if (!holds) throw std::invalid_argument(std::string("DirectLight: ") + what);
+    if (!holds) throw RequestError("lights", what);
   };
   for (Sun& sun : rig.suns) {
     sun.to_sun = checked_direction(sun.to_sun);
-    require(is_light(sun.irradiance), "a sun's irradiance is negative or not finite");
+    require(is_light(sun.irradiance), "the irradiance of a sun is negative or not finite");
     require(sun.angular_radius >= 0 && sun.angular_radius < 1.58f,
-            "a sun's radius is out of range");
+            "the radius of a sun is not between 0 and a quarter turn");
   }
   for (const PointLight& point : rig.points) {
-    require(is_light(point.intensity), "a point's intensity is negative or not finite");
-    require(std::isfinite(glm::dot(point.position, point.position)), "a point is not finite");
+    require(is_light(point.intensity), "the intensity of a point light is negative or not finite");
+    const glm::dvec3 away = glm::abs(point.position);
+    require(away.x <= kMostLightDistance && away.y <= kMostLightDistance &&
+                away.z <= kMostLightDistance,
+            "a coordinate of a point light is not finite, or beyond 1e150");
   }
   rig.sky.up = checked_direction(rig.sky.up);
-  require(is_light(rig.sky.radiance), "the sky's radiance is negative or not finite");
+  require(is_light(rig.sky.radiance), "the radiance of the sky is negative or not finite");
   if (const Image* map = rig.sky.map.get()) {
     require(map->pixels.size() == std::size_t{map->width} * map->height,
-            "the sky's map is not whole");
+            "the picture of the sky has another number of pixels than its size says");
   }
   return rig;
 }

@@ -25,8 +25,11 @@ struct Sun {
 /// Towards a sun: azimuth 0 is +z, 90 is +x; elevation 90 is +y.
 [[nodiscard]] glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees);
 
+/// Greatest coordinate of a point light, whose square is still a number.
+inline constexpr double kMostLightDistance = 1e150;
+
 struct PointLight {
-  glm::dvec3 position{0};
+  glm::dvec3 position{0};  ///< each coordinate at most kMostLightDistance
   glm::vec3 intensity{1};  ///< W / sr
 };
 
@@ -72,7 +75,7 @@ struct LightRig {
 ///  "points": [{"position": [x, y, z], "intensity": [r, g, b]}, ...],
 ///  "sky": {"radiance": [r, g, b], "map": "path", "map_xxh3": "16 hex digits", "up": [x, y, z]}}
 /// A sky with a map gets the map's own digest, not Sky::map_xxh3.
-/// @throws std::invalid_argument when a number is not finite or the path is not UTF-8
+/// @throws RequestError when a number is not finite or the path is not UTF-8
 [[nodiscard]] std::string to_json(const LightRig& rig);
 /// The inverse of to_json, exact; members that are absent keep their defaults. The map is named,
 /// not read: load_sky_map() reads it. Directions that are not unit are made so.
@@ -108,7 +111,7 @@ struct LightSampling {
 class DirectLight {
  public:
   /// @param scene  must outlive this
-  /// @throws std::invalid_argument when a direction is zero or a number not finite or negative
+  /// @throws RequestError when a direction is zero or a number not finite or negative
   DirectLight(const RayScene& scene, LightRig rig);
   ~DirectLight();
 

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/procedural/city_block.h"
 #include "engine/scene/sampling/directions.h"
 #include "engine/scene/sampling/low_discrepancy.h"
@@ -234,7 +234,8 @@ Mesh city_mesh(std::uint64_t count) {
   const Layout layout = lay_out(count);
   constexpr std::uint64_t kMost = 0xFFFFFFFF;
   const auto require = [](bool fits) {
-    if (!fits) throw std::invalid_argument("city_mesh: too many vertices for 32-bit indices");
+    if (!fits)
+      throw RequestError("city_points", "a mesh of so large a city has 2^32 vertices or more");
   };
   require(layout.blocks < kMost / 3 / kGroundTriangles);
   Mesh mesh;

@@ -24,7 +24,7 @@ namespace ptc {
 [[nodiscard]] Bounds city_bounds(std::uint64_t count);
 /// The same city as a mesh, for ray-traced references and pictures: every point lies on a triangle
 /// of its colour and normal, within float rounding.
-/// @throws std::invalid_argument when it would have 2^32 vertices or more
+/// @throws RequestError when it would have 2^32 vertices or more
 [[nodiscard]] Mesh city_mesh(std::uint64_t count);
 
 }  // namespace ptc

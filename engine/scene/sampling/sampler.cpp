@@ -8,13 +8,13 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/scene/sampling/clusters.h"
 #include "engine/scene/sampling/directions.h"
 #include "engine/scene/sampling/low_discrepancy.h"
@@ -46,21 +46,23 @@ glm::vec3 finite_or_black(const glm::vec3& c) {
 }
 
 SamplingOptions resolved(const Mesh& mesh, SamplingOptions options) {
-  const auto require = [](bool holds, const char* what) {
-    if (!holds) throw std::invalid_argument(std::string("sample_mesh: ") + what);
+  const auto require = [](bool holds, const char* field, const char* what) {
+    if (!holds) throw RequestError(field, what);
   };
-  require(options.spacing >= 0 && std::isfinite(options.spacing),
-          "spacing is negative or not finite");
+  require(options.spacing >= 0 && std::isfinite(options.spacing), "sampling.spacing",
+          "`sampling.spacing` is negative or not finite");
   if (options.spacing == 0) options.spacing = spacing_for(mesh, options.count);
   // Memory follows the number of surfels, if slowly.
   const double side = spacing_for(mesh, 1);
-  require(side == 0 || side / options.spacing <= kMostAcross,
-          "the spacing is too small for the mesh");
+  require(side == 0 || side / options.spacing <= kMostAcross, "sampling.spacing",
+          "`sampling.spacing` is too small for a mesh of this size");
   if (options.camera) {
     require(options.pixels_per_surfel > 0 && std::isfinite(options.pixels_per_surfel),
-            "pixels per surfel is not positive");
-    require(options.finest > 0 && options.finest <= 1, "the finest share is not in (0, 1]");
-    require(options.camera->width > 0 && options.camera->height > 0, "the camera has no pixels");
+            "sampling.pixels_per_surfel", "`sampling.pixels_per_surfel` is not positive");
+    require(options.finest > 0 && options.finest <= 1, "sampling.finest",
+            "`sampling.finest` is not above 0 and at most 1");
+    require(options.camera->width > 0 && options.camera->height > 0, "sampling.camera",
+            "the `sampling.camera` has no pixels");
   }
   return options;
 }
@@ -269,7 +271,7 @@ std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
 }  // namespace
 
 double spacing_for(const Mesh& mesh, std::uint64_t count) {
-  if (count == 0) throw std::invalid_argument("spacing_for: no surfel is wanted");
+  if (count == 0) throw RequestError("sampling.count", "`sampling.count` is 0");
   double area = 0;
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& c = mesh.triangles[i];

@@ -24,7 +24,7 @@ struct SamplingOptions {
 
 /// Spacing that gives about `count` surfels on the mesh: sqrt(area / count), where both sides of
 /// double-sided materials count. 0 for a mesh without area.
-/// @throws std::invalid_argument when count is 0
+/// @throws RequestError when count is 0
 [[nodiscard]] double spacing_for(const Mesh& mesh, std::uint64_t count);
 
 /// Surfels spread evenly over a mesh, lit: radiance = emission + albedo / pi * irradiance.
@@ -37,7 +37,7 @@ struct SamplingOptions {
 /// in solids. Double-sided materials give two surfels back to back. Deterministic for any thread
 /// count. The order is that of the Z-curve, roughly. Memory: sampling_bytes().
 /// @param light, scene, executor  must outlive the source
-/// @throws std::invalid_argument when count, spacing or a camera's number makes no sense, or there
+/// @throws RequestError when count, spacing or a camera's number makes no sense, or there
 ///         would be more than 9 * 10^10 surfels
 [[nodiscard]] std::unique_ptr<PointSource> sample_mesh(const DirectLight& light,
                                                        const RayScene& scene,

@@ -1,10 +1,10 @@
 #include "engine/shade/reference/brute_force.h"
 
-#include <stdexcept>
 #include <string>
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/io/cloud/record.h"
 #include "engine/store/point_scan.h"
 #include "format/scalar.h"
@@ -14,9 +14,10 @@ namespace ptc {
 std::vector<Surfel> load_surfels(const ContainerReader& container, std::uint64_t limit) {
   const std::uint64_t count = container.superblock().points;
   if (count > limit) {
-    throw std::length_error(container.path().string() + ": " + std::to_string(count) +
-                            " points are too many for a reference in memory; the limit is " +
-                            std::to_string(limit));
+    throw RequestError("limit",
+                       container.path().string() + ": " + std::to_string(count) +
+                           " points are too many for a reference in memory; the limit is " +
+                           std::to_string(limit));
   }
   std::vector<Surfel> surfels;
   surfels.reserve(static_cast<std::size_t>(count));

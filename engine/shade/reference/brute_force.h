@@ -16,7 +16,7 @@
 
 namespace ptc {
 
-/// All surfels of a container, decoded. @throws std::length_error above `limit` points, so that a
+/// All surfels of a container, decoded. @throws RequestError above `limit` points, so that a
 /// reference run on a city does not exhaust memory.
 [[nodiscard]] std::vector<Surfel> load_surfels(const ContainerReader& container,
                                                std::uint64_t limit);

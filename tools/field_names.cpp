@@ -1,0 +1,66 @@
+// The one place where fields of requests (engine/pipeline/pipeline.h) meet options.
+#include "tools/field_names.h"
+
+#include <algorithm>
+#include <array>
+
+namespace ptc {
+namespace {
+
+struct FieldName {
+  std::string_view field;
+  std::string_view option;
+};
+
+constexpr std::array kFields{
+    FieldName{"append", "--append"},
+    FieldName{"backdrop", "--backdrop"},
+    FieldName{"bounces", "--bounces"},
+    FieldName{"camera", "--camera"},
+    FieldName{"check", "--check"},
+    FieldName{"city_points", "--city"},
+    FieldName{"count", "--count"},
+    FieldName{"error", "--error"},
+    FieldName{"estimate", "--estimate"},
+    FieldName{"page_shift", "--page-size"},
+    FieldName{"profile", "--profile"},
+    FieldName{"resume", "--resume"},
+    FieldName{"run.memory_bytes", "--memory"},
+    FieldName{"run.temp_dirs", "--temp"},
+    FieldName{"samples", "--samples"},
+    FieldName{"sampling.camera", "--camera"},
+    FieldName{"sampling.count", "--points"},
+    FieldName{"sampling.finest", "--finest"},
+    FieldName{"sampling.lights.area_rays", "--area-rays"},
+    FieldName{"sampling.pixels_per_surfel", "--pixels-per-surfel"},
+    FieldName{"sampling.spacing", "--spacing"},
+    FieldName{"size", "--size"},
+    FieldName{"tolerate_damage", "--tolerate-damage"},
+    FieldName{"tree.leaf_points", "--leaf"},
+    FieldName{"tree.levels_per_stream", "--levels-per-stream"},
+};
+
+}  // namespace
+
+std::string_view option_of(std::string_view field) noexcept {
+  const auto found = std::ranges::find(kFields, field, &FieldName::field);
+  return found == kFields.end() ? std::string_view() : found->option;
+}
+
+std::string with_options(std::string_view message) {
+  std::string text;
+  while (!message.empty()) {
+    const std::size_t open = message.find('`');
+    const std::size_t close = open == message.npos ? open : message.find('`', open + 1);
+    if (close == message.npos) break;
+    const std::string_view option = option_of(message.substr(open + 1, close - open - 1));
+    // Of what is no field the second quote may open the next.
+    const std::size_t end = option.empty() ? close : close + 1;
+    text += option.empty() ? message.substr(0, end) : message.substr(0, open);
+    text += option;
+    message.remove_prefix(end);
+  }
+  return text.append(message);
+}
+
+}  // namespace ptc
