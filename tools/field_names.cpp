@@ -1,4 +1,4 @@
-// The one place where fields of requests (engine/pipeline/pipeline.h) meet options.
+// The one place where fields of requests (engine/pipeline) meet options.
 #include "tools/field_names.h"
 
 #include <algorithm>
@@ -18,10 +18,16 @@ constexpr std::array kFields{
     FieldName{"bounces", "--bounces"},
     FieldName{"camera", "--camera"},
     FieldName{"check", "--check"},
+    FieldName{"checkpoint_points", "--checkpoint"},
     FieldName{"city_points", "--city"},
     FieldName{"count", "--count"},
     FieldName{"error", "--error"},
     FieldName{"estimate", "--estimate"},
+    FieldName{"gather.inflation", "--inflation"},
+    FieldName{"gather.parallax", "--parallax"},
+    FieldName{"gather.resolution", "--resolution"},
+    FieldName{"gather.solid_angle", "--solid-angle"},
+    FieldName{"lift", "--lift"},
     FieldName{"page_shift", "--page-size"},
     FieldName{"profile", "--profile"},
     FieldName{"resume", "--resume"},

@@ -179,12 +179,14 @@ ordered_json damage_facts(const LightingReport& report) {
 std::string damage_text(const LightingReport& report) {
   const DamageReport& damage = *report.damage;
   if (damage.pages.empty()) return "  no page that was needed is damaged\n";
-  const auto& [page, why] = *damage.pages.begin();
+  const std::string& first = damage.pages.begin()->second;
+  const std::size_t count = damage.pages.size();
+  const std::string pages = count == 1 ? "1 page" : fmt::format("{} pages, the first", count);
   std::string text = fmt::format(
-      "  damaged: {} pages, the first {}: {}; {} points left out\n"
+      "  damaged: {}: {}; {} points left out\n"
       "  {} receivers see what stands in for them: occlusion changed by at most {:.4f}, by at most "
       "{:.6f} in the mean of all\n",
-      damage.pages.size(), page, printable(why), damage.points, damage.stand_ins.receivers,
+      pages, printable(first), damage.points, damage.stand_ins.receivers,
       damage.stand_ins.greatest_bound, mean_bound(report));
   if (damage.node_pages > 0) {
     text += fmt::format(

@@ -23,6 +23,16 @@ decltype(auto) at_offset(const InputFile& file, std::uint64_t base, Body&& body)
   }
 }
 
+/// Likewise for what is wrong with a page; `base` is its place in the file.
+template <class Body>
+decltype(auto) at_page(const InputFile& file, std::uint64_t base, std::uint32_t page, Body&& body) {
+  try {
+    return body();
+  } catch (const FormatError& error) {
+    throw error.rebased(base, file.path().string()).in_page(page);
+  }
+}
+
 /// @throws FormatError with path and offset, as all of these
 [[nodiscard]] FileHeader read_file_header(const InputFile& file);
 

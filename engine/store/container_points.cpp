@@ -24,8 +24,9 @@ std::size_t ContainerPoints::next(std::span<PointRecord> out) {
 void ContainerPoints::refuse_order() const {
   const std::uint32_t page = container_.point_pages()[scan_.index()];
   throw FormatError(kPageHeaderBytes, "spec/points.md#point-order",
-                    "the first point of the page precedes the one before")
-      .rebased(container_.entry(page).offset, container_.path().string());
+                    "the first point precedes the one before")
+      .rebased(container_.entry(page).offset, container_.path().string())
+      .in_page(page);
 }
 
 }  // namespace ptc

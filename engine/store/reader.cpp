@@ -44,9 +44,7 @@ struct ContainerReader::Impl {
   PageHeader agreed_header(std::uint32_t page, std::span<const std::byte> image) const {
     const PageHeader found = decode_page_header(image.first(kPageHeaderBytes), header);
     if (found.page_id != page || entry_of(found, entries[page].offset) != entries[page]) {
-      throw FormatError(
-          0, kAgreement,
-          "the page header is not what the directory says of page " + std::to_string(page));
+      throw FormatError(0, kAgreement, "the page header is not what the directory says");
     }
     return found;
   }
@@ -73,7 +71,7 @@ struct ContainerReader::Impl {
 
   PageHeader decode(std::uint32_t page, std::span<const std::byte> image, std::span<std::byte> out,
                     PageDecoder& decoder) const {
-    return at_offset(file, entry(page).offset, [&] {
+    return at_page(file, entry(page).offset, page, [&] {
       const PageHeader found = checked_header(page, image);
       decode_payload(found, image.subspan(kPageHeaderBytes), {entries, superblock.points, &columns},
                      out, decoder);
@@ -93,7 +91,7 @@ struct ContainerReader::Impl {
     std::vector<std::byte> payload(where.raw_bytes);
     PageDecoder decoder;
     const PageHeader found = read(superblock.meta_page, payload, decoder);
-    return at_offset(file, where.offset, [&] {
+    return at_page(file, where.offset, superblock.meta_page, [&] {
       try {
         return decode_meta(payload);
       } catch (const FormatError& error) {
@@ -170,7 +168,8 @@ PageHeader ContainerReader::read_page_header(std::uint32_t page) const {
   const DirectoryEntry& where = impl_->entry(page);
   std::array<std::byte, kPageHeaderBytes> image;
   impl_->file.read_at(where.offset, image);
-  return at_offset(impl_->file, where.offset, [&] { return impl_->agreed_header(page, image); });
+  return at_page(impl_->file, where.offset, page,
+                 [&] { return impl_->agreed_header(page, image); });
 }
 
 ContainerReader::PageRange ContainerReader::page_range(std::uint32_t page) const {
@@ -200,7 +199,7 @@ PageHeader ContainerReader::read_stored_page(std::uint32_t page,
   stored.resize(kPageHeaderBytes + std::size_t{where.stored_bytes});
   impl_->file.read_at(where.offset, stored);
   const PageHeader found =
-      at_offset(impl_->file, where.offset, [&] { return impl_->checked_header(page, stored); });
+      at_page(impl_->file, where.offset, page, [&] { return impl_->checked_header(page, stored); });
   stored.erase(stored.begin(), stored.begin() + kPageHeaderBytes);
   return found;
 }

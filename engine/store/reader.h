@@ -21,8 +21,9 @@ namespace ptc {
 /// most kMostPageBytes while it opens.
 class ContainerReader {
  public:
-  /// @throws FormatError whose text begins with the path and whose offset is that in the file, as
-  /// for every function here; std::system_error; DataError when the file shrinks meanwhile
+  /// @throws FormatError whose message begins with the path and whose offset is that in the file,
+  /// as for every function here, with the number of the page at fault where one is read;
+  /// std::system_error; DataError when the file shrinks meanwhile
   explicit ContainerReader(const std::filesystem::path& path);
   ~ContainerReader();
 
@@ -51,7 +52,7 @@ class ContainerReader {
   /// @param out      at least page_payload_limit() bytes
   /// @param decoder  one per thread
   /// @return the page's header; the payload is the first raw_bytes of `out`
-  /// @throws FormatError naming path and offset
+  /// @throws FormatError naming path, offset and page
   PageHeader read_page(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder) const;
   /// The same of a page whose bytes are at hand.
   /// @param image  page_range() of file()

@@ -51,7 +51,12 @@ Remedy remedy_of(Cause cause) noexcept {
 }
 
 Finding finding_of(const FormatError& error, int level) {
-  return {.level = level, .offset = error.offset(), .rule = error.clause(), .text = error.text()};
+  const std::string page = error.page() ? fmt::format("page {}: ", *error.page()) : "";
+  return {.level = level,
+          .offset = error.offset(),
+          .page = error.page(),
+          .rule = error.clause(),
+          .text = page + error.text()};
 }
 
 std::string code_of(const Finding& finding) {

@@ -61,10 +61,7 @@ void check_values(const PageHeader& header, const Meta& meta, const std::byte* c
 }
 
 Finding finding_in(const PageSite& site, int level, const FormatError& error) {
-  Finding finding = finding_of(error.rebased(site.entry.offset, ""), level);
-  finding.page = site.page;
-  finding.text = fmt::format("page {}: {}", site.page, finding.text);
-  return finding;
+  return finding_of(error.rebased(site.entry.offset, "").in_page(site.page), level);
 }
 
 }  // namespace
@@ -137,10 +134,8 @@ std::optional<Finding> SurveyedPage::check_header(const PageSite& site, FlipBudg
 std::optional<Finding> SurveyedPage::check_agreement(const PageSite& site) const {
   if (header_.page_id == site.page && entry_of(header_, site.entry.offset) == site.entry)
     return std::nullopt;
-  Finding finding = finding_in(
-      site, 1,
-      {0, kAgreement,
-       fmt::format("the page header is not what the directory says of page {}", site.page)});
+  Finding finding =
+      finding_in(site, 1, {0, kAgreement, "the page header is not what the directory says"});
   finding.cause = header_.page_id != site.page ? Cause::swapped : Cause::stale;
   finding.bytes = kPageHeaderBytes + header_.stored_bytes;
   finding.expected = header_.page_id != site.page ? fmt::format("page {}", site.page)

@@ -197,7 +197,7 @@ class Bench(ProgramTest):
         charts = self.here / "charts"
         printed = self.succeed("ptcbench", "scale", "--quick", "--points", "20k", "--points", "900k", "--receivers", "300",
                                "--memory", "96M", "--threads", "2", "-o", charts, "--json")
-        self.assertIn("GB of temporary files in", printed.stderr)
+        self.assertIn("MB of temporary files in", printed.stderr)
         facts = json.loads((charts / "scale.json").read_text())
         said = json.loads(printed.stdout)
         self.assertEqual([said["rows"], said["laws"]], [facts["rows"], facts["laws"]])

@@ -294,7 +294,15 @@ class Verify(ProgramTest):
         number, count = struct.unpack_from("<I", whole, 4096 + 8)[0], struct.unpack_from("<I", whole, 4096 + 24)[0]
         points = json.loads(self.succeed("ptcinfo", scene, "--json").stdout)["points"]
         message = self.fail_with(1, "ptcshade", broken, "-o", out)
-        self.assertIn("broken.ptcx: offset 4160: payload's checksum is wrong", message)
+        why = f"broken.ptcx: offset 4160: page {number}: payload's checksum is wrong"
+        self.assertIn(why, message)
+        self.assertIn(why, run("ptcverify", broken).stderr)
+        for command in (["ptcrender", broken, "-o", self.here / "o.png", *SMALL_PICTURE], ["ptcshade", broken, "-o", self.here / "o.ptcx"],
+                        ["ptcshade", broken, "-o", out, "--bounces", "2"], ["ptcshade", scene, "--receivers", broken, "-o", out],
+                        ["ptcconvert", broken, out], ["ptcconvert", broken, self.here / "o.xyz"],
+                        ["ptcconvert", broken, self.here / "o.ptcx"], ["ptcconvert", broken, self.here / "o.ptcx", "--page-size", "8K"],
+                        ["ptcbuild", self.cloud, "--append", broken, "-o", self.here / "o.ptcx"]):
+            self.assertIn(why, self.fail_with(1, *command))
         self.assertFalse(out.exists())
         result = self.succeed("ptcshade", broken, "-o", out, "--tolerate-damage", "--json")
         damage = json.loads(result.stdout)["damage"]
@@ -310,7 +318,7 @@ class Verify(ProgramTest):
         self.succeed("ptcshade", broken, "--receivers", scene, "-o", self.here / "o.ptcx", "--tolerate-damage")
         self.fail_with(1, "ptcrender", broken, "-o", self.here / "o.png", *SMALL_PICTURE)
         told = self.succeed("ptcrender", broken, "-o", self.here / "o.png", *SMALL_PICTURE, "--tolerate-damage").stdout
-        self.assertIn("damaged: 1 pages", told)
+        self.assertIn(f"damaged: 1 page: {self.here}/{why}", told)
         told = self.succeed("ptcshade", scene, "-o", out, "--tolerate-damage").stdout
         self.assertIn("no page that was needed is damaged", told)
 

@@ -15,3 +15,18 @@ TEST_CASE("error: what() says where, what and which clause", "[format][error]") 
   CHECK(moved.clause() == error.clause());
   CHECK(moved.text() == "pages overlap");
 }
+
+TEST_CASE("error: what() names the page where one is known, in whatever order it is told",
+          "[format][error]") {
+  const FormatError error(64, "spec/container.md#page-payload", "payload's checksum is wrong");
+  CHECK_FALSE(error.page());
+  for (const FormatError& told :
+       {error.rebased(4096, "a.ptcx").in_page(66), error.in_page(66).rebased(4096, "a.ptcx"),
+        error.in_page(1).in_page(66).rebased(4096, "a.ptcx")}) {
+    CHECK(std::string(told.what()) ==
+          "a.ptcx: offset 4160: page 66: payload's checksum is wrong "
+          "(spec/container.md#page-payload)");
+    CHECK(told.page() == 66U);
+    CHECK(told.text() == error.text());
+  }
+}

@@ -1,5 +1,6 @@
 // The road end to end: mesh or cloud to container to shaded points and pictures.
 #include <fstream>
+#include <limits>
 
 #include <catch2/catch.hpp>
 
@@ -10,6 +11,7 @@
 #include "engine/ptc.h"
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
+#include "tests/shade/gather_scene.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -252,4 +254,63 @@ TEST_CASE("pipeline: clouds without normals and inputs without points are refuse
   CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent),
                     Catch::Contains("bare.ply") && Catch::Contains("normals"));
   CHECK_FALSE(std::filesystem::exists(dir / "a.ptcx"));
+}
+
+TEST_CASE("pipeline: a request that is out of range names its field", "[integration][request]") {
+  const TemporaryDirectory dir;
+  const auto scene = dir / "scene.ptcx";
+  write_scene(scene, small_scene(0.1), {}, 12, Codec::zstd);
+  Progress silent;
+  const auto field_of = [&](const auto& run) -> std::string {
+    try {
+      run();
+    } catch (const RequestError& error) {
+      CHECK_FALSE(std::string(error.what()).empty());
+      return error.field();
+    }
+    return "none";
+  };
+  const auto build = [&](auto&& spoil) {
+    BuildRequest request{.city_points = 1000};
+    spoil(request);
+    return field_of([&] { build_container(request, dir / "o.ptcx", silent); });
+  };
+  CHECK(build([](BuildRequest& r) { r.page_shift = 11; }) == "page_shift");
+  CHECK(build([](BuildRequest& r) { r.page_shift = 21; }) == "page_shift");
+  CHECK(build([](BuildRequest& r) { r.tree.leaf_points = 0; }) == "tree.leaf_points");
+  CHECK(build([](BuildRequest& r) { r.tree.leaf_points = 65536; }) == "tree.leaf_points");
+  CHECK(build([](BuildRequest& r) { r.tree.levels_per_stream = 0; }) == "tree.levels_per_stream");
+  CHECK(build([](BuildRequest& r) { r.checkpoint_points = 0; }) == "checkpoint_points");
+  CHECK(build([](BuildRequest& r) { r.run.memory_bytes = 1 << 20; }) == "run.memory_bytes");
+  const auto shade = [&](auto&& spoil, const char* target = "o.ply") {
+    ShadeRequest request{{.scene = scene}};
+    spoil(request);
+    return field_of([&] { shade_container(request, dir / target, silent); });
+  };
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  CHECK(shade([](ShadeRequest& r) { r.gather.resolution = 20; }) == "gather.resolution");
+  CHECK(shade([](ShadeRequest& r) { r.gather.resolution = 80; }) == "gather.resolution");
+  CHECK(shade([](ShadeRequest& r) { r.gather.solid_angle = 0; }) == "gather.solid_angle");
+  CHECK(shade([](ShadeRequest& r) { r.gather.parallax = kNan; }) == "gather.parallax");
+  CHECK(shade([](ShadeRequest& r) { r.gather.inflation = -1; }) == "gather.inflation");
+  CHECK(shade([](ShadeRequest& r) { r.error = 0; }) == "error");
+  CHECK(shade([](ShadeRequest& r) { r.lift = kNan; }) == "lift");
+  CHECK(shade([](ShadeRequest& r) { r.estimate = true; }) == "estimate");
+  CHECK(shade([](ShadeRequest& r) { r.tolerate_damage = true, r.bounces = 2; }) ==
+        "tolerate_damage");
+  CHECK(shade([](ShadeRequest& r) { r.count = 5; }, "o.ptcx") == "count");
+  CHECK(shade([](ShadeRequest&) {}, "o.cloud") == "target");
+  const auto render = [&](auto&& spoil, std::vector<PictureTarget> targets) {
+    RenderRequest request{{.scene = scene}};
+    request.size = {8, 8};
+    spoil(request);
+    return field_of([&] { render_picture(request, targets, silent); });
+  };
+  CHECK(render([](RenderRequest& r) { r.samples = 3; }, {{dir / "o.png"}}) == "samples");
+  CHECK(render([](RenderRequest& r) { r.samples = 0; }, {{dir / "o.png"}}) == "samples");
+  CHECK(render([](RenderRequest& r) { r.size = {{0, 8}}; }, {{dir / "o.png"}}) == "size");
+  CHECK(render([](RenderRequest& r) { r.size = {{65537, 1}}; }, {{dir / "o.png"}}) == "size");
+  CHECK(render([](RenderRequest&) {}, {{dir / "o.jpg"}}) == "targets");
+  CHECK(render([](RenderRequest&) {}, {}) == "targets");
+  CHECK(std::filesystem::directory_iterator(dir.path())->path() == scene);
 }

@@ -22,6 +22,7 @@
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "format/error.h"
+#include "format/node_page.h"
 #include "format/point_page.h"
 
 namespace ptc {
@@ -91,6 +92,7 @@ class Build {
       : request_(request), target_(target), progress_(progress), executor_(request.run.threads) {}
 
   BuildReport run() {
+    check_request();
     if (!request_.append.empty()) open_scene();
     if (request_.resume) resumption_ = std::make_unique<Resumption>(request_, target_);
     if (resumption_ && resumption_->plan() && was_published()) return std::move(report_);
@@ -110,6 +112,18 @@ class Build {
   }
 
  private:
+  void check_request() const {
+    const auto require = [](bool holds, const char* field, const char* range) {
+      if (!holds) throw RequestError(field, fmt::format("`{}` is not {}", field, range));
+    };
+    require(request_.page_shift >= 12 && request_.page_shift <= 20, "page_shift",
+            "the logarithm of 4 KiB to 1 MiB, 12 to 20");
+    require(request_.tree.leaf_points >= 1 && request_.tree.leaf_points <= kMaxLeafPoints,
+            "tree.leaf_points", "1 to 65535");
+    require(request_.tree.levels_per_stream >= 1, "tree.levels_per_stream", "1 or more");
+    require(request_.checkpoint_points >= 1, "checkpoint_points", "1 or more");
+  }
+
   /// The scene that is added to.
   void open_scene() {
     std::error_code absent;

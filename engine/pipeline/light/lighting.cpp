@@ -1,6 +1,9 @@
 #include "engine/pipeline/light/lighting.h"
 
+#include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
@@ -10,7 +13,27 @@
 namespace ptc {
 namespace {
 
-void check_request(const LightingRequest& request) {
+/// @throws RequestError when a setting of the gather, the error asked for or the lift is out of
+///         range
+void check_ranges(const LightingRequest& request) {
+  const auto require = [](bool holds, const char* field, const char* range) {
+    if (!holds) throw RequestError(field, fmt::format("`{}` is not {}", field, range));
+  };
+  const auto is_positive = [](float value) { return std::isfinite(value) && value > 0; };
+  const GatherOptions& gather = request.gather;
+  require(is_positive(gather.solid_angle), "gather.solid_angle", "above 0 and finite");
+  require(std::isfinite(gather.parallax) && gather.parallax >= 0, "gather.parallax",
+          "0 or more and finite");
+  require(is_positive(gather.inflation), "gather.inflation", "above 0 and finite");
+  require(gather.resolution >= 16 && gather.resolution <= 64 && gather.resolution % 16 == 0,
+          "gather.resolution", "16, 32, 48 or 64");
+  require(!request.error || (*request.error > 0 && *request.error <= 1), "error",
+          "above 0 and at most 1");
+  require(std::isfinite(request.lift) && request.lift >= 0, "lift", "0 or more and finite");
+}
+
+/// @throws RequestError when parts of the request exclude each other
+void check_combination(const LightingRequest& request) {
   const bool traces_rays = request.error || request.check.receivers > 0;
   if (request.estimate && !traces_rays) {
     throw RequestError("estimate",
@@ -41,7 +64,8 @@ DamageReport damage_report(const ContainerReader& scene, const LostPages& lost,
 }
 
 const LightingRequest& checked(const LightingRequest& request) {
-  check_request(request);
+  check_ranges(request);
+  check_combination(request);
   return request;
 }
 

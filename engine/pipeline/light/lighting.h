@@ -84,8 +84,8 @@ class Lighting {
   /// Checks the request and opens the scene.
   /// @param request   must outlive this
   /// @param report    gets what the run does; must outlive this
-  /// @throws RequestError when parts of the request exclude each other; FormatError,
-  ///         std::system_error
+  /// @throws RequestError when a part of the request is out of range or excludes another;
+  ///         FormatError, std::system_error
   Lighting(const LightingRequest& request, LightingReport& report, Progress& progress);
   ~Lighting();
 

@@ -233,6 +233,7 @@ class TileRenderer {
 
 /// @throws RequestError when a picture's ending is neither .exr nor .png
 void check_targets(std::span<const PictureTarget> targets, bool estimate) {
+  if (targets.empty()) throw RequestError("targets", "no picture is named that is to be written");
   bool exr = false;
   for (const PictureTarget& target : targets) {
     const std::string ending = lower_extension(target.path);

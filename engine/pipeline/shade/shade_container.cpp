@@ -139,7 +139,12 @@ struct OpenReceivers {
 };
 
 void check_target(const ShadeRequest& request, const std::filesystem::path& target) {
-  if (lower_extension(target) == ".ply") return;
+  const std::string ending = lower_extension(target);
+  if (ending == ".ply") return;
+  if (ending != ".ptcx") {
+    throw RequestError(
+        "target", "the name of what is shaded ends in .ptcx or .ply, not as in " + target.string());
+  }
   if (request.tolerate_damage && request.receivers.empty()) {
     throw RequestError("tolerate_damage",
                        "`tolerate_damage` goes with a .ply as output: a copy of the container "
