@@ -5,7 +5,6 @@
 
 #include <glm/vec3.hpp>
 
-#include "engine/base/surfel.h"
 #include "format/morton.h"
 
 namespace ptc {
@@ -15,13 +14,6 @@ struct Receiver {
   glm::dvec3 position{0};  ///< scene units, already lifted off its surface
   glm::vec3 normal{0};     ///< unit
 };
-
-/// The receiver above a surfel.
-/// @param lift  height over the surfel, in its radii
-[[nodiscard]] inline Receiver lifted(const Surfel& surfel, float lift) {
-  return {surfel.position + glm::dvec3(surfel.normal) * static_cast<double>(lift * surfel.radius),
-          surfel.normal};
-}
 
 /// Light that arrives at a receiver.
 struct Shading {

@@ -1,12 +1,13 @@
 """What the programs tell, and that it does not depend on threads or memory."""
 
 import json
+import math
 import re
 import struct
 import unittest
 from pathlib import Path
 
-from programs import SMALL_PICTURE, ProgramTest, read_ply, run
+from programs import CORE, SMALL_PICTURE, ProgramTest, ball, read_ply, run, write_ply
 
 VECTORS = Path(__file__).resolve().parents[2] / "spec/vectors"
 
@@ -151,6 +152,31 @@ class Facts(ProgramTest):
                                         "--check-rays", "64", "--json").stdout)
         self.assertGreaterEqual(facts["check"]["receivers"], 20)
         self.assertIn("occlusion_rms", facts["check"]["discs"])
+
+    def test_radii_that_no_scene_has_are_shaded_as_rays_see_them(self):
+        cloud, scene, out = self.here / "c.ply", self.here / "c.ptcx", self.here / "o.ply"
+        for radius in (1e19, 1e20, 1e30, 3e38):
+            for which in (range(90, 91), range(180)):  # one disc, all of them
+                points = [list(point) for point in ball(180)]
+                for i in which:
+                    points[i][CORE.index("radius")] = radius
+                write_ply(cloud, points)
+                self.succeed("ptcbuild", cloud, "-o", scene)
+                self.succeed("ptcverify", scene, "--level", "4")
+                shade = ["ptcshade", scene, "-o", out, "--json"]
+                for options in (["--count", "100", "--error", "5%", "--estimate"], ["--bounces", "2", "--lift", "100"],
+                                ["--receivers", self.scene]):
+                    facts = json.loads(self.succeed(*shade, *options, "--check", "20", "--check-rays", "1024").stdout)
+                    discs = facts["check"]["discs"]
+                    self.assertLess(discs["occlusion_rms"], 0.01, (radius, options))
+                    self.assertLess(discs["irradiance_rms"] * discs["irradiance_mean"], 0.02, (radius, options))
+                names, shaded = read_ply(out)
+                for name in names[len(CORE):]:
+                    self.assertTrue(all(math.isfinite(point[names.index(name)]) for point in shaded), name)
+                facts = json.loads(self.succeed("ptcrender", scene, "-o", self.here / "o.png", *SMALL_PICTURE, "--check", "20",
+                                                "--json").stdout)
+                self.assertLess(facts["check"]["discs"]["occlusion_rms"], 0.01, radius)
+                self.succeed("ptcrender", scene, "--mesh", self.mesh, "-o", self.here / "o.png", *SMALL_PICTURE, "--check", "9")
 
     def test_an_error_is_asked_for_met_and_measured(self):
         picture = ["-o", self.here / "o.png", *SMALL_PICTURE]

@@ -14,7 +14,7 @@
 #include "engine/measure/statistics.h"
 #include "engine/ptc.h"
 #include "engine/scene/mesh_reference.h"
-#include "engine/shade/shading.h"
+#include "engine/shade/lift.h"
 #include "engine/store/container_points.h"
 #include "format/error.h"
 #include "tests/support/scenes.h"
@@ -77,7 +77,7 @@ std::vector<Receiver> all_points(const ContainerReader& scene) {
   ContainerPoints(scene).next(records);
   std::vector<Receiver> receivers;
   for (const PointRecord& r : records)
-    receivers.push_back(lifted(to_surfel(r, scene.header().frame), 0.15F));
+    receivers.push_back(lifted(to_surfel(r, scene.header().frame), 0.15F, scene.header().frame));
   return receivers;
 }
 

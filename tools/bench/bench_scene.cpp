@@ -13,9 +13,9 @@
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/temporary_container.h"
 #include "engine/scene/procedural/city.h"
+#include "engine/shade/lift.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/shader.h"
-#include "engine/shade/shading.h"
 #include "engine/store/container_points.h"
 #include "format/text.h"
 
@@ -190,8 +190,8 @@ void BenchScene::add_points(const SceneOptions& options) {
     if (blocks > 0 && at != blocks * taken / wanted) continue;
     ++taken;
     for (std::size_t i = 0; i < count; ++i) {
-      set.receivers.push_back(
-          lifted(to_surfel(block[i], container_->header().frame), options.lift));
+      set.receivers.push_back(lifted(to_surfel(block[i], container_->header().frame), options.lift,
+                                     container_->header().frame));
     }
   }
   sets_.push_back(std::move(set));

@@ -6,8 +6,8 @@
 
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/run.h"
+#include "engine/shade/lift.h"
 #include "engine/shade/reference/brute_force.h"
-#include "engine/shade/shading.h"
 
 namespace ptc::bench {
 namespace {
@@ -57,7 +57,8 @@ std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, 
     append_surfels(container, pages.subspan(first, std::min(pages_of_block, pages.size() - first)),
                    surfels);
     surfels.resize(std::min(surfels.size(), Shader::kBlock));
-    for (const Surfel& s : surfels) blocks[i].receivers.push_back(lifted(s, lift));
+    for (const Surfel& s : surfels)
+      blocks[i].receivers.push_back(lifted(s, lift, container.header().frame));
   }
   return blocks;
 }

@@ -12,6 +12,7 @@
 #include "engine/octree/build_pages.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/temporary_container.h"
+#include "engine/shade/lift.h"
 #include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "format/scalar.h"
@@ -59,7 +60,7 @@ class BouncedPoints : public PointStream {
     at_ = 0;
     count_ = points_.next(records_);
     for (std::size_t i = 0; i < count_; ++i)
-      receivers_[i] = lifted(to_surfel(records_[i], frame_), lift_);
+      receivers_[i] = lifted(to_surfel(records_[i], frame_), lift_, frame_);
     const double before = ptc::cpu_seconds();
     shader_.shade(std::span(receivers_).first(count_), std::span(results_).first(count_),
                   progress_);

@@ -16,6 +16,7 @@
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/shade/lift.h"
 
 namespace ptc {
 namespace {
@@ -82,8 +83,9 @@ void make_mesh_view(Subject& subject, const RenderRequest& request, const Contai
   subject.rays = std::make_unique<RayScene>(subject.mesh);
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
   return_freed_memory();  // what reading the files and building the rays' tree took
-  subject.view = view_mesh(*subject.rays, *subject.light, request.light_sampling, subject.camera,
-                           subject.side, request.lift * static_cast<float>(surfel_radius));
+  subject.view =
+      view_mesh(*subject.rays, *subject.light, request.light_sampling, subject.camera, subject.side,
+                lift_height(static_cast<float>(surfel_radius), request.lift, scene.header().frame));
 }
 
 /// Makes the view of the scene's surfels, drawn into a depth buffer.

@@ -11,6 +11,8 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/shade/lift.h"
+#include "engine/shade/scene_scale.h"
 #include "engine/store/point_scan.h"
 #include "format/scalar.h"
 
@@ -28,7 +30,8 @@ struct Payload {
   std::array<std::uint8_t, 3> albedo{};
 };
 
-/// A disc in front of the camera, in its axes: x to the right, y down, z forward.
+/// A disc in front of the camera, in its axes: x to the right, y down, z forward; in edges of the
+/// frame.
 struct Projected {
   glm::vec3 centre{0}, normal{0};
   float radius = 0;
@@ -41,6 +44,8 @@ class SurfelView : public PrimaryView {
   SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift,
              LostPages* lost, const Executor& executor, Progress& progress)
       : position_(camera.position),
+        frame_(scene.header().frame),
+        scale_(frame_),
         width_(camera.width * side),
         height_(camera.height * side),
         lift_(lift),
@@ -64,9 +69,10 @@ class SurfelView : public PrimaryView {
     glm::vec3 normal(n[0], n[1], n[2]);
     const bool back = glm::dot(normal, along) > 0;
     if (back) normal = -normal;
-    PrimaryHit hit{.position = position_ + glm::dvec3(along) * static_cast<double>(s.depth),
+    const double depth = scale_.scene_units(static_cast<double>(s.depth));
+    PrimaryHit hit{.position = position_ + glm::dvec3(along) * depth,
                    .normal = normal,
-                   .lift = lift_ * decode_ufloat16(s.payload.radius),
+                   .lift = lift_height(decode_ufloat16(s.payload.radius), lift_, frame_),
                    .offset_normal = normal,
                    .sky_included = true};
     for (int c = 0; c < 3; ++c) {
@@ -78,7 +84,7 @@ class SurfelView : public PrimaryView {
 
  private:
   struct Sample {
-    float depth = std::numeric_limits<float>::infinity();  // t of t (x, y, 1)
+    float depth = std::numeric_limits<float>::infinity();  // t of t (x, y, 1), edges of the frame
     Payload payload;
   };
 
@@ -117,9 +123,9 @@ class SurfelView : public PrimaryView {
 
   void project(const Surfel& surfel, std::vector<Projected>& discs) const {
     Projected disc{
-        .centre = glm::vec3(surfel.position - position_) * axes_,  // times the transpose
+        .centre = scale_.way(position_, surfel.position) * axes_,  // times the transpose
         .normal = surfel.normal * axes_,
-        .radius = surfel.radius,
+        .radius = scale_.radius(surfel.radius),
         .payload = {
             .radiance = encode_rgbe({surfel.radiance.r, surfel.radiance.g, surfel.radiance.b}),
             .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
@@ -177,6 +183,8 @@ class SurfelView : public PrimaryView {
   }
 
   glm::dvec3 position_;
+  Frame frame_;
+  SceneScale scale_;
   glm::mat3 axes_{1};  // columns: right, down, forward
   unsigned width_, height_;
   float lift_;

@@ -17,6 +17,7 @@
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/pipeline/temporary_container.h"
+#include "engine/shade/lift.h"
 #include "engine/store/point_scan.h"
 
 namespace ptc {
@@ -169,8 +170,9 @@ std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
                        i * plan.stride + (plan.stride - plan.receivers) / 2);
     const std::size_t count = cursor.next(surfels);
     pilots[i].receivers.resize(count);
-    std::ranges::transform(std::span(surfels).first(count), pilots[i].receivers.begin(),
-                           [&](const Surfel& s) { return lifted(s, lift); });
+    std::ranges::transform(
+        std::span(surfels).first(count), pilots[i].receivers.begin(),
+        [&](const Surfel& s) { return lifted(s, lift, receivers.container.header().frame); });
   }
   return pilots;
 }
@@ -178,10 +180,11 @@ std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
 /// Shades all receivers, batch by batch.
 void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, ShadedSink& sink) {
   PointCursor cursor = receivers.cursor();
+  const Frame& frame = receivers.container.header().frame;
   std::vector<Surfel> surfels(kBatch);
   std::vector<Receiver> batch(kBatch);
   while (const std::size_t count = cursor.next(surfels)) {
-    for (std::size_t i = 0; i < count; ++i) batch[i] = lifted(surfels[i], lift);
+    for (std::size_t i = 0; i < count; ++i) batch[i] = lifted(surfels[i], lift, frame);
     const LitReceivers lit = lighting.shade(std::span(batch).first(count));
     sink.write(std::span(surfels).first(count), lit.shading, lit.estimates);
   }

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include <glm/common.hpp>
+
 #include "engine/base/numbers.h"
 #include "engine/shade/kernels/gather_kernels.h"
 
@@ -50,11 +52,12 @@ struct Gather::Impl {
     const Frame& frame = scene.view().frame();
     const double scale = 1 / frame.unit();
     const glm::dvec3 origin(frame.origin[0], frame.origin[1], frame.origin[2]);
+    constexpr double kFarthest = SceneScale::kMostDistance / SceneScale::kLatticeUnit;
     receivers.clear();
     for (std::size_t i = 0; i < from.size(); ++i) {
       const glm::dvec3& p = from[i].position;
       receivers.push_back({.key = receiver_key(frame, p, grid->variant()),
-                           .position = (p - origin) * scale,
+                           .position = glm::clamp((p - origin) * scale, -kFarthest, kFarthest),
                            .normal = from[i].normal,
                            .index = i});
     }
@@ -74,7 +77,7 @@ struct Gather::Impl {
   /// @param bound      on what stand-ins among that change
   void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited,
                   std::size_t depth, float bound) {
-    const ReceiverCell bounds(cell, scene.view().frame().unit());
+    const ReceiverCell bounds(cell, SceneScale::kLatticeUnit);
     if (cell.size() == 1) {
       const DirectionBuffer& drawn = collect(bounds, inherited, leaf, nullptr, depth, bound);
       resolve(cell, drawn, depth, bound);
@@ -111,8 +114,7 @@ struct Gather::Impl {
     std::array<glm::vec3, kViewpoints> offsets{};
     for (const PlacedReceiver& receiver : cell) {
       for (std::size_t i = 0; i < depth; ++i) {
-        offsets[i] =
-            glm::vec3((receiver.position - levels[i]->centre) * scene.view().frame().unit());
+        offsets[i] = glm::vec3((receiver.position - levels[i]->centre) * SceneScale::kLatticeUnit);
       }
       results[receiver.index] =
           drawn.resolve(*grid, receiver.normal, std::span(offsets).first(depth));
@@ -144,10 +146,11 @@ struct Gather::Impl {
   const DirectionBuffer& collect(const ReceiverCell& cell, const DirectionBuffer& inherited,
                                  DirectionBuffer& own, NearLists* left, std::size_t depth,
                                  float& bound) {
-    const double unit = scene.view().frame().unit();
+    const SceneScale& scale = scene.view().scale();
     const CellTest test{
         .cell = cell,
-        .unit = unit,
+        .lengths = scale.length_factors(),
+        .areas = scale.area_factors(),
         .limit = options.solid_angle / kPi,
         .shared_from =
             left ? std::min(std::numeric_limits<float>::max(), cell.radius / options.parallax) : 0,
@@ -169,7 +172,7 @@ struct Gather::Impl {
     };
     if (depth > 0) {
       const Level& around = *levels[depth - 1];
-      const glm::vec3 move((around.centre - cell.centre) * unit);
+      const glm::vec3 move((around.centre - cell.centre) * SceneScale::kLatticeUnit);
       opened.clear();
       for (std::size_t i = 0; i < around.left.clusters.size; flush())
         i = look_at_clusters(around, i, move, test, out);

@@ -24,7 +24,7 @@ struct alignas(64) ClusterPayload {
 };
 static_assert(sizeof(ClusterPayload) == 64);
 
-/// Clusters, relative to the centre of the cell that left them, in scene units.
+/// Clusters, relative to the centre of the cell that left them, in edges of the frame.
 struct NearClusters {
   std::vector<float> x, y, z, radius, thickness;
   std::vector<float> mean_x, mean_y, mean_z;  ///< normal over area, not unit

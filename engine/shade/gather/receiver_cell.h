@@ -24,15 +24,14 @@ struct PlacedReceiver {
 /// Bounds of some receivers: positions in a sphere, normals in a cone.
 struct ReceiverCell {
   glm::dvec3 centre{0};  ///< lattice units
-  float radius = 0;      ///< scene units
-  float depth =
-      0;  ///< farthest that a receiver lies below the centre along its normal, scene units
-  glm::vec3 axis{0};    ///< unit
+  float radius = 0;      ///< in units of `unit`
+  float depth = 0;    ///< farthest that a receiver lies below the centre along its normal, likewise
+  glm::vec3 axis{0};  ///< unit
   float cone_cos = -1;  ///< every normal n: n . axis >= cone_cos
   float cone_sin = 0;
   bool has_horizon = false;  ///< the cone is narrow enough to cull below it
 
-  /// @param unit  lattice unit in scene units
+  /// @param unit  lattice unit, in what lengths are wanted in
   ReceiverCell(std::span<const PlacedReceiver> receivers, double unit);
 };
 

@@ -10,6 +10,7 @@ SceneView::SceneView(const ContainerReader& container, LostPages* lost)
     : container_(&container),
       lost_(lost),
       frame_(container.header().frame),
+      scale_(frame_),
       points_(container.superblock().points),
       groups_(container.superblock().node_groups),
       points_per_page_(container.superblock().points_per_page) {

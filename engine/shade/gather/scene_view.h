@@ -5,6 +5,7 @@
 
 #include "engine/cache/page_cache.h"
 #include "engine/shade/lost_pages.h"
+#include "engine/shade/scene_scale.h"
 #include "format/node_page.h"
 
 namespace ptc {
@@ -16,6 +17,7 @@ class SceneView {
   explicit SceneView(const ContainerReader& container, LostPages* lost = nullptr);
 
   [[nodiscard]] const Frame& frame() const noexcept { return frame_; }
+  [[nodiscard]] const SceneScale& scale() const noexcept { return scale_; }
   [[nodiscard]] std::uint64_t points() const noexcept { return points_; }
   [[nodiscard]] std::uint64_t groups() const noexcept { return groups_; }
   [[nodiscard]] std::uint32_t points_per_page() const noexcept { return points_per_page_; }
@@ -33,6 +35,7 @@ class SceneView {
   const ContainerReader* container_;
   LostPages* lost_;
   Frame frame_;
+  SceneScale scale_;
   std::uint64_t points_;
   std::uint64_t groups_;
   std::uint32_t points_per_page_;

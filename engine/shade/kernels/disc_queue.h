@@ -7,7 +7,8 @@
 
 namespace ptc {
 
-/// Oriented discs relative to the receiver that they are drawn for, in scene units.
+/// Oriented discs relative to the receiver that they are drawn for, in any unit whose fourth powers
+/// are floats.
 struct DiscQueue {
   static constexpr int kCapacity = 1024;
   static constexpr int kLanes = 8;       ///< a push may write so many

@@ -18,6 +18,8 @@ HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
+constexpr float kMostStoredArea = 0x1.ffp127F;  // the greatest finite ufloat16
+
 /// Clusters relative to a cell's centre.
 struct Clusters {
   Vec to;
@@ -133,6 +135,10 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
                               VF area, const Cube& cube, DiscQueue& queue) {
   const F f;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  // What does not fit the field is only known to be large: the sphere limits it.
+  const auto known = hn::Lt(area, hn::Set(f, kMostStoredArea));
+  area = hn::Mul(hn::Mul(area, hn::Set(f, test.areas[0])), hn::Set(f, test.areas[1]));
+  area = hn::IfThenElse(known, area, hn::Inf(f));
   const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
   const VF along_axis[3] = {toward.x, toward.y, toward.z};
   VF weight[3], front = zero;
@@ -223,6 +229,8 @@ class GroupLanes {
     const F f;
     const int at = 2 * first;
     const auto step = hn::Set(f, step_), unit = hn::Set(f, static_cast<float>(test_.unit));
+    // Around discs as large as they may be, and where they are.
+    const auto most = hn::Set(f, 2 * SceneScale::kMostRadius);
     const auto offset = [&](std::size_t k, double centre) {
       return hn::Set(f,
                      static_cast<float>((static_cast<double>(corner_[k]) - centre) * test_.unit));
@@ -235,8 +243,8 @@ class GroupLanes {
         .to = {hn::MulAdd(step, to_float(load_u16(group_.mean_x() + at)), offset(0, centre.x)),
                hn::MulAdd(step, to_float(load_u16(group_.mean_y() + at)), offset(1, centre.y)),
                hn::MulAdd(step, to_float(load_u16(group_.mean_z() + at)), offset(2, centre.z))},
-        .radius = hn::Mul(unit, load_ufloat16(group_.radius() + at)),
-        .thickness = hn::Mul(unit, load_ufloat16(group_.thickness() + at)),
+        .radius = hn::Min(hn::Mul(unit, load_ufloat16(group_.radius() + at)), most),
+        .thickness = hn::Min(hn::Mul(unit, load_ufloat16(group_.thickness() + at)), most),
         .mean = {hn::Sub(share_[0], share_[1]), hn::Sub(share_[2], share_[3]),
                  hn::Sub(share_[4], share_[5])}};
     set_derived(c);

@@ -10,16 +10,19 @@
 #include "engine/shade/gather/near_lists.h"
 #include "engine/shade/gather/receiver_cell.h"
 #include "engine/shade/kernels/disc_queue.h"
+#include "engine/shade/scene_scale.h"
 #include "engine/shade/shading.h"
 #include "format/node_page.h"
 
 namespace ptc {
 
-/// A receiver cell with the limits of its gather.
+/// A receiver cell with the limits of its gather. Lengths are in edges of the frame.
 struct CellTest {
   ReceiverCell cell;
-  double unit = 1;        ///< lattice unit in scene units
-  float limit = 0;        ///< a cluster is small when r^2 < limit d^2
+  double unit = SceneScale::kLatticeUnit;  ///< lattice unit
+  SceneScale::Factors lengths{1, 1};       ///< from scene units
+  SceneScale::Factors areas{1, 1};         ///< likewise
+  float limit = 0;                         ///< a cluster is small when r^2 < limit d^2
   float shared_from = 0;  ///< distance from which the cell settles things for all its receivers
   float inflation = 1;
   Sides sides = Sides::both;

@@ -78,7 +78,8 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   left.size += append(rgbe, hn::RebindMask(u, keep), u, left.rgbe.data() + at);
 }
 
-/// Coordinates of a page relative to a centre, in scene units.
+/// Coordinates of a page relative to a centre. @param unit  lattice unit, in what they are wanted
+/// in
 HWY_INLINE VF relative(VU low, VU high10, double centre, double unit) {
   const F f;
   const I i;
@@ -127,7 +128,9 @@ void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uin
                relative(word(4), hn::And(hn::ShiftRight<10>(high), ten), centre.y, test.unit),
                relative(word(8), hn::And(hn::ShiftRight<20>(high), ten), centre.z, test.unit)},
         .normal = unfold(coordinate(20), coordinate(22)),
-        .radius = hn::BitCast(f, word(16))};
+        .radius = hn::Min(hn::Mul(hn::Mul(hn::BitCast(f, word(16)), hn::Set(f, test.lengths[0])),
+                                  hn::Set(f, test.lengths[1])),
+                          hn::Set(f, SceneScale::kMostRadius))};
     const auto half = [&](std::size_t bytes_before) {
       return hn::PromoteTo(f, hn::LoadU(F16(), reinterpret_cast<const hwy::float16_t*>(
                                                    payload + bytes_before * n + 2 * k)));

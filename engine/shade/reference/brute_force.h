@@ -13,6 +13,7 @@
 #include "engine/base/surfel.h"
 #include "engine/cache/page_cache.h"
 #include "engine/shade/gather/direction_buffer.h"
+#include "engine/shade/scene_scale.h"
 
 namespace ptc {
 
@@ -33,8 +34,9 @@ void shade_brute_force(std::span<const Surfel> surfels, std::span<const Receiver
 
 /// What a ray has met so far.
 struct DiscHit {
-  float depth = std::numeric_limits<float>::infinity();  ///< bumped, see spec/shading.md#surfels
-  glm::vec3 radiance{0};                                 ///< of the side that it met
+  /// Bumped (spec/shading.md#surfels), in edges of the frame.
+  float depth = std::numeric_limits<float>::infinity();
+  glm::vec3 radiance{0};  ///< of the side that it met
 
   [[nodiscard]] bool met() const noexcept { return depth < std::numeric_limits<float>::infinity(); }
 };
@@ -48,10 +50,14 @@ class DiscRays {
   static constexpr std::uint64_t kBytes =
       200;  ///< of a surfel, at the most, while its tree is built
 
-  /// @param origin  where rays are exact; the middle of the surfels when empty
+  /// Where rays are exact, and the unit of what Embree is given, whose numbers end at 1.8e18.
+  struct Space {
+    glm::dvec3 origin{0};
+    SceneScale scale{Frame{}};
+  };
+  /// @param space  the middle of the surfels and the edge of a frame around them when empty
   DiscRays(std::span<const Surfel> surfels, Sides sides,
-           std::function<glm::vec3(const glm::vec3&)> sky,
-           const std::optional<glm::dvec3>& origin = {});
+           std::function<glm::vec3(const glm::vec3&)> sky, const std::optional<Space>& space = {});
   ~DiscRays();
 
   /// @param rays  stratified cosine rays, rounded down to a square   Deterministic in `seed`.

@@ -9,6 +9,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/shade/reference/brute_force.h"
+#include "engine/shade/scene_scale.h"
 
 namespace ptc {
 namespace {
@@ -43,7 +44,7 @@ struct DiscRays::Impl {
   std::span<const Surfel> surfels;
   Sides sides;
   std::function<glm::vec3(const glm::vec3&)> sky;
-  glm::dvec3 origin{0};
+  Space space;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 
@@ -53,8 +54,9 @@ struct DiscRays::Impl {
   }
 
   [[nodiscard]] glm::vec3 centre(unsigned i) const {
-    return glm::vec3(surfels[i].position - origin);
+    return space.scale.way(space.origin, surfels[i].position);
   }
+  [[nodiscard]] float radius(unsigned i) const { return space.scale.radius(surfels[i].radius); }
 
   /// One candidate of one ray: whether the disc stops it, and which of overlapping discs wins.
   static void filter(const RTCFilterFunctionNArguments* args) {
@@ -63,17 +65,17 @@ struct DiscRays::Impl {
     const auto& hit = *reinterpret_cast<const RTCHit*>(args->hit);
     auto& context = *reinterpret_cast<Context*>(args->context);
     const Surfel& disc = context.discs->surfels[hit.primID];
+    const float radius = context.discs->radius(hit.primID);
     const glm::vec3 from(ray.org_x, ray.org_y, ray.org_z), along(ray.dir_x, ray.dir_y, ray.dir_z);
     const glm::vec3 to = context.discs->centre(hit.primID) - from;
     const bool back = glm::dot(to, disc.normal) >= 0;
-    if (back && (context.discs->sides == Sides::front ||
-                 glm::dot(to, to) < 4 * disc.radius * disc.radius)) {
+    if (back && (context.discs->sides == Sides::front || glm::dot(to, to) < 4 * radius * radius)) {
       args->valid[0] = 0;
       return;
     }
     if (!context.choose) return;
     const glm::vec3 off = along * ray.tfar - to;
-    const float depth = ray.tfar + kBump / disc.radius * glm::dot(off, off);
+    const float depth = ray.tfar + kBump / radius * glm::dot(off, off);
     if (depth < context.best) {
       context.best = depth;
       context.best_disc = hit.primID;
@@ -108,7 +110,7 @@ struct DiscRays::Impl {
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
     const float t = ray.ray.tfar;
     const float slack = 1e-6F * t;
-    const float deepest = t + kBump * surfels[ray.hit.primID].radius + slack;
+    const float deepest = t + kBump * radius(ray.hit.primID) + slack;
     context.choose = true;
     context.best = met.depth;
     RTCRayHit again = make_ray(from, along, t - slack, std::min(deepest, met.depth));
@@ -125,14 +127,20 @@ struct DiscRays::Impl {
 
 DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
                    std::function<glm::vec3(const glm::vec3&)> sky,
-                   const std::optional<glm::dvec3>& origin)
+                   const std::optional<Space>& space)
     : impl_(std::make_unique<Impl>()) {
   impl_->surfels = surfels;
   impl_->sides = sides;
   impl_->sky = std::move(sky);
   Bounds bounds;
   for (const Surfel& s : surfels) bounds.add(s.position);
-  if (!bounds.empty()) impl_->origin = origin ? *origin : (bounds.low + bounds.high) * 0.5;
+  if (space) {
+    impl_->space = *space;
+  } else if (!bounds.empty()) {
+    const glm::dvec3 &low = bounds.low, &high = bounds.high;
+    impl_->space = {(low + high) * 0.5,
+                    SceneScale(frame_around({low.x, low.y, low.z}, {high.x, high.y, high.z}))};
+  }
   impl_->device = rtcNewDevice(nullptr);
   if (!impl_->device) throw std::runtime_error("Embree: no device");
   impl_->scene = rtcNewScene(impl_->device);
@@ -148,7 +156,7 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
       vertices[4 * i + static_cast<std::size_t>(k)] = c[k];
       normals[3 * i + static_cast<std::size_t>(k)] = surfels[i].normal[k];
     }
-    vertices[4 * i + 3] = surfels[i].radius;
+    vertices[4 * i + 3] = impl_->radius(static_cast<unsigned>(i));
   }
   rtcSetGeometryIntersectFilterFunction(geometry, &Impl::filter);
   rtcCommitGeometry(geometry);
@@ -188,7 +196,7 @@ unsigned side_of(std::size_t rays) {
 }  // namespace
 
 void DiscRays::meet(const Receiver& receiver, std::uint64_t seed, std::span<DiscHit> hits) const {
-  const glm::vec3 from(receiver.position - impl_->origin);
+  const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, receiver.position);
   for_each_ray(receiver.normal, side_of(hits.size()), seed,
                [&](std::size_t i, const glm::vec3& along) { impl_->meet(from, along, hits[i]); });
 }

@@ -35,7 +35,8 @@ void StreamedRays::load(std::size_t part) {
   const Superblock& whole = scene_.superblock();
   const glm::dvec3 low(whole.bounds_low[0], whole.bounds_low[1], whole.bounds_low[2]);
   const glm::dvec3 high(whole.bounds_high[0], whole.bounds_high[1], whole.bounds_high[2]);
-  rays_.emplace(surfels_, sides_, sky_, (low + high) * 0.5);
+  rays_.emplace(surfels_, sides_, sky_,
+                DiscRays::Space{(low + high) * 0.5, SceneScale(scene_.header().frame)});
   loaded_ = part;
 }
 
