@@ -18,7 +18,7 @@ FOLDERS = ["format", "engine", "tools"]
 def read_table(text):
     """Layers that each layer may include, from set(PTC_LAYERS_x "a;b") lines."""
     table = {}
-    for layer, value in re.findall(r'^set\(PTC_LAYERS_(\S+) "([^"]*)"\)', text, re.MULTILINE):
+    for layer, value in re.findall(r'^set\(PTC_LAYERS_(\S+)\s+"([^"]*)"\)', text, re.MULTILINE):
         value = re.sub(r"\$\{PTC_LAYERS_([^}]+)\}", lambda m: ";".join(table[m[1]]), value)
         table[layer] = [name for name in value.split(";") if name]
     return table
@@ -160,11 +160,15 @@ class Layers(unittest.TestCase):
         self.assertEqual(faults("engine/octree/a.cpp", '#include "engine/octree/b.h"'), [])
         self.assertEqual(faults("engine/octree/a.cpp", "#include <vector>"), [])
         self.assertEqual(faults("tools/a.cpp", '#include "engine/shade/b.h"'), [])
+        self.assertEqual(faults("tools/a.cpp", '#include "tools/bench/chart/b.h"'), [])
         for path, line in (("engine/octree/a.cpp", '#include "engine/shade/b.h"'),
                            ("engine/shade/a.cpp", '#  include "engine/octree/b.h"'),
                            ("format/a.h", '#include "engine/base/b.h"'),
                            ("engine/io/a.h", '#include "engine/ptc.h"'),
                            ("engine/pipeline/a.h", '#include "tools/b.h"'),
+                           ("tools/a.cpp", '#include "tools/bench/experiments/b.h"'),
+                           ("tools/bench/chart/a.cpp", '#include "engine/shade/b.h"'),
+                           ("tools/bench/references/a.h", '#include "tools/bench/report/b.h"'),
                            ("engine/io/a.h", '#include "../base/b.h"'),
                            ("engine/io/a.h", '#include "missing.h"'),
                            ("engine/io/a.h", "#include <format/b.h>")):

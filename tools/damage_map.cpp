@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/measure/picture.h"
+#include "tools/bench/chart/picture.h"
 #include "tools/report.h"
 
 namespace ptc {

@@ -1,5 +1,5 @@
 // JSON, CSV, words and charts of rows made by hand.
-#include "tools/bench/accuracy_report.h"
+#include "tools/bench/experiments/accuracy_report.h"
 
 #include <fstream>
 #include <limits>
@@ -8,7 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/scenes.h"
-#include "tools/bench/accuracy_chart.h"
+#include "tools/bench/experiments/accuracy_chart.h"
 
 using namespace ptc;
 using namespace ptc::bench;

@@ -1,5 +1,5 @@
 // Which scene a word means, and what it is made of.
-#include "tools/bench/bench_scene.h"
+#include "tools/bench/scenes/bench_scene.h"
 
 #include <set>
 

@@ -1,5 +1,5 @@
 // JSON, CSV, words and the chart of errors made by hand.
-#include "tools/bench/error_report.h"
+#include "tools/bench/experiments/error_report.h"
 
 #include <algorithm>
 #include <cmath>

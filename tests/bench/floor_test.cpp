@@ -9,7 +9,7 @@
 #include "engine/scene/mesh_reference.h"
 #include "engine/scene/sampling/sampler.h"
 #include "engine/shade/reference/brute_force.h"
-#include "tools/bench/procedural.h"
+#include "tools/bench/scenes/procedural.h"
 
 using namespace ptc;
 

@@ -1,5 +1,5 @@
 // Growth: what is measured, what a row says, and what becomes of rows made by hand.
-#include "tools/bench/growth.h"
+#include "tools/bench/experiments/growth.h"
 
 #include <cmath>
 #include <fstream>
@@ -10,7 +10,7 @@
 
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
-#include "tools/bench/growth_report.h"
+#include "tools/bench/experiments/growth_report.h"
 
 using namespace ptc;
 using namespace ptc::bench;

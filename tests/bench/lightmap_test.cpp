@@ -1,5 +1,5 @@
 // Radiance of surfels, found again at places of triangles.
-#include "tools/bench/lightmap.h"
+#include "tools/bench/references/lightmap.h"
 
 #include <cmath>
 

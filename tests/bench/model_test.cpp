@@ -1,5 +1,5 @@
 // The study of the model: what is measured, what bounds it keeps, and what becomes of its rows.
-#include "tools/bench/model.h"
+#include "tools/bench/experiments/model.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/reference/plain_gather.h"
 #include "tests/support/scenes.h"
-#include "tools/bench/methods.h"
-#include "tools/bench/model_report.h"
+#include "tools/bench/experiments/model_report.h"
+#include "tools/bench/references/methods.h"
 
 using namespace ptc;
 using namespace ptc::bench;

@@ -1,5 +1,5 @@
 // Payloads: what each of them tells of surfels, against the surfels themselves.
-#include "tools/bench/payload.h"
+#include "tools/bench/experiments/payload.h"
 
 #include <algorithm>
 #include <array>

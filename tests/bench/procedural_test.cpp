@@ -1,5 +1,5 @@
 // Scenes made in code: their size, and where they are open.
-#include "tools/bench/procedural.h"
+#include "tools/bench/scenes/procedural.h"
 
 #include <cmath>
 #include <limits>

@@ -1,14 +1,14 @@
 // The ray tracer that PTCX is measured against, beside the oracle of engine/shade.
-#include "tools/bench/ray_baseline.h"
+#include "tools/bench/references/ray_baseline.h"
 
 #include <cmath>
 #include <stdexcept>
 
 #include <catch2/catch.hpp>
 
-#include "engine/measure/statistics.h"
 #include "engine/shade/reference/brute_force.h"
 #include "tests/support/scenes.h"
+#include "tools/bench/chart/statistics.h"
 
 using namespace ptc;
 using namespace ptc::bench;

@@ -1,5 +1,5 @@
 // Files of records by which benches move bytes: how many there are, and that they are the same.
-#include "tools/bench/record_file.h"
+#include "tools/bench/scenes/record_file.h"
 
 #include <cstring>
 #include <fstream>

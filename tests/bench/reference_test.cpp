@@ -1,12 +1,12 @@
 // References that tell their own error, and pictures that are compared.
-#include "tools/bench/reference.h"
+#include "tools/bench/references/reference.h"
 
 #include <cmath>
 
 #include <catch2/catch.hpp>
 
 #include "engine/scene/sampling/low_discrepancy.h"
-#include "tools/bench/window.h"
+#include "tools/bench/experiments/window.h"
 
 using namespace ptc;
 using namespace ptc::bench;

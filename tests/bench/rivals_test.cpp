@@ -1,5 +1,5 @@
 // Times at equal error, on numbers made by hand.
-#include "tools/bench/rivals.h"
+#include "tools/bench/experiments/rivals.h"
 
 #include <cmath>
 #include <limits>

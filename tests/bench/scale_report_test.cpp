@@ -1,5 +1,5 @@
 // Scale: the law of growth and the reports, of rows made by hand.
-#include "tools/bench/scale_report.h"
+#include "tools/bench/experiments/scale_report.h"
 
 #include <cmath>
 #include <filesystem>

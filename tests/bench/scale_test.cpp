@@ -10,8 +10,8 @@
 #include "engine/io/cloud/points.h"
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
-#include "tools/bench/scale_answers.h"
-#include "tools/bench/scale_bench.h"
+#include "tools/bench/experiments/scale_answers.h"
+#include "tools/bench/experiments/scale_bench.h"
 
 using namespace ptc;
 using namespace ptc::bench;

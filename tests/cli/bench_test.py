@@ -254,6 +254,24 @@ class Bench(ProgramTest):
         for word in ("city+backdrop", "+backdrop", ""):
             self.assertIn(word, self.fail_with(2, "ptcbench", "accuracy", word, "-o", self.here / "charts"))
 
+    def test_wrong_values_of_options_are_usage_errors(self):
+        cases = {
+            "accuracy": ["--setting=0.1,0.1", "--setting=0.1,0.1,32,0", "--setting=0.1,0.1,32,101",
+                         "--setting=0.1,0.1,32,1,1", "--setting=0,0.1,32", "--setting=13,0.1,32",
+                         "--setting=0.1,-0.1,32", "--setting=0.1,4,32", "--setting=0.1,0.1,33",
+                         "--setting=0.1,0.1,80", "--setting=0.1,0.1,0", "--setting=nan,0.1,32", "--setting=fine",
+                         "--setting=", "--method=embree", "--method=", "--set=all", "--set=", "--points=0",
+                         "--checked=9", "--repeats=0", "--reference-rays=1000", "--reference-rays=8",
+                         "--reference-rays=131072"],
+            "growth": ["--points=0", "--points=1.5", "--points=x", "--panel=time", "--panel=", "--checked=9",
+                       "--repeats=0"],
+            "scale": ["--points=999", "--points=x", "--receivers=0", "--receivers=1.5", "--repeats=0",
+                      "--panel=points"],
+        }
+        for experiment, options in cases.items():
+            for option in options:
+                self.fail_with(2, "ptcbench", experiment, "-o", self.here / "o", option)
+
     def test_a_directory_that_cannot_be_made_is_the_machines_fault(self):
         for place in (self.mesh, self.mesh / "charts"):
             message = self.fail_with(3, "ptcbench", "accuracy", self.mesh, "--quick", "-o", place)

@@ -1,6 +1,7 @@
 """What the tests of the programs share: small inputs, running a program, what must hold after.
 
-Tests run with PTC_BIN, the directory of the programs; they need the standard library only.
+Tests run with PTC_BIN, the directory of the programs, and PTC_PROGRAMS, their names with blanks
+between them; they need the standard library only.
 """
 
 import math
@@ -13,7 +14,7 @@ import unittest
 from pathlib import Path
 
 BIN = Path(os.environ["PTC_BIN"])
-PROGRAMS = ["ptcbuild", "ptcshade", "ptcrender", "ptcconvert", "ptcinfo", "ptcverify", "ptcbench"]
+PROGRAMS = os.environ["PTC_PROGRAMS"].split()
 CORE = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b",
         "red", "green", "blue"]
 SMALL_PICTURE = ["--camera", "0.5,0.5,3,0.5,0.5,0.5", "--size", "24x16", "--samples", "1"]

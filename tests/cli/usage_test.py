@@ -76,24 +76,14 @@ class Usage(ProgramTest):
                           "--samples=0", "--samples=3", "--exposure=inf", "--layer=depth=a.png",
                           "--layer=direct=a.exr", "--layer=direct", "--camera=0,0,0,0,0,0"],
             "ptcconvert": ["--codec=", "--page-size=64"],
-            "ptcbench": ["--setting=0.1,0.1", "--setting=0.1,0.1,32,0", "--setting=0.1,0.1,32,101", "--setting=0.1,0.1,32,1,1", "--setting=0,0.1,32", "--setting=13,0.1,32",
-                         "--setting=0.1,-0.1,32", "--setting=0.1,4,32", "--setting=0.1,0.1,33", "--setting=0.1,0.1,80",
-                         "--setting=0.1,0.1,0", "--setting=nan,0.1,32", "--setting=fine", "--setting=",
-                         "--method=embree", "--method=", "--set=all", "--set=", "--points=0", "--checked=9",
-                         "--repeats=0", "--reference-rays=1000", "--reference-rays=8", "--reference-rays=131072"],
         }
         operands = {"ptcbuild": [self.mesh, "-o", self.here / "o.ptcx"],
                     "ptcshade": [self.scene, "-o", self.here / "o.ply"],
                     "ptcrender": [self.scene, "-o", self.here / "o.png"],
-                    "ptcconvert": [self.scene, self.here / "o.ptcx"],
-                    "ptcbench": ["accuracy", self.mesh, "-o", self.here / "o"]}
+                    "ptcconvert": [self.scene, self.here / "o.ptcx"]}
         for program, options in cases.items():
             for option in options:
                 self.fail_with(2, program, *operands[program], option)
-        for option in ("--points=0", "--points=1.5", "--points=x", "--panel=time", "--panel=", "--checked=9", "--repeats=0"):
-            self.fail_with(2, "ptcbench", "growth", "-o", self.here / "o", option)
-        for option in ("--points=999", "--points=x", "--receivers=0", "--receivers=1.5", "--repeats=0", "--panel=points"):
-            self.fail_with(2, "ptcbench", "scale", "-o", self.here / "o", option)
 
     def test_an_error_stands_for_the_settings_that_trade_time_for_it(self):
         for program, output in (("ptcshade", "o.ply"), ("ptcrender", "o.png")):

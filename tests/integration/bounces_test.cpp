@@ -11,13 +11,13 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/io/image/image.h"
-#include "engine/measure/statistics.h"
 #include "engine/ptc.h"
 #include "engine/scene/mesh_reference.h"
 #include "engine/shade/lift.h"
 #include "engine/store/container_points.h"
 #include "format/error.h"
 #include "tests/support/scenes.h"
+#include "tools/bench/chart/statistics.h"
 
 using namespace ptc;
 using namespace ptc::test;

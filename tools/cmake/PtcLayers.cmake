@@ -10,10 +10,16 @@ set(PTC_LAYERS_engine/octree "format;engine/base;engine/io;engine/sort;engine/st
 set(PTC_LAYERS_engine/verify "format;engine/base;engine/io;engine/sort;engine/store;engine/octree")
 set(PTC_LAYERS_engine/cache "format;engine/base;engine/io;engine/store")
 set(PTC_LAYERS_engine/shade "format;engine/base;engine/io;engine/store;engine/cache")
-set(PTC_LAYERS_engine/measure "format;engine/base;engine/io")
 set(PTC_LAYERS_engine/pipeline "format;engine/base;engine/io;engine/scene;engine/sort;engine/store;engine/octree;engine/cache;engine/shade")
 set(PTC_LAYERS_engine "engine/pipeline")
-set(PTC_LAYERS_tools "${PTC_LAYERS_engine/pipeline};engine/measure;engine/verify;engine/pipeline;engine;tools")
+set(PTC_LAYERS_tools/bench/chart "format;engine/base;engine/io")
+set(PTC_LAYERS_tools "${PTC_LAYERS_engine/pipeline};engine/verify;engine/pipeline;engine;tools/bench/chart")
+set(PTC_LAYERS_tools/bench/report "format;engine/base;engine/io;tools/bench/chart")
+set(PTC_LAYERS_tools/bench/scenes "${PTC_LAYERS_engine/pipeline};engine/pipeline;engine")
+set(PTC_LAYERS_tools/bench/references "${PTC_LAYERS_tools/bench/scenes};tools/bench/chart;tools/bench/scenes")
+set(PTC_LAYERS_tools/bench/experiments
+  "${PTC_LAYERS_tools};tools;tools/bench/report;tools/bench/scenes;tools/bench/references")
+set(PTC_LAYERS_tools/bench "${PTC_LAYERS_tools/bench/experiments};tools/bench/experiments")
 
 add_library(ptc_options INTERFACE)
 target_compile_features(ptc_options INTERFACE cxx_std_20)

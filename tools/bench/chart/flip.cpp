@@ -1,0 +1,192 @@
+// The colour pipeline, the feature pipeline and their product, in the order and with the letters of
+// Andersson et al. 2020 and its erratum of page 10 (116 instead of 100).
+#include "tools/bench/chart/flip.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include <glm/vec3.hpp>
+
+#include "tools/bench/chart/colour.h"
+#include "tools/bench/chart/plane_filter.h"
+
+namespace ptc {
+namespace {
+
+// Sensitivity of the eye to contrast over frequency [cycles / degree]: a1 exp(-b1 f^2) +
+// a2 exp(-b2 f^2).
+struct Sensitivity {
+  double a1, b1, a2, b2;
+};
+constexpr Sensitivity kAchromatic = {1, 0.0047, 0, 0};
+constexpr Sensitivity kRedGreen = {1, 0.0053, 0, 0};
+constexpr Sensitivity kBlueYellow = {34.1, 0.04, 13.5, 0.025};
+constexpr double kWidestB = 0.04;  // one radius for all channels
+
+constexpr float kColourPower = 0.7F;       // qc
+constexpr float kBreak = 0.4F;             // pc: this share of the largest colour error ...
+constexpr float kBreakError = 0.95F;       // pt: ... becomes this error
+constexpr double kFeatureDegrees = 0.082;  // w: width of what the eye takes for an edge
+constexpr float kFeaturePower = 0.5F;      // qf
+
+std::size_t radius_of(double sigma) {
+  return static_cast<std::size_t>(std::ceil(3 * sigma));
+}
+
+// Spatial standard deviation [pixels] of exp(-b f^2): exp(-pi^2 x^2 / b), x in degrees.
+double sigma_of(double b, double pixels_per_degree) {
+  return std::sqrt(b / 2) / std::numbers::pi * pixels_per_degree;
+}
+
+Plane blurred(const Plane& plane, double sigma, std::size_t radius) {
+  const Kernel kernel = gaussian(sigma, radius);
+  return filter_columns(filter_rows(plane, kernel), kernel);
+}
+
+// The two Gaussians of a channel are summed and made to sum to 1 together. Each is a sqrt(pi / b)
+// exp(-pi^2 r^2 / b), also in two dimensions.
+Plane perceived(const Plane& plane, const Sensitivity& s, double pixels_per_degree) {
+  const std::size_t radius = radius_of(sigma_of(kWidestB, pixels_per_degree));
+  const double sigma1 = sigma_of(s.b1, pixels_per_degree);
+  Plane first = blurred(plane, sigma1, radius);
+  if (s.a2 == 0) return first;
+  const double sigma2 = sigma_of(s.b2, pixels_per_degree);
+  const auto share = [radius](double a, double b, double sigma) {
+    const double sum = gaussian_sum(sigma, radius);
+    return a * std::sqrt(std::numbers::pi / b) * sum * sum;
+  };
+  const double share1 = share(s.a1, s.b1, sigma1);
+  const double share2 = share(s.a2, s.b2, sigma2);
+  const auto part2 = static_cast<float>(share2 / (share1 + share2));
+  const Plane second = blurred(plane, sigma2, radius);
+  for (std::size_t i = 0; i < first.values.size(); ++i) {
+    first.values[i] += part2 * (second.values[i] - first.values[i]);
+  }
+  return first;
+}
+
+// Y, Cx and Cz of a picture clamped to [0, 1].
+std::array<Plane, 3> opponent_planes(const Image& image) {
+  std::array<Plane, 3> planes;
+  for (Plane& plane : planes) plane = {image.width, image.height, {}};
+  for (Plane& plane : planes) plane.values.reserve(image.pixels.size());
+  for (glm::vec3 pixel : image.pixels) {
+    for (int c = 0; c < 3; ++c) pixel[c] = pixel[c] > 0 ? std::min(pixel[c], 1.0F) : 0.0F;
+    const glm::vec3 ycxcz = ycxcz_of_rgb(pixel);
+    for (int c = 0; c < 3; ++c) planes[static_cast<std::size_t>(c)].values.push_back(ycxcz[c]);
+  }
+  return planes;
+}
+
+// What the eye sees of the colours, as L* a* b* with Hunt's adjustment.
+std::vector<glm::vec3> seen_colours(const std::array<Plane, 3>& planes, double pixels_per_degree) {
+  const Plane y = perceived(planes[0], kAchromatic, pixels_per_degree);
+  const Plane cx = perceived(planes[1], kRedGreen, pixels_per_degree);
+  const Plane cz = perceived(planes[2], kBlueYellow, pixels_per_degree);
+  std::vector<glm::vec3> colours(y.values.size());
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    glm::vec3 rgb = rgb_of_ycxcz({y.values[i], cx.values[i], cz.values[i]});
+    for (int c = 0; c < 3; ++c) rgb[c] = std::clamp(rgb[c], 0.0F, 1.0F);
+    colours[i] = hunt_lab_of_rgb(rgb);
+  }
+  return colours;
+}
+
+std::vector<float> magnitude(const Plane& across, const Plane& down) {
+  std::vector<float> result(across.values.size());
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const float x = across.values[i];
+    const float y = down.values[i];
+    result[i] = std::sqrt(x * x + y * y);
+  }
+  return result;
+}
+
+struct Features {
+  std::vector<float> edges;
+  std::vector<float> points;
+};
+
+// Strength of edges and points of the lightness, from first and second derivatives.
+Features features_of(Plane lightness, double pixels_per_degree) {
+  for (float& value : lightness.values) value = (value + 16) / 116;  // 0 to 1
+  const double sigma = kFeatureDegrees / 2 * pixels_per_degree;
+  const std::size_t radius = radius_of(sigma);
+  const Kernel bell = gaussian(sigma, radius);
+  const Kernel first = first_derivative(sigma, radius);
+  const Kernel second = second_derivative(sigma, radius);
+  const Plane smooth = filter_rows(lightness, bell);
+  return {
+      magnitude(filter_columns(filter_rows(lightness, first), bell), filter_columns(smooth, first)),
+      magnitude(filter_columns(filter_rows(lightness, second), bell),
+                filter_columns(smooth, second))};
+}
+
+// 0 to 1; the lower part of the scale gets most of the range.
+float colour_error(float distance, float largest) {
+  const float power = std::pow(distance, kColourPower);
+  const float bend = kBreak * largest;
+  const float error = power < bend
+                          ? power / bend * kBreakError
+                          : kBreakError + (power - bend) / (largest - bend) * (1 - kBreakError);
+  return std::min(error, 1.0F);
+}
+
+float feature_error(const Features& a, const Features& b, std::size_t i) {
+  const float edge = std::abs(a.edges[i] - b.edges[i]);
+  const float point = std::abs(a.points[i] - b.points[i]);
+  const float error = std::max(edge, point) / std::numbers::sqrt2_v<float>;
+  return std::min(std::pow(error, kFeaturePower), 1.0F);
+}
+
+void check(const Image& test, const Image& reference, float pixels_per_degree) {
+  const std::size_t count = std::size_t{test.width} * test.height;
+  if (count == 0 || test.width != reference.width || test.height != reference.height ||
+      test.pixels.size() != count || reference.pixels.size() != count) {
+    throw std::invalid_argument("flip: pictures without pixels or of different sizes");
+  }
+  if (!(pixels_per_degree >= 1 && pixels_per_degree <= 1000)) {
+    throw std::invalid_argument("flip: pixels per degree out of range");
+  }
+}
+
+struct Seen {
+  std::vector<glm::vec3> colours;
+  Features features;
+};
+
+Seen see(const Image& image, double pixels_per_degree) {
+  std::array<Plane, 3> planes = opponent_planes(image);
+  std::vector<glm::vec3> colours = seen_colours(planes, pixels_per_degree);
+  return {std::move(colours), features_of(std::move(planes[0]), pixels_per_degree)};
+}
+
+}  // namespace
+
+std::vector<float> flip(const Image& test, const Image& reference, float pixels_per_degree) {
+  check(test, reference, pixels_per_degree);
+  const Seen a = see(test, static_cast<double>(pixels_per_degree));
+  const Seen b = see(reference, static_cast<double>(pixels_per_degree));
+  // No two colours of [0, 1]^3 are farther apart than pure green and pure blue.
+  const float largest =
+      std::pow(hyab(hunt_lab_of_rgb({0, 1, 0}), hunt_lab_of_rgb({0, 0, 1})), kColourPower);
+  std::vector<float> errors(a.colours.size());
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    const float colour = colour_error(hyab(a.colours[i], b.colours[i]), largest);
+    errors[i] = std::pow(colour, 1 - feature_error(a.features, b.features, i));
+  }
+  return errors;
+}
+
+double mean_flip(const Image& test, const Image& reference, float pixels_per_degree) {
+  double sum = 0;
+  const std::vector<float> errors = flip(test, reference, pixels_per_degree);
+  for (const float error : errors) sum += static_cast<double>(error);
+  return sum / static_cast<double>(errors.size());
+}
+
+}  // namespace ptc

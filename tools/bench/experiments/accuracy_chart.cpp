@@ -1,0 +1,140 @@
+#include "tools/bench/experiments/accuracy_chart.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <functional>
+#include <span>
+
+#include <fmt/format.h>
+
+namespace ptc::bench {
+namespace {
+
+/// What a panel shows over time.
+struct Measure {
+  const char* title;
+  const char* label;
+  Quantity job;
+  std::function<double(const AccuracyRow&)> value;
+  std::function<double(const ReferenceNote&)> noise;  ///< of the reference; empty: unknown
+};
+
+const std::array<Measure, 4>& measures() {
+  static const std::array<Measure, 4> all{
+      {{"occlusion", "RMS error, % of the mean", Quantity::occlusion,
+        [](const AccuracyRow& r) { return 100 * r.occlusion.rms; },
+        [](const ReferenceNote& n) { return 100 * n.occlusion_noise; }},
+       {"irradiance", "RMS error, % of the mean", Quantity::bleeding,
+        [](const AccuracyRow& r) { return 100 * r.irradiance.rms; },
+        [](const ReferenceNote& n) { return 100 * n.irradiance_noise; }},
+       {"irradiance, worst 1 %",
+        "99th percentile of errors, % of the mean",
+        Quantity::bleeding,
+        [](const AccuracyRow& r) { return 100 * r.irradiance.percentile_99; },
+        {}},
+       {"lit picture",
+        "mean FLIP",
+        Quantity::bleeding,
+        [](const AccuracyRow& r) { return r.flip; },
+        {}}}};
+  return all;
+}
+
+const char* legend_name(std::string_view method) {
+  if (method == "ptcx") return "PTCX";
+  if (method == "plain") return "plain gather";
+  return method == "embree-discs" ? "Embree, same discs" : "Embree, mesh";
+}
+
+/// Panels of one set; what was not measured has none.
+std::vector<ChartPanel> panels_of(const SceneAccuracy& scene, const ReferenceNote& note,
+                                  const std::string& title, std::span<const Measure> shown) {
+  std::vector<ChartPanel> panels;
+  for (const Measure& measure : shown) {
+    ChartPanel panel{.title = title + measure.title,
+                     .x_label = "CPU time per receiver, \u00b5s",
+                     .y_label = measure.label};
+    for (const char* method : kMethods) {
+      ChartSeries series{.name = legend_name(method)};
+      for (const AccuracyRow& row : scene.rows) {
+        if (row.set != note.set || row.method != method || row.job != measure.job) continue;
+        const double error = measure.value(row);
+        if (!std::isfinite(error)) continue;
+        const Spread& us = row.us_per_receiver;
+        series.points.push_back({.x = us.median,
+                                 .y = error,
+                                 .x_low = us.low,
+                                 .x_high = us.high,
+                                 .label = row.setting.substr(0, row.setting.find(' '))});
+      }
+      if (!series.points.empty()) panel.series.push_back(std::move(series));
+    }
+    if (panel.series.empty()) continue;
+    if (measure.noise) panel.limits.push_back({measure.noise(note), "noise of the reference"});
+    panels.push_back(std::move(panel));
+  }
+  return panels;
+}
+
+void append(Chart& chart, const std::vector<ChartPanel>& panels) {
+  chart.panels.insert(chart.panels.end(), panels.begin(), panels.end());
+}
+
+std::string percent(double share) {
+  return std::isfinite(share) ? fmt::format("{:.2g} %", 100 * share)
+                              : std::string("an unknown share");
+}
+
+constexpr char kReading[] =
+    "Markers: median of all runs; bars: the fastest and the slowest. Beside them: solid angle in "
+    "sr of PTCX and of the "
+    "plain gather, rays of Embree.\n";
+
+}  // namespace
+
+std::string note_text(const ReferenceNote& note, const SceneAccuracy& scene) {
+  std::string text = fmt::format(
+      "{}, {}: {} surfels; errors at {} receivers against {} rays each at the same model, which "
+      "are off by {} of the mean "
+      "occlusion",
+      note.scene, note.set, scene.surfels, note.receivers, note.rays,
+      percent(note.occlusion_noise));
+  const bool light = note.irradiance_mean > 0;
+  if (light) text += fmt::format(" and {} of the mean irradiance", percent(note.irradiance_noise));
+  text += ".";
+  if (!std::isfinite(note.occlusion_floor)) return text;
+  text += fmt::format(" Discs and mesh differ by {}", percent(note.occlusion_floor));
+  if (light) text += " and " + percent(note.irradiance_floor);
+  return text + ".";
+}
+
+Chart chart_of(const SceneAccuracy& scene) {
+  Chart chart{.title = "Time against error: " + scene.name(), .note = kReading, .columns = 1};
+  for (const ReferenceNote& note : scene.references) {
+    std::string title = note.set + ": ";
+    title.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(title.front())));
+    const std::vector<ChartPanel> panels = panels_of(scene, note, title, measures());
+    chart.columns = std::max(chart.columns, static_cast<unsigned>(panels.size()));
+    append(chart, panels);
+    chart.note += note_text(note, scene) + "\n";
+  }
+  return chart;
+}
+
+Chart chart_of(const std::vector<SceneAccuracy>& scenes) {
+  Chart chart{.title = "Time against error", .note = kReading, .columns = 1};
+  for (const SceneAccuracy& scene : scenes) {
+    const std::size_t before = chart.panels.size();
+    for (const ReferenceNote& note : scene.references) {
+      const std::string title = fmt::format("{}, {}: ", note.scene, note.set);
+      append(chart, panels_of(scene, note, title, std::span(measures()).first(2)));
+      chart.note += note_text(note, scene) + "\n";
+    }
+    chart.columns = std::max(chart.columns, static_cast<unsigned>(chart.panels.size() - before));
+  }
+  return chart;
+}
+
+}  // namespace ptc::bench

@@ -1,0 +1,117 @@
+#include "tools/bench/experiments/error_knob.h"
+
+#include <unistd.h>
+
+#include <cmath>
+
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/run.h"
+#include "engine/shade/lift.h"
+#include "engine/shade/reference/brute_force.h"
+
+namespace ptc::bench {
+namespace {
+
+/// A file of this process that goes when it ends.
+class WorkFile {
+ public:
+  WorkFile(const std::filesystem::path& directory, const char* ending)
+      : path_(directory / (".ptcbench-" + std::to_string(getpid()) + ending)) {}
+  ~WorkFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  WorkFile(const WorkFile&) = delete;
+  WorkFile& operator=(const WorkFile&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+ErrorRow row_of(const std::string& scene, const char* set, const LightingReport& report) {
+  const double pilots = report.tuning->ray_cpu_seconds + report.tuning->shade_cpu_seconds;
+  const auto receivers = static_cast<double>(std::max<std::uint64_t>(1, report.receivers));
+  return {.scene = scene,
+          .set = set,
+          .asked = report.tuning->asked,
+          .tuning = *report.tuning,
+          .check = *report.check,
+          .receivers = report.receivers,
+          .us_per_receiver = report.shade_cpu_seconds * 1e6 / receivers,
+          .pilot_share = pilots / std::max(1e-9, pilots + report.shade_cpu_seconds)};
+}
+
+/// Whole blocks of the scene's points, evenly spread: what shading all of them meets.
+std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, float lift) {
+  const std::span<const std::uint32_t> pages = container.point_pages();
+  const std::size_t per_page = std::max(1U, container.superblock().points_per_page);
+  const std::size_t pages_of_block = (Shader::kBlock + per_page - 1) / per_page;
+  const std::size_t count =
+      std::min<std::size_t>(wanted, std::max<std::size_t>(1, pages.size() / pages_of_block));
+  std::vector<Pilot> blocks(pages.empty() ? 0 : count);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const std::size_t first = (pages.size() - std::min(pages.size(), pages_of_block)) * i /
+                              std::max<std::size_t>(1, count - 1);
+    std::vector<Surfel> surfels;
+    append_surfels(container, pages.subspan(first, std::min(pages_of_block, pages.size() - first)),
+                   surfels);
+    surfels.resize(std::min(surfels.size(), Shader::kBlock));
+    for (const Surfel& s : surfels)
+      blocks[i].receivers.push_back(lifted(s, lift, container.header().frame));
+  }
+  return blocks;
+}
+
+}  // namespace
+
+double SceneErrors::slope() const {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  for (const RungError& rung : rungs) {
+    if (!(rung.error.relative() > 0 && rung.us_per_receiver > 0)) continue;
+    const double time = std::log(rung.us_per_receiver), error = std::log(rung.error.relative());
+    n += 1;
+    x += time;
+    y += error;
+    xx += time * time;
+    xy += time * error;
+  }
+  return (n * xy - x * y) / (n * xx - x * x);
+}
+
+SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,
+                           const std::filesystem::path& work, const RunOptions& run,
+                           Progress& progress) {
+  const WorkFile scene(work, ".ptcx"), points(work, ".ply"), picture(work, ".exr");
+  const LitScene lit = build_scene(choice, options.scene, scene.path(), run, progress);
+  const CheckRequest check{.receivers = options.checked, .rays = options.rays};
+  ShadeRequest shade{
+      {.scene = scene.path(), .lift = options.scene.lift, .check = check, .run = run}};
+  RenderRequest render{
+      {.scene = scene.path(), .lift = options.scene.lift, .check = check, .run = run}};
+  render.mesh = lit.mesh.triangles.empty() ? nullptr : std::make_shared<const Mesh>(lit.mesh);
+  render.camera = lit.camera;
+  render.samples = 1;
+  const PictureTarget target{.path = picture.path()};
+  SceneErrors errors{.name = choice.name};
+  for (const double asked : options.asked) {
+    shade.error = render.error = asked;
+    errors.rows.push_back(
+        row_of(choice.name, "points", shade_container(shade, points.path(), progress)));
+    errors.rows.push_back(
+        row_of(choice.name, "camera", render_picture(render, std::span(&target, 1), progress)));
+  }
+  const ContainerReader container(scene.path());
+  const Executor executor(run.threads);
+  errors.surfels = container.superblock().points;
+  const ShadeOptions settings{.cache_bytes =
+                                  cache_bytes_left(budget_of(run.memory_bytes, "the ladder"),
+                                                   container, executor.threads(), BackEnd::pread)};
+  const std::vector<Pilot> blocks = blocks_of(container, options.climbed, options.scene.lift);
+  progress.begin(choice.name + ", the ladder", 0, "receivers");
+  errors.rungs = climb(container, settings, blocks, options.rays / 2, executor, progress);
+  progress.end();
+  return errors;
+}
+
+}  // namespace ptc::bench

@@ -1,0 +1,277 @@
+#include "tools/bench/experiments/growth.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "engine/base/memory.h"
+#include "engine/io/file/disk_space.h"
+#include "engine/pipeline/run.h"
+#include "engine/scene/light/lights.h"
+#include "engine/shade/reference/brute_force.h"
+#include "engine/shade/shader.h"
+#include "engine/sort/spill.h"
+#include "tools/bench/experiments/accuracy.h"
+#include "tools/bench/experiments/timed_runs.h"
+#include "tools/bench/references/methods.h"
+#include "tools/bench/references/reference.h"
+
+namespace ptc::bench {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr Spread kNoTime{kNone, kNone, kNone};
+
+GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene,
+                 const Executor& executor) {
+  return {.panel = panel,
+          .x = x,
+          .scene = scene.name(),
+          .surfels = scene.container().superblock().points,
+          .threads = executor.threads(),
+          .receivers = scene.sets().front().receivers.size(),
+          .us = kNoTime,
+          .wall_us = kNoTime,
+          .occlusion_rms = kNone,
+          .irradiance_rms = kNone,
+          .speedup_discs = kNone,
+          .speedup_mesh = kNone,
+          .hit_rate = kNone,
+          .pages = kNone,
+          .bytes = kNone};
+}
+
+/// Shades the scene's own points with a page cache of some size that is empty at first.
+class CapRun {
+ public:
+  /// @param share  of all pages, decoded, that the cache holds
+  /// @param most_bytes  that the cache takes, whatever the share
+  CapRun(const BenchScene& scene, double share, unsigned threads,
+         std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max())
+      : scene_(scene), executor_(threads), results_(scene.sets().front().receivers.size()) {
+    const ContainerReader& container = scene.container();
+    const auto frames = static_cast<std::uint64_t>(std::ceil(share * container.page_count()));
+    options_.cache_bytes =
+        std::max(PageCache::least_bytes(container, threads),
+                 std::min(most_bytes, PageCache::bytes_for(container, threads, frames)));
+    options_.sky = sky_function(scene.lights().sky);
+  }
+
+  void run() {
+    Shader shader(scene_.container(), options_, executor_);
+    Progress silent;
+    const auto start = std::chrono::steady_clock::now();
+    const double before = cpu_seconds();
+    shader.shade(scene_.sets().front().receivers, results_, silent);
+    const double each = 1e6 / static_cast<double>(results_.size());
+    us_.push_back((cpu_seconds() - before) * each);
+    wall_.push_back(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() * each);
+    cache_ = shader.cache_statistics();
+  }
+
+  void fill(GrowthRow& row) const {
+    const auto count = static_cast<double>(results_.size());
+    row.threads = executor_.threads();
+    row.us = spread_of(us_);
+    row.wall_us = spread_of(wall_);
+    row.hit_rate = cache_.hit_rate();
+    row.pages = static_cast<double>(cache_.misses) / count;
+    row.bytes = static_cast<double>(cache_.bytes_read) / count;
+  }
+  [[nodiscard]] const std::vector<Shading>& results() const { return results_; }
+
+ private:
+  const BenchScene& scene_;
+  Executor executor_;
+  ShadeOptions options_;
+  std::vector<Shading> results_;
+  std::vector<double> us_, wall_;
+  CacheStatistics cache_;
+};
+
+/// Some receivers of a scene and what rays at its discs say of them.
+class Truth {
+ public:
+  Truth(const BenchScene& scene, const GrowthOptions& options, const Executor& executor) {
+    const ReceiverSet& set = scene.sets().front();
+    checked_ = choose_checked(scene, set, options.checked);
+    const DiscRays oracle(scene.surfels(), Sides::both, {});
+    const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) {
+      return oracle.trace(r, rays, seed);
+    };
+    reference_ = make_reference(set, checked_, {.half = options.reference_rays}, trace, executor);
+  }
+
+  void compare(const std::vector<Shading>& results, GrowthRow& row) const {
+    std::vector<Shading> ours;
+    for (const std::size_t i : checked_.receivers) ours.push_back(results[i]);
+    row.occlusion_rms = relative_rms(occlusion_of(ours), occlusion_of(reference_.mean));
+    row.irradiance_rms = relative_rms(irradiance_of(ours), irradiance_of(reference_.mean));
+  }
+
+ private:
+  Checked checked_;
+  Reference reference_;
+};
+
+class GrowthRun {
+ public:
+  using Report = std::function<void(const std::vector<GrowthRow>&)>;
+
+  GrowthRun(const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run,
+            Progress& progress, const Report& report)
+      : options_(options),
+        work_(work),
+        run_(run),
+        executor_(run.threads),
+        progress_(progress),
+        report_(report) {}
+
+  std::vector<GrowthRow> measure() {
+    if (wants("surfels")) {
+      for (const std::uint64_t points : options_.points) tell(&GrowthRun::measure_surfels, points);
+    }
+    if (wants("solid-angle")) tell(&GrowthRun::measure_solid_angles);
+    if (wants("depth")) {
+      for (const unsigned layers : options_.layers) tell(&GrowthRun::measure_depth, layers);
+    }
+    if (wants("cap")) tell(&GrowthRun::measure_caps);
+    return std::move(rows_);
+  }
+
+ private:
+  [[nodiscard]] bool wants(const char* panel) const {
+    return std::ranges::find(options_.panels, panel) != options_.panels.end();
+  }
+
+  template <class... Arguments>
+  void tell(void (GrowthRun::*part)(Arguments...), Arguments... arguments) {
+    (this->*part)(arguments...);
+    if (report_) report_(rows_);
+  }
+
+  [[nodiscard]] bool in_reach(std::uint64_t points) const { return points <= options_.ray_reach; }
+
+  [[nodiscard]] BenchScene make_scene(const SceneChoice& choice, std::uint64_t points) {
+    const std::filesystem::path directory =
+        run_.temp_dirs.empty() ? work_ : roomiest(run_.temp_dirs);
+    require_room({&directory, 1}, build_disk_bytes(points), fmt::format("{} surfels", points));
+    const SceneOptions options{.points = points,
+                               .shaded_width = 0,
+                               .own_points = options_.own_points,
+                               .rays = in_reach(points)};
+    return {choice, options, work_, run_, progress_};
+  }
+
+  /// Time and error at a list of settings, and of Embree around these errors.
+  void measure_settings(const BenchScene& scene, const std::string& panel,
+                        const std::vector<double>& at, const std::vector<GatherOptions>& settings) {
+    const std::vector<std::string> methods =
+        panel == "surfels" ? std::vector<std::string>{"ptcx", "embree-discs", "embree-mesh"}
+                           : std::vector<std::string>{"ptcx"};
+    const AccuracyOptions options{.checked = options_.checked,
+                                  .reference_rays = options_.reference_rays,
+                                  .repeats = options_.repeats,
+                                  .methods = methods,
+                                  .sets = {"points"},
+                                  .settings = settings,
+                                  .rays = options_.rays};
+    const SceneAccuracy accuracy = measure_accuracy(scene, options, executor_, progress_);
+    std::size_t next = 0;
+    for (const AccuracyRow& measured : accuracy.rows) {
+      if (measured.method != "ptcx" || measured.job != Quantity::bleeding) continue;
+      GrowthRow row = row_of(panel, at[next++], scene, executor_);
+      row.us = measured.us_per_receiver;
+      row.occlusion_rms = measured.occlusion.rms;
+      row.irradiance_rms = measured.irradiance.rms;
+      row.speedup_discs = measured.speedup_discs;
+      row.speedup_mesh = measured.speedup_mesh;
+      rows_.push_back(row);
+    }
+  }
+
+  void measure_surfels(std::uint64_t points) {
+    const BenchScene scene = make_scene({.name = "city"}, points);
+    const auto surfels = static_cast<double>(scene.container().superblock().points);
+    if (in_reach(points)) {
+      measure_settings(scene, "surfels", {surfels}, {GatherOptions{}});
+    } else {
+      CapRun run(scene, 1, executor_.threads(), run_.memory_bytes);
+      for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) run.run();
+      rows_.push_back(row_of("surfels", surfels, scene, executor_));
+      run.fill(rows_.back());
+    }
+  }
+
+  void measure_solid_angles() {
+    const BenchScene scene = make_scene({.name = "city"}, options_.middle_points);
+    std::vector<GatherOptions> settings;
+    std::vector<double> at;
+    for (const float solid_angle : options_.solid_angles) {
+      settings.push_back({.solid_angle = solid_angle});
+      at.push_back(static_cast<double>(solid_angle));
+    }
+    measure_settings(scene, "solid-angle", at, settings);
+  }
+
+  void measure_depth(unsigned layers) {
+    const BenchScene scene = make_scene(
+        {.name = fmt::format("{} sheets", layers), .layers = layers}, options_.middle_points);
+    measure_settings(scene, "depth", {static_cast<double>(layers)}, {GatherOptions{}});
+  }
+
+  void measure_caps() {
+    const std::uint64_t points = options_.points.back();
+    const BenchScene scene = make_scene({.name = "city"}, points);
+    std::optional<Truth> truth;
+    if (in_reach(points)) truth.emplace(scene, options_, executor_);
+    std::vector<std::unique_ptr<CapRun>> runs;
+    for (const unsigned threads : thread_counts(executor_.threads())) {
+      for (const double cap : options_.caps)
+        runs.push_back(std::make_unique<CapRun>(scene, cap, threads));
+    }
+    progress_.begin("city, caps", options_.repeats * runs.size(), "runs");
+    for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
+      for (const auto& run : runs) {
+        run->run();
+        progress_.advance(1);
+      }
+    }
+    progress_.end();
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      GrowthRow row = row_of("cap", options_.caps[i % options_.caps.size()], scene, executor_);
+      runs[i]->fill(row);
+      if (truth) truth->compare(runs[i]->results(), row);
+      rows_.push_back(row);
+    }
+  }
+
+  const GrowthOptions& options_;
+  const std::filesystem::path& work_;
+  const RunOptions& run_;
+  Executor executor_;
+  Progress& progress_;
+  const Report& report_;
+  std::vector<GrowthRow> rows_;
+};
+
+}  // namespace
+
+std::uint64_t build_disk_bytes(std::uint64_t points) noexcept {
+  constexpr std::uint64_t kRecord = kSpilledBytes,
+                          kContainer = 64;  // of a point: spilled by the sort; pages
+  return points * (kRecord + kContainer);
+}
+
+std::vector<GrowthRow> measure_growth(
+    const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run,
+    Progress& progress, const std::function<void(const std::vector<GrowthRow>&)>& report) {
+  return GrowthRun(options, work, run, progress, report).measure();
+}
+
+}  // namespace ptc::bench

@@ -1,0 +1,144 @@
+// What codecs, packing and rounding make of a scene's pages, and how long it takes to undo.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "engine/base/memory.h"
+#include "engine/octree/rounding.h"
+#include "engine/store/container_points.h"
+#include "format/point_page.h"
+#include "tools/bench/experiments/model.h"
+
+namespace ptc::bench {
+namespace {
+
+/// A page as it is in memory.
+struct Payload {
+  std::vector<std::byte> bytes;
+  PayloadColumns columns;
+};
+
+std::vector<Payload> node_payloads(const ContainerReader& container) {
+  std::vector<Payload> pages;
+  std::vector<std::byte> buffer(container.page_payload_limit());
+  PageDecoder decoder;
+  for (const std::uint32_t page : container.node_pages()) {
+    const PageHeader header = container.read_page(page, buffer, decoder);
+    pages.push_back({{buffer.begin(), buffer.begin() + header.raw_bytes}, {}});
+  }
+  return pages;
+}
+
+struct PointPayloads {
+  std::vector<Payload> pages;
+  double moved = 0;  ///< farthest that a point was, in its own radii
+};
+
+double moved(const PointRecord& from, const PointRecord& to, const Frame& frame) {
+  if (to.radius <= 0) return 0;
+  const std::array<double, 3> a = frame.to_position(decode_morton(from.key)),
+                              b = frame.to_position(decode_morton(to.key));
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / static_cast<double>(to.radius);
+}
+
+PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
+  const Frame& frame = container.header().frame;
+  ContainerPoints originals(container), points(container);
+  const Executor executor(1);
+  const std::unique_ptr<PointStream> rounding =
+      rounded ? round_points(points, frame.unit(), executor) : nullptr;
+  PointPayloads out;
+  std::vector<PointRecord> from(container.superblock().points_per_page), to(from.size());
+  while (const std::size_t count = originals.next(from)) {  // both hand out page by page
+    const std::size_t same = rounding ? rounding->next(to) : points.next(to);
+    if (same != count) throw std::logic_error("point_payloads: streams differ");
+    for (std::size_t i = 0; i < count; ++i)
+      out.moved = std::max(out.moved, moved(from[i], to[i], frame));
+    out.pages.push_back({encode_point_page(std::span(to).first(count)),
+                         {static_cast<std::uint32_t>(count), packed_point_columns()}});
+  }
+  return out;
+}
+
+/// Codes pages and decodes them again.
+class PageStudy {
+ public:
+  PageStudy(const BenchScene& scene, unsigned repeats) : scene_(scene), repeats_(repeats) {}
+
+  /// @param form  points, packed, rounded or nodes
+  [[nodiscard]] ModelRow measure(const std::vector<Payload>& pages, const std::string& form,
+                                 Codec codec, int level) const {
+    const bool nodes = form == "nodes";
+    PageEncoder encoder(codec, level);
+    std::vector<Stored> stored(pages.size());
+    double bytes = 0;
+    for (std::size_t i = 0; i < pages.size(); ++i) {
+      const PayloadColumns columns = form == "points" ? PayloadColumns{} : pages[i].columns;
+      stored[i].coding = encoder.encode(pages[i].bytes, stored[i].bytes, columns);
+      bytes += static_cast<double>(stored[i].bytes.size());
+    }
+    std::vector<double> seconds;
+    for (unsigned repeat = 0; repeat < repeats_; ++repeat) seconds.push_back(decode(pages, stored));
+    const Superblock& superblock = scene_.container().superblock();
+    const auto records = static_cast<double>(nodes ? superblock.nodes : superblock.points);
+    return {.scene = scene_.name(),
+            .axis = "pages",
+            .variant = codec == Codec::zstd  ? fmt::format("zstd {}", level)
+                       : codec == Codec::lz4 ? "lz4"
+                                             : "raw",
+            .form = form,
+            .bytes = bytes / records,
+            .per = nodes ? "node" : "point",
+            .decode_ns = 1e9 * spread_of(seconds).median / records};
+  }
+
+ private:
+  struct Stored {
+    Coding coding;
+    std::vector<std::byte> bytes;
+  };
+
+  [[nodiscard]] double decode(const std::vector<Payload>& pages,
+                              const std::vector<Stored>& stored) const {
+    PageDecoder decoder;
+    std::vector<std::byte> payload(scene_.container().page_payload_limit());
+    const double before = cpu_seconds();
+    for (std::size_t i = 0; i < pages.size(); ++i) {
+      decoder.decode(stored[i].coding, stored[i].bytes,
+                     std::span(payload).first(pages[i].bytes.size()), pages[i].columns);
+    }
+    return cpu_seconds() - before;
+  }
+
+  const BenchScene& scene_;
+  unsigned repeats_;
+};
+
+}  // namespace
+
+std::vector<ModelRow> study_pages(const BenchScene& scene, const ModelOptions& options) {
+  const PageStudy study(scene, options.repeats);
+  std::vector<ModelRow> rows;
+  const auto add = [&](const std::vector<Payload>& pages, const std::string& form) {
+    const std::size_t first = rows.size();
+    if (form == "points" || form == "nodes")
+      rows.push_back(study.measure(pages, form, Codec::raw, 0));
+    rows.push_back(study.measure(pages, form, Codec::lz4, 0));
+    for (const int level : options.levels)
+      rows.push_back(study.measure(pages, form, Codec::zstd, level));
+    return std::span(rows).subspan(first);
+  };
+  const PointPayloads exact = point_payloads(scene.container(), false),
+                      rounded = point_payloads(scene.container(), true);
+  for (ModelRow& row : add(exact.pages, "points")) row.moved = exact.moved;
+  for (ModelRow& row : add(exact.pages, "packed")) row.moved = exact.moved;
+  for (ModelRow& row : add(rounded.pages, "rounded")) row.moved = rounded.moved;
+  add(node_payloads(scene.container()), "nodes");
+  return rows;
+}
+
+}  // namespace ptc::bench

@@ -1,0 +1,200 @@
+#include "tools/bench/scenes/bench_scene.h"
+
+#include <algorithm>
+#include <numbers>
+#include <set>
+
+#include "engine/base/error.h"
+#include "engine/io/cloud/points.h"
+#include "engine/io/cloud/record.h"
+#include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/run.h"
+#include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/temporary_container.h"
+#include "engine/scene/procedural/city.h"
+#include "engine/shade/lift.h"
+#include "engine/shade/reference/brute_force.h"
+#include "engine/shade/shader.h"
+#include "engine/store/container_points.h"
+#include "format/text.h"
+
+namespace ptc::bench {
+namespace {
+
+constexpr std::uint64_t kMostSurfels = 250'000'000;
+
+/// A name that charts, tables and file systems take.
+std::string plain_name(const std::filesystem::path& file) {
+  const std::string whole = file.filename().string();
+  std::string name = whole.substr(0, whole.find('.', 1));
+  const bool utf8 = is_utf8(name);
+  for (char& c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f || (byte >= 0x80 && !utf8)) c = '_';
+  }
+  return name;
+}
+
+using Hits = std::vector<std::optional<PrimaryHit>>;
+
+/// Receivers where pixels see something, and the window in their middle.
+ReceiverSet camera_set(const Hits& hits, unsigned width, unsigned height,
+                       const SceneOptions& options) {
+  ReceiverSet set{.name = "camera",
+                  .window_width = std::min(options.window_width, width),
+                  .window_height = std::min(options.window_height, height)};
+  const unsigned left = (width - set.window_width) / 2, top = (height - set.window_height) / 2;
+  for (unsigned y = 0; y < height; ++y) {
+    for (unsigned x = 0; x < width; ++x) {
+      const auto& hit = hits[std::size_t{y} * width + x];
+      const bool inside = x - left < set.window_width && y - top < set.window_height;
+      if (inside) set.window.push_back({.receiver = ReceiverSet::kNone});
+      if (!hit) continue;
+      if (inside) {
+        set.window.back() = {
+            .receiver = set.receivers.size(), .albedo = hit->albedo, .direct = hit->direct};
+      }
+      set.receivers.push_back(
+          {hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
+    }
+  }
+  return set;
+}
+
+}  // namespace
+
+SceneChoice parse_scene(const std::string& text) {
+  constexpr std::string_view kBackdrop = "+backdrop";
+  SceneChoice choice;
+  std::string rest = text;
+  if (rest.ends_with(kBackdrop)) {
+    rest.resize(rest.size() - kBackdrop.size());
+    choice.backdrop = true;
+  }
+  if (rest.empty()) throw RequestError("scenes", "'" + text + "': a scene without a name");
+  choice.name = rest;
+  if (rest == "fractal" || rest == "window" || rest == "city") {
+    if (choice.backdrop) throw RequestError("scenes", text + ": a backdrop is for files of meshes");
+    return choice;
+  }
+  choice.file = rest;
+  choice.name = plain_name(choice.file);
+  return choice;
+}
+
+std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts) {
+  std::vector<SceneChoice> choices;
+  std::set<std::string> taken;
+  for (const std::string& text : texts) {
+    SceneChoice choice = parse_scene(text);
+    const std::string name = choice.name;
+    for (int number = 2; !taken.insert(choice.name).second; ++number) {
+      choice.name = name + "-" + std::to_string(number);
+    }
+    choices.push_back(std::move(choice));
+  }
+  return choices;
+}
+
+LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
+                     const std::filesystem::path& target, const RunOptions& run,
+                     Progress& progress) {
+  BuildRequest request{.backdrop = choice.backdrop, .profile = options.profile, .run = run};
+  request.sampling.count = options.points;
+  request.tree.levels_per_stream = options.levels_per_stream;
+  request.page_shift = options.page_shift;
+  LitScene lit;
+  std::vector<MeshCamera> cameras;
+  const bool procedural = choice.file.empty() && choice.name != "city";
+  if (choice.file.empty() && !procedural) {
+    request.city_points = options.points;
+    if (options.rays) lit.mesh = city_mesh(options.points);
+  } else if (procedural) {
+    lit = choice.layers > 0          ? make_layers(choice.layers)
+          : choice.name == "fractal" ? make_fractal(options.points)
+                                     : make_window_room();
+    request.lights = lit.lights;
+    request.mesh = std::make_shared<const Mesh>(lit.mesh);
+  } else {
+    request.inputs.push_back(choice.file);
+    Progress silent;  // the build reads the file once more and notes what is left out
+    lit.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, silent, &cameras);
+  }
+  build_container(request, target, progress);
+  const ContainerReader container(target);
+  lit.lights = recorded_lights(container, progress);
+  if (!procedural) {
+    lit.camera = default_camera(container, cameras, choice.backdrop,
+                                std::array{options.width, options.height});
+  }
+  lit.camera.width = options.width;
+  lit.camera.height = options.height;
+  return lit;
+}
+
+BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options,
+                       const std::filesystem::path& work, const RunOptions& run, Progress& progress)
+    : name_(choice.name) {
+  container_ = make_temporary_container(work, [&](const std::filesystem::path& path) {
+    lit_ = build_scene(choice, options, path, run, progress);
+  });
+  if (options.rays) surfels_ = load_surfels(*container_, kMostSurfels);
+  const Executor executor(run.threads);
+  if (options.shaded_width > 0) add_camera(options, executor, progress);
+  add_points(options);
+}
+
+double BenchScene::spacing() const {
+  return surfel_spacing(*container_);
+}
+
+void BenchScene::add_camera(const SceneOptions& options, const Executor& executor,
+                            Progress& progress) {
+  const Camera& camera = lit_.camera;
+  std::optional<RayScene> rays;
+  std::optional<DirectLight> light;
+  std::unique_ptr<PrimaryView> view;
+  if (lit_.mesh.triangles.empty()) {
+    view = view_surfels(*container_, camera, 1, options.lift, nullptr, executor, progress);
+  } else {
+    rays.emplace(lit_.mesh);
+    light.emplace(*rays, lit_.lights);
+    const auto radius = static_cast<float>(spacing() / std::numbers::sqrt2);
+    view = view_mesh(*rays, *light, {.sun_rays = 1, .area_rays = 4, .sky_rays = 0}, camera, 1,
+                     options.lift * radius);
+  }
+  const unsigned width = std::min(options.shaded_width, camera.width);
+  const unsigned height = std::min(options.shaded_height, camera.height);
+  const unsigned left = (camera.width - width) / 2, top = (camera.height - height) / 2;
+  Hits hits(std::size_t{width} * height);
+  executor.for_each(height, [&](std::size_t y, unsigned) {
+    for (unsigned x = 0; x < width; ++x)
+      hits[y * width + x] = view->at(left + x, top + static_cast<unsigned>(y));
+  });
+  sets_.push_back(camera_set(hits, width, height, options));
+}
+
+/// Whole blocks of neighbours, evenly spread: what shading all points meets.
+void BenchScene::add_points(const SceneOptions& options) {
+  ReceiverSet set{.name = "points"};
+  const std::uint64_t points = container_->superblock().points;
+  const std::size_t blocks = points / Shader::kBlock;
+  const std::size_t wanted =
+      std::max<std::size_t>(1, std::min<std::size_t>(blocks, options.own_points / Shader::kBlock));
+  ContainerPoints all(*container_);
+  std::vector<PointRecord> block(Shader::kBlock);
+  std::size_t taken = 0;
+  for (std::size_t at = 0; const std::size_t count = all.next(block); ++at) {
+    if (taken == wanted) break;
+    if (blocks > 0 && at != blocks * taken / wanted) continue;
+    ++taken;
+    for (std::size_t i = 0; i < count; ++i) {
+      set.receivers.push_back(lifted(to_surfel(block[i], container_->header().frame), options.lift,
+                                     container_->header().frame));
+    }
+  }
+  sets_.push_back(std::move(set));
+}
+
+}  // namespace ptc::bench
