@@ -1,6 +1,4 @@
 // JSON, CSV, words and charts of rows made by hand.
-#include "tools/bench/experiments/accuracy_report.h"
-
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -8,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/scenes.h"
+#include "tools/bench/experiments/accuracy.h"
 #include "tools/bench/experiments/accuracy_chart.h"
 
 using namespace ptc;
@@ -95,7 +94,7 @@ std::vector<std::vector<std::string>> csv_cells(const std::string& text) {
 }  // namespace
 
 TEST_CASE("facts: a row says where, what, how long and how wrong", "[bench][report]") {
-  const nlohmann::ordered_json facts = facts_of({accuracy()});
+  const nlohmann::ordered_json facts = facts_of(report_of({accuracy()}, 5));
   REQUIRE(facts.at("rows").size() == 8);
   for (const auto& found : facts.at("rows")) {
     for (const char* key : {"scene",
@@ -105,8 +104,9 @@ TEST_CASE("facts: a row says where, what, how long and how wrong", "[bench][repo
                             "setting",
                             "receivers",
                             "us_per_receiver",
-                            "us_low",
-                            "us_high",
+                            "us_per_receiver_low",
+                            "us_per_receiver_high",
+                            "wall_us_per_receiver",
                             "ao_rms",
                             "e_rms",
                             "bias",
@@ -137,7 +137,7 @@ TEST_CASE("facts: a row says where, what, how long and how wrong", "[bench][repo
 }
 
 TEST_CASE("facts: what was not measured is null", "[bench][report]") {
-  const nlohmann::ordered_json facts = facts_of({accuracy()});
+  const nlohmann::ordered_json facts = facts_of(report_of({accuracy()}, 5));
   const auto& occlusion = facts.at("rows")[0];
   CHECK(occlusion.at("e_rms").is_null());
   CHECK(occlusion.at("ao_rms_mesh").is_null());
@@ -157,8 +157,8 @@ TEST_CASE(
   for (AccuracyRow& r : plain.rows) r.scene = "rooms";
   for (ReferenceNote& n : plain.references) n.scene = "rooms";
   const std::vector<SceneAccuracy> scenes{accuracy(), plain};
-  write_reports(dir.path(), scenes);
-  const nlohmann::ordered_json facts = facts_of(scenes);
+  write_files(dir.path(), report_of(scenes, 5));
+  const nlohmann::ordered_json facts = facts_of(report_of(scenes, 5));
   CHECK(nlohmann::ordered_json::parse(text_of(dir / "accuracy.json")) == facts);
   const auto lines = csv_cells(text_of(dir / "accuracy.csv"));
   REQUIRE(lines.size() == 1 + facts.at("rows").size());
@@ -179,10 +179,10 @@ TEST_CASE(
 
 TEST_CASE("words: a line for each row and for each reference, nothing that is no number",
           "[bench][report]") {
-  const std::string text = accuracy_text({accuracy()});
-  CHECK(std::ranges::count(text, '\n') == 1 + 8 + 2);
+  const std::string text = text_of(report_of({accuracy()}, 5));
+  CHECK(std::ranges::count(text, '\n') == (2 + 8) + 1 + (2 + 2));  // titles and headings, too
   CHECK(text.find("nan") == std::string::npos);
-  CHECK(text.find("embree-discs, 64 rays, packets") != std::string::npos);
+  CHECK(text.find("embree-discs  64 rays, packets") != std::string::npos);
 }
 
 TEST_CASE("chart: each set has a row of panels, each method a curve", "[bench][report]") {

@@ -10,7 +10,6 @@
 
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
-#include "tools/bench/experiments/growth_report.h"
 
 using namespace ptc;
 using namespace ptc::bench;
@@ -159,7 +158,7 @@ TEST_CASE("growth: a build stays below the bytes that it was said to take", "[be
 
 TEST_CASE("growth report: a panel for each thing that varied, and three for caps",
           "[bench][report]") {
-  const Chart chart = chart_of(all_rows());
+  const Chart chart = report_of(all_rows(), 3).figures.front().chart;
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
   CHECK(titles == std::vector<std::string>{"Surfels", "Solid angle", "Depth complexity", "Memory",
@@ -182,12 +181,12 @@ TEST_CASE("growth report: a panel for each thing that varied, and three for caps
   CHECK(memory.series[1].points[1].label == "99.50 %");
   CHECK(chart.panels[4].series[1].points[1].y == Approx(28.5));
   CHECK(chart.panels[5].series[0].points[0].y == 3000);
-  CHECK(chart_of({row("depth", 4, 2, 70)}).panels.size() == 1);
+  CHECK(report_of({row("depth", 4, 2, 70)}, 3).figures.front().chart.panels.size() == 1);
 }
 
 TEST_CASE("growth report: rows have the same members, and null for what was not measured",
           "[bench][report]") {
-  const nlohmann::ordered_json facts = facts_of(all_rows());
+  const nlohmann::ordered_json facts = facts_of(report_of(all_rows(), 3));
   REQUIRE(facts.at("rows").size() == 8);
   for (const auto& r : facts.at("rows")) CHECK(r.size() == facts.at("rows").front().size());
   CHECK(facts["rows"][0]["hit_rate"].is_null());
@@ -195,7 +194,7 @@ TEST_CASE("growth report: rows have the same members, and null for what was not 
   CHECK(facts["rows"][4]["e_rms"].is_null());
   CHECK(facts["rows"][4]["hit_rate"] == 0.995);
   const test::TemporaryDirectory dir;
-  write_reports(dir.path(), all_rows());
+  write_files(dir.path(), report_of(all_rows(), 3));
   for (const char* ending : {".json", ".csv", ".svg", ".png"}) {
     CHECK(std::filesystem::file_size(dir / (std::string("growth") + ending)) > 100);
   }
@@ -203,5 +202,5 @@ TEST_CASE("growth report: rows have the same members, and null for what was not 
   std::string line;
   for (int i = 0; i < 9; ++i) REQUIRE(std::getline(csv, line));
   CHECK(!std::getline(csv, line));
-  CHECK(growth_text(all_rows()).find("solid-angle") != std::string::npos);
+  CHECK(text_of(report_of(all_rows(), 3)).find("solid-angle") != std::string::npos);
 }

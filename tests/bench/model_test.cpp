@@ -11,7 +11,6 @@
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/reference/plain_gather.h"
 #include "tests/support/scenes.h"
-#include "tools/bench/experiments/model_report.h"
 #include "tools/bench/references/methods.h"
 
 using namespace ptc;
@@ -50,7 +49,7 @@ const SceneModel& measured() {
 }
 
 const ModelRow& row_of(const SceneModel& model, const std::string& axis, const std::string& variant,
-                       const std::string& form, double solid_angle = ModelRow::kNone) {
+                       const std::string& form, double solid_angle = kNone) {
   const auto found = std::ranges::find_if(model.rows, [&](const ModelRow& r) {
     const bool angle = std::isnan(solid_angle) || r.solid_angle == Approx(solid_angle);
     return r.axis == axis && r.variant == variant && r.form == form && angle;
@@ -174,12 +173,12 @@ TEST_CASE("model: a camera that sees nothing is told", "[bench][model]") {
 
 TEST_CASE("model report: rows have the same members, panels what was measured", "[bench][report]") {
   const std::vector<SceneModel> scenes{measured()};
-  const nlohmann::ordered_json facts = facts_of(scenes);
+  const nlohmann::ordered_json facts = facts_of(report_of(scenes, 1));
   REQUIRE(facts.at("rows").size() == measured().rows.size());
   for (const auto& row : facts.at("rows")) CHECK(row.size() == facts.at("rows").front().size());
   CHECK(facts.dump().find("nan") == std::string::npos);
 
-  const Chart chart = chart_of(measured());
+  const Chart chart = report_of({measured()}, 1).figures.front().chart;
   REQUIRE(chart.panels.size() == 8);
   const ChartPanel& over_bytes = chart.panels[0];
   CHECK(over_bytes.title == "Payload at 0.02 sr: irradiance");
@@ -192,12 +191,12 @@ TEST_CASE("model report: rows have the same members, panels what was measured", 
   CHECK(chart.panels[2].series[3].points.size() == 2);
   SceneModel few = measured();
   std::erase_if(few.rows, [](const ModelRow& row) { return row.axis != "leaf"; });
-  CHECK(chart_of(few).panels.size() == 2);
+  CHECK(report_of({few}, 1).figures.front().chart.panels.size() == 2);
 
   const test::TemporaryDirectory dir;
-  write_reports(dir.path(), scenes);
+  write_files(dir.path(), report_of(scenes, 1));
   for (const char* name : {"model.json", "model.csv", "model-fractal.svg", "model-fractal.png"}) {
     CHECK(std::filesystem::file_size(dir / name) > 100);
   }
-  CHECK(model_text(scenes).find("nan") == std::string::npos);
+  CHECK(text_of(report_of(scenes, 1)).find("nan") == std::string::npos);
 }

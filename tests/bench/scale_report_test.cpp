@@ -1,6 +1,4 @@
 // Scale: the law of growth and the reports, of rows made by hand.
-#include "tools/bench/experiments/scale_report.h"
-
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/scenes.h"
+#include "tools/bench/experiments/scale_law.h"
 
 using namespace ptc;
 using namespace ptc::bench;
@@ -52,22 +51,6 @@ std::vector<ScaleRow> rows_of(const std::vector<std::uint64_t>& sizes) {
 
 }  // namespace
 
-TEST_CASE(
-    "scale report: a power law is found again, and its middle where measurements lie about it",
-    "[bench][report]") {
-  const PowerLaw exact =
-      fit_power_law({{1, 3}, {10, 3 * std::pow(10, 0.7)}, {1000, 3 * std::pow(1000, 0.7)}});
-  CHECK(exact.factor == Approx(3));
-  CHECK(exact.exponent == Approx(0.7));
-  CHECK(exact.at(1e6) == Approx(3 * std::pow(1e6, 0.7)));
-  const PowerLaw noisy = fit_power_law({{1, 2}, {1, 0.5}, {100, 20}, {100, 5}});
-  CHECK(noisy.factor == Approx(1));
-  CHECK(noisy.exponent == Approx(0.5));
-  CHECK(std::isnan(fit_power_law({{5, 1}}).exponent));
-  for (const double x : {3.0, 7.0, 1e6})
-    CHECK(std::isnan(fit_power_law({{x, 1}, {x, 2}, {x, 4}}).at(x)));
-}
-
 TEST_CASE("scale report: each stage has its law, and time at 1.7 billion points",
           "[bench][report]") {
   const std::vector<ScaleLaw> laws = laws_of(rows_of({1'000'000, 5'000'000}));
@@ -102,7 +85,7 @@ TEST_CASE("scale report: the greatest size is held against the least of 20 milli
 
 TEST_CASE("scale report: rows have the same members, and null for what a stage has not",
           "[bench][report]") {
-  const nlohmann::ordered_json facts = facts_of(rows_of({1'000'000, 20'000'000}));
+  const nlohmann::ordered_json facts = facts_of(report_of(rows_of({1'000'000, 20'000'000}), 5));
   const auto& rows = facts.at("rows");
   REQUIRE(rows.size() == 12);
   for (const auto& r : rows) CHECK(r.size() == rows.front().size());
@@ -112,7 +95,7 @@ TEST_CASE("scale report: rows have the same members, and null for what a stage h
   CHECK(rows[2]["floor_share"].is_null());
   CHECK(rows[3]["floor_share"].is_null());
   CHECK(rows[2]["wall_ns_each"] == Approx(3e7));
-  CHECK(rows[2]["cpu_ns_per_point"] == Approx(6e7));
+  CHECK(rows[2]["cpu_ns_each"] == Approx(6e7));
   CHECK(rows[2]["hit_rate"] == Approx(0.995));
   for (const char* member : {"hit_rate", "hits", "receivers"}) CHECK(rows[0][member].is_null());
   for (const char* member : {"file_bytes", "bytes_per_node"}) CHECK(rows[2][member].is_null());
@@ -123,7 +106,7 @@ TEST_CASE("scale report: rows have the same members, and null for what a stage h
 
 TEST_CASE("scale report: panels of time, receivers, memory and bytes; limits are dashed",
           "[bench][report]") {
-  const Chart chart = chart_of(rows_of({1'000'000, 20'000'000}));
+  const Chart chart = report_of(rows_of({1'000'000, 20'000'000}), 5).figures.front().chart;
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
   CHECK(titles ==
@@ -154,7 +137,7 @@ TEST_CASE("scale report: files and text of one size and of several", "[bench][re
   for (const std::vector<std::uint64_t>& sizes :
        {std::vector<std::uint64_t>{1'000'000}, {1'000'000, 20'000'000, 200'000'000}}) {
     const std::vector<ScaleRow> rows = rows_of(sizes);
-    write_reports(dir.path(), rows);
+    write_files(dir.path(), report_of(rows, 5));
     for (const char* ending : {".json", ".csv", ".svg", ".png"}) {
       CHECK(std::filesystem::file_size(dir / (std::string("scale") + ending)) > 100);
     }
@@ -162,9 +145,8 @@ TEST_CASE("scale report: files and text of one size and of several", "[bench][re
     std::size_t lines = 0;
     for (std::string line; std::getline(csv, line);) ++lines;
     CHECK(lines == rows.size() + 1);
-    const std::string text = scale_text(rows);
-    CHECK_THAT(text,
-               Catch::Contains("build floor") && Catch::Contains("    9.0    99.50         5 "));
+    const std::string text = text_of(report_of(rows, 5));
+    CHECK_THAT(text, Catch::Contains("build floor") && Catch::Contains(" 9.0   99.50       5 "));
     CHECK((text.find("nan") == std::string::npos));
   }
 }

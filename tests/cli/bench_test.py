@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import unittest
 
 from programs import ProgramTest, ball, write_ply
@@ -78,9 +79,10 @@ class Bench(ProgramTest):
         self.assertTrue(facts["rows"][0]["met"])
         errors = [r["error"] for r in facts["ladder"]]
         self.assertLess(errors[-1], errors[0] / 5)
-        self.assertLess(facts["slopes"]["fractal"], -0.4)
+        self.assertEqual([s["scene"] for s in facts["slopes"]], ["fractal"])
+        self.assertLess(facts["slopes"][0]["slope"], -0.4)
         self.assertEqual(sorted(p.name for p in charts.iterdir()),
-                         ["error.csv", "error.json", "error.png", "error.svg", "ladder.csv", "ladder.json"])
+                         ["error-ladder.csv", "error-slopes.csv", "error.csv", "error.json", "error.png", "error.svg"])
 
     def test_a_cloud_has_no_mesh_to_be_measured(self):
         cloud = self.here / "balls.ply"
@@ -130,7 +132,7 @@ class Bench(ProgramTest):
         self.assertEqual({axis: axes.count(axis) for axis in axes},
                          {"payload": 51, "node": 6, "leaf": 6, "directions": 4, "pages": 22})
         self.assertTrue(all(row["decode_ns"] if row["axis"] == "pages" else row["us_per_receiver"] for row in rows))
-        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["model-box.png", "model-box.svg", "model.csv", "model.json"])
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["model-box.png", "model-box.svg", "model-scenes.csv", "model.csv", "model.json"])
 
     def test_sorts_of_every_order_are_right_and_leave_their_files_alone(self):
         charts = self.here / "charts"
@@ -205,16 +207,38 @@ class Bench(ProgramTest):
         self.assertEqual([r["stage"] for r in facts["rows"]], 2 * stages)
         self.assertEqual([law["stage"] for law in facts["laws"]], stages[:3])
         for row in facts["rows"]:
-            self.assertGreater(row["wall_low"], 0)
+            self.assertGreater(row["wall_seconds_low"], 0)
             self.assertEqual(row["hit_rate"] is None, row["stage"] != "shade")
             self.assertEqual(row["floor_share"] is None, row["stage"] not in ("build", "verify"))
-            if row["memory_bytes"] > 0:
+            if row["memory_bytes"]:
                 self.assertLess(row["resident_bytes"], 96 << 20)
         small, large = (r for r in facts["rows"] if r["stage"] == "build")
         self.assertEqual(small["spilled_bytes"], 0)
         self.assertGreaterEqual(large["spilled_bytes"], 34 * large["points"])
         self.assertTrue(all(law["predicted_seconds"] > 0 for law in facts["laws"]))
-        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["scale.csv", "scale.json", "scale.png", "scale.svg"])
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["scale-laws.csv", "scale.csv", "scale.json", "scale.png", "scale.svg"])
+
+    def test_results_name_the_run_and_no_path(self):
+        charts, results = self.here / "charts", self.here / "results"
+        scene = self.here / "box.obj"
+        scene.write_text(self.mesh.read_text())
+        self.succeed("ptcbench", "accuracy", scene, "--quick", "--quiet", "--checked", "10", "--repeats", "1",
+                     "--reference-rays", "256", "--method", "ptcx", "--set", "points", "--points", "1k", "-o", charts,
+                     "--results", results, "--name", "little")
+        self.assertEqual(sorted(p.name for p in results.iterdir()),
+                         ["little-box.png", "little-box.svg", "little.md", "little.png", "little.svg"])
+        text = (results / "little.md").read_text()
+        self.assertIn("| command | `ptcbench accuracy box.obj --quick ", text)
+        self.assertIn("--results results --name little` |", text)
+        self.assertIn("Fewer than 5 runs (1)", text)
+        for word in (str(self.here), os.uname().nodename + " "):
+            self.assertNotIn(word, text)
+        rows = json.loads((charts / "little.json").read_text())["rows"]
+        self.assertEqual(text.count("| points | occlusion |") + text.count("| points | bleeding |"), len(rows))
+
+    def test_a_name_of_files_that_leads_elsewhere_is_a_usage_error(self):
+        for name in ("", ".hidden", "../charts", "a/b"):
+            self.fail_with(2, "ptcbench", "sort", "--quick", "-o", self.here / "o", f"--name={name}")
 
     def test_growth_beyond_the_disk_is_the_machines_fault(self):
         message = self.fail_with(3, "ptcbench", "growth", "--points", "40000G", "--panel", "surfels", "-o", self.here)

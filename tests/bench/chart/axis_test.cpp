@@ -29,7 +29,7 @@ std::string names(const Values& ticks) {
 
 }  // namespace
 
-TEST_CASE("axis: a logarithmic one is ticked at 1, 2 and 5 of each decade", "[measure][axis]") {
+TEST_CASE("axis: a logarithmic one is ticked at 1, 2 and 5 of each decade", "[chart][axis]") {
   const Axis axis{3, 700, true};
   CHECK(names(ticks_of(axis)) == "5 10 20 50 100 200 500");
   CHECK(names(ticks_of(axis, 1)) == "10 100");
@@ -39,7 +39,7 @@ TEST_CASE("axis: a logarithmic one is ticked at 1, 2 and 5 of each decade", "[me
 }
 
 TEST_CASE("axis: a logarithmic one over less than three such ticks is ticked as linear",
-          "[measure][axis]") {
+          "[chart][axis]") {
   CHECK(names(ticks_of({21, 90, true})) == "30 40 50 60 70 80 90");
   CHECK(names(ticks_of({21, 90, true}, 1)) == "40 60 80");
   CHECK(names(ticks_of({15, 90, true})) == "20 40 60 80");
@@ -47,7 +47,7 @@ TEST_CASE("axis: a logarithmic one over less than three such ticks is ticked as 
   CHECK(names(ticks_of({20, 100, true})) == "20 50 100");
 }
 
-TEST_CASE("axis: a linear one is ticked at multiples of 1, 2 or 5", "[measure][axis]") {
+TEST_CASE("axis: a linear one is ticked at multiples of 1, 2 or 5", "[chart][axis]") {
   CHECK(names(ticks_of({0, 1})) == "0 0.2 0.4 0.6 0.8 1");
   CHECK(names(ticks_of({0, 1}, 1)) == "0 0.5 1");
   CHECK(names(ticks_of({0, 1}, 2)) == "0 1");
@@ -56,7 +56,7 @@ TEST_CASE("axis: a linear one is ticked at multiples of 1, 2 or 5", "[measure][a
   CHECK(names(ticks_of({0.12, 0.19})) == "0.12 0.13 0.14 0.15 0.16 0.17 0.18 0.19");
 }
 
-TEST_CASE("axis: ticks of any interval lie inside, ascend and are few", "[measure][axis]") {
+TEST_CASE("axis: ticks of any interval lie inside, ascend and are few", "[chart][axis]") {
   for (int exponent = -290; exponent <= 290; exponent += 29) {
     for (const double ratio : {1.0001, 1.3, 2.0, 9.0, 1e3, 1e9}) {
       const double low = 1.7 * std::pow(10.0, exponent);
@@ -78,7 +78,7 @@ TEST_CASE("axis: ticks of any interval lie inside, ascend and are few", "[measur
   }
 }
 
-TEST_CASE("axis: the finest ticks that fit are taken, and two when none does", "[measure][axis]") {
+TEST_CASE("axis: the finest ticks that fit are taken, and two when none does", "[chart][axis]") {
   const Axis axis{3, 70000, true};
   const auto at_most = [&](std::size_t most) {
     return names(ticks_that_fit(
@@ -90,13 +90,13 @@ TEST_CASE("axis: the finest ticks that fit are taken, and two when none does", "
   CHECK(at_most(0) == "100 10k");
 }
 
-TEST_CASE("axis: minor ticks are all nine of a decade, on few decades only", "[measure][axis]") {
+TEST_CASE("axis: minor ticks are all nine of a decade, on few decades only", "[chart][axis]") {
   CHECK(names(minor_ticks({7, 31, true})) == "7 8 9 10 20 30");
   CHECK(minor_ticks({7, 31, false}).empty());
   CHECK(minor_ticks({1, 1.1e6, true}).empty());
 }
 
-TEST_CASE("axis: values lie inside with air around them", "[measure][axis]") {
+TEST_CASE("axis: values lie inside with air around them", "[chart][axis]") {
   for (const bool log : {false, true}) {
     for (const Values& values : {Values{3, 700}, Values{650, 700}, Values{5}, Values{1e-300, 1e300},
                                  Values{1e15, 1e15 + 1}, Values{4e307, 1e-300}}) {
@@ -113,7 +113,7 @@ TEST_CASE("axis: values lie inside with air around them", "[measure][axis]") {
   CHECK(around({-2, 1}, false).low == Approx(-2.18));
 }
 
-TEST_CASE("axis: a linear one begins at 0 unless that wastes more than half", "[measure][axis]") {
+TEST_CASE("axis: a linear one begins at 0 unless that wastes more than half", "[chart][axis]") {
   CHECK(around({3, 6}, false).low == 0);
   CHECK(around({0, 6}, false).low == 0);
   CHECK(around({3.1, 6}, false).low > 2.5);
@@ -121,13 +121,13 @@ TEST_CASE("axis: a linear one begins at 0 unless that wastes more than half", "[
 }
 
 TEST_CASE("axis: a logarithmic one does not blow up differences of a few percent",
-          "[measure][axis]") {
+          "[chart][axis]") {
   const Axis axis = around({100, 101}, true);
   CHECK(axis.high / axis.low == Approx(1.25));
   CHECK(axis.share(std::sqrt(100.0 * 101)) == Approx(0.5));
 }
 
-TEST_CASE("axis: what it cannot show does not stretch it", "[measure][axis]") {
+TEST_CASE("axis: what it cannot show does not stretch it", "[chart][axis]") {
   const Values odd = {NAN, kInfinity, -kInfinity, 5, 50};
   CHECK(around(odd, false).high == Approx(53));
   CHECK(around({0, -3, 5, 50}, true).low == around({5, 50}, true).low);
@@ -142,14 +142,14 @@ TEST_CASE("axis: what it cannot show does not stretch it", "[measure][axis]") {
   }
 }
 
-TEST_CASE("axis: shares are even in values or in their logarithms", "[measure][axis]") {
+TEST_CASE("axis: shares are even in values or in their logarithms", "[chart][axis]") {
   CHECK(Axis{10, 30, false}.share(15) == Approx(0.25));
   CHECK(Axis{10, 1000, true}.share(100) == Approx(0.5));
   CHECK(Axis{10, 1000, true}.share(10) == 0);
   CHECK(Axis{10, 1000, true}.share(1000) == 1);
 }
 
-TEST_CASE("axis: names are short", "[measure][axis]") {
+TEST_CASE("axis: names are short", "[chart][axis]") {
   CHECK(tick_label(0) == "0");
   CHECK(tick_label(0.1 + 0.2) == "0.3");
   CHECK(tick_label(-2.5) == "−2.5");

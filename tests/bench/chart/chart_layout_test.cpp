@@ -49,7 +49,7 @@ bool overlap(const Box& a, const Box& b) {
 
 }  // namespace
 
-TEST_CASE("chart layout: panels lie in the chart and beside each other", "[measure][chart]") {
+TEST_CASE("chart layout: panels lie in the chart and beside each other", "[chart]") {
   for (std::size_t panels = 1; panels <= 7; ++panels) {
     for (unsigned columns = 1; columns <= 5; ++columns) {
       const ChartLayout layout = layout_of(chart_of(panels, columns));
@@ -67,7 +67,7 @@ TEST_CASE("chart layout: panels lie in the chart and beside each other", "[measu
   }
 }
 
-TEST_CASE("chart layout: a legend of many names goes on in the next row", "[measure][chart]") {
+TEST_CASE("chart layout: a legend of many names goes on in the next row", "[chart]") {
   const ChartLayout few = layout_of(chart_of(3, 3, 3));
   const ChartLayout many = layout_of(chart_of(3, 3, 20));
   REQUIRE(many.legend.size() == 20);
@@ -78,7 +78,7 @@ TEST_CASE("chart layout: a legend of many names goes on in the next row", "[meas
   }
 }
 
-TEST_CASE("chart layout: values lie between the axes, names of values apart", "[measure][chart]") {
+TEST_CASE("chart layout: values lie between the axes, names of values apart", "[chart]") {
   const Ruler ruler;
   Chart chart = chart_of(6, 3);
   for (std::size_t i = 0; i < 6; ++i) {  // up to 900, 9k, 90k ...
@@ -103,7 +103,7 @@ TEST_CASE("chart layout: values lie between the axes, names of values apart", "[
   }
 }
 
-TEST_CASE("chart layout: bars and limits widen the axes", "[measure][chart]") {
+TEST_CASE("chart layout: bars and limits widen the axes", "[chart]") {
   Chart chart{"", "", {panel_of({{"a", {{10, 10, 2, 5000}, {20, 20}}}})}};
   chart.panels[0].limits = {{3000, "limit"}, {-1, "cannot be shown"}};
   const ChartLayout layout = layout_of(chart);
@@ -116,7 +116,7 @@ TEST_CASE("chart layout: bars and limits widen the axes", "[measure][chart]") {
   CHECK_FALSE(layout.panels[0].empty);
 }
 
-TEST_CASE("chart layout: a panel is empty when no point has both values", "[measure][chart]") {
+TEST_CASE("chart layout: a panel is empty when no point has both values", "[chart]") {
   const std::vector<ChartSeries> bad = {{"a", {{NAN, 1}, {1, NAN}, {0, 1}, {1, -1}}}, {"b", {}}};
   Chart chart{"", "", {panel_of(bad), panel_of({}), panel_of(bad)}};
   chart.panels[2].log_x = false;  // shows (0, 1)
@@ -126,8 +126,7 @@ TEST_CASE("chart layout: a panel is empty when no point has both values", "[meas
   CHECK_FALSE(layout.panels[2].empty);
 }
 
-TEST_CASE("chart layout: one name has one style, 42 names have different ones",
-          "[measure][chart]") {
+TEST_CASE("chart layout: one name has one style, 42 names have different ones", "[chart]") {
   Chart chart = chart_of(2, 2, 42);
   std::ranges::reverse(chart.panels[1].series);
   const std::vector<SeriesStyle> styles = styles_of(chart);
@@ -142,7 +141,7 @@ TEST_CASE("chart layout: one name has one style, 42 names have different ones",
   CHECK(looks.size() == 42);
 }
 
-TEST_CASE("chart layout: text is wrapped at blanks and at line breaks", "[measure][chart]") {
+TEST_CASE("chart layout: text is wrapped at blanks and at line breaks", "[chart]") {
   const Ruler ruler;
   const std::string text =
       "Median of five runs. Bars from the fastest to the slowest of them.\n"

@@ -72,8 +72,7 @@ void check_refused(const Scratch& scratch, const char* name, const Chart& chart)
 
 }  // namespace
 
-TEST_CASE("chart: an SVG can be searched for titles, axes, names and the note",
-          "[measure][chart]") {
+TEST_CASE("chart: an SVG can be searched for titles, axes, names and the note", "[chart]") {
   const Scratch scratch;
   const std::string svg = svg_of(scratch, sample());
   CHECK(scratch.listing() == "drawn.svg");
@@ -87,7 +86,7 @@ TEST_CASE("chart: an SVG can be searched for titles, axes, names and the note",
   CHECK(title < svg.find("<path"));
 }
 
-TEST_CASE("chart: equal charts are equal bytes, whatever was drawn before", "[measure][chart]") {
+TEST_CASE("chart: equal charts are equal bytes, whatever was drawn before", "[chart]") {
   const Scratch scratch;
   const std::string svg = svg_of(scratch, sample());
   static_cast<void>(drawn(scratch, sample()));
@@ -100,7 +99,7 @@ TEST_CASE("chart: equal charts are equal bytes, whatever was drawn before", "[me
   CHECK(svg_of(scratch, other) != svg);
 }
 
-TEST_CASE("chart: a PNG has two pixels a unit and is mostly white", "[measure][chart]") {
+TEST_CASE("chart: a PNG has two pixels a unit and is mostly white", "[chart]") {
   const Scratch scratch;
   const Image image = drawn(scratch, sample());
   const std::string svg = svg_of(scratch, sample());
@@ -113,7 +112,7 @@ TEST_CASE("chart: a PNG has two pixels a unit and is mostly white", "[measure][c
   CHECK(image.at(0, 0) == glm::vec3(1));
 }
 
-TEST_CASE("chart: a name keeps its colour in another panel", "[measure][chart]") {
+TEST_CASE("chart: a name keeps its colour in another panel", "[chart]") {
   const Scratch scratch;
   const Image image = drawn(scratch, sample());      // the legend is in the left half
   CHECK(count_of(image, false, 0, 114, 178) > 200);  // ours
@@ -122,7 +121,7 @@ TEST_CASE("chart: a name keeps its colour in another panel", "[measure][chart]")
   CHECK(count_of(image, true, 213, 94, 0) > 200);
 }
 
-TEST_CASE("chart: a panel without points says so in its middle", "[measure][chart]") {
+TEST_CASE("chart: a panel without points says so in its middle", "[chart]") {
   const Scratch scratch;
   Chart chart{"", "", {ChartPanel{}}, 1};
   const Image empty = drawn(scratch, chart);
@@ -141,7 +140,7 @@ TEST_CASE("chart: a panel without points says so in its middle", "[measure][char
   CHECK(dark(drawn(scratch, chart)) < dark(empty));
 }
 
-TEST_CASE("chart: a line is broken where a point cannot be shown", "[measure][chart]") {
+TEST_CASE("chart: a line is broken where a point cannot be shown", "[chart]") {
   const Scratch scratch;
   const auto ink = [&](double y) {
     ChartPanel panel;
@@ -153,7 +152,7 @@ TEST_CASE("chart: a line is broken where a point cannot be shown", "[measure][ch
   CHECK(ink(-1) == ink(NAN));
 }
 
-TEST_CASE("chart: the drawing shows dashes, bars, limits and labels", "[measure][chart]") {
+TEST_CASE("chart: the drawing shows dashes, bars, limits and labels", "[chart]") {
   const Scratch scratch;
   const Chart chart = sample();
   const std::string whole = svg_of(scratch, chart);
@@ -183,7 +182,7 @@ TEST_CASE("chart: the drawing shows dashes, bars, limits and labels", "[measure]
   }));
 }
 
-TEST_CASE("chart: no value of any kind breaks a drawing", "[measure][chart]") {
+TEST_CASE("chart: no value of any kind breaks a drawing", "[chart]") {
   const Scratch scratch;
   for (const double value : {0.0, -1.0, double{NAN}, kInfinity, -kInfinity, 1.7e308, -1.7e308,
                              2.3e-308, 5e-324, 4e307}) {
@@ -206,7 +205,7 @@ TEST_CASE("chart: no value of any kind breaks a drawing", "[measure][chart]") {
   }
 }
 
-TEST_CASE("chart: what cannot be drawn is refused and leaves no file", "[measure][chart]") {
+TEST_CASE("chart: what cannot be drawn is refused and leaves no file", "[chart]") {
   const Scratch scratch;
   check_refused(scratch, "a.pdf", sample());
   check_refused(scratch, "svg", sample());
@@ -225,7 +224,7 @@ TEST_CASE("chart: what cannot be drawn is refused and leaves no file", "[measure
   check_refused(scratch, "a.svg", chart);
 }
 
-TEST_CASE("chart: a target that cannot be written keeps what was there", "[measure][chart]") {
+TEST_CASE("chart: a target that cannot be written keeps what was there", "[chart]") {
   const Scratch scratch;
   for (const char* ending : {".svg", ".png"}) {
     const auto name = std::string("a") + ending;

@@ -60,20 +60,20 @@ void check_error(const Image& test, const Image& reference, double expected) {
 
 }  // namespace
 
-TEST_CASE("flip: equal pictures have an error of exactly 0", "[measure][flip]") {
+TEST_CASE("flip: equal pictures have an error of exactly 0", "[chart][flip]") {
   const Image image = noise(23, 11, 1);
   for (const float error : flip(image, image)) REQUIRE(error == 0);
   CHECK(mean_flip(plain(glm::vec3(0.3F)), plain(glm::vec3(0.3F))) == 0);
 }
 
-TEST_CASE("flip: the order of the two pictures does not matter", "[measure][flip]") {
+TEST_CASE("flip: the order of the two pictures does not matter", "[chart][flip]") {
   const Image a = noise(23, 11, 1);
   const Image b = noise(23, 11, 2);
   CHECK(flip(a, b) == flip(b, a));
   CHECK(mean_flip(a, b) == mean_flip(b, a));
 }
 
-TEST_CASE("flip: plain colours have the error that tables of L* a* b* give", "[measure][flip]") {
+TEST_CASE("flip: plain colours have the error that tables of L* a* b* give", "[chart][flip]") {
   const glm::dvec3 black(0);
   const glm::dvec3 white(100, 0, 0);
   const glm::dvec3 red(53.2408, 80.0925, 67.2032);
@@ -88,12 +88,12 @@ TEST_CASE("flip: plain colours have the error that tables of L* a* b* give", "[m
   check_error(plain(glm::vec3(0.2F)), plain(glm::vec3(0.21F)), grey);
 }
 
-TEST_CASE("flip: black against white is 0.967, green against blue exactly 1", "[measure][flip]") {
+TEST_CASE("flip: black against white is 0.967, green against blue exactly 1", "[chart][flip]") {
   CHECK(mean_flip(plain({0, 0, 0}), plain({1, 1, 1})) == Approx(0.96738).margin(1e-5));
   CHECK(mean_flip(plain({0, 1, 0}), plain({0, 0, 1})) == 1);
 }
 
-TEST_CASE("flip: noise has the errors of sums over every neighbour", "[measure][flip]") {
+TEST_CASE("flip: noise has the errors of sums over every neighbour", "[chart][flip]") {
   for (const float pixels_per_degree : {10.0F, 31.5F, 67.0F}) {
     const Image a = noise(17, 12, 3);
     Image b = a;
@@ -107,7 +107,7 @@ TEST_CASE("flip: noise has the errors of sums over every neighbour", "[measure][
   }
 }
 
-TEST_CASE("flip: from farther away a checkerboard looks more like grey", "[measure][flip]") {
+TEST_CASE("flip: from farther away a checkerboard looks more like grey", "[chart][flip]") {
   double before = 1;
   for (const float pixels_per_degree : {5.0F, 10.0F, 20.0F, 40.0F, 80.0F}) {
     const double error =
@@ -118,7 +118,7 @@ TEST_CASE("flip: from farther away a checkerboard looks more like grey", "[measu
   CHECK(before < 0.3);
 }
 
-TEST_CASE("flip: a thin line is seen as a feature beyond its colour", "[measure][flip]") {
+TEST_CASE("flip: a thin line is seen as a feature beyond its colour", "[chart][flip]") {
   const Image grey = plain(glm::vec3(0.4F), 41, 41);
   Image line = grey;
   for (unsigned y = 0; y < 41; ++y) line.pixels[41 * y + 20] = glm::vec3(0.5F);
@@ -134,18 +134,18 @@ TEST_CASE("flip: a thin line is seen as a feature beyond its colour", "[measure]
   CHECK(flip(line, grey)[middle - 20] == 0);
 }
 
-TEST_CASE("flip: values outside [0, 1] are clamped and no number is black", "[measure][flip]") {
+TEST_CASE("flip: values outside [0, 1] are clamped and no number is black", "[chart][flip]") {
   CHECK(mean_flip(plain({-1, 2, NAN}), plain({0, 1, 0})) == 0);
   CHECK(mean_flip(plain({INFINITY, -INFINITY, 1}), plain({1, 0, 1})) == 0);
 }
 
-TEST_CASE("flip: pictures smaller than the filters are compared", "[measure][flip]") {
+TEST_CASE("flip: pictures smaller than the filters are compared", "[chart][flip]") {
   check_error(plain({0, 1, 0}, 1, 1), plain({0, 0, 1}, 1, 1), 1);
   CHECK(flip(noise(1, 30, 1), noise(1, 30, 2)).size() == 30);
   CHECK(flip(noise(30, 1, 1), noise(30, 1, 2), 1000).size() == 30);
 }
 
-TEST_CASE("flip: different sizes, no pixels and impossible eyes are refused", "[measure][flip]") {
+TEST_CASE("flip: different sizes, no pixels and impossible eyes are refused", "[chart][flip]") {
   const Image image = plain({}, 4, 3);
   CHECK_THROWS_AS(flip(image, plain({}, 3, 4)), std::invalid_argument);
   CHECK_THROWS_AS(flip(image, plain({}, 4, 2)), std::invalid_argument);

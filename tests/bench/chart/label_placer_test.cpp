@@ -15,8 +15,7 @@ bool overlap(const Box& a, const Box& b) {
 
 }  // namespace
 
-TEST_CASE("labels: the boxes around a spot keep their distance and their size",
-          "[measure][labels]") {
+TEST_CASE("labels: the boxes around a spot keep their distance and their size", "[chart][labels]") {
   const auto boxes = boxes_around({50, 40}, 6, 20, 10);
   for (const Box& box : boxes) {
     CHECK(box.width() == Approx(20));
@@ -27,7 +26,7 @@ TEST_CASE("labels: the boxes around a spot keep their distance and their size",
   CHECK(boxes[0].bottom < 40);
 }
 
-TEST_CASE("labels: the first box is taken where nothing is in the way", "[measure][labels]") {
+TEST_CASE("labels: the first box is taken where nothing is in the way", "[chart][labels]") {
   LabelPlacer placer(kArea);
   const auto boxes = boxes_around({50, 40}, 6, 20, 10);
   const auto box = placer.place(boxes);
@@ -37,7 +36,7 @@ TEST_CASE("labels: the first box is taken where nothing is in the way", "[measur
 }
 
 TEST_CASE("labels: no label leaves the area or covers a marker or another label",
-          "[measure][labels]") {
+          "[chart][labels]") {
   LabelPlacer placer(kArea);
   const Box marker{60, 60, 66, 66};
   placer.block(marker);
@@ -56,14 +55,14 @@ TEST_CASE("labels: no label leaves the area or covers a marker or another label"
   CHECK(placed.size() < 40);
 }
 
-TEST_CASE("labels: one without room is not placed", "[measure][labels]") {
+TEST_CASE("labels: one without room is not placed", "[chart][labels]") {
   LabelPlacer placer(kArea);
   placer.block({0, 0, 100, 100});
   CHECK_FALSE(placer.place(boxes_around({50, 50}, 6, 20, 10)));
   CHECK_FALSE(LabelPlacer(kArea).place(boxes_around({50, 50}, 6, 101, 10)));
 }
 
-TEST_CASE("labels: lines are avoided, and crossed where they are everywhere", "[measure][labels]") {
+TEST_CASE("labels: lines are avoided, and crossed where they are everywhere", "[chart][labels]") {
   LabelPlacer placer(kArea);
   placer.avoid({50, 40}, {80, 10});  // through the box above right
   const auto boxes = boxes_around({50, 40}, 6, 20, 10);

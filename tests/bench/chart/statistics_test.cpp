@@ -9,7 +9,7 @@
 
 using namespace ptc;
 
-TEST_CASE("spread: of odd and even numbers of runs in any order", "[measure][statistics]") {
+TEST_CASE("spread: of odd and even numbers of runs in any order", "[chart][statistics]") {
   const Spread one = spread_of({7});
   CHECK(one.median == 7);
   CHECK(one.low == 7);
@@ -22,12 +22,12 @@ TEST_CASE("spread: of odd and even numbers of runs in any order", "[measure][sta
   CHECK(spread_of({3, 5}).median == 4);
 }
 
-TEST_CASE("spread: of no run or of what is no number is refused", "[measure][statistics]") {
+TEST_CASE("spread: of no run or of what is no number is refused", "[chart][statistics]") {
   CHECK_THROWS_AS(spread_of({}), std::invalid_argument);
   CHECK_THROWS_AS(spread_of({1, NAN, 2}), std::invalid_argument);
 }
 
-TEST_CASE("errors: four pairs worked out by hand", "[measure][statistics]") {
+TEST_CASE("errors: four pairs worked out by hand", "[chart][statistics]") {
   // Differences 1, -1, 3, 1: squares 12, sum 4.
   const std::vector<double> ours = {2, 1, 6, 5};
   const std::vector<double> reference = {1, 2, 3, 4};
@@ -44,7 +44,7 @@ TEST_CASE("errors: four pairs worked out by hand", "[measure][statistics]") {
   CHECK(relative.reference_mean == 2.5);
 }
 
-TEST_CASE("errors: floats give what their doubles give", "[measure][statistics]") {
+TEST_CASE("errors: floats give what their doubles give", "[chart][statistics]") {
   const std::vector<float> ours = {0.1F, 1, 1e8F};
   const std::vector<float> reference = {0.2F, 1e-9F, 99999992.0F};
   const ErrorStatistics errors = error_statistics(ours, reference);
@@ -57,7 +57,7 @@ TEST_CASE("errors: floats give what their doubles give", "[measure][statistics]"
 }
 
 TEST_CASE("errors: the 99th percentile is the nearest rank of the absolute errors",
-          "[measure][statistics]") {
+          "[chart][statistics]") {
   // Errors 1, -2, 3, ... -+n: the rank is ceil(0.99 n).
   const auto percentile = [](std::size_t n) {
     std::vector<double> ours;
@@ -75,7 +75,7 @@ TEST_CASE("errors: the 99th percentile is the nearest rank of the absolute error
   CHECK(percentile(1000) == 990);
 }
 
-TEST_CASE("errors: one that is no number makes every figure NaN", "[measure][statistics]") {
+TEST_CASE("errors: one that is no number makes every figure NaN", "[chart][statistics]") {
   std::vector<double> ours(300, 1);
   const std::vector<double> reference(300, 0.5);
   for (std::size_t i = 0; i < ours.size(); i += 2) ours[i] = NAN;
@@ -85,7 +85,7 @@ TEST_CASE("errors: one that is no number makes every figure NaN", "[measure][sta
   CHECK(std::isnan(errors.percentile_99));
 }
 
-TEST_CASE("errors: unequal or no values are refused", "[measure][statistics]") {
+TEST_CASE("errors: unequal or no values are refused", "[chart][statistics]") {
   const std::vector<double> two(2);
   const std::vector<double> three(3);
   CHECK_THROWS_AS(error_statistics(two, three), std::invalid_argument);
@@ -94,7 +94,7 @@ TEST_CASE("errors: unequal or no values are refused", "[measure][statistics]") {
 }
 
 TEST_CASE("errors: a reference without a mean above 0 has no relative error",
-          "[measure][statistics]") {
+          "[chart][statistics]") {
   const std::vector<double> ours = {1, 2};
   const std::vector<double> black = {0, 0};
   const ErrorStatistics relative = over_mean(error_statistics(ours, black));
@@ -102,4 +102,19 @@ TEST_CASE("errors: a reference without a mean above 0 has no relative error",
   CHECK(std::isnan(relative.bias));
   CHECK(std::isnan(relative.percentile_99));
   CHECK(relative.reference_mean == 0);
+}
+
+TEST_CASE("power law: it is found again, and its middle where measurements lie about it",
+          "[chart]") {
+  const PowerLaw exact =
+      fit_power_law({{1, 3}, {10, 3 * std::pow(10, 0.7)}, {1000, 3 * std::pow(1000, 0.7)}});
+  CHECK(exact.factor == Approx(3));
+  CHECK(exact.exponent == Approx(0.7));
+  CHECK(exact.at(1e6) == Approx(3 * std::pow(1e6, 0.7)));
+  const PowerLaw noisy = fit_power_law({{1, 2}, {1, 0.5}, {100, 20}, {100, 5}});
+  CHECK(noisy.factor == Approx(1));
+  CHECK(noisy.exponent == Approx(0.5));
+  CHECK(std::isnan(fit_power_law({{5, 1}}).exponent));
+  for (const double x : {3.0, 7.0, 1e6})
+    CHECK(std::isnan(fit_power_law({{x, 1}, {x, 2}, {x, 4}}).at(x)));
 }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -57,6 +56,10 @@ Spread spread_of(std::vector<double> values) {
   return {std::midpoint(values[lower], values[upper]), values.front(), values.back()};
 }
 
+Spread scaled(const Spread& spread, double factor) noexcept {
+  return {spread.median * factor, spread.low * factor, spread.high * factor};
+}
+
 ErrorStatistics error_statistics(std::span<const float> ours, std::span<const float> reference) {
   return statistics_of(ours, reference);
 }
@@ -66,10 +69,31 @@ ErrorStatistics error_statistics(std::span<const double> ours, std::span<const d
 }
 
 ErrorStatistics over_mean(const ErrorStatistics& errors) noexcept {
-  const double mean =
-      errors.reference_mean > 0 ? errors.reference_mean : std::numeric_limits<double>::quiet_NaN();
+  const double mean = errors.reference_mean > 0 ? errors.reference_mean : kNone;
   return {errors.count, errors.rms / mean, errors.bias / mean, errors.percentile_99 / mean,
           errors.reference_mean};
+}
+
+double PowerLaw::at(double x) const {
+  return factor * std::pow(x, exponent);
+}
+
+PowerLaw fit_power_law(const std::vector<std::pair<double, double>>& points) {
+  const auto count = static_cast<double>(points.size());
+  double mean_x = 0, mean_y = 0;
+  for (const auto& [x, y] : points) {
+    mean_x += std::log(x) / count;
+    mean_y += std::log(y) / count;
+  }
+  double xx = 0, xy = 0;
+  for (const auto& [x, y] : points) {
+    xx += (std::log(x) - mean_x) * (std::log(x) - mean_x);
+    xy += (std::log(x) - mean_x) * (std::log(y) - mean_y);
+  }
+  const bool equal = std::ranges::all_of(
+      points, [&](const auto& point) { return point.first == points.front().first; });
+  if (equal) return {kNone, kNone};
+  return {std::exp(mean_y - xy / xx * mean_x), xy / xx};
 }
 
 }  // namespace ptc

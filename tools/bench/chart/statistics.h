@@ -1,8 +1,10 @@
-// What a set of runs and a set of errors come to.
+// What a set of runs and a set of errors come to, and the law by which something grows.
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace ptc {
@@ -14,8 +16,15 @@ struct Spread {
   double high = 0;
 };
 
+/// What was not measured.
+inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+inline constexpr Spread kNoSpread{kNone, kNone, kNone};
+
 /// @throws std::invalid_argument when there is no value, or one is no number
 [[nodiscard]] Spread spread_of(std::vector<double> values);
+
+/// The same runs in another unit.
+[[nodiscard]] Spread scaled(const Spread& spread, double factor) noexcept;
 
 /// How far values are from their reference, in their unit.
 struct ErrorStatistics {
@@ -38,5 +47,15 @@ struct ErrorStatistics {
 /// The same errors as shares of the reference's mean, which stays as it is: for quantities without
 /// a scale of their own, as irradiance. Errors of a reference whose mean is not above 0 are NaN.
 [[nodiscard]] ErrorStatistics over_mean(const ErrorStatistics& errors) noexcept;
+
+/// y = factor x^exponent.
+struct PowerLaw {
+  double factor = 0, exponent = 0;
+  [[nodiscard]] double at(double x) const;
+};
+
+/// Least squares of log y against log x; NaN where all x are equal or there is no point.
+/// @param points  x and y, above 0
+[[nodiscard]] PowerLaw fit_power_law(const std::vector<std::pair<double, double>>& points);
 
 }  // namespace ptc

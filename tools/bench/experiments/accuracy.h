@@ -10,6 +10,7 @@
 
 #include "engine/base/executor.h"
 #include "tools/bench/chart/statistics.h"
+#include "tools/bench/report/report.h"
 #include "tools/bench/scenes/bench_scene.h"
 
 namespace ptc::bench {
@@ -49,8 +50,9 @@ struct AccuracyRow {
   std::string scene, set, method, setting;
   Quantity job = Quantity::occlusion;
   std::size_t receivers = 0;  ///< that were timed
-  Spread us_per_receiver;     ///< CPU time of one core
-  GatherCounts counts;        ///< of a receiver in the mean, times a thousand; zeros of rays
+  Spread us_per_receiver;     ///< CPU time, all threads together
+  Spread wall_us_per_receiver = kNoSpread;
+  GatherCounts counts;  ///< of a receiver in the mean, times a thousand; zeros of rays
   ErrorStatistics occlusion;
   ErrorStatistics irradiance;  ///< over RGB; NaN for the job occlusion
   double flip = 0;             ///< mean over a window of the camera's picture; NaN for other sets
@@ -92,5 +94,10 @@ struct SceneAccuracy {
 [[nodiscard]] SceneAccuracy measure_accuracy(const BenchScene& scene,
                                              const AccuracyOptions& options,
                                              const Executor& executor, Progress& progress);
+
+/// Files "accuracy": the rows, what their errors are against, a chart of all scenes, and one of
+/// each scene.
+/// @param scenes  one or more, of different names
+[[nodiscard]] Report report_of(const std::vector<SceneAccuracy>& scenes, unsigned runs);
 
 }  // namespace ptc::bench

@@ -10,6 +10,7 @@
 #include "engine/base/progress.h"
 #include "engine/ptc.h"
 #include "tools/bench/chart/statistics.h"
+#include "tools/bench/report/report.h"
 
 namespace ptc::bench {
 
@@ -54,5 +55,8 @@ struct BuildRow {
 [[nodiscard]] std::vector<BuildRow> measure_build(
     const BuildBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const std::function<void(const std::vector<BuildRow>&)>& report = {});
+
+/// Files "build": the rows, and charts over points and over the cap.
+[[nodiscard]] Report report_of(const std::vector<BuildRow>& rows, unsigned runs);
 
 }  // namespace ptc::bench

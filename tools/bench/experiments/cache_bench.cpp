@@ -17,13 +17,11 @@
 #include "engine/shade/shader.h"
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/growth.h"
-#include "tools/bench/experiments/timed_runs.h"
+#include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/bench_scene.h"
 
 namespace ptc::bench {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 bool same(const std::vector<Shading>& a, const std::vector<Shading>& b) {
   static_assert(std::is_trivially_copyable_v<Shading>);
@@ -173,7 +171,7 @@ class HitRun {
             .receivers = kLookups,
             .wall = spread_of(times_.wall),
             .cpu = spread_of(times_.cpu),
-            .wait = {kNone, kNone, kNone},
+            .wait = kNoSpread,
             .hit_rate = statistics.hit_rate(),
             .pages = kNone,
             .bytes = kNone,
@@ -224,21 +222,20 @@ class CacheRun {
       if (wants("threads")) measure_threads(scene);
       if (wants("receivers")) {
         shade_under_caps("receivers", scene,
-                         {{.name = "Z-curve"}, {.name = "no order", .shuffled = true}}, {threads_},
-                         1);
+                         {{.name = "Z-curve"}, {.name = "no order", .shuffled = true}}, {threads_});
       }
     }
     if (wants("pages")) {
       for (const auto& [name, levels] :
            {std::pair("a stream a level", 1), {"subtrees", 3}, {"depth-first", kLatticeBits}}) {
-        shade_under_caps("pages", make_scene(levels, 16), {{.name = name}}, {1}, 1);
+        shade_under_caps("pages", make_scene(levels, 16), {{.name = name}}, {1});
       }
     }
     if (wants("sizes")) {
       for (const auto& [name, shift] :
            {std::pair("16 KiB", 14), {"64 KiB", 16}, {"256 KiB", 18}, {"1 MiB", 20}}) {
         shade_under_caps("sizes", make_scene(1, static_cast<std::uint8_t>(shift)), {{.name = name}},
-                         {1}, 1);
+                         {1});
       }
     }
     return std::move(rows_);
@@ -296,7 +293,7 @@ class CacheRun {
           {.name = "io_uring, no read-ahead", .back_end = BackEnd::io_uring, .read_ahead = false});
     } catch (const std::system_error&) {  // then there is no row of it
     }
-    shade_under_caps("back-end", scene, ways, thread_counts(threads_), options_.repeats);
+    shade_under_caps("back-end", scene, ways, thread_counts(threads_));
   }
 
   void measure_threads(const BenchScene& scene) {
@@ -309,12 +306,12 @@ class CacheRun {
         runs.push_back(std::make_unique<ShadeRun>(scene, way, options_.middle_cap, threads));
       }
     }
-    shade("threads", runs, options_.repeats);
+    shade("threads", runs);
   }
 
   void shade_under_caps(const std::string& panel, const BenchScene& scene,
                         const std::vector<ShadeRun::Way>& ways,
-                        const std::vector<unsigned>& threads, unsigned repeats) {
+                        const std::vector<unsigned>& threads) {
     std::vector<std::unique_ptr<ShadeRun>> runs;
     for (const unsigned count : threads) {
       for (const double cap : options_.caps) {
@@ -322,13 +319,12 @@ class CacheRun {
           runs.push_back(std::make_unique<ShadeRun>(scene, way, cap, count));
       }
     }
-    shade(panel, runs, repeats);
+    shade(panel, runs);
   }
 
-  void shade(const std::string& panel, const std::vector<std::unique_ptr<ShadeRun>>& runs,
-             unsigned repeats) {
-    progress_.begin("shade, " + panel, repeats * runs.size(), "runs");
-    for (unsigned repeat = 0; repeat < repeats; ++repeat) {
+  void shade(const std::string& panel, const std::vector<std::unique_ptr<ShadeRun>>& runs) {
+    progress_.begin("shade, " + panel, options_.repeats * runs.size(), "runs");
+    for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
       for (const auto& run : runs) {
         run->run();
         progress_.advance(1);

@@ -12,6 +12,7 @@
 #include "engine/base/progress.h"
 #include "engine/ptc.h"
 #include "tools/bench/chart/statistics.h"
+#include "tools/bench/report/report.h"
 
 namespace ptc::bench {
 
@@ -56,5 +57,8 @@ struct CacheRow {
 [[nodiscard]] std::vector<CacheRow> measure_cache(
     const CacheBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const std::function<void(const std::vector<CacheRow>&)>& report = {});
+
+/// Files "cache": the rows, and a chart of each panel.
+[[nodiscard]] Report report_of(const std::vector<CacheRow>& rows, unsigned runs);
 
 }  // namespace ptc::bench

@@ -2,7 +2,7 @@
 
 #include <unistd.h>
 
-#include <cmath>
+#include <utility>
 
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/run.h"
@@ -29,6 +29,15 @@ class WorkFile {
   std::filesystem::path path_;
 };
 
+/// Seconds of the stage that shades.
+double shading_seconds(const LightingReport& report) {
+  double sum = 0;
+  for (const auto& [stage, seconds] : report.seconds) {
+    if (stage == "shade" || stage == "render") sum += seconds;
+  }
+  return sum;
+}
+
 ErrorRow row_of(const std::string& scene, const char* set, const LightingReport& report) {
   const double pilots = report.tuning->ray_cpu_seconds + report.tuning->shade_cpu_seconds;
   const auto receivers = static_cast<double>(std::max<std::uint64_t>(1, report.receivers));
@@ -39,6 +48,7 @@ ErrorRow row_of(const std::string& scene, const char* set, const LightingReport&
           .check = *report.check,
           .receivers = report.receivers,
           .us_per_receiver = report.shade_cpu_seconds * 1e6 / receivers,
+          .wall_us_per_receiver = shading_seconds(report) * 1e6 / receivers,
           .pilot_share = pilots / std::max(1e-9, pilots + report.shade_cpu_seconds)};
 }
 
@@ -66,17 +76,12 @@ std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, 
 }  // namespace
 
 double SceneErrors::slope() const {
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  std::vector<std::pair<double, double>> measured;
   for (const RungError& rung : rungs) {
-    if (!(rung.error.relative() > 0 && rung.us_per_receiver > 0)) continue;
-    const double time = std::log(rung.us_per_receiver), error = std::log(rung.error.relative());
-    n += 1;
-    x += time;
-    y += error;
-    xx += time * time;
-    xy += time * error;
+    if (rung.error.relative() > 0 && rung.us_per_receiver > 0)
+      measured.emplace_back(rung.us_per_receiver, rung.error.relative());
   }
-  return (n * xy - x * y) / (n * xx - x * x);
+  return fit_power_law(measured).exponent;
 }
 
 SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,

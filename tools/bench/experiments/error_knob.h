@@ -8,6 +8,7 @@
 
 #include "engine/pipeline/quality/tuning.h"
 #include "engine/ptc.h"
+#include "tools/bench/report/report.h"
 #include "tools/bench/scenes/bench_scene.h"
 
 namespace ptc::bench {
@@ -28,7 +29,8 @@ struct ErrorRow {
   CheckReport check;
   std::uint64_t receivers = 0;
   double us_per_receiver = 0;  ///< CPU time, without the pilots'
-  double pilot_share = 0;      ///< of the CPU time of gather and pilots together
+  double wall_us_per_receiver = kNone;
+  double pilot_share = 0;  ///< of the CPU time of gather and pilots together
 
   [[nodiscard]] double measured() const noexcept { return check.discs.relative(); }
 };
@@ -50,5 +52,10 @@ struct SceneErrors {
 [[nodiscard]] SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,
                                          const std::filesystem::path& work, const RunOptions& run,
                                          Progress& progress);
+
+/// Files "error": the rows, the ladder of all settings, its slopes, and a chart of measured against
+/// asked and of error against time.
+/// @param scenes  one or more
+[[nodiscard]] Report report_of(const std::vector<SceneErrors>& scenes, unsigned runs = 1);
 
 }  // namespace ptc::bench

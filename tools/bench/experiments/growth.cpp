@@ -1,14 +1,12 @@
 #include "tools/bench/experiments/growth.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include <fmt/format.h>
 
-#include "engine/base/memory.h"
 #include "engine/io/file/disk_space.h"
 #include "engine/pipeline/run.h"
 #include "engine/scene/light/lights.h"
@@ -16,15 +14,12 @@
 #include "engine/shade/shader.h"
 #include "engine/sort/spill.h"
 #include "tools/bench/experiments/accuracy.h"
-#include "tools/bench/experiments/timed_runs.h"
 #include "tools/bench/references/methods.h"
 #include "tools/bench/references/reference.h"
+#include "tools/bench/references/timed_runs.h"
 
 namespace ptc::bench {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr Spread kNoTime{kNone, kNone, kNone};
 
 GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene,
                  const Executor& executor) {
@@ -34,8 +29,8 @@ GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene,
           .surfels = scene.container().superblock().points,
           .threads = executor.threads(),
           .receivers = scene.sets().front().receivers.size(),
-          .us = kNoTime,
-          .wall_us = kNoTime,
+          .us = kNoSpread,
+          .wall_us = kNoSpread,
           .occlusion_rms = kNone,
           .irradiance_rms = kNone,
           .speedup_discs = kNone,
@@ -64,21 +59,15 @@ class CapRun {
   void run() {
     Shader shader(scene_.container(), options_, executor_);
     Progress silent;
-    const auto start = std::chrono::steady_clock::now();
-    const double before = cpu_seconds();
-    shader.shade(scene_.sets().front().receivers, results_, silent);
-    const double each = 1e6 / static_cast<double>(results_.size());
-    us_.push_back((cpu_seconds() - before) * each);
-    wall_.push_back(
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() * each);
+    costs_.add(timed([&] { shader.shade(scene_.sets().front().receivers, results_, silent); }));
     cache_ = shader.cache_statistics();
   }
 
   void fill(GrowthRow& row) const {
     const auto count = static_cast<double>(results_.size());
     row.threads = executor_.threads();
-    row.us = spread_of(us_);
-    row.wall_us = spread_of(wall_);
+    row.us = costs_.cpu_us(results_.size());
+    row.wall_us = costs_.wall_us(results_.size());
     row.hit_rate = cache_.hit_rate();
     row.pages = static_cast<double>(cache_.misses) / count;
     row.bytes = static_cast<double>(cache_.bytes_read) / count;
@@ -90,7 +79,7 @@ class CapRun {
   Executor executor_;
   ShadeOptions options_;
   std::vector<Shading> results_;
-  std::vector<double> us_, wall_;
+  Costs costs_;
   CacheStatistics cache_;
 };
 
@@ -158,9 +147,7 @@ class GrowthRun {
   [[nodiscard]] bool in_reach(std::uint64_t points) const { return points <= options_.ray_reach; }
 
   [[nodiscard]] BenchScene make_scene(const SceneChoice& choice, std::uint64_t points) {
-    const std::filesystem::path directory =
-        run_.temp_dirs.empty() ? work_ : roomiest(run_.temp_dirs);
-    require_room({&directory, 1}, build_disk_bytes(points), fmt::format("{} surfels", points));
+    require_room({&work_, 1}, build_disk_bytes(points), fmt::format("{} surfels", points));
     const SceneOptions options{.points = points,
                                .shaded_width = 0,
                                .own_points = options_.own_points,
@@ -187,6 +174,7 @@ class GrowthRun {
       if (measured.method != "ptcx" || measured.job != Quantity::bleeding) continue;
       GrowthRow row = row_of(panel, at[next++], scene, executor_);
       row.us = measured.us_per_receiver;
+      row.wall_us = measured.wall_us_per_receiver;
       row.occlusion_rms = measured.occlusion.rms;
       row.irradiance_rms = measured.irradiance.rms;
       row.speedup_discs = measured.speedup_discs;

@@ -10,6 +10,7 @@
 
 #include "engine/base/progress.h"
 #include "tools/bench/chart/statistics.h"
+#include "tools/bench/report/report.h"
 #include "tools/bench/scenes/bench_scene.h"
 
 namespace ptc::bench {
@@ -44,8 +45,8 @@ struct GrowthRow {
   std::uint64_t surfels = 0;
   unsigned threads = 0;
   std::size_t receivers = 0;
-  Spread us;                                     ///< CPU time of a receiver, all threads together
-  Spread wall_us;                                ///< under caps alone
+  Spread us;  ///< CPU time of a receiver, all threads together
+  Spread wall_us;
   double occlusion_rms = 0, irradiance_rms = 0;  ///< over the mean of rays at the same discs
   double speedup_discs = 0,
          speedup_mesh = 0;  ///< Embree's CPU time at the same error of irradiance over ours
@@ -60,6 +61,11 @@ struct GrowthRow {
 [[nodiscard]] std::vector<GrowthRow> measure_growth(
     const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const std::function<void(const std::vector<GrowthRow>&)>& report = {});
+
+/// Files "growth": the rows, and a panel for time against each of what varied; under caps wall time
+/// and what was read, too.
+/// @param rows  one or more
+[[nodiscard]] Report report_of(const std::vector<GrowthRow>& rows, unsigned runs);
 
 /// Bytes on the disk while a city or a mesh of so many surfels is built, at most.
 [[nodiscard]] std::uint64_t build_disk_bytes(std::uint64_t points) noexcept;

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/base/memory.h"
 #include "engine/octree/build_pages.h"
 #include "engine/pipeline/temporary_container.h"
 #include "engine/shade/reference/brute_force.h"
@@ -53,11 +52,12 @@ class GatherStudy {
     const GatherOptions options{.resolution = resolution};
     const auto method =
         make_gather(container, scene_.lights().sky, set_, checked_, options, cache, executor_);
-    std::vector<double> us;
-    for (unsigned repeat = 0; repeat < repeats; ++repeat) us.push_back(method->run());
+    Costs costs;
+    for (unsigned repeat = 0; repeat < repeats; ++repeat) costs.add(method->run());
     row.scene = scene_.name();
     row.solid_angle = static_cast<double>(options.solid_angle);
-    row.us = spread_of(us);
+    row.us = costs.cpu_us(method->receivers());
+    row.wall_us = costs.wall_us(method->receivers());
     compare(row, method->result().checked, reference_.mean);
     return row;
   }

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "tools/bench/chart/statistics.h"
+#include "tools/bench/report/report.h"
 #include "tools/bench/scenes/bench_scene.h"
 
 namespace ptc::bench {
@@ -34,8 +34,6 @@ struct ModelOptions {
 
 /// One variant of one part of the model. NaN: not measured.
 struct ModelRow {
-  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
   std::string scene;
   /// payload; node (all columns, bounds too); leaf (points of one); directions (pixels along a cube
   /// edge); pages
@@ -47,10 +45,10 @@ struct ModelRow {
   double bytes = kNone;  ///< of a `per`; of a node without its group's 24, of a point with its
                          ///< share of everything
   std::string per;       ///< node, point or cube
-  Spread us{
-      kNone, kNone,
-      kNone};  ///< CPU time of a receiver; payloads and nodes: plain gather, decoded beforehand
-  double evaluate_us = kNone;  ///< of that, what the payload takes
+  /// Of a receiver; payloads and nodes: plain gather, decoded beforehand.
+  Spread us = kNoSpread;  ///< CPU time
+  Spread wall_us = kNoSpread;
+  double evaluate_us = kNone;  ///< of the CPU time, what the payload takes
   double decode_ns = kNone;    ///< CPU time to decode one `per`
   double moved =
       kNone;  ///< of pages: the farthest that a point lies from where it was, in its radii
@@ -86,6 +84,10 @@ struct SceneModel {
 /// Of that, the rows of pages.
 [[nodiscard]] std::vector<ModelRow> study_pages(const BenchScene& scene,
                                                 const ModelOptions& options);
+
+/// Files "model": the rows, their scenes, and for each scene a chart: payloads over bytes and over
+/// time, leaves over both, directions over time, pages.
+[[nodiscard]] Report report_of(const std::vector<SceneModel>& scenes, unsigned runs);
 
 /// Sets a row's errors. @param ours  of the same receivers as the reference
 void compare(ModelRow& row, std::span<const Shading> ours, std::span<const Shading> reference);

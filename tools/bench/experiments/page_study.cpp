@@ -12,6 +12,7 @@
 #include "engine/store/container_points.h"
 #include "format/point_page.h"
 #include "tools/bench/experiments/model.h"
+#include "tools/bench/references/timed_runs.h"
 
 namespace ptc::bench {
 namespace {
@@ -81,8 +82,9 @@ class PageStudy {
       stored[i].coding = encoder.encode(pages[i].bytes, stored[i].bytes, columns);
       bytes += static_cast<double>(stored[i].bytes.size());
     }
-    std::vector<double> seconds;
-    for (unsigned repeat = 0; repeat < repeats_; ++repeat) seconds.push_back(decode(pages, stored));
+    Costs costs;
+    for (unsigned repeat = 0; repeat < repeats_; ++repeat)
+      costs.add(timed([&] { decode(pages, stored); }));
     const Superblock& superblock = scene_.container().superblock();
     const auto records = static_cast<double>(nodes ? superblock.nodes : superblock.points);
     return {.scene = scene_.name(),
@@ -93,7 +95,7 @@ class PageStudy {
             .form = form,
             .bytes = bytes / records,
             .per = nodes ? "node" : "point",
-            .decode_ns = 1e9 * spread_of(seconds).median / records};
+            .decode_ns = 1e9 * spread_of(costs.cpu).median / records};
   }
 
  private:
@@ -102,16 +104,13 @@ class PageStudy {
     std::vector<std::byte> bytes;
   };
 
-  [[nodiscard]] double decode(const std::vector<Payload>& pages,
-                              const std::vector<Stored>& stored) const {
+  void decode(const std::vector<Payload>& pages, const std::vector<Stored>& stored) const {
     PageDecoder decoder;
     std::vector<std::byte> payload(scene_.container().page_payload_limit());
-    const double before = cpu_seconds();
     for (std::size_t i = 0; i < pages.size(); ++i) {
       decoder.decode(stored[i].coding, stored[i].bytes,
                      std::span(payload).first(pages[i].bytes.size()), pages[i].columns);
     }
-    return cpu_seconds() - before;
   }
 
   const BenchScene& scene_;

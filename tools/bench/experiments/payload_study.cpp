@@ -16,6 +16,7 @@
 #include "format/scalar.h"
 #include "tools/bench/experiments/model.h"
 #include "tools/bench/experiments/payload.h"
+#include "tools/bench/references/timed_runs.h"
 
 namespace ptc::bench {
 namespace {
@@ -190,18 +191,20 @@ class Study {
   void set_cuts(const Tree& tree, float solid_angle) {
     tree_ = &tree;
     solid_angle_ = solid_angle;
-    cut_us_ = timed(
+    cut_cost_ = for_each(
         [&](std::size_t i) { cuts_[i] = tree.cut(scene_.surfels(), receivers_[i], solid_angle); });
   }
 
   [[nodiscard]] ModelRow measure(const char* axis, const char* variant, const char* form,
                                  double bytes, const See& see) {
-    std::vector<double> evaluate, whole;
+    Costs evaluate, whole;
     std::vector<Shading> results(receivers_.size());
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
-      evaluate.push_back(timed([&](std::size_t i) { add_discs(i, see); }));
-      whole.push_back(cut_us_ + evaluate.back() +
-                      timed([&](std::size_t i) { results[i] = draw(i); }));
+      Cost cost = for_each([&](std::size_t i) { add_discs(i, see); });
+      evaluate.add(cost);
+      cost += cut_cost_;
+      cost += for_each([&](std::size_t i) { results[i] = draw(i); });
+      whole.add(cost);
     }
     ModelRow row{.scene = scene_.name(),
                  .axis = axis,
@@ -210,18 +213,18 @@ class Study {
                  .solid_angle = static_cast<double>(solid_angle_),
                  .bytes = bytes,
                  .per = "node",
-                 .us = spread_of(whole),
-                 .evaluate_us = spread_of(evaluate).median};
+                 .us = whole.cpu_us(receivers_.size()),
+                 .wall_us = whole.wall_us(receivers_.size()),
+                 .evaluate_us = evaluate.cpu_us(receivers_.size()).median};
     compare(row, results, truth_);
     return row;
   }
 
  private:
-  /// CPU microseconds of a receiver.
-  double timed(const std::function<void(std::size_t)>& body) const {
-    const double before = cpu_seconds();
-    executor_.for_each(receivers_.size(), [&](std::size_t i, unsigned) { body(i); });
-    return (cpu_seconds() - before) * 1e6 / static_cast<double>(receivers_.size());
+  /// Calls body(i) for every receiver.
+  Cost for_each(const std::function<void(std::size_t)>& body) const {
+    return timed(
+        [&] { executor_.for_each(receivers_.size(), [&](std::size_t i, unsigned) { body(i); }); });
   }
 
   /// Discs that stand for the nodes of a cut.
@@ -269,7 +272,7 @@ class Study {
   std::vector<Shading> truth_;
   const Tree* tree_ = nullptr;
   float solid_angle_ = 0;
-  double cut_us_ = 0;
+  Cost cut_cost_;
   std::vector<Cut> cuts_;
   std::vector<std::vector<Disc>> discs_;
 };
@@ -311,12 +314,11 @@ std::vector<ModelRow> study_payloads(const BenchScene& scene, std::span<const Re
             study.measure("node", "all columns", "float", kFloatNodeBytes, seen_by(p, floats[i])));
       progress.advance(1);
     }
-    rows.push_back(study.measure("payload", "exact", "float", ModelRow::kNone,
-                                 [&](std::uint32_t at, const glm::vec3& toward) {
-                                   const Node& node = exact.nodes()[at];
-                                   return see_exactly(
-                                       surfels.subspan(node.first_point, node.points), toward);
-                                 }));
+    rows.push_back(study.measure(
+        "payload", "exact", "float", kNone, [&](std::uint32_t at, const glm::vec3& toward) {
+          const Node& node = exact.nodes()[at];
+          return see_exactly(surfels.subspan(node.first_point, node.points), toward);
+        }));
     study.set_cuts(stored, solid_angle);
     const double whole = kBoundsBytes + static_cast<double>(payloads()[cube].stored_bytes());
     rows.push_back(study.measure("node", "all columns", "stored", whole,

@@ -16,7 +16,7 @@
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/scale_answers.h"
 #include "tools/bench/experiments/stored_bytes.h"
-#include "tools/bench/experiments/timed_runs.h"
+#include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
 
 namespace ptc::bench {

@@ -10,6 +10,7 @@
 #include "engine/base/progress.h"
 #include "engine/ptc.h"
 #include "tools/bench/chart/statistics.h"
+#include "tools/bench/report/report.h"
 
 namespace ptc::bench {
 
@@ -61,5 +62,9 @@ struct ScaleRow {
 [[nodiscard]] std::vector<ScaleRow> measure_scale(
     const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const std::function<void(const std::vector<ScaleRow>&)>& report = {});
+
+/// Files "scale": the rows, their laws, and a chart of time, memory and bytes over points.
+/// @param rows  of one or more sizes, ascending
+[[nodiscard]] Report report_of(const std::vector<ScaleRow>& rows, unsigned runs);
 
 }  // namespace ptc::bench

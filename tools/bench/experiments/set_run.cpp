@@ -1,7 +1,6 @@
 #include "tools/bench/experiments/set_run.h"
 
 #include <algorithm>
-#include <limits>
 
 #include <fmt/format.h>
 
@@ -11,7 +10,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr ErrorStatistics kNoErrors{
     .rms = kNone, .bias = kNone, .percentile_99 = kNone, .reference_mean = kNone};
 
@@ -50,7 +48,7 @@ struct SetRun::Entry {
   std::vector<Quantity> jobs;
   const Reference* reference;
   std::unique_ptr<Method> run;
-  std::vector<double> us;
+  Costs costs;
   std::optional<Shadings> result;
 
   [[nodiscard]] bool has(Quantity job) const { return std::ranges::find(jobs, job) != jobs.end(); }
@@ -147,7 +145,7 @@ void SetRun::measure(Progress& progress) {
   progress.begin(scene_.name() + " " + set_.name, options_.repeats * entries_.size(), "runs");
   for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
     for (const auto& entry : entries_) {
-      entry->us.push_back(entry->run->run());
+      entry->costs.add(entry->run->run());
       progress.advance(1);
     }
   }
@@ -172,7 +170,8 @@ std::vector<AccuracyRow> SetRun::timed_rows() const {
                       .setting = entry->setting,
                       .job = job,
                       .receivers = entry->run->receivers(),
-                      .us_per_receiver = spread_of(entry->us),
+                      .us_per_receiver = entry->costs.cpu_us(entry->run->receivers()),
+                      .wall_us_per_receiver = entry->costs.wall_us(entry->run->receivers()),
                       .counts = mean_counts(entry->run->counts()),
                       .occlusion_rms_mesh = kNone,
                       .irradiance_rms_mesh = kNone});

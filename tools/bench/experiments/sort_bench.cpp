@@ -12,7 +12,7 @@
 #include "engine/base/memory.h"
 #include "engine/base/numbers.h"
 #include "engine/io/file/disk_space.h"
-#include "tools/bench/experiments/timed_runs.h"
+#include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
 
 namespace ptc::bench {

@@ -11,6 +11,7 @@
 #include "engine/base/progress.h"
 #include "engine/ptc.h"
 #include "tools/bench/chart/statistics.h"
+#include "tools/bench/report/report.h"
 
 namespace ptc::bench {
 
@@ -52,5 +53,8 @@ struct SortRow {
 [[nodiscard]] std::vector<SortRow> measure_sort(
     const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const std::function<void(const std::vector<SortRow>&)>& report = {});
+
+/// Files "sort": the rows, and a chart of both panels.
+[[nodiscard]] Report report_of(const std::vector<SortRow>& rows, unsigned runs);
 
 }  // namespace ptc::bench

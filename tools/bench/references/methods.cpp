@@ -11,14 +11,6 @@
 namespace ptc::bench {
 namespace {
 
-/// CPU microseconds of one of `count`.
-template <class Body>
-double timed(std::size_t count, const Body& body) {
-  const double before = cpu_seconds();
-  body();
-  return (cpu_seconds() - before) * 1e6 / static_cast<double>(count);
-}
-
 class GatherMethod : public Method {
  public:
   GatherMethod(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
@@ -30,12 +22,11 @@ class GatherMethod : public Method {
                 executor),
         results_(set.receivers.size()) {}
 
-  double run() override {
+  Cost run() override {
     Progress silent;
-    const double us =
-        timed(results_.size(), [&] { shader_.shade(set_.receivers, results_, silent); });
+    const Cost cost = timed([&] { shader_.shade(set_.receivers, results_, silent); });
     static_cast<void>(shader_.cache_statistics());  // gives back the readers of the shared cache
-    return us;
+    return cost;
   }
   [[nodiscard]] std::size_t receivers() const override { return results_.size(); }
   [[nodiscard]] Shadings result() override {
@@ -61,8 +52,8 @@ class OneByOne : public Method {
   OneByOne(const ReceiverSet& set, const Checked& checked, const Executor& executor)
       : set_(set), checked_(checked), executor_(executor) {}
 
-  double run() override {
-    return timed(receivers(), [&] { last_ = shade_all(checked_.receivers); });
+  Cost run() override {
+    return timed([&] { last_ = shade_all(checked_.receivers); });
   }
   [[nodiscard]] std::size_t receivers() const override { return checked_.receivers.size(); }
   [[nodiscard]] Shadings result() override { return {last_, shade_all(checked_.window)}; }
@@ -101,10 +92,10 @@ class PlainMethod : public OneByOne {
         cache_(cache),
         gathers_(executor.threads()) {}
 
-  double run() override {
-    const double us = OneByOne::run();
+  Cost run() override {
+    const Cost cost = OneByOne::run();
     for (auto& gather : gathers_) gather.reset();  // the cache has readers for one method
-    return us;
+    return cost;
   }
   [[nodiscard]] Shadings result() override {
     Shadings shadings = OneByOne::result();

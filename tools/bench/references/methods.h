@@ -9,6 +9,7 @@
 #include "engine/base/executor.h"
 #include "engine/shade/shader.h"
 #include "tools/bench/references/ray_baseline.h"
+#include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/bench_scene.h"
 
 namespace ptc::bench {
@@ -31,8 +32,8 @@ struct Shadings {
 class Method {
  public:
   virtual ~Method() = default;
-  /// Shades, and returns CPU microseconds of a receiver.
-  virtual double run() = 0;
+  /// Shades all its receivers once.
+  virtual Cost run() = 0;
   /// Receivers that run() times.
   [[nodiscard]] virtual std::size_t receivers() const = 0;
   /// What the last run gave; the window may take a run of its own.

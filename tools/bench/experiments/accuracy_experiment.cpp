@@ -1,0 +1,157 @@
+#include <bit>
+
+#include "tools/bench/experiments/accuracy.h"
+#include "tools/bench/experiments/accuracy_chart.h"
+#include "tools/bench/experiments/experiment.h"
+#include "tools/values.h"
+
+namespace ptc::bench {
+namespace {
+
+constexpr char kReading[] =
+    "Time of a receiver against its error. ptcx is the hierarchical gather over its settings, "
+    "plain the gather of one receiver at a time, embree-discs and embree-mesh are Sobol-Owen "
+    "rays at the same discs and at the mesh with baked light, single or in packets, whichever is "
+    "faster. Errors are root mean square, mean and 99th percentile over the mean of rays at the "
+    "same model; occlusion is timed alone by any-hit rays, bleeding is occlusion and irradiance. "
+    "The last two columns tell how much longer Embree takes for the same error.";
+
+Value times_thousand(const AccuracyRow& row, std::uint64_t count) {
+  return when(row.counts.receivers > 0, static_cast<double>(count) / 1000);
+}
+
+const Columns<AccuracyRow>& columns() {
+  using R = AccuracyRow;
+  static const Columns<R> columns{
+      {"scene", {"scene"}, &R::scene},
+      {"set", {"receivers"}, &R::set},
+      {"job", {"of"}, [](const R& r) { return std::string(name_of(r.job)); }},
+      {"method", {"method"}, &R::method},
+      {"setting", {"setting"}, &R::setting},
+      {"receivers", {"timed"}, &R::receivers},
+      {"us_per_receiver", {"CPU us each", "{:.1f}"}, &R::us_per_receiver},
+      {"wall_us_per_receiver", {"wall us each", "{:.1f}"}, &R::wall_us_per_receiver},
+      {"ao_rms", percent("occlusion RMS %"), path(&R::occlusion, &ErrorStatistics::rms)},
+      {"e_rms", percent("irradiance RMS %"), path(&R::irradiance, &ErrorStatistics::rms)},
+      {"bias", percent("bias %", "{:+.2f}"), [](const R& r) { return r.error().bias; }},
+      {"p99", percent("p99 %", "{:.1f}"), [](const R& r) { return r.error().percentile_99; }},
+      {"flip", {"FLIP", "{:.4f}"}, &R::flip},
+      {"ao_rms_mesh", {}, &R::occlusion_rms_mesh},
+      {"e_rms_mesh", {}, &R::irradiance_rms_mesh},
+      {"speedup_discs", {"times, discs", "{:.1f}"}, &R::speedup_discs},
+      {"speedup_mesh", {"times, mesh", "{:.1f}"}, &R::speedup_mesh},
+      {"groups", {}, [](const R& r) { return times_thousand(r, r.counts.groups); }},
+      {"surfel_blocks", {}, [](const R& r) { return times_thousand(r, r.counts.surfel_blocks); }},
+      {"clusters", {}, [](const R& r) { return times_thousand(r, r.counts.clusters); }},
+      {"surfels", {}, [](const R& r) { return times_thousand(r, r.counts.surfels); }},
+      {"retests", {}, [](const R& r) { return times_thousand(r, r.counts.retests); }}};
+  return columns;
+}
+
+/// A reference and the size of its scene.
+struct ReferenceRow {
+  const ReferenceNote* note;
+  const SceneAccuracy* scene;
+};
+
+const Columns<ReferenceRow>& reference_columns() {
+  using R = ReferenceRow;
+  const auto noted = [](auto member) { return [member](const R& r) { return r.note->*member; }; };
+  constexpr char kNumber[] = "{:.4g}", kShare[] = "{:.2g}";
+  static const Columns<R> columns{
+      {"scene", {"scene"}, noted(&ReferenceNote::scene)},
+      {"set", {"receivers"}, noted(&ReferenceNote::set)},
+      {"surfels", {"surfels"}, [](const R& r) { return r.scene->surfels; }},
+      {"triangles", {"triangles"}, [](const R& r) { return r.scene->triangles; }},
+      {"receivers", {"checked"}, noted(&ReferenceNote::receivers)},
+      {"rays", {"rays each"}, noted(&ReferenceNote::rays)},
+      {"ao_mean", {"mean occlusion", kNumber}, noted(&ReferenceNote::occlusion_mean)},
+      {"e_mean", {"mean irradiance", kNumber}, noted(&ReferenceNote::irradiance_mean)},
+      {"ao_noise", percent("noise %", kShare), noted(&ReferenceNote::occlusion_noise)},
+      {"e_noise", percent("noise, light %", kShare), noted(&ReferenceNote::irradiance_noise)},
+      {"ao_floor", percent("discs to mesh %", kShare), noted(&ReferenceNote::occlusion_floor)},
+      {"e_floor", percent("discs to mesh, light %", kShare),
+       noted(&ReferenceNote::irradiance_floor)}};
+  return columns;
+}
+
+}  // namespace
+
+Report report_of(const std::vector<SceneAccuracy>& scenes, unsigned runs) {
+  std::vector<AccuracyRow> rows;
+  std::vector<ReferenceRow> references;
+  Report report{.name = "accuracy",
+                .title = "Time against error",
+                .reading = kReading,
+                .runs = runs,
+                .figures = {{.chart = chart_of(scenes)}}};
+  for (const SceneAccuracy& scene : scenes) {
+    rows.insert(rows.end(), scene.rows.begin(), scene.rows.end());
+    for (const ReferenceNote& note : scene.references) references.push_back({&note, &scene});
+    report.figures.push_back({.part = scene.name(), .chart = chart_of(scene)});
+  }
+  report.tables = {
+      tabulate<AccuracyRow>({.name = "rows", .group = "scene"}, columns(), rows),
+      tabulate<ReferenceRow>({.name = "references", .title = "What the errors are against"},
+                             reference_columns(), references)};
+  return report;
+}
+
+Experiment make_accuracy_experiment() {
+  const auto options = std::make_shared<AccuracyOptions>();
+  const auto scenes = std::make_shared<SceneList>();
+  const auto declare = [=](Declaration& d) {
+    constexpr char kExpert[] = "Expert";
+    const auto is_power_of_two = [](const std::string& text) {
+      const auto rays = parse_number<unsigned>(text);
+      return rays && std::has_single_bit(*rays) ? std::string()
+                                                : "must be a power of two, is " + text;
+    };
+    SceneOptions& scene = options->scene;
+    d.scenes(*scenes);
+    d.points(scene.points, "2M", 200'000);
+    d.checked(options->checked, 200);
+    add_integer(d.command(), "--reference-rays", options->reference_rays, 16, 65536,
+                "Rays of each half of a reference, a power of two")
+        ->check(is_power_of_two);
+    d.repeats(options->repeats, 3);
+    d.list("--setting", "SR,RAD,R[,X]", options->settings, parse_setting,
+           "Measure PTCX with this solid angle, parallax, resolution and inflation, in place of a "
+           "list from coarse to fine; repeatable")
+        ->group(kExpert);
+    const std::vector<GatherOptions> all = AccuracyOptions::default_settings();
+    d.quick("--setting", options->settings, {all[0], all[2], all[3], all[5]});
+    d.words("--method", options->methods, "Measure this method, not all; repeatable")
+        ->group(kExpert);
+    d.words("--set", options->sets,
+            "Shade these receivers: pixels of a picture, or the scene's own points; repeatable")
+        ->group(kExpert);
+    // In the middle of the picture: as dense as all of it, or less would be shared.
+    d.quick(scene.shaded_width, 192);
+    d.quick(scene.shaded_height, 108);
+    d.quick(scene.window_width, 48);
+    d.quick(scene.window_height, 27);
+    d.quick(scene.own_points, 8'192);
+    d.quick(options->rays, {64, 256, 1024, 4096});
+    d.quick(options->plain_solid_angles, {0.01F});
+  };
+  const auto run = [=](const Bench& b) {
+    const Executor executor(b.run.threads);
+    return measure_scenes(*scenes, options->repeats, b, [&](const SceneChoice& choice) {
+      const BenchScene scene(choice, options->scene, b.work, b.run, b.progress);
+      return measure_accuracy(scene, *options, executor, b.progress);
+    });
+  };
+  return {.name = "accuracy",
+          .purpose =
+              "Time per receiver against error: PTCX over its settings, the plain gather, "
+              "Embree on the same discs and on the mesh",
+          .quick =
+              "Under a minute a scene on two cores: 200k points, fewer receivers of each set "
+              "(192 x 108 pixels, 8k points), 200 of them checked, 3 runs of fewer settings",
+          .declare = declare,
+          .run = run,
+          .check = [scenes] { scenes->check(); }};
+}
+
+}  // namespace ptc::bench

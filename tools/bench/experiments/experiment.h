@@ -1,0 +1,71 @@
+// What a command of ptcbench is: options with what --quick makes of them, and a measurement.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "engine/base/progress.h"
+#include "engine/pipeline/pipeline.h"
+#include "tools/bench/experiments/declaration.h"
+#include "tools/bench/report/report.h"
+
+namespace ptc::bench {
+
+/// Where and how an experiment runs.
+struct Bench {
+  std::filesystem::path work;  ///< directory for its temporary files, which are gone at the end
+  RunOptions run;
+  Progress& progress;
+  std::function<void(const Report&)> publish;  ///< takes the report of what was measured so far
+};
+
+struct Experiment {
+  const char* name;     ///< the command's word, and the name of its files
+  const char* purpose;  ///< what is measured, against what
+  const char* quick;    ///< what --quick does, for the help
+  /// Declares the experiment's own options.
+  std::function<void(Declaration&)> declare;
+  /// @throws DataError when an answer is wrong; std::system_error
+  std::function<Report(const Bench&)> run;
+  /// Refuses what cannot be measured, before anything is written; may be empty.
+  /// @throws CLI::ValidationError, std::invalid_argument for options; DataError for files
+  std::function<void()> check{};
+};
+
+[[nodiscard]] Experiment make_accuracy_experiment();
+[[nodiscard]] Experiment make_build_experiment();
+[[nodiscard]] Experiment make_cache_experiment();
+[[nodiscard]] Experiment make_error_experiment();
+[[nodiscard]] Experiment make_growth_experiment();
+[[nodiscard]] Experiment make_model_experiment();
+[[nodiscard]] Experiment make_scale_experiment();
+[[nodiscard]] Experiment make_sort_experiment();
+
+/// Publishes the report of the rows so far as they come. @return the report of all
+/// @param measure  calls its last argument whenever there are more rows
+template <class Row, class Options>
+[[nodiscard]] Report measure_rows(
+    std::vector<Row> (*measure)(const Options&, const std::filesystem::path&, const RunOptions&,
+                                Progress&, const std::function<void(const std::vector<Row>&)>&),
+    const Options& options, const Bench& bench) {
+  const auto so_far = [&](const std::vector<Row>& rows) {
+    bench.publish(report_of(rows, options.repeats));
+  };
+  return report_of(measure(options, bench.work, bench.run, bench.progress, so_far),
+                   options.repeats);
+}
+
+/// The same for scenes. @param measure  takes a SceneChoice and gives what report_of() takes
+template <class Measure>
+[[nodiscard]] Report measure_scenes(const SceneList& scenes, unsigned runs, const Bench& bench,
+                                    const Measure& measure) {
+  std::vector<std::invoke_result_t<Measure, const SceneChoice&>> done;
+  for (const SceneChoice& choice : scenes.choices()) {
+    done.push_back(measure(choice));
+    bench.publish(report_of(done, runs));
+  }
+  return report_of(done, runs);
+}
+
+}  // namespace ptc::bench

@@ -1,0 +1,207 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "tools/bench/experiments/experiment.h"
+#include "tools/bench/experiments/scale_law.h"
+#include "tools/values.h"
+
+namespace ptc::bench {
+namespace {
+
+constexpr char kReading[] =
+    "The procedural city under one memory cap. build: generated, sorted, built into a container. "
+    "verify: every byte read and checked (level 2). shade: occlusion and bleeding of some of its "
+    "points, evenly spread. Verify and shade begin with the file out of the system's cache. "
+    "Limits: build floor and verify floor are the same disk moving the bytes of build and verify "
+    "with nothing done to them, past the system's cache; memcpy is one thread copying the "
+    "records once. Each: of a point, or of a receiver in shade. Peaks are what a stage adds to "
+    "the program. All runs of a size gave the same container and the same finite values.";
+
+double each_ns(const ScaleRow& row) {
+  return 1e9 / static_cast<double>(row.items());
+}
+
+double hit_rate(const ScaleRow& row) {
+  const auto lookups = static_cast<double>(row.hits + row.misses);
+  return lookups > 0 ? static_cast<double>(row.hits) / lookups : kNone;
+}
+
+double floor_share(const std::vector<ScaleRow>& rows, const ScaleRow& row) {
+  const auto found = std::ranges::find_if(rows, [&](const ScaleRow& r) {
+    return r.points == row.points && r.stage == row.stage + " floor";
+  });
+  return found == rows.end() ? kNone : found->wall.median / row.wall.median;
+}
+
+double mebibytes(std::uint64_t bytes) {
+  return static_cast<double>(bytes) / kMebi;
+}
+
+Columns<ScaleRow> columns_of(const std::vector<ScaleRow>& rows) {
+  using R = ScaleRow;
+  const auto only = [](const char* stage, auto member) {
+    return [stage, member](const R& r) { return when(r.stage == stage, r.*member); };
+  };
+  return {{"stage", {"stage"}, &R::stage},
+          {"points", {"points"}, &R::points},
+          {"receivers", {"receivers"}, only("shade", &R::receivers)},
+          {"threads", {"threads"}, &R::threads},
+          {"memory_bytes",
+           {"cap MiB", "{:.0f}", kMebi},
+           [](const R& r) { return when(r.memory_bytes > 0, r.memory_bytes); }},
+          {"wall_seconds", {"wall s", "{:.3f}"}, &R::wall},
+          {"wall_ns_each",
+           {"wall ns each", "{:.1f}"},
+           [](const R& r) { return each_ns(r) * r.wall.median; }},
+          {"cpu_ns_each",
+           {"CPU ns each", "{:.1f}"},
+           [](const R& r) { return scaled(r.cpu, each_ns(r)); }},
+          {"resident_bytes", {"peak MiB", "{:.0f}", kMebi}, &R::resident_bytes},
+          {"moved_bytes", {"moved GB", "{:.3f}", kGiga}, &R::moved_bytes},
+          {"disk_bytes", {"disk gave GB", "{:.3f}", kGiga}, &R::disk_bytes},
+          {"spilled_bytes", {"spilled GB", "{:.2f}", kGiga}, only("build", &R::spilled_bytes)},
+          {"file_bytes", {"file GB", "{:.2f}", kGiga}, only("build", &R::file_bytes)},
+          {"nodes", {"nodes"}, only("build", &R::nodes)},
+          {"bytes_per_point", {"bytes a point", "{:.2f}"}, only("build", &R::bytes_per_point)},
+          {"bytes_per_node", {"bytes a node", "{:.2f}"}, only("build", &R::bytes_per_node)},
+          {"rebuilt", {"tree built again"}, only("verify", &R::rebuilt)},
+          {"cap_share", percent("pages that fit %", "{:.1f}"), only("shade", &R::cap_share)},
+          {"hits", {}, only("shade", &R::hits)},
+          {"hit_rate", percent("hits %"), hit_rate},
+          {"misses", {"misses"}, only("shade", &R::misses)},
+          {"floor_share", percent("floor %", "{:.0f}"),
+           [&rows](const R& r) { return floor_share(rows, r); }}};
+}
+
+const Columns<ScaleLaw>& law_columns() {
+  using R = ScaleLaw;
+  static const Columns<R> columns{
+      {"stage", {"stage"}, &R::stage},
+      {"time_exponent", {"time grows as points^", "{:.3f}"}, &R::time_exponent},
+      {"resident_exponent", {"peak grows as points^", "{:.3f}"}, &R::resident_exponent},
+      {"predicted_points", {}, [](const ScaleLaw&) { return kPredictedPoints; }},
+      {"predicted_seconds", {"s at 1.7 billion", "{:.0f}"}, &R::predicted_seconds},
+      {"time_ratio", {"times the time each", "{:.3f}"}, &R::time_ratio},
+      {"resident_ratio", {"times the peak", "{:.3f}"}, &R::resident_ratio}};
+  return columns;
+}
+
+ScaleLaw law_of(const std::vector<ScaleRow>& rows, const char* stage) {
+  std::vector<const ScaleRow*> sizes;
+  for (const ScaleRow& row : rows) {
+    if (row.stage == stage) sizes.push_back(&row);
+  }
+  std::vector<std::pair<double, double>> times, residents;
+  for (const ScaleRow* row : sizes) {
+    times.emplace_back(row->points, row->wall.median);
+    residents.emplace_back(row->points, row->resident_bytes);
+  }
+  const PowerLaw time = fit_power_law(times);
+  ScaleLaw law{.stage = stage,
+               .time_exponent = time.exponent,
+               .resident_exponent = fit_power_law(residents).exponent,
+               .predicted_seconds = kNone,
+               .time_ratio = kNone,
+               .resident_ratio = kNone};
+  const ScaleRow& greatest = *sizes.back();
+  if (greatest.points < kPredictedPoints)
+    law.predicted_seconds = time.at(static_cast<double>(kPredictedPoints));
+  const auto least =
+      std::ranges::find_if(sizes, [](const ScaleRow* row) { return row->points >= kLargePoints; });
+  if (least == sizes.end() || (*least)->points == greatest.points) return law;
+  law.time_ratio =
+      each_ns(greatest) * greatest.wall.median / (each_ns(**least) * (*least)->wall.median);
+  law.resident_ratio =
+      static_cast<double>(greatest.resident_bytes) / static_cast<double>((*least)->resident_bytes);
+  return law;
+}
+
+void add_point(ChartPanel& panel, const std::string& name, bool dashed, const ScaleRow& row,
+               double y, const std::string& label = {}) {
+  series_of(panel, name, dashed)
+      .points.push_back({.x = static_cast<double>(row.points), .y = y, .label = label});
+}
+
+Chart chart_of(const std::vector<ScaleRow>& rows) {
+  ChartPanel time{
+      .title = "Time of a point", .x_label = "points", .y_label = "wall time per point, ns"};
+  ChartPanel shade{
+      .title = "Time of a receiver", .x_label = "points", .y_label = "wall time per receiver, us"};
+  ChartPanel memory{.title = "Memory", .x_label = "points", .y_label = "most resident, MiB"};
+  ChartPanel bytes{.title = "Bytes", .x_label = "points", .y_label = "bytes per point"};
+  memory.limits.push_back({.y = mebibytes(rows.front().memory_bytes), .label = "cap"});
+  const auto per_point = [](std::uint64_t count, const ScaleRow& row) {
+    return static_cast<double>(count) / static_cast<double>(row.points);
+  };
+  for (const ScaleRow& row : rows) {
+    const bool limit = row.memory_bytes == 0;
+    const double each = each_ns(row) * row.wall.median;
+    if (row.stage == "shade") {
+      const double rate = hit_rate(row);
+      add_point(shade, row.stage, false, row, each / 1000,
+                std::isfinite(rate) ? fmt::format("{:.2f} % hits", 100 * rate) : "");
+      add_point(bytes, "read by shade", false, row, per_point(row.moved_bytes, row));
+    } else {
+      add_point(time, row.stage, limit, row, each);
+    }
+    if (!limit) add_point(memory, row.stage, false, row, mebibytes(row.resident_bytes));
+    if (row.stage != "build") continue;
+    add_point(bytes, "moved by build", false, row, per_point(row.moved_bytes, row));
+    add_point(bytes, "container", false, row, per_point(row.file_bytes, row));
+  }
+  return {.title = "From a city to shaded receivers",
+          .note = kReading,
+          .panels = {time, shade, memory, bytes},
+          .columns = 2};
+}
+
+}  // namespace
+
+std::vector<ScaleLaw> laws_of(const std::vector<ScaleRow>& rows) {
+  return {law_of(rows, "build"), law_of(rows, "verify"), law_of(rows, "shade")};
+}
+
+Report report_of(const std::vector<ScaleRow>& rows, unsigned runs) {
+  const std::vector<ScaleLaw> laws = laws_of(rows);
+  return {.name = "scale",
+          .title = "From a city to shaded receivers",
+          .reading = kReading,
+          .runs = runs,
+          .tables = {tabulate<ScaleRow>({.name = "rows"}, columns_of(rows), rows),
+                     tabulate<ScaleLaw>({.name = "laws", .title = "The law by which stages grow"},
+                                        law_columns(), laws)},
+          .notes = {"The last two columns of the law: the greatest size over the least of 20 "
+                    "million or more."},
+          .figures = {{.chart = chart_of(rows)}}};
+}
+
+Experiment make_scale_experiment() {
+  const auto options = std::make_shared<ScaleOptions>();
+  const auto declare = [options](Declaration& d) {
+    d.points(options->points,
+             "Points of the city, in place of 1M, 5M and 20M; repeatable; 1000 or more",
+             {200'000, 1'000'000});
+    add_count(d.command(), "--receivers", options->receivers, "Of them, spread evenly")
+        ->default_str("100k");
+    d.quick("--receivers", options->receivers, 8'000);
+    d.repeats(options->repeats, 2);
+  };
+  const auto check = [options] {
+    const std::uint64_t least = options->points.front();
+    if (least < 1000) refuse("--points", std::to_string(least), "1000 or more");
+  };
+  return {.name = "scale",
+          .purpose =
+              "From a procedural city to shaded receivers, end to end under the cap: time, "
+              "bytes, memory and cache hits of build, verification and shading at growing "
+              "sizes, and their law",
+          .quick = "Under a minute on two cores: 200k and 1M points, 8k receivers, 2 runs",
+          .declare = declare,
+          .run = [options](const Bench& b) { return measure_rows(measure_scale, *options, b); },
+          .check = check};
+}
+
+}  // namespace ptc::bench
