@@ -79,6 +79,9 @@ TEST_CASE("results: few runs and a changed tree are stated, and nothing else is"
   const std::string few = results_text(report(4), circumstances(false));
   CHECK_THAT(few, Catch::Contains("**Fewer than 5 runs (4)**"));
   CHECK(few.find("not committed") == std::string::npos);
+  const std::string counted = results_text(report(0), circumstances(false));
+  CHECK(counted.find("Fewer") == std::string::npos);
+  CHECK_THAT(counted, Catch::Contains("| runs | 1, of counts that do not vary |"));
   const std::string changed = results_text(report(5), circumstances(true));
   CHECK_THAT(changed, Catch::Contains("| commit | 0123456789ab with changes |") &&
                           Catch::Contains("not committed"));

@@ -16,16 +16,16 @@ namespace {
 using namespace ptc::bench;
 
 constexpr char kPurpose[] =
-    "Measures time and error together, against rays at the same scene in the same run, and draws\n"
-    "charts of one against the other, of how time grows, or of what each part of the model is "
-    "worth;\n"
-    "sort and build beside the disk; the page cache; and all of it at growing sizes. Scenes are "
-    "held\n"
-    "in memory whole; --memory caps sort, build and scale alone.";
+    "Measures time and error together, against rays at the same scene in the same run; how time\n"
+    "grows, and what each part of the model is worth; sort, build and verification beside the "
+    "disk;\n"
+    "the page cache; and all of it at growing sizes. Draws charts and writes tables. Scenes of\n"
+    "accuracy, error, growth and model are held in memory whole, whatever --memory says.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
     "  ptcbench accuracy room.obj --set camera --method ptcx --setting 0.02,0.1,32 -o charts\n"
+    "  ptcbench demo dragon.ply.gz+backdrop --memory 256M -o charts --results results\n"
     "  ptcbench error fractal window city dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench growth --quick -o charts\n"
     "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o "
@@ -33,12 +33,13 @@ constexpr char kExamples[] =
     "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n"
     "  ptcbench build --points 1M --points 20M --points 200M --memory 1G --temp /scratch -o "
     "charts\n"
-    "  ptcbench cache --quick -o charts --results charts\n"
+    "  ptcbench cache --quick -o charts\n"
     "  ptcbench scale --quick -o charts\n"
     "  ptcbench scale --points 1700M --repeats 1 --memory 2G --temp /scratch -o charts\n"
     "  ptcbench sort --quick -o charts\n"
     "  ptcbench sort --points 200M --panel disk --order city --memory 1G --temp /scratch -o "
-    "charts\n";
+    "charts\n"
+    "  ptcbench verify --quick -o charts\n";
 
 struct Arguments {
   std::filesystem::path directory;
@@ -116,9 +117,11 @@ int main(int argc, char** argv) {
   ptc::Command command("ptcbench", kPurpose, kExamples);
   Arguments arguments;
   std::list<std::pair<Experiment, Declaration>> all;
-  for (const auto make : {make_accuracy_experiment, make_build_experiment, make_cache_experiment,
-                          make_error_experiment, make_growth_experiment, make_model_experiment,
-                          make_scale_experiment, make_sort_experiment}) {
+  for (const auto make :
+       {make_accuracy_experiment, make_build_experiment, make_cache_experiment,
+        make_demo_experiment, make_error_experiment, make_growth_experiment,
+        make_instructions_experiment, make_model_experiment, make_mutations_experiment,
+        make_scale_experiment, make_sort_experiment, make_verify_experiment}) {
     const Experiment experiment = make();
     CLI::App* const app = command.app().add_subcommand(experiment.name, experiment.purpose);
     auto& [kept, declaration] = all.emplace_back(experiment, Declaration(*app));

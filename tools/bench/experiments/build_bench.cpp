@@ -1,7 +1,5 @@
 #include "tools/bench/experiments/build_bench.h"
 
-#include <unistd.h>
-
 #include <array>
 #include <map>
 #include <utility>
@@ -16,6 +14,7 @@
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"
 #include "tools/bench/experiments/stored_bytes.h"
+#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
 
@@ -177,8 +176,8 @@ class BuildRun {
 
   const BuildBenchOptions& options_;
   std::filesystem::path work_;
-  std::filesystem::path target_ = work_ / fmt::format(".ptcx-build-{}.ptcx", getpid());
-  TemporaryName name_{target_};
+  WorkFile file_{work_, ".ptcx"};
+  const std::filesystem::path& target_ = file_.path();
   RunOptions run_;
   Executor executor_;
   Progress& progress_;

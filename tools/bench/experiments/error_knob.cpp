@@ -1,33 +1,15 @@
 #include "tools/bench/experiments/error_knob.h"
 
-#include <unistd.h>
-
 #include <utility>
 
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/run.h"
 #include "engine/shade/lift.h"
 #include "engine/shade/reference/brute_force.h"
+#include "tools/bench/experiments/work_file.h"
 
 namespace ptc::bench {
 namespace {
-
-/// A file of this process that goes when it ends.
-class WorkFile {
- public:
-  WorkFile(const std::filesystem::path& directory, const char* ending)
-      : path_(directory / (".ptcbench-" + std::to_string(getpid()) + ending)) {}
-  ~WorkFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  WorkFile(const WorkFile&) = delete;
-  WorkFile& operator=(const WorkFile&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// Seconds of the stage that shades.
 double shading_seconds(const LightingReport& report) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/base/progress.h"
-#include "engine/pipeline/pipeline.h"
+#include "engine/ptc.h"
 #include "tools/bench/experiments/declaration.h"
 #include "tools/bench/report/report.h"
 
@@ -36,11 +36,15 @@ struct Experiment {
 [[nodiscard]] Experiment make_accuracy_experiment();
 [[nodiscard]] Experiment make_build_experiment();
 [[nodiscard]] Experiment make_cache_experiment();
+[[nodiscard]] Experiment make_demo_experiment();
 [[nodiscard]] Experiment make_error_experiment();
 [[nodiscard]] Experiment make_growth_experiment();
+[[nodiscard]] Experiment make_instructions_experiment();
 [[nodiscard]] Experiment make_model_experiment();
+[[nodiscard]] Experiment make_mutations_experiment();
 [[nodiscard]] Experiment make_scale_experiment();
 [[nodiscard]] Experiment make_sort_experiment();
+[[nodiscard]] Experiment make_verify_experiment();
 
 /// Publishes the report of the rows so far as they come. @return the report of all
 /// @param measure  calls its last argument whenever there are more rows

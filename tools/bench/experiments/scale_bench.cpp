@@ -1,7 +1,5 @@
 #include "tools/bench/experiments/scale_bench.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -16,6 +14,7 @@
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/scale_answers.h"
 #include "tools/bench/experiments/stored_bytes.h"
+#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
 
@@ -188,9 +187,8 @@ class ScaleRun {
 
   const ScaleOptions& options_;
   std::filesystem::path work_;
-  std::filesystem::path scene_ = work_ / fmt::format(".ptcx-scale-{}.ptcx", getpid());
-  std::filesystem::path lit_ = work_ / fmt::format(".ptcx-scale-{}.ply", getpid());
-  TemporaryName scene_name_{scene_}, lit_name_{lit_};
+  WorkFile scene_file_{work_, ".ptcx"}, lit_file_{work_, ".ply"};
+  const std::filesystem::path &scene_ = scene_file_.path(), &lit_ = lit_file_.path();
   RunOptions run_;
   Progress& progress_;
   const std::function<void(const std::vector<ScaleRow>&)>& report_;

@@ -21,7 +21,7 @@ struct Report {
   std::string name;  ///< of its files, without ending
   std::string title;
   std::string reading;               ///< what is measured against what, and how to read it
-  unsigned runs = 1;                 ///< of each measurement
+  unsigned runs = 1;                 ///< of each measurement; 0: nothing was timed
   std::vector<Table> tables;         ///< one or more
   std::vector<std::string> notes{};  ///< a sentence or more each, about these figures
   std::vector<Figure> figures{};

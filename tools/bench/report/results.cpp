@@ -8,7 +8,7 @@ namespace {
 /// What a reader must know before a number is quoted; empty where nothing is against it.
 std::string reservations(const Report& report, const Circumstances& c) {
   std::string text;
-  if (report.runs < kEnoughRuns) {
+  if (report.runs > 0 && report.runs < kEnoughRuns) {
     text += fmt::format("**Fewer than {} runs ({})**: the spread is not known well.\n", kEnoughRuns,
                         report.runs);
   }
@@ -29,7 +29,8 @@ std::string head_of(const Report& report, const Circumstances& c) {
          row("load before", fmt::format("{:.2f} running threads", c.load)) +
          row("commit", c.commit + (c.changed ? " with changes" : "")) +
          row("date", c.date + " UTC") + row("command", "`" + c.command + "`") +
-         row("runs", std::to_string(report.runs));
+         row("runs",
+             report.runs > 0 ? std::to_string(report.runs) : "1, of counts that do not vary");
 }
 
 std::string links_of(const Report& report) {

@@ -97,29 +97,38 @@ std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts) {
   return choices;
 }
 
+SceneRequest request_scene(const SceneChoice& choice, const SceneOptions& options,
+                           const RunOptions& run) {
+  SceneRequest scene{.build = {.backdrop = choice.backdrop, .profile = options.profile, .run = run},
+                     .lit = {}};
+  scene.build.sampling.count = options.points;
+  scene.build.tree.levels_per_stream = options.levels_per_stream;
+  scene.build.page_shift = options.page_shift;
+  if (!choice.file.empty()) {
+    scene.build.inputs.push_back(choice.file);
+  } else if (choice.name == "city") {
+    scene.build.city_points = options.points;
+  } else {
+    scene.lit = choice.layers > 0          ? make_layers(choice.layers)
+                : choice.name == "fractal" ? make_fractal(options.points)
+                                           : make_window_room();
+    scene.build.lights = scene.lit.lights;
+    scene.build.mesh = std::make_shared<const Mesh>(scene.lit.mesh);
+  }
+  return scene;
+}
+
 LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
                      const std::filesystem::path& target, const RunOptions& run,
                      Progress& progress) {
-  BuildRequest request{.backdrop = choice.backdrop, .profile = options.profile, .run = run};
-  request.sampling.count = options.points;
-  request.tree.levels_per_stream = options.levels_per_stream;
-  request.page_shift = options.page_shift;
-  LitScene lit;
+  auto [request, lit] = request_scene(choice, options, run);
   std::vector<MeshCamera> cameras;
-  const bool procedural = choice.file.empty() && choice.name != "city";
-  if (choice.file.empty() && !procedural) {
-    request.city_points = options.points;
-    if (options.rays) lit.mesh = city_mesh(options.points);
-  } else if (procedural) {
-    lit = choice.layers > 0          ? make_layers(choice.layers)
-          : choice.name == "fractal" ? make_fractal(options.points)
-                                     : make_window_room();
-    request.lights = lit.lights;
-    request.mesh = std::make_shared<const Mesh>(lit.mesh);
-  } else {
-    request.inputs.push_back(choice.file);
+  const bool procedural = request.mesh != nullptr;
+  if (!choice.file.empty()) {
     Progress silent;  // the build reads the file once more and notes what is left out
     lit.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, silent, &cameras);
+  } else if (!procedural && options.rays) {
+    lit.mesh = city_mesh(options.points);
   }
   build_container(request, target, progress);
   const ContainerReader container(target);
@@ -130,7 +139,7 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
   }
   lit.camera.width = options.width;
   lit.camera.height = options.height;
-  return lit;
+  return std::move(lit);
 }
 
 BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options,

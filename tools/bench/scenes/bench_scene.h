@@ -57,9 +57,17 @@ struct SceneOptions {
   float lift = 0.15F;                               ///< as ShadeRequest::lift
   bool rays = true;                    ///< surfels and mesh are loaded, which rays need
   Profile profile = Profile::compact;  ///< of the container
-  int levels_per_stream = 1;           ///< as TreeOptions::levels_per_stream
+  int levels_per_stream = 1;           ///< as BuildOptions::levels_per_stream
   std::uint8_t page_shift = 16;        ///< as BuildRequest::page_shift
 };
+
+/// What build_container() is asked for, and what belongs to a procedural scene.
+struct SceneRequest {
+  BuildRequest build;
+  LitScene lit;  ///< mesh, light and camera of a procedural scene but the city; else empty
+};
+[[nodiscard]] SceneRequest request_scene(const SceneChoice& choice, const SceneOptions& options,
+                                         const RunOptions& run);
 
 /// Builds a scene's container.
 /// @return  its mesh (empty for a cloud), the light and the camera that belong to it

@@ -1,9 +1,9 @@
 // Flips, holes, pages in the wrong place, wrong lengths, transfers as text.
-#include "tests/mutation/mutations.h"
+#include "tools/bench/experiments/mutations.h"
 
 #include <algorithm>
 
-namespace ptc::test {
+namespace ptc::bench {
 namespace {
 
 using Pages = std::span<const PagePlace>;
@@ -129,4 +129,4 @@ std::vector<Mutation> mutations_of(const Bytes& whole, Pages pages) {
           {"taken for text", 6, as_text}};
 }
 
-}  // namespace ptc::test
+}  // namespace ptc::bench

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace ptc::test {
+namespace ptc::bench {
 
 using Bytes = std::vector<std::byte>;
 
@@ -30,4 +30,4 @@ struct Mutation {
 [[nodiscard]] std::vector<Mutation> mutations_of(const Bytes& whole,
                                                  std::span<const PagePlace> pages);
 
-}  // namespace ptc::test
+}  // namespace ptc::bench

@@ -1,0 +1,313 @@
+// Changes small containers of every profile in all ways of mutations.h and counts what a
+// verification and a reader make of each.
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <fstream>
+#include <new>
+#include <random>
+#include <string>
+#include <thread>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include "engine/base/error.h"
+#include "engine/pipeline/convert/convert.h"
+#include "engine/store/reader.h"
+#include "engine/verify/verify.h"
+#include "tools/bench/experiments/experiment.h"
+#include "tools/bench/experiments/mutations.h"
+#include "tools/bench/experiments/work_file.h"
+#include "tools/values.h"
+
+namespace ptc::bench {
+namespace {
+
+constexpr char kReading[] =
+    "Small containers of every profile, with and without channels, are changed in every way of "
+    "each "
+    "kind. Found: the verification calls the file unsound. Accepted: it finds nothing. Misread: a "
+    "reader that loads every page gave other bytes without a word. Each change is tried in a child "
+    "process, so that a crash or a hang is counted, too.";
+
+constexpr auto kPatience = std::chrono::seconds(20);
+constexpr std::size_t kFew = 500;     // ways: of so few all are tried
+constexpr std::size_t kPoints = 150;  // of a container
+constexpr std::uint8_t kPageShift = 12;
+constexpr std::size_t kEnoughTried = 1000;
+
+/// What a child tells its parent while it works.
+struct Tally {
+  std::size_t next = 0;  ///< way that it is at
+  std::size_t tried = 0;
+  std::size_t accepted = 0;
+  std::size_t misread = 0;
+  std::size_t first_accepted = 0;
+};
+
+struct MutationRow {
+  std::string change;
+  std::size_t tried = 0, accepted = 0, misread = 0, crashes = 0, hangs = 0;
+
+  [[nodiscard]] std::size_t found() const { return tried - accepted - crashes - hangs; }
+  [[nodiscard]] bool all_found() const { return accepted + misread + crashes + hangs == 0; }
+
+  MutationRow& operator+=(const MutationRow& other) {
+    tried += other.tried;
+    accepted += other.accepted;
+    misread += other.misread;
+    crashes += other.crashes;
+    hangs += other.hangs;
+    return *this;
+  }
+};
+
+const Columns<MutationRow>& columns() {
+  using R = MutationRow;
+  static const Columns<R> columns{
+      {"change", {"change"}, &R::change},    {"tried", {"tried"}, &R::tried},
+      {"found", {"found"}, &R::found},       {"accepted", {"accepted"}, &R::accepted},
+      {"misread", {"misread"}, &R::misread}, {"crashes", {"crashes"}, &R::crashes},
+      {"hangs", {"hangs"}, &R::hangs}};
+  return columns;
+}
+
+struct Subject {
+  std::string name;
+  std::filesystem::path path;  ///< where changed files are written
+  Bytes whole;
+  std::vector<PagePlace> pages;
+  Bytes content;
+};
+
+Bytes read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+void write_file(const std::filesystem::path& path, const Bytes& bytes) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+  if (!file.flush()) throw DataError(path.string() + ": a changed file could not be written");
+}
+
+/// The payloads of all pages, one after another.
+Bytes content_of(const std::filesystem::path& path) {
+  const ContainerReader reader(path);
+  PageDecoder decoder;
+  Bytes all, buffer(reader.page_payload_limit());
+  for (std::uint32_t page = 0; page < reader.page_count(); ++page) {
+    const PageHeader header = reader.read_page(page, buffer, decoder);
+    all.insert(all.end(), buffer.begin(), buffer.begin() + header.raw_bytes);
+  }
+  return all;
+}
+
+/// A cloud of surfels at random in the unit cube, the same each time.
+void write_cloud(const std::filesystem::path& path) {
+  std::mt19937_64 bits(3);
+  const auto number = [&] {
+    return static_cast<float>(bits() >> 40) / static_cast<float>(1 << 24);
+  };
+  std::ofstream file(path);
+  for (std::size_t i = 0; i < kPoints; ++i) {
+    const glm::vec3 position(number(), number(), number());
+    const glm::vec3 turned = glm::vec3(number(), number(), number()) - 0.5F;
+    const glm::vec3 normal = glm::normalize(turned + glm::vec3(0, 0, 1e-3F));
+    file << fmt::format("{} {} {} {} {} {} {} {} {} {}\n", position.x, position.y, position.z,
+                        normal.x, normal.y, normal.z, 0.01F + 0.1F * number(), number(), number(),
+                        number());
+  }
+}
+
+/// Containers to change.
+std::vector<Subject> make_subjects(const Bench& bench, const WorkFile& changed) {
+  const WorkFile cloud(bench.work, ".xyz"), scene(bench.work, "-scene.ptcx"),
+      lit(bench.work, "-lit.ptcx");
+  Progress silent;
+  write_cloud(cloud.path());
+  build_container({.inputs = {cloud.path()},
+                   .page_shift = kPageShift,
+                   .profile = Profile::raw,
+                   .run = {.threads = 1}},
+                  scene.path(), silent);
+  shade_container({{.scene = scene.path(), .run = {.threads = 1}}}, lit.path(), silent);
+  struct Kind {
+    const char* name;
+    Profile profile;
+    bool shaded;
+  };
+  std::vector<Subject> subjects;
+  for (const Kind& kind : {Kind{"raw", Profile::raw, false},
+                           {"exact", Profile::exact, false},
+                           {"fast", Profile::fast, false},
+                           {"compact", Profile::compact, false},
+                           {"compact, shaded", Profile::compact, true}}) {
+    recode_container(ContainerReader(kind.shaded ? lit.path() : scene.path()), changed.path(),
+                     {.profile = kind.profile}, silent);
+    Subject& subject = subjects.emplace_back();
+    subject = {.name = kind.name,
+               .path = changed.path(),
+               .whole = read_file(changed.path()),
+               .pages = {},
+               .content = content_of(changed.path())};
+    const ContainerReader container(changed.path());
+    for (const DirectoryEntry& entry : container.entries()) {
+      subject.pages.push_back(
+          {entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
+    }
+  }
+  return subjects;
+}
+
+bool verification_finds_it(const std::filesystem::path& path) {
+  Progress silent;
+  try {
+    return !verify_container(path, {.threads = 1, .flip_budget = 0}, silent).sound();
+  } catch (const std::runtime_error&) {  // the file changed while it was looked at, or such
+    return true;
+  }
+}
+
+bool reader_is_misled(const Subject& subject) {
+  try {
+    return content_of(subject.path) != subject.content;
+  } catch (const std::runtime_error&) {  // refused
+    return false;
+  }
+}
+
+/// In a child: ways from tally.next on.
+void work(const Subject& subject, const Mutation& mutation, std::size_t every, Tally& tally) {
+  Bytes changed;
+  for (; tally.next < mutation.count; tally.next += every) {
+    if (!mutation.apply(subject.whole, subject.pages, tally.next, changed)) continue;
+    write_file(subject.path, changed);
+    ++tally.tried;
+    if (!verification_finds_it(subject.path) && tally.accepted++ == 0)
+      tally.first_accepted = tally.next;
+    tally.misread += reader_is_misled(subject);
+  }
+}
+
+/// Waits for a child, and ends it when it stays at one way for too long. @return as waitpid()
+int wait_patiently(pid_t child, const Tally& tally) {
+  int status = 0;
+  std::size_t seen = ~std::size_t{0};
+  auto since = std::chrono::steady_clock::now();
+  while (::waitpid(child, &status, WNOHANG) == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const auto now = std::chrono::steady_clock::now();
+    const std::size_t at = reinterpret_cast<const volatile std::size_t&>(tally.next);
+    if (at != seen) since = now;
+    seen = at;
+    if (now - since > kPatience) ::kill(child, SIGALRM);
+  }
+  return status;
+}
+
+MutationRow try_all(const Subject& subject, const Mutation& mutation, std::size_t every,
+                    Progress& progress) {
+  void* const shared =
+      ::mmap(nullptr, sizeof(Tally), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (shared == MAP_FAILED) throw std::bad_alloc();
+  auto& tally = *new (shared) Tally;
+  MutationRow row{.change = mutation.name};
+  while (tally.next < mutation.count) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::signal(SIGALRM, SIG_DFL);
+      try {
+        work(subject, mutation, every, tally);
+      } catch (...) {  // what a reader must not let through
+        ::abort();
+      }
+      ::_exit(0);
+    }
+    const int status = wait_patiently(child, tally);
+    if (!WIFSIGNALED(status) && WEXITSTATUS(status) == 0) continue;
+    ++(WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM ? row.hangs : row.crashes);
+    progress.note(
+        fmt::format("{}, {}: way {} ended the process", subject.name, mutation.name, tally.next));
+    tally.next += every;
+  }
+  row.tried = tally.tried;
+  row.accepted = tally.accepted;
+  row.misread = tally.misread;
+  if (tally.accepted > 0) {
+    progress.note(fmt::format("{}, {}: way {} was accepted", subject.name, mutation.name,
+                              tally.first_accepted));
+  }
+  ::munmap(shared, sizeof(Tally));
+  return row;
+}
+
+Report report_of(const std::vector<MutationRow>& rows, std::size_t every) {
+  Report report{.name = "mutations",
+                .title = "Does a change to a file go unseen?",
+                .reading = kReading,
+                .runs = 0,
+                .tables = {tabulate<MutationRow>({.name = "rows"}, columns(), rows)}};
+  if (every > 1) {
+    report.notes = {
+        fmt::format("Of kinds with {} ways or more, one in {} was tried.", kFew, every)};
+  }
+  return report;
+}
+
+/// @throws DataError when a change was not found
+Report measure(std::size_t every, const Bench& bench) {
+  const WorkFile changed(bench.work, "-changed.ptcx");
+  const std::vector<Subject> subjects = make_subjects(bench, changed);
+  const std::size_t kinds = mutations_of(subjects[0].whole, subjects[0].pages).size();
+  std::vector<MutationRow> rows;
+  MutationRow all{.change = "all"};
+  bench.progress.begin("mutations", kinds, "kinds");
+  for (std::size_t kind = 0; kind < kinds; ++kind) {
+    MutationRow sum;
+    for (const Subject& subject : subjects) {
+      const Mutation mutation = mutations_of(subject.whole, subject.pages)[kind];
+      sum.change = mutation.name;
+      sum += try_all(subject, mutation, mutation.count < kFew ? 1 : every, bench.progress);
+    }
+    all += sum;
+    rows.push_back(sum);
+    bench.publish(report_of(rows, every));
+    bench.progress.advance(1);
+  }
+  bench.progress.end();
+  rows.push_back(all);
+  bench.publish(report_of(rows, every));
+  if (all.tried < kEnoughTried || !all.all_found()) {
+    throw DataError(fmt::format("mutations: {} of {} were found, {} misread", all.found(),
+                                all.tried, all.misread));
+  }
+  return report_of(rows, every);
+}
+
+}  // namespace
+
+Experiment make_mutations_experiment() {
+  const auto every = std::make_shared<std::uint64_t>(1);
+  const auto declare = [every](Declaration& d) {
+    add_integer(d.command(), "--every", *every, 1, 1'000'000,
+                "Try one way in N of the kinds that have many");
+    d.quick("--every", *every, 1009);
+  };
+  return {.name = "mutations",
+          .purpose =
+              "Whether a verification and a reader find every change to a file: flipped bits, "
+              "holes, pages in the wrong place, wrong lengths, transfers as text",
+          .quick = "A few seconds: one way in 1009 of the kinds that have many",
+          .declare = declare,
+          .run = [every](const Bench& bench) { return measure(*every, bench); }};
+}
+
+}  // namespace ptc::bench

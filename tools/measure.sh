@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# Writes every file of spec/results, one command after another. Nothing else should run meanwhile.
+#
+#   tools/measure.sh [--quick] [--list] [--bin DIR] [--work DIR] [--results DIR] [--only NAME] MESH
+#
+# MESH is the Stanford dragon, as tools/demo.sh fetches it. --quick takes seconds a file and shows
+# that each command works; its figures say nothing. --list prints names and commands and runs none.
+# Paths are relative to the root of the tree.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+quick= list= only= mesh=
+bin=build/release/bin
+work=build/measure
+results=spec/results
+while [[ $# -gt 0 ]]; do
+  case $1 in
+    --quick) quick=1 ;;
+    --list) list=1 ;;
+    --bin) bin=$2 && shift ;;
+    --work) work=$2 && shift ;;
+    --results) results=$2 && shift ;;
+    --only) only=$2 && shift ;;
+    -*)
+      echo "measure.sh: unknown option $1" >&2
+      exit 2
+      ;;
+    *) mesh=$1 ;;
+  esac
+  shift
+done
+if [[ -n $list ]]; then
+  mesh=dragon.ply.gz
+elif [[ ! -r $mesh ]]; then
+  echo "measure.sh: give the mesh of the dragon, a file that can be read (tools/demo.sh fetches it)" >&2
+  exit 2
+fi
+failed=()
+
+# measure NAME EXPERIMENT ARGUMENT... -- QUICK-ARGUMENT...: writes NAME.md
+measure() {
+  local name=$1 experiment=$2 full=() short=()
+  shift 2
+  while [[ $1 != -- ]]; do full+=("$1") && shift; done
+  shift
+  short=("$@")
+  if [[ -n $list ]]; then
+    echo "$name: ptcbench" "$experiment" "${full[@]}"
+    return
+  fi
+  [[ -z $only || $only == "$name" ]] || return 0
+  local arguments=("${full[@]}")
+  [[ -z $quick ]] || arguments=(--quick "${short[@]}")
+  echo "==" "$name: ptcbench" "$experiment" "${arguments[@]}"
+  "$bin/ptcbench" "$experiment" "${arguments[@]}" --name "$name" -o "$work" --results "$results" --quiet ||
+    failed+=("$name")
+}
+
+once=(--repeats 1)
+measure accuracy accuracy fractal window city "$mesh+backdrop" -- \
+  "$mesh+backdrop" --points 2k --checked 10 --reference-rays 64 --set points --method ptcx --method embree-mesh "${once[@]}"
+measure build build --points 20M --points 200M --panel points --memory 1G -- --points 20k --panel points "${once[@]}"
+measure build-cap build --points 20M --panel cap -- --points 200k --panel cap --cap 96M "${once[@]}"
+measure cache cache --points 6M --receivers 32768 -- --points 20k --receivers 4096 --panel hits --panel receivers "${once[@]}"
+measure cache-threads cache --panel threads --receivers 262144 -- \
+  --panel threads --points 20k --receivers 4096 "${once[@]}"
+measure demo demo "$mesh+backdrop" --memory 256M -- "$mesh+backdrop" --points 5k --checked 20 "${once[@]}"
+measure demo-city demo city --points 20M --receivers 100k --memory 256M --stage build --stage verify --stage shade -- \
+  city --points 5k --receivers 1k --stage build --stage verify --stage shade "${once[@]}"
+measure error error fractal window city "$mesh+backdrop" --points 200k --checked 500 -- \
+  "$mesh+backdrop" --points 2k --checked 20 --check-rays 256
+measure growth growth -- --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
+measure growth-cap growth --points 6M --panel cap -- --points 8k --checked 10 --panel cap "${once[@]}"
+measure instructions instructions -- --points 10k --receivers 4096 --checked 10 "${once[@]}"
+measure model model fractal window city "$mesh+backdrop" --points 200k -- \
+  "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
+measure mutations mutations -- --every 10007
+measure scale scale --points 20M --points 200M --memory 2G -- --points 20k --points 40k --receivers 100 "${once[@]}"
+measure scale-1700m scale --points 20M --points 200M --points 1700M --repeats 1 --memory 2G -- \
+  --points 20k --receivers 100 "${once[@]}"
+measure sort sort --points 4M --points 20M --memory 1G -- --points 20k "${once[@]}"
+measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
+  --points 20k --panel disk --order city "${once[@]}"
+measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
+
+if [[ ${#failed[@]} -gt 0 ]]; then
+  echo "measure.sh: failed: ${failed[*]}" >&2
+  exit 1
+fi
