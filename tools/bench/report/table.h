@@ -42,8 +42,8 @@ template <class T>
   return measured ? value_of(value) : Value();
 }
 
-/// Units in which people read shares, bytes and seconds.
-inline constexpr double kPercent = 0.01, kMebi = 1048576, kGiga = 1e9, kMicro = 1e-6;
+/// Units in which people read shares and bytes.
+inline constexpr double kPercent = 0.01, kMebi = 1048576, kGiga = 1e9;
 
 /// How a column looks to people.
 struct Shown {
