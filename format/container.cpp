@@ -25,7 +25,7 @@ constexpr std::size_t kHeaderHashAt = 120;
 constexpr std::uint64_t kKnownIncompat = 0;
 constexpr std::size_t kOriginAt = 64;
 constexpr std::size_t kEdgeAt = 88;
-constexpr double kGreatestWhole = 0x1p53;  // whole numbers up to here are doubles
+constexpr double kMaxWhole = 0x1p53;  // whole numbers up to here are doubles
 
 void check_constants(const std::byte* p) {
   constexpr char kConstants[] = "spec/container.md#header-constants";
@@ -52,8 +52,7 @@ void check_frame(const Frame& frame) {
   }
   for (const double origin : frame.origin) {
     const double steps = origin / frame.unit();
-    if (!(steps >= -kGreatestWhole && steps <= kGreatestWhole - 0x1p42) ||
-        std::rint(steps) != steps) {
+    if (!(steps >= -kMaxWhole && steps <= kMaxWhole - 0x1p42) || std::rint(steps) != steps) {
       throw FormatError(kOriginAt, kFrame,
                         "origin is not a multiple of the unit, or beyond 2^53 units");
     }

@@ -10,8 +10,8 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kHalfMask = (std::uint64_t{1} << kHalfBits) - 1;
-constexpr int kLeastExponent = -960;         // edge 2^-960: the unit 2^-1002 is a normal double
-constexpr double kGreatestBound = 0x1p1000;  // origin + edge stays finite
+constexpr int kMinExponent = -960;      // edge 2^-960: the unit 2^-1002 is a normal double
+constexpr double kMaxBound = 0x1p1000;  // origin + edge stays finite
 
 // Bit i to bit 3 i for 21 bits, halving the stride at each step (Morton 1966; steps as in
 // Raman and Wise 2008, "Converting to and from Dilated Integers").
@@ -89,8 +89,8 @@ Frame frame_around(const std::array<double, 3>& low, const std::array<double, 3>
   double magnitude = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double reach = std::max(std::abs(low[axis]), std::abs(high[axis]));
-    if (!(low[axis] <= high[axis]) || !(reach <= kGreatestBound) ||
-        !(high[axis] - low[axis] <= kGreatestBound)) {
+    if (!(low[axis] <= high[axis]) || !(reach <= kMaxBound) ||
+        !(high[axis] - low[axis] <= kMaxBound)) {
       throw std::invalid_argument("frame_around: bounds must be finite, ordered, at most 2^1000");
     }
     extent = std::max(extent, high[axis] - low[axis]);
@@ -100,7 +100,7 @@ Frame frame_around(const std::array<double, 3>& low, const std::array<double, 3>
 
   // No edge below the extent, nor below magnitude / 2^11, can fit; one of the next few does.
   const double least = std::max({extent, magnitude * 0x1p-11, 0x1p-960});
-  int exponent = std::max(std::ilogb(least), kLeastExponent);
+  int exponent = std::max(std::ilogb(least), kMinExponent);
   const auto all_fit = [&](double unit) {
     return fits(low[0], high[0], unit) && fits(low[1], high[1], unit) &&
            fits(low[2], high[2], unit);

@@ -14,12 +14,12 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kGreatestPayload = (0xffff + 1) * kSlotUnit;
-constexpr double kGreatestFloat = std::numeric_limits<float>::max();
+constexpr std::size_t kMaxPayload = (0xffff + 1) * kSlotUnit;
+constexpr double kMaxFloat = std::numeric_limits<float>::max();
 
 // Least float that is not below x, which is not negative.
 float float_above(double x) noexcept {
-  const auto nearest = static_cast<float>(std::min(x, kGreatestFloat));
+  const auto nearest = static_cast<float>(std::min(x, kMaxFloat));
   return nearest < x ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
 }
 
@@ -30,7 +30,7 @@ std::uint16_t to_u16(double x) noexcept {
 }
 
 float to_float(double x) noexcept {
-  return static_cast<float>(std::min(x, kGreatestFloat));
+  return static_cast<float>(std::min(x, kMaxFloat));
 }
 
 bool sane(double x) noexcept {
@@ -206,7 +206,7 @@ std::size_t node_group_bytes(std::size_t children) noexcept {
 }
 
 NodePageEncoder::NodePageEncoder(std::size_t payload_limit)
-    : limit_(std::min(payload_limit, kGreatestPayload)) {}
+    : limit_(std::min(payload_limit, kMaxPayload)) {}
 
 bool NodePageEncoder::fits(std::size_t children) const noexcept {
   const std::size_t table = round_to_slot(sizeof(std::uint16_t) * (slots_.size() + 1));

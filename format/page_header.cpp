@@ -8,14 +8,14 @@
 #include "format/node_page.h"
 #include "format/page_facts.h"
 #include "format/point_page.h"
+#include "format/schema.h"
 
 namespace ptc {
 namespace {
 
 constexpr std::size_t kPageHashAt = 56;
 constexpr std::uint16_t kNoLevel = 0xffff;
-constexpr std::uint16_t kGreatestGroup = 255;
-constexpr std::uint32_t kGreatestGroupCount = 0xffff;
+constexpr std::uint32_t kMaxGroupCount = 0xffff;
 constexpr std::uint64_t kKeyLimit = std::uint64_t{1} << 63;
 constexpr char kFields[] = "spec/container.md#page-fields";
 
@@ -32,7 +32,7 @@ std::uint64_t page_seed(const Uuid& uuid, std::uint32_t page_id, std::uint16_t t
 bool record_count_fits(const PageFacts& facts) noexcept {
   switch (static_cast<PageType>(facts.type)) {
     case PageType::node:
-      return facts.record_count <= kGreatestGroupCount;
+      return facts.record_count <= kMaxGroupCount;
     case PageType::point:
       return point_page_bytes(facts.record_count) == facts.raw_bytes;
     case PageType::directory:
@@ -88,7 +88,7 @@ void check_page_facts(const PageFacts& facts, const FileHeader& file) {
     throw FormatError(0, kLength, "stored_bytes is not 1 to raw_bytes");
   }
   const bool attribute = facts.type == static_cast<std::uint16_t>(PageType::attribute);
-  if (attribute ? facts.group == 0 || facts.group > kGreatestGroup : facts.group != 0) {
+  if (attribute ? facts.group == 0 || facts.group > kMaxGroup : facts.group != 0) {
     throw FormatError(0, kFields, "group does not suit the page's type");
   }
   if (facts.record_count == 0 || !record_count_fits(facts)) {

@@ -7,7 +7,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint16_t kGreatestUfloat16 = 0xfeff;  // exponent 255 is infinity and NaN
+constexpr std::uint16_t kMaxUfloat16 = 0xfeff;  // exponent 255 is infinity and NaN
 
 // Nearest integer, halves away from zero; exact for the magnitudes used here.
 int nearest(float x) noexcept {
@@ -53,14 +53,14 @@ std::uint16_t encode_half(float x) noexcept {
 std::uint16_t encode_ufloat16_up(float x) noexcept {
   if (!(x > 0)) return 0;
   const std::uint32_t rounded = (std::bit_cast<std::uint32_t>(x) + 0x7fff) >> 15;
-  return static_cast<std::uint16_t>(std::min<std::uint32_t>(rounded, kGreatestUfloat16));
+  return static_cast<std::uint16_t>(std::min<std::uint32_t>(rounded, kMaxUfloat16));
 }
 
 std::uint16_t encode_ufloat16(float x) noexcept {
   if (!(x > 0)) return 0;
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
   const std::uint32_t rounded = (bits + 0x3fff + (bits >> 15 & 1)) >> 15;
-  return static_cast<std::uint16_t>(std::min<std::uint32_t>(rounded, kGreatestUfloat16));
+  return static_cast<std::uint16_t>(std::min<std::uint32_t>(rounded, kMaxUfloat16));
 }
 
 std::uint32_t encode_rgbe(const std::array<float, 3>& rgb) noexcept {

@@ -19,7 +19,6 @@ constexpr std::size_t kNameBytes = 32;
 constexpr std::size_t kTextHeadBytes = 8;   // bytes of key, bytes of value
 constexpr std::size_t kMaxGroupBytes = 34;  // as many as a core record: the page always fits
 constexpr std::uint8_t kMaxComponents = 16;
-constexpr std::uint16_t kMaxGroup = 255;
 
 bool known(ChannelType type) noexcept {
   return type >= ChannelType::u8 && type <= ChannelType::f32;

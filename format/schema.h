@@ -16,6 +16,9 @@ enum class ChannelType : std::uint8_t { u8 = 1, u16 = 2, half = 3, f32 = 4 };
 /// Bytes of one component.
 [[nodiscard]] std::size_t channel_bytes(ChannelType type) noexcept;
 
+/// Greatest number of a group of channels.
+inline constexpr std::uint16_t kMaxGroup = 255;
+
 /// A named quantity of every point beyond the core record, e.g. {"occlusion", half, 1, 1}.
 struct Channel {
   std::string name;  ///< [a-z0-9_.], 1 to 31 bytes, unique in the file

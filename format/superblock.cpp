@@ -24,7 +24,7 @@ constexpr std::size_t kWriterAt = 328;
 constexpr std::size_t kWriterBytes = 64;
 constexpr std::array<std::array<std::size_t, 2>, 3> kReserved{
     {{172, 176}, {200, 232}, {kWriterAt + kWriterBytes, kHashAt}}};
-constexpr std::uint64_t kGreatestCount = std::uint64_t{1} << 48;
+constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 48;
 
 void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
                   std::uint64_t file_bytes) {
@@ -73,7 +73,7 @@ void check_directory(const Superblock& s) {
 void check_tree(const Superblock& s) {
   constexpr char kRoot[] = "spec/container.md#superblock-root";
   constexpr char kCounts[] = "spec/container.md#superblock-counts";
-  if (s.points > kGreatestCount || s.nodes > kGreatestCount || s.node_groups > s.nodes) {
+  if (s.points > kMaxCount || s.nodes > kMaxCount || s.node_groups > s.nodes) {
     throw FormatError(176, kCounts, "points, nodes or node_groups is out of range");
   }
   const bool empty = s.points == 0;

@@ -69,8 +69,8 @@ constexpr std::array<Field, 34> kSuperFields{
 
 class Mutation {
  public:
-  Mutation(std::vector<std::byte>& file, std::size_t most_bytes, unsigned seed)
-      : file_(file), most_bytes_(most_bytes), random_(seed) {
+  Mutation(std::vector<std::byte>& file, std::size_t max_bytes, unsigned seed)
+      : file_(file), max_bytes_(max_bytes), random_(seed) {
     for (const Field& field : kSuperFields) {
       std::memcpy(&numbers_.emplace_back(0), &file_[find_layout(file_).superblock + field.at],
                   field.bytes);
@@ -195,7 +195,7 @@ class Mutation {
     std::uint64_t size = stored.size();
     if (codec == 1) size = ZSTD_getFrameContentSize(stored.data(), stored.size());
     if (codec == 2 && stored.size() > 4) size = load<std::uint32_t>(stored.data(), 0);
-    if (codec > 2 || size > most_bytes_) return false;
+    if (codec > 2 || size > max_bytes_) return false;
     raw.resize(size);
     try {
       PageDecoder().decode({static_cast<Codec>(codec)}, stored, raw);
@@ -258,7 +258,7 @@ class Mutation {
   /// too long
   bool insert_zeros(const Layout::Page& page, std::size_t bytes) {
     const Layout layout = find_layout(file_);
-    if (file_.size() + bytes > most_bytes_ || page.entry < page.header) return false;
+    if (file_.size() + bytes > max_bytes_ || page.entry < page.header) return false;
     const auto move = [&](std::size_t at) {
       const auto offset = load<std::uint64_t>(file_.data(), at);
       if (offset > page.header) store(file_.data(), at, offset + bytes);
@@ -275,7 +275,7 @@ class Mutation {
   }
 
   std::vector<std::byte>& file_;
-  std::size_t most_bytes_;
+  std::size_t max_bytes_;
   std::minstd_rand random_;
   std::vector<std::uint64_t> numbers_;  ///< of the superblock
 };
@@ -300,7 +300,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
   const auto* const bytes = reinterpret_cast<const std::byte*>(data);
   std::vector<std::byte> file(bytes, bytes + size);
   if (seed % 2 == 0) file = good[seed / 2 % good.size()];
-  if (file.size() > max_size || file.size() < ptc::fuzz::kLeastFile || seed % 32 == 1) {
+  if (file.size() > max_size || file.size() < ptc::fuzz::kMinFile || seed % 32 == 1) {
     return LLVMFuzzerMutate(data, size, max_size);
   }
   ptc::fuzz::Mutation(file, max_size, seed).run();

@@ -84,7 +84,7 @@ Layout find_layout(std::span<const std::byte> file) {
 }
 
 void seal(std::span<std::byte> file, unsigned seals) {
-  if (file.size() < kLeastFile) return;
+  if (file.size() < kMinFile) return;
   if (seals & kSealFileHeader) hash_to(file, 120, 0, 120, seed("PTCXHEAD"));
   const Layout layout = find_layout(file);
   for (const Layout::Page& page : layout.pages) {

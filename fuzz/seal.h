@@ -24,9 +24,9 @@ struct Layout {
   std::vector<DirectoryPage> directory;
 };
 
-/// @param file  at least kLeastFile bytes
+/// @param file  at least kMinFile bytes
 [[nodiscard]] Layout find_layout(std::span<const std::byte> file);
-inline constexpr std::size_t kLeastFile = 3 * 4096;
+inline constexpr std::size_t kMinFile = 3 * 4096;
 
 /// What seal() repairs, in this order.
 enum Seals : unsigned {

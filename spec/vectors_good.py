@@ -66,7 +66,7 @@ def full_directory_pages():
                  channels=[(f"c{k}", 1, 1, k) for k in range(1, 83)])
 
 
-def greatest_leaf():
+def max_leaf():
     """65535 points in one leaf, on full pages of the greatest size that take 136 bytes in the file."""
     draft = Draft([Surfel((5, 6, 7), radius=1, radiance=(1, 2, 3))] * 65535, leaf_points=65535,
                   page_shift=20)
@@ -133,7 +133,7 @@ def packed(codec, loose=()):
     return draft
 
 
-def greatest_shifts():
+def max_shifts():
     """Numbers of which the top bit alone differs: shifts of 41, 15 and 7."""
     surfels = [Surfel(q.q, radius=2.0 * (i & 1), radiance=(0, 2.0 * (i & 1), 0),
                       albedo=(0, 128 * (i & 1), 0), uv=(-32768 * (i & 1), 0))
@@ -206,7 +206,7 @@ def vectors():
         Surfel((1 << k, 0, 0), radius=1) for k in range(42)], leaf_points=1)
     yield "three-coincident-points", Draft(coincident * 3, leaf_points=1)
     yield "coincident-points-on-three-levels", Draft(coincident * 70, leaf_points=1)
-    yield "greatest-leaf", greatest_leaf()
+    yield "greatest-leaf", max_leaf()
     yield "two-pages", two_pages()
     yield "root-first", root_first()
     yield "pages-in-any-place", changed(two_pages(), lambda d: setattr(d, "lie", reversed))
@@ -238,6 +238,6 @@ def vectors():
     yield "packed-columns-zstd", packed(r.ZSTD)
     yield "packed-columns-lz4", packed(r.LZ4)
     yield "packed-columns-loose", packed(r.LZ4, loose=(8, 16, 42))
-    yield "packed-columns-greatest-shifts", greatest_shifts()
+    yield "packed-columns-greatest-shifts", max_shifts()
     if shutil.which("zstd"):
         yield "zstd", with_zstd()

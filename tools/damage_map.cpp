@@ -31,10 +31,10 @@ constexpr std::array kStyles{
 };
 
 constexpr std::uint64_t kColumns = 96;
-constexpr std::uint64_t kMostRows = 40;
+constexpr std::uint64_t kMaxRows = 40;
 constexpr double kCell = 8, kLeft = 96, kTop = 52, kMargin = 16, kLine = 14;
-constexpr std::size_t kMostLines = 16;
-constexpr std::size_t kMostLetters = 150;
+constexpr std::size_t kMaxLines = 16;
+constexpr std::size_t kMaxLetters = 150;
 
 Kind kind_of(PageType type) {
   switch (type) {
@@ -57,7 +57,7 @@ class Parts {
  public:
   explicit Parts(const VerifyReport& report) : file_bytes_(report.file_bytes) {
     const std::uint64_t sectors = file_bytes_ / kSectorBytes + 1;
-    bytes_ = (sectors + kColumns * kMostRows - 1) / (kColumns * kMostRows) * kSectorBytes;
+    bytes_ = (sectors + kColumns * kMaxRows - 1) / (kColumns * kMaxRows) * kSectorBytes;
     kinds_.resize((file_bytes_ + bytes_ - 1) / bytes_, Kind::nothing);
     for (const PageSite& site : report.sites)
       mark(site.entry.offset, site.end(), kind_of(site.entry.type));
@@ -97,8 +97,8 @@ class Parts {
 };
 
 std::string shortened(std::string text) {
-  if (text.size() <= kMostLetters) return text;
-  std::size_t end = kMostLetters;
+  if (text.size() <= kMaxLetters) return text;
+  std::size_t end = kMaxLetters;
   while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80)
     --end;  // no half of a letter
   return text.substr(0, end) + "...";
@@ -107,7 +107,7 @@ std::string shortened(std::string text) {
 std::vector<std::string> lines_of(const VerifyReport& report) {
   std::vector<std::string> lines;
   for (const Finding& finding : report.findings) {
-    if (lines.size() == kMostLines) break;
+    if (lines.size() == kMaxLines) break;
     lines.push_back(shortened(line_of(finding)));
   }
   const std::uint64_t rest = report.damage + report.warnings - lines.size();

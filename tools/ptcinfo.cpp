@@ -123,7 +123,7 @@ void require_memory(const std::filesystem::path& path, const ptc::RunOptions& ru
   const std::uint64_t texts = kTexts << superblock.header.page_shift;
   ptc::MemoryBudget budget(run.memory_bytes, "this file");
   budget.charge("its record", texts);
-  budget.charge("its directory", ptc::ContainerReader::kMostPageBytes * superblock.page_count);
+  budget.charge("its directory", ptc::ContainerReader::kMaxPageBytes * superblock.page_count);
   budget.require();
 }
 

@@ -33,7 +33,7 @@ constexpr char kExamples[] =
 constexpr char kVerifyCodes[] =
     "0 sound, 1 damaged, 2 usage, 3 system, 4 format not supported, 5 limit too small,\n"
     "6 unfinished or truncated, 7 internal error.";
-constexpr std::size_t kMostLines = 20;
+constexpr std::size_t kMaxLines = 20;
 
 const char* text_of(ptc::Remedy remedy) {
   switch (remedy) {
@@ -100,7 +100,7 @@ ordered_json line_for(const ptc::Finding& finding) {
 
 std::string findings_text(const std::string& name, const ptc::VerifyReport& report) {
   std::string text;
-  const std::size_t shown = std::min(kMostLines, report.findings.size());
+  const std::size_t shown = std::min(kMaxLines, report.findings.size());
   for (std::size_t i = 0; i < shown; ++i)
     text += fmt::format("ptcverify: {}: {}\n", name, line_of(report.findings[i]));
   const std::uint64_t rest = report.damage + report.warnings - shown;

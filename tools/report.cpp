@@ -172,7 +172,7 @@ ordered_json damage_facts(const LightingReport& report) {
           {"node_pages", damage.node_pages},
           {"stand_ins", damage.stand_ins.stand_ins},
           {"receivers", damage.stand_ins.receivers},
-          {"greatest_bound", damage.stand_ins.greatest_bound},
+          {"max_bound", damage.stand_ins.max_bound},
           {"mean_bound", mean_bound(report)}};
 }
 
@@ -187,7 +187,7 @@ std::string damage_text(const LightingReport& report) {
       "  {} receivers see what stands in for them: occlusion changed by at most {:.4f}, by at most "
       "{:.6f} in the mean of all\n",
       pages, printable(first), damage.points, damage.stand_ins.receivers,
-      damage.stand_ins.greatest_bound, mean_bound(report));
+      damage.stand_ins.max_bound, mean_bound(report));
   if (damage.node_pages > 0) {
     text += fmt::format(
         "  {} of them hold nodes, which ptcverify --salvage builds again from the points\n",

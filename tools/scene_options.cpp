@@ -125,12 +125,12 @@ Sky LightArguments::sky() const {
 
 void add_light_sampling(CLI::App& app, LightSampling& sampling) {
   constexpr char kGroup[] = "Expert";
-  constexpr std::uint64_t kMost = 1 << 16;
-  add_integer(app, "--sun-rays", sampling.sun_rays, 1, kMost, "Shadow rays of a point to each sun")
+  constexpr std::uint64_t kMax = 1 << 16;
+  add_integer(app, "--sun-rays", sampling.sun_rays, 1, kMax, "Shadow rays of a point to each sun")
       ->group(kGroup);
-  add_integer(app, "--sky-rays", sampling.sky_rays, 0, kMost, "Shadow rays of a point to the sky")
+  add_integer(app, "--sky-rays", sampling.sky_rays, 0, kMax, "Shadow rays of a point to the sky")
       ->group(kGroup);
-  add_integer(app, "--area-rays", sampling.area_rays, 0, kMost,
+  add_integer(app, "--area-rays", sampling.area_rays, 0, kMax,
               "Shadow rays of a point to emissive triangles")
       ->group(kGroup);
 }
@@ -168,11 +168,11 @@ void CameraArguments::set_place(const std::string& text) {
 }
 
 void CameraArguments::set_size(const std::string& text) {
-  constexpr unsigned kMost = 1 << 16;  // of an EXR
+  constexpr unsigned kMax = 1 << 16;  // of an EXR
   const std::size_t cross = text.find('x');
   const auto side = [&](std::string_view digits) {
     const auto pixels = parse_number<unsigned>(digits);
-    if (!pixels || *pixels < 1 || *pixels > kMost) {
+    if (!pixels || *pixels < 1 || *pixels > kMax) {
       refuse("--size", text, "WIDTHxHEIGHT, 1 to 65536 each");
     }
     return *pixels;

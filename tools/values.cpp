@@ -46,9 +46,9 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
 }
 
 std::uint64_t parse_count(const std::string& option, const std::string& text) {
-  constexpr double kGreatest = 0x1p48;  // points of a file
+  constexpr double kMax = 0x1p48;  // points of a file
   const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
-  if (!(count >= 1 && count <= kGreatest) || std::rint(count) != count) {
+  if (!(count >= 1 && count <= kMax) || std::rint(count) != count) {
     refuse(option, text, "a whole number from 1 to 2^48, as 250000, 250k or 1.5M");
   }
   return static_cast<std::uint64_t>(count);
@@ -92,7 +92,7 @@ CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& co
 }
 
 std::uint64_t parse_size(const std::string& option, const std::string& text) {
-  constexpr double kGreatest = 0x1p62;
+  constexpr double kMax = 0x1p62;
   const double bytes = parse_scaled(text, {{"K", 0x1p10},
                                            {"M", 0x1p20},
                                            {"G", 0x1p30},
@@ -101,8 +101,7 @@ std::uint64_t parse_size(const std::string& option, const std::string& text) {
                                            {"MiB", 0x1p20},
                                            {"GiB", 0x1p30},
                                            {"TiB", 0x1p40}});
-  if (!(bytes >= 1 && bytes <= kGreatest))
-    refuse(option, text, "a size as 800000000, 256M or 1.5G");
+  if (!(bytes >= 1 && bytes <= kMax)) refuse(option, text, "a size as 800000000, 256M or 1.5G");
   return static_cast<std::uint64_t>(bytes);
 }
 

@@ -22,17 +22,17 @@ void MemoryBudget::charge(std::string part, std::uint64_t bytes) {
   if (bytes > 0) parts_.emplace_back(std::move(part), bytes);
 }
 
-std::uint64_t MemoryBudget::rest(const std::string& part, std::uint64_t least_bytes) const {
-  if (cap_ >= charged_ && cap_ - charged_ >= least_bytes) return cap_ - charged_;
+std::uint64_t MemoryBudget::rest(const std::string& part, std::uint64_t min_bytes) const {
+  if (cap_ >= charged_ && cap_ - charged_ >= min_bytes) return cap_ - charged_;
   auto parts = parts_;
-  if (least_bytes > 0) parts.emplace_back(part, least_bytes);
+  if (min_bytes > 0) parts.emplace_back(part, min_bytes);
   std::ranges::stable_sort(parts, std::greater{}, &decltype(parts)::value_type::second);
   std::string list;
   for (const auto& [name, bytes] : parts) {
     list += (list.empty() ? "" : ", ") + mebibytes(bytes) + " for " + name;
   }
   throw LimitError("the memory cap is too small for " + job_ + ": the least that works is " +
-                   mebibytes(charged_ + least_bytes) + " (" + list + ")");
+                   mebibytes(charged_ + min_bytes) + " (" + list + ")");
 }
 
 }  // namespace ptc

@@ -20,9 +20,9 @@ class MemoryBudget {
   void charge(std::string part, std::uint64_t bytes);
 
   /// Bytes that are left for `part` when all that was charged is taken.
-  /// @throws LimitError when they are fewer than `least_bytes`; it names the least cap that works
+  /// @throws LimitError when they are fewer than `min_bytes`; it names the least cap that works
   ///         and every part of it
-  [[nodiscard]] std::uint64_t rest(const std::string& part, std::uint64_t least_bytes) const;
+  [[nodiscard]] std::uint64_t rest(const std::string& part, std::uint64_t min_bytes) const;
 
   /// Checks that the cap holds what was charged. @throws LimitError as rest()
   void require() const { static_cast<void>(rest({}, 0)); }

@@ -86,10 +86,10 @@ std::string progress_bar(const StageState& s, std::size_t columns) {
 
   const std::string share = format(" %3d %% ", percent(s));
   const std::size_t fixed = s.stage.size() + share.size() + words.size() + 3;  // a space, [ and ]
-  constexpr std::size_t kLeastBar = 5, kMostBar = 40;
+  constexpr std::size_t kMinBar = 5, kMaxBar = 40;
   std::string bar;
-  if (columns >= fixed + kLeastBar) {
-    const std::size_t room = std::min(columns - fixed, kMostBar);
+  if (columns >= fixed + kMinBar) {
+    const std::size_t room = std::min(columns - fixed, kMaxBar);
     const auto full = static_cast<std::size_t>(fraction(s) * static_cast<double>(room));
     bar = " [" + std::string(full, '#') + std::string(room - full, '.') + "]";
   }

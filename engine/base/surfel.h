@@ -7,7 +7,7 @@ namespace ptc {
 
 /// Greatest coordinate of what files give: around whatever lies between such places there is a cube
 /// that a container takes.
-inline constexpr double kMostCoordinate = 0x1p999;
+inline constexpr double kMaxCoordinate = 0x1p999;
 
 /// A disc of surface: light leaves it diffusely on the side of its normal.
 struct Surfel {

@@ -26,7 +26,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint32_t kMostSlots = 256;
+constexpr std::uint32_t kMaxSlots = 256;
 constexpr std::uint64_t kGuardBytes = 64;            // may be read past a payload
 constexpr std::uint64_t kDecoderBytes = 128u << 10;  // a zstd context takes 94 KiB
 constexpr std::uint64_t kTableSlotBytes = 32;        // of a PageReader, rounded up
@@ -35,19 +35,19 @@ std::uint64_t frame_bytes(const ContainerReader& container) {
   return (container.page_payload_limit() + 63) / 64 * 64 + kGuardBytes;
 }
 
-std::size_t most_stored(const ContainerReader& container) {
+std::size_t max_stored(const ContainerReader& container) {
   return std::size_t{1} << container.header().page_shift;
 }
 
 /// What the readers take: table, decoder, and the back end's buffers.
 std::uint64_t reader_bytes(const ContainerReader& container, unsigned threads, BackEnd back_end) {
-  return threads * (kMostSlots * kTableSlotBytes + kDecoderBytes +
-                    page_source_bytes(back_end, most_stored(container)));
+  return threads * (kMaxSlots * kTableSlotBytes + kDecoderBytes +
+                    page_source_bytes(back_end, max_stored(container)));
 }
 
 /// Frames within the cap; more than the pages and a working set for each thread are of no use.
 std::uint32_t count_frames(const ContainerReader& container, const CacheOptions& options) {
-  const std::uint64_t least = PageCache::least_bytes(container, options.threads, options.back_end);
+  const std::uint64_t least = PageCache::min_bytes(container, options.threads, options.back_end);
   if (options.memory_bytes < least) {
     throw std::invalid_argument("page cache: " + std::to_string(options.memory_bytes) +
                                 " bytes are too few, " + std::to_string(least) +
@@ -58,18 +58,18 @@ std::uint32_t count_frames(const ContainerReader& container, const CacheOptions&
   const std::uint64_t each = frame_bytes(container) + FrameTable::bytes(0, 1, 0, 0);
   const std::uint64_t wanted = std::max<std::uint64_t>(
       pages, std::uint64_t{2} * options.threads * std::max(1u, options.local_slots));
-  constexpr std::uint64_t kMostFrames = 0x7fffffff;  // FrameTable needs a bit
+  constexpr std::uint64_t kMaxFrames = 0x7fffffff;  // FrameTable needs a bit
   return static_cast<std::uint32_t>(
-      std::min({(options.memory_bytes - fixed) / each, wanted, kMostFrames}));
+      std::min({(options.memory_bytes - fixed) / each, wanted, kMaxFrames}));
 }
 
 std::uint32_t choose_slots(const CacheOptions& options, std::uint32_t frames) {
   const std::uint64_t threads = options.threads;
   if (options.local_slots == 0) {
     const auto fair = static_cast<std::uint32_t>(frames / (2 * threads));
-    return std::bit_floor(std::clamp(fair, 1u, kMostSlots));
+    return std::bit_floor(std::clamp(fair, 1u, kMaxSlots));
   }
-  if (!std::has_single_bit(options.local_slots) || options.local_slots > kMostSlots ||
+  if (!std::has_single_bit(options.local_slots) || options.local_slots > kMaxSlots ||
       threads * options.local_slots > frames) {
     throw std::invalid_argument("page cache: local_slots is no power of two up to 256, or " +
                                 std::to_string(frames) + " frames are too few for it");
@@ -205,15 +205,15 @@ PageCache::PageCache(const ContainerReader& container, const CacheOptions& optio
 
 PageCache::~PageCache() = default;
 
-std::uint64_t PageCache::least_bytes(const ContainerReader& container, unsigned threads,
-                                     BackEnd back_end) {
+std::uint64_t PageCache::min_bytes(const ContainerReader& container, unsigned threads,
+                                   BackEnd back_end) {
   return bytes_for(container, threads, std::uint64_t{2} * threads, back_end);
 }
 
 std::uint64_t PageCache::bytes_for(const ContainerReader& container, unsigned threads,
                                    std::uint64_t frames, BackEnd back_end) {
   return reader_bytes(container, threads, back_end) +
-         FrameTable::bytes(container.page_count(), frames, threads, kMostSlots) +
+         FrameTable::bytes(container.page_count(), frames, threads, kMaxSlots) +
          frames * frame_bytes(container);
 }
 
@@ -239,7 +239,7 @@ PageReader::PageReader(PageCache& cache)
       table_(std::make_unique<Slot[]>(shared_.slots)),
       mask_(shared_.slots - 1),
       source_(make_page_source(shared_.options.back_end, shared_.container.file(),
-                               most_stored(shared_.container))) {
+                               max_stored(shared_.container))) {
   static_assert(sizeof(Slot) <= kTableSlotBytes);
   const std::lock_guard lock(shared_.mutex);
   const auto seat = std::ranges::find(shared_.seats, false);

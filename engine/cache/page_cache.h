@@ -57,8 +57,8 @@ class PageCache {
   PageCache& operator=(const PageCache&) = delete;
 
   /// Least cap for so many threads: two frames each, and the tables.
-  [[nodiscard]] static std::uint64_t least_bytes(const ContainerReader& container, unsigned threads,
-                                                 BackEnd back_end = BackEnd::pread);
+  [[nodiscard]] static std::uint64_t min_bytes(const ContainerReader& container, unsigned threads,
+                                               BackEnd back_end = BackEnd::pread);
   /// Least cap that gives so many frames.
   [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads,
                                                std::uint64_t frames,

@@ -19,7 +19,7 @@ namespace {
 
 class PreadSource : public PageSource {
  public:
-  PreadSource(const InputFile& file, std::size_t most_bytes) : file_(file), buffer_(most_bytes) {}
+  PreadSource(const InputFile& file, std::size_t max_bytes) : file_(file), buffer_(max_bytes) {}
 
   std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
     const std::span<std::byte> out(buffer_.data(), bytes);
@@ -34,8 +34,8 @@ class PreadSource : public PageSource {
 
 class DirectSource : public PageSource {
  public:
-  DirectSource(const InputFile& file, std::size_t most_bytes)
-      : file_(file), direct_(file), blocks_(direct_room(most_bytes)) {}
+  DirectSource(const InputFile& file, std::size_t max_bytes)
+      : file_(file), direct_(file), blocks_(direct_room(max_bytes)) {}
 
   std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
     const DirectRange range(offset, bytes);
@@ -103,22 +103,22 @@ DirectDescriptor::~DirectDescriptor() {
 }
 
 std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& file,
-                                             std::size_t most_bytes) {
+                                             std::size_t max_bytes) {
   switch (back_end) {
     case BackEnd::mmap:
       return std::make_unique<MmapSource>(file);
     case BackEnd::direct:
-      return std::make_unique<DirectSource>(file, most_bytes);
+      return std::make_unique<DirectSource>(file, max_bytes);
     case BackEnd::io_uring:
-      return std::make_unique<UringSource>(file, most_bytes);
+      return std::make_unique<UringSource>(file, max_bytes);
     case BackEnd::pread:
       break;
   }
-  return std::make_unique<PreadSource>(file, most_bytes);
+  return std::make_unique<PreadSource>(file, max_bytes);
 }
 
-std::uint64_t page_source_bytes(BackEnd back_end, std::size_t most_bytes) noexcept {
-  const std::uint64_t room = direct_room(most_bytes);
+std::uint64_t page_source_bytes(BackEnd back_end, std::size_t max_bytes) noexcept {
+  const std::uint64_t room = direct_room(max_bytes);
   return back_end == BackEnd::io_uring ? UringSource::kSlots * room + UringSource::kRingBytes
                                        : room;
 }

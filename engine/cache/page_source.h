@@ -32,12 +32,12 @@ class PageSource {
 };
 
 /// @param file        outlives the source
-/// @param most_bytes  of a range
+/// @param max_bytes  of a range
 /// @throws std::system_error when the system or the file system does not have the back end
 [[nodiscard]] std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& file,
-                                                           std::size_t most_bytes);
+                                                           std::size_t max_bytes);
 
 /// Memory that a source takes.
-[[nodiscard]] std::uint64_t page_source_bytes(BackEnd back_end, std::size_t most_bytes) noexcept;
+[[nodiscard]] std::uint64_t page_source_bytes(BackEnd back_end, std::size_t max_bytes) noexcept;
 
 }  // namespace ptc

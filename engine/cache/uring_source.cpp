@@ -17,10 +17,10 @@ void check(int result, const char* call, const InputFile& file) {
 
 }  // namespace
 
-UringSource::UringSource(const InputFile& file, std::size_t most_bytes)
+UringSource::UringSource(const InputFile& file, std::size_t max_bytes)
     : file_(file),
       direct_(file),
-      slot_bytes_(direct_room(most_bytes)),
+      slot_bytes_(direct_room(max_bytes)),
       blocks_(kSlots * slot_bytes_) {
   check(io_uring_queue_init(kSlots, &ring_, 0), "io_uring_setup", file);
 }

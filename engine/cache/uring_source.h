@@ -18,7 +18,7 @@ class UringSource : public PageSource {
   static constexpr std::size_t kSlots = 32;
   static constexpr std::uint64_t kRingBytes = 16384;  ///< both queues of kSlots, in whole pages
 
-  UringSource(const InputFile& file, std::size_t most_bytes);
+  UringSource(const InputFile& file, std::size_t max_bytes);
   ~UringSource() override;
   UringSource(const UringSource&) = delete;
   UringSource& operator=(const UringSource&) = delete;

@@ -86,7 +86,7 @@ Frame grow_frame(const Frame& old, const std::array<double, 3>& low,
     for (std::size_t axis = 0; axis < 3; ++axis)
       fits[axis] = holds(grown, axis, low[axis], high[axis]);
     if (std::ranges::all_of(fits, [](bool fit) { return fit; })) return grown;
-    if (doublings > kMostDoublings) {
+    if (doublings > kMaxDoublings) {
       throw RequestError("append",
                          "the new points lie so far from the scene that its cube would grow more "
                          "than 65536 times: build all anew, without `append`");

@@ -10,11 +10,11 @@
 namespace ptc {
 
 /// Most doublings of a cube that is to hold more: 26 bits of the old lattice are left then.
-inline constexpr int kMostDoublings = 16;
+inline constexpr int kMaxDoublings = 16;
 
 /// The cube of `old`, doubled until it holds a box, too: at each step it becomes an octant of the
 /// new one, so that keys keep their order. The old frame when it holds the box.
-/// @throws std::invalid_argument as frame_around(); RequestError when more than kMostDoublings
+/// @throws std::invalid_argument as frame_around(); RequestError when more than kMaxDoublings
 /// would be needed
 [[nodiscard]] Frame grow_frame(const Frame& old, const std::array<double, 3>& low,
                                const std::array<double, 3>& high);

@@ -33,7 +33,7 @@ PageOrder::PageOrder(ContainerWriter& writer, std::uint32_t points_per_page, int
 void PageOrder::Range::include(const GroupView& group) {
   first = std::min(first, group.cell().high);
   last = std::max(last, group.cell().high);
-  least_level = std::min(least_level, static_cast<std::uint16_t>(group.level()));
+  min_level = std::min(min_level, static_cast<std::uint16_t>(group.level()));
 }
 
 ChildRef PageOrder::add(const GroupView& group, std::uint64_t end) {
@@ -63,7 +63,7 @@ void PageOrder::take_points() {
 void PageOrder::flush(std::optional<Stream>& stream) {
   whole_.push_back({.id = stream->page,
                     .facts = {.type = PageType::node,
-                              .level = stream->keys.least_level,
+                              .level = stream->keys.min_level,
                               .record_count = stream->encoder.size(),
                               .first_key = stream->keys.first,
                               .last_key = stream->keys.last},

@@ -48,7 +48,7 @@ class PageOrder : public GroupSink {
   struct Range {
     std::uint64_t first = ~std::uint64_t{0};
     std::uint64_t last = 0;
-    std::uint16_t least_level = 0xffff;
+    std::uint16_t min_level = 0xffff;
     void include(const GroupView& group);
   };
   struct Stream {

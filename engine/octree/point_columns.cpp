@@ -21,7 +21,7 @@ namespace ptc::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<double, PointColumns::kMostLanes>;
+using D = hn::CappedTag<double, PointColumns::kMaxLanes>;
 using V = hn::VFromD<D>;
 
 /// A whole number below 2^52: its bits as the fraction of 2^52 + v.
@@ -34,8 +34,7 @@ inline double to_double(std::uint64_t v) {
 void decode_points(const PointRecord* points, std::size_t count, double unit, double* columns,
                    std::size_t stride) {
   constexpr std::size_t kBlock = kPositionBlock;
-  constexpr double kGreatest =
-      1e150;  // spec/nodes.md#node-number: what is stored ends at 3e38 anyway
+  constexpr double kMax = 1e150;  // spec/nodes.md#node-number: what is stored ends at 3e38 anyway
   PositionBlock positions;
   std::array<float, kBlock> radius;
   std::array<std::int16_t, kBlock> u, v;
@@ -60,7 +59,7 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
     for (std::size_t i = 0; i < n; ++i) {
       const double r = radius[i];
       const double scaled = r / unit;
-      lattice_radius[i] = scaled < kGreatest ? scaled : kGreatest;
+      lattice_radius[i] = scaled < kMax ? scaled : kMax;
       area[i] = 2.0 * r * r;
     }
     double* const x = out(PointColumns::kNormalX);
@@ -190,7 +189,7 @@ HWY_EXPORT(decode_points);
 HWY_EXPORT(summarise);
 
 void PointColumns::assign(std::span<const PointRecord> points, double unit) {
-  stride_ = points.size() + kMostLanes;
+  stride_ = points.size() + kMaxLanes;
   values_.resize(kColumns * stride_);
   HWY_DYNAMIC_DISPATCH(decode_points)(points.data(), points.size(), unit, values_.data(), stride_);
 }

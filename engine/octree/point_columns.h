@@ -33,14 +33,14 @@ class PointColumns {
   /// @param unit  lattice unit in scene units
   void assign(std::span<const PointRecord> points, double unit);
 
-  /// Values of a column. The area is 2 radius^2 in scene units squared. At least kMostLanes values
+  /// Values of a column. The area is 2 radius^2 in scene units squared. At least kMaxLanes values
   /// can be read from each.
   [[nodiscard]] const double* column(Column k) const noexcept {
     return values_.data() + k * stride_;
   }
 
   /// Lanes of the widest vectors that read columns.
-  static constexpr std::size_t kMostLanes = 8;
+  static constexpr std::size_t kMaxLanes = 8;
 
  private:
   std::size_t stride_ = 0;

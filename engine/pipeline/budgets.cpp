@@ -37,7 +37,7 @@ std::uint64_t cache_bytes_left(MemoryBudget budget, const ContainerReader& scene
   charge_directory(budget, scene);
   budget.charge("threads that gather", threads * kGatherBytes);
   return budget.rest("the page cache",
-                     std::max(kMinCacheBytes, PageCache::least_bytes(scene, threads, back_end)));
+                     std::max(kMinCacheBytes, PageCache::min_bytes(scene, threads, back_end)));
 }
 
 }  // namespace ptc

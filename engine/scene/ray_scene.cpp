@@ -23,8 +23,8 @@ namespace {
 
 // Embree's own limit is 1.8e18, and it does not forgive a ray beyond it.
 bool is_sane(const glm::vec3& v) {
-  constexpr float kMost = 1e18f;
-  return std::abs(v.x) <= kMost && std::abs(v.y) <= kMost && std::abs(v.z) <= kMost;
+  constexpr float kMax = 1e18f;
+  return std::abs(v.x) <= kMax && std::abs(v.y) <= kMax && std::abs(v.z) <= kMax;
 }
 
 void check_device(RTCDevice device) {

@@ -8,9 +8,9 @@
 namespace ptc {
 
 float lift_height(float radius, float lift, const Frame& frame) noexcept {
-  constexpr double kMost = std::numeric_limits<float>::max();
-  const double edges = std::min(SceneScale::kMostLiftedRadius * frame.edge, kMost);
-  return std::min(lift * std::min(radius, static_cast<float>(edges)), static_cast<float>(kMost));
+  constexpr double kMax = std::numeric_limits<float>::max();
+  const double edges = std::min(SceneScale::kMaxLiftedRadius * frame.edge, kMax);
+  return std::min(lift * std::min(radius, static_cast<float>(edges)), static_cast<float>(kMax));
 }
 
 Receiver lifted(const Surfel& surfel, float lift, const Frame& frame) noexcept {

@@ -9,7 +9,7 @@ namespace ptc {
 
 /// How far a receiver rises above a surfel, in scene units.
 ///
-/// Radii above SceneScale::kMostLiftedRadius edges of the frame count as that, and the result is
+/// Radii above SceneScale::kMaxLiftedRadius edges of the frame count as that, and the result is
 /// finite.
 /// @param radius  of the surfel, scene units
 /// @param lift    in radii

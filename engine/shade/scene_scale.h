@@ -20,12 +20,12 @@ namespace ptc {
 /// scaling rounds nothing, and the results of other scenes are the same bits in any unit.
 class SceneScale {
  public:
-  static constexpr float kMostRadius = 0x1p28F;    ///< edges
-  static constexpr double kMostDistance = 0x1p36;  ///< edges, from the frame's origin, each axis
+  static constexpr float kMaxRadius = 0x1p28F;     ///< edges
+  static constexpr double kMaxDistance = 0x1p36;   ///< edges, from the frame's origin, each axis
   static constexpr double kLatticeUnit = 0x1p-42;  ///< edges
   /// Radii that a receiver is lifted by are at most so many edges: receivers stay near the scene,
   /// since floats are exact relative to the cell of receivers that share what they see.
-  static constexpr double kMostLiftedRadius = 0x1p12;
+  static constexpr double kMaxLiftedRadius = 0x1p12;
 
   explicit SceneScale(const Frame& frame) noexcept
       : per_unit_(1 / frame.edge),
@@ -44,12 +44,12 @@ class SceneScale {
   [[nodiscard]] double scene_units(double length) const noexcept { return length / per_unit_; }
   /// A radius in edges from one in scene units.
   [[nodiscard]] float radius(float scene_units) const noexcept {
-    return std::min(scene_units * lengths_[0] * lengths_[1], kMostRadius);
+    return std::min(scene_units * lengths_[0] * lengths_[1], kMaxRadius);
   }
   /// The way from a place to another, both in scene units.
   [[nodiscard]] glm::vec3 way(const glm::dvec3& from, const glm::dvec3& to) const noexcept {
     const auto along = [&](int k) {
-      return static_cast<float>(std::clamp(length(to[k] - from[k]), -kMostDistance, kMostDistance));
+      return static_cast<float>(std::clamp(length(to[k] - from[k]), -kMaxDistance, kMaxDistance));
     };
     return {along(0), along(1), along(2)};
   }

@@ -54,7 +54,7 @@ inline constexpr float kDark =
 struct DamageCounts {
   std::uint64_t stand_ins = 0;  ///< clusters drawn in place of their children
   std::uint64_t receivers = 0;  ///< that see some of them
-  double greatest_bound = 0;    ///< of one receiver, at most 1
+  double max_bound = 0;         ///< of one receiver, at most 1
   std::uint64_t bounds = 0;  ///< sum over receivers, in units of kBoundUnit: the same in any order
 
   static constexpr double kBoundUnit = 0x1p-32;

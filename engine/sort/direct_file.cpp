@@ -15,7 +15,7 @@ namespace ptc {
 namespace {
 
 constexpr int kFlags = O_RDWR | O_DIRECT;
-constexpr std::size_t kMostBytes = std::size_t{8} << 20;  // of one call
+constexpr std::size_t kMaxBytes = std::size_t{8} << 20;  // of one call
 
 [[noreturn]] void fail(const char* call, const std::string& name) {
   throw std::system_error(errno, std::generic_category(), std::string(call) + " " + name);
@@ -54,7 +54,7 @@ void DirectFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const
   while (!bytes.empty()) {
     const bool direct = direct_;
     const ssize_t n =
-        ::pread(fd_, bytes.data(), std::min(bytes.size(), kMostBytes), static_cast<off_t>(offset));
+        ::pread(fd_, bytes.data(), std::min(bytes.size(), kMaxBytes), static_cast<off_t>(offset));
     if (n < 0 && errno != EINTR && !give_up_direct(direct)) fail("pread", name_);
     if (n == 0) throw DataError(name_ + ": the file ends too early");
     if (n < 0) continue;
@@ -68,7 +68,7 @@ void DirectFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes
   while (!bytes.empty()) {
     const bool direct = direct_;
     const ssize_t n =
-        ::pwrite(fd_, bytes.data(), std::min(bytes.size(), kMostBytes), static_cast<off_t>(offset));
+        ::pwrite(fd_, bytes.data(), std::min(bytes.size(), kMaxBytes), static_cast<off_t>(offset));
     if (n == 0) errno = EIO;
     if (n == 0 || (n < 0 && errno != EINTR && !give_up_direct(direct)))
       fail_write(errno, name_, offset + bytes.size());

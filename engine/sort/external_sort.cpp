@@ -182,8 +182,8 @@ void ExternalSorter::Impl::take(std::span<const PointRecord> records) {
 
 // Only the first run is known: without a sample it stands for what will come.
 void ExternalSorter::Impl::begin_partition() {
-  constexpr std::size_t kKeysPerRange = 4, kLeastKeys = 64;
-  if (sample.size() < kLeastKeys) {
+  constexpr std::size_t kKeysPerRange = 4, kMinKeys = 64;
+  if (sample.size() < kMinKeys) {
     sample.clear();
     const std::size_t stride = filled / plan.sample_keys + 1;
     for (std::size_t i = 0; i < filled; i += stride) sample.push_back(filling[i].key);

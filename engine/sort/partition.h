@@ -107,9 +107,9 @@ class WriteCombiner {
 /// below a 32nd of the records, nor smaller than is worth a thread.
 [[nodiscard]] inline std::size_t partition_blocks(std::size_t records, std::size_t classes,
                                                   unsigned threads) noexcept {
-  constexpr std::size_t kLeastRecords = 1 << 15;
+  constexpr std::size_t kMinRecords = 1 << 15;
   const std::size_t affordable = records * sizeof(PointRecord) / 32 / partition_bytes(classes);
-  return std::clamp<std::size_t>(std::min(affordable, records / kLeastRecords), 1, threads);
+  return std::clamp<std::size_t>(std::min(affordable, records / kMinRecords), 1, threads);
 }
 
 /// How many records of each block fall into each class, and in which bits their keys differ.

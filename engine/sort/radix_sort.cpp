@@ -20,7 +20,7 @@ namespace ptc {
 namespace {
 
 constexpr int kKeyBits = 128;
-constexpr int kMostClassBits = 11;
+constexpr int kMaxClassBits = 11;
 constexpr int kExtraBits = 5;
 constexpr std::size_t kSamplesPerClass = 16;
 constexpr std::size_t kSampleRecords = 256;
@@ -140,7 +140,7 @@ void sort_in_cache(const Piece& p, std::uint64_t* words) noexcept {
 
 // As many classes as give each some 2048 records.
 int class_bits(std::size_t count) noexcept {
-  return std::clamp(static_cast<int>(std::bit_width(count)) - 12, 5, kMostClassBits);
+  return std::clamp(static_cast<int>(std::bit_width(count)) - 12, 5, kMaxClassBits);
 }
 
 // Ascending classes of keys that agree in all bits before `bit`, of about equal size.

@@ -11,15 +11,15 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kLeastBytes = 256 << 10;
-constexpr std::uint64_t kMostRecords = 0xffffffff;  // a run's index has 32 bits
+constexpr std::uint64_t kMinBytes = 256 << 10;
+constexpr std::uint64_t kMaxRecords = 0xffffffff;  // a run's index has 32 bits
 
 // What a run holds of a range is read in one piece: make it worth the disk's while.
 constexpr std::uint64_t kPieceBytes = 64 << 10;
-constexpr std::uint64_t kLeastRanges = 48, kUsualRanges = 512, kMostRanges = 2048;
+constexpr std::uint64_t kMinRanges = 48, kUsualRanges = 512, kMaxRanges = 2048;
 // The more keys, the less ranges differ in size: by an eighth (standard deviation) with the most.
-constexpr std::uint64_t kLeastSampleKeys = 16, kMostSampleKeys = 64;  // of each range
-constexpr std::uint64_t kLeastReadBytes = SpillReader::kLeastBytes, kMostReadBytes = 4 << 20;
+constexpr std::uint64_t kMinSampleKeys = 16, kMaxSampleKeys = 64;  // of each range
+constexpr std::uint64_t kMinReadBytes = SpillReader::kMinBytes, kMaxReadBytes = 4 << 20;
 
 // Four parts in two runs, each on a page boundary.
 constexpr std::size_t kRunStep = 2 * kPageRecords;
@@ -31,7 +31,7 @@ constexpr std::uint64_t kPartRecords = kPageRecords * 4608;
 // A range is one bucket. Small ones are sorted sooner, but grouping by more ranges and reading more
 // pieces takes longer: this is the smallest of use. The largest should fit into a quarter of the
 // memory although ranges differ.
-constexpr std::uint64_t kLeastRangeRecords = 5 << 16, kMostRangeRecords = kPartRecords / 8 * 5;
+constexpr std::uint64_t kMinRangeRecords = 5 << 16, kMaxRangeRecords = kPartRecords / 8 * 5;
 
 }  // namespace
 
@@ -46,28 +46,28 @@ std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept {
 }
 
 SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads, std::uint64_t expected) {
-  if (memory_bytes < kLeastBytes)
+  if (memory_bytes < kMinBytes)
     throw std::invalid_argument("SortOptions::memory_bytes: less than 256 KiB");
   SortPlan plan;
   const std::uint64_t usual =
       expected == 0 ? kUsualRanges
-                    : std::clamp(expected / kLeastRangeRecords, kLeastRanges, kUsualRanges);
-  const std::uint64_t wanted = std::clamp(expected / kMostRangeRecords + 1, usual, kMostRanges);
+                    : std::clamp(expected / kMinRangeRecords, kMinRanges, kUsualRanges);
+  const std::uint64_t wanted = std::clamp(expected / kMaxRangeRecords + 1, usual, kMaxRanges);
   plan.ranges =
-      static_cast<std::size_t>(std::clamp(memory_bytes / 2 / kPieceBytes, kLeastRanges, wanted));
+      static_cast<std::size_t>(std::clamp(memory_bytes / 2 / kPieceBytes, kMinRanges, wanted));
   const std::uint64_t keys_of_cap = memory_bytes / 64 / sizeof(MortonKey) / plan.ranges;
   plan.sample_keys =
-      static_cast<std::size_t>(std::clamp(keys_of_cap, kLeastSampleKeys, kMostSampleKeys)) *
+      static_cast<std::size_t>(std::clamp(keys_of_cap, kMinSampleKeys, kMaxSampleKeys)) *
       plan.ranges;
 
   plan.read_bytes =
-      static_cast<std::size_t>(std::clamp(memory_bytes / 64, kLeastReadBytes, kMostReadBytes));
+      static_cast<std::size_t>(std::clamp(memory_bytes / 64, kMinReadBytes, kMaxReadBytes));
 
   // plan_bytes() grows with the runs: the largest that stays below the cap.
   const std::uint64_t of_use = 2 * std::max(kPartRecords, expected / plan.ranges * 8 / 5);
   std::uint64_t fits = 0;
   std::uint64_t exceeds =
-      std::min({memory_bytes / (2 * sizeof(PointRecord)), of_use, kMostRecords}) / kRunStep + 1;
+      std::min({memory_bytes / (2 * sizeof(PointRecord)), of_use, kMaxRecords}) / kRunStep + 1;
   while (exceeds - fits > 1) {
     const std::uint64_t steps = fits + (exceeds - fits) / 2;
     plan.run_records = static_cast<std::size_t>(steps * kRunStep);

@@ -18,7 +18,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kMostVolumes = 1 << 10;
+constexpr std::uint64_t kMaxVolumes = 1 << 10;
 constexpr std::size_t kPieceBytes = std::size_t{2} << 20;  // of a write
 
 // The i-th of `count` positions in [0, size), one in each of as many equal strides, anywhere in it:
@@ -88,7 +88,7 @@ SpillFile SpillFile::named(std::span<const std::filesystem::path> names) {
 
 SpillFile SpillFile::reopened(StateReader& state) {
   SpillFile file;
-  for (std::uint64_t count = state.get_count(kMostVolumes); count > 0; --count) {
+  for (std::uint64_t count = state.get_count(kMaxVolumes); count > 0; --count) {
     const std::filesystem::path name = state.get_text();
     const auto end = state.get<std::uint64_t>();
     file.volumes_.push_back(std::make_unique<Volume>(name, DirectFile::Kept::found, end));
@@ -172,7 +172,7 @@ std::uint64_t SpillFile::bytes() const noexcept {
 
 SpillReader::SpillReader(std::size_t buffer_bytes)
     : buffer_(buffer_bytes / (kTransfers * kDirectBytes) * (kTransfers * kDirectBytes)) {
-  if (buffer_.size() < kLeastBytes) throw std::invalid_argument("SpillReader: buffer too small");
+  if (buffer_.size() < kMinBytes) throw std::invalid_argument("SpillReader: buffer too small");
 }
 
 void SpillReader::read(const SpillFile& file, std::span<const Piece> pieces) {

@@ -87,11 +87,11 @@ class SpillReader {
     std::span<PointRecord> out;
   };
 
-  /// @param buffer_bytes  of all reads that run at once, at least kLeastBytes
+  /// @param buffer_bytes  of all reads that run at once, at least kMinBytes
   explicit SpillReader(std::size_t buffer_bytes);
   void read(const SpillFile& file, std::span<const Piece> pieces);
 
-  static constexpr std::size_t kLeastBytes = kTransfers * 2 * kDirectBytes;
+  static constexpr std::size_t kMinBytes = kTransfers * 2 * kDirectBytes;
 
  private:
   Arena buffer_;

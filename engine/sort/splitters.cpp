@@ -13,7 +13,7 @@ Splitters::Splitters(std::vector<MortonKey> sample, std::size_t ranges) {
     const Whole key = whole(sample[i * sample.size() / ranges]);
     if (keys_.empty() || keys_.back() < key)
       keys_.push_back(key);
-    else if (keys_.back() == key && key != kGreatest)
+    else if (keys_.back() == key && key != kMax)
       keys_.push_back(key + 1);  // a second quantile: the key fills a range
   }
   index();
@@ -40,9 +40,9 @@ void Splitters::save(StateWriter& state) const {
 
 void Splitters::index() {
   constexpr std::size_t kCellsPerRange = 32;
-  const std::size_t most_cells = kCellsPerRange * size();
+  const std::size_t max_cells = kCellsPerRange * size();
   const Whole extent = keys_.back() - keys_.front();
-  while (extent >> shift_ >= most_cells) ++shift_;
+  while (extent >> shift_ >= max_cells) ++shift_;
 
   below_cell_.assign(static_cast<std::size_t>(extent >> shift_) + 2, 0);
   for (const Whole key : keys_)
@@ -54,7 +54,7 @@ void Splitters::index() {
 bool Splitters::single_key(std::size_t range) const noexcept {
   if (range == 0) return false;
   const Whole first = keys_[range - 1];
-  return first == kGreatest || (range < keys_.size() && keys_[range] == first + 1);
+  return first == kMax || (range < keys_.size() && keys_[range] == first + 1);
 }
 
 }  // namespace ptc

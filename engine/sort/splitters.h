@@ -52,7 +52,7 @@ class Splitters {
 
  private:
   __extension__ typedef unsigned __int128 Whole;
-  static constexpr Whole kGreatest = ~Whole{0};
+  static constexpr Whole kMax = ~Whole{0};
 
   [[nodiscard]] static Whole whole(const MortonKey& key) noexcept {
     return Whole{key.high} << 64 | key.low;

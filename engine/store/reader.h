@@ -18,7 +18,7 @@ namespace ptc {
 /// damaged), directory, meta page, and that the directory's pages make up one scene; a page's
 /// checksum is checked each time it is read. Padding between pages is not looked at.
 /// Threads: reading may be called concurrently.   Memory: kPageBytes a page, at
-/// most kMostPageBytes while it opens.
+/// most kMaxPageBytes while it opens.
 class ContainerReader {
  public:
   /// @throws FormatError whose message begins with the path and whose offset is that in the file,
@@ -27,8 +27,8 @@ class ContainerReader {
   explicit ContainerReader(const std::filesystem::path& path);
   ~ContainerReader();
 
-  static constexpr std::uint64_t kPageBytes = 36;       ///< of memory a page
-  static constexpr std::uint64_t kMostPageBytes = 100;  ///< while it opens
+  static constexpr std::uint64_t kPageBytes = 36;      ///< of memory a page
+  static constexpr std::uint64_t kMaxPageBytes = 100;  ///< while it opens
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
   [[nodiscard]] const FileHeader& header() const noexcept;

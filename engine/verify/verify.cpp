@@ -21,8 +21,8 @@ namespace {
 constexpr char kPadding[] = "spec/container.md#padding";
 
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
-constexpr std::size_t kMostCachedPages = 1024;
-constexpr std::size_t kLeastCachedPages = 8;
+constexpr std::size_t kMaxCachedPages = 1024;
+constexpr std::size_t kMinCachedPages = 8;
 constexpr std::size_t kPagesAtOnce = 256;
 
 /// Part of a file.
@@ -80,14 +80,14 @@ class FileCheck {
         survey_.container ? s.node_groups : 0;  // a lone superblock may say anything
     const std::uint64_t fixed = kBaseBytes + 100 * survey_.sites.size() + groups / 8 +
                                 3 * page * executor_.threads() + 100 * s.leaf_points;
-    const std::uint64_t least = fixed + kLeastCachedPages * page;
+    const std::uint64_t least = fixed + kMinCachedPages * page;
     if (options_.memory_bytes < least) {
       throw LimitError(
           fmt::format("the memory cap is too small for this file: the least that works is {}M",
                       (least >> 20) + 1));
     }
     cached_pages_ = static_cast<std::size_t>(
-        std::min<std::uint64_t>(kMostCachedPages, (options_.memory_bytes - fixed) / page));
+        std::min<std::uint64_t>(kMaxCachedPages, (options_.memory_bytes - fixed) / page));
   }
 
   /// What keeps readers from opening the file is a finding, unless it was found in a page or the
@@ -206,7 +206,7 @@ class FileCheck {
   FlipBudget flips_;
   Survey survey_;
   VerifyReport report_;
-  std::size_t cached_pages_ = kLeastCachedPages;
+  std::size_t cached_pages_ = kMinCachedPages;
 };
 
 }  // namespace

@@ -24,9 +24,9 @@ constexpr double kRelative = 1e-6;        // sums in another order
 constexpr double kLatticeSlack = 0x1p-8;  // the same for positions up to 2^42 in double
 constexpr double kAngleSlack = 1e-6;      // normals and axes are unit to float precision
 
-constexpr double kGreatestUfloat16 = 0x1.ffp127;
-constexpr double kLeastUfloat16 = 0x1p-134;
-constexpr double kLeastRgbe = 0x1p-136;
+constexpr double kMaxUfloat16 = 0x1.ffp127;
+constexpr double kMinUfloat16 = 0x1p-134;
+constexpr double kMinRgbe = 0x1p-136;
 
 const char* axis_name(std::size_t k) {
   constexpr std::array kNames{"+x", "-x", "+y", "-y", "+z", "-z"};
@@ -68,8 +68,8 @@ std::optional<Fault> compare_mean(const NodeSummary& stored, const NodeSummary& 
 
 std::optional<Fault> compare_sphere(const NodeSummary& stored, const NodeSummary& exact) {
   const double needed = exact.radius + distance(stored.mean, exact.mean);
-  const double least = std::min(needed, kGreatestUfloat16) * (1 - kRelative) - kLatticeSlack;
-  const double most = (needed + kLatticeSlack) * (1 + 0x1p-8) * (1 + kRelative) + kLeastUfloat16;
+  const double least = std::min(needed, kMaxUfloat16) * (1 - kRelative) - kLatticeSlack;
+  const double most = (needed + kLatticeSlack) * (1 + 0x1p-8) * (1 + kRelative) + kMinUfloat16;
   if (stored.radius >= least && stored.radius <= most) return {};
   return Fault{kSphere, fmt::format("sphere of radius {} lattice units about the mean position, "
                                     "its points take {}",
@@ -92,8 +92,8 @@ std::optional<Fault> compare_slab(const NodeSummary& stored, const NodeSummary& 
   const double widest = exact.radius + moved;
   const double needed = std::min(exact.thickness + exact.radius * turned + moved, widest);
   const double slack = kLatticeSlack + kRelative * widest;
-  const double least = std::min(needed, kGreatestUfloat16) - slack;
-  const double most = (needed + slack) * (1 + 0x1p-8) * (1 + kRelative) + kLeastUfloat16;
+  const double least = std::min(needed, kMaxUfloat16) - slack;
+  const double most = (needed + slack) * (1 + 0x1p-8) * (1 + kRelative) + kMinUfloat16;
   if (stored.thickness >= least && stored.thickness <= most) return {};
   return Fault{kSlab, fmt::format("slab of thickness {} lattice units about the mean position, "
                                   "its points take {}",
@@ -101,8 +101,8 @@ std::optional<Fault> compare_slab(const NodeSummary& stored, const NodeSummary& 
 }
 
 std::optional<Fault> compare_area(const NodeSummary& stored, const NodeSummary& exact) {
-  const double area = std::min(exact.area, kGreatestUfloat16);
-  if (std::abs(stored.area - area) <= area * (0x1p-9 + kRelative) + kLeastUfloat16) return {};
+  const double area = std::min(exact.area, kMaxUfloat16);
+  if (std::abs(stored.area - area) <= area * (0x1p-9 + kRelative) + kMinUfloat16) return {};
   return Fault{kSums,
                fmt::format("area {} is not the sum {} of its points", stored.area, exact.area)};
 }
@@ -114,7 +114,7 @@ std::optional<Fault> compare_radiance(const NodeSummary& stored, const NodeSumma
   const double greatest = std::ranges::max(radiance);
   for (std::size_t c = 0; c < 3; ++c) {
     const double found = stored.flux[k][c] / stored.facing[k];
-    if (std::abs(found - radiance[c]) > greatest * (1.0 / 256 + kRelative) + kLeastRgbe) {
+    if (std::abs(found - radiance[c]) > greatest * (1.0 / 256 + kRelative) + kMinRgbe) {
       return Fault{kSums, fmt::format("radiance {} ({}) along {} is not the mean {} of its points",
                                       found, "rgb"[c], axis_name(k), radiance[c])};
     }
@@ -177,7 +177,7 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
                         static_cast<double>(at[2])};
     const double reach =
         distance(position, stored.mean) + static_cast<double>(points[i].radius) / unit;
-    if (reach > radius && stored.radius < kGreatestUfloat16) {
+    if (reach > radius && stored.radius < kMaxUfloat16) {
       return Fault{kSphere,
                    fmt::format("disc {} of the leaf reaches {} lattice units from the mean "
                                "position, beyond the sphere's {}",
@@ -187,7 +187,7 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
     const double tilt = std::sin(angle_between(slab, normal));
     const double height = std::abs(dot(slab, position) - dot(slab, stored.mean)) +
                           static_cast<double>(points[i].radius) / unit * tilt;
-    if (height > thickness && stored.thickness < kGreatestUfloat16) {
+    if (height > thickness && stored.thickness < kMaxUfloat16) {
       return Fault{kSlab,
                    fmt::format("disc {} of the leaf reaches {} lattice units from the middle "
                                "plane, beyond the slab's {}",

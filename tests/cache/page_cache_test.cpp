@@ -197,7 +197,7 @@ TEST_CASE("cache: the least cap works and one byte less is refused by its number
   for (const unsigned threads : {1u, 2u, 5u, 64u}) {
     CacheOptions options;
     options.threads = threads;
-    options.memory_bytes = PageCache::least_bytes(pages.container, threads);
+    options.memory_bytes = PageCache::min_bytes(pages.container, threads);
     const PageCache cache(pages.container, options);
     CHECK(cache.statistics().frames == 2 * threads);
     CHECK(cache.local_slots() == 1);

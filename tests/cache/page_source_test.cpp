@@ -17,7 +17,7 @@ using namespace ptc::test;
 
 namespace {
 
-constexpr std::size_t kMostBytes = 20'000;
+constexpr std::size_t kMaxBytes = 20'000;
 
 std::vector<std::byte> noise(std::size_t bytes) {
   std::mt19937 random(1);
@@ -49,14 +49,14 @@ TEST_CASE("page source: any range is what the file holds, expected or not", "[ca
   for (const BackEnd back_end : available_back_ends(file)) {
     INFO("back end " << static_cast<int>(back_end));
     std::mt19937 random(2);
-    const auto source = make_page_source(back_end, file, kMostBytes);
+    const auto source = make_page_source(back_end, file, kMaxBytes);
     std::size_t wrong = 0;
     for (int i = 0; i < 2000; ++i) {
       // Up to more than any back end keeps; some of them are read afterwards, in any order.
       const std::uint32_t expected = below(i % 50 == 0 ? 100 : 4, random);
       std::vector<std::pair<std::uint64_t, std::size_t>> ranges;
       for (std::uint32_t k = 0; k <= expected; ++k) {
-        const std::size_t bytes = 1 + below(kMostBytes, random);
+        const std::size_t bytes = 1 + below(kMaxBytes, random);
         ranges.emplace_back(
             below(static_cast<std::uint32_t>(noise.bytes.size() - bytes + 1), random), bytes);
         if (k > 0) source->expect(ranges.back().first, bytes);
@@ -77,7 +77,7 @@ TEST_CASE("page source: the last bytes of a file are read, and none beyond them"
   const InputFile file(noise.path());
   for (const BackEnd back_end : available_back_ends(file)) {
     INFO("back end " << static_cast<int>(back_end));
-    const auto source = make_page_source(back_end, file, kMostBytes);
+    const auto source = make_page_source(back_end, file, kMaxBytes);
     for (const std::size_t bytes : {1U, 2U, 3U, 4U, 4099U, 4100U}) {
       const std::uint64_t offset = noise.bytes.size() - bytes;
       CHECK(noise.same(offset, source->read(offset, bytes)));
@@ -92,7 +92,7 @@ TEST_CASE("page source: a file that became shorter is an error that names it",
   for (const BackEnd back_end : available_back_ends(file)) {
     if (back_end == BackEnd::mmap) continue;  // SIGBUS, as its comment says
     INFO("back end " << static_cast<int>(back_end));
-    const auto source = make_page_source(back_end, file, kMostBytes);
+    const auto source = make_page_source(back_end, file, kMaxBytes);
     write_file(noise.path(), noise.bytes);
     CHECK(noise.same(600'000, source->read(600'000, 5000)));
     REQUIRE(::truncate(noise.path().c_str(), 603'000) == 0);
@@ -108,10 +108,10 @@ TEST_CASE("page source: one that ends leaves nothing on its way", "[cache][sourc
   const InputFile file(noise.path());
   for (const BackEnd back_end : available_back_ends(file)) {
     for (int i = 0; i < 20; ++i) {
-      const auto source = make_page_source(back_end, file, kMostBytes);
+      const auto source = make_page_source(back_end, file, kMaxBytes);
       static_cast<void>(source->read(0, 10));
-      for (std::uint64_t k = 1; k < 20; ++k) source->expect(k * 20'000, kMostBytes);
-      if (i % 2 == 0) CHECK(noise.same(380'000, source->read(380'000, kMostBytes)));
+      for (std::uint64_t k = 1; k < 20; ++k) source->expect(k * 20'000, kMaxBytes);
+      if (i % 2 == 0) CHECK(noise.same(380'000, source->read(380'000, kMaxBytes)));
     }
   }
 }

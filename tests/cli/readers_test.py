@@ -22,7 +22,7 @@ from vectors_tree import Surfel, scatter
 from vectors_verify import four_points
 
 DRAFTS = (
-    good.one_point, good.two_pages, good.root_first, good.pages_by_any_number, good.texts, good.greatest_shifts,
+    good.one_point, good.two_pages, good.root_first, good.pages_by_any_number, good.texts, good.max_shifts,
     good.with_lz4, good.frames_by_hand, lambda: good.packed(reader.LZ4), lambda: good.packed(reader.ZSTD),
     lambda: Draft(scatter(20, 5), channels=good.CHANNELS, text=(("a", "b"),)),
     lambda: Draft([Surfel((5, 6, 7), radius=0.5)] * 20, leaf_points=1),

@@ -64,8 +64,8 @@ std::atomic<long> calls{0};
 std::atomic<bool> in_main{false};
 int trace = -1;
 
-constexpr int kMostFiles = 1024;
-char paths[kMostFiles][PATH_MAX];  // of open files below the directory; "": another file
+constexpr int kMaxFiles = 1024;
+char paths[kMaxFiles][PATH_MAX];  // of open files below the directory; "": another file
 std::atomic_flag trace_lock = ATOMIC_FLAG_INIT;
 
 template <class Function>
@@ -115,7 +115,7 @@ __attribute__((destructor)) void tell_count() {
 }
 
 const char* path_of(int fd) {
-  return fd >= 0 && fd < kMostFiles ? paths[fd] : "";
+  return fd >= 0 && fd < kMaxFiles ? paths[fd] : "";
 }
 
 // Where `path` is, when that is in the directory; else "".
@@ -208,7 +208,7 @@ int open_watched(int base, const char* path, int flags, mode_t mode) {
   const bool is_there =
       where[0] != '\0' && ::access(where, F_OK) == 0;  // then its name does not change
   const int fd = real(base, path, flags, mode);
-  if (fd < 0 || fd >= kMostFiles || where[0] == '\0') return fd;
+  if (fd < 0 || fd >= kMaxFiles || where[0] == '\0') return fd;
   std::strcpy(paths[fd], where);
   if (is_there && (flags & O_TRUNC) != 0) record("cut", where);
   if (!is_there && (flags & O_CREAT) != 0) record("create", where);
@@ -349,7 +349,7 @@ int fdatasync(int fd) {
 int close(int fd) {
   static const auto real = next_of(&::close, "close");
   const bool fails = strikes("close", Kind::close, path_of(fd));
-  if (fd >= 0 && fd < kMostFiles) paths[fd][0] = '\0';
+  if (fd >= 0 && fd < kMaxFiles) paths[fd][0] = '\0';
   const int result = real(fd);
   if (fails) errno = error_number;
   return fails ? -1 : result;

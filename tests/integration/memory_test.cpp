@@ -18,7 +18,7 @@ using namespace ptc::test;
 namespace {
 
 /// Least number of bytes under which a run is not refused.
-std::uint64_t least_cap(const std::function<void(std::uint64_t)>& run) {
+std::uint64_t min_cap(const std::function<void(std::uint64_t)>& run) {
   const auto refused = [&](std::uint64_t bytes) {
     try {
       run(bytes);
@@ -53,7 +53,7 @@ TEST_CASE(
     "[integration][memory]") {
   const TemporaryDirectory dir;
   const auto building = [&](std::uint64_t points, std::uint8_t page_shift, unsigned threads) {
-    return least_cap([&](std::uint64_t bytes) {
+    return min_cap([&](std::uint64_t bytes) {
       BuildRequest request;
       request.city_points = points;
       request.page_shift = page_shift;
@@ -89,7 +89,7 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
   REQUIRE(many > few + 100);
   Progress silent;
   const auto shading = [&](const char* scene, const char* receivers) {
-    return least_cap([&](std::uint64_t bytes) {
+    return min_cap([&](std::uint64_t bytes) {
       ShadeRequest request{{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}}};
       request.count = 1;
       if (*receivers != 0) request.receivers = dir / receivers;
@@ -101,7 +101,7 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
   CHECK(shading("few.ptcx", "few.ptcx") == least + 36 * few);
   CHECK(shading("few.ptcx", "many.ptcx") == least + 36 * many);
   const auto lit = [&](const char* scene, unsigned bounces, unsigned threads) {
-    return least_cap([&](std::uint64_t bytes) {
+    return min_cap([&](std::uint64_t bytes) {
       ShadeRequest request{
           {.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = threads}}};
       request.bounces = bounces;
@@ -113,7 +113,7 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
   CHECK(lit("few.ptcx", 2, 1) - lit("few.ptcx", 1, 1) >
         (512 << 10) + (36 + 80) * few);  // and an encoder
   const auto picture = [&](const char* scene) {
-    return least_cap([&](std::uint64_t bytes) {
+    return min_cap([&](std::uint64_t bytes) {
       RenderRequest request{{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}}};
       request.camera = Camera{.width = 2, .height = 2};
       render_picture(request, std::array{PictureTarget{dir / "o.png"}}, silent);

@@ -252,12 +252,12 @@ TEST_CASE("triangulate: half a million corners are covered once and take few loo
           "[io][triangulate]") {
   constexpr std::size_t kCorners = 500'000;
   const double line = 8 * std::log2(kCorners);
-  const auto check = [&](const Polygon& polygon, double most_looks) {
+  const auto check = [&](const Polygon& polygon, double max_looks) {
     Triangles triangles;
     const TriangulationCounts counts = triangulate(polygon, triangles);
     CHECK(triangles.size() == polygon.size() - 2);
     CHECK(counts.fan_corners == 0);
-    CHECK(static_cast<double>(counts.looks) < most_looks * kCorners);
+    CHECK(static_cast<double>(counts.looks) < max_looks * kCorners);
     double size = 0;
     for (const auto& [a, b, c] : triangles) {
       size += glm::length(glm::cross(polygon[b] - polygon[a], polygon[c] - polygon[a])) / 2;

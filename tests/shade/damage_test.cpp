@@ -68,7 +68,7 @@ struct Damaged {
       reference.shade(alone, std::span(&pair.expected, 1), grid);
       Gather gather(view, cache, {});
       gather.shade(alone, std::span(&pair.found, 1), grid);
-      pair.bound = gather.counts().damage.greatest_bound;
+      pair.bound = gather.counts().damage.max_bound;
       pairs.push_back(pair);
     }
     return pairs;
@@ -104,7 +104,7 @@ TEST_CASE("damage: of a whole scene nothing is lost and no bit differs", "[shade
   CHECK(std::ranges::equal(run.results, damaged.scene.shade(), same));
   CHECK(lost.list().empty());
   CHECK(run.counts.damage.stand_ins == 0);
-  CHECK(run.counts.damage.greatest_bound == 0);
+  CHECK(run.counts.damage.max_bound == 0);
 }
 
 TEST_CASE("damage: without leave to go on a lost page is an error that names file, place and rule",
@@ -192,7 +192,7 @@ TEST_CASE("damage: neither threads nor the cap change what stands in", "[shade][
   std::optional<Damaged::Run> first;
   for (const unsigned threads : {1U, 3U}) {
     for (const std::uint64_t cap :
-         {PageCache::least_bytes(*damaged.broken, threads), std::uint64_t{64} << 20}) {
+         {PageCache::min_bytes(*damaged.broken, threads), std::uint64_t{64} << 20}) {
       LostPages lost(*damaged.broken);
       const auto run = damaged.shade(&lost, threads, cap);
       CHECK(lost.list().size() == 3);
@@ -201,7 +201,7 @@ TEST_CASE("damage: neither threads nor the cap change what stands in", "[shade][
       CHECK(run.counts.damage.stand_ins == first->counts.damage.stand_ins);
       CHECK(run.counts.damage.receivers == first->counts.damage.receivers);
       CHECK(run.counts.damage.bounds == first->counts.damage.bounds);
-      CHECK(run.counts.damage.greatest_bound == first->counts.damage.greatest_bound);
+      CHECK(run.counts.damage.max_bound == first->counts.damage.max_bound);
     }
   }
   CHECK(first->counts.damage.stand_ins > 0);

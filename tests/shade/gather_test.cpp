@@ -272,7 +272,7 @@ TEST_CASE("gather: threads, cap, page order and mmap change no bit", "[shade][ga
     return true;
   };
   CHECK(same(scene.shade({}, 2)));
-  CHECK(same(scene.shade({.cache_bytes = PageCache::least_bytes(*scene.container, 2)}, 2)));
+  CHECK(same(scene.shade({.cache_bytes = PageCache::min_bytes(*scene.container, 2)}, 2)));
   CHECK(same(scene.shade({.back_end = BackEnd::mmap}, 2)));
   Scene depth_first(surfels, {.levels_per_stream = 63});
   depth_first.receivers = scene.receivers;

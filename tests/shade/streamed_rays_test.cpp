@@ -14,7 +14,7 @@ TEST_CASE("streamed rays: parts of a scene give what the whole gives", "[shade][
   const auto receivers = std::span<const Receiver>(scene.receivers).first(300);
   const std::uint64_t points = scene.container->superblock().points;
   REQUIRE(points * (sizeof(Surfel) + DiscRays::kBytes) < (64U << 20));
-  REQUIRE(points * (sizeof(Surfel) + DiscRays::kBytes) > StreamedRays::kLeastBytes);
+  REQUIRE(points * (sizeof(Surfel) + DiscRays::kBytes) > StreamedRays::kMinBytes);
   const Executor executor(2);
   const auto sky = [](const glm::vec3& d) { return glm::vec3(1 + d.z); };
   const auto trace = [&](std::uint64_t memory_bytes) {
@@ -25,7 +25,7 @@ TEST_CASE("streamed rays: parts of a scene give what the whole gives", "[shade][
     return results;
   };
   const std::vector<Shading> whole = trace(std::uint64_t{128} << 20),
-                             parts = trace(StreamedRays::kLeastBytes);
+                             parts = trace(StreamedRays::kMinBytes);
   double covered = 0;
   for (std::size_t i = 0; i < whole.size(); ++i) {
     covered += static_cast<double>(whole[i].occlusion);
@@ -51,7 +51,7 @@ TEST_CASE("streamed rays: an empty scene covers nothing", "[shade][rays]") {
   Progress silent;
   StreamedRays rays(
       *scene.container, Sides::both, [](const glm::vec3&) { return glm::vec3(1); },
-      StreamedRays::kLeastBytes);
+      StreamedRays::kMinBytes);
   rays.trace(receivers, 64, 0, results, Executor(1), silent);
   CHECK(results[0].occlusion == 0);
   CHECK(results[0].sky.x == Approx(3.14159265F));

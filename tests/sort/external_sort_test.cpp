@@ -25,7 +25,7 @@ using namespace ptc::test;
 namespace {
 
 constexpr std::uint64_t kMiB = 1 << 20;
-constexpr std::uint64_t kLeastCap = kMiB / 4;  // runs of 1536 records
+constexpr std::uint64_t kMinCap = kMiB / 4;  // runs of 1536 records
 
 // A directory that is removed with all that should not be in it.
 struct TempDirectory {
@@ -106,7 +106,7 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
     const std::vector<PointRecord> input = make_records(keys, 30000);  // 1.2 MB
     const std::vector<PointRecord> expected = stable_sorted(input);
     const std::vector<MortonKey> sample = sample_of(input, 2000);
-    for (const std::uint64_t cap : {kLeastCap, 64 * kMiB}) {
+    for (const std::uint64_t cap : {kMinCap, 64 * kMiB}) {
       CAPTURE(cap);
       const Outcome one = sort(input, cap, 1, sample), two = sort(input, cap, 2, sample);
       CHECK(same_bytes(one.records, expected));
@@ -135,8 +135,7 @@ TEST_CASE("external sort: what the disk has no room for is refused before it beg
   const TempDirectory directory;
   const Executor executor(1);
   try {
-    const ExternalSorter sorter({kLeastCap, {directory.path}, std::uint64_t{1} << 50}, executor,
-                                {});
+    const ExternalSorter sorter({kMinCap, {directory.path}, std::uint64_t{1} << 50}, executor, {});
     FAIL("begun");
   } catch (const std::system_error& error) {
     CHECK(error.code() == std::errc::no_space_on_device);
@@ -184,7 +183,7 @@ TEST_CASE("external sort: clusters inside clusters are split until they fit", "[
   }
   const std::vector<PointRecord> expected = stable_sorted(input);
   for (const unsigned threads : {1u, 2u}) {
-    const Outcome outcome = sort(input, kLeastCap, threads, sample_of(input, 100));
+    const Outcome outcome = sort(input, kMinCap, threads, sample_of(input, 100));
     CHECK(same_bytes(outcome.records, expected));
     CHECK(outcome.statistics.spilled_bytes > input.size() * kSpilledBytes / 2 * 3);
   }
@@ -194,7 +193,7 @@ TEST_CASE("external sort: equal keys beyond memory stream in the order of the in
           "[sort][external]") {
   for (const Keys keys : {Keys::equal, Keys::heavy, Keys::few}) {
     const std::vector<PointRecord> input = make_records(keys, 80000);
-    const Outcome outcome = sort(input, kLeastCap, 2, sample_of(input, 500));
+    const Outcome outcome = sort(input, kMinCap, 2, sample_of(input, 500));
     CHECK(same_bytes(outcome.records, stable_sorted(input)));
     // They are not partitioned again and again.
     CHECK(outcome.statistics.spilled_bytes < 3 * input.size() * kSpilledBytes);
@@ -206,7 +205,7 @@ TEST_CASE("external sort: every count around a run's end is sorted", "[sort][ext
   const std::vector<PointRecord> input = make_records(Keys::lattice, 5000);
   for (const std::size_t count : {0u, 1u, 2u, 1535u, 1536u, 1537u, 3071u, 3072u, 3073u, 5000u}) {
     const std::span<const PointRecord> part(input.data(), count);
-    const Outcome outcome = sort(part, kLeastCap, 2, {});
+    const Outcome outcome = sort(part, kMinCap, 2, {});
     CHECK(same_bytes(outcome.records, stable_sorted({part.begin(), part.end()})));
     CHECK(outcome.statistics.points == count);
   }
@@ -217,7 +216,7 @@ TEST_CASE("external sort: blocks of any size come out the same", "[sort][externa
   const Executor two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
   const std::vector<PointRecord> expected = stable_sorted(input);
-  for (const std::uint64_t cap : {kLeastCap, 16 * kMiB})
+  for (const std::uint64_t cap : {kMinCap, 16 * kMiB})
     for (const std::size_t block : {1u, 13u, 4096u, 100000u}) {
       ExternalSorter sorter({cap, {directory.path}}, two, {});
       add_in_blocks(sorter, input, block);
@@ -235,7 +234,7 @@ TEST_CASE("external sort: a block that is offered is filled as long as there are
   const TempDirectory directory;
   const Executor two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
-  ExternalSorter sorter({kLeastCap, {directory.path}}, two, {});
+  ExternalSorter sorter({kMinCap, {directory.path}}, two, {});
   sorter.add(input);
   const std::unique_ptr<PointStream> stream = sorter.finish();
   std::vector<PointRecord> out(15000);
@@ -282,13 +281,13 @@ TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);
   const std::size_t files = open_files();
   {
-    ExternalSorter sorter({kLeastCap, {directory.path}}, two, {});
+    ExternalSorter sorter({kMinCap, {directory.path}}, two, {});
     sorter.add(input);
     CHECK(open_files() == files + 1);
   }
   CHECK(open_files() == files);
   for (const std::size_t taken : {0u, 1u, 30000u}) {
-    ExternalSorter sorter({kLeastCap, {directory.path}}, two, {});
+    ExternalSorter sorter({kMinCap, {directory.path}}, two, {});
     sorter.add(input);
     const std::unique_ptr<PointStream> stream = sorter.finish();
     std::vector<PointRecord> out(taken);
@@ -316,9 +315,9 @@ TEST_CASE("external sort: a directory that cannot be written to is named once it
   small.add(input);
   CHECK(drain(*small.finish(), 1000).size() == input.size());
 
-  ExternalSorter large({kLeastCap, {"/nonexistent/spill"}}, two, {});
+  ExternalSorter large({kMinCap, {"/nonexistent/spill"}}, two, {});
   CHECK_THROWS_AS(large.add(input), std::system_error);
-  ExternalSorter again({kLeastCap, {"/nonexistent/spill"}}, two, {});
+  ExternalSorter again({kMinCap, {"/nonexistent/spill"}}, two, {});
   CHECK_THROWS_WITH(again.add(input), Catch::Contains("/nonexistent/spill"));
 }
 
@@ -377,7 +376,7 @@ TEST_CASE("external sort: a stream that failed does not look as if it ended", "[
   const std::vector<MortonKey> one_key(1000, input.front().key);
   for (const unsigned threads : {1u, 2u}) {
     const Executor executor(threads);
-    ExternalSorter sorter({kLeastCap, {directory.path}}, executor, one_key);
+    ExternalSorter sorter({kMinCap, {directory.path}}, executor, one_key);
     sorter.add(input);
     // The first spill fits, the partition of the bucket that is too large does not.
     const FileSizeLimit limit(input.size() * kSpilledBytes + kMiB);

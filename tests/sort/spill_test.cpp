@@ -107,7 +107,7 @@ TEST_CASE("spill: each range gives its records back in the order of the input", 
     for (const std::size_t step : {1u, 7u, 5000u}) {
       SpillFile file({&kDirectory, 1});
       const auto partition = spilled(file, input, run, 10);
-      SpillReader reader(SpillReader::kLeastBytes);
+      SpillReader reader(SpillReader::kMinBytes);
       REQUIRE(partition->ranges() == splitters.size());
       for (std::size_t range = 0; range < partition->ranges(); ++range) {
         std::vector<PointRecord> expected, actual, block(step);
@@ -135,7 +135,7 @@ TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
   file.discard({}, 0);  // no more than what it is asked for
   CHECK(nameless_bytes() - others == all);
 
-  SpillReader reader(SpillReader::kLeastBytes);
+  SpillReader reader(SpillReader::kMinBytes);
   std::vector<PointRecord> out(records.size());
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
@@ -171,7 +171,7 @@ TEST_CASE("spill: records are spread over directories and come back from all", "
   }
   CHECK(all == file.bytes());
 
-  SpillReader reader(SpillReader::kLeastBytes);
+  SpillReader reader(SpillReader::kMinBytes);
   std::vector<PointRecord> sorted, block(input.size());
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
@@ -204,7 +204,7 @@ TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
   const std::vector<PointRecord> input = make_records(Keys::ascending, 5000);
   SpillFile file({&kDirectory, 1});
   const auto partition = spilled(file, input, 600, 3);
-  SpillReader reader(SpillReader::kLeastBytes);
+  SpillReader reader(SpillReader::kMinBytes);
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
     std::vector<PointRecord> all(static_cast<std::size_t>(bucket.size()));
@@ -225,7 +225,7 @@ TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
 }
 
 TEST_CASE("spill: a read buffer below its least is refused", "[sort][spill]") {
-  CHECK_THROWS_AS(SpillReader(SpillReader::kLeastBytes - 1), std::invalid_argument);
+  CHECK_THROWS_AS(SpillReader(SpillReader::kMinBytes - 1), std::invalid_argument);
 }
 
 TEST_CASE("sort plan: for very many records it uses most of the cap and never more",
@@ -242,7 +242,7 @@ TEST_CASE("sort plan: for very many records it uses most of the cap and never mo
       CHECK(plan.run_records * sizeof(PointRecord) % kDirectBytes == 0);
       CHECK(2 * plan.run_records / 4 * sizeof(PointRecord) % kDirectBytes == 0);
       CHECK(plan.ranges >= 48);
-      CHECK(plan.read_bytes >= SpillReader::kLeastBytes);
+      CHECK(plan.read_bytes >= SpillReader::kMinBytes);
     }
   CHECK_THROWS_AS(plan_sort((256 << 10) - 1, 1, 0), std::invalid_argument);
   CHECK_NOTHROW(plan_sort(~std::uint64_t{0}, 1, ~std::uint64_t{0}));

@@ -9,8 +9,8 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kMostHeaderBytes = std::uint64_t{1} << 20;
-constexpr std::size_t kMostNames = 1024;  // elements, and properties of one element
+constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
+constexpr std::size_t kMaxNames = 1024;  // elements, and properties of one element
 
 std::optional<PlyType> type_named(std::string_view name) {
   constexpr std::array<std::pair<std::string_view, PlyType>, 16> kNames = {
@@ -85,12 +85,11 @@ void PlyReader::read_header() {
   // The mark first: without it the file may be one line of any length.
   constexpr std::string_view kMark = "ply";
   const bool marked =
-      stream_.most_left() > kMark.size() && stream_.next_line(line) && Words(line).next() == kMark;
+      stream_.max_left() > kMark.size() && stream_.next_line(line) && Words(line).next() == kMark;
   if (!marked) stream_.fail_at(0, "not a PLY file");
   bool has_format = false;
   while (stream_.next_line(line)) {
-    if (stream_.offset() > kMostHeaderBytes)
-      stream_.fail_at_line("a PLY header of more than 1 MiB");
+    if (stream_.offset() > kMaxHeaderBytes) stream_.fail_at_line("a PLY header of more than 1 MiB");
     Words words(line);
     const std::string_view keyword = words.next();
     if (keyword == "comment" || keyword == "obj_info" || keyword.empty()) continue;
@@ -136,7 +135,7 @@ void PlyReader::add_element(std::string_view name, std::string_view count) {
     stream_.fail_at_line("an element needs a name and a count");
   }
   if (find(name) != nullptr) stream_.fail_at_line("two elements of one name");
-  if (elements_.size() == kMostNames) stream_.fail_at_line("more than 1024 elements");
+  if (elements_.size() == kMaxNames) stream_.fail_at_line("more than 1024 elements");
   elements_.push_back({std::string(name), static_cast<std::uint64_t>(*number), {}, 0});
 }
 
@@ -159,14 +158,14 @@ void PlyReader::add_property(std::string_view line) {
   if (property.name.empty()) stream_.fail_at_line("a property without name");
   PlyElement& element = elements_.back();
   if (element.find(property.name)) stream_.fail_at_line("two properties of one name");
-  if (element.properties.size() == kMostNames) stream_.fail_at_line("more than 1024 properties");
+  if (element.properties.size() == kMaxNames) stream_.fail_at_line("more than 1024 properties");
   element.properties.push_back(std::move(property));
 }
 
 void PlyReader::check_counts() const {
   const bool ascii = encoding_ == PlyEncoding::ascii;
   // The last line of a text may lack its end.
-  std::uint64_t left = stream_.most_left() + (ascii ? 1 : 0);
+  std::uint64_t left = stream_.max_left() + (ascii ? 1 : 0);
   for (const PlyElement& element : elements_) {
     const std::uint64_t least = ply_least_bytes(element, ascii);
     if (least == 0) continue;

@@ -198,13 +198,13 @@ bool all_within(const glm::dvec3& v, double most) {
 }  // namespace
 
 std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out) {
-  constexpr double kMostFloat = std::numeric_limits<float>::max();
+  constexpr double kMaxFloat = std::numeric_limits<float>::max();
   if (!all_finite(raw.position)) return "a position that is not finite";
-  if (glm::any(glm::greaterThan(glm::abs(raw.position), glm::dvec3(kMostCoordinate))))
+  if (glm::any(glm::greaterThan(glm::abs(raw.position), glm::dvec3(kMaxCoordinate))))
     return "a position beyond 2^999";
-  if (!(raw.radius >= 0 && raw.radius <= kMostFloat))
+  if (!(raw.radius >= 0 && raw.radius <= kMaxFloat))
     return "a radius that is negative, no number or beyond floats";
-  if (!all_within(raw.radiance, kMostFloat))
+  if (!all_within(raw.radiance, kMaxFloat))
     return "a radiance that is negative, no number or beyond floats";
   if (!all_within(raw.albedo, 1)) return "a colour outside its range";
   out.position = raw.position;

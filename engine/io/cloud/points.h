@@ -40,7 +40,7 @@ struct PointFile {
 /// XYZ text (.xyz .xyzn .asc .txt): lines "x y z [nx ny nz [radius [r g b]]]", r g b the linear
 /// radiance, # comments; all lines have as many values as the first.
 ///
-/// Every surfel is checked: position finite and within kMostCoordinate, normal of non-zero finite
+/// Every surfel is checked: position finite and within kMaxCoordinate, normal of non-zero finite
 /// length (it is normalised), radius finite and not negative, radiance finite and not negative,
 /// albedo in [0, 1]. A PLY that ends early, counts more than it can hold, or goes on after its last
 /// element is refused.

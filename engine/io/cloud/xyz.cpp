@@ -10,7 +10,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kMostValues = 10;
+constexpr std::size_t kMaxValues = 10;
 
 class XyzSource : public PointSource {
  public:
@@ -60,7 +60,7 @@ class XyzSource : public PointSource {
     for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
       const std::optional<double> value = parse_number(word);
       if (!value) stream_.fail_at_line("not a number");
-      if (count == kMostValues) stream_.fail_at_line("more than 10 values");
+      if (count == kMaxValues) stream_.fail_at_line("more than 10 values");
       values_[count++] = *value;
     }
     return count;
@@ -76,7 +76,7 @@ class XyzSource : public PointSource {
   }
 
   ByteStream stream_;
-  std::array<double, kMostValues> values_{};
+  std::array<double, kMaxValues> values_{};
   std::size_t columns_ = 0;
   bool has_line_ = false;
   std::uint64_t done_ = 0;

@@ -144,7 +144,7 @@ std::vector<std::string> channel_names(const ExrLayer& layer) {
 
 void check_layers(unsigned width, unsigned height, const std::vector<ExrLayer>& layers) {
   const std::uint64_t count = std::uint64_t{width} * height;
-  if (count == 0 || width > kMostImageSide || height > kMostImageSide || count > kMostImagePixels) {
+  if (count == 0 || width > kMaxImageSide || height > kMaxImageSide || count > kMaxImagePixels) {
     throw std::invalid_argument("write_exr: size out of range");
   }
   if (layers.empty()) throw std::invalid_argument("write_exr: no layer");
@@ -173,8 +173,8 @@ std::vector<half> as_halves(const std::vector<float>& values) {
 
 }  // namespace
 
-Image read_exr(const std::filesystem::path& path, std::uint64_t most_pixels) {
-  check_exr_headers(path, most_pixels);
+Image read_exr(const std::filesystem::path& path, std::uint64_t max_pixels) {
+  check_exr_headers(path, max_pixels);
   try {
     return decode_first_part(path);
   } catch (const std::exception& error) {  // the library's own types among them

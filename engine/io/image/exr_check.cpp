@@ -14,8 +14,8 @@ namespace ptc {
 namespace {
 
 constexpr std::uint32_t kMultiPart = 0x1000;  // bit of the version field
-constexpr std::size_t kMostName = 255;
-constexpr std::int64_t kMostTileSide = 8192;
+constexpr std::size_t kMaxName = 255;
+constexpr std::int64_t kMaxTileSide = 8192;
 
 /// Types whose values the library reads by these sizes, whatever size the attribute declares: where
 /// the two differ, it would take what follows for names and sizes that were not checked.
@@ -55,8 +55,8 @@ bool suits(std::string_view type, std::uint32_t size) {
 
 class HeaderWalk {
  public:
-  HeaderWalk(const std::filesystem::path& path, std::uint64_t most_pixels)
-      : stream_(path), bytes_(stream_.most_left()), most_pixels_(most_pixels) {}
+  HeaderWalk(const std::filesystem::path& path, std::uint64_t max_pixels)
+      : stream_(path), bytes_(stream_.max_left()), max_pixels_(max_pixels) {}
 
   void run() {
     stream_.skip(4);  // the magic number was read
@@ -80,7 +80,7 @@ class HeaderWalk {
     for (;;) {
       const auto c = std::to_integer<char>(stream_.take(1)[0]);
       if (c == '\0') return text;
-      if (text.size() == kMostName) stream_.fail_at(stream_.offset(), "EXR: a name without end");
+      if (text.size() == kMaxName) stream_.fail_at(stream_.offset(), "EXR: a name without end");
       text.push_back(c);
     }
   }
@@ -95,7 +95,7 @@ class HeaderWalk {
     for (; !attribute.empty(); attribute = name()) {
       const std::string type = name();
       const std::uint32_t size = u32();
-      if (size > stream_.most_left()) {
+      if (size > stream_.max_left()) {
         stream_.fail_at(stream_.offset(),
                         "EXR: attribute '" + attribute + "' past the end of the file");
       }
@@ -153,17 +153,17 @@ class HeaderWalk {
   void check_sizes() const {
     const auto [width, height] = window_;
     if (width < 1 || height < 1) fail("a picture without pixels");
-    if (width > kMostImageSide || height > kMostImageSide ||
-        static_cast<std::uint64_t>(width * height) > kMostImagePixels) {
+    if (width > kMaxImageSide || height > kMaxImageSide ||
+        static_cast<std::uint64_t>(width * height) > kMaxImagePixels) {
       fail("more pixels than this program takes");
     }
-    if (static_cast<std::uint64_t>(width * height) > most_pixels_) {
-      fail("more pixels than the " + std::to_string(most_pixels_) + " that are left");
+    if (static_cast<std::uint64_t>(width * height) > max_pixels_) {
+      fail("more pixels than the " + std::to_string(max_pixels_) + " that are left");
     }
     const auto [tile_width, tile_height] = tile_;
     if (tile_width == 0 && tile_height == 0) return;
-    if (tile_width < 1 || tile_height < 1 || tile_width > kMostTileSide ||
-        tile_height > kMostTileSide) {
+    if (tile_width < 1 || tile_height < 1 || tile_width > kMaxTileSide ||
+        tile_height > kMaxTileSide) {
       fail("tiles of a size that this program does not take");
     }
     const std::int64_t tiles =
@@ -177,15 +177,15 @@ class HeaderWalk {
 
   ByteStream stream_;
   std::uint64_t bytes_;
-  std::uint64_t most_pixels_;
+  std::uint64_t max_pixels_;
   std::array<std::int64_t, 2> window_{};
   std::array<std::int64_t, 2> tile_{};
 };
 
 }  // namespace
 
-void check_exr_headers(const std::filesystem::path& path, std::uint64_t most_pixels) {
-  HeaderWalk(path, most_pixels).run();
+void check_exr_headers(const std::filesystem::path& path, std::uint64_t max_pixels) {
+  HeaderWalk(path, max_pixels).run();
 }
 
 }  // namespace ptc

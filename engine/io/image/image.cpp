@@ -20,7 +20,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kMostFileBytes = std::uint64_t{1} << 30;  // stb counts in int
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{1} << 30;  // stb counts in int
 
 struct StbFree {
   void operator()(void* pixels) const noexcept { stbi_image_free(pixels); }
@@ -43,17 +43,17 @@ const std::vector<float>& linear_of_16_bit() {
 
 // The most that deflate, JPEG's end-of-band runs and run lengths make of a byte is below 8448
 // pixels (a 1-bit PNG): a small file cannot ask for a large allocation.
-void check_size(int width, int height, std::size_t file_bytes, std::uint64_t most_pixels,
+void check_size(int width, int height, std::size_t file_bytes, std::uint64_t max_pixels,
                 const std::string& name) {
   if (width < 1 || height < 1) refuse(name, "a picture without pixels");
   const auto w = static_cast<std::uint64_t>(width);
   const auto h = static_cast<std::uint64_t>(height);
   const std::string size = std::to_string(w) + " x " + std::to_string(h) + " pixels";
-  if (w > kMostImageSide || h > kMostImageSide || w * h > kMostImagePixels) {
+  if (w > kMaxImageSide || h > kMaxImageSide || w * h > kMaxImagePixels) {
     refuse(name, size + " are more than this program takes");
   }
-  if (w * h > most_pixels) {
-    refuse(name, size + " are more than the " + std::to_string(most_pixels) + " that are left");
+  if (w * h > max_pixels) {
+    refuse(name, size + " are more than the " + std::to_string(max_pixels) + " that are left");
   }
   if (w * h / 8448 > file_bytes) {
     refuse(name, size + " cannot come from " + std::to_string(file_bytes) + " bytes");
@@ -124,10 +124,10 @@ std::uint8_t stored_8_bit(float linear) {
 }  // namespace
 
 Image decode_image(std::span<const std::byte> bytes, const std::string& name,
-                   std::uint64_t most_pixels) {
+                   std::uint64_t max_pixels) {
   const RasterFormat format = raster_format(bytes, name);
   if (format == RasterFormat::none) refuse(name, "not a PNG, JPEG, BMP, HDR, TGA or EXR picture");
-  if (bytes.size() > kMostFileBytes) refuse(name, "a picture of more than 1 GiB");
+  if (bytes.size() > kMaxFileBytes) refuse(name, "a picture of more than 1 GiB");
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int size = static_cast<int>(bytes.size());
   int width = 0;
@@ -135,30 +135,30 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name,
   if (stbi_info_from_memory(data, size, &width, &height, nullptr) == 0) {
     refuse(name, stbi_failure_reason());
   }
-  check_size(width, height, bytes.size(), most_pixels, name);
+  check_size(width, height, bytes.size(), max_pixels, name);
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
   check_raster(bytes, format, pixels, name);
   return format == RasterFormat::hdr ? decode_hdr(data, size, name)
                                      : decode_integers(data, size, name);
 }
 
-Image read_image(const std::filesystem::path& path, std::uint64_t most_pixels) {
+Image read_image(const std::filesystem::path& path, std::uint64_t max_pixels) {
   const InputFile file(path);
   constexpr std::array kExrMagic = {std::byte{0x76}, std::byte{0x2f}, std::byte{0x31},
                                     std::byte{0x01}};
   std::array<std::byte, 4> magic{};
   if (file.size() >= magic.size()) file.read_at(0, magic);
-  if (magic == kExrMagic) return read_exr(path, most_pixels);
-  if (file.size() > kMostFileBytes) refuse(path.string(), "a picture of more than 1 GiB");
+  if (magic == kExrMagic) return read_exr(path, max_pixels);
+  if (file.size() > kMaxFileBytes) refuse(path.string(), "a picture of more than 1 GiB");
   std::vector<std::byte> bytes(file.size());
   file.read_at(0, bytes);
-  return decode_image(bytes, path.string(), most_pixels);
+  return decode_image(bytes, path.string(), max_pixels);
 }
 
 void write_png(const std::filesystem::path& target, const Image& image) {
   const std::size_t count = std::size_t{image.width} * image.height;
-  if (count == 0 || image.width > kMostImageSide || image.height > kMostImageSide ||
-      count > kMostImagePixels || image.pixels.size() != count) {
+  if (count == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide ||
+      count > kMaxImagePixels || image.pixels.size() != count) {
     throw std::invalid_argument("write_png: size and number of pixels do not fit");
   }
   std::vector<std::uint8_t> stored;

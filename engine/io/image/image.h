@@ -13,8 +13,8 @@
 namespace ptc {
 
 /// The largest pictures that are read and written, in pixels.
-inline constexpr unsigned kMostImageSide = 1U << 16;
-inline constexpr std::uint64_t kMostImagePixels = std::uint64_t{1} << 28;
+inline constexpr unsigned kMaxImageSide = 1U << 16;
+inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 
 /// Linear RGB, row by row from the top.
 struct Image {
@@ -33,17 +33,17 @@ struct Image {
 ///
 /// An EXR gives the data window of its first part: channels R G B, or Y as grey; deep parts are
 /// refused.
-/// @param most_pixels  at most kMostImagePixels
+/// @param max_pixels  at most kMaxImagePixels
 /// @throws DataError when it is no such picture, ends too early or has more pixels;
 ///         std::system_error
 /// Memory: 12 bytes a pixel, and what the decoder takes.
 [[nodiscard]] Image read_image(const std::filesystem::path& path,
-                               std::uint64_t most_pixels = kMostImagePixels);
+                               std::uint64_t max_pixels = kMaxImagePixels);
 
 /// The same for a PNG, JPEG, TGA, BMP or HDR in memory.
 /// @param name  what errors call it; a name that ends in ".tga" says that it is a TGA
 [[nodiscard]] Image decode_image(std::span<const std::byte> bytes, const std::string& name,
-                                 std::uint64_t most_pixels = kMostImagePixels);
+                                 std::uint64_t max_pixels = kMaxImagePixels);
 
 /// One layer of an EXR file: channel names are "R" "G" "B" for the empty name, else "NAME.R" ... ;
 /// one-component layers have the channel "NAME.V"; three-component vectors "NAME.X" "NAME.Y"

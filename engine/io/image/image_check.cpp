@@ -14,9 +14,9 @@ namespace {
 
 // stb decodes each scan over the whole picture, even an empty one. Encoders write some ten scans;
 // libjpeg's cjpeg reads scripts of at most 100 (rdswitch.c).
-constexpr std::uint64_t kMostScans = 100;
+constexpr std::uint64_t kMaxScans = 100;
 // Ten scans of the largest picture fit; they take about half a minute.
-constexpr std::uint64_t kMostScannedPixels = std::uint64_t{1} << 32;
+constexpr std::uint64_t kMaxScannedPixels = std::uint64_t{1} << 32;
 
 constexpr char kTooEarly[] = "the picture ends too early";
 
@@ -97,8 +97,8 @@ std::optional<Fault> jpeg_fault(std::span<const std::byte> bytes, std::uint64_t 
     if (marker == 0xd9 && !at.past_end()) return std::nullopt;
     if (marker == 0 || (marker >= 0xd0 && marker <= 0xd7)) continue;
     in_scan = marker == kStartOfScan;
-    if (in_scan && ++scans > kMostScans) return Fault{offset, "a JPEG of more than 100 scans"};
-    if (in_scan && scans * pixels > kMostScannedPixels) {
+    if (in_scan && ++scans > kMaxScans) return Fault{offset, "a JPEG of more than 100 scans"};
+    if (in_scan && scans * pixels > kMaxScannedPixels) {
       return Fault{offset, "a JPEG of more than 2^32 pixels in all scans"};
     }
     const unsigned length = at.u16_big();
@@ -185,7 +185,7 @@ std::optional<std::array<std::uint64_t, 2>> hdr_size(std::string_view line) {
   bool in_number = false;
   for (const char c : line) {
     const bool digit = c >= '0' && c <= '9';
-    if (digit && part < 2 && size[part] < kMostImagePixels) {
+    if (digit && part < 2 && size[part] < kMaxImagePixels) {
       size[part] = size[part] * 10 + static_cast<std::uint64_t>(c - '0');
     }
     if (in_number && !digit) ++part;

@@ -18,7 +18,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kMostMaterials = 65536;
+constexpr std::size_t kMaxMaterials = 65536;
 
 glm::vec3 flat_normal(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
   const glm::dvec3 a(mesh.positions[triangle[0]]);
@@ -120,7 +120,7 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
   if (!is_finite(transform) || determinant == 0 || !std::isfinite(determinant)) {
     throw std::invalid_argument("append_mesh: the transform is not finite and invertible");
   }
-  if (mesh.materials.size() + other.materials.size() > kMostMaterials) {
+  if (mesh.materials.size() + other.materials.size() > kMaxMaterials) {
     throw RequestError("inputs", "the meshes have more than 65,536 materials together");
   }
   Mesh added = other;

@@ -37,7 +37,7 @@ class ObjMesh {
     joined_.clear();
     do {
       joined_.append(line.substr(0, line.size() - (line.ends_with('\\') ? 1 : 0)));
-      if (joined_.size() > ByteStream::kMostBytesAtOnce) {
+      if (joined_.size() > ByteStream::kMaxBytesAtOnce) {
         stream_.fail_at_line("a line of more than 64 MiB");
       }
       if (!line.ends_with('\\')) break;

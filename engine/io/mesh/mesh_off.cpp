@@ -60,7 +60,7 @@ class OffMesh {
     vertices_ = count(words);
     faces_ = count(words);
     // "0 0 0" and the end of the line at least; "0" for a face.
-    const std::uint64_t left = stream_.most_left() + 1;
+    const std::uint64_t left = stream_.max_left() + 1;
     if (vertices_ > left / 6 || faces_ > (left - 6 * vertices_) / 2) {
       stream_.fail_at_line("more vertices or faces than the file can hold");
     }

@@ -50,7 +50,7 @@ std::string reason_for(const std::string& name, const std::filesystem::path& pat
 std::uint64_t TextureLoader::pixels_left() const {
   constexpr std::uint64_t kPixelsOfByte = 256;
   const std::uint64_t most = free_pixels_ + kPixelsOfByte * (texture_bytes_ + mesh_bytes_);
-  return std::min(most - pixels_, kMostImagePixels);
+  return std::min(most - pixels_, kMaxImagePixels);
 }
 
 std::shared_ptr<const Image> TextureLoader::keep(Image image) {

@@ -20,10 +20,10 @@ using Corner = MeshSoup::Corner;
 using Triangle = std::array<Corner, 3>;
 
 constexpr std::uint32_t kNone = MeshSoup::kNone;
-constexpr std::size_t kMostMaterials = 65536;
-constexpr std::size_t kMostCorners = std::size_t{1} << 28;
+constexpr std::size_t kMaxMaterials = 65536;
+constexpr std::size_t kMaxCorners = std::size_t{1} << 28;
 // Farther from the centre, squares of float distances leave the range of float.
-constexpr double kMostExtent = 1e18;
+constexpr double kMaxExtent = 1e18;
 
 struct Soup {
   std::vector<Triangle> triangles;
@@ -57,14 +57,14 @@ glm::dvec3 checked_origin(const MeshSoup& soup, const std::filesystem::path& pat
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
       refuse(path, "vertex " + std::to_string(i) + ": a position that is not finite");
     }
-    if (glm::any(glm::greaterThan(glm::abs(p), glm::dvec3(kMostCoordinate)))) {
+    if (glm::any(glm::greaterThan(glm::abs(p), glm::dvec3(kMaxCoordinate)))) {
       refuse(path, "vertex " + std::to_string(i) + ": a position beyond 2^999");
     }
     bounds.add(p);
   }
   if (bounds.empty()) return glm::dvec3(0);
   const glm::dvec3 half = bounds.high / 2.0 - bounds.low / 2.0;
-  if (half.x > kMostExtent || half.y > kMostExtent || half.z > kMostExtent) {
+  if (half.x > kMaxExtent || half.y > kMaxExtent || half.z > kMaxExtent) {
     refuse(path, "positions more than 2e18 apart");
   }
   return glm::round(bounds.low / 2.0 + bounds.high / 2.0);
@@ -218,14 +218,14 @@ void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles
 }  // namespace
 
 std::size_t MeshSoup::add_material(Material material, const std::filesystem::path& path) {
-  if (materials.size() == kMostMaterials) refuse(path, "more than 65,536 materials");
+  if (materials.size() == kMaxMaterials) refuse(path, "more than 65,536 materials");
   materials.push_back(std::move(material));
   return materials.size() - 1;
 }
 
 void MeshSoup::add_polygon(std::span<const Corner> polygon, std::size_t material,
                            const std::filesystem::path& path) {
-  if (polygon.size() > kMostCorners - corners.size()) refuse(path, "more than 2^28 corners");
+  if (polygon.size() > kMaxCorners - corners.size()) refuse(path, "more than 2^28 corners");
   corners.insert(corners.end(), polygon.begin(), polygon.end());
   polygon_sizes.push_back(static_cast<std::uint32_t>(polygon.size()));
   material_of.push_back(static_cast<std::uint16_t>(material));

@@ -65,10 +65,10 @@ struct TriangulationCounts {
 ///
 /// The work is about n log n looks for n corners; where long triangles lie among evenly spread
 /// corners it is up to n sqrt(n).
-/// @param most_looks  after which the rest becomes a fan; usually n (1024 + 8 sqrt(n)) or 2^34
+/// @param max_looks  after which the rest becomes a fan; usually n (1024 + 8 sqrt(n)) or 2^34
 TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
                                 std::vector<std::array<std::uint32_t, 3>>& triangles,
-                                std::optional<std::uint64_t> most_looks = {});
+                                std::optional<std::uint64_t> max_looks = {});
 
 /// Takes normals through a transform: its inverse transpose, up to a positive factor.
 [[nodiscard]] glm::dmat3 normal_transform(const glm::dmat4& transform);
@@ -93,7 +93,7 @@ TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
 class TextureLoader {
  public:
   TextureLoader(std::filesystem::path directory, MeshWarnings& warnings,
-                std::uint64_t free_pixels = kMostImagePixels)
+                std::uint64_t free_pixels = kMaxImagePixels)
       : directory_(std::move(directory)), warnings_(warnings), free_pixels_(free_pixels) {}
 
   /// @param name  path relative to the directory, / or \ between its parts

@@ -30,7 +30,7 @@ class StlMesh {
   // The size tells: texts begin with "solid", but so do the headers of many binary files.
   bool read_binary() {
     ByteStream stream(path_);
-    const std::uint64_t bytes = stream.most_left();
+    const std::uint64_t bytes = stream.max_left();
     if (bytes < kHeaderBytes) return false;
     std::uint32_t count = 0;
     std::memcpy(&count, stream.take(kHeaderBytes).data() + 80, sizeof count);

@@ -9,13 +9,13 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kParts = 4;
-constexpr std::size_t kMostBytes = 300;
+constexpr std::size_t kMaxBytes = 300;
 
 // On one line. Where UTF-8 is cut, no half character is left.
 std::string shown(std::string_view part) {
-  const bool cut = part.size() > kMostBytes;
+  const bool cut = part.size() > kMaxBytes;
   if (cut) {
-    std::size_t end = kMostBytes;
+    std::size_t end = kMaxBytes;
     while (end > 0 && (static_cast<unsigned char>(part[end]) & 0xC0) == 0x80) --end;
     part = part.substr(0, end);
   }

@@ -121,7 +121,7 @@ InwardCorners inward_corners(const std::vector<glm::dvec2>& points) {
 // triangle is asked about log n times on the average until it is empty or gone.
 class EarClipper {
  public:
-  EarClipper(std::vector<glm::dvec2> points, std::uint64_t most_looks)
+  EarClipper(std::vector<glm::dvec2> points, std::uint64_t max_looks)
       : points_(std::move(points)),
         next_(points_.size()),
         previous_(points_.size()),
@@ -129,7 +129,7 @@ class EarClipper {
         inward_(inward_corners(points_)),
         tree_(inward_.places),
         waiting_(inward_.places.size(), points_.size()),
-        most_looks_(most_looks) {
+        max_looks_(max_looks) {
     const auto n = static_cast<std::uint32_t>(points_.size());
     for (std::uint32_t i = 0; i < n; ++i) {
       next_[i] = (i + 1) % n;
@@ -156,7 +156,7 @@ class EarClipper {
  private:
   // The first ear of the ring from a corner on; kNone when there is none or it takes too long.
   std::uint32_t find_ear(std::uint32_t from) {
-    while (looks_ + tree_.looks() < most_looks_) {
+    while (looks_ + tree_.looks() < max_looks_) {
       auto corner = open_.next(from);
       if (!corner) corner = open_.next(0);
       if (!corner) break;
@@ -204,7 +204,7 @@ class EarClipper {
   InwardCorners inward_;
   PointTree tree_;
   Lists waiting_;  // of each place, the corners whose triangle holds it
-  std::uint64_t most_looks_;
+  std::uint64_t max_looks_;
   std::uint64_t looks_ = 0;
 };
 
@@ -227,7 +227,7 @@ TriangulationCounts cut_quad(const std::vector<glm::dvec2>& points, Triangles& t
 }  // namespace
 
 TriangulationCounts triangulate(std::span<const glm::dvec3> polygon, Triangles& triangles,
-                                std::optional<std::uint64_t> most_looks) {
+                                std::optional<std::uint64_t> max_looks) {
   if (polygon.size() < 3) return {};
   if (polygon.size() == 3) {
     triangles.push_back({0, 1, 2});
@@ -235,7 +235,7 @@ TriangulationCounts triangulate(std::span<const glm::dvec3> polygon, Triangles& 
   }
   std::vector<glm::dvec2> flat = project(polygon);
   if (flat.size() == 4) return cut_quad(flat, triangles);
-  const std::uint64_t most = most_looks.value_or(usual_most_looks(flat.size()));
+  const std::uint64_t most = max_looks.value_or(usual_most_looks(flat.size()));
   return EarClipper(std::move(flat), most).clip(triangles);
 }
 

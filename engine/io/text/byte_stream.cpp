@@ -17,11 +17,11 @@ namespace {
 constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
 // Deflate makes up to 1032 bytes of one, of a file of nothing but repetition: 600 KB of gzip were
 // minutes of reading and gigabytes of vertices. Meshes and clouds shrink to a twentieth at best.
-constexpr std::uint64_t kMostUnpackRatio = 256;
+constexpr std::uint64_t kMaxUnpackRatio = 256;
 constexpr std::uint64_t kFreeUnpackedBytes = std::uint64_t{1} << 26;
 
-std::uint64_t most_unpacked(std::uint64_t packed) {
-  return kFreeUnpackedBytes + kMostUnpackRatio * std::min(packed, UINT64_MAX / 512);
+std::uint64_t max_unpacked(std::uint64_t packed) {
+  return kFreeUnpackedBytes + kMaxUnpackRatio * std::min(packed, UINT64_MAX / 512);
 }
 
 }  // namespace
@@ -93,9 +93,9 @@ ByteStream::ByteStream(const std::filesystem::path& path) : file_(path), buffer_
 
 ByteStream::~ByteStream() = default;
 
-std::uint64_t ByteStream::most_left() const noexcept {
+std::uint64_t ByteStream::max_left() const noexcept {
   if (gunzip_) {
-    const std::uint64_t most = most_unpacked(file_.size());
+    const std::uint64_t most = max_unpacked(file_.size());
     return most > offset() ? most - offset() : 0;
   }
   return file_.size() > offset() ? file_.size() - offset() : 0;
@@ -113,7 +113,7 @@ std::size_t ByteStream::read_some(std::span<std::byte> out) {
                                                                          : zError(count)));
     }
     const std::uint64_t unpacked = base_ + end_ + static_cast<std::uint64_t>(count);
-    if (unpacked > most_unpacked(file_.size())) {
+    if (unpacked > max_unpacked(file_.size())) {
       fail_at(base_ + end_, "gzip data that unpack to more than 256 times their size");
     }
     return static_cast<std::size_t>(count);
@@ -134,7 +134,7 @@ bool ByteStream::refill() {
     begin_ = 0;
   }
   if (end_ == buffer_.size()) {
-    if (end_ >= kMostBytesAtOnce) fail_at(base_, "a line or record of more than 64 MiB");
+    if (end_ >= kMaxBytesAtOnce) fail_at(base_, "a line or record of more than 64 MiB");
     buffer_.resize(2 * buffer_.size());
   }
   const std::size_t count = read_some(std::span(buffer_).subspan(end_));
@@ -166,7 +166,7 @@ bool ByteStream::next_line(std::string_view& line) {
 }
 
 std::span<const std::byte> ByteStream::take(std::size_t count) {
-  if (count > kMostBytesAtOnce) fail_at(offset(), "a record of more than 64 MiB");
+  if (count > kMaxBytesAtOnce) fail_at(offset(), "a record of more than 64 MiB");
   while (end_ - begin_ < count) {
     const std::size_t missing = count - (end_ - begin_);
     if (!refill()) {

@@ -16,11 +16,11 @@ namespace ptc {
 
 /// Buffered sequential reading; a name that ends in ".gz" is unpacked on the way. Offsets count
 /// unpacked bytes.
-/// Memory: a buffer of 256 KiB, up to kMostBytesAtOnce while a line or record is longer.
+/// Memory: a buffer of 256 KiB, up to kMaxBytesAtOnce while a line or record is longer.
 class ByteStream {
  public:
   /// The longest line and the largest record.
-  static constexpr std::size_t kMostBytesAtOnce = std::size_t{1} << 26;
+  static constexpr std::size_t kMaxBytesAtOnce = std::size_t{1} << 26;
 
   /// @throws std::system_error, DataError when a .gz is no gzip file
   explicit ByteStream(const std::filesystem::path& path);
@@ -34,7 +34,7 @@ class ByteStream {
   /// Number of the line that next_line() gave last, from 1 on.
   [[nodiscard]] std::uint64_t line() const noexcept { return line_; }
   /// No more bytes than this are to come; exact where the file is not packed.
-  [[nodiscard]] std::uint64_t most_left() const noexcept;
+  [[nodiscard]] std::uint64_t max_left() const noexcept;
 
   /// Sets `line` to the next line without its end ("\n" or "\r\n"), valid until the next call.
   /// @return false at the end of the file

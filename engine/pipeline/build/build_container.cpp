@@ -187,7 +187,7 @@ class Build {
                   ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()));
     if (scene_) {
       budget.charge("the directory of " + scene_->path().filename().string(),
-                    ContainerReader::kMostPageBytes * scene_->page_count());
+                    ContainerReader::kMaxPageBytes * scene_->page_count());
     }
     if (resumption_) {
       budget.charge("checkpoints", kCheckpointBytes + (kOpenPages << request_.page_shift));

@@ -55,7 +55,7 @@ class CheckSample {
            std::span<const ErrorEstimate> estimates = {});
 
   /// @param scene         the container that the receivers were shaded from
-  /// @param memory_bytes  cap for rays at the surfels, at least StreamedRays::kLeastBytes
+  /// @param memory_bytes  cap for rays at the surfels, at least StreamedRays::kMinBytes
   /// @param progress      advances by one for each receiver, twice for each reference
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides,
                                     const CheckScene& seen, std::uint64_t memory_bytes,

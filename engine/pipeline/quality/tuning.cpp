@@ -30,7 +30,7 @@ constexpr unsigned kResamples = 200;
 constexpr unsigned kBelow = 190;  // of them, sorted: errors of 19 in 20 samples of pilots are below
 
 /// Sides of squares of rays: how a reference begins, and the most that its noise may lead to.
-constexpr unsigned kFirstSide = 16, kMostSide = 128;
+constexpr unsigned kFirstSide = 16, kMaxSide = 128;
 constexpr double kNoise = 0.7;  // of a half, over what is asked
 
 class Tuner {
@@ -54,7 +54,7 @@ class Tuner {
     const double noise = noise_of_half();
     if (noise > kNoise * asked) {
       side = static_cast<unsigned>(
-          std::min<double>(kMostSide, std::ceil(side * noise / (kNoise * asked))));
+          std::min<double>(kMaxSide, std::ceil(side * noise / (kNoise * asked))));
       trace(discs, side, progress);
     }
     return side * side;

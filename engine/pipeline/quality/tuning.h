@@ -47,7 +47,7 @@ struct TuningReport {
 
 /// Compares pilots with rays at the same surfels and finds the cheapest setting that meets `asked`.
 /// @param options   of the run. Of its gather only sides and bleeding count. Its cache_bytes, at
-///                  least StreamedRays::kLeastBytes, are the cap of the rays too
+///                  least StreamedRays::kMinBytes, are the cap of the rays too
 /// @param compared  gets the receivers of the pilots that were compared
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by
 /// pilot

@@ -54,11 +54,11 @@ unsigned side_of(unsigned samples) {
 void check_size(const Camera& camera) {
   const std::uint64_t pixels = std::uint64_t{camera.width} * camera.height;
   const unsigned longer = std::max(camera.width, camera.height);
-  if (pixels > 0 && pixels <= kMostImagePixels && longer <= kMostImageSide) return;
+  if (pixels > 0 && pixels <= kMaxImagePixels && longer <= kMaxImageSide) return;
   throw RequestError("size",
                      fmt::format("`size` is {} x {}: a picture has 1 to {} pixels along each "
                                  "side, and at most {} in all",
-                                 camera.width, camera.height, kMostImageSide, kMostImagePixels));
+                                 camera.width, camera.height, kMaxImageSide, kMaxImagePixels));
 }
 
 /// Loads the meshes and finds the camera.

@@ -18,10 +18,10 @@
 namespace ptc {
 namespace {
 
-constexpr double kMost = std::numeric_limits<float>::max();
-constexpr Range kFinite{-kMost, kMost};
-constexpr Range kPlace{-kMostLightDistance, kMostLightDistance};
-constexpr Range kLight{0, kMost};
+constexpr double kMax = std::numeric_limits<float>::max();
+constexpr Range kFinite{-kMax, kMax};
+constexpr Range kPlace{-kMaxLightDistance, kMaxLightDistance};
+constexpr Range kLight{0, kMax};
 constexpr Range kAngle{0, 1.5707964};
 
 // A null in the text would be a number lost; better to say so when it is written.

@@ -65,9 +65,9 @@ LightRig checked(LightRig rig) {
   for (const PointLight& point : rig.points) {
     require(is_light(point.intensity), "the intensity of a point light is negative or not finite");
     const glm::dvec3 away = glm::abs(point.position);
-    require(away.x <= kMostLightDistance && away.y <= kMostLightDistance &&
-                away.z <= kMostLightDistance,
-            "a coordinate of a point light is not finite, or beyond 1e150");
+    require(
+        away.x <= kMaxLightDistance && away.y <= kMaxLightDistance && away.z <= kMaxLightDistance,
+        "a coordinate of a point light is not finite, or beyond 1e150");
   }
   rig.sky.up = checked_direction(rig.sky.up);
   require(is_light(rig.sky.radiance), "the radiance of the sky is negative or not finite");

@@ -26,10 +26,10 @@ struct Sun {
 [[nodiscard]] glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees);
 
 /// Greatest coordinate of a point light, whose square is still a number.
-inline constexpr double kMostLightDistance = 1e150;
+inline constexpr double kMaxLightDistance = 1e150;
 
 struct PointLight {
-  glm::dvec3 position{0};  ///< each coordinate at most kMostLightDistance
+  glm::dvec3 position{0};  ///< each coordinate at most kMaxLightDistance
   glm::vec3 intensity{1};  ///< W / sr
 };
 

@@ -232,12 +232,12 @@ Bounds city_bounds(std::uint64_t count) {
 
 Mesh city_mesh(std::uint64_t count) {
   const Layout layout = lay_out(count);
-  constexpr std::uint64_t kMost = 0xFFFFFFFF;
+  constexpr std::uint64_t kMax = 0xFFFFFFFF;
   const auto require = [](bool fits) {
     if (!fits)
       throw RequestError("city_points", "a mesh of so large a city has 2^32 vertices or more");
   };
-  require(layout.blocks < kMost / 3 / kGroundTriangles);
+  require(layout.blocks < kMax / 3 / kGroundTriangles);
   Mesh mesh;
   for (std::uint32_t colour = 0; colour < kCityColours; ++colour) {
     Material material;
@@ -248,7 +248,7 @@ Mesh city_mesh(std::uint64_t count) {
   for (std::uint64_t i = 0; i < layout.blocks; ++i) {
     const BlockPlace place = block_place(i);
     const std::vector<Facet> facets = build_block(place);
-    require(mesh.positions.size() + 4 * facets.size() <= kMost);
+    require(mesh.positions.size() + 4 * facets.size() <= kMax);
     for (const Facet& facet : facets) add_facet(facet, block_corner(place), mesh);
   }
   return mesh;

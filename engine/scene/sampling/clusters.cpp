@@ -17,7 +17,7 @@ namespace ptc {
 namespace {
 
 // Surfaces that turn by more than 75 degrees do not share a cluster.
-constexpr float kLeastCosine = 0.26f;
+constexpr float kMinCosine = 0.26f;
 
 // Going beyond the middle takes half as many rounds to the same evenness.
 constexpr float kStride = 1.7f;
@@ -94,7 +94,7 @@ class NearClusters {
             normal_x[at] * p.normal.x + normal_y[at] * p.normal.y + normal_z[at] * p.normal.z;
         const float off_kind = kind[at] - own_kind;
         const float square = dx * dx + dy * dy + dz * dz +
-                             std::max(kLeastCosine - cosine, 0.0f) * kNever +
+                             std::max(kMinCosine - cosine, 0.0f) * kNever +
                              off_kind * off_kind * kNever;
         const std::int32_t bits = std::bit_cast<std::int32_t>(square);
         least = std::min(least, (bits & ~kRowMask) | i);

@@ -28,9 +28,9 @@ namespace {
 constexpr double kPatchSurfels = 8192;
 constexpr unsigned kPointsPerSurfel = 16;
 constexpr unsigned kRounds = 6;
-constexpr unsigned kLitPoints = 4;    // of a surfel's points, evenly spread
-constexpr double kLeastNormal = 0.1;  // length of a mean normal that means something
-constexpr double kMostAcross = 3e5;   // spacings along the side of a square as large as the mesh
+constexpr unsigned kLitPoints = 4;  // of a surfel's points, evenly spread
+constexpr double kMinNormal = 0.1;  // length of a mean normal that means something
+constexpr double kMaxAcross = 3e5;  // spacings along the side of a square as large as the mesh
 
 // What each of some points takes of a number of rays.
 unsigned share(unsigned rays) {
@@ -54,7 +54,7 @@ SamplingOptions resolved(const Mesh& mesh, SamplingOptions options) {
   if (options.spacing == 0) options.spacing = spacing_for(mesh, options.count);
   // Memory follows the number of surfels, if slowly.
   const double side = spacing_for(mesh, 1);
-  require(side == 0 || side / options.spacing <= kMostAcross, "sampling.spacing",
+  require(side == 0 || side / options.spacing <= kMaxAcross, "sampling.spacing",
           "`sampling.spacing` is too small for a mesh of this size");
   if (options.camera) {
     require(options.pixels_per_surfel > 0 && std::isfinite(options.pixels_per_surfel),
@@ -205,7 +205,7 @@ Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest,
   const auto count = static_cast<double>(group.members.size());
   const double length = glm::length(group.normal);
   Surfel surfel;
-  surfel.normal = length > kLeastNormal * count ? glm::vec3(group.normal / length) : at.normal;
+  surfel.normal = length > kMinNormal * count ? glm::vec3(group.normal / length) : at.normal;
   surfel.radius = static_cast<float>(std::sqrt(0.5 * group.area));
   surfel.albedo = finite_or_black(glm::vec3(group.albedo / count));
   surfel.position =

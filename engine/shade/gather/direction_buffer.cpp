@@ -51,7 +51,7 @@ DirectionGrid::DirectionGrid(unsigned resolution,
                              const std::function<glm::vec3(const glm::vec3&)>& sky,
                              unsigned variant)
     : variant_(variant) {
-  if (resolution == 0 || resolution > kMostResolution || resolution % 16 != 0) {
+  if (resolution == 0 || resolution > kMaxResolution || resolution % 16 != 0) {
     throw std::invalid_argument("DirectionGrid: the resolution is 16, 32, 48 or 64");
   }
   const double step = 2.0 / resolution;

@@ -52,7 +52,7 @@ struct Gather::Impl {
     const Frame& frame = scene.view().frame();
     const double scale = 1 / frame.unit();
     const glm::dvec3 origin(frame.origin[0], frame.origin[1], frame.origin[2]);
-    constexpr double kFarthest = SceneScale::kMostDistance / SceneScale::kLatticeUnit;
+    constexpr double kFarthest = SceneScale::kMaxDistance / SceneScale::kLatticeUnit;
     receivers.clear();
     for (std::size_t i = 0; i < from.size(); ++i) {
       const glm::dvec3& p = from[i].position;
@@ -283,14 +283,14 @@ void GatherCounts::add(const GatherCounts& other) noexcept {
 
 void DamageCounts::add(std::uint64_t more, float bound) noexcept {
   receivers += more;
-  greatest_bound = std::max(greatest_bound, static_cast<double>(bound));
+  max_bound = std::max(max_bound, static_cast<double>(bound));
   bounds += more * static_cast<std::uint64_t>(static_cast<double>(bound) / kBoundUnit);
 }
 
 void DamageCounts::add(const DamageCounts& other) noexcept {
   stand_ins += other.stand_ins;
   receivers += other.receivers;
-  greatest_bound = std::max(greatest_bound, other.greatest_bound);
+  max_bound = std::max(max_bound, other.max_bound);
   bounds += other.bounds;
 }
 

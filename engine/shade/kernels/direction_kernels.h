@@ -26,7 +26,7 @@ struct CubeGeometry {
   glm::mat3 rotation;   ///< from the world to the cube's axes
 };
 
-inline constexpr int kMostResolution = 64;
+inline constexpr int kMaxResolution = 64;
 
 /// Axes of a face of the cube: w points through it, u and v follow cyclically.
 struct CubeFace {

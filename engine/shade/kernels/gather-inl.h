@@ -133,7 +133,7 @@ HWY_INLINE VF highest(const ReceiverCell& cell, VF distance2, VF along) {
 /// Half the extent of a slab along any normal of the cone: at most `thick` along the slab's normal
 /// and `wide` across it.
 /// @param cosine  of the angle between the slab's normal and the cone's axis
-HWY_INLINE VF greatest_rise(const ReceiverCell& cell, VF cosine, VF thick, VF wide) {
+HWY_INLINE VF max_rise(const ReceiverCell& cell, VF cosine, VF thick, VF wide) {
   const F f;
   const auto sine = hn::Sqrt(hn::Max(hn::NegMulAdd(cosine, cosine, hn::Set(f, 1.0F)), hn::Zero(f)));
   const auto cone_cos = hn::Set(f, cell.cone_cos), cone_sin = hn::Set(f, cell.cone_sin);

@@ -18,7 +18,7 @@ HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
-constexpr float kMostStoredArea = 0x1.ffp127F;  // the greatest finite ufloat16
+constexpr float kMaxStoredArea = 0x1.ffp127F;  // the greatest finite ufloat16
 
 /// Clusters relative to a cell's centre.
 struct Clusters {
@@ -40,7 +40,7 @@ HWY_INLINE void set_derived(Clusters& c) {
 HWY_INLINE VF top(const CellTest& test, const Clusters& c) {
   const Vec axis = spread(test.cell.axis);
   // What lies in the sphere and in the slab; of a mean normal of zero, NaN, the sphere alone.
-  auto rise = greatest_rise(test.cell, dot(c.normal, axis), c.thickness, c.radius);
+  auto rise = max_rise(test.cell, dot(c.normal, axis), c.thickness, c.radius);
   rise = hn::IfThenElse(hn::Lt(rise, c.radius), rise, c.radius);
   return hn::Add(highest(test.cell, c.distance2, dot(c.to, axis)), rise);
 }
@@ -136,7 +136,7 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
   const F f;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
   // What does not fit the field is only known to be large: the sphere limits it.
-  const auto known = hn::Lt(area, hn::Set(f, kMostStoredArea));
+  const auto known = hn::Lt(area, hn::Set(f, kMaxStoredArea));
   area = hn::Mul(hn::Mul(area, hn::Set(f, test.areas[0])), hn::Set(f, test.areas[1]));
   area = hn::IfThenElse(known, area, hn::Inf(f));
   const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
@@ -230,7 +230,7 @@ class GroupLanes {
     const int at = 2 * first;
     const auto step = hn::Set(f, step_), unit = hn::Set(f, static_cast<float>(test_.unit));
     // Around discs as large as they may be, and where they are.
-    const auto most = hn::Set(f, 2 * SceneScale::kMostRadius);
+    const auto most = hn::Set(f, 2 * SceneScale::kMaxRadius);
     const auto offset = [&](std::size_t k, double centre) {
       return hn::Set(f,
                      static_cast<float>((static_cast<double>(corner_[k]) - centre) * test_.unit));

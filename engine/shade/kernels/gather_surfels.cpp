@@ -33,8 +33,7 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   const auto d2 = dot(s.to, s.to);
   wanted = hn::And(wanted, hn::Gt(s.radius, hn::Zero(f)));
   if (cell.has_horizon) {
-    const auto rise =
-        hn::Min(greatest_rise(cell, dot(s.normal, axis), hn::Zero(f), s.radius), s.radius);
+    const auto rise = hn::Min(max_rise(cell, dot(s.normal, axis), hn::Zero(f), s.radius), s.radius);
     wanted =
         hn::And(wanted, hn::Gt(hn::Add(highest(cell, d2, dot(s.to, axis)), rise), hn::Zero(f)));
   }
@@ -130,7 +129,7 @@ void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uin
         .normal = unfold(coordinate(20), coordinate(22)),
         .radius = hn::Min(hn::Mul(hn::Mul(hn::BitCast(f, word(16)), hn::Set(f, test.lengths[0])),
                                   hn::Set(f, test.lengths[1])),
-                          hn::Set(f, SceneScale::kMostRadius))};
+                          hn::Set(f, SceneScale::kMaxRadius))};
     const auto half = [&](std::size_t bytes_before) {
       return hn::PromoteTo(f, hn::LoadU(F16(), reinterpret_cast<const hwy::float16_t*>(
                                                    payload + bytes_before * n + 2 * k)));

@@ -20,7 +20,7 @@ using WI = hn::RebindToSigned<W>;
 using WU = hn::RebindToUnsigned<W>;
 using VW = hn::VFromD<W>;
 
-constexpr float kMostShift = 4;  // pixels: beyond it the first order says nothing
+constexpr float kMaxShift = 4;  // pixels: beyond it the first order says nothing
 
 /// An entry of a table of kViewpoints for each lane.
 HWY_INLINE VW look_up(const float* table, hn::VFromD<WI> index) {
@@ -72,7 +72,7 @@ struct FaceView {
     const auto move = hn::MulSub(at, look_up(offset_w, viewpoint), look_up(offset, viewpoint));
     const auto pixels =
         hn::Mul(hn::Mul(near, move), hn::Set(f, 0.5F * static_cast<float>(cube.resolution)));
-    return hn::Max(hn::Min(pixels, hn::Set(f, kMostShift)), hn::Set(f, -kMostShift));
+    return hn::Max(hn::Min(pixels, hn::Set(f, kMaxShift)), hn::Set(f, -kMaxShift));
   }
 };
 
@@ -144,7 +144,7 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
 
 template <bool kMoves>
 HWY_INLINE void add_face(const FaceView& face, LaneSums& sums) {
-  alignas(64) float down[kMostResolution] = {};
+  alignas(64) float down[kMaxResolution] = {};
   int y = 0, end = face.cube.resolution;
   while (y < end && !face.sees(y)) ++y;
   while (y < end && !face.sees(end - 1)) --end;

@@ -22,8 +22,8 @@ constexpr float kWideSlack = 0.05F;  // pixels: rounding of a disc's bounds, whe
 
 /// Columns of each row that a disc may cover, from `first` up to `end`.
 struct Spans {
-  alignas(64) std::int32_t first[kMostResolution + kLanes];
-  std::int32_t end[kMostResolution + kLanes];
+  alignas(64) std::int32_t first[kMaxResolution + kLanes];
+  std::int32_t end[kMaxResolution + kLanes];
 };
 
 /// A disc in the axes of a face. The pixel (1, u, v) meets its plane at t = height / slope,

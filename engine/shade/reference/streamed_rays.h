@@ -18,11 +18,11 @@ namespace ptc {
 /// ray meet one part after the other. Results do not depend on the cap.
 class StreamedRays {
  public:
-  static constexpr std::uint64_t kLeastBytes = std::uint64_t{16} << 20;
+  static constexpr std::uint64_t kMinBytes = std::uint64_t{16} << 20;
 
   /// Loads the first part.
   /// @param sky           as DiscRays
-  /// @param memory_bytes  cap, kLeastBytes at least
+  /// @param memory_bytes  cap, kMinBytes at least
   StreamedRays(const ContainerReader& scene, Sides sides,
                std::function<glm::vec3(const glm::vec3&)> sky, std::uint64_t memory_bytes);
 

@@ -12,11 +12,11 @@
 namespace ptc {
 namespace {
 
-constexpr double kAir = 0.06;         // share of the values' interval added at an end
-constexpr double kLeastRatio = 1.25;  // of a log axis: noise is not blown up further
-constexpr double kMost = std::numeric_limits<double>::max() / 4;
-constexpr int kMostLinear = 8;  // ticks
-constexpr double kLeast = std::numeric_limits<double>::min();
+constexpr double kAir = 0.06;       // share of the values' interval added at an end
+constexpr double kMinRatio = 1.25;  // of a log axis: noise is not blown up further
+constexpr double kMax = std::numeric_limits<double>::max() / 4;
+constexpr int kMaxLinear = 8;  // ticks
+constexpr double kMin = std::numeric_limits<double>::min();
 
 // digit * 10^exponent, rounded once where it can be.
 double decimal(double digit, int exponent) {
@@ -41,13 +41,13 @@ struct Step {
 };
 
 std::vector<double> linear_ticks(const Axis& axis, unsigned coarseness) {
-  const double least = (axis.high - axis.low) / (kMostLinear - 1);
+  const double least = (axis.high - axis.low) / (kMaxLinear - 1);
   int index = 3 * floor_exponent(least);
   while (Step(index).times(1) < least) ++index;
   const Step step(index + static_cast<int>(coarseness));
   const double first = std::ceil(axis.low / step.times(1)) - 1;  // one less: it may be rounded up
   std::vector<double> ticks;
-  for (int i = 0; i <= kMostLinear + 1; ++i) {
+  for (int i = 0; i <= kMaxLinear + 1; ++i) {
     const double value = step.times(first + i);
     if (value >= axis.low && value <= axis.high) ticks.push_back(value + 0.0);  // + 0: no -0
   }
@@ -92,7 +92,7 @@ double Axis::share(double value) const noexcept {
 }
 
 bool can_show(double value, bool log) noexcept {
-  return std::abs(value) <= kMost && (!log || value >= kLeast);
+  return std::abs(value) <= kMax && (!log || value >= kMin);
 }
 
 Axis axis_around(std::span<const double> values, bool log) {
@@ -106,8 +106,8 @@ Axis axis_around(std::span<const double> values, bool log) {
   if (log) {
     if (low > high) return {1, 10, true};
     const double span = std::log(high) - std::log(low);
-    const double air = std::exp(std::max(kAir * span, (std::log(kLeastRatio) - span) / 2));
-    return {std::max(low / air, kLeast), std::min(high * air, 4 * kMost), true};
+    const double air = std::exp(std::max(kAir * span, (std::log(kMinRatio) - span) / 2));
+    return {std::max(low / air, kMin), std::min(high * air, 4 * kMax), true};
   }
   if (low > high || (low == 0 && high == 0)) return {0, 1, false};
   if (low >= 0 && low <= high / 2) return {0, high * (1 + kAir), false};

@@ -19,7 +19,7 @@ namespace ptc {
 namespace {
 
 constexpr double kPixelsAUnit = 2;
-constexpr double kMostUnits = 16000;  // cairo's pictures end at 32767 pixels a side
+constexpr double kMaxUnits = 16000;  // cairo's pictures end at 32767 pixels a side
 
 // cairo calls back from C: what goes wrong is returned instead of thrown.
 cairo_status_t collect(void* bytes, const unsigned char* data, unsigned count) noexcept {
@@ -96,7 +96,7 @@ void write_picture(const std::filesystem::path& target, const Picture& picture) 
   if (ending != ".svg" && ending != ".png") {
     throw std::invalid_argument("write_picture: neither .svg nor .png: " + target.string());
   }
-  if (picture.width > kMostUnits || picture.height > kMostUnits) {
+  if (picture.width > kMaxUnits || picture.height > kMaxUnits) {
     throw std::invalid_argument("write_picture: the picture is larger than 16000 units");
   }
   const std::string bytes = ending == ".svg" ? svg_of(picture) : png_of(picture);

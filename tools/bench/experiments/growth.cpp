@@ -44,15 +44,15 @@ GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene,
 class CapRun {
  public:
   /// @param share  of all pages, decoded, that the cache holds
-  /// @param most_bytes  that the cache takes, whatever the share
+  /// @param max_bytes  that the cache takes, whatever the share
   CapRun(const BenchScene& scene, double share, unsigned threads,
-         std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max())
+         std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max())
       : scene_(scene), executor_(threads), results_(scene.sets().front().receivers.size()) {
     const ContainerReader& container = scene.container();
     const auto frames = static_cast<std::uint64_t>(std::ceil(share * container.page_count()));
     options_.cache_bytes =
-        std::max(PageCache::least_bytes(container, threads),
-                 std::min(most_bytes, PageCache::bytes_for(container, threads, frames)));
+        std::max(PageCache::min_bytes(container, threads),
+                 std::min(max_bytes, PageCache::bytes_for(container, threads, frames)));
     options_.sky = sky_function(scene.lights().sky);
   }
 

@@ -9,7 +9,7 @@ namespace {
 using Pages = std::span<const PagePlace>;
 
 constexpr std::size_t kSector = 512;
-constexpr std::size_t kMostAppended = 10000;
+constexpr std::size_t kMaxAppended = 10000;
 
 auto at(Bytes& bytes, std::size_t offset) {
   return bytes.begin() + static_cast<std::ptrdiff_t>(offset);
@@ -124,7 +124,7 @@ std::vector<Mutation> mutations_of(const Bytes& whole, Pages pages) {
           {"a page over another", pages.size() * pages.size(), copy_page},
           {"two words swapped", whole.size() / 8 - 1, swap_words},
           {"truncated at each byte", whole.size(), truncate},
-          {"bytes appended", 2 * kMostAppended / 97, append},
+          {"bytes appended", 2 * kMaxAppended / 97, append},
           {"a sector left out", sectors, remove_bytes},
           {"taken for text", 6, as_text}};
 }

@@ -199,8 +199,8 @@ Seen see_harmonics(const float* p, const glm::vec3& toward) {
     for (std::size_t i = square(l); i < square(l + 1); ++i) sum += p[i] * basis[i];
   }
   Seen seen{.front = p[0] * std::max(0.0F, even + odd), .back = p[0] * std::max(0.0F, even - odd)};
-  constexpr float kLeast = 1e-3F;  // of the area: less is what is left of waves
-  if (even + odd <= kLeast) return seen;
+  constexpr float kMin = 1e-3F;  // of the area: less is what is left of waves
+  if (even + odd <= kMin) return seen;
   for (int c = 0; c < 3; ++c) {
     const float* const light = p + n * static_cast<std::size_t>(c + 1);
     float sum = 0;
@@ -289,11 +289,11 @@ Seen see_exactly(std::span<const Surfel> below, const glm::vec3& toward) {
 }
 
 void spherical_harmonics(std::size_t degree, const glm::vec3& unit, float* out) {
-  constexpr std::size_t kMost = 4;
-  using Square = std::array<std::array<float, kMost + 1>, kMost + 1>;
+  constexpr std::size_t kMax = 4;
+  using Square = std::array<std::array<float, kMax + 1>, kMax + 1>;
   static const Square scale = [] {  // sqrt(2 (l - m)! / (l + m)!), 1 where m is 0
     Square s{};
-    for (std::size_t l = 0; l <= kMost; ++l) {
+    for (std::size_t l = 0; l <= kMax; ++l) {
       for (std::size_t m = 0; m <= l; ++m) {
         const double ratio = std::tgamma(l - m + 1) / std::tgamma(l + m + 1);
         s[l][m] = static_cast<float>(std::sqrt(m > 0 ? 2 * ratio : ratio));

@@ -22,7 +22,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kMostSurfels = 250'000'000;
+constexpr std::uint64_t kMaxSurfels = 250'000'000;
 
 /// A name that charts, tables and file systems take.
 std::string plain_name(const std::filesystem::path& file) {
@@ -148,7 +148,7 @@ BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options,
   container_ = make_temporary_container(work, [&](const std::filesystem::path& path) {
     lit_ = build_scene(choice, options, path, run, progress);
   });
-  if (options.rays) surfels_ = load_surfels(*container_, kMostSurfels);
+  if (options.rays) surfels_ = load_surfels(*container_, kMaxSurfels);
   const Executor executor(run.threads);
   if (options.shaded_width > 0) add_camera(options, executor, progress);
   add_points(options);
