@@ -11,6 +11,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/image/image.h"
 #include "engine/octree/build_pages.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/store/container_points.h"
 #include "engine/verify/verify.h"
 #include "format/codec.h"
@@ -177,7 +178,7 @@ void container(ByteSource& from) {
   Stream stream(points);
   options.frame = frame;
   ContainerWriter writer(path, options);
-  const Superblock superblock = build_pages(stream, writer, build, Executor(1), silent);
+  const Superblock superblock = build_pages(stream, writer, build, ThreadPool(1), silent);
   write_attributes(from, writer, meta, points.size(), attributes);
   const Superblock written = writer.finish(meta, superblock);
 

@@ -13,6 +13,7 @@
 #include "engine/base/error.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/store/writer.h"
 #include "engine/verify/surveyed_page.h"
 #include "format/bytes.h"
@@ -217,7 +218,7 @@ class Salvage {
     if (before) tree.leaf_points = std::max(1U, before->leaf_points);
     KeptPoints points(*page_, flips_, points_);
     progress_.begin("build", points_.size() * points_per_page(*survey_.header), "points");
-    Superblock after = build_pages(points, writer, tree, Executor(options_.threads), progress_);
+    Superblock after = build_pages(points, writer, tree, ThreadPool(options_.threads), progress_);
     progress_.end();
     for (const auto& [group, kept] : by_group_) write_channels(writer, group, kept, after.points);
     Meta meta = survey_.meta;

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/base/executor.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/verify/rebuild.h"
 #include "engine/verify/surveyed_page.h"
 #include "engine/verify/verify_tree.h"
@@ -201,7 +201,7 @@ class FileCheck {
 
   InputFile file_;
   VerifyOptions options_;
-  Executor executor_;
+  ThreadPool executor_;
   Findings findings_;
   FlipBudget flips_;
   Survey survey_;

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/scene/mesh_reference.h"
 #include "engine/scene/sampling/sampler.h"
 #include "engine/shade/reference/brute_force.h"
@@ -35,7 +36,7 @@ std::vector<SurfaceHit> seen(const RayScene& rays, Camera camera, unsigned side)
 Floor measure(const bench::LitScene& scene, std::uint64_t count, unsigned side) {
   const RayScene rays(scene.mesh);
   const DirectLight light(rays, scene.lights);
-  const Executor executor;
+  const ThreadPool executor;
   SamplingOptions options;
   options.count = count;
   std::vector<Surfel> surfels(count + count / 10);

@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/reference/plain_gather.h"
 #include "tests/support/scenes.h"
@@ -39,7 +40,7 @@ const SceneModel& measured() {
   static const SceneModel model = [] {
     const test::TemporaryDirectory dir;
     Progress silent;
-    const Executor executor(1);
+    const ThreadPool executor(1);
     const BenchScene scene({.name = "fractal"}, small().scene, dir.path(), {.threads = 1}, silent);
     SceneModel found = measure_model(scene, small(), dir.path(), executor, silent);
     CHECK(std::filesystem::is_empty(dir.path()));
@@ -135,7 +136,7 @@ TEST_CASE("model: leaves, directions and pages cost what they should", "[bench][
 TEST_CASE("model: nodes as they are stored shade as the plain gather does", "[bench][model]") {
   const test::TemporaryDirectory dir;
   Progress silent;
-  const Executor executor(1);
+  const ThreadPool executor(1);
   ModelOptions options = small();
   options.solid_angles = {0.05F};
   const BenchScene scene({.name = "city"}, options.scene, dir.path(), {.threads = 1}, silent);
@@ -168,7 +169,7 @@ TEST_CASE("model: a camera that sees nothing is told", "[bench][model]") {
   options.scene.shaded_width = 0;
   options.scene.own_points = 0;
   const BenchScene scene({.name = "city"}, options.scene, dir.path(), {.threads = 1}, silent);
-  CHECK_THROWS_AS(measure_model(scene, options, dir.path(), Executor(1), silent), DataError);
+  CHECK_THROWS_AS(measure_model(scene, options, dir.path(), ThreadPool(1), silent), DataError);
 }
 
 TEST_CASE("model report: rows have the same members, panels what was measured", "[bench][report]") {

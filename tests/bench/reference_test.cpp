@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/scene/sampling/low_discrepancy.h"
 #include "tools/bench/experiments/window.h"
 
@@ -45,7 +46,7 @@ TEST_CASE("reference: what it says of its own error is true", "[bench][reference
     s.irradiance = glm::vec3(3 + 0.5F * noise(seed + kCount));
     return s;
   };
-  const Reference reference = make_reference(set, checked, {.half = 64}, trace, Executor(1));
+  const Reference reference = make_reference(set, checked, {.half = 64}, trace, ThreadPool(1));
   CHECK(reference.window.empty());
   const std::vector<float> truth(kCount, 0.5F), light(3 * kCount, 3.0F);
   CHECK(reference.occlusion_noise ==
@@ -62,7 +63,7 @@ TEST_CASE("reference: the window has rays of its own", "[bench][reference]") {
     return Shading{.occlusion = static_cast<float>(rays)};
   };
   const Reference reference =
-      make_reference(set, checked, {.half = 64, .window = 16}, trace, Executor(1));
+      make_reference(set, checked, {.half = 64, .window = 16}, trace, ThreadPool(1));
   CHECK(occlusion_of(reference.mean) == std::vector<float>{64, 64});
   CHECK(occlusion_of(reference.window) == std::vector<float>{16, 16, 16});
 }

@@ -11,6 +11,7 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/io/image/image.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/ptc.h"
 #include "engine/scene/mesh_reference.h"
 #include "engine/shade/lift.h"
@@ -55,7 +56,7 @@ Lit bounce(const ContainerReader& scene, unsigned bounces, const TemporaryDirect
            unsigned threads = 1) {
   Lit lit;
   Progress silent;
-  const Executor executor(threads);
+  const ThreadPool executor(threads);
   BounceOptions options;
   options.bounces = bounces;
   options.temp_dir = dir.path();
@@ -64,7 +65,7 @@ Lit bounce(const ContainerReader& scene, unsigned bounces, const TemporaryDirect
 }
 
 std::vector<Shading> shade(const ContainerReader& scene, const std::vector<Receiver>& receivers) {
-  const Executor executor(1);
+  const ThreadPool executor(1);
   Shader shader(scene, {}, executor);
   std::vector<Shading> results(receivers.size());
   Progress silent;

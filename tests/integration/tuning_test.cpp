@@ -7,6 +7,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/quality/error_sums.h"
 #include "engine/pipeline/run.h"
 #include "engine/ptc.h"
@@ -51,7 +52,7 @@ std::vector<double> errors_along_ladder(const Scene& scene) {
   Progress silent;
   std::vector<double> errors;
   for (const RungError& rung :
-       climb(*scene.container, {.cache_bytes = 64U << 20}, pilots, 2304, Executor(1), silent)) {
+       climb(*scene.container, {.cache_bytes = 64U << 20}, pilots, 2304, ThreadPool(1), silent)) {
     CHECK(rung.us_per_receiver > 0);
     errors.push_back(rung.error.relative());
   }

@@ -10,6 +10,7 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/octree/radius.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/store/reader.h"
 #include "format/point_page.h"
 #include "tests/support/scenes.h"
@@ -52,7 +53,7 @@ TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
     ContainerWriter writer(dir / name, {.page_shift = 12, .frame = scene.frame});
     VectorStream stream(scene.records, block);
     Progress silent;
-    writer.finish({}, build_pages(stream, writer, {}, Executor(), silent));
+    writer.finish({}, build_pages(stream, writer, {}, ThreadPool(), silent));
   };
   write("one.ptcx", 1);
   write("all.ptcx", 5000);
@@ -105,7 +106,7 @@ TEST_CASE("build: when the stream fails no page is on its way any more", "[build
     Progress silent;
     // The executor is gone before the writer is: pages that were still being compressed would use
     // it.
-    CHECK_THROWS_WITH(build_pages(stream, writer, {}, Executor(2), silent), "the stream failed");
+    CHECK_THROWS_WITH(build_pages(stream, writer, {}, ThreadPool(2), silent), "the stream failed");
     const std::uintmax_t bytes = written();
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     CHECK(written() == bytes);

@@ -8,6 +8,7 @@
 #include "engine/octree/build_pages.h"
 #include "engine/octree/radius.h"
 #include "engine/octree/rounding.h"
+#include "engine/parallel/thread_pool.h"
 #include "format/error.h"
 #include "tests/support/scenes.h"
 
@@ -67,7 +68,7 @@ class Rebuild {
  private:
   const SortedScene& scene_;
   Setting setting_;
-  Executor executor_;
+  ThreadPool executor_;
 };
 
 SortedScene scene_without_radii() {
@@ -133,7 +134,7 @@ TEST_CASE("checkpoint: every prefix of a state is refused", "[build][checkpoint]
     VectorStream none({});
     StateReader state(bytes, "state");
     Progress silent;
-    static_cast<void>(build_pages(none, writer, {}, Executor(1), silent, {.from = &state}));
+    static_cast<void>(build_pages(none, writer, {}, ThreadPool(1), silent, {.from = &state}));
   };
   std::vector<std::byte> bytes = saved.state;
   const std::size_t step =

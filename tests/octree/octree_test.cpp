@@ -7,6 +7,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "format/scalar.h"
 #include "tests/support/scenes.h"
 
@@ -60,7 +61,7 @@ std::pair<SubtreeGroups, OctreeBuilder::Result> streamed(std::span<const PointRe
                                                          std::uint32_t leaf_points,
                                                          std::size_t block, unsigned threads) {
   Emitted sink;
-  const Executor executor(threads);
+  const ThreadPool executor(threads);
   OctreeBuilder builder(sink, leaf_points, 1.0, executor);
   for (; records.size() > block; records = records.subspan(block))
     builder.add(records.first(block));

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/io/cloud/record.h"
+#include "engine/parallel/thread_pool.h"
 #include "format/scalar.h"
 #include "tests/support/scenes.h"
 
@@ -19,7 +20,7 @@ namespace {
 std::vector<PointRecord> rounded(const std::vector<PointRecord>& records, const Frame& frame,
                                  std::size_t block = 777) {
   VectorStream stream(records, block);
-  const Executor executor(2);
+  const ThreadPool executor(2);
   const std::unique_ptr<PointStream> from = round_points(stream, frame.unit(), executor);
   std::vector<PointRecord> out(records.size()), part(block);
   std::size_t at = 0;

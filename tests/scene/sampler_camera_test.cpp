@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/scene/sampling/sampler.h"
 #include "engine/scene/sampling/spacing_field.h"
 #include "tests/scene/coverage.h"
@@ -28,7 +29,7 @@ Camera overhead(double height) {
 std::vector<Surfel> sample(const Mesh& mesh, const SamplingOptions& options) {
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
-  const Executor executor(2);
+  const ThreadPool executor(2);
   return drain(*sample_mesh(light, scene, options, executor));
 }
 

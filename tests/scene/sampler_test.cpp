@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/scene/sampling/directions.h"
 #include "tests/scene/coverage.h"
 #include "tests/scene/meshes.h"
@@ -24,7 +25,7 @@ std::vector<Surfel> sample(const Mesh& mesh, const SamplingOptions& options,
                            std::size_t block = 1000) {
   const RayScene scene(mesh);
   const DirectLight light(scene, rig);
-  const Executor executor(threads);
+  const ThreadPool executor(threads);
   return drain(*sample_mesh(light, scene, options, executor), block);
 }
 
@@ -439,7 +440,7 @@ TEST_CASE("sampler: it streams: the first surfels of very many come at once", "[
   const Mesh mesh = cube();
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
-  const Executor executor(1);
+  const ThreadPool executor(1);
   SamplingOptions options;
   options.count = 4'000'000;
   const auto source = sample_mesh(light, scene, options, executor);

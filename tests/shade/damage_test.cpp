@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "format/error.h"
 #include "tests/shade/gather_scene.h"
 
@@ -80,7 +81,7 @@ struct Damaged {
   };
   [[nodiscard]] Run shade(LostPages* lost, unsigned threads = 1,
                           std::uint64_t cache_bytes = 64U << 20) const {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     Shader shader(*broken, {.cache_bytes = cache_bytes, .lost = lost}, executor);
     Run run{std::vector<Shading>(scene.receivers.size()), {}};
     Progress silent;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/shade/shader.h"
 #include "tests/support/scenes.h"
 
@@ -24,7 +25,7 @@ struct Scene {
 
   [[nodiscard]] std::vector<Shading> shade(ShadeOptions options = {}, unsigned threads = 1,
                                            unsigned variant = 0) const {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     if (options.cache_bytes > (64U << 20)) options.cache_bytes = 64U << 20;
     Shader shader(*container, options, executor);
     std::vector<Shading> results(receivers.size());

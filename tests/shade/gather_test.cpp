@@ -7,6 +7,7 @@
 #include <glm/mat3x3.hpp>
 #include <hwy/targets.h>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/shade/reference/brute_force.h"
 #include "tests/shade/gather_scene.h"
 
@@ -176,7 +177,7 @@ TEST_CASE("gather: equals drawing every surfel when no cluster may stand for any
     std::vector<Shading> all(ours.size());
     const DirectionGrid grid(options.gather.resolution, {});
     shade_brute_force(load_surfels(*scene.container, 1'000'000), scene.receivers, all, grid, sides,
-                      Executor(1));
+                      ThreadPool(1));
     const Errors e = compare(ours, all);
     CHECK(e.occlusion_rms < 1e-4);  // float rounding at the edges of discs moves single pixels
     CHECK(e.irradiance_rms < 1e-3);
@@ -336,7 +337,7 @@ TEST_CASE("gather: receivers with nothing near share sums over one buffer", "[sh
   const std::vector<Shading> shared = scene.shade();
   std::vector<Shading> exact(shared.size());
   shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both,
-                    Executor(2));
+                    ThreadPool(2));
   const Errors e = compare(shared, exact);
   CAPTURE(e.occlusion_rms, e.irradiance_rms);
   CHECK(e.occlusion_rms < 0.003);
@@ -381,7 +382,7 @@ TEST_CASE("gather: the mean of four variants has less error than one", "[shade][
   const std::vector<Surfel> surfels = load_surfels(*scene.container, 1'000'000);
   std::vector<Shading> exact(scene.receivers.size());
   shade_brute_force(surfels, scene.receivers, exact, DirectionGrid(64, {}), Sides::both,
-                    Executor(2));
+                    ThreadPool(2));
   ShadeOptions options;
   options.variants = 4;
   std::vector<Shading> mean(exact.size());
@@ -437,7 +438,7 @@ TEST_CASE("gather: a back is clear to the receivers of a cell within two radii, 
     const std::vector<Shading> results = scene.shade({.gather = {.parallax = 0.4F}});
     std::vector<Shading> all(results.size());
     shade_brute_force(std::span(&disc, 1), scene.receivers, all, DirectionGrid(32, {}), Sides::both,
-                      Executor(1));
+                      ThreadPool(1));
     for (std::size_t i = 0; i < results.size(); ++i) {
       CAPTURE(disc.position.x, scene.receivers[i].position.z);
       CHECK(results[i].occlusion == Approx(all[i].occlusion).margin(0.06));

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/shade/reference/brute_force.h"
 #include "tests/shade/gather_scene.h"
 
@@ -66,7 +67,7 @@ Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
   ShadeOptions options;
   options.gather.solid_angle = 0.2F;
   options.gather.resolution = 64;
-  const Executor executor(1);
+  const ThreadPool executor(1);
   Shader shader(*scene.container, options, executor);
   std::vector<Shading> results(scene.receivers.size());
   Progress silent;

@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;
@@ -15,7 +16,7 @@ TEST_CASE("streamed rays: parts of a scene give what the whole gives", "[shade][
   const std::uint64_t points = scene.container->superblock().points;
   REQUIRE(points * (sizeof(Surfel) + DiscRays::kBytes) < (64U << 20));
   REQUIRE(points * (sizeof(Surfel) + DiscRays::kBytes) > StreamedRays::kMinBytes);
-  const Executor executor(2);
+  const ThreadPool executor(2);
   const auto sky = [](const glm::vec3& d) { return glm::vec3(1 + d.z); };
   const auto trace = [&](std::uint64_t memory_bytes) {
     std::vector<Shading> results(receivers.size());
@@ -52,7 +53,7 @@ TEST_CASE("streamed rays: an empty scene covers nothing", "[shade][rays]") {
   StreamedRays rays(
       *scene.container, Sides::both, [](const glm::vec3&) { return glm::vec3(1); },
       StreamedRays::kMinBytes);
-  rays.trace(receivers, 64, 0, results, Executor(1), silent);
+  rays.trace(receivers, 64, 0, results, ThreadPool(1), silent);
   CHECK(results[0].occlusion == 0);
   CHECK(results[0].sky.x == Approx(3.14159265F));
 }

@@ -15,6 +15,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/memory.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/sort/spill.h"
 #include "tests/sort/records.h"
 #include "tests/support/sanitizers.h"
@@ -63,7 +64,7 @@ std::vector<PointRecord> drain(PointStream& stream, std::size_t block) {
 Outcome sort(std::span<const PointRecord> input, std::uint64_t cap, unsigned threads,
              std::span<const MortonKey> sample, std::uint64_t expected = 0) {
   const TempDirectory directory;
-  const Executor executor(threads);
+  const ThreadPool executor(threads);
   ExternalSorter sorter({cap, {directory.path}, expected}, executor, sample);
   add_in_blocks(sorter, input, 3001);
   Outcome outcome;
@@ -133,7 +134,7 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
 TEST_CASE("external sort: what the disk has no room for is refused before it begins",
           "[sort][external]") {
   const TempDirectory directory;
-  const Executor executor(1);
+  const ThreadPool executor(1);
   try {
     const ExternalSorter sorter({kMinCap, {directory.path}, std::uint64_t{1} << 50}, executor, {});
     FAIL("begun");
@@ -201,7 +202,7 @@ TEST_CASE("external sort: equal keys beyond memory stream in the order of the in
 }
 
 TEST_CASE("external sort: every count around a run's end is sorted", "[sort][external]") {
-  const Executor two(2);
+  const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::lattice, 5000);
   for (const std::size_t count : {0u, 1u, 2u, 1535u, 1536u, 1537u, 3071u, 3072u, 3073u, 5000u}) {
     const std::span<const PointRecord> part(input.data(), count);
@@ -213,7 +214,7 @@ TEST_CASE("external sort: every count around a run's end is sorted", "[sort][ext
 
 TEST_CASE("external sort: blocks of any size come out the same", "[sort][external]") {
   const TempDirectory directory;
-  const Executor two(2);
+  const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
   const std::vector<PointRecord> expected = stable_sorted(input);
   for (const std::uint64_t cap : {kMinCap, 16 * kMiB})
@@ -232,7 +233,7 @@ TEST_CASE("external sort: blocks of any size come out the same", "[sort][externa
 TEST_CASE("external sort: a block that is offered is filled as long as there are records",
           "[sort][external]") {
   const TempDirectory directory;
-  const Executor two(2);
+  const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
   ExternalSorter sorter({kMinCap, {directory.path}}, two, {});
   sorter.add(input);
@@ -244,7 +245,7 @@ TEST_CASE("external sort: a block that is offered is filled as long as there are
 
 TEST_CASE("external sort: the digest is that of the set, however it came", "[sort][digest]") {
   const TempDirectory directory;
-  const Executor one(1), two(2);
+  const ThreadPool one(1), two(2);
   const auto digest = [&](std::span<const PointRecord> records, const Executor& executor,
                           std::size_t block) {
     ExternalSorter sorter({64 * kMiB, {directory.path}}, executor, {});
@@ -277,7 +278,7 @@ TEST_CASE("external sort: the digest is that of the set, however it came", "[sor
 TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops",
           "[sort][external]") {
   const TempDirectory directory;
-  const Executor two(2);
+  const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);
   const std::size_t files = open_files();
   {
@@ -299,7 +300,7 @@ TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops
 
 TEST_CASE("external sort: adding after the end and ending twice are refused", "[sort][external]") {
   const TempDirectory directory;
-  const Executor one(1);
+  const ThreadPool one(1);
   ExternalSorter sorter({kMiB, {directory.path}}, one, {});
   const std::unique_ptr<PointStream> stream = sorter.finish();
   CHECK_THROWS_AS(sorter.add({}), std::invalid_argument);
@@ -309,7 +310,7 @@ TEST_CASE("external sort: adding after the end and ending twice are refused", "[
 
 TEST_CASE("external sort: a directory that cannot be written to is named once it is needed",
           "[sort][external]") {
-  const Executor two(2);
+  const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::lattice, 50000);
   ExternalSorter small({64 * kMiB, {"/nonexistent/spill"}}, two, {});
   small.add(input);
@@ -325,7 +326,7 @@ TEST_CASE("external sort: a disk that fills up is reported and leaves nothing be
           "[sort][external]") {
   const TempDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::lattice, 100000);  // 4 MB
-  const Executor two(2);
+  const ThreadPool two(2);
   for (const std::uint64_t room : {std::uint64_t{0}, kMiB / 10, kMiB, 3 * kMiB}) {
     CAPTURE(room);
     const std::size_t files = open_files();
@@ -351,7 +352,7 @@ TEST_CASE("external sort: what one directory does not take goes to the others",
   const TempDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
   const std::vector<MortonKey> sample = sample_of(input, 1000);
-  const Executor two(2);
+  const ThreadPool two(2);
   std::vector<std::filesystem::path> directories(2, directory.path);
   if (std::filesystem::exists("/dev/shm"))
     directories[1] = "/dev/shm";  // on a disk of its own, with other room
@@ -375,7 +376,7 @@ TEST_CASE("external sort: a stream that failed does not look as if it ended", "[
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);  // 2 MB
   const std::vector<MortonKey> one_key(1000, input.front().key);
   for (const unsigned threads : {1u, 2u}) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     ExternalSorter sorter({kMinCap, {directory.path}}, executor, one_key);
     sorter.add(input);
     // The first spill fits, the partition of the bucket that is too large does not.
@@ -436,7 +437,7 @@ TEST_CASE("external sort: resident memory stays below the cap and is given back"
     return;
   }
   for (const unsigned threads : {1u, 2u}) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     sort_random(1 << 18, 8 * kMiB, executor, true);  // starts threads and their heaps
     for (const bool fair_sample : {true, false})
       for (const bool spills : {true, false}) {

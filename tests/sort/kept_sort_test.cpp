@@ -8,6 +8,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/direct_range.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/sort/sort_plan.h"
 #include "engine/sort/spill.h"
 #include "tests/sort/records.h"
@@ -29,7 +30,7 @@ struct Kept {
 
   Kept(std::span<const PointRecord> input, std::span<const MortonKey> sample,
        std::uint64_t cap = kCap) {
-    const Executor two(2);
+    const ThreadPool two(2);
     options.memory_bytes = cap;
     ExternalSorter sorter(options, two, sample);
     if (!input.empty()) sorter.add(input);
@@ -43,7 +44,7 @@ struct Kept {
     SortOptions other = options;
     other.memory_bytes = cap;
     StateReader reader(state, "state");
-    const Executor one(1);
+    const ThreadPool one(1);
     ExternalSorter sorter(other, one, reader);
     reader.end();
     const auto stream = sorter.finish(first);
@@ -78,7 +79,7 @@ void check_torn(const Kept& kept, std::span<const PointRecord> expected,
   const std::vector<std::byte> whole = read_file(file);
   write_at(file, offset, torn);
   StateReader reader(kept.state, "state");
-  const Executor two(2);
+  const ThreadPool two(2);
   SortOptions options = kept.options;
   options.memory_bytes = kCap;
   ExternalSorter sorter(options, two, reader);
@@ -143,7 +144,7 @@ TEST_CASE("kept sort: records stay on the disk until they are given back", "[sor
   CHECK(kept.from(0).size() == input.size());
   CHECK(blocks() == all);
   StateReader reader(kept.state, "state");
-  const Executor one(1);
+  const ThreadPool one(1);
   ExternalSorter sorter(kept.options, one, reader);
   std::uint64_t before = all;
   for (const std::uint64_t record : {0u, 100'000u, 100'000u, 150'000u}) {
@@ -161,7 +162,7 @@ TEST_CASE("kept sort: files and tables that are not what they were are refused",
   const Kept kept(input, sample_of(input, 300));
   const auto open = [&](std::span<const std::byte> state) {
     StateReader reader(state, "state");
-    const Executor one(1);
+    const ThreadPool one(1);
     const ExternalSorter sorter(kept.options, one, reader);
     reader.end();
   };

@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "tests/sort/records.h"
 
 using namespace ptc;
@@ -17,7 +18,7 @@ constexpr std::byte kUntouched{0xa5};
 
 TEST_CASE("partition: classes ascend and keep their order for any number of blocks",
           "[sort][partition]") {
-  const Executor three(3);
+  const ThreadPool three(3);
   for (const std::size_t count : {1u, 7u, 8u, 9u, 1000u, 4099u})
     for (const std::size_t classes : {1u, 2u, 3u, 64u})
       for (const std::size_t blocks : {1u, 2u, 5u}) {
@@ -62,7 +63,7 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
 
 TEST_CASE("partition: the differences are the bits that are not the same in all keys",
           "[sort][partition]") {
-  const Executor two(2);
+  const ThreadPool two(2);
   std::vector<PointRecord> input(100, numbered({0xf0, 1}, 0));
   const auto classify = [](const PointRecord&) { return std::size_t{0}; };
   const auto differences = [&] { return ClassCounts(input, 1, 3, classify, two).differences(); };

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/memory.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/sort/external_sort.h"
 #include "tests/sort/records.h"
 
@@ -29,7 +30,7 @@ bool sorts(const std::vector<PointRecord>& input, const Executor& executor) {
 
 TEST_CASE("radix_sort: the order is that of a stable sort for keys of every shape",
           "[sort][radix]") {
-  const Executor one(1), two(2), five(5);
+  const ThreadPool one(1), two(2), five(5);
   for (const Keys keys : kAllKeys) {
     CAPTURE(static_cast<int>(keys));
     for (const std::size_t count : {1000u, 20000u, 150000u}) {
@@ -44,14 +45,14 @@ TEST_CASE("radix_sort: the order is that of a stable sort for keys of every shap
 }
 
 TEST_CASE("radix_sort: every small size is sorted", "[sort][radix]") {
-  const Executor one(1);
+  const ThreadPool one(1);
   for (std::size_t count = 0; count <= 130; ++count)
     for (const Keys keys : {Keys::random, Keys::few, Keys::surface, Keys::nested})
       CHECK(sorts(make_records(keys, count, count), one));
 }
 
 TEST_CASE("radix_sort: sizes around the change of method are sorted", "[sort][radix]") {
-  const Executor one(1), two(2);
+  const ThreadPool one(1), two(2);
   for (const std::size_t limit : {1u << 13, 1u << 15, 1u << 17})
     for (const std::size_t count : {limit - 1, limit, limit + 1}) {
       const std::vector<PointRecord> input = make_records(Keys::lattice, count);
@@ -62,7 +63,7 @@ TEST_CASE("radix_sort: sizes around the change of method are sorted", "[sort][ra
 }
 
 TEST_CASE("radix_sort: each single bit of a key decides", "[sort][radix]") {
-  const Executor one(1);
+  const ThreadPool one(1);
   for (const std::size_t count : {2u, 40u, 9000u})
     for (int bit = 0; bit < 128; ++bit) {
       std::vector<PointRecord> input;
@@ -75,7 +76,7 @@ TEST_CASE("radix_sort: each single bit of a key decides", "[sort][radix]") {
 }
 
 TEST_CASE("radix_sort: arrays may begin anywhere in a cache line", "[sort][radix]") {
-  const Executor two(2);
+  const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 140000);
   const std::vector<PointRecord> expected = stable_sorted(input);
   std::vector<PointRecord> records(input.size() + 16), scratch(input.size() + 16);
@@ -98,7 +99,7 @@ TEST_CASE("radix_sort: arrays may begin anywhere in a cache line", "[sort][radix
 
 TEST_CASE("radix_sort: no shape of keys takes many times longer than random ones",
           "[sort][radix]") {
-  const Executor one(1);
+  const ThreadPool one(1);
   const auto seconds = [&](Keys keys) {
     std::vector<PointRecord> records = make_records(keys, 400000), scratch(records.size());
     const double start = cpu_seconds();
@@ -113,7 +114,7 @@ TEST_CASE("radix_sort: no shape of keys takes many times longer than random ones
 }
 
 TEST_CASE("radix_sort: scratch that is too small is refused", "[sort][radix]") {
-  const Executor one(1);
+  const ThreadPool one(1);
   std::vector<PointRecord> records(10), scratch(9);
   CHECK_THROWS_AS(radix_sort(records, scratch, one), std::invalid_argument);
   CHECK_NOTHROW(radix_sort({}, {}, one));

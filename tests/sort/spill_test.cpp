@@ -14,6 +14,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/sort/direct_file.h"
 #include "engine/sort/sort_plan.h"
 #include "tests/sort/records.h"
@@ -28,7 +29,7 @@ const std::filesystem::path kDirectory = std::filesystem::temp_directory_path();
 // `count` records in runs of at most `run`, partitioned by splitters of all of them.
 std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord> records,
                                    std::size_t run, std::size_t ranges) {
-  const Executor two(2);
+  const ThreadPool two(2);
   Arena memory(run * sizeof(PointRecord) + kDirectBytes);
   const auto partition =
       std::make_shared<Partition>(file, Splitters(sample_of(records, 1000), ranges));

@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/io/cloud/record.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/store/writer.h"
 
 namespace ptc::test {
@@ -59,7 +60,7 @@ void write_scene(const std::filesystem::path& target, const std::vector<Surfel>&
   ContainerWriter writer(target, {.page_shift = page_shift, .codec = codec, .frame = scene.frame});
   VectorStream stream(std::move(scene.records));
   Progress silent;
-  const Superblock superblock = build_pages(stream, writer, options, Executor(), silent);
+  const Superblock superblock = build_pages(stream, writer, options, ThreadPool(), silent);
   writer.finish({}, superblock);
 }
 

@@ -12,6 +12,7 @@
 
 #include "engine/base/error.h"
 #include "engine/octree/build_pages.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"
@@ -37,7 +38,8 @@ void write_numbered(const std::filesystem::path& path) {
   ContainerWriter writer(path, {.page_shift = 12, .codec = Codec::zstd, .frame = scene.frame});
   VectorStream stream(scene.records);
   Progress silent;
-  const Superblock superblock = build_pages(stream, writer, {.leaf_points = 4}, Executor(), silent);
+  const Superblock superblock =
+      build_pages(stream, writer, {.leaf_points = 4}, ThreadPool(), silent);
   const Meta meta{.channels = {{.name = "number", .type = ChannelType::u16}},
                   .text = {{"source", "test"}}};
   const std::uint32_t full = points_per_page(writer.header());

@@ -2,19 +2,22 @@
 # tests/layers.py reads every #include "..." of the tree against it.
 set(PTC_LAYERS_format "")
 set(PTC_LAYERS_engine/base "")
-set(PTC_LAYERS_engine/io "format;engine/base")
-set(PTC_LAYERS_engine/scene "format;engine/base;engine/io")
-set(PTC_LAYERS_engine/sort "format;engine/base;engine/io")
-set(PTC_LAYERS_engine/store "format;engine/base;engine/io")
-set(PTC_LAYERS_engine/octree "format;engine/base;engine/io;engine/sort;engine/store")
-set(PTC_LAYERS_engine/verify "format;engine/base;engine/io;engine/sort;engine/store;engine/octree")
-set(PTC_LAYERS_engine/cache "format;engine/base;engine/io;engine/store")
-set(PTC_LAYERS_engine/shade "format;engine/base;engine/io;engine/store;engine/cache")
-set(PTC_LAYERS_engine/pipeline "format;engine/base;engine/io;engine/scene;engine/sort;engine/store;engine/octree;engine/cache;engine/shade")
-set(PTC_LAYERS_engine "engine/pipeline")
-set(PTC_LAYERS_tools/bench/chart "format;engine/base;engine/io")
+set(PTC_LAYERS_engine/parallel "engine/base")
+set(PTC_LAYERS_engine/io/file "format;engine/base")
+set(PTC_LAYERS_engine/io "format;engine/base;engine/io/file")
+set(PTC_LAYERS_engine/scene "format;engine/base;engine/io/file;engine/io")
+set(PTC_LAYERS_engine/sort "format;engine/base;engine/io/file")
+set(PTC_LAYERS_engine/store "format;engine/base;engine/io/file")
+set(PTC_LAYERS_engine/octree "format;engine/base;engine/io/file;engine/io;engine/sort;engine/store")
+set(PTC_LAYERS_engine/verify "format;engine/base;engine/parallel;engine/io/file;engine/io;engine/sort;engine/store;engine/octree")
+set(PTC_LAYERS_engine/cache "format;engine/base;engine/io/file;engine/store")
+set(PTC_LAYERS_engine/shade "format;engine/base;engine/io/file;engine/io;engine/store;engine/cache")
+set(PTC_LAYERS_engine/pipeline
+  "format;engine/base;engine/parallel;engine/io/file;engine/io;engine/scene;engine/sort;engine/store;engine/octree;engine/cache;engine/shade")
+set(PTC_LAYERS_engine "${PTC_LAYERS_engine/pipeline};engine/pipeline;engine/verify")
+set(PTC_LAYERS_tools/bench/chart "format;engine/base;engine/io/file;engine/io")
 set(PTC_LAYERS_tools "${PTC_LAYERS_engine/pipeline};engine/verify;engine/pipeline;engine;tools/bench/chart")
-set(PTC_LAYERS_tools/bench/report "format;engine/base;engine/io;tools/bench/chart")
+set(PTC_LAYERS_tools/bench/report "format;engine/base;engine/io/file;engine/io;tools/bench/chart")
 set(PTC_LAYERS_tools/bench/scenes "${PTC_LAYERS_engine/pipeline};engine/pipeline;engine")
 set(PTC_LAYERS_tools/bench/references "${PTC_LAYERS_tools/bench/scenes};tools/bench/chart;tools/bench/scenes")
 set(PTC_LAYERS_tools/bench/experiments
@@ -24,9 +27,10 @@ set(PTC_LAYERS_tools/bench "${PTC_LAYERS_tools/bench/experiments};tools/bench/ex
 add_library(ptc_options INTERFACE)
 target_compile_features(ptc_options INTERFACE cxx_std_20)
 # No contraction: a fused multiply-add in one build and not in another would change the bytes. Nobody asks for errno or
-# traps of arithmetic, which would keep loops from becoming vectors.
+# traps of arithmetic, which would keep loops from becoming vectors. Nor does anybody replace a function of the shared
+# libraries, which would keep functions from being inlined.
 target_compile_options(ptc_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-  -Wsign-conversion -Wno-missing-field-initializers -ffp-contract=off -fno-math-errno -fno-trapping-math
+  -Wsign-conversion -Wno-missing-field-initializers -ffp-contract=off -fno-math-errno -fno-trapping-math -fno-semantic-interposition
   $<$<BOOL:${PTC_WERROR}>:-Werror>)
 if(PTC_FUZZ)  # what is fuzzed tells which of its branches were taken
   target_compile_options(ptc_options INTERFACE -fsanitize=fuzzer-no-link)

@@ -12,6 +12,7 @@
 #include "engine/io/text/text.h"
 #include "engine/octree/merge.h"
 #include "engine/octree/radius.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/append.h"
 #include "engine/pipeline/build/build_inputs.h"
@@ -354,7 +355,7 @@ class Build {
   BuildRequest request_;
   const std::filesystem::path& target_;
   Progress& progress_;
-  const Executor executor_;
+  const ThreadPool executor_;
   BuildReport report_;
   RadiusCounts radius_counts_;
   std::unique_ptr<ContainerReader> scene_;  ///< that the points are added to; null: none

@@ -18,6 +18,7 @@
 #include "engine/io/text/text.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/store/container_points.h"
@@ -143,8 +144,7 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   std::vector<std::byte> payload(container.page_payload_limit());
   for (const std::uint32_t page : order) {
     const PageHeader header = container.read_page(page, payload, decoder);
-    writer.write_page(page, ContainerWriter::facts_of(header),
-                      std::span(payload).first(header.raw_bytes),
+    writer.write_page(page, summary_of(header), std::span(payload).first(header.raw_bytes),
                       container.attribute_columns(header.group));
     if (header.type == PageType::point) progress.advance(header.record_count);
   }
@@ -223,7 +223,7 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   const bool round =
       is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
   check_meta(meta, page_shift);
-  const Executor executor(options.run.threads);
+  const ThreadPool executor(options.run.threads);
   const std::uint64_t pages =
       (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) +
       container.page_count();

@@ -17,6 +17,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/memory_budget.h"
 #include "engine/base/progress.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/quality/check.h"
 #include "engine/pipeline/quality/estimate.h"
 #include "engine/pipeline/quality/tuning.h"
@@ -125,7 +126,7 @@ class Lighting {
   const LightingRequest& request_;
   LightingReport& report_;
   Progress& progress_;
-  Executor executor_;
+  ThreadPool executor_;
   ContainerReader scene_;
   std::unique_ptr<LostPages> lost_;
   std::unique_ptr<ContainerReader> bounced_;  ///< the scene with earlier bounces; null: one bounce

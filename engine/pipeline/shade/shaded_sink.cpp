@@ -145,8 +145,8 @@ class ContainerSink : public ShadedSink {
       const bool earlier = entry.type == PageType::attribute && entry.group == kGroup;
       if (entry.type == PageType::meta || earlier) continue;
       const PageHeader header = from_.read_stored_page(page, stored);
-      writer_.write_stored_page(writer_.reserve_page(), ContainerWriter::facts_of(header),
-                                header.coding, header.raw_bytes, stored);
+      writer_.write_stored_page(writer_.reserve_page(), summary_of(header), header.coding,
+                                header.raw_bytes, stored);
     }
   }
 

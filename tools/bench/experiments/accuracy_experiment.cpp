@@ -1,5 +1,6 @@
 #include <bit>
 
+#include "engine/parallel/thread_pool.h"
 #include "tools/bench/experiments/accuracy.h"
 #include "tools/bench/experiments/accuracy_chart.h"
 #include "tools/bench/experiments/experiment.h"
@@ -136,7 +137,7 @@ Experiment make_accuracy_experiment() {
     d.quick(options->plain_solid_angles, {0.01F});
   };
   const auto run = [=](const Bench& b) {
-    const Executor executor(b.run.threads);
+    const ThreadPool executor(b.run.threads);
     return measure_scenes(*scenes, options->repeats, b, [&](const SceneChoice& choice) {
       const BenchScene scene(choice, options->scene, b.work, b.run, b.progress);
       return measure_accuracy(scene, *options, executor, b.progress);

@@ -8,6 +8,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/run.h"
 #include "engine/store/reader.h"
@@ -179,7 +180,7 @@ class BuildRun {
   WorkFile file_{work_, ".ptcx"};
   const std::filesystem::path& target_ = file_.path();
   RunOptions run_;
-  Executor executor_;
+  ThreadPool executor_;
   Progress& progress_;
   const std::function<void(const std::vector<BuildRow>&)>& report_;
   std::vector<BuildRow> rows_;

@@ -13,6 +13,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/run.h"
 #include "engine/shade/shader.h"
 #include "tools/bench/experiments/disk_reads.h"
@@ -61,7 +62,7 @@ class ShadeRun {
   void run() {
     forget(scene_.container().file());
     PageCache cache(scene_.container(), cache_options_);
-    const Executor executor(
+    const ThreadPool executor(
         threads_);  // of this run alone: the least of all there are limits the others
     const std::uint64_t before = disk_bytes();
     times_.run([&] {
@@ -141,7 +142,7 @@ class HitRun {
     }
     PageReader reader(cache_);
     for (std::uint32_t page = 0; page < pages_; ++page)
-      payloads_.push_back(reader.get(page).payload);
+      payloads_.push_back(reader.pin(page).payload());
     for (const std::uint32_t page : sequence_) expected_ += static_cast<unsigned>(*payloads_[page]);
   }
 
@@ -188,7 +189,7 @@ class HitRun {
     PageReader reader(cache_);
     std::uint64_t sum = 0;
     for (const std::uint32_t page : sequence_)
-      sum += static_cast<unsigned>(*reader.get(page).payload);
+      sum += static_cast<unsigned>(*reader.pin(page).payload());
     return sum;
   }
 
@@ -210,7 +211,7 @@ class CacheRun {
       : options_(options),
         work_(work),
         run_(run),
-        threads_(Executor(run.threads).threads()),
+        threads_(ThreadPool(run.threads).threads()),
         progress_(progress),
         report_(report) {}
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/verify/verify.h"
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/work_file.h"
@@ -200,7 +201,7 @@ class DemoRun {
     return {.scene = choice_.name,
             .stage = kStages[stage],
             .memory_bytes = bench_.run.memory_bytes,
-            .threads = Executor(bench_.run.threads).threads(),
+            .threads = ThreadPool(bench_.run.threads).threads(),
             .wall = spread_of(times_[stage].wall),
             .cpu = spread_of(times_[stage].cpu),
             .resident_bytes = times_[stage].resident,

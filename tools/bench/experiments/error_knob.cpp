@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/run.h"
 #include "engine/shade/lift.h"
@@ -89,7 +90,7 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
         row_of(choice.name, "camera", render_picture(render, std::span(&target, 1), progress)));
   }
   const ContainerReader container(scene.path());
-  const Executor executor(run.threads);
+  const ThreadPool executor(run.threads);
   errors.surfels = container.superblock().points;
   const ShadeOptions settings{.cache_bytes =
                                   cache_bytes_left(budget_of(run.memory_bytes, "the ladder"),

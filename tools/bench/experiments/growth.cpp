@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "engine/io/file/disk_space.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/run.h"
 #include "engine/scene/light/lights.h"
 #include "engine/shade/reference/brute_force.h"
@@ -76,7 +77,7 @@ class CapRun {
 
  private:
   const BenchScene& scene_;
-  Executor executor_;
+  ThreadPool executor_;
   ShadeOptions options_;
   std::vector<Shading> results_;
   Costs costs_;
@@ -242,7 +243,7 @@ class GrowthRun {
   const GrowthOptions& options_;
   const std::filesystem::path& work_;
   const RunOptions& run_;
-  Executor executor_;
+  ThreadPool executor_;
   Progress& progress_;
   const Report& report_;
   std::vector<GrowthRow> rows_;

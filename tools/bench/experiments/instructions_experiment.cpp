@@ -1,6 +1,7 @@
 // The gather on each instruction set that the machine has.
 #include <hwy/targets.h>
 
+#include "engine/parallel/thread_pool.h"
 #include "engine/shade/reference/brute_force.h"
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/references/methods.h"
@@ -65,7 +66,7 @@ class OnlyInstructions {
 };
 
 Report measure(const InstructionOptions& options, const Bench& bench) {
-  const Executor executor(bench.run.threads);
+  const ThreadPool executor(bench.run.threads);
   const BenchScene scene(
       {.name = "city"},
       {.points = options.points, .shaded_width = 0, .own_points = options.receivers}, bench.work,

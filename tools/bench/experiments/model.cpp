@@ -6,6 +6,7 @@
 
 #include "engine/base/error.h"
 #include "engine/octree/build_pages.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/temporary_container.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/store/container_points.h"
@@ -32,7 +33,7 @@ std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::u
                            {.page_shift = from.header().page_shift, .frame = from.header().frame});
     Progress silent;
     const Superblock superblock =
-        build_pages(points, writer, {.leaf_points = leaf_points}, Executor(), silent);
+        build_pages(points, writer, {.leaf_points = leaf_points}, ThreadPool(), silent);
     writer.finish(from.meta(), superblock);
   });
 }

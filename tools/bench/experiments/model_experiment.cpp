@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/parallel/thread_pool.h"
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/model.h"
 
@@ -201,7 +202,7 @@ Experiment make_model_experiment() {
     d.quick(options->reference_rays, 4096);
   };
   const auto run = [=](const Bench& b) {
-    const Executor executor(b.run.threads);
+    const ThreadPool executor(b.run.threads);
     return measure_scenes(*scenes, options->repeats, b, [&](const SceneChoice& choice) {
       const BenchScene scene(choice, options->scene, b.work, b.run, b.progress);
       return measure_model(scene, *options, b.work, executor, b.progress);

@@ -9,6 +9,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/octree/rounding.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/store/container_points.h"
 #include "format/point_page.h"
 #include "tools/bench/experiments/model.h"
@@ -49,7 +50,7 @@ double moved(const PointRecord& from, const PointRecord& to, const Frame& frame)
 PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
   const Frame& frame = container.header().frame;
   ContainerPoints originals(container), points(container);
-  const Executor executor(1);
+  const ThreadPool executor(1);
   const std::unique_ptr<PointStream> rounding =
       rounded ? round_points(points, frame.unit(), executor) : nullptr;
   PointPayloads out;

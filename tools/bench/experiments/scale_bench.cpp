@@ -8,6 +8,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/io/file/disk_space.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/build/build_space.h"
 #include "engine/sort/spill.h"
 #include "engine/verify/verify.h"
@@ -156,7 +157,7 @@ class ScaleRun {
   }
 
   void add_rows(const SizeRuns& runs) {
-    const unsigned threads = Executor(run_.threads).threads();
+    const unsigned threads = ThreadPool(run_.threads).threads();
     const Superblock& made = runs.built.superblock;
     ScaleRow& build = add_row("build", runs, runs.build, threads);
     build.memory_bytes = run_.memory_bytes;

@@ -12,6 +12,7 @@
 #include "engine/base/memory.h"
 #include "engine/base/numbers.h"
 #include "engine/io/file/disk_space.h"
+#include "engine/parallel/thread_pool.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
 
@@ -242,7 +243,7 @@ class SortRun {
   const SortBenchOptions& options_;
   std::filesystem::path work_;
   RunOptions run_;
-  Executor executor_;
+  ThreadPool executor_;
   Progress& progress_;
   const std::function<void(const std::vector<SortRow>&)>& report_;
   std::vector<SortRow> rows_;

@@ -6,6 +6,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/verify/verify.h"
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/experiment.h"
@@ -99,7 +100,7 @@ class VerifyRun {
             .system = cold_ ? "cold" : "warm",
             .points = container.points,
             .file_bytes = container.file_bytes,
-            .threads = level_ ? Executor(run_.threads).threads() : 1,
+            .threads = level_ ? ThreadPool(run_.threads).threads() : 1,
             .memory_bytes = level_ ? run_.memory_bytes : 0,
             .wall = spread_of(times_.wall),
             .cpu = spread_of(times_.cpu),

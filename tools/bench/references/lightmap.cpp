@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <nanoflann.hpp>
 
+#include "engine/parallel/thread_pool.h"
 #include "format/scalar.h"
 
 namespace ptc::bench {
@@ -84,7 +85,7 @@ Lightmap::Lightmap(const Mesh& mesh, std::span<const Surfel> surfels, double spa
   texels_.resize(count);
   const Cloud cloud{surfels};
   const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10));
-  const Executor executor;
+  const ThreadPool executor;
   executor.for_ranges(grids_.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const glm::vec3 a = corner(t, 0), u = corner(t, 1) - a, v = corner(t, 2) - a;

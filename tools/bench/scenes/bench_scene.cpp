@@ -7,6 +7,7 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/run.h"
@@ -149,7 +150,7 @@ BenchScene::BenchScene(const SceneChoice& choice, const SceneOptions& options,
     lit_ = build_scene(choice, options, path, run, progress);
   });
   if (options.rays) surfels_ = load_surfels(*container_, kMaxSurfels);
-  const Executor executor(run.threads);
+  const ThreadPool executor(run.threads);
   if (options.shaded_width > 0) add_camera(options, executor, progress);
   add_points(options);
 }

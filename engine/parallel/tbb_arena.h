@@ -1,4 +1,4 @@
-// Threads from oneTBB. Only pool.cpp knows the library.
+// Threads from oneTBB. Only tbb_arena.cpp knows the library.
 #pragma once
 
 #include <memory>
@@ -6,13 +6,13 @@
 namespace ptc {
 
 /// An arena with one slot per thread, the calling thread's among them.
-class Pool {
+class TbbArena {
  public:
   /// @param threads  at least 1
-  explicit Pool(unsigned threads);
-  ~Pool();
-  Pool(const Pool&) = delete;
-  Pool& operator=(const Pool&) = delete;
+  explicit TbbArena(unsigned threads);
+  ~TbbArena();
+  TbbArena(const TbbArena&) = delete;
+  TbbArena& operator=(const TbbArena&) = delete;
 
   /// What run() calls.
   class Work {

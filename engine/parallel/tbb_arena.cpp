@@ -1,6 +1,6 @@
 // Threads from oneTBB. Compiled without the race checker, which does not see how the library orders
-// its tasks and would report them all; Executor orders what its bodies read and write by itself.
-#include "engine/base/pool.h"
+// its tasks and would report them all; ThreadPool orders what its bodies read and write by itself.
+#include "engine/parallel/tbb_arena.h"
 
 #include <optional>
 #include <thread>
@@ -11,7 +11,7 @@
 
 namespace ptc {
 
-struct Pool::Impl {
+struct TbbArena::Impl {
   explicit Impl(unsigned threads) : arena(static_cast<int>(threads), 1) {
     // TBB starts no more workers than the machine has cores unless it is told to.
     if (threads > std::thread::hardware_concurrency())
@@ -22,11 +22,11 @@ struct Pool::Impl {
   std::optional<tbb::global_control> more;
 };
 
-Pool::Pool(unsigned threads) : impl_(std::make_unique<Impl>(threads)) {}
+TbbArena::TbbArena(unsigned threads) : impl_(std::make_unique<Impl>(threads)) {}
 
-Pool::~Pool() = default;
+TbbArena::~TbbArena() = default;
 
-void Pool::run(unsigned times, Work& work) {
+void TbbArena::run(unsigned times, Work& work) {
   const auto one = [&work](const tbb::blocked_range<unsigned>&) {
     work.work(static_cast<unsigned>(tbb::this_task_arena::current_thread_index()));
   };

@@ -1,5 +1,5 @@
 // Loops on a bounded pool.
-#include "engine/base/executor.h"
+#include "engine/parallel/thread_pool.h"
 
 #include <atomic>
 #include <chrono>
@@ -25,13 +25,13 @@ void linger() {
 }  // namespace
 
 TEST_CASE("executor: it has as many threads as asked for, or as the machine", "[base][executor]") {
-  for (const unsigned threads : kThreadCounts) CHECK(Executor(threads).threads() == threads);
-  CHECK(Executor(0).threads() >= 1);
+  for (const unsigned threads : kThreadCounts) CHECK(ThreadPool(threads).threads() == threads);
+  CHECK(ThreadPool(0).threads() >= 1);
 }
 
 TEST_CASE("executor: every index is visited exactly once", "[base][executor]") {
   for (const unsigned threads : kThreadCounts) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     for (const std::size_t count : {0u, 1u, 2u, 7u, 1000u}) {
       std::vector<std::atomic<int>> visits(count);
       executor.for_each(count, [&](std::size_t i, unsigned) { ++visits[i]; });
@@ -42,7 +42,7 @@ TEST_CASE("executor: every index is visited exactly once", "[base][executor]") {
 
 TEST_CASE("executor: ranges are the aligned pieces of the count", "[base][executor]") {
   for (const unsigned threads : {1u, 2u}) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     for (std::size_t count = 0; count < 12; ++count)
       for (std::size_t grain = 1; grain < 14; ++grain) {
         std::vector<std::size_t> end_of(count + 1, 0);
@@ -62,7 +62,7 @@ TEST_CASE("executor: ranges are the aligned pieces of the count", "[base][execut
 TEST_CASE("executor: a thread index is in range and never used twice at a time",
           "[base][executor]") {
   for (const unsigned threads : kThreadCounts) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     std::vector<std::atomic<int>> busy(threads);
     std::atomic<int> clashes = 0, most = 0, running = 0;
     executor.for_each(64, [&](std::size_t, unsigned thread) {
@@ -87,7 +87,7 @@ TEST_CASE("executor: a thread index is in range and never used twice at a time",
 TEST_CASE("executor: a nested loop keeps its thread's index and runs no outer body meanwhile",
           "[base][executor]") {
   for (const unsigned threads : kThreadCounts) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     std::vector<std::atomic<int>> busy(threads);
     std::atomic<int> clashes = 0, inner = 0;
     executor.for_each(32, [&](std::size_t, unsigned thread) {
@@ -105,7 +105,7 @@ TEST_CASE("executor: a nested loop keeps its thread's index and runs no outer bo
 }
 
 TEST_CASE("executor: calls from threads of its user neither deadlock nor mix", "[base][executor]") {
-  const Executor executor(2);
+  const ThreadPool executor(2);
   std::vector<std::thread> users;
   std::atomic<std::size_t> sum = 0;
   for (int u = 0; u < 4; ++u)
@@ -120,7 +120,7 @@ TEST_CASE("executor: calls from threads of its user neither deadlock nor mix", "
 TEST_CASE("executor: the exception of a body reaches the caller and stops the loop",
           "[base][executor]") {
   for (const unsigned threads : kThreadCounts) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     std::atomic<std::size_t> begun = 0;
     const auto fail_at = [&](std::size_t bad) {
       executor.for_each(100000, [&, bad](std::size_t i, unsigned) {
@@ -142,7 +142,7 @@ TEST_CASE("executor: the exception of a body reaches the caller and stops the lo
 
 TEST_CASE("executor: an exception passes through nested loops", "[base][executor]") {
   for (const unsigned threads : kThreadCounts) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     CHECK_THROWS_WITH(executor.for_each(8,
                                         [&](std::size_t, unsigned) {
                                           executor.for_ranges(100, 3, [](std::size_t, std::size_t) {
@@ -155,7 +155,7 @@ TEST_CASE("executor: an exception passes through nested loops", "[base][executor
 
 TEST_CASE("executor: what a body wrote is seen by the caller", "[base][executor]") {
   for (const unsigned threads : kThreadCounts) {
-    const Executor executor(threads);
+    const ThreadPool executor(threads);
     std::vector<int> values(5000, 0);
     for (int round = 0; round < 20; ++round)
       executor.for_ranges(values.size(), 64, [&](std::size_t begin, std::size_t end) {

@@ -1,0 +1,28 @@
+// The executor that this library brings.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+#include "engine/base/executor.h"
+
+namespace ptc {
+
+/// A bounded pool of threads (oneTBB). With one thread, loops run in their caller.
+class ThreadPool final : public Executor {
+ public:
+  /// @param threads  0: one for each core of the machine
+  explicit ThreadPool(unsigned threads = 0);
+  ~ThreadPool() override;
+
+  [[nodiscard]] unsigned threads() const noexcept override { return threads_; }
+  void for_each(std::size_t count,
+                const std::function<void(std::size_t index, unsigned thread)>& body) const override;
+
+ private:
+  unsigned threads_;
+  std::unique_ptr<class TbbArena> arena_;  ///< null with one thread
+};
+
+}  // namespace ptc
