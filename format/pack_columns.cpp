@@ -1,17 +1,11 @@
-// The loops of packing, compiled once per instruction set (spec/points.md#packed-columns).
+// The loops of packing (spec/points.md#packed-columns).
 #include <bit>
 #include <vector>
 
 #include "format/bytes.h"
 #include "format/packed_layout.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "format/pack_columns.cpp"
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-
-HWY_BEFORE_NAMESPACE();
-namespace ptc::HWY_NAMESPACE {
+namespace ptc {
 namespace {
 
 template <class T, class Value>
@@ -102,20 +96,13 @@ void pack_all(std::span<const std::byte> payload, std::uint32_t count,
 }
 
 }  // namespace
-}  // namespace ptc::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
-namespace ptc {
-
-HWY_EXPORT(pack_all);
 
 void pack_columns(std::span<const std::byte> payload, std::uint32_t count,
-                  std::span<const PackedColumn> columns, std::vector<std::byte>& packed) {
+                  std::span<const PackedColumn> columns, std::vector<std::byte>& packed,
+                  InstructionSet set) {
   check_packed_size(payload.size(), count, columns);
   packed.clear();
-  HWY_DYNAMIC_DISPATCH(pack_all)(payload, count, columns, packed);
+  with_instructions(set, [&] { pack_all(payload, count, columns, packed); });
 }
 
 }  // namespace ptc
-#endif

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "format/instruction_sets.h"
 #include "format/schema.h"
 
 namespace ptc {
@@ -33,7 +34,8 @@ struct PackedColumn {
 /// @param packed   its size is what they take
 /// @throws std::invalid_argument when the payload has another size
 void pack_columns(std::span<const std::byte> payload, std::uint32_t count,
-                  std::span<const PackedColumn> columns, std::vector<std::byte>& packed);
+                  std::span<const PackedColumn> columns, std::vector<std::byte>& packed,
+                  InstructionSet set = widest_instructions());
 
 /// @param payload  filled; its size is that of the unpacked columns
 /// @throws std::invalid_argument when it is not, FormatError with the offset in `packed`

@@ -7,6 +7,7 @@
 #include <span>
 #include <type_traits>
 
+#include "format/instruction_sets.h"
 #include "format/morton.h"
 
 namespace ptc {
@@ -27,7 +28,10 @@ static_assert(sizeof(PointRecord) == 40 && std::is_trivially_copyable_v<PointRec
 inline constexpr std::size_t kPositionBlock = 256;
 using PositionBlock = std::array<std::array<std::uint64_t, kPositionBlock>, 3>;
 
+/// Decodes the keys of points into lattice coordinates.
 /// @param points  at most kPositionBlock
-void decode_positions(std::span<const PointRecord> points, PositionBlock& out) noexcept;
+/// @param out     its front is filled
+void decode_positions(std::span<const PointRecord> points, PositionBlock& out,
+                      InstructionSet set = widest_instructions()) noexcept;
 
 }  // namespace ptc

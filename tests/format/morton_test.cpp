@@ -6,6 +6,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "format/point_record.h"
 #include "tests/format/support.h"
 
 using namespace ptc;
@@ -51,6 +52,24 @@ TEST_CASE("morton: keys interleave z y x and come back", "[format][morton]") {
   CHECK(wrong == 0);
   const MortonKey last = encode_morton({kLatticeMax, kLatticeMax, kLatticeMax});
   CHECK(last == MortonKey{0x7fffffffffffffff, 0x7fffffffffffffff});
+}
+
+TEST_CASE("morton: blocks of keys are decoded the same by every instruction set",
+          "[format][morton]") {
+  Random random(3);
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{7}, kPositionBlock}) {
+    std::vector<PointRecord> points(count);
+    for (PointRecord& point : points) point.key = encode_morton(random_point(random));
+    for (const InstructionSet set : kInstructionSets) {
+      if (!has_instructions(set)) continue;
+      PositionBlock positions{};
+      decode_positions(points, positions, set);
+      for (std::size_t i = 0; i < count; ++i) {
+        const LatticePoint p = decode_morton(points[i].key);
+        CHECK((positions[0][i] == p[0] && positions[1][i] == p[1] && positions[2][i] == p[2]));
+      }
+    }
+  }
 }
 
 TEST_CASE("morton: levels, digits and cells agree with the digits one by one", "[format][morton]") {

@@ -41,7 +41,13 @@ Bytes point_payload(std::uint32_t count, unsigned zeros, unsigned spread, std::u
 
 Bytes pack(const Bytes& payload, std::uint32_t count, std::span<const PackedColumn> columns) {
   Bytes packed;
-  pack_columns(payload, count, columns, packed);
+  pack_columns(payload, count, columns, packed, InstructionSet::baseline);
+  for (const InstructionSet set : kInstructionSets) {
+    if (!has_instructions(set)) continue;
+    Bytes again;
+    pack_columns(payload, count, columns, again, set);
+    CHECK(again == packed);
+  }
   return packed;
 }
 
