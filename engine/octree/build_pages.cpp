@@ -96,10 +96,10 @@ void add_block(std::span<const PointRecord> block, const Frame& frame, const Exe
   executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
     const auto page = block.subspan(i * per_page, std::min(per_page, block.size() - i * per_page));
     pages[i] = point_page(page);
-    totals[i] = totals_of(PointPage(pages[i].payload.data(), pages[i].facts.record_count), frame);
+    totals[i] = totals_of(PointPage(pages[i].payload.data(), pages[i].summary.record_count), frame);
   });
   for (std::size_t i = 0; i < pages.size(); ++i) {
-    include(superblock, totals[i], pages[i].facts.record_count);
+    include(superblock, totals[i], pages[i].summary.record_count);
     order.add(std::move(pages[i]));
   }
 }

@@ -16,10 +16,10 @@ std::vector<std::byte> aligned(std::span<const std::byte> bytes) {
 }  // namespace
 
 ContainerWriter::Page point_page(std::span<const PointRecord> points) {
-  return {.facts = {.type = PageType::point,
-                    .record_count = static_cast<std::uint32_t>(points.size()),
-                    .first_key = points.front().key.high,
-                    .last_key = points.back().key.high},
+  return {.summary = {.type = PageType::point,
+                      .record_count = static_cast<std::uint32_t>(points.size()),
+                      .first_key = points.front().key.high,
+                      .last_key = points.back().key.high},
           .payload = encode_point_page(points)};
 }
 
@@ -62,11 +62,11 @@ void PageOrder::take_points() {
 
 void PageOrder::flush(std::optional<Stream>& stream) {
   whole_.push_back({.id = stream->page,
-                    .facts = {.type = PageType::node,
-                              .level = stream->keys.min_level,
-                              .record_count = stream->encoder.size(),
-                              .first_key = stream->keys.first,
-                              .last_key = stream->keys.last},
+                    .summary = {.type = PageType::node,
+                                .level = stream->keys.min_level,
+                                .record_count = stream->encoder.size(),
+                                .first_key = stream->keys.first,
+                                .last_key = stream->keys.last},
                     .payload = stream->encoder.take()});
   stream.reset();
 }
@@ -75,7 +75,7 @@ void PageOrder::save(StateWriter& state) const {
   state.put(next_point_);
   state.put(std::uint64_t{points_.size()});
   for (const Page& page : points_) {
-    state.put(page.facts.record_count);
+    state.put(page.summary.record_count);
     state.put_bytes(page.payload);
   }
   for (const std::optional<Stream>& stream : streams_) {

@@ -3,76 +3,121 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "engine/io/file/file.h"
+#include "engine/store/page_content.h"
+#include "engine/store/structure.h"
 #include "format/codec.h"
 #include "format/container.h"
 #include "format/schema.h"
 
 namespace ptc {
 
-/// A container open for reading. Opening checks header, superblocks (the second when the first is
-/// damaged), directory, meta page, and that the directory's pages make up one scene; a page's
-/// checksum is checked each time it is read. Padding between pages is not looked at.
-/// Threads: reading may be called concurrently.   Memory: kPageBytes a page, at
-/// most kMaxPageBytes while it opens.
+/// A container that is open for reading.
+///
+/// Opening checks the header, the superblocks (the second copy serves when the first is damaged),
+/// the directory, the meta page, and that the pages of the directory make up one scene. The
+/// checksum of a page is checked each time the page is read. The padding between pages is not read.
+///
+///     const ContainerReader scene("city.ptcx");
+///     std::vector<std::byte> payload(scene.page_payload_limit());
+///     PageDecoder decoder;
+///     for (const std::uint32_t page : scene.point_pages()) {
+///       const PageHeader header = scene.read_page(page, payload, decoder);
+///       use(PointPage(payload.data(), header.record_count));
+///     }
+///
+/// Every function that reads throws FormatError, whose message begins with the path and whose
+/// offset counts from the start of the file; an error in a page also names the page. A file that
+/// has shrunk since it was opened is a DataError, and a failing system call a std::system_error. A
+/// page number that does not exist is a std::invalid_argument.
+///
+/// Threads: all functions may be called concurrently.
+/// Memory: kPageBytes for each page; up to kMaxPageBytes for each while it opens.
 class ContainerReader {
  public:
-  /// @throws FormatError whose message begins with the path and whose offset is that in the file,
-  /// as for every function here, with the number of the page at fault where one is read;
-  /// std::system_error; DataError when the file shrinks meanwhile
+  /// Opens a container.
   explicit ContainerReader(const std::filesystem::path& path);
-  ~ContainerReader();
+  ContainerReader(const ContainerReader&) = delete;
+  ContainerReader& operator=(const ContainerReader&) = delete;
 
-  static constexpr std::uint64_t kPageBytes = 36;      ///< of memory a page
-  static constexpr std::uint64_t kMaxPageBytes = 100;  ///< while it opens
+  static constexpr std::uint64_t kPageBytes = 36;      ///< memory of an open container, per page
+  static constexpr std::uint64_t kMaxPageBytes = 100;  ///< memory while it opens, per page
 
-  [[nodiscard]] const std::filesystem::path& path() const noexcept;
-  [[nodiscard]] const FileHeader& header() const noexcept;
-  [[nodiscard]] const Superblock& superblock() const noexcept;
-  [[nodiscard]] const Meta& meta() const noexcept;
-  [[nodiscard]] std::uint32_t page_count() const noexcept;
-  [[nodiscard]] std::size_t page_payload_limit() const noexcept;  ///< page size - 64
-  /// @throws std::invalid_argument when there is no such page, as for every function here
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return file_.path(); }
+  [[nodiscard]] const InputFile& file() const noexcept { return file_; }
+  [[nodiscard]] const FileHeader& header() const noexcept { return header_; }
+  [[nodiscard]] const Superblock& superblock() const noexcept { return superblock_; }
+  /// The channels of the points and the texts that describe the file.
+  [[nodiscard]] const Meta& meta() const noexcept { return meta_; }
+  /// The number of pages, those of the directory not counted.
+  [[nodiscard]] std::uint32_t page_count() const noexcept { return superblock_.page_count; }
+  /// The largest payload that a page of this file may have: the page size less its header, bytes.
+  [[nodiscard]] std::size_t page_payload_limit() const noexcept;
+
+  /// The directory entry of a page.
   [[nodiscard]] const DirectoryEntry& entry(std::uint32_t page) const;
-  [[nodiscard]] std::span<const DirectoryEntry> entries() const noexcept;  ///< by page
-  /// Pages of a kind by ascending number: the k-th point page holds points k * points_per_page on.
-  [[nodiscard]] std::span<const std::uint32_t> point_pages() const noexcept;
-  [[nodiscard]] std::span<const std::uint32_t> node_pages() const noexcept;
+  /// The directory entries of all pages, by page number.
+  [[nodiscard]] std::span<const DirectoryEntry> entries() const noexcept { return entries_; }
+  /// The numbers of the point pages, ascending. The k-th one holds the points from
+  /// k * points_per_page on.
+  [[nodiscard]] std::span<const std::uint32_t> point_pages() const noexcept {
+    return index_.points;
+  }
+  /// The numbers of the node pages, ascending.
+  [[nodiscard]] std::span<const std::uint32_t> node_pages() const noexcept { return index_.nodes; }
+  /// The numbers of the attribute pages of a channel group, ascending: one for each point page, or
+  /// none where the group does not exist.
   [[nodiscard]] std::span<const std::uint32_t> attribute_pages(std::uint16_t group) const;
-  /// Columns of a group's attribute pages, for ContainerWriter::write_page(); none where there is
-  /// no such group.
+  /// The columns of a group's attribute pages, as ContainerWriter::write_page() takes them; empty
+  /// where the group does not exist.
   [[nodiscard]] std::span<const PackedColumn> attribute_columns(std::uint16_t group) const;
 
-  /// Reads, verifies and decodes a page's payload. Point and node pages also pass the checks of
-  /// PointPage::verify() and NodePage, and each child that a node page refers to exists.
-  /// @param out      at least page_payload_limit() bytes
-  /// @param decoder  one per thread
-  /// @return the page's header; the payload is the first raw_bytes of `out`
-  /// @throws FormatError naming path, offset and page
+  /// Reads a page, verifies it and decodes its payload.
+  ///
+  /// Point pages pass PointPage::verify(), node pages the checks of NodePage, and every child that
+  /// a node page refers to exists.
+  /// @param out      receives the payload in its first raw_bytes; at least page_payload_limit()
+  ///                 bytes
+  /// @param decoder  is used by one thread at a time
+  /// @return         the header of the page
   PageHeader read_page(std::uint32_t page, std::span<std::byte> out, PageDecoder& decoder) const;
-  /// The same of a page whose bytes are at hand.
-  /// @param image  page_range() of file()
+
+  /// Verifies and decodes a page as read_page() does, from bytes that the caller has read.
+  /// @param image  the bytes of page_range(page)
   PageHeader decode_page(std::uint32_t page, std::span<const std::byte> image,
                          std::span<std::byte> out, PageDecoder& decoder) const;
-  /// Where the header and the stored bytes of a page are.
+
+  /// Where a page lies in the file.
   struct PageRange {
     std::uint64_t offset = 0;
-    std::size_t bytes = 0;
+    std::size_t bytes = 0;  ///< header and stored payload
   };
   [[nodiscard]] PageRange page_range(std::uint32_t page) const;
-  [[nodiscard]] const InputFile& file() const noexcept;
-  /// The header of a page, compared with the directory; its payload is not read.
+
+  /// Reads the header of a page and compares it with the directory. The payload is not read.
   [[nodiscard]] PageHeader read_page_header(std::uint32_t page) const;
-  /// The payload as it is stored, checksum verified, not decoded, for copying.
+
+  /// Reads a page for copying: its checksum is verified, its payload stays as it is stored.
+  /// @param stored  receives the stored payload
   PageHeader read_stored_page(std::uint32_t page, std::vector<std::byte>& stored) const;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  [[nodiscard]] PageHeader agreed_header(std::uint32_t page,
+                                         std::span<const std::byte> image) const;
+  [[nodiscard]] PageHeader checked_header(std::uint32_t page,
+                                          std::span<const std::byte> image) const;
+  [[nodiscard]] Meta read_meta() const;
+
+  InputFile file_;
+  FileHeader header_;
+  Superblock superblock_;
+  std::vector<DirectoryEntry> entries_;
+  PageIndex index_;
+  Meta meta_;
+  GroupColumns columns_;
 };
 
 }  // namespace ptc

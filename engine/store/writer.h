@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
+#include <future>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "engine/base/executor.h"
+#include "engine/io/file/file.h"
+#include "engine/store/entry_table.h"
+#include "engine/store/page_images.h"
 #include "format/codec.h"
 #include "format/container.h"
 #include "format/schema.h"
@@ -16,108 +18,134 @@
 namespace ptc {
 
 struct WriterOptions {
-  std::uint8_t page_shift = 16;
+  std::uint8_t page_shift = 16;  ///< the page size is 2^page_shift bytes; 12 to 20
   Codec codec = Codec::zstd;
-  int level = 1;  ///< of zstd, clamped to its range
-  Uuid uuid{};
-  Frame frame;
-  /// Name of the file until it is published, under which it stays when it is not; empty: a
-  /// temporary one.
+  int level = 1;  ///< compression level of zstd, clamped to its range
+  Uuid uuid{};    ///< identity of the file, which salts the checksums of its page headers
+  Frame frame;    ///< the cube of space that the points' lattice fills
+  /// The name of the file until it is published. The file stays under that name when the writer
+  /// ends without finish(). Empty: a temporary name, and nothing stays.
   std::filesystem::path partial;
 };
 
 /// How far a writer got.
 struct WriterState {
-  std::uint32_t pages = 0;          ///< reserved
-  std::uint64_t end = kBlockBytes;  ///< of those written
+  std::uint32_t pages = 0;          ///< reserved page numbers
+  std::uint64_t end = kBlockBytes;  ///< end of the written pages, bytes from the start of the file
 };
 
-/// What superblocks say of who wrote them, unless they are told otherwise: program and version.
+/// The program and its version, which superblocks record unless another writer is named.
 [[nodiscard]] const char* writer_name() noexcept;
 
-/// A container on its way to the disk. Page numbers are given out by reserve_page(), so that a
-/// parent can refer to a page that is written later; pages are written in any order, and lie in the
-/// file in the order of the calls.
+/// A container on its way to the disk.
 ///
-/// Until finish() has returned, the target is what it was before; a writer that ends before leaves
-/// nothing behind. What a reader would refuse is not written but thrown as std::invalid_argument,
-/// after which the writer is of no more use. Every call may throw std::system_error.
-/// Memory: memory_bytes().   Threads: one at a time.
+/// reserve_page() gives out page numbers, so that a parent can refer to a page that is written
+/// later. Pages may be written in any order; they lie in the file in the order of the calls.
+///
+/// The target stays what it was until finish() returns. A writer that ends before that leaves
+/// nothing behind, unless WriterOptions::partial names the file. A page that a reader would refuse
+/// is a std::invalid_argument, and the writer is then of no further use. Every call may throw
+/// std::system_error.
+/// Threads: one at a time.   Memory: memory_bytes().
 class ContainerWriter {
  public:
-  /// Most that a writer holds while pages are written, beside those that it is given: an encoder
-  /// for each thread of write_pages().
+  /// The most memory that a writer holds while pages are written, the pages themselves not counted:
+  /// an encoder for each thread of write_pages().
   [[nodiscard]] static std::uint64_t writing_bytes(std::uint8_t page_shift,
                                                    unsigned threads) noexcept;
-  /// What finish() of so many pages takes: the directory, encoded and not, and its order. Until
-  /// then it is on the disk.
+  /// The memory that finish() takes: the directory, encoded and decoded, and its order. Until then
+  /// the directory is on the disk.
   [[nodiscard]] static std::uint64_t finish_bytes(std::uint64_t pages) noexcept;
-  /// Both.
+  /// writing_bytes() plus finish_bytes().
   [[nodiscard]] static std::uint64_t memory_bytes(std::uint64_t pages, std::uint8_t page_shift,
                                                   unsigned threads) noexcept;
 
+  /// Begins a container.
   /// @throws std::invalid_argument when page_shift is not 12 to 20 or the frame breaks a rule of
-  /// spec/morton.md#frame
+  ///         spec/morton.md#frame
   ContainerWriter(const std::filesystem::path& target, const WriterOptions& options);
-  /// Goes on with the partial file of a writer with the same options, whose state() this was; what
-  /// lies behind is cut.
+  /// Continues the partial file of a writer with the same options. What lies behind the state is
+  /// cut off.
+  /// @param state  what state() of that writer returned
   /// @throws DataError when the file does not hold these pages
   ContainerWriter(const std::filesystem::path& target, const WriterOptions& options,
                   const WriterState& state);
-  ~ContainerWriter();
+  ContainerWriter(const ContainerWriter&) = delete;
+  ContainerWriter& operator=(const ContainerWriter&) = delete;
 
-  [[nodiscard]] const FileHeader& header() const noexcept;
-  /// The next page number, from 0 on. @throws DataError after 2^32 - 2 pages
+  [[nodiscard]] const FileHeader& header() const noexcept { return header_; }
+  /// Gives out the next page number; the first is 0.
+  /// @throws DataError after 2^32 - 2 pages
   [[nodiscard]] std::uint32_t reserve_page();
 
-  /// What a page header says beyond sizes and hashes.
-  struct PageFacts {
-    PageType type = PageType::point;
-    std::uint16_t group = 0;
-    std::uint16_t level = 0xffff;
-    std::uint32_t record_count = 0;
-    std::uint64_t first_key = 0;
-    std::uint64_t last_key = 0;
-  };
-  /// Those of a page that is there.
-  [[nodiscard]] static PageFacts facts_of(const PageHeader& page) noexcept;
-  /// Compresses, checksums and writes the page. Each reserved page must be written once.
+  /// Compresses, checksums and writes a page. Each reserved page must be written exactly once.
+  /// @param page     a reserved number
   /// @param payload  1 to page size - 64 bytes
-  /// @param columns  of an attribute page, from packed_group_columns(); without them it is not
-  /// packed
-  void write_page(std::uint32_t page_id, const PageFacts& facts, std::span<const std::byte> payload,
-                  std::span<const PackedColumn> columns = {});
+  /// @param columns  of an attribute page, from packed_group_columns(), to pack it; empty: it is
+  /// not
+  ///                 packed
+  void write_page(std::uint32_t page, const PageSummary& summary,
+                  std::span<const std::byte> payload, std::span<const PackedColumn> columns = {});
+
   /// A page that is not compressed yet.
   struct Page {
     std::uint32_t id = 0;
-    PageFacts facts;
+    PageSummary summary;
     std::vector<std::byte> payload;
   };
-  /// The same of several, compressed side by side; they lie in the file in their order here. Not of
-  /// attribute pages. With more than one thread they are on their way when this returns, and what
-  /// goes wrong is thrown by a later call.
-  /// @param executor  must outlive the next call of flush() or finish()
+  /// Compresses pages of points and nodes in parallel and writes them in the order given here. With
+  /// more than one thread this returns before they are written, and a later call throws what goes
+  /// wrong.
+  /// @param executor  must outlive the next call of flush(), state() or finish()
   /// Memory: the pages and their stored bytes.
   void write_pages(std::vector<Page> pages, const Executor& executor);
-  /// Returns when all pages are in the file. @throws what went wrong with them
-  void flush();
-  /// State once all pages are in the file.
-  [[nodiscard]] WriterState state();
-  /// What is in the file is on the disk when it returns. Threads: while another thread writes, too.
-  void sync();
-  /// Writes a page whose payload is already in its stored form (copied from another container).
-  void write_stored_page(std::uint32_t page_id, const PageFacts& facts, Coding coding,
+
+  /// Writes a page whose payload is already in its stored form, such as one of another container.
+  /// @param raw_bytes  size of the decoded payload
+  void write_stored_page(std::uint32_t page, const PageSummary& summary, Coding coding,
                          std::uint32_t raw_bytes, std::span<const std::byte> stored);
 
-  /// Meta page, directory, superblocks; syncs and publishes under the target's name.
-  /// @param superblock  counts, bounds, totals and root; the rest is filled in here, the
-  /// writer's name when it is empty
-  /// @return  the superblock as it was written
+  /// Waits until all pages are in the file.
+  /// @throws what went wrong while write_pages() was under way
+  void flush();
+  /// Waits until all pages are in the file and returns how far the writer got.
+  [[nodiscard]] WriterState state();
+  /// Flushes everything that is in the file to stable storage. Threads: safe beside one thread that
+  /// writes.
+  void sync() { file_.sync(); }
+
+  /// Writes the meta page, the directory and the superblocks, flushes them to stable storage and
+  /// publishes the file under the target's name.
+  /// @param superblock  has counts, bounds, totals and root; everything else is filled in, and the
+  ///                    writer's name where it is empty
+  /// @return            the superblock as it was written
   Superblock finish(const Meta& meta, Superblock superblock);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  void find_pages(const std::filesystem::path& partial);
+  void begin_page();
+  void write_content_page(std::uint32_t page, const PageSummary& summary,
+                          std::span<const std::byte> payload,
+                          std::span<const PackedColumn> columns);
+  void append(const PageImage& image);
+  void append_page(const PageImage& image);
+  void write_directory(std::span<const std::byte> directory);
+  void complete(Superblock& superblock, std::span<const std::byte> directory) const;
+  [[nodiscard]] std::vector<DirectoryEntry> decode_directory(std::span<const std::byte> directory,
+                                                             std::uint64_t file_bytes) const;
+  [[nodiscard]] Block commit_record(Superblock& superblock, std::span<const std::byte> directory,
+                                    const Meta& meta) const;
+
+  FileHeader header_;
+  OutputFile file_;
+  EntryTable entries_;  ///< guards itself: pages are reserved while others are written
+  PageImages encoder_;
+  std::uint64_t end_ = kBlockBytes;  ///< where the next page goes
+  bool finished_ = false;
+  PageImage image_;                ///< of write_page(), kept between calls
+  std::vector<PageImage> images_;  ///< of write_pages(), kept between calls
+  std::future<void> writing_;      ///< write_pages() under way; last, so that its end is awaited
+                                   ///< before the other members go
 };
 
 }  // namespace ptc

@@ -42,7 +42,7 @@ void check_pages(const ContainerReader& reader, const Sample& sample) {
 void check_index(const ContainerReader& reader, const Sample& sample) {
   std::vector<std::uint32_t> points, nodes, second;
   for (std::uint32_t page = 0; page < sample.pages.size(); ++page) {
-    const ContainerWriter::PageFacts& facts = sample.pages[page].facts;
+    const PageSummary& facts = sample.pages[page].facts;
     if (facts.type == PageType::point) points.push_back(page);
     if (facts.type == PageType::node) nodes.push_back(page);
     if (facts.group == 2) second.push_back(page);

@@ -17,7 +17,7 @@
 namespace ptc::test {
 namespace {
 
-using Facts = ContainerWriter::PageFacts;
+using Facts = PageSummary;
 
 /// A group as it is planned: which points it covers and what its children are.
 struct Plan {

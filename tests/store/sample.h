@@ -38,7 +38,7 @@ struct SampleOptions {
 /// What went into a sample, page by page in the order of their numbers.
 struct Sample {
   struct Page {
-    ContainerWriter::PageFacts facts;
+    PageSummary facts;
     std::vector<std::byte> payload;
   };
   std::vector<Page> pages;  ///< the meta page is not among them

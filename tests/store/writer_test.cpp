@@ -16,7 +16,7 @@ using namespace ptc::test;
 
 namespace {
 
-using Facts = ContainerWriter::PageFacts;
+using Facts = PageSummary;
 
 /// A limit on the length of files that this process writes, as a full disk would be.
 class FileLimit {
@@ -102,7 +102,7 @@ TEST_CASE("writer: pages copied in their stored form give the same container", "
   std::vector<std::byte> stored;
   for (std::uint32_t page = copied; page-- > 0;) {
     const PageHeader h = from.read_stored_page(page, stored);
-    to.write_stored_page(page, ContainerWriter::facts_of(h), h.coding, h.raw_bytes, stored);
+    to.write_stored_page(page, summary_of(h), h.coding, h.raw_bytes, stored);
   }
   to.finish(from.meta(), from.superblock());
   CHECK((read_file(scratch / "a.ptcx") == read_file(scratch / "b.ptcx")));
