@@ -102,8 +102,8 @@ class Session {
   static constexpr unsigned kReaders = 4;
   struct Seat {
     std::unique_ptr<PageReader> reader;
-    PageReader::Page view;
-    const Bytes* shows = nullptr;  ///< what `view` must stay
+    std::optional<PageGuard> view;  ///< pins a page of the reader
+    const Bytes* shows = nullptr;   ///< what `view` must stay
   };
 
   void step(PageCache& cache, const CacheOptions& options, fuzz::ByteSource& from) {
@@ -112,6 +112,7 @@ class Session {
     if (what % 32 == 0) return file_.write(forms_[from.take() % 2]);
     if (what % 32 == 1) {
       seat.shows = nullptr;
+      seat.view.reset();
       return seat.reader.reset();
     }
     if (!seat.reader && !sit(cache, options, seat)) return;
@@ -120,7 +121,7 @@ class Session {
         what % 8 == 2 ? from.take<std::uint32_t>() : from.take() % (container_.page_count() + 1);
     get(seat, page);
     for (const Seat& other : seats_)
-      require(other.shows == nullptr || shows(other.view, *other.shows));
+      require(other.shows == nullptr || shows(*other.view, *other.shows));
   }
 
   bool sit(PageCache& cache, const CacheOptions& options, Seat& seat) {
@@ -138,8 +139,9 @@ class Session {
 
   void get(Seat& seat, std::uint32_t page) {
     seat.shows = nullptr;
+    seat.view.reset();
     try {
-      seat.view = seat.reader->get(page);
+      seat.view.emplace(seat.reader->pin(page));
     } catch (const FormatError&) {
       ++lookups_;
       return require(page < container_.page_count() &&
@@ -149,15 +151,16 @@ class Session {
     }
     ++lookups_;
     require(page < container_.page_count() &&
-            seat.view.record_count == container_.entry(page).record_count);
+            seat.view->record_count() == container_.entry(page).record_count);
     for (const Payloads& form : payloads_) {
-      if (form[page] && shows(seat.view, *form[page])) seat.shows = &*form[page];
+      if (form[page] && shows(*seat.view, *form[page])) seat.shows = &*form[page];
     }
-    require(seat.shows != nullptr && reinterpret_cast<std::uintptr_t>(seat.view.payload) % 64 == 0);
+    require(seat.shows != nullptr &&
+            reinterpret_cast<std::uintptr_t>(seat.view->payload()) % 64 == 0);
   }
 
-  static bool shows(const PageReader::Page& view, const Bytes& payload) {
-    return std::ranges::equal(std::span(view.payload, view.bytes), payload);
+  static bool shows(const PageGuard& view, const Bytes& payload) {
+    return std::ranges::equal(std::span(view.payload(), view.bytes()), payload);
   }
 
   void check_counts(const CacheStatistics& counts, std::uint64_t frames) const {

@@ -92,7 +92,7 @@ struct PageCache::Impl {
         arena(frames * frame_stride),
         seats(with.threads) {}
 
-  PageReader::Page view(std::uint32_t frame) const noexcept {
+  PageReader::View view(std::uint32_t frame) const noexcept {
     return {arena.data() + frame * frame_stride, table.page_bytes(frame),
             table.record_count(frame)};
   }
@@ -102,22 +102,22 @@ struct PageCache::Impl {
     std::uint32_t number;
     PageDecoder& decoder;
     PageSource& source;
-    std::uint64_t lookups;  ///< since it last told, this one included
+    std::uint64_t lookups;  ///< not yet added to the statistics, this one included
     std::uint64_t shared_hits;
   };
 
   /// Holds a page that hold() did not find.
   std::uint32_t acquire(std::uint32_t page, const Caller& caller) {
     std::unique_lock lock(mutex);
-    told.lookups += caller.lookups;
-    told.shared_hits += caller.shared_hits;
-    told.local_hits += caller.lookups - 1 - caller.shared_hits;
+    statistics.lookups += caller.lookups;
+    statistics.shared_hits += caller.shared_hits;
+    statistics.local_hits += caller.lookups - 1 - caller.shared_hits;
     const std::uint32_t frame = table.join(caller.number, page);
     if (frame == kNoFrame) return load(lock, page, caller);
-    ++told.shared_hits;
+    ++statistics.shared_hits;
     const auto begin = Clock::now();
     loaded.wait(lock, [&] { return table.state(frame) != FrameTable::State::loading; });
-    told.wait_seconds += seconds_since(begin);
+    statistics.wait_seconds += seconds_since(begin);
     if (table.state(frame) == FrameTable::State::ready) return frame;
     const std::exception_ptr error = table.error(frame);
     table.leave(caller.number, frame);
@@ -126,7 +126,7 @@ struct PageCache::Impl {
   }
 
   std::uint32_t load(std::unique_lock<std::mutex>& lock, std::uint32_t page, const Caller& caller) {
-    ++told.misses;
+    ++statistics.misses;
     const std::uint32_t frame = table.claim(caller.number, page);
     lock.unlock();
     PageHeader header;
@@ -144,8 +144,8 @@ struct PageCache::Impl {
       throw;
     }
     lock.lock();
-    told.bytes_read += kPageHeaderBytes + std::uint64_t{header.stored_bytes};
-    told.wait_seconds += waited;
+    statistics.bytes_read += kPageHeaderBytes + std::uint64_t{header.stored_bytes};
+    statistics.wait_seconds += waited;
     table.ready(frame, header.raw_bytes, header.record_count);
     loaded.notify_all();
     return frame;
@@ -184,12 +184,13 @@ struct PageCache::Impl {
   const CacheOptions options;
   const bool reads_ahead;
   const std::uint32_t slots;
-  mutable std::mutex mutex;  ///< guards told, seats and what of the table is not for readers alone
+  mutable std::mutex
+      mutex;  ///< guards statistics, seats and what of the table is not for readers alone
   std::condition_variable loaded;
   FrameTable table;
   const std::uint64_t frame_stride;
   Arena arena;
-  CacheStatistics told;
+  CacheStatistics statistics;
   std::vector<bool> seats;  ///< by number of a reader: there is one
 };
 
@@ -227,7 +228,7 @@ std::uint32_t PageCache::local_slots() const noexcept {
 
 CacheStatistics PageCache::statistics() const {
   const std::lock_guard lock(impl_->mutex);
-  CacheStatistics sum = impl_->told;
+  CacheStatistics sum = impl_->statistics;
   sum.evictions = impl_->table.evictions();
   sum.frames = impl_->table.size();
   sum.peak_frames = impl_->table.peak();
@@ -253,16 +254,20 @@ PageReader::PageReader(PageCache& cache)
 PageReader::~PageReader() {
   const std::lock_guard lock(shared_.mutex);
   for (std::uint32_t slot = 0; slot <= mask_; ++slot) shared_.table.release(number_, slot);
-  shared_.told.lookups += lookups_;
-  shared_.told.shared_hits += shared_hits_;
-  shared_.told.local_hits += lookups_ - shared_hits_;
+  shared_.statistics.lookups += lookups_;
+  shared_.statistics.shared_hits += shared_hits_;
+  shared_.statistics.local_hits += lookups_ - shared_hits_;
   shared_.seats[number_] = false;
 }
 
-PageReader::Page PageReader::find(std::uint32_t page) {
+const PageReader::View& PageReader::find(std::uint32_t page) {
+  if (pins_ != 0) {
+    --lookups_;
+    throw std::logic_error("page cache: a page is asked for while this reader has another pinned");
+  }
   if (page >= shared_.container.page_count()) {
     --lookups_;
-    throw std::invalid_argument("page cache: there is no page " + std::to_string(page));
+    throw std::invalid_argument("page cache: page " + std::to_string(page) + " does not exist");
   }
   Slot& slot = table_[page & mask_];
   slot.page = kEmpty;  // and stays so when the page does not arrive

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include "engine/cache/page_source.h"
 #include "engine/cache/replacement.h"
@@ -14,60 +15,64 @@ namespace ptc {
 
 struct CacheOptions {
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;  ///< frames and tables together
-  unsigned threads = 1;                                   ///< how many readers will exist at once
+  unsigned threads = 1;                                   ///< readers that exist at once, at most
   BackEnd back_end = BackEnd::pread;
   Replacement replacement = Replacement::clock;
-  bool read_ahead = true;  ///< io_uring alone: the page after one that was missed is expected
-  /// Pages that a reader holds on to, a power of two up to 256; 0: as many as the frames allow.
+  bool read_ahead = true;  ///< with io_uring: a miss also reads the next page of the same kind
+  /// Pages that each reader keeps resident for itself, a power of two up to 256; 0: as many as the
+  /// frames allow.
   std::uint32_t local_slots = 0;
 };
 
 struct CacheStatistics {
-  std::uint64_t lookups = 0;      ///< PageReader::get calls: the sum of the next three
-  std::uint64_t local_hits = 0;   ///< answered by the thread's own level
-  std::uint64_t shared_hits = 0;  ///< found in a frame, or joined another thread's read
+  std::uint64_t lookups = 0;      ///< calls of PageReader::pin(): the sum of the next three
+  std::uint64_t local_hits = 0;   ///< found in the reader's own table
+  std::uint64_t shared_hits = 0;  ///< found in a frame, or in a read of another thread
   std::uint64_t misses = 0;       ///< pages read, failed reads included
   std::uint64_t evictions = 0;
-  std::uint64_t bytes_read = 0;   ///< stored bytes of pages that arrived, headers included
-  std::uint64_t frames = 0;       ///< frames there are: what the cap allows and the file can use
-  std::uint64_t peak_frames = 0;  ///< most that were in use at once
-  double wait_seconds =
-      0;  ///< for bytes from the back end or for another thread's read, all readers together
-  [[nodiscard]] double hit_rate() const noexcept;  ///< 1 - misses / lookups; 1 without lookups
+  std::uint64_t bytes_read = 0;   ///< stored bytes of pages that were read, headers included
+  std::uint64_t frames = 0;       ///< frames of the cache: what the cap allows and the file can use
+  std::uint64_t peak_frames = 0;  ///< the most frames that were in use at once
+  /// The time that all readers together waited for the back end or for another thread's read.
+  double wait_seconds = 0;
+  /// 1 - misses / lookups; 1 without lookups.
+  [[nodiscard]] double hit_rate() const noexcept;
 };
 
-/// The shared level. A page that is there is found without a lock (engine/cache/frame_table.h). One
-/// that is not is read once even when several threads ask for it at the same time (single flight);
-/// reading and verifying happen outside the lock. Of the pages that no reader holds, one that was
-/// not asked for of late leaves first.
+/// The level of the cache that all threads share.
 ///
-/// A page that cannot be read fails for all who wait for it; who asks later tries again.
-/// Memory: frames of one page size each in one block, 4 bytes a page of the container, and for each
-/// reader its table, its decoder and its back end's buffers; all of it within the cap. The
-/// container's own directory is not counted. Threads: a PageCache may be shared; each thread makes
-/// its own PageReader.
+/// A resident page is found without a lock (engine/cache/frame_table.h). A missing page is read
+/// once, even when several threads ask for it at the same time (single flight); reading and
+/// verifying happen outside the lock. Among unpinned pages, one that was not used recently is
+/// evicted first.
+///
+/// A page that cannot be read fails for all callers that wait for it; a later call tries again.
+/// Threads: a cache may be shared; each thread makes its own PageReader.
+/// Memory: within the cap, one block of frames of one page each, 4 bytes for each page of the
+/// container, and for each reader its table, its decoder and the buffers of its back end. The
+/// container's own directory is not included.
 class PageCache {
  public:
-  /// @param container  outlives the cache
-  /// @throws std::invalid_argument naming the least cap that works, when the cap is below it, or
-  /// when there are no threads or local_slots is not a power of two that the frames allow
+  /// @param container  must outlive the cache
+  /// @throws std::invalid_argument when the cap is too small (the text names the least that works),
+  ///         when `threads` is 0, or when `local_slots` is not a power of two that the frames allow
   PageCache(const ContainerReader& container, const CacheOptions& options);
   ~PageCache();
   PageCache(const PageCache&) = delete;
   PageCache& operator=(const PageCache&) = delete;
 
-  /// Least cap for so many threads: two frames each, and the tables.
+  /// The least cap for a number of threads: two frames each, and the tables.
   [[nodiscard]] static std::uint64_t min_bytes(const ContainerReader& container, unsigned threads,
                                                BackEnd back_end = BackEnd::pread);
-  /// Least cap that gives so many frames.
+  /// The least cap that gives a number of frames.
   [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads,
                                                std::uint64_t frames,
                                                BackEnd back_end = BackEnd::pread);
   [[nodiscard]] const ContainerReader& container() const noexcept;
-  /// Sums over the shared level and all readers that have ended. Of a living reader, hits since its
-  /// last miss are missing.
+  /// Sums over the shared level and all readers that have ended. The hits of a living reader since
+  /// its last miss are not included.
   [[nodiscard]] CacheStatistics statistics() const;
-  /// Pages that each reader holds on to.
+  /// The number of pages that each reader keeps resident for itself.
   [[nodiscard]] std::uint32_t local_slots() const noexcept;
 
  private:
@@ -76,52 +81,91 @@ class PageCache {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A thread's way to pages: a direct-mapped table of pages that it holds, so a repeated access
-/// takes no lock and writes nothing shared. Not thread-safe: one per thread.
+/// A resident page, which is not evicted while its guard lives.
+///
+/// A reader pins one page at a time: asking it for another while a guard lives is a
+/// std::logic_error, at the latest when the other page is not at hand. A guard that was moved from
+/// pins nothing.
+class PageGuard {
+ public:
+  PageGuard(PageGuard&& other) noexcept
+      : payload_(other.payload_),
+        bytes_(other.bytes_),
+        record_count_(other.record_count_),
+        pins_(std::exchange(other.pins_, nullptr)) {}
+  PageGuard& operator=(PageGuard&&) = delete;
+  ~PageGuard() {
+    if (pins_ != nullptr) --*pins_;
+  }
+
+  /// The decoded payload, aligned to 64 bytes. Up to 64 bytes beyond bytes() may be read: they are
+  /// zero or stale, never unmapped.
+  [[nodiscard]] const std::byte* payload() const noexcept { return payload_; }
+  /// The size of the payload.
+  [[nodiscard]] std::uint32_t bytes() const noexcept { return bytes_; }
+  /// The number of records in the payload, from the page's header.
+  [[nodiscard]] std::uint32_t record_count() const noexcept { return record_count_; }
+
+ private:
+  friend class PageReader;
+  PageGuard(const std::byte* payload, std::uint32_t bytes, std::uint32_t record_count,
+            std::uint32_t& pins) noexcept
+      : payload_(payload), bytes_(bytes), record_count_(record_count), pins_(&pins) {
+    ++pins;
+  }
+
+  const std::byte* payload_;
+  std::uint32_t bytes_;
+  std::uint32_t record_count_;
+  std::uint32_t* pins_;
+};
+
+/// One thread's way to pages: a direct-mapped table of pages that it keeps resident, so that a
+/// repeated access takes no lock and writes nothing shared.
+/// Threads: one reader for each thread.
 class PageReader {
  public:
-  /// @param cache  outlives the reader
-  /// @throws std::invalid_argument when as many readers as CacheOptions::threads exist already;
-  /// std::system_error
-  ///         when the system does not have the back end
+  /// @param cache  must outlive the reader
+  /// @throws std::invalid_argument when CacheOptions::threads readers exist already;
+  ///         std::system_error when the system lacks the back end
   explicit PageReader(PageCache& cache);
   ~PageReader();
   PageReader(const PageReader&) = delete;
   PageReader& operator=(const PageReader&) = delete;
 
-  /// A resident page. `payload` stays valid until the next get() of this reader, aligned to 64.
-  /// Bytes up to 64 past the payload may be read (they are zero or stale, never unmapped).
-  struct Page {
+  /// Pins a page, which is read when it is not resident. The guard must not outlive the reader.
+  /// @throws FormatError, DataError, std::system_error when the page cannot be read, the same for
+  ///         all callers that wait for it; std::invalid_argument for a page that does not exist;
+  ///         std::logic_error when this reader would have to give up a pinned page. The reader
+  ///         stays usable.
+  [[nodiscard]] PageGuard pin(std::uint32_t page) {
+    const Slot& slot = table_[page & mask_];
+    ++lookups_;
+    const View& view = slot.page == page ? slot.view : find(page);
+    return {view.payload, view.bytes, view.record_count, pins_};
+  }
+
+ private:
+  friend struct PageCache::Impl;
+  static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};  ///< no page number, not even kNoPage
+  struct View {
     const std::byte* payload = nullptr;
     std::uint32_t bytes = 0;
     std::uint32_t record_count = 0;
   };
-  /// @param page  below the container's page count
-  /// @throws FormatError, DataError, std::system_error when the page cannot be read, the same for
-  /// all who wait for it; std::invalid_argument when there is no such page. The reader stays
-  /// usable.
-  [[nodiscard]] Page get(std::uint32_t page) {
-    const Slot& slot = table_[page & mask_];
-    ++lookups_;
-    if (slot.page == page) return slot.view;
-    return find(page);
-  }
-
- private:
-  static constexpr std::uint64_t kEmpty =
-      ~std::uint64_t{0};  // equal to no page number, kNoPage included
   struct Slot {
     std::uint64_t page = kEmpty;
-    Page view;
+    View view;
   };
-  Page find(std::uint32_t page);
+  const View& find(std::uint32_t page);
 
   PageCache::Impl& shared_;
   std::uint32_t number_;  ///< among the readers
   std::unique_ptr<Slot[]> table_;
   std::uint32_t mask_;
-  std::uint64_t lookups_ = 0;      ///< since the shared level was last told
-  std::uint64_t shared_hits_ = 0;  ///< likewise
+  std::uint32_t pins_ = 0;         ///< guards that live
+  std::uint64_t lookups_ = 0;      ///< not yet added to the shared statistics
+  std::uint64_t shared_hits_ = 0;  ///< not yet added to the shared statistics
   std::unique_ptr<PageSource> source_;
   PageDecoder decoder_;
 };

@@ -10,7 +10,7 @@ bool LostPages::contains(std::uint32_t page, PageReader& reader) {
     if (state != kUnknown) return state == kLost;
   }
   try {
-    static_cast<void>(reader.get(page));
+    static_cast<void>(reader.pin(page));
   } catch (const FormatError& error) {
     add(page, error.what());
     return true;

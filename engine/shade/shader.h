@@ -1,9 +1,12 @@
 // Shading many receivers on many threads under one cap.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
@@ -13,44 +16,61 @@
 namespace ptc {
 
 struct ShadeOptions {
-  std::uint64_t cache_bytes = std::uint64_t{512} << 20;  ///< page cache, all threads together
+  std::uint64_t cache_bytes = std::uint64_t{512} << 20;  ///< page cache of all threads together
   BackEnd back_end = BackEnd::pread;
   GatherOptions gather;
-  /// Radiance that arrives from a direction (unit) where nothing covers it; empty: none.
+  /// The radiance that arrives from a direction (unit vector) where nothing covers it, W / (m^2
+  /// sr); empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;
-  /// Pages to read through in place of a cache of its own, for as many threads; it outlives the
-  /// Shader.
+  /// A cache for as many threads, to read through in place of the shader's own; must outlive the
+  /// shader. Null: the shader makes its own.
   PageCache* cache = nullptr;
-  LostPages* lost = nullptr;  ///< goes on past damaged pages, which it tells there; null: they are
-                              ///< errors. It outlives the Shader
-  unsigned variants =
-      1;  ///< turns of the direction cube and shifts of the receiver cells to choose from
+  /// Where damaged pages are noted, which shading then passes over; must outlive the shader. Null:
+  /// damaged pages are errors.
+  LostPages* lost = nullptr;
+  /// How many variants there are to choose from. Each turns the direction cube and shifts the
+  /// receiver cells in another way.
+  unsigned variants = 1;
 };
 
-/// Keeps cache and gathers between calls.
+/// Shades receivers block by block, and keeps the page cache and the gathers between calls.
 class Shader {
  public:
+  /// @param container  must outlive the shader, as must the executor
   Shader(const ContainerReader& container, const ShadeOptions& options, const Executor& executor);
-  ~Shader();
 
-  /// Receivers of a block: neighbours on the Z-curve that one thread shades together.
+  /// The receivers of a block: neighbours on the Z-curve that one thread shades together.
   static constexpr std::size_t kBlock = 4096;
 
-  /// Sorts the receivers along the Z-curve, shades them block by block. A receiver's result depends
-  /// on the receivers of its block, so callers that stream give multiples of kBlock, in Z order.
-  /// @param results  as many as receivers, in their order
-  /// @param variant  modulo the variants there are. The errors of two variants are not alike: their
-  ///                 mean has fewer
+  /// Sorts the receivers along the Z-curve and shades them block by block. The result of a receiver
+  /// depends on the receivers of its block, so callers that stream should pass multiples of kBlock,
+  /// in Z order.
+  /// @param results  as many as receivers, in the same order
+  /// @param variant  taken modulo ShadeOptions::variants. Two variants have different errors, so
+  ///                 their mean has a smaller one
+  /// @throws FormatError for a damaged page, unless ShadeOptions::lost is set; std::system_error
   void shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress,
              unsigned variant = 0);
 
+  /// The counts of all calls so far.
   [[nodiscard]] GatherCounts counts() const;
-  /// Complete once no shade() is running; gives back the readers that the cache allows.
-  [[nodiscard]] CacheStatistics cache_statistics() const;
+  /// The statistics of the page cache. Not while shade() runs: the gathers are released, so that
+  /// their readers' counts are complete, and are made again by the next shade().
+  [[nodiscard]] CacheStatistics cache_statistics();
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  [[nodiscard]] Gather& gather(unsigned thread);
+  [[nodiscard]] std::vector<std::size_t> z_order(std::span<const Receiver> receivers,
+                                                 unsigned variant) const;
+
+  const Executor& executor_;
+  SceneView view_;
+  std::vector<std::unique_ptr<DirectionGrid>> grids_;  ///< by variant
+  GatherOptions options_;
+  std::unique_ptr<PageCache> own_cache_;
+  PageCache& cache_;
+  std::vector<std::unique_ptr<Gather>> gathers_;  ///< by thread, made when first needed
+  GatherCounts counts_;                           ///< of gathers that were released
 };
 
 }  // namespace ptc

@@ -11,6 +11,7 @@
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
@@ -73,7 +74,7 @@ CacheStatistics run(PageCache& cache, const Pages& pages, const Trace& trace) {
   {
     PageReader reader(cache);
     for (const std::uint32_t page : trace) {
-      if (!pages.same(page, reader.get(page))) ++wrong;
+      if (!pages.same(page, reader.pin(page))) ++wrong;
     }
   }
   CHECK(wrong == 0);
@@ -167,10 +168,10 @@ TEST_CASE("cache: 64 bytes past a payload can be read, which starts on a cache l
   PageReader reader(cache);
   unsigned sum = 0;
   for (std::uint32_t page = 0; page < pages.count(); ++page) {
-    const PageReader::Page found = reader.get(page);
-    CHECK(std::bit_cast<std::uintptr_t>(found.payload) % 64 == 0);
+    const PageGuard found = reader.pin(page);
+    CHECK(std::bit_cast<std::uintptr_t>(found.payload()) % 64 == 0);
     for (std::size_t i = 0; i < 64; ++i)
-      sum += static_cast<unsigned>(found.payload[found.bytes + i]);
+      sum += static_cast<unsigned>(found.payload()[found.bytes() + i]);
   }
   CHECK(sum < 64 * 256 * pages.count());
 }
@@ -247,10 +248,30 @@ TEST_CASE("cache: a reader that ends gives back what it had pinned", "[cache]") 
   for (int round = 0; round < 5; ++round) {
     PageReader reader(cache);
     for (std::uint32_t page = 0; page < pages.count(); ++page) {
-      REQUIRE(pages.same(page, reader.get(page)));
+      REQUIRE(pages.same(page, reader.pin(page)));
     }
   }
   CHECK(cache.statistics().lookups == std::uint64_t{5} * pages.count());
+}
+
+TEST_CASE("cache: a reader gives up no page that is pinned, whatever the others evict",
+          "[cache][guard]") {
+  const Pages pages;
+  PageCache cache(pages.container, pages.options(2, 4, 1));
+  PageReader reader(cache), other(cache);
+  {
+    PageGuard pinned = reader.pin(0);
+    CHECK_THROWS_AS(reader.pin(1), std::logic_error);
+    for (std::uint32_t page = 1; page < pages.count(); ++page) {
+      CHECK(pages.same(page, other.pin(page)));
+    }
+    CHECK(pages.same(0, pinned));
+    const PageGuard moved = std::move(pinned);
+    CHECK_THROWS_AS(reader.pin(1), std::logic_error);
+    CHECK(pages.same(0, moved));
+  }
+  CHECK(pages.same(1, reader.pin(1)));
+  CHECK(cache.statistics().evictions > 0);
 }
 
 TEST_CASE("cache: a page that there is not is refused and not counted", "[cache]") {
@@ -258,10 +279,10 @@ TEST_CASE("cache: a page that there is not is refused and not counted", "[cache]
   PageCache cache(pages.container, pages.options(1, 4));
   {
     PageReader reader(cache);
-    CHECK_THROWS_AS(reader.get(kNoPage), std::invalid_argument);  // no slot holds a page yet
-    CHECK(pages.same(0, reader.get(0)));
-    CHECK_THROWS_AS(reader.get(pages.count()), std::invalid_argument);
-    CHECK(pages.same(0, reader.get(0)));
+    CHECK_THROWS_AS(reader.pin(kNoPage), std::invalid_argument);  // no slot holds a page yet
+    CHECK(pages.same(0, reader.pin(0)));
+    CHECK_THROWS_AS(reader.pin(pages.count()), std::invalid_argument);
+    CHECK(pages.same(0, reader.pin(0)));
   }
   CHECK(cache.statistics().lookups == 2);
   CHECK(cache.statistics().hit_rate() == Approx(0.5));
@@ -274,16 +295,16 @@ TEST_CASE("cache: a damaged page is an error each time, and a page again once it
     PageCache cache(pages.container, pages.options(1, 4, slots));
     {
       PageReader reader(cache);
-      CHECK(pages.same(2, reader.get(2)));
+      CHECK(pages.same(2, reader.pin(2)));
       {
         const Flip damage(pages.file.path(), pages.container.entry(0).offset + 70);
-        for (int i = 0; i < 20; ++i) CHECK_THROWS_AS(reader.get(0), FormatError);
-        CHECK(pages.same(1, reader.get(1)));
-        CHECK_THROWS_WITH(reader.get(0), Catch::StartsWith(pages.file.path().string()));
+        for (int i = 0; i < 20; ++i) CHECK_THROWS_AS(reader.pin(0), FormatError);
+        CHECK(pages.same(1, reader.pin(1)));
+        CHECK_THROWS_WITH(reader.pin(0), Catch::StartsWith(pages.file.path().string()));
       }
-      CHECK(pages.same(0, reader.get(0)));
+      CHECK(pages.same(0, reader.pin(0)));
       for (std::uint32_t page = 0; page < pages.count(); ++page) {
-        CHECK(pages.same(page, reader.get(page)));
+        CHECK(pages.same(page, reader.pin(page)));
       }
     }
     const CacheStatistics s = cache.statistics();
@@ -298,11 +319,11 @@ TEST_CASE("cache: statistics do not count a living reader's hits before they are
   PageCache cache(pages.container, pages.options(1, 8));
   CHECK(cache.statistics().hit_rate() == 1);
   PageReader reader(cache);
-  static_cast<void>(reader.get(0));
-  static_cast<void>(reader.get(0));
-  static_cast<void>(reader.get(0));
+  static_cast<void>(reader.pin(0));
+  static_cast<void>(reader.pin(0));
+  static_cast<void>(reader.pin(0));
   CHECK(cache.statistics().lookups == 1);
-  static_cast<void>(reader.get(1));
+  static_cast<void>(reader.pin(1));
   CHECK(cache.statistics().lookups == 4);
   CHECK(cache.statistics().local_hits == 2);
 }
@@ -329,7 +350,7 @@ TEST_CASE("cache: resident memory stays within the cap", "[cache][cap]") {
     PageReader reader(cache);
     for (std::uint32_t round = 0; round < 2; ++round) {
       for (std::uint32_t page = 0; page < container.page_count(); ++page) {
-        static_cast<void>(reader.get(page));
+        static_cast<void>(reader.pin(page));
         most = std::max(most, resident_bytes());
       }
     }

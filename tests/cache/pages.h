@@ -67,9 +67,9 @@ class Pages {
   }
 
   [[nodiscard]] std::uint32_t count() const { return container.page_count(); }
-  [[nodiscard]] bool same(std::uint32_t page, const PageReader::Page& found) const {
-    return found.record_count == container.entry(page).record_count &&
-           std::ranges::equal(payloads[page], std::span(found.payload, found.bytes));
+  [[nodiscard]] bool same(std::uint32_t page, const PageGuard& found) const {
+    return found.record_count() == container.entry(page).record_count &&
+           std::ranges::equal(payloads[page], std::span(found.payload(), found.bytes()));
   }
   /// Options that give exactly so many frames.
   [[nodiscard]] CacheOptions options(unsigned threads, std::uint64_t frames,

@@ -115,7 +115,7 @@ TEST_CASE("cache: threads that fight for frames get the right pages", "[cache][t
           for (std::uint64_t i = 0; i < kGets; ++i) {
             // Half of the gets go to a few pages that all threads want.
             const std::uint32_t page = below(i % 2 == 0 ? 8 : pages.count(), random);
-            if (!pages.same(page, reader.get(page))) ++wrong;
+            if (!pages.same(page, reader.pin(page))) ++wrong;
           }
         });
         CHECK(wrong == 0);
@@ -135,7 +135,7 @@ TEST_CASE("cache: a page that all ask for at once is read once", "[cache][thread
       PageReader reader(cache);
       for (std::uint32_t page = 0; page < pages.count(); ++page) {
         together.arrive_and_wait();
-        static_cast<void>(reader.get(page));
+        static_cast<void>(reader.pin(page));
       }
     });
     const CacheStatistics s = cache.statistics();
@@ -158,7 +158,7 @@ TEST_CASE("cache: who waits for a read that fails gets its error", "[cache][thre
     on_threads(kThreads, [&](unsigned) {
       PageReader reader(cache);
       try {
-        static_cast<void>(reader.get(0));
+        static_cast<void>(reader.pin(0));
       } catch (const FormatError&) {
         ++errors;
       }
@@ -167,7 +167,7 @@ TEST_CASE("cache: who waits for a read that fails gets its error", "[cache][thre
   CHECK(cache.statistics().shared_hits > 0);
   CHECK(errors == asked);
   PageReader reader(cache);
-  CHECK(pages.same(1, reader.get(1)));
+  CHECK(pages.same(1, reader.pin(1)));
 }
 
 TEST_CASE("cache: readers that pin all they may do not lock each other out", "[cache][threads]") {
@@ -182,7 +182,7 @@ TEST_CASE("cache: readers that pin all they may do not lock each other out", "[c
     PageReader reader(cache);
     for (std::uint32_t i = 0; i < 5000; ++i) {
       const std::uint32_t page = (i + 25 * thread) % pages.count();
-      if (!pages.same(page, reader.get(page))) ++wrong;
+      if (!pages.same(page, reader.pin(page))) ++wrong;
     }
   });
   CHECK(wrong == 0);
@@ -209,7 +209,7 @@ TEST_CASE("cache: all who ask for a damaged page get its error, the others their
         if (page == 0) ++asked;
         std::exception_ptr caught;
         try {
-          if (!pages.same(page, reader.get(page))) ++wrong;
+          if (!pages.same(page, reader.pin(page))) ++wrong;
         } catch (...) {
           caught = std::current_exception();
         }

@@ -1,36 +1,88 @@
 // The hierarchical gather: light at many neighbouring receivers at once (spec/shading.md#gather).
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
 
 #include "engine/shade/gather/direction_buffer.h"
+#include "engine/shade/gather/near_lists.h"
+#include "engine/shade/gather/receiver_cell.h"
 #include "engine/shade/gather/scene_view.h"
+#include "engine/shade/kernels/disc_queue.h"
+#include "engine/shade/kernels/gather_kernels.h"
 #include "engine/shade/shading.h"
 
 namespace ptc {
 
-/// Shades receivers in cells of an implicit octree over them: what all receivers of a cell see
-/// within `parallax` is drawn once, into a buffer that the cell's children inherit. One per thread.
+/// Shades receivers in cells of an implicit octree over them. What all receivers of a cell see
+/// within the angle GatherOptions::parallax is drawn once, into a buffer that the cell's children
+/// inherit.
 ///
-/// Results depend on the receivers of the call and on the options, not on the cache, the order of
-/// pages or what was shaded before.
-/// Memory: a direction buffer (48 KiB at resolution 32) per level of receiver cells, and lists.
+/// The results depend on the receivers of the call and on the options alone, not on the cache, the
+/// order of pages or what was shaded before.
+/// Threads: one gather for each thread.
+/// Memory: a direction buffer (48 KiB at resolution 32) for each level of receiver cells, and
+/// lists.
 class Gather {
  public:
+  /// @param view   must outlive the gather, as must the cache
   Gather(const SceneView& view, PageCache& cache, const GatherOptions& options);
-  ~Gather();
 
-  /// @param receivers  neighbours, in any order; a few thousand share best
-  /// @param results    as many
-  /// @param grid       of the options' resolution; its variant shifts the cells too
+  /// Shades receivers.
+  /// @param receivers  neighbours, in any order; a few thousand at once share best
+  /// @param results    as many as receivers, in the same order
+  /// @param grid       of the options' resolution; its variant also shifts the receiver cells
+  /// @throws FormatError for a damaged page, unless the view notes lost pages; std::system_error
   void shade(std::span<const Receiver> receivers, std::span<Shading> results,
              const DirectionGrid& grid);
-  [[nodiscard]] const GatherCounts& counts() const noexcept;
+  /// The counts of all calls so far.
+  [[nodiscard]] const GatherCounts& counts() const noexcept { return counts_; }
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  /// One depth of receiver cells: what the current cell of that depth draws and leaves.
+  struct Level {
+    explicit Level(const GatherOptions& options) : buffer(options.resolution, options.bleeding) {}
+
+    glm::dvec3 centre{0};  ///< lattice units
+    DirectionBuffer buffer;
+    NearLists left;
+  };
+
+  void place(std::span<const Receiver> from);
+  void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited,
+                  std::size_t depth, float bound);
+  void resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn,
+               std::size_t depth, float bound);
+  const DirectionBuffer& collect(const ReceiverCell& cell, const DirectionBuffer& inherited,
+                                 DirectionBuffer& own, NearLists* left, std::size_t depth,
+                                 float& bound);
+  std::size_t look_at_clusters(const Level& around, std::size_t from, const glm::vec3& move,
+                               const CellTest& test, CellOutput& out);
+  std::size_t look_at_surfels(const Level& around, std::size_t from, const glm::vec3& move,
+                              const CellTest& test, CellOutput& out);
+  void push(const ClusterPayload& payload);
+  void look_at_group(const ChildRef& reference, const CellTest& test, CellOutput& out);
+  template <class Flush>
+  void look_at_run(const ChildRef& leaf, const CellTest& test, CellOutput& out, const Flush& flush);
+
+  SceneReader scene_;
+  GatherOptions options_;
+  const DirectionGrid* grid_ = nullptr;  ///< of the current call
+  GatherCounts counts_;
+  std::vector<PlacedReceiver> receivers_;       ///< of the current call, along the Z-curve
+  std::span<Shading> results_;                  ///< of the current call
+  std::vector<std::unique_ptr<Level>> levels_;  ///< by depth, made when first needed
+  std::vector<ClusterPayload>
+      payloads_;                       ///< clusters that the current cells left, outer cells first
+  std::vector<ChildRef> stack_;        ///< nodes to visit
+  std::vector<std::uint32_t> opened_;  ///< indices into payloads_ of clusters to open
+  DirectionBuffer empty_, leaf_;
+  DiscQueue queue_;
 };
 
 }  // namespace ptc

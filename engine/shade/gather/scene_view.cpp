@@ -25,20 +25,23 @@ void SceneView::fail(const char* clause, const char* text) const {
       .rebased(0, container_->path().string());
 }
 
-GroupView SceneReader::group(std::uint32_t page, std::uint16_t slot) {
-  const PageReader::Page view = pages_.get(page);
-  const NodePage nodes(view.payload, view.record_count);
+PinnedGroup SceneReader::group(std::uint32_t page, std::uint16_t slot) {
+  PageGuard guard = pages_.pin(page);
+  const NodePage nodes(guard.payload(), guard.record_count());
   if (slot >= nodes.size()) {
     view_.fail("spec/nodes.md#references", "a node refers to a group that its page does not hold");
   }
-  return nodes[slot];
+  return {std::move(guard), nodes[slot]};
 }
 
 unsigned SceneReader::lost_children(std::uint32_t page, std::uint16_t slot) {
-  const GroupView view = group(page, slot);
   std::array<ChildRef, 8> children;
-  const int count = view.size();
-  for (int i = 0; i < count; ++i) children[static_cast<std::size_t>(i)] = view.child(i);
+  int count = 0;
+  {
+    const PinnedGroup found = group(page, slot);
+    count = found->size();
+    for (int i = 0; i < count; ++i) children[static_cast<std::size_t>(i)] = found->child(i);
+  }
   unsigned lost = 0;
   for (int i = 0; i < count; ++i)
     lost |= (is_lost(children[static_cast<std::size_t>(i)]) ? 1U : 0U) << i;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "engine/cache/page_cache.h"
 #include "engine/shade/lost_pages.h"
@@ -42,19 +43,32 @@ class SceneView {
   ChildRef root_;
 };
 
-/// One thread's way into the octree.
+/// A sibling group whose page is pinned.
+class PinnedGroup {
+ public:
+  PinnedGroup(PageGuard page, GroupView group) noexcept : page_(std::move(page)), group_(group) {}
+  [[nodiscard]] const GroupView& operator*() const noexcept { return group_; }
+  [[nodiscard]] const GroupView* operator->() const noexcept { return &group_; }
+
+ private:
+  PageGuard page_;
+  GroupView group_;
+};
+
+/// One thread's way into the octree. What it gives pins a page, so one result lives at a time.
 class SceneReader {
  public:
   SceneReader(const SceneView& view, PageCache& cache) : view_(view), pages_(cache) {}
 
   [[nodiscard]] const SceneView& view() const noexcept { return view_; }
-  /// A group; valid until the next call. @throws FormatError when the reference leads nowhere
-  [[nodiscard]] GroupView group(std::uint32_t page, std::uint16_t slot);
-  /// Children of a group that need a lost page: bit i for child i. Groups given before are gone.
+  /// Finds a group.
+  /// @throws FormatError when its page does not hold it
+  [[nodiscard]] PinnedGroup group(std::uint32_t page, std::uint16_t slot);
+  /// Finds the children of a group that need a lost page: bit i for child i.
   [[nodiscard]] unsigned lost_children(std::uint32_t page, std::uint16_t slot);
-  /// The page that holds a point; valid until the next call.
-  [[nodiscard]] PageReader::Page points(std::uint64_t point) {
-    return pages_.get(view_.point_page(point));
+  /// Pins the page that holds a point.
+  [[nodiscard]] PageGuard points(std::uint64_t point) {
+    return pages_.pin(view_.point_page(point));
   }
 
  private:

@@ -148,7 +148,8 @@ Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) 
 
 void PlainGather::visit_group(const ChildRef& reference, const Receiver& receiver) {
   ++counts_.groups;
-  const GroupView group = scene_.group(reference.page, reference.slot);
+  const PinnedGroup pinned = scene_.group(reference.page, reference.slot);
+  const GroupView& group = *pinned;
   for (int i = 0; i < group.size(); ++i) {
     const Cluster c = read_cluster(group, i, scene_.view().frame(), receiver.position);
     const glm::vec3 slab = c.flatness > 0 ? c.mean / c.flatness : glm::vec3(0);
@@ -168,8 +169,8 @@ void PlainGather::visit_group(const ChildRef& reference, const Receiver& receive
 void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
   const std::uint32_t per_page = scene_.view().points_per_page();
   for (std::uint64_t k = run.first_point; k < run.first_point + run.point_count; ++k) {
-    const PageReader::Page page = scene_.points(k);
-    const PointPage points(page.payload, page.record_count);
+    const PageGuard page = scene_.points(k);
+    const PointPage points(page.payload(), page.record_count());
     const Surfel surfel =
         to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
     const glm::vec3 to(surfel.position - receiver.position);
