@@ -1,0 +1,76 @@
+"""Makes the Debian packages, looks into them, and has lintian look at them where it is installed.
+
+Environment: PTC_BUILD, a build directory with everything in it; PTC_CMAKE, the program cmake.
+"""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BUILD = pathlib.Path(os.environ["PTC_BUILD"])
+CPACK = pathlib.Path(os.environ["PTC_CMAKE"]).with_name("cpack")
+PACKAGES = {"libptc", "libptc-dev", "ptcx-tools"}
+
+
+def run(*command):
+    done = subprocess.run([str(part) for part in command], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    if done.returncode != 0:
+        raise AssertionError(f"{command}: {done.returncode}\n{done.stdout}")
+    return done.stdout
+
+
+class Debian(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.directory = tempfile.TemporaryDirectory()
+        work = pathlib.Path(cls.directory.name)
+        run(CPACK, "-G", "DEB", "--config", BUILD / "CPackConfig.cmake", "-B", work,
+            "-D", "CPACK_PACKAGING_INSTALL_PREFIX=/usr")
+        cls.packages = {path.name.split("_")[0]: path for path in work.glob("*.deb")}
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.directory.cleanup()
+
+    def files(self, package):
+        lines = run("dpkg-deb", "--contents", self.packages[package]).splitlines()
+        return {line.split(" ./")[1].split(" -> ")[0] for line in lines if " ./" in line}
+
+    def test_there_are_three_packages_and_each_holds_its_part(self):
+        self.assertEqual(set(self.packages), PACKAGES)
+        libraries, headers, tools = (self.files(name) for name in ("libptc", "libptc-dev", "ptcx-tools"))
+        self.assertTrue(any(name.endswith("libptc.so.0") for name in libraries))
+        self.assertTrue(any(name.endswith("libptc-store.so.0") for name in libraries))
+        self.assertFalse(any("/include/" in name or "/bin/" in name for name in libraries))
+        self.assertIn("usr/include/ptc/ptc.h", headers)
+        for ending in ("libptc.a", "libptc-store.a", "ptcConfig.cmake", "pkgconfig/ptc.pc", "pkgconfig/ptc-store.pc"):
+            self.assertTrue(any(name.endswith(ending) for name in headers), ending)
+        for program in ("ptcbuild", "ptcshade", "ptcrender", "ptcconvert", "ptcinfo", "ptcverify"):
+            self.assertIn(f"usr/bin/{program}", tools)
+        self.assertIn("usr/share/mime/packages/ptcx.xml", tools)
+
+    def test_a_package_names_what_it_needs(self):
+        def depends(name):
+            return run("dpkg-deb", "--field", self.packages[name], "Depends")
+
+        self.assertIn("libembree", depends("libptc"))
+        self.assertIn("libptc (=", depends("libptc-dev"))
+        self.assertNotIn("cairo", depends("libptc"))
+
+    @unittest.skipUnless(shutil.which("lintian"), "lintian is not installed")
+    def test_lintian_has_no_errors(self):
+        done = subprocess.run(["lintian", "--allow-root", "--fail-on", "error", *self.packages.values()],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertEqual([line for line in done.stdout.splitlines() if line.startswith("E:")], [])
+
+
+if __name__ == "__main__":
+    if not shutil.which("dpkg-shlibdeps"):
+        print("skipped: dpkg-shlibdeps is not installed")
+        sys.exit(77)
+    unittest.main()
