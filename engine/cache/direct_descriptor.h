@@ -1,4 +1,4 @@
-// Reading a file past the system's page cache.
+// Direct reads of a file, which bypass the system's page cache.
 #pragma once
 
 #include <cstddef>
@@ -10,10 +10,10 @@
 
 namespace ptc {
 
-/// A descriptor of an open file for direct transfers (O_DIRECT).
+/// A second descriptor of an open file, for direct transfers (O_DIRECT). Closed with this object.
 class DirectDescriptor {
  public:
-  /// @throws std::system_error when the file system has no direct transfers
+  /// @throws std::system_error when the file system does not support direct transfers
   explicit DirectDescriptor(const InputFile& file);
   ~DirectDescriptor();
   DirectDescriptor(const DirectDescriptor&) = delete;
@@ -25,10 +25,12 @@ class DirectDescriptor {
   int fd_;
 };
 
-/// A range, when so many bytes of its blocks have been read. What a transfer left out, as at the
-/// end of the file or after an error, is read through the page cache, which tells what is wrong, if
-/// anything is.
-/// @param blocks  where they were read to
+/// Returns the bytes of a range after a direct transfer of its blocks. If the transfer fell short,
+/// at the end of the file or by an error, the range is read again through the page cache, which
+/// reports what is wrong if anything is.
+/// @param blocks  memory that the blocks were read into; the result points into it
+/// @param got     bytes that the transfer delivered; negative after an error
+/// @throws DataError when the file ends within the range, std::system_error
 [[nodiscard]] inline std::span<const std::byte> complete(const DirectRange& range,
                                                          std::byte* blocks, std::int64_t got,
                                                          const InputFile& file) {

@@ -1,3 +1,6 @@
+// The transitions of frames, and the one race between them: a reader holds a frame without the lock
+// while another evicts it. Each side announces itself first and then looks for the other, so that
+// at least one of them backs off (engine/cache/frame_table.h).
 #include "engine/cache/frame_table.h"
 
 #include <algorithm>
@@ -27,6 +30,7 @@ std::uint32_t FrameTable::hold(std::uint32_t reader, std::uint32_t page) noexcep
   Held& slot = held(reader, page);
   const std::uint32_t frame = frame_of_[page].load(std::memory_order_relaxed);
   if ((frame & kLoading) == 0) {  // kNoFrame has that bit too
+    // Announce the hold, then check that the frame was not evicted meanwhile.
     slot.store(frame, std::memory_order_seq_cst);
     if (frame_of_[page].load(std::memory_order_seq_cst) == frame) {
       order_->touch(frame);
@@ -62,6 +66,7 @@ bool FrameTable::is_held(std::uint32_t frame) noexcept {
 }
 
 bool FrameTable::evict(std::uint32_t frame) noexcept {
+  // Announce the eviction, then check that no reader holds the frame.
   std::atomic<std::uint32_t>& frame_of_page = frame_of_[frames_[frame].page];
   frame_of_page.store(kNoFrame, std::memory_order_seq_cst);
   if (is_held(frame)) {
@@ -74,10 +79,13 @@ bool FrameTable::evict(std::uint32_t frame) noexcept {
 }
 
 std::uint32_t FrameTable::free_frame() noexcept {
+  // Prefer an empty frame: one that was used before, whose memory is resident, to a new one.
   if (empty_ != kNoFrame || touched_ < frames_.size()) {
     peak_ = std::max(peak_, ++used_);
     return empty_ != kNoFrame ? std::exchange(empty_, frames_[empty_].next_empty) : touched_++;
   }
+  // Evict the first candidate that no reader holds. There is one, because readers hold fewer frames
+  // than there are.
   std::uint32_t frame = order_->candidate();
   while (!evict(frame)) frame = order_->candidate();
   return frame;

@@ -1,3 +1,4 @@
+// The back ends that read when they are asked; io_uring is in engine/cache/uring_source.cpp.
 #include "engine/cache/page_source.h"
 
 #include <fcntl.h>
@@ -17,6 +18,7 @@
 namespace ptc {
 namespace {
 
+/// Copies each range through the page cache into a buffer.
 class PreadSource : public PageSource {
  public:
   PreadSource(const InputFile& file, std::size_t max_bytes) : file_(file), buffer_(max_bytes) {}
@@ -32,6 +34,7 @@ class PreadSource : public PageSource {
   Arena buffer_;
 };
 
+/// Reads the whole blocks that a range lies in, past the page cache.
 class DirectSource : public PageSource {
  public:
   DirectSource(const InputFile& file, std::size_t max_bytes)
@@ -50,7 +53,8 @@ class DirectSource : public PageSource {
   Arena blocks_;
 };
 
-/// The file mapped whole. What was read stops counting as resident with the next read.
+/// Maps the whole file. Each read releases the pages of the read before, so that resident memory
+/// stays within the cap.
 class MmapSource : public PageSource {
  public:
   explicit MmapSource(const InputFile& file) : bytes_(file.size()) {
@@ -65,16 +69,18 @@ class MmapSource : public PageSource {
   MmapSource& operator=(const MmapSource&) = delete;
 
   std::span<const std::byte> read(std::uint64_t offset, std::size_t bytes) override {
-    constexpr std::uint64_t kAround = 65536;  // what the system may map around a fault
+    constexpr std::uint64_t kAround = 65536;  // bytes that the system may map around a fault
     advise(last_offset_, last_bytes_, kAround, MADV_DONTNEED);
     last_offset_ = offset;
     last_bytes_ = bytes;
-    // All at once, not fault by fault; older systems refuse it.
+    // Map the range at once instead of fault by fault. Older systems refuse this, which is
+    // harmless.
     advise(offset, bytes, kDirectBytes, MADV_POPULATE_READ);
     return {data_ + offset, bytes};
   }
 
  private:
+  /// Gives advice on a range, widened to multiples of `unit`.
   void advise(std::uint64_t offset, std::size_t bytes, std::uint64_t unit, int advice) noexcept {
     const std::uint64_t begin = offset / unit * unit;
     const std::uint64_t end =
@@ -91,11 +97,11 @@ class MmapSource : public PageSource {
 }  // namespace
 
 DirectDescriptor::DirectDescriptor(const InputFile& file) {
-  // By its descriptor, not its path, behind which there may be another file by now.
+  // Open it by its descriptor, because its path may name another file by now.
   fd_ = open_retrying("/proc/self/fd/" + std::to_string(file.descriptor()), O_RDONLY | O_DIRECT);
   if (fd_ < 0)
     throw std::system_error(errno, std::generic_category(),
-                            "open for direct transfers " + file.path().string());
+                            "open for direct reads (O_DIRECT) " + file.path().string());
 }
 
 DirectDescriptor::~DirectDescriptor() {

@@ -1,3 +1,4 @@
+// Second chance over an array of flags, and least recently used over a list.
 #include "engine/cache/replacement.h"
 
 #include <atomic>
@@ -8,6 +9,12 @@
 namespace ptc {
 namespace {
 
+/// The clock: a hand goes round the frames, clears the flag of those used since it last passed, and
+/// stops at the first whose flag is clear.
+///
+///   frame   0   1   2   3   4   5
+///   used    .   x   x   .   .   x
+///               ^ hand -----> candidate is 3; the flags of 1 and 2 are cleared
 class ClockOrder : public ReplacementOrder {
  public:
   explicit ClockOrder(std::uint32_t frames) : marks_(frames) {}
@@ -42,7 +49,8 @@ class ClockOrder : public ReplacementOrder {
   std::uint32_t hand_ = 0;
 };
 
-/// A list through the frames, so that nothing allocates.
+/// The frames as a doubly linked list from oldest to newest use. The links lie in an array by
+/// frame, so that nothing allocates.
 class LruOrder : public ReplacementOrder {
  public:
   explicit LruOrder(std::uint32_t frames) : links_(frames) {}
@@ -75,6 +83,7 @@ class LruOrder : public ReplacementOrder {
   };
   static_assert(sizeof(Link) == kReplacementBytes);
 
+  /// Moves a frame to the newest end.
   void renew(std::uint32_t frame) noexcept {
     unlink(frame);
     append_newest(frame);

@@ -1,3 +1,8 @@
+// Slots are used in turn, and each transfer carries the address of its slot, so that completions
+// may arrive in any order:
+//
+//   slots    | read | wanted, landed | wanted, flying | flying | ... |
+//              ^ next_: the next transfer waits for the one that flies here, if any
 #include "engine/cache/uring_source.h"
 
 #include <algorithm>
@@ -25,16 +30,18 @@ UringSource::UringSource(const InputFile& file, std::size_t max_bytes)
   check(io_uring_queue_init(kSlots, &ring_, 0), "io_uring_setup", file);
 }
 
-// What the system still writes to is waited for before it is given back.
+// The system may write to the slots until their transfers have ended.
 UringSource::~UringSource() {
   try {
     for (const Slot& slot : slots_) land(slot);
-  } catch (const std::system_error&) {  // then it is the system that holds on to the blocks
+  } catch (const std::system_error&) {  // the wait failed, and a destructor cannot report it
   }
   io_uring_queue_exit(&ring_);
 }
 
 std::span<const std::byte> UringSource::read(std::uint64_t offset, std::size_t bytes) {
+  // Take the slot in which the range is expected, or begin its transfer now. Hand over all
+  // transfers that were begun, in one system call.
   Slot* const expected = find(offset);
   Slot& slot = expected ? *expected : begin(offset, bytes);
   submit();
@@ -58,7 +65,7 @@ UringSource::Slot& UringSource::begin(std::uint64_t offset, std::size_t bytes) {
   next_ = (next_ + 1) % kSlots;
   land(slot);
   io_uring_sqe* const entry = io_uring_get_sqe(&ring_);
-  assert(entry != nullptr);  // as many as slots
+  assert(entry != nullptr);  // the queue has an entry for each slot
   slot = {.range = {offset, bytes}, .wanted = true, .flying = true};
   io_uring_prep_read(entry, direct_.get(), blocks_of(slot), static_cast<unsigned>(slot.range.whole),
                      slot.range.begin);
@@ -76,6 +83,7 @@ void UringSource::submit() {
 void UringSource::land(const Slot& slot) {
   while (slot.flying) {
     submit();
+    // Wait for any transfer, which may be that of another slot, and note how it ended.
     io_uring_cqe* done = nullptr;
     const int result = io_uring_wait_cqe(&ring_, &done);
     if (result == -EINTR) continue;

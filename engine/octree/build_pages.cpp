@@ -1,3 +1,6 @@
+// Takes the points block by block. A block is a whole number of pages, so that page boundaries, and
+// with them the sums of the superblock, do not depend on how the stream delivers its points. While
+// the writer encodes the pages of one block, the next is read and built.
 #include "engine/octree/build_pages.h"
 
 #include <algorithm>
@@ -13,15 +16,16 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kPointsAtOnce = std::size_t{1} << 16;
+constexpr std::size_t kPointsAtOnce = std::size_t{1} << 16;  // points of a block, in whole pages
 
-/// What the superblock says of points.
+/// Bounds and sums of points, as the superblock records them.
 struct Totals {
   std::array<double, 3> low{}, high{};
   double area = 0;
   std::array<double, 3> flux{};
 };
 
+/// Returns the totals of one page.
 Totals totals_of(const PointPage& points, const Frame& frame) {
   Totals totals;
   LatticePoint low = points.position(0), high = low;
@@ -43,8 +47,8 @@ Totals totals_of(const PointPage& points, const Frame& frame) {
   return totals;
 }
 
-/// Adds the sums of one page after another, so that they depend on the page size and on nothing
-/// else.
+/// Adds the totals of one page to the superblock. Pages are added in their order, so that the sums
+/// depend on the points and the page size alone.
 void include(Superblock& superblock, const Totals& page, std::uint64_t points) {
   const bool first = superblock.points == 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -58,7 +62,8 @@ void include(Superblock& superblock, const Totals& page, std::uint64_t points) {
   superblock.points += points;
 }
 
-/// Waits for pages on their way when a build ends, however it does: they use its executor.
+/// Waits for pages that are still being written when a build ends in any way, because they use its
+/// executor.
 class Settled {
  public:
   explicit Settled(ContainerWriter& writer) : writer_(writer) {}
@@ -67,8 +72,8 @@ class Settled {
   ~Settled() {
     try {
       writer_.flush();
-    } catch (...) {  // after flush() there are none; else what ended the build is on its way to the
-                     // caller
+    } catch (
+        ...) {  // a build that succeeds has flushed before; one that fails throws its own error
     }
   }
 
@@ -76,7 +81,7 @@ class Settled {
   ContainerWriter& writer_;
 };
 
-/// Fills `block` whole unless the stream ends.
+/// Reads points until `block` is full or the stream ends. Returns the number of points read.
 std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
   std::size_t filled = 0;
   while (filled < block.size()) {
@@ -87,7 +92,7 @@ std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
   return filled;
 }
 
-/// The points of one call of OctreeBuilder::add(), and what they add to the superblock.
+/// Encodes the points of a block as pages, and adds their totals to the superblock.
 void add_block(std::span<const PointRecord> block, const Frame& frame, const Executor& executor,
                Superblock& superblock, PageOrder& order) {
   const std::size_t per_page = superblock.points_per_page;
@@ -124,6 +129,7 @@ void load_totals(StateReader& state, Superblock& superblock) {
 Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
                        const Executor& executor, Progress& progress,
                        const Checkpoints& checkpoints) {
+  // Begin with nothing, or where the checkpoint was made.
   const Frame& frame = writer.header().frame;
   Superblock superblock;
   superblock.leaf_points = options.leaf_points;
@@ -138,6 +144,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
     order.load(*checkpoints.from, superblock.points);
     octree.load(*checkpoints.from, writer.state().pages);
   }
+  // Build pages and tree block by block.
   std::uint64_t saved = superblock.points;
   std::vector<PointRecord> block(std::max<std::size_t>(kPointsAtOnce / per_page, 1) * per_page);
   while (const std::size_t count = read_full(points, block)) {
@@ -145,6 +152,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
     octree.add(std::span(block).first(count));
     writer.write_pages(order.take(), executor);
     progress.advance(count);
+    // Make a checkpoint when one is due, but none after the last, partial block.
     if (!checkpoints.save || superblock.points - saved < checkpoints.interval ||
         count < block.size())
       continue;
@@ -155,6 +163,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
     octree.save(state);
     checkpoints.save({superblock.points, block.back().key}, state.take());
   }
+  // Close the tree, write the pages that are left, and fill in the counts.
   const OctreeBuilder::Result tree = octree.finish();
   order.finish();
   writer.write_pages(order.take(), executor);

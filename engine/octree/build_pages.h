@@ -1,4 +1,7 @@
-// Sorted surfels to a container: point pages, octree, node pages.
+// Builds a container from sorted surfels in one pass: point pages, octree, node pages.
+//
+//   PointStream -+-> point pages ------------------+-> PageOrder -> ContainerWriter
+//                +-> OctreeBuilder -> groups ------+
 #pragma once
 
 #include <cstdint>
@@ -12,39 +15,42 @@
 
 namespace ptc {
 
+/// The shape of the octree and the order of its pages.
 struct BuildOptions {
   std::uint32_t leaf_points = 16;  ///< a cell with no more points is not split, 1 to kMaxLeafPoints
   /// Levels of groups that share a stream of node pages: 1 keeps each level to itself, 63 puts all
-  /// in the order in which they are finished, which is depth-first (spec/nodes.md#page-order).
+  /// groups in the order in which they are finished, depth-first (spec/nodes.md#page-order).
   int levels_per_stream = 1;
 };
 
-/// Where a build is: between two points.
+/// How far a build got, between two points.
 struct BuildPlace {
-  std::uint64_t points = 0;  ///< taken from the stream
-  MortonKey last_key;        ///< of the last of them
+  std::uint64_t points = 0;  ///< points taken from the stream
+  MortonKey last_key;        ///< key of the last point taken
 };
 
-/// For a build that can be interrupted.
+/// Checkpoints of a build that can be interrupted and resumed.
 struct Checkpoints {
-  /// Points between two checkpoints at the least, and at most those that build_pages() takes at
-  /// once more.
+  /// Fewest points between two checkpoints. There may be more, by up to one block of points that
+  /// build_pages() takes at once.
   std::uint64_t interval = std::uint64_t{1} << 22;
-  /// Takes what another build needs to go on from there, beside ContainerWriter::state(); null:
-  /// there are no checkpoints.
+  /// Receives, at each checkpoint, the state that another build needs to resume there, in addition
+  /// to ContainerWriter::state(). Null: no checkpoints are made.
   std::function<void(const BuildPlace& at, std::vector<std::byte> state)> save;
-  /// Such a state to begin with; the stream and the writer have gone on from there, too. Null: from
-  /// the first point on.
+  /// The state of a checkpoint to resume from; stream and writer must stand at the same place.
+  /// Null: the build begins with the first point.
   StateReader* from = nullptr;
 };
 
-/// Writes the pages of all points and nodes in one pass.
+/// Writes the pages of all points and nodes in one pass. The result is the same for any number of
+/// threads.
 /// @param points  ascending keys in the lattice of the writer's frame
-/// @throws DataError, FormatError for a state that is none
-/// @return  the superblock for ContainerWriter::finish(), its counts, bounds and totals filled
-/// Memory: one open page per stream; of 65,536 points, or a page of them if that is more, the
-/// records twice, and their pages and nodes three times, some 20 MB in all.   Deterministic for any
-/// number of threads.
+/// @return  the superblock for ContainerWriter::finish(), with counts, bounds and totals filled in
+/// @throws DataError, FormatError when the state to resume from is invalid; and what stream and
+///         writer throw
+/// Memory: one open page for each stream. In addition, for a block of 65,536 points (or one page of
+/// points if that is more), the records twice and their pages and nodes three times: some 20 MB in
+/// all.
 [[nodiscard]] Superblock build_pages(PointStream& points, ContainerWriter& writer,
                                      const BuildOptions& options, const Executor& executor,
                                      Progress& progress, const Checkpoints& checkpoints = {});

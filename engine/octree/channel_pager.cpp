@@ -1,4 +1,5 @@
-// Runs of columns (engine/octree/channel_pager.h).
+// Copies runs of each column: column c of a page with n points begins c.before * n bytes from the
+// start of the payload, where c.before is the width of the columns before it.
 #include "engine/octree/channel_pager.h"
 
 #include <algorithm>

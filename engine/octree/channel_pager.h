@@ -1,4 +1,4 @@
-// Columns of attribute pages, moved to pages of another length.
+// Repacks the columns of attribute pages into pages with another number of points.
 #pragma once
 
 #include <cstddef>
@@ -11,18 +11,22 @@
 
 namespace ptc {
 
-/// Moves the columns of one channel group from pages of one size to pages of another.   Memory: a
-/// page.
+/// Moves the columns of one channel group from pages of one size to pages of another:
+///
+///   source pages   | a0 a1 a2 b0 b1 b2 | a3 a4 a5 b3 b4 b5 |      a, b: columns, digit: point
+///   result pages   | a0 a1 b0 b1 | a2 a3 b2 b3 | ...
+///
+/// Memory: one page.
 class ChannelPager {
  public:
-  /// Fills the payload of the next page that there is. @return how many points it has
+  /// Writes the payload of the next source page. @return the number of its points, at least 1
   using Source = std::function<std::uint32_t(std::span<std::byte> payload)>;
 
-  /// @param columns        of the group's pages; what they span must outlive this
-  /// @param payload_limit  of the pages that come
+  /// @param columns        columns of the group's pages; must outlive this
+  /// @param payload_limit  size of the largest source payload, bytes
   ChannelPager(std::span<const PackedColumn> columns, std::size_t payload_limit, Source source);
 
-  /// Payload of a page with the next `count` points.
+  /// Returns the payload of a page with the next `count` points.
   [[nodiscard]] std::vector<std::byte> next(std::size_t count);
 
  private:
@@ -30,8 +34,8 @@ class ChannelPager {
   std::size_t point_bytes_ = 0;
   std::vector<std::byte> payload_;
   Source source_;
-  std::size_t held_ = 0;  ///< points of the page in payload_
-  std::size_t at_ = 0;
+  std::size_t held_ = 0;  ///< points of the source page in payload_
+  std::size_t at_ = 0;    ///< the next point of that page
 };
 
 }  // namespace ptc

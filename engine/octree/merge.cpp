@@ -1,3 +1,4 @@
+// Growth of a frame, and a merge of two streams block by block.
 #include "engine/octree/merge.h"
 
 #include <algorithm>
@@ -9,19 +10,21 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kBlock = 1 << 14;
+constexpr std::size_t kBlock = 1 << 14;  // points read from each stream at once
 
-/// The origin as a number of lattice units: whole, and exact.
+/// Returns the origin in lattice units, which is a whole number that a double holds exactly.
 double origin_units(const Frame& frame, std::size_t axis) {
   return frame.origin[axis] / frame.unit();
 }
 
+/// Returns whether points from `low` to `high` along an axis round to lattice points of a frame.
 bool holds(const Frame& frame, std::size_t axis, double low, double high) {
   const double half = 0.5 * frame.unit();
   return low >= frame.origin[axis] - half &&
          high <= frame.origin[axis] + (frame.edge - frame.unit()) + half;
 }
 
+/// Moves the keys of a stream.
 class MovedStream : public PointStream {
  public:
   MovedStream(PointStream& sorted, const LatticeMove& move) : sorted_(sorted), move_(move) {}
@@ -36,6 +39,7 @@ class MovedStream : public PointStream {
   LatticeMove move_;
 };
 
+/// Merges two sorted streams.
 class MergedStream : public PointStream {
  public:
   MergedStream(PointStream& first, PointStream& second) : first_{first}, second_{second} {}
@@ -52,13 +56,15 @@ class MergedStream : public PointStream {
   }
 
  private:
+  /// One of the two streams, with a block that was read from it.
   struct Side {
     PointStream& stream;
     std::vector<PointRecord> block = std::vector<PointRecord>(kBlock);
     std::size_t at = 0, end = 0;
     bool ended = false;
 
-    /// False at the end of the stream.
+    /// Reads the next block when the current one is used up. Returns false at the end of the
+    /// stream.
     bool fill() {
       if (at < end) return true;
       if (ended) return false;
@@ -78,7 +84,7 @@ class MergedStream : public PointStream {
 
 Frame grow_frame(const Frame& old, const std::array<double, 3>& low,
                  const std::array<double, 3>& high) {
-  static_cast<void>(frame_around(low, high));  // bounds that are none
+  static_cast<void>(frame_around(low, high));  // refuses bounds that no frame can hold
   Frame grown = old;
   std::array<double, 3> offset{};
   for (int doublings = 1;; ++doublings) {
@@ -87,17 +93,19 @@ Frame grow_frame(const Frame& old, const std::array<double, 3>& low,
       fits[axis] = holds(grown, axis, low[axis], high[axis]);
     if (std::ranges::all_of(fits, [](bool fit) { return fit; })) return grown;
     if (doublings > kMaxDoublings) {
-      throw RequestError("append",
-                         "the new points lie so far from the scene that its cube would grow more "
-                         "than 65536 times: build all anew, without `append`");
+      throw RequestError(
+          "append",
+          "the new points lie so far from the scene that its cube would have to grow "
+          "more than 65536 times: build the whole scene again, without `append`");
     }
+    // Double the cube towards the side on which the box lies outside.
     const Frame before = grown;
     grown.edge = 2 * before.edge;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const bool below = low[axis] < before.origin[axis] - 0.5 * before.unit();
       offset[axis] = offset[axis] / 2 + (below ? std::ldexp(1.0, kLatticeBits - 1) : 0);
-      // A unit of the grown lattice may not divide the old origin: up to the next, as halved
-      // coordinates go down.
+      // The old origin may lie between two units of the grown lattice. Round it up, because halving
+      // rounds the coordinates down.
       grown.origin[axis] =
           (std::ceil(std::ldexp(origin_units(old, axis), -doublings)) - offset[axis]) *
           grown.unit();

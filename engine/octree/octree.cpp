@@ -1,3 +1,14 @@
+// Cuts the arriving points into pieces, builds the pieces in parallel, and joins them in order.
+//
+// Two neighbouring points p, q determine the level of the smallest cell that holds both: the number
+// of leading octal digits that their keys share. That level says which cells end between them:
+//
+//   p   0.3 5 1 7 ...
+//   q   0.3 5 6 0 ...     shared = 2: cells below level 2 end after p, the cell of level 2 goes on
+//
+// So closing every open cell deeper than `shared`, and opening one at that level if there is none,
+// keeps path_ the chain of cells around the current point. Below the lattice, digits of the rank
+// among coincident points take the place of digits of the key.
 #include "engine/octree/octree.h"
 
 #include <algorithm>
@@ -11,6 +22,7 @@
 namespace ptc {
 namespace {
 
+/// Saves a node field by field.
 void save_child(const NodeChild& child, StateWriter& state) {
   state.put(static_cast<std::uint8_t>(child.ref.interior));
   state.put(child.ref.page);
@@ -26,6 +38,9 @@ void save_child(const NodeChild& child, StateWriter& state) {
   state.put(node.cone_cos);
 }
 
+/// Loads a node that save_child() saved.
+/// @param pages, points  numbers of pages and points so far, which its references must be below
+/// @throws DataError when it refers to what does not exist, or a number is not finite
 NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t points) {
   NodeChild child;
   child.ref.interior = state.get<std::uint8_t>() != 0;
@@ -35,10 +50,10 @@ NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t poin
   child.ref.point_count = state.get<std::uint32_t>();
   state.require(child.ref.interior ? child.ref.page < pages
                                    : child.ref.point_count <= points - child.ref.first_point,
-                "a closed cell of the tree's state lies nowhere");
+                "the tree's state refers to a group or to points that do not exist");
   const auto load_number = [&](auto& value) {
     value = state.get<std::remove_reference_t<decltype(value)>>();
-    state.require(std::isfinite(value), "a sum of the tree's state is not finite");
+    state.require(std::isfinite(value), "a sum in the tree's state is not finite");
   };
   NodeSummary& node = child.node;
   std::ranges::for_each(node.mean, load_number);
@@ -68,30 +83,33 @@ void OctreeBuilder::add(std::span<const PointRecord> points) {
   build(false);
 }
 
-/// Level of the smallest cell that holds the window's point `at`, whose rank is rank_, and a later
-/// one.
+/// Returns the level of the smallest cell that holds the window's point `at`, whose rank is rank_,
+/// and a later point `other`.
 int OctreeBuilder::common(std::size_t at, std::size_t other) const {
   const int level = common_level(window_[at].key, window_[other].key);
   return level < kLatticeBits ? level : level + common_rank_level(rank_, rank_ + (other - at));
 }
 
-/// The same of the point `at` and the one before.
+/// Returns the level of the smallest cell that holds the window's point `at` and the point before.
 int OctreeBuilder::level_before(std::size_t at) const {
   const int level = common_level(last_key_, window_[at].key);
   return level < kLatticeBits ? level : level + common_rank_level(rank_ - 1, rank_);
 }
 
+/// Returns a piece to fill, with the memory of one that was used before.
 OctreeBuilder::Piece& OctreeBuilder::new_piece() {
   if (piece_count_ == pieces_.size()) pieces_.emplace_back();
   return pieces_[piece_count_++];
 }
 
-/// Cuts the window's front into pieces: from each point on the largest cell that has no more than
-/// piece_points_ points and does not hold the point before. As a cell around it has more points
-/// than a leaf, it is a node.
+/// Cuts the front of the window into pieces. A piece is the largest cell that begins with the next
+/// point, has at most piece_points_ points, and does not hold the point before. It is a node of the
+/// tree, because the cell around it has more points than a leaf.
+/// @param last  no more points will come, so that the rest of the window is complete
 void OctreeBuilder::cut(bool last) {
   piece_count_ = 0;
   for (std::size_t at = 0; at < window_.size();) {
+    // Find the rank of the next point, and the level of the largest cell that begins with it.
     const std::size_t reach = window_.size() - at;
     if (reach <= piece_points_ && !last) break;
     const bool begins = window_first_ + at == 0;
@@ -99,11 +117,13 @@ void OctreeBuilder::cut(bool last) {
     const int before = begins ? -1 : level_before(at);
     const int level =
         1 + (reach > piece_points_ ? std::max(before, common(at, at + piece_points_)) : before);
+    // Find the last point of that cell by bisection.
     std::size_t inside = at;
     for (std::size_t outside = at + std::min(reach, piece_points_); outside - inside > 1;) {
       const std::size_t middle = inside + (outside - inside) / 2;
       (common(at, middle) >= level ? inside : outside) = middle;
     }
+    // Make it a piece.
     Piece& piece = new_piece();
     piece.first = window_first_ + at;
     piece.count = inside + 1 - at;
@@ -111,12 +131,13 @@ void OctreeBuilder::cut(bool last) {
     piece.shared = before;
     piece.before = last_key_;
     last_key_ = window_[inside].key;
-    last_rank_ = rank_ + piece.count -
-                 1;  // of use only where this key goes on, and then the piece has no other
+    // The rank matters only if more points with this key follow; then the piece has no other key.
+    last_rank_ = rank_ + piece.count - 1;
     at = inside + 1;
   }
 }
 
+/// Builds all pieces of the window, joins them, and removes their points.
 void OctreeBuilder::build(bool last) {
   cut(last);
   executor_.for_each(piece_count_, [this](std::size_t i, unsigned thread) {
@@ -135,8 +156,10 @@ void OctreeBuilder::build(bool last) {
   window_first_ += done;
 }
 
-/// Hands a piece's groups on, when the cells that end before it are closed.
+/// Joins a piece to the tree: closes the cells that end before it, then emits its groups.
 void OctreeBuilder::join(Piece& piece) {
+  // Close the cells that end before the piece, and put the node closed last into the cell that goes
+  // on.
   if (piece.first > 0) {
     while (!path_.empty() && path_.back().level > piece.shared) {
       path_.back().children.push_back(current_);
@@ -148,6 +171,7 @@ void OctreeBuilder::join(Piece& piece) {
     }
     path_.back().children.push_back(current_);
   }
+  // Emit the groups of the piece, with references in place of their numbers.
   places_.clear();
   const auto placed = [this](const ChildRef& ref) {
     return ref.interior ? places_[ref.page] : ref;
@@ -165,6 +189,7 @@ void OctreeBuilder::join(Piece& piece) {
   result_.points = piece.first + piece.count;
 }
 
+/// Counts a group and hands it to the sink.
 ChildRef OctreeBuilder::emit(std::span<std::byte> group, std::uint64_t end) {
   const GroupView view(group.data());
   result_.nodes += static_cast<unsigned>(view.size());
@@ -173,7 +198,7 @@ ChildRef OctreeBuilder::emit(std::span<std::byte> group, std::uint64_t end) {
   return sink_.add(view, end);
 }
 
-/// Closes the innermost open cell.
+/// Closes the innermost open cell, and returns the node that stands for it.
 NodeChild OctreeBuilder::close(std::uint64_t end) {
   const NodeGroup group = std::move(path_.back());
   path_.pop_back();
@@ -201,6 +226,7 @@ void OctreeBuilder::save(StateWriter& state) const {
 }
 
 void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
+  // Load the points that wait, and the counts.
   window_ = load_points(state);
   for (std::uint64_t* number : {&window_first_, &last_key_.high, &last_key_.low, &last_rank_,
                                 &result_.points, &result_.nodes, &result_.groups}) {
@@ -209,15 +235,15 @@ void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
   result_.levels = static_cast<int>(state.get_count(kMaxLevel + 1));
   state.require(
       result_.points == window_first_ && (window_.empty() || last_key_ <= window_.front().key),
-      "the points of the tree's state do not follow each other");
+      "the points in the tree's state are not in order");
+  // Load the open cells from the root down.
   current_ = load_child(state, pages, window_first_);
   path_.resize(static_cast<std::size_t>(state.get_count(kMaxLevel + 1)));
   int above = -1;
   for (NodeGroup& cell : path_) {
     cell.cell = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
     cell.level = static_cast<int>(state.get_count(kMaxLevel));
-    state.require(cell.level > above,
-                  "the open cells of the tree's state do not lie in each other");
+    state.require(cell.level > above, "the open cells in the tree's state are not nested");
     above = cell.level;
     cell.children.resize(static_cast<std::size_t>(state.get_count(kMaxChildren - 1)));
     for (NodeChild& child : cell.children) child = load_child(state, pages, window_first_);

@@ -1,3 +1,5 @@
+// Emits pages and saves the open ones. A state holds open pages as payloads; loading them applies
+// the checks that a reader applies to pages of a file, so that a damaged state cannot build a tree.
 #include "engine/octree/page_order.h"
 
 #include <algorithm>
@@ -8,7 +10,7 @@
 namespace ptc {
 namespace {
 
-/// Payloads are read as numbers.
+/// Copies bytes into a vector, whose memory is aligned so that payloads can be read as numbers.
 std::vector<std::byte> aligned(std::span<const std::byte> bytes) {
   return {bytes.begin(), bytes.end()};
 }
@@ -37,7 +39,9 @@ void PageOrder::Range::include(const GroupView& group) {
 }
 
 ChildRef PageOrder::add(const GroupView& group, std::uint64_t end) {
+  // Emit the point pages that begin at or before the group's end.
   while (!points_.empty() && next_point_ <= end) take_points();
+  // Put the group on the page of its stream, or on a new one if it does not fit.
   std::optional<Stream>& stream =
       streams_[static_cast<std::size_t>(group.level() / levels_per_stream_)];
   if (stream && !stream->encoder.fits(static_cast<std::size_t>(group.size()))) flush(stream);
@@ -72,6 +76,7 @@ void PageOrder::flush(std::optional<Stream>& stream) {
 }
 
 void PageOrder::save(StateWriter& state) const {
+  // Save the point pages that wait, then the open page of every stream.
   state.put(next_point_);
   state.put(std::uint64_t{points_.size()});
   for (const Page& page : points_) {
@@ -92,7 +97,7 @@ void PageOrder::load(StateReader& state, std::uint64_t points) {
   for (auto pages = state.get<std::uint64_t>(); pages > 0; --pages) {
     const std::vector<PointRecord> records = load_points(state);
     state.require(!records.empty() && records.size() <= points_per_page_,
-                  "a page with no or too many points");
+                  "a page of the state has no points or too many");
     points_.push_back(point_page(records));
   }
   for (std::optional<Stream>& stream : streams_) load_stream(state, stream, points);
@@ -102,15 +107,17 @@ void PageOrder::load_stream(StateReader& state, std::optional<Stream>& stream,
                             std::uint64_t points) {
   const auto groups = state.get<std::uint32_t>();
   if (groups == 0) return;
+  // Open the page under the number that it had.
   const std::uint32_t pages = writer_.state().pages;
   const auto number = state.get<std::uint32_t>();
-  state.require(number < pages, "an open page that has no number");
+  state.require(number < pages, "an open page of the state has a number that was not given out");
   stream.emplace(Stream{number, NodePageEncoder(payload_limit_)});
+  // Check its groups, and add them again.
   const std::vector<std::byte> payload = aligned(state.get_bytes());
   const NodePage page(payload, groups, pages, points);
   for (std::uint32_t slot = 0; slot < groups; ++slot) {
     state.require(stream->encoder.fits(static_cast<std::size_t>(page[slot].size())),
-                  "an open page that is too long");
+                  "an open page of the state is too long");
     stream->keys.include(page[slot]);
     stream->encoder.add(page[slot]);
   }

@@ -1,4 +1,10 @@
-// Loops over points (point_columns.h).
+// The loops over points, compiled once for each instruction set.
+//
+// Sums run point by point in scalar code, because their result depends on the order of addition.
+// Bounds are maxima and minima, which do not, so they run in vectors of up to kMaxLanes points;
+// lanes behind the last point are masked:
+//
+//   column   | x0 x1 x2 x3 | x4 x5 x6 x7 | x8 -- -- -- |     9 points, 4 lanes, 3 lanes masked
 #include "engine/octree/point_columns.h"
 
 #include <algorithm>
@@ -24,13 +30,14 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, PointColumns::kMaxLanes>;
 using V = hn::VFromD<D>;
 
-/// A whole number below 2^52: its bits as the fraction of 2^52 + v.
+/// Converts a whole number v below 2^52, by way of the double whose fraction bits are v: 2^52 + v.
 inline double to_double(std::uint64_t v) {
   return std::bit_cast<double>(v | 0x4330000000000000) - 0x1p52;
 }
 
-/// Columns of `count` points from `first` on; what of each is read together lies together for a
-/// while.
+/// Decodes points into columns, in blocks. The fields of a block are first gathered in small
+/// arrays, so that values that are decoded together lie together.
+/// @param stride  values from one column to the next
 void decode_points(const PointRecord* points, std::size_t count, double unit, double* columns,
                    std::size_t stride) {
   constexpr std::size_t kBlock = kPositionBlock;
@@ -40,6 +47,7 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
   std::array<std::int16_t, kBlock> u, v;
   std::array<std::array<std::uint16_t, kBlock>, 3> radiance;
   for (std::size_t first = 0; first < count; first += kBlock) {
+    // Gather the fields of one block.
     const std::size_t n = std::min(kBlock, count - first);
     for (std::size_t i = 0; i < n; ++i) {
       const PointRecord& point = points[first + i];
@@ -48,6 +56,7 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
       v[i] = point.normal[1];
       for (std::size_t c = 0; c < 3; ++c) radiance[c][i] = point.radiance[c];
     }
+    // Decode positions, radii and areas.
     const auto out = [&](PointColumns::Column k) { return columns + k * stride + first; };
     decode_positions({points + first, n}, positions);
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -62,6 +71,7 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
       lattice_radius[i] = scaled < kMax ? scaled : kMax;
       area[i] = 2.0 * r * r;
     }
+    // Decode normals and radiance.
     double* const x = out(PointColumns::kNormalX);
     double* const y = out(PointColumns::kNormalY);
     double* const z = out(PointColumns::kNormalZ);
@@ -78,7 +88,8 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
   }
 }
 
-/// What columns have of some points; beyond `end` anything.
+/// The values of a few consecutive points, one point in each lane; lanes from `end` on hold
+/// anything.
 class Lanes {
  public:
   Lanes(const PointColumns& points, std::size_t first, std::size_t end)
@@ -86,7 +97,7 @@ class Lanes {
   [[nodiscard]] HWY_INLINE V operator[](PointColumns::Column k) const {
     return hn::LoadU(D(), points_.column(k) + first_);
   }
-  /// `value` where there is a point.
+  /// Returns `value` in the lanes that hold a point, and `otherwise` in the rest.
   [[nodiscard]] HWY_INLINE V only(V value, V otherwise) const {
     return hn::IfThenElse(mask_, value, otherwise);
   }
@@ -101,8 +112,10 @@ HWY_INLINE V dot(const V (&a)[3], const V (&b)[3]) {
   return hn::Add(hn::Add(hn::Mul(a[0], b[0]), hn::Mul(a[1], b[1])), hn::Mul(a[2], b[2]));
 }
 
-/// Sphere, cone and slab about the mean and along the axis of the sums.
+/// Sets sphere, cone and slab of a node from its points. Mean and sums must be set: they give the
+/// centre and the axis.
 void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeSummary& node) {
+  // Broadcast centre and axes.
   const D d;
   const std::array<double, 3> slab_axis = slab_normal(node);
   const bool has_axis = set_cone_axis(node, slab_axis);
@@ -114,6 +127,8 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
   splat(slab_axis, slab);
   splat(node.cone_axis, axis);
   const V axis_squared = dot(axis, axis), zero = hn::Zero(d), one = hn::Set(d, 1.0);
+  // Find the greatest reach of a disc from the centre and from the middle plane, and the smallest
+  // cosine of a normal to the axis.
   V radius = zero, thickness = zero, cosine = one;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
     const Lanes point(points, i, end);
@@ -134,24 +149,27 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
     const V reach = hn::Div(hn::Mul(wide, hn::Sqrt(dot(cross, cross))), hn::Sqrt(squared));
     thickness = hn::Max(thickness, point.only(hn::Add(hn::Abs(dot(slab, away)), reach), zero));
   }
+  // Reduce the lanes.
   node.radius = hn::GetLane(hn::MaxOfLanes(d, radius));
   set_bounds(node, has_axis, hn::GetLane(hn::MinOfLanes(d, cosine)),
              hn::GetLane(hn::MaxOfLanes(d, thickness)));
 }
 
+/// Implements summarise_points() for one instruction set.
 NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t end) {
   NodeSummary node;
   const auto value = [&](PointColumns::Column k, std::size_t i) { return points.column(k)[i]; };
-  // Sums of offsets keep the lattice unit, sums of coordinates up to 2^42 lose it.
+  // Sum offsets from the first point: sums of coordinates up to 2^42 would lose the lattice unit.
   const std::array<double, 3> origin{value(PointColumns::kX, begin), value(PointColumns::kY, begin),
                                      value(PointColumns::kZ, begin)};
   double weight = 0;
   bool has_area = false;
   for (std::size_t i = begin; i < end; ++i) has_area |= value(PointColumns::kDiscArea, i) > 0;
-  std::array<std::array<double, 4>, 6> towards{};  // an axis: facing, flux
+  // Sum positions, area, and facing area and flux along the six axis directions.
+  std::array<std::array<double, 4>, 6> towards{};  // by direction: facing area, flux
   for (std::size_t i = begin; i < end; ++i) {
     const double area = value(PointColumns::kDiscArea, i);
-    const double w = has_area ? area : 1.0;  // points without extent still have a middle
+    const double w = has_area ? area : 1.0;  // points without area still have a mean position
     node.mean[0] += w * (value(PointColumns::kX, i) - origin[0]);
     node.mean[1] += w * (value(PointColumns::kY, i) - origin[1]);
     node.mean[2] += w * (value(PointColumns::kZ, i) - origin[2]);
@@ -169,6 +187,7 @@ NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t
       for (std::size_t c = 0; c < 4; ++c) towards[k][c] += facing * light[c];
     }
   }
+  // Fill in the node, and bound its points.
   for (std::size_t k = 0; k < 6; ++k) {
     node.facing[k] = towards[k][0];
     node.flux[k] = {towards[k][1], towards[k][2], towards[k][3]};

@@ -1,4 +1,4 @@
-// Surfels in columns of numbers, as sums over them want them.
+// Surfels decoded into columns of doubles, so that sums over them run at full speed.
 #pragma once
 
 #include <cstddef>
@@ -10,31 +10,32 @@
 
 namespace ptc {
 
-/// The numbers of surfels, decoded once; in lattice units where nothing else is said.   Memory: 88
-/// bytes a point.
+/// The values of surfels, decoded once, with one column for each value.
+/// Memory: 88 bytes for each point.
 class PointColumns {
  public:
+  /// The columns, in the order in which they lie in memory.
   enum Column : std::size_t {
-    kX,
+    kX,  ///< position, lattice units
     kY,
     kZ,
-    kDiscRadius,
-    kNormalX,
+    kDiscRadius,  ///< radius of the disc, lattice units
+    kNormalX,     ///< normal, unit length to float precision
     kNormalY,
     kNormalZ,
-    kDiscArea,
-    kRed,
+    kDiscArea,  ///< 2 radius^2, scene units squared
+    kRed,       ///< radiance
     kGreen,
     kBlue,
     kColumns
   };
 
-  /// Decodes points in place of what was here.
+  /// Decodes points, in place of those decoded before.
   /// @param unit  lattice unit in scene units
   void assign(std::span<const PointRecord> points, double unit);
 
-  /// Values of a column. The area is 2 radius^2 in scene units squared. At least kMaxLanes values
-  /// can be read from each.
+  /// Returns the values of a column, one for each point. At least kMaxLanes values can be read from
+  /// any of them on; those behind the last point are unspecified.
   [[nodiscard]] const double* column(Column k) const noexcept {
     return values_.data() + k * stride_;
   }
@@ -43,12 +44,14 @@ class PointColumns {
   static constexpr std::size_t kMaxLanes = 8;
 
  private:
-  std::size_t stride_ = 0;
-  std::vector<double> values_;
+  std::size_t stride_ = 0;      ///< values from one column to the next: the points and kMaxLanes
+  std::vector<double> values_;  ///< column after column
 };
 
-/// Summary of the points from `begin` to `end`, at least one: exact bounding sphere and cone. Sums
-/// run in the order of the points, so that they are the same on every machine.
+/// Returns the summary of the points from `begin` up to `end`, with an exact bounding sphere about
+/// their mean position and an exact cone about their mean normal. Sums follow the order of the
+/// points, so that they are the same on every machine.
+/// @pre begin < end
 [[nodiscard]] NodeSummary summarise_points(const PointColumns& points, std::size_t begin,
                                            std::size_t end);
 

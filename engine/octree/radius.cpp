@@ -1,3 +1,10 @@
+// A window slides along the Z-curve, one chunk at a time:
+//
+//   curve     ....|  halo  |        chunk        |  halo  |....
+//   window_       ^0        ^at_ at first         ^chunk_end_
+//
+// Radii are estimated for the chunk, from neighbours anywhere in the window. The halo behind is the
+// end of the chunk before, whose points are handed out already but still count as neighbours.
 #include "engine/octree/radius.h"
 
 #include <algorithm>
@@ -17,9 +24,9 @@ namespace {
 constexpr std::size_t kChunk = std::size_t{1} << 16;
 constexpr std::size_t kHalo = std::size_t{1} << 13;
 constexpr std::size_t kNeighbours = 6;
-constexpr double kLargest = 3;  // times the chunk's median
+constexpr double kLargest = 3;  // the greatest radius, in medians of the chunk
 
-/// Positions for the k-d tree, in lattice units.
+/// Positions for the k-d tree, in lattice units, with the interface that nanoflann asks for.
 struct Cloud {
   std::vector<std::array<double, 3>> points;
   [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
@@ -34,8 +41,9 @@ struct Cloud {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud,
                                                  3, std::size_t>;
 
-/// The different positions of a window. Points of one place follow each other on the curve; a tree
-/// that held each of them would not be one, for it cannot split them.
+/// The distinct positions of a window, called places, in a k-d tree. Points in one place follow
+/// each other on the curve. The tree holds each place once, because it could not split coincident
+/// points.
 class Places {
  public:
   explicit Places(std::span<const PointRecord> window) {
@@ -55,9 +63,10 @@ class Places {
 
   [[nodiscard]] std::size_t count() const noexcept { return points_at_.size(); }
 
-  /// Squared distance to the nth of the nearest points, or places, beginning with the place's own.
-  /// @param n     1 to kNeighbours + 1, at most so many as there are
-  /// @param each  whether the points of a place count each or as one
+  /// Returns the squared distance from a place to its nth nearest point or place, lattice units
+  /// squared. The place itself is the first.
+  /// @param n     1 to kNeighbours + 1, at most the number of points or places
+  /// @param each  count every point of a place; otherwise each place counts as one
   [[nodiscard]] double distance_to(std::size_t place, std::size_t n, bool each) const {
     std::array<std::size_t, kNeighbours + 1> index{};
     std::array<double, kNeighbours + 1> squared{};
@@ -73,7 +82,7 @@ class Places {
 
  private:
   Cloud cloud_;
-  std::vector<std::size_t> points_at_;  ///< of each place
+  std::vector<std::size_t> points_at_;  ///< by place: the number of its points
   std::optional<Tree> tree_;
 };
 
@@ -83,6 +92,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// The stream that estimate_radii() returns.
 class RadiusStream : public PointStream {
  public:
   RadiusStream(PointStream& sorted, double unit, std::uint64_t first, RadiusCounts& counts)
@@ -101,7 +111,7 @@ class RadiusStream : public PointStream {
   }
 
  private:
-  /// Window = halo behind, chunk, halo ahead; the chunk behind has its radii already.
+  /// Slides the window on to the next chunk, and estimates its radii.
   void advance() {
     const std::size_t keep_from = chunk_end_ - std::min(chunk_end_, kHalo);
     window_.erase(window_.begin(), window_.begin() + static_cast<std::ptrdiff_t>(keep_from));
@@ -112,7 +122,7 @@ class RadiusStream : public PointStream {
     estimate(chunk_begin, chunk_end_);
   }
 
-  /// Reads up to so many points in the window.
+  /// Reads points until the window has `size` points or the stream ends.
   void fill(std::size_t size) {
     std::size_t filled = window_.size();
     window_.resize(size);
@@ -124,13 +134,15 @@ class RadiusStream : public PointStream {
     window_.resize(filled);
   }
 
+  /// Estimates the missing radii of the window's points from `begin` up to `end`.
   void estimate(std::size_t begin, std::size_t end) {
     const auto chunk = std::span(window_).subspan(begin, end - begin);
     if (std::ranges::none_of(chunk, [](const PointRecord& p) { return p.radius == 0; })) return;
     const Places places(window_);
     std::vector<double> radii = neighbour_radii(places, begin, end, true);
     double middle = median(radii);
-    if (middle == 0) {  // most of the chunk lies in stacks of points: each counts as one
+    // Where most points are stacked in few places, count every place as one point.
+    if (middle == 0) {
       radii = neighbour_radii(places, begin, end, false);
       std::vector<double> once;
       for (std::size_t i = begin; i < end; ++i) {
@@ -138,6 +150,7 @@ class RadiusStream : public PointStream {
       }
       middle = median(std::move(once));
     }
+    // Limit the radii by their median, and store them where there is none.
     for (std::size_t i = 0; i < chunk.size(); ++i) {
       if (chunk[i].radius != 0) continue;
       const double radius = radii[i] > 0 ? std::min(radii[i], kLargest * middle) : middle;
@@ -146,8 +159,9 @@ class RadiusStream : public PointStream {
     }
   }
 
-  /// Of the points from begin to end.
-  /// @param each  whether the points of a place count each or as one
+  /// Returns the radii that follow from the neighbours alone, for the window's points from `begin`
+  /// up to `end`, lattice units. A radius is 0 where there are no neighbours.
+  /// @param each  see Places::distance_to()
   std::vector<double> neighbour_radii(const Places& places, std::size_t begin, std::size_t end,
                                       bool each) {
     const std::size_t all = each ? window_.size() : places.count();
@@ -172,8 +186,8 @@ class RadiusStream : public PointStream {
   double unit_;
   RadiusCounts& counts_;
   std::vector<PointRecord> window_;
-  std::size_t at_ = 0;         // next point to hand out
-  std::size_t chunk_end_ = 0;  // points before it have their radii
+  std::size_t at_ = 0;         ///< the window's next point to hand out
+  std::size_t chunk_end_ = 0;  ///< the window's points before this one have their radii
 };
 
 }  // namespace

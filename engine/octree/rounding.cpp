@@ -1,3 +1,6 @@
+// Rounds points piece by piece in parallel. The position of a point may depend on the point before
+// it, so each piece is first rounded as if it were the first, and its beginning is then rounded
+// again with the true point before, until a position comes out the same.
 #include "engine/octree/rounding.h"
 
 #include <algorithm>
@@ -9,41 +12,45 @@
 namespace ptc {
 namespace {
 
-/// To 8 bits behind the leading one.
+/// Rounds a radius to 8 bits behind the leading one.
 float rounded_radius(float radius) noexcept {
   const std::uint32_t bits = (std::bit_cast<std::uint32_t>(radius + 0.0F) + 0x4000) & ~0x7fffU;
-  return std::bit_cast<float>(std::min(bits, 0x7f7f8000U));  // the greatest that is finite
+  return std::bit_cast<float>(std::min(bits, 0x7f7f8000U));  // the greatest finite value
 }
 
-/// To a multiple of 32; the ends of the range, which the axes lie on, stay.
+/// Rounds a component of a normal to a multiple of 32. The ends of the range, 32767 and -32767,
+/// stay, because the axes lie on them.
 std::int16_t rounded_normal(std::int16_t component) noexcept {
   const int size = std::min((std::abs(int{component}) + 16) / 32 * 32, 32767);
   return static_cast<std::int16_t>(component < 0 ? -size : size);
 }
 
-/// A half to 7 bits behind the leading one.
+/// Rounds a half to 7 bits behind the leading one.
 std::uint16_t rounded_radiance(std::uint16_t half) noexcept {
   if (half == 0x8000) return 0;  // -0
   return static_cast<std::uint16_t>(std::min((half + 4) & ~7, 0x7bf8));
 }
 
+/// The stream that round_points() returns.
 class RoundedStream : public PointStream {
  public:
   RoundedStream(PointStream& sorted, double unit, const Executor& executor, const MortonKey& before)
       : sorted_(sorted), unit_(unit), executor_(executor), last_(before) {}
 
   std::size_t next(std::span<PointRecord> out) override {
+    // Round all pieces, each as if it were the first.
     const std::size_t count = sorted_.next(out);
     exact_.resize(count);
     executor_.for_ranges(count, kGrain, [&](std::size_t begin, std::size_t end) {
-      MortonKey before;  // as if nothing were
+      MortonKey before;  // as if there were no point before
       for (std::size_t i = begin; i < end; ++i) {
         exact_[i] = out[i].key;
         round(out[i], before);
         before = out[i].key;
       }
     });
-    // Where pieces meet, what is before may move a point, and that one the next.
+    // Correct the beginning of each piece: the true point before may change the position of its
+    // first point, and that the position of the next.
     for (std::size_t begin = 0; begin < count; begin += kGrain) {
       for (std::size_t i = begin; i < count; ++i) {
         const MortonKey key =
@@ -57,8 +64,9 @@ class RoundedStream : public PointStream {
   }
 
  private:
-  static constexpr std::size_t kGrain = 2048;
+  static constexpr std::size_t kGrain = 2048;  // points of a piece
 
+  /// Rounds a point. @param before  position of the rounded point before it
   void round(PointRecord& point, const MortonKey& before) const noexcept {
     point.radius = rounded_radius(point.radius);
     for (std::int16_t& component : point.normal) component = rounded_normal(component);
@@ -66,9 +74,9 @@ class RoundedStream : public PointStream {
     point.key = rounded_key(point.key, point.radius, before);
   }
 
-  /// The low corner of the largest cell around the point whose diagonal the radius allows. A
-  /// coarser cell than that of the point before may start in front of it: then a smaller one is
-  /// taken, at the end the point itself.
+  /// Returns the low corner of the largest cell around the point whose diagonal is at most
+  /// kRoundedPosition radii. If that corner precedes the previous point on the curve, a smaller
+  /// cell is taken, in the end the point itself.
   [[nodiscard]] MortonKey rounded_key(const MortonKey& key, float radius,
                                       const MortonKey& before) const noexcept {
     const double edge = static_cast<double>(radius) / unit_ * (kRoundedPosition / std::sqrt(3.0));
@@ -81,8 +89,8 @@ class RoundedStream : public PointStream {
   PointStream& sorted_;
   double unit_;
   const Executor& executor_;
-  std::vector<MortonKey> exact_;  ///< of the points being rounded
-  MortonKey last_;                ///< of the points handed out
+  std::vector<MortonKey> exact_;  ///< the keys of the points being rounded, before rounding
+  MortonKey last_;                ///< the rounded key of the last point handed out
 };
 
 }  // namespace

@@ -1,4 +1,5 @@
-// How a container keeps its points, and what rounding them may lose (spec/points.md#rounding).
+// The profiles in which a container stores points, and the rounding that two of them apply
+// (spec/points.md#rounding).
 #pragma once
 
 #include <memory>
@@ -8,31 +9,38 @@
 
 namespace ptc {
 
+/// How points are stored.
 enum class Profile {
-  raw,      ///< exact, neither packed nor compressed: for reading in place
+  raw,      ///< exact, neither packed nor compressed, so that pages can be used where they lie
   exact,    ///< exact, packed, zstd
   fast,     ///< rounded, packed, LZ4: decodes fastest
   compact,  ///< rounded, packed, zstd: smallest
 };
 
+/// Returns the codec of a profile.
 [[nodiscard]] Codec codec_of(Profile profile) noexcept;
+/// Returns whether a profile rounds points.
 [[nodiscard]] bool is_rounded(Profile profile) noexcept;
 
-/// What rounding takes at most from a point.
-inline constexpr double kRoundedPosition = 0.001;      ///< distance, of the rounded radius
-inline constexpr double kRoundedRadius = 1.0 / 512;    ///< share
-inline constexpr double kRoundedNormal = 0.0021;       ///< angle, rad
-inline constexpr double kRoundedRadiance = 1.0 / 256;  ///< share, or 2^-22 if that is more
+/// The greatest distance that rounding moves a point, in rounded radii.
+inline constexpr double kRoundedPosition = 0.001;
+/// The greatest relative change of a radius by rounding.
+inline constexpr double kRoundedRadius = 1.0 / 512;
+/// The greatest angle by which rounding turns a normal [rad].
+inline constexpr double kRoundedNormal = 0.0021;
+/// The greatest relative change of radiance by rounding; the absolute change may be 2^-22 if that
+/// is more.
+inline constexpr double kRoundedRadiance = 1.0 / 256;
 
-/// The same in words.
+/// The four bounds in words, as the meta page of a rounded container records them.
 inline constexpr const char* kRounding =
     "position 0.001 radius, radius 1/512, normal 0.0021, radiance 1/256";
 
-/// Rounds sorted points; their order stays. Rounding what is rounded changes nothing. Points of
-/// radius 0 keep their position.
+/// Returns a stream of the same points, rounded. Their order stays. Rounding rounded points changes
+/// nothing. Points of radius 0 keep their position.
 /// @param sorted, executor  must outlive the result
 /// @param unit              lattice unit in scene units
-/// @param before            key of the rounded point before the first; none: zero
+/// @param before            key of the rounded point before the first; zero when there is none
 [[nodiscard]] std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit,
                                                         const Executor& executor,
                                                         const MortonKey& before = {});

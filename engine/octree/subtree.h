@@ -1,4 +1,4 @@
-// The octree of points in memory.
+// Builds the octree of points that are in memory, by one thread.
 #pragma once
 
 #include <cstdint>
@@ -13,43 +13,48 @@
 
 namespace ptc {
 
-/// Groups of a part of the tree in post-order, one after another as they lie in pages. References
-/// of interior children are numbers of groups in here.
+/// The groups of a part of the tree in post-order, encoded as they lie in pages. Their references
+/// to interior children are numbers of groups in this object.
 struct SubtreeGroups {
   struct Group {
-    std::size_t begin = 0;  ///< in bytes
-    std::size_t size = 0;
-    std::uint64_t end = 0;  ///< the point after its last
+    std::size_t begin = 0;  ///< offset of the group in `bytes`
+    std::size_t size = 0;   ///< bytes of the group
+    std::uint64_t end = 0;  ///< number after its last point
   };
-  std::vector<std::byte> bytes;
+  std::vector<std::byte> bytes;  ///< the groups, one after another
   std::vector<Group> groups;
 
+  /// Removes all groups, but keeps the memory.
   void clear() noexcept {
     bytes.clear();
     groups.clear();
   }
 };
 
-/// Octal digits that the ranks of two coincident points share, of kMaxLevel - kLatticeBits.
+/// Returns the number of leading octal digits that the ranks of two coincident points share; a rank
+/// has kMaxLevel - kLatticeBits digits.
 [[nodiscard]] int common_rank_level(std::uint64_t a, std::uint64_t b) noexcept;
 
-/// Builds the octree below one cell, as OctreeBuilder says.   Memory: 90 bytes a point, and a group
-/// for each level.
+/// Builds the octree below one cell, by the rules of OctreeBuilder.
+/// Memory: 90 bytes for each point, and a group for each level.
 class SubtreeBuilder {
  public:
-  /// Takes a group when its children are done. @return an interior reference to it
+  /// Receives each group after the groups of its children. @param end  number after its last point
+  /// @return  an interior reference to the group
   using Emit = std::function<ChildRef(const NodeGroup& group, std::uint64_t end)>;
 
-  /// @param leaf_points, unit  as of OctreeBuilder
+  /// @param leaf_points  a cell with no more points is not split, 1 to kMaxLeafPoints
+  /// @param unit         lattice unit in scene units
   SubtreeBuilder(std::uint32_t leaf_points, double unit) : leaf_points_(leaf_points), unit_(unit) {}
 
-  /// @param points  all of one cell, ascending, at least 1
-  /// @param first   number of the first of them
-  /// @param rank    of the first among those with its key
-  /// @return the node that stands for them: a leaf when it has no more points than a leaf may
+  /// Builds the tree of all points of one cell.
+  /// @param points  ascending by key, at least 1
+  /// @param first   number of the first point
+  /// @param rank    rank of the first point among the points with its key
+  /// @return  the node that stands for the points: a leaf when they are at most leaf_points
   [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first,
                                 std::uint64_t rank, const Emit& emit);
-  /// The same; groups are appended to `out`.
+  /// Builds the tree of all points of one cell, and appends its groups to `out`.
   [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first,
                                 std::uint64_t rank, SubtreeGroups& out);
 
@@ -62,9 +67,9 @@ class SubtreeBuilder {
   PointColumns columns_;
   std::uint64_t first_ = 0;
   const Emit* emit_ = nullptr;
-  std::vector<std::uint8_t>
-      levels_;                   ///< of the smallest cell that holds a point and the one before
-  std::vector<NodeGroup> path_;  ///< groups being filled, by depth; kept for their memory
+  /// By point: the level of the smallest cell that holds it and the point before.
+  std::vector<std::uint8_t> levels_;
+  std::vector<NodeGroup> path_;  ///< groups being filled, by depth; kept so that memory is reused
 };
 
 }  // namespace ptc

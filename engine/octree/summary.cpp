@@ -1,4 +1,6 @@
-// What a node knows of its surfels (spec/nodes.md#summary).
+// Combines the summaries of clusters (spec/nodes.md#summary). Sums add up. Bounds do not: a bound
+// of the whole must enclose each part's bound, moved by the distance between their centres and
+// turned by the angle between their axes.
 #include "engine/octree/summary.h"
 
 #include <algorithm>
@@ -21,8 +23,8 @@ double distance(const Vec3& a, const Vec3& b) {  // lattice coordinates: no squa
   return std::sqrt(dot(d, d));
 }
 
-/// Half the extent along a unit direction of a thing `thick` along its normal and `wide` across it;
-/// all of `wide` when the normal is zero.
+/// Returns half the extent, along a unit direction, of a body that reaches `thick` along its normal
+/// and `wide` across it; `wide` when the normal is zero.
 double extent_along(const Vec3& direction, const Vec3& normal, double thick, double wide) {
   const double length = std::sqrt(dot(normal, normal));
   if (!(length > 0)) return wide;
@@ -32,17 +34,19 @@ double extent_along(const Vec3& direction, const Vec3& normal, double thick, dou
   return (thick * std::abs(dot(direction, normal)) + wide * std::sqrt(dot(cross, cross))) / length;
 }
 
+/// Returns the distance between two points along a unit direction.
 double offset_along(const Vec3& direction, const Vec3& a, const Vec3& b) {
   return std::abs(dot(direction, {a[0] - b[0], a[1] - b[1], a[2] - b[2]}));
 }
 
-/// Cosine of the angle between a direction and the cone's axis, neither quite of unit length.
+/// Returns the cosine of the angle between a direction and the cone's axis, whose lengths are 1
+/// only to float precision.
 double cosine_to_axis(const NodeSummary& node, const std::array<float, 3>& n) {
   const Vec3 a{node.cone_axis[0], node.cone_axis[1], node.cone_axis[2]}, b{n[0], n[1], n[2]};
   return std::clamp(dot(a, b) / std::sqrt(dot(a, a) * dot(b, b)), -1.0, 1.0);
 }
 
-/// The greatest float not above x, so that a cone never loses a normal to rounding.
+/// Returns the greatest float that is not above x, so that a cone never loses a normal to rounding.
 float round_down(double x) {
   const auto nearest = static_cast<float>(x);
   return static_cast<double>(nearest) <= x ? nearest : std::nextafter(nearest, -2.0F);
@@ -77,6 +81,7 @@ NodeSummary summarise_points(std::span<const PointRecord> points, double unit) {
 }
 
 NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
+  // Add up areas and flux, and offsets from the first mean position.
   NodeSummary sum;
   const Vec3& origin = nodes.front()->mean;
   double weight = 0;
@@ -93,6 +98,7 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
     }
   }
   for (std::size_t k = 0; k < 3; ++k) sum.mean[k] = origin[k] + sum.mean[k] / weight;
+  // Enclose the spheres, cones and slabs of the parts.
   const Vec3 slab = slab_normal(sum);
   const bool has_axis = set_cone_axis(sum, slab);
   double angle = has_axis ? 0 : kPiDouble;

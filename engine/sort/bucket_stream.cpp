@@ -1,4 +1,5 @@
-// Buckets from disk, one loaded ahead of the one that is handed out.
+// Loads buckets from disk ahead of the one that is handed out: read one, sort it while the next is
+// read, hand it out.
 #include "engine/sort/bucket_stream.h"
 
 #include <algorithm>
@@ -41,6 +42,7 @@ void BucketLoader::push(std::shared_ptr<const Partition> partition, std::size_t 
 BucketLoader::Block BucketLoader::read(std::span<PointRecord> out,
                                        const std::function<std::span<PointRecord>()>& scratch) {
   while (!buckets_.empty()) {
+    // Partition a bucket that does not fit again, and go on with its first range.
     BucketReader& bucket = buckets_.back();
     if (bucket.left() > out.size() && !bucket.single_key()) {
       BucketReader large = std::move(bucket);
@@ -48,11 +50,11 @@ BucketLoader::Block BucketLoader::read(std::span<PointRecord> out,
       split(std::move(large), out, scratch());
       continue;
     }
-    // All that is kept of it must be found whole before a piece of it goes out.
+    // Check all records of a kept bucket before a part of it goes out.
     if (bucket.kept() && bucket.left() == bucket.size() && bucket.left() > out.size()) {
       for (BucketReader ahead = bucket; ahead.read(out, reader_) > 0;) continue;
     }
-    // Records of one key are sorted as they came: they are the input's order.
+    // Read it. Records of one key are sorted as they are, because they lie in the input's order.
     const Block block{out.first(bucket.read(out, reader_)), bucket.single_key()};
     if (bucket.left() == 0) {
       buckets_.pop_back();
@@ -63,13 +65,16 @@ BucketLoader::Block BucketLoader::read(std::span<PointRecord> out,
   return {};
 }
 
-// A bucket that does not fit: a partition of its own, whose ranges come in its place. It ends,
-// because Splitters cut off at least the records of one key, which fit always.
+// Partitions a bucket that does not fit, and puts the new ranges in its place. The recursion ends,
+// because Splitters give the records of at least one key a range of their own, and a range with one
+// key need not fit.
 void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
                          std::span<PointRecord> scratch) {
-  constexpr std::size_t kSamplesPerRange = 4;  // each is a read of its own
+  // Choose new ranges from a sample of the bucket.
+  constexpr std::size_t kSamplesPerRange = 4;  // few, because each sample is a read of its own
   Splitters splitters(bucket.sample(kSamplesPerRange * ranges_, reader_), ranges_);
   const auto partition = std::make_shared<Partition>(file_, std::move(splitters));
+  // Write the bucket's records again, run by run, grouped by the new ranges.
   std::vector<std::uint16_t> range_of(out.size());
   while (const std::size_t count = bucket.read(out, reader_)) {
     const std::span<const PointRecord> run = out.first(count);
@@ -85,7 +90,8 @@ BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory,
     : loader_(std::move(loader)), executor_(executor), at_end_(std::move(at_end)) {
   const std::size_t quarter = memory.size() / 4;
   const auto block = [&](std::size_t k) { return memory.subspan(k * quarter, quarter); };
-  scratch_ = block(0);  // on a page boundary, for it is written where a range is partitioned again
+  scratch_ = block(0);  // begins on a page boundary: a range that is partitioned again is written
+                        // to disk from here
   reading_ = std::async(std::launch::async, [this, out = block(1)] {
     return loader_.read(out, [this] { return scratch_; });
   });
@@ -95,8 +101,8 @@ BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory,
 
 BucketStream::~BucketStream() = default;
 
-// What was read is sorted, and more is read. Reading leaves the processor free: it has a thread
-// even if the executor has only one.
+// Begins to sort the block that was read, and to read the next one into `free`. Reading hardly uses
+// the processor, so it has its own thread even if the executor has only one.
 void BucketStream::advance(std::span<PointRecord> free) {
   const Block read = reading_.get();
   const auto sort = [this, read] {
@@ -115,7 +121,7 @@ void BucketStream::advance(std::span<PointRecord> free) {
 }
 
 std::span<const PointRecord> BucketStream::next_block() {
-  if (error_) std::rethrow_exception(error_);  // what failed once has no next block
+  if (error_) std::rethrow_exception(error_);  // a stream that failed stays failed
   if (!sorting_.valid()) return {};
   try {
     const std::span<PointRecord> sorted = sorting_.get().records;
@@ -124,7 +130,7 @@ std::span<const PointRecord> BucketStream::next_block() {
       at_end_();
       return {};
     }
-    advance(current_);  // which the caller has no more use for
+    advance(current_);  // the caller is done with this block
     current_ = {sorted.data(), scratch_.size()};
     return sorted;
   } catch (...) {

@@ -1,4 +1,5 @@
-// A temporary file past the page cache.
+// Direct transfers, with the page cache as the way out where a file system refuses them: some
+// refuse when a file is opened, others at the first transfer.
 #include "engine/sort/direct_file.h"
 
 #include <fcntl.h>
@@ -15,7 +16,7 @@ namespace ptc {
 namespace {
 
 constexpr int kFlags = O_RDWR | O_DIRECT;
-constexpr std::size_t kMaxBytes = std::size_t{8} << 20;  // of one call
+constexpr std::size_t kMaxBytes = std::size_t{8} << 20;  // of one system call
 
 [[noreturn]] void fail(const char* call, const std::string& name) {
   throw std::system_error(errno, std::generic_category(), std::string(call) + " " + name);
@@ -26,14 +27,14 @@ constexpr std::size_t kMaxBytes = std::size_t{8} << 20;  // of one call
 DirectFile::DirectFile(const std::filesystem::path& directory)
     : name_("temporary file in " + directory.string()),
       fd_(open_retrying(directory, kFlags | O_TMPFILE, 0600)) {
-  if (fd_ < 0) buffered_.emplace(directory);  // no direct transfers here, or an error to report
+  if (fd_ < 0) buffered_.emplace(directory);  // without direct transfers; it reports other errors
 }
 
 DirectFile::DirectFile(const std::filesystem::path& file, Kept how) : name_(file.string()) {
   const int flags = kFlags | (how == Kept::made ? O_CREAT | O_TRUNC : 0);
   fd_ = open_retrying(file, flags, 0600);
   if (fd_ < 0 && errno == EINVAL)
-    fd_ = open_retrying(file, flags & ~O_DIRECT, 0600);  // no direct transfers here
+    fd_ = open_retrying(file, flags & ~O_DIRECT, 0600);  // the file system has no direct transfers
   if (fd_ < 0) fail("open", name_);
 }
 
@@ -56,7 +57,7 @@ void DirectFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const
     const ssize_t n =
         ::pread(fd_, bytes.data(), std::min(bytes.size(), kMaxBytes), static_cast<off_t>(offset));
     if (n < 0 && errno != EINTR && !give_up_direct(direct)) fail("pread", name_);
-    if (n == 0) throw DataError(name_ + ": the file ends too early");
+    if (n == 0) throw DataError(name_ + ": the file is shorter than what was written to it");
     if (n < 0) continue;
     offset += static_cast<std::uint64_t>(n);
     bytes = bytes.subspan(static_cast<std::size_t>(n));

@@ -1,11 +1,11 @@
-// What the radix sort allocates beside its scratch, for those who keep to a cap.
+// The memory that radix_sort() allocates next to its scratch, for callers that keep to a cap.
 #pragma once
 
 #include <cstddef>
 
 namespace ptc {
 
-/// Bytes that radix_sort() allocates at most for so many records and threads.
+/// Returns the most bytes that radix_sort() allocates for this many records and threads.
 [[nodiscard]] std::size_t radix_sort_bytes(std::size_t records, unsigned threads) noexcept;
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// How a sort divides the memory it may hold.
+// Chooses the ranges first, then the sample and the read buffer, and gives the rest to the runs.
 #include "engine/sort/sort_plan.h"
 
 #include <algorithm>
@@ -12,33 +12,34 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMinBytes = 256 << 10;
-constexpr std::uint64_t kMaxRecords = 0xffffffff;  // a run's index has 32 bits
+constexpr std::uint64_t kMaxRecords = 0xffffffff;  // record numbers within a run have 32 bits
 
-// What a run holds of a range is read in one piece: make it worth the disk's while.
+// The records of one range in one run are read in one piece, which should be at least this long.
 constexpr std::uint64_t kPieceBytes = 64 << 10;
 constexpr std::uint64_t kMinRanges = 48, kUsualRanges = 512, kMaxRanges = 2048;
-// The more keys, the less ranges differ in size: by an eighth (standard deviation) with the most.
-constexpr std::uint64_t kMinSampleKeys = 16, kMaxSampleKeys = 64;  // of each range
+// Sample keys for each range. The more there are, the less ranges differ in size: with the most, by
+// an eighth (standard deviation).
+constexpr std::uint64_t kMinSampleKeys = 16, kMaxSampleKeys = 64;
 constexpr std::uint64_t kMinReadBytes = SpillReader::kMinBytes, kMaxReadBytes = 4 << 20;
 
-// Four parts in two runs, each on a page boundary.
+// Two runs hold four parts, each of which begins on a page boundary.
 constexpr std::size_t kRunStep = 2 * kPageRecords;
 static_assert(kPageRecords * sizeof(PointRecord) % kDirectBytes == 0);
 
-// Parts of 94 MB hold pieces of each range that are long enough.
+// A part of 94 MB holds a piece of each range that is long enough.
 constexpr std::uint64_t kPartRecords = kPageRecords * 4608;
 
-// A range is one bucket. Small ones are sorted sooner, but grouping by more ranges and reading more
-// pieces takes longer: this is the smallest of use. The largest should fit into a quarter of the
-// memory although ranges differ.
+// Each range becomes one bucket. Smaller buckets are sorted faster, but grouping by more ranges and
+// reading more pieces takes longer, which sets the minimum. The maximum lets a bucket fit into a
+// quarter of the memory although ranges differ in size.
 constexpr std::uint64_t kMinRangeRecords = 5 << 16, kMaxRangeRecords = kPartRecords / 8 * 5;
 
 }  // namespace
 
 std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept {
   const std::uint64_t runs = 2 * std::uint64_t{plan.run_records} * sizeof(PointRecord);
-  // Grouping a run takes less than radix_sort() but for the first block and the numbers of the
-  // ranges.
+  // Grouping a run takes no more than radix_sort(), except for the bursts of a single block and the
+  // range numbers of the records.
   const std::uint64_t work = radix_sort_bytes(plan.run_records, threads) +
                              partition_bytes(plan.ranges) +
                              plan.run_records * sizeof(std::uint16_t);
@@ -48,6 +49,7 @@ std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept {
 SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads, std::uint64_t expected) {
   if (memory_bytes < kMinBytes)
     throw std::invalid_argument("SortOptions::memory_bytes: less than 256 KiB");
+  // Choose as many ranges as give buckets of a useful size and pieces that are long enough.
   SortPlan plan;
   const std::uint64_t usual =
       expected == 0 ? kUsualRanges
@@ -55,6 +57,7 @@ SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads, std::uint64_t e
   const std::uint64_t wanted = std::clamp(expected / kMaxRangeRecords + 1, usual, kMaxRanges);
   plan.ranges =
       static_cast<std::size_t>(std::clamp(memory_bytes / 2 / kPieceBytes, kMinRanges, wanted));
+  // Give the sample and the read buffer a 64th of the memory each.
   const std::uint64_t keys_of_cap = memory_bytes / 64 / sizeof(MortonKey) / plan.ranges;
   plan.sample_keys =
       static_cast<std::size_t>(std::clamp(keys_of_cap, kMinSampleKeys, kMaxSampleKeys)) *
@@ -63,7 +66,7 @@ SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads, std::uint64_t e
   plan.read_bytes =
       static_cast<std::size_t>(std::clamp(memory_bytes / 64, kMinReadBytes, kMaxReadBytes));
 
-  // plan_bytes() grows with the runs: the largest that stays below the cap.
+  // Find the largest useful runs within the cap by bisection, as plan_bytes() grows with the runs.
   const std::uint64_t of_use = 2 * std::max(kPartRecords, expected / plan.ranges * 8 / 5);
   std::uint64_t fits = 0;
   std::uint64_t exceeds =

@@ -1,4 +1,4 @@
-// How a sort divides the memory it may hold.
+// The plan of an external sort: how it divides the memory that it may hold.
 #pragma once
 
 #include <cstddef>
@@ -6,27 +6,34 @@
 
 namespace ptc {
 
-/// Fewest records whose bytes are whole pages, 5 of them.
+/// The smallest number of records whose bytes fill whole pages: 5 pages of 4 KiB.
 inline constexpr std::size_t kPageRecords = 512;
 
-/// Sizes that follow from the cap and from what will come. Two runs of records are held at once, or
-/// four parts of their memory; when buckets are read, it is four blocks.
+/// The sizes of a sort, which follow from the cap and from the number of records expected.
+///
+/// The memory of two runs is used in three ways, one after another:
+///
+///   all fits         | records of one run  | scratch of one run  |
+///   spilling         | part | part | part | part |    collected, grouped, written at the same time
+///   reading buckets  | block | block | block | block |     see BucketStream
 struct SortPlan {
-  std::size_t run_records = 0;  ///< a multiple of 1536: runs and parts lie on page boundaries
-  std::size_t ranges = 0;       ///< of a partition
-  std::size_t sample_keys = 0;  ///< kept for the splitters, at most
-  std::size_t read_bytes = 0;   ///< read from the disk at once
+  std::size_t run_records = 0;  ///< a multiple of 1024: runs and their halves fill whole pages
+  std::size_t ranges = 0;       ///< ranges of keys in a partition
+  std::size_t sample_keys = 0;  ///< most keys that are kept for the splitters
+  std::size_t read_bytes = 0;   ///< buffer for all reads that run at once
 };
 
-/// Bytes held at once by a sort that follows the plan: runs, what grouping and sorting them takes,
-/// the sample and what is read at once. The table of runs is beside it, 4 bytes for each run and
-/// range, 12 of kept files: 1/6000 of what is spilled, 1/2000, under a cap of 8 MiB or more.
+/// Returns the bytes that a sort with this plan holds at once: two runs, what grouping and sorting
+/// them takes, the sample, and the read buffer. The table of runs comes on top, with 4 bytes for
+/// each run and range (12 for kept files): under a cap of 8 MiB or more, 1/6000 of the spilled
+/// bytes (1/2000).
 [[nodiscard]] std::uint64_t plan_bytes(const SortPlan& plan, unsigned threads) noexcept;
 
-/// The plan with the largest runs whose plan_bytes() is at most `memory_bytes` and that are of use:
-/// touching more memory takes longer than the disk, beside which the sort goes on.
-/// @param expected  records; 0: not known
-/// @throws std::invalid_argument below 256 KiB
+/// Returns the plan with the largest useful runs whose plan_bytes() is at most `memory_bytes`. Runs
+/// beyond a certain size are of no use: touching their memory takes longer than the disk, which
+/// works at the same time.
+/// @param expected  number of records that will come; 0: not known
+/// @throws std::invalid_argument when `memory_bytes` is below 256 KiB
 [[nodiscard]] SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads,
                                  std::uint64_t expected);
 

@@ -1,4 +1,9 @@
-// Records on disk, grouped by range of keys.
+// Transfers between memory, where records have 40 bytes and begin anywhere, and disk, where they
+// are packed and transfers move whole blocks:
+//
+//   memory   | record . | record . | record . |      .: reserved bytes, not on disk
+//   disk     ...|record|record|record|....
+//            |  block  |  block  |  block  |         a read takes the blocks around its records
 #include "engine/sort/spill.h"
 
 #include <algorithm>
@@ -19,29 +24,31 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMaxVolumes = 1 << 10;
-constexpr std::size_t kPieceBytes = std::size_t{2} << 20;  // of a write
+constexpr std::size_t kPieceBytes = std::size_t{2} << 20;  // written by one call
 
-// The i-th of `count` positions in [0, size), one in each of as many equal strides, anywhere in it:
-// records that repeat with a period must not fool the sample. The same for the same arguments.
+// The i-th of `count` sample positions in [0, size). There is one in each of `count` equal strides,
+// at a pseudorandom place in it, so that records that repeat with a period do not mislead the
+// sample. Equal arguments give equal positions.
 std::uint64_t sample_position(std::uint64_t i, std::uint64_t count, std::uint64_t size) noexcept {
   const std::uint64_t begin = i * size / count, end = (i + 1) * size / count;
   return begin + splitmix64((i + size - 1) * kSplitMixStep) % (end - begin);
 }
 
-/// A disk, a quota or what the file system allows a file is used up: another directory may have
-/// room.
+/// Returns whether an error means that a disk, a quota or the size limit of a file is used up, so
+/// that another directory may still have room.
 bool is_full(const std::error_code& code) noexcept {
   return code.value() == ENOSPC || code.value() == EDQUOT || code.value() == EFBIG;
 }
 
-/// Of what goes to the disk of records from the i-th of a run's part on. Those of its pieces add up
-/// to that of the part.
-/// @param stride  bytes from record to record
+/// Returns the checksum of the spilled bytes of records i, i+1, ... of one run's range. The
+/// checksums of consecutive pieces add up to the checksum of the whole range.
+/// @param stride  bytes from one record to the next
 std::uint64_t digest_of(std::span<const std::byte> records, std::size_t stride,
                         std::uint64_t i) noexcept {
   return xxh3_64_sum(records, kSpilledBytes, stride, i);
 }
 
+/// Restores records from their spilled bytes.
 void unpack(const std::byte* bytes, std::span<PointRecord> out) noexcept {
   for (std::size_t i = 0; i < out.size(); ++i) {
     PointRecord record;
@@ -50,6 +57,7 @@ void unpack(const std::byte* bytes, std::span<PointRecord> out) noexcept {
   }
 }
 
+/// Reads one piece through a buffer, as many records at a time as the buffer holds.
 void read_piece(const SpillFile& file, const SpillReader::Piece& piece,
                 std::span<std::byte> buffer) {
   SpillPlace place = piece.place;
@@ -64,6 +72,7 @@ void read_piece(const SpillFile& file, const SpillReader::Piece& piece,
   }
 }
 
+/// Writes a range by several transfers at once.
 void write_pieces(DirectFile& file, std::uint64_t offset, std::span<const std::byte> bytes) {
   for_each_transfer(
       (bytes.size() + kPieceBytes - 1) / kPieceBytes, [&](std::size_t i, std::size_t) {
@@ -92,7 +101,8 @@ SpillFile SpillFile::reopened(StateReader& state) {
     const std::filesystem::path name = state.get_text();
     const auto end = state.get<std::uint64_t>();
     file.volumes_.push_back(std::make_unique<Volume>(name, DirectFile::Kept::found, end));
-    state.require(std::filesystem::file_size(name) == end, "a temporary file has another length");
+    state.require(std::filesystem::file_size(name) == end,
+                  "a temporary file does not have the recorded length");
   }
   return file;
 }
@@ -110,7 +120,7 @@ void SpillFile::save(StateWriter& state) {
 std::vector<std::uint32_t> SpillFile::by_room(std::uint64_t bytes) const {
   std::vector<double> fill;
   for (const auto& volume : volumes_) {
-    std::error_code unknown;  // a write tells what is wrong
+    std::error_code unknown;  // a write will report what is wrong
     const std::uint64_t free = std::filesystem::space(volume->place, unknown).available;
     const auto used = static_cast<double>(volume->end + bytes);
     fill.push_back(
@@ -133,7 +143,7 @@ SpillPlace SpillFile::append(std::span<const std::byte> packed) {
       write_pieces(volume.file, place.offset, bytes);
     } catch (const std::system_error& error) {
       if (v == order.back() || !is_full(error.code())) throw;
-      volume.file.discard(place.offset, bytes.size());  // the part that found room
+      volume.file.discard(place.offset, bytes.size());  // the part that was written
       continue;
     }
     volume.end += bytes.size();
@@ -194,11 +204,11 @@ Partition::Partition(SpillFile& file, StateReader& state)
     for (std::uint64_t i = 0; i < ends; ++i) {
       run.starts.push_back(state.get<std::uint32_t>());
       state.require(i == 0 ? run.starts[i] == 0 : run.starts[i - 1] <= run.starts[i],
-                    "ranges of a run do not ascend");
+                    "the ranges of a run do not ascend");
     }
     for (std::uint64_t i = 0; i < ranges(); ++i) run.digests.push_back(state.get<std::uint64_t>());
     state.require(file_.holds(run.place, run.starts.back() * kSpilledBytes),
-                  "a run past the end of its file");
+                  "a run lies past the end of its file");
   }
 }
 
@@ -276,6 +286,7 @@ bool BucketReader::single_key() const noexcept {
 }
 
 std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) {
+  // Collect the pieces that fill `out`, from one run after another.
   std::vector<SpillReader::Piece> pieces;
   std::size_t filled = 0;
   const std::size_t first_run = run_, first_at = at_;
@@ -291,6 +302,7 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
       at_ = 0;
     }
   }
+  // Read them, then check them or give back their disk blocks.
   reader.read(partition_->file_, pieces);
   if (kept()) {
     verify(first_run, first_at, out.first(filled));
@@ -301,7 +313,8 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
   return filled;
 }
 
-/// @param records  read from the at-th of the run's part on
+/// Adds records to the checksum, and compares it where a run's part of the range ends.
+/// @param records  the records of the range from number `at` of a run on
 void BucketReader::verify(std::size_t run, std::size_t at, std::span<const PointRecord> records) {
   for (; !records.empty(); ++run, at = 0) {
     const Partition::Run& from = partition_->runs_[run];
@@ -317,7 +330,7 @@ void BucketReader::verify(std::size_t run, std::size_t at, std::span<const Point
 std::vector<MortonKey> BucketReader::sample(std::size_t count, SpillReader& reader) const {
   std::vector<PointRecord> records(static_cast<std::size_t>(std::min<std::uint64_t>(count, size_)));
   std::vector<SpillReader::Piece> pieces;
-  std::uint64_t begin = 0;  // of the run's part among all records of the range
+  std::uint64_t begin = 0;  // number of the run's first record among all records of the range
   for (const Partition::Run& run : partition_->runs_) {
     const std::uint64_t end = begin + run.size(range_);
     for (std::size_t i = pieces.size(); i < records.size(); ++i) {

@@ -1,4 +1,11 @@
-// Records on disk, grouped by the ranges that their keys lie in.
+// Records on disk, grouped by ranges of their keys.
+//
+// A sort writes its records in runs, each as large as memory allows and grouped by range. Later it
+// reads one range at a time from all runs:
+//
+//   SpillFile     | run 0: range 0, range 1, ... | run 1: range 0, range 1, ... | ...
+//                          \_______                       /
+//   BucketReader                   \  range 0 of all runs, in the order of the input
 #pragma once
 
 #include <atomic>
@@ -19,47 +26,50 @@
 
 namespace ptc {
 
-/// Bytes of a record on the disk: all that are not reserved.
+/// Bytes of a record on disk: all but the reserved ones, which are last.
 inline constexpr std::size_t kSpilledBytes = offsetof(PointRecord, reserved);
 
-/// Where records lie.
+/// Where records lie in a SpillFile.
 struct SpillPlace {
-  std::uint32_t volume = 0;
-  std::uint64_t offset = 0;  ///< bytes
+  std::uint32_t volume = 0;  ///< number of the volume
+  std::uint64_t offset = 0;  ///< bytes from the start of the volume
 };
 
-/// Temporary files of records, one volume in each of several directories. Threads: one appends,
-/// others may read and discard what it has appended.
+/// Temporary files of records: one file, called a volume, in each of several directories.
+/// Threads: one thread may append while others read and discard what was appended before.
 class SpillFile {
  public:
+  /// Creates volumes without names, which vanish with this object.
   /// @param directories  at least one
   /// @throws std::system_error naming the directory
   explicit SpillFile(std::span<const std::filesystem::path> directories);
-  /// Volumes with names, which stay; one that is there already is overwritten.
+  /// Creates named volumes, which stay. Existing files are overwritten.
+  /// @throws std::system_error naming the file
   [[nodiscard]] static SpillFile named(std::span<const std::filesystem::path> names);
-  /// Those of which save() told. @throws DataError when they are not what they were,
-  /// std::system_error
+  /// Reopens the named volumes that save() recorded.
+  /// @throws DataError when they have another length than they had; std::system_error
   [[nodiscard]] static SpillFile reopened(StateReader& state);
-  /// Puts volumes with names on the disk, and tells what there is in them.
+  /// Flushes named volumes to stable storage, and records their names and lengths.
   void save(StateWriter& state);
 
-  /// Writes records to the volume that this leaves least full, by its directory's room; when there
-  /// is none left, to the others.
-  /// @param packed  kSpilledBytes of each, at an address that is a multiple of kDirectBytes, in
-  /// memory that can be read up
-  ///                to the next such multiple behind them
-  /// @return  their place, its offset a multiple of kDirectBytes
+  /// Writes records to the volume that will then be the least full, by the room in its directory;
+  /// if that has no room after all, to one of the others.
+  /// @param packed  kSpilledBytes of each record. Must begin at a multiple of kDirectBytes, in
+  ///                memory that is readable up to the next such multiple after its end
+  /// @return  where the records lie; the offset is a multiple of kDirectBytes
   /// @throws std::system_error naming the directory
   [[nodiscard]] SpillPlace append(std::span<const std::byte> packed);
-  /// True when what was appended has so many bytes there.
+  /// Returns whether a range lies within what was appended, at an offset that append() may return.
   [[nodiscard]] bool holds(const SpillPlace& place, std::uint64_t bytes) const noexcept;
+  /// Reads a range. @throws DataError, std::system_error as DirectFile::read_at()
   void read_at(const SpillPlace& place, std::span<std::byte> bytes) const;
-  /// @throws DataError: so many points there are not what was written
+  /// Reports that this many points at a place differ from what was written. @throws DataError
+  /// always, naming file and offset
   [[noreturn]] void refuse(const SpillPlace& place, std::size_t points) const;
-  /// Gives back the disk's blocks that end in these bytes, which are not read again, nor those in
-  /// front of them in their first block.
+  /// Gives back the disk blocks that end within a range. The first of them may begin before the
+  /// range: neither the range nor those bytes can be read again.
   void discard(const SpillPlace& place, std::uint64_t bytes) const noexcept;
-  /// Bytes appended so far.
+  /// Returns the bytes appended so far, to all volumes together.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
 
  private:
@@ -67,28 +77,31 @@ class SpillFile {
     explicit Volume(const std::filesystem::path& directory) : place(directory), file(directory) {}
     Volume(const std::filesystem::path& name, DirectFile::Kept how, std::uint64_t bytes)
         : place(name), file(name, how), end(bytes) {}
-    std::filesystem::path place;  ///< the directory, or the file when it has a name
+    std::filesystem::path place;  ///< the directory; for a named volume the file
     DirectFile file;
-    std::atomic<std::uint64_t> end{0};
+    std::atomic<std::uint64_t> end{0};  ///< bytes appended
   };
   SpillFile() = default;
-  /// Numbers of the volumes, those first that so many bytes leave least full.
+  /// Returns the numbers of all volumes, in the order of how full they would be with this many
+  /// bytes more.
   [[nodiscard]] std::vector<std::uint32_t> by_room(std::uint64_t bytes) const;
 
   std::vector<std::unique_ptr<Volume>> volumes_;
 };
 
-/// Reads from any offset of SpillFiles, several pieces at once, through memory of its own.
+/// Reads records from any offset of a SpillFile, several pieces at once, through a buffer of its
+/// own.
 class SpillReader {
  public:
-  /// Consecutive records in the file and where they go.
+  /// Consecutive records in the file and the memory that they are read into.
   struct Piece {
     SpillPlace place;
     std::span<PointRecord> out;
   };
 
-  /// @param buffer_bytes  of all reads that run at once, at least kMinBytes
+  /// @param buffer_bytes  buffer for all reads that run at once, at least kMinBytes
   explicit SpillReader(std::size_t buffer_bytes);
+  /// Reads all pieces. @throws DataError, std::system_error as DirectFile::read_at()
   void read(const SpillFile& file, std::span<const Piece> pieces);
 
   static constexpr std::size_t kMinBytes = kTransfers * 2 * kDirectBytes;
@@ -97,43 +110,46 @@ class SpillReader {
   Arena buffer_;
 };
 
-/// What lies in a SpillFile of each range of keys. Records come in runs, each as large as memory
-/// allows, that are grouped by range:
-///
-///   file  | run 0: range 0, range 1, ... | run 1: range 0, range 1, ... | ...
-///
-/// The runs' parts of one range, one after another, are its records in the order of the input.
+/// The table of the runs in a SpillFile: where each range of keys lies in each run. The parts of
+/// one range, run after run, are its records in the order of the input.
 class Partition {
  public:
-  /// @param kept  what is read stays on the disk until it is discarded
+  /// @param file  must outlive this
+  /// @param kept  records stay on disk after they are read, until they are discarded, and have
+  ///              checksums
   Partition(SpillFile& file, Splitters splitters, bool kept = false);
-  /// As save() wrote it, kept. @throws DataError
+  /// Loads a kept partition that save() wrote. @throws DataError when the table does not fit the
+  /// file
   Partition(SpillFile& file, StateReader& state);
+  /// Records the splitters and the table of runs.
   void save(StateWriter& state) const;
 
-  /// Where each range begins in a run, and the end.
+  /// The record numbers within a run where each range begins, and the end of the last one.
   using Starts = std::vector<std::uint32_t>;
 
-  /// Fills the front of `range_of` with the numbers of the ranges that records lie in. Threads: any
-  /// time.
+  /// Writes the range number of each record to the front of `range_of`.
+  /// Threads: may be called at any time.
   void find_ranges(std::span<const PointRecord> records,
                    std::span<std::uint16_t> range_of) const noexcept;
+  /// Does the same with the threads of an executor.
   void find_ranges(std::span<const PointRecord> records, std::span<std::uint16_t> range_of,
                    const Executor& executor) const;
-  /// Groups what goes to the disk of a run, stable. Threads: while another run is written, too.
-  /// @param range_of  each record's range
-  /// @param grouped   for kSpilledBytes of each
+  /// Groups the records of a run by range, in their order within each range, and packs them as they
+  /// go to disk. Threads: may run while another run is written.
+  /// @param range_of  the range number of each record
+  /// @param grouped   room for kSpilledBytes of each record
   [[nodiscard]] Starts group_run(std::span<const PointRecord> records,
                                  std::span<const std::uint16_t> range_of,
                                  std::span<std::byte> grouped, const Executor& executor) const;
-  /// Writes what group_run() has grouped, as SpillFile::append(). Runs come in the order of the
-  /// input.
+  /// Writes a run that group_run() has grouped, under the conditions of SpillFile::append(). Runs
+  /// must be written in the order of the input.
   void write_run(std::span<const std::byte> grouped, Starts starts);
 
   [[nodiscard]] std::size_t ranges() const noexcept { return splitters_.size(); }
-  /// Records of a range.
+  /// Returns the number of records in a range.
   [[nodiscard]] std::uint64_t size(std::size_t range) const noexcept;
-  /// Gives back the disk of a range; ranges go by ascending number.
+  /// Gives back the disk blocks of a range. Ranges must be discarded in ascending order, because a
+  /// block may hold the end of one range and the beginning of the next.
   void discard(std::size_t range) const noexcept;
 
  private:
@@ -141,12 +157,14 @@ class Partition {
   struct Run {
     SpillPlace place;
     Starts starts;
-    std::vector<std::uint64_t> digests;  // of each range in the run, when kept: a power cut may
-                                         // tear what is to be on the disk
+    std::vector<std::uint64_t> digests;  ///< checksum of each range of a kept run, because a power
+                                         ///< cut may lose bytes that were written
 
+    /// Returns the number of records of a range in this run.
     [[nodiscard]] std::size_t size(std::size_t range) const noexcept {
       return starts[range + 1] - starts[range];
     }
+    /// Returns the place of the i-th record of a range in this run.
     [[nodiscard]] SpillPlace place_of(std::size_t range, std::size_t i) const noexcept {
       return {place.volume, place.offset + (starts[range] + i) * kSpilledBytes};
     }
@@ -158,24 +176,27 @@ class Partition {
   std::vector<Run> runs_;
 };
 
-/// Reads the records of one range in the order of the input. What was read leaves the disk unless
-/// it is kept: ranges of a partition are read by ascending number. What is kept is compared with
-/// what was written, run by run, when all of the range there was read.
+/// Reads the records of one range in the order of the input. Records that were read leave the disk
+/// unless the partition is kept, so the ranges of a partition must be read in ascending order.
+/// Kept records are compared with their checksum at the end of each run's part of the range.
 class BucketReader {
  public:
   BucketReader(std::shared_ptr<const Partition> partition, std::size_t range);
 
-  /// How many there are.
+  /// Returns the number of records in the range.
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-  /// How many were not read yet.
+  /// Returns the number of records not read yet.
   [[nodiscard]] std::uint64_t left() const noexcept { return left_; }
-  /// True when all have the same key.
+  /// Returns whether all records have the same key.
   [[nodiscard]] bool single_key() const noexcept;
+  /// Returns whether the partition is kept.
   [[nodiscard]] bool kept() const noexcept { return partition_->kept_; }
-  /// Fills the front of `out`. @return how many. @throws DataError when what is kept is not what
-  /// was written
+  /// Reads the next records into the front of `out`.
+  /// @return  the number of records read; less than out.size() only at the end of the range
+  /// @throws DataError when kept records are not what was written; std::system_error
   [[nodiscard]] std::size_t read(std::span<PointRecord> out, SpillReader& reader);
-  /// `count` keys, at least 1, from all parts of the range.
+  /// Returns a sample of keys, drawn evenly from the whole range.
+  /// @param count  keys wanted, at least 1; there are fewer when the range has fewer records
   [[nodiscard]] std::vector<MortonKey> sample(std::size_t count, SpillReader& reader) const;
 
  private:
@@ -185,9 +206,9 @@ class BucketReader {
   std::size_t range_;
   std::uint64_t size_ = 0;
   std::uint64_t left_ = 0;
-  std::size_t run_ = 0;       // where to read on
-  std::size_t at_ = 0;        // in that run's part
-  std::uint64_t digest_ = 0;  // of what was read of that part
+  std::size_t run_ = 0;       ///< the run to read on in
+  std::size_t at_ = 0;        ///< the next record of the range in that run
+  std::uint64_t digest_ = 0;  ///< checksum of the range's records in that run before at_
 };
 
 }  // namespace ptc

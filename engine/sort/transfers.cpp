@@ -1,3 +1,4 @@
+// The threads take the next number from one counter, so that transfers begin in ascending order.
 #include "engine/sort/transfers.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// Patterns that copies, disks and transfers leave (spec/recovery.md#causes).
+// Recognises the patterns that failing copies, disks and transfers leave in bytes
+// (spec/recovery.md#causes). A diagnosis is evidence, not proof: two faults can look like a third.
 #include "engine/verify/diagnose.h"
 
 #include <algorithm>
@@ -22,7 +23,8 @@ bool all_zero(std::span<const std::byte> bytes) {
   return std::ranges::all_of(bytes, [](std::byte b) { return b == std::byte{0}; });
 }
 
-/// The bit whose flip makes `bytes` whole. They are as they were when it returns.
+/// Finds the bit whose flip makes whole() return true, by trying every bit of `bytes`. The bytes
+/// are unchanged when it returns. The search costs 8 n^2 hashed bytes for n bytes.
 template <class Whole>
 Diagnosis find_flipped_bit(std::span<std::byte> bytes, const Whole& whole, FlipBudget& budget) {
   if (!budget.take(8 * bytes.size() * bytes.size())) return {};
@@ -38,7 +40,10 @@ Diagnosis find_flipped_bit(std::span<std::byte> bytes, const Whole& whole, FlipB
   return {};
 }
 
-/// The first run of zero sectors, counted from the start of the file.
+/// Finds the first run of sectors that are zero. Sectors are aligned to the start of the file:
+///
+///   offset    |--part--|--sector--|--sector--|--part--|
+///                      ^ only whole sectors are examined
 Diagnosis zeroed_sectors(std::span<const std::byte> stored, std::uint64_t offset) {
   Diagnosis found;
   const auto first = static_cast<std::size_t>(round_up(offset, kSectorBytes) - offset);
@@ -59,19 +64,24 @@ Diagnosis zeroed_sectors(std::span<const std::byte> stored, std::uint64_t offset
 
 Diagnosis diagnose_magic(std::span<const std::byte> begin) {
   const auto is = [&](std::initializer_list<int> pattern) { return begins_with(begin, pattern); };
-  if (is({0x89, 'P', 'T', 'C', 0x0a, 0x1a})) return {Cause::text_mode, "CR LF became LF"};
+  // Recognise the magic, 89 'P' 'T' 'C' 0d 0a 1a 0a, as transfers in text mode leave it.
+  if (is({0x89, 'P', 'T', 'C', 0x0a, 0x1a}))
+    return {Cause::text_mode, "a transfer changed CR LF to LF"};
   if (is({0x89, 'P', 'T', 'C', 0x0d, 0x0d}) || is({0x89, 'P', 'T', 'C', 0x0d, 0x0a, 0x1a, 0x0d})) {
-    return {Cause::text_mode, "LF became CR LF"};
+    return {Cause::text_mode, "a transfer changed LF to CR LF"};
   }
-  if (is({0x89, 'P', 'T', 'C', 0x0d, 0x1a})) return {Cause::text_mode, "LF was dropped"};
+  if (is({0x89, 'P', 'T', 'C', 0x0d, 0x1a})) return {Cause::text_mode, "a transfer dropped LF"};
   if (is({0x89, 'P', 'T', 'C', 0x0a, 0x0a}) || is({0x89, 'P', 'T', 'C', 0x0d, 0x0d, 0x1a})) {
-    return {Cause::text_mode, "line ends were changed"};
+    return {Cause::text_mode, "a transfer changed the line ends"};
   }
-  if (is({0x09, 'P', 'T', 'C'})) return {Cause::text_mode, "the eighth bit was dropped"};
+  if (is({0x09, 'P', 'T', 'C'}))
+    return {Cause::text_mode, "a transfer dropped the eighth bit of every byte"};
   if (is({0xc2, 0x89, 'P', 'T', 'C'}) || is({0xef, 0xbf, 0xbd, 'P', 'T', 'C'})) {
-    return {Cause::text_mode, "it was encoded anew as UTF-8"};
+    return {Cause::text_mode, "a transfer encoded the bytes as UTF-8"};
   }
-  if (begin.size() < 8) return {Cause::truncated, fmt::format("it has {} bytes", begin.size())};
+  // Recognise a file that lost its beginning, and other common formats.
+  if (begin.size() < 8)
+    return {Cause::truncated, fmt::format("the file has only {} bytes", begin.size())};
   if (all_zero(begin))
     return {Cause::zeroed, fmt::format("its first {} bytes are zero", begin.size()), 0,
             begin.size()};

@@ -1,4 +1,4 @@
-// Names, explanations and remedies of causes (engine/verify/finding.h).
+// The table of causes, with their names, explanations and remedies, and the texts of findings.
 #include "engine/verify/finding.h"
 
 #include <array>
@@ -9,6 +9,8 @@
 namespace ptc {
 namespace {
 
+/// What is said about one cause. The explanation stands in front of the remedy: "EXPLANATION:
+/// REMEDY".
 struct CauseText {
   const char* name;
   const char* explanation;
@@ -16,19 +18,22 @@ struct CauseText {
 };
 
 constexpr std::array kCauses{
+    // in the order of Cause
     CauseText{"unknown", "", Remedy::replace},
     CauseText{"bit-flip", "", Remedy::test_machines},
     CauseText{"zeroed", "blocks were lost in a copy or by the disk", Remedy::copy_again},
     CauseText{"swapped", "blocks were written to the wrong place", Remedy::copy_again},
-    CauseText{"stale", "blocks are of an older or other file", Remedy::copy_again},
-    CauseText{"unfinished", "its writer was stopped", Remedy::write_again},
-    CauseText{"truncated", "the end is missing", Remedy::transfer},
+    CauseText{"stale", "blocks come from an older version of this file or from another file",
+              Remedy::copy_again},
+    CauseText{"unfinished", "the program that wrote the file was stopped before it finished",
+              Remedy::write_again},
+    CauseText{"truncated", "the end of the file is missing", Remedy::transfer},
     CauseText{"appended", "", Remedy::cut},
     CauseText{"text-mode", "", Remedy::transfer_bare},
-    CauseText{"unreadable", "the disk fails", Remedy::rescue},
+    CauseText{"unreadable", "the disk cannot read its blocks", Remedy::rescue},
     CauseText{"foreign", "", Remedy::other_file},
     CauseText{"newer", "", Remedy::newer_program},
-    CauseText{"writer", "the file is as its writer made it", Remedy::report},
+    CauseText{"writer", "the program that wrote the file made this error", Remedy::report},
 };
 static_assert(kCauses.size() == static_cast<std::size_t>(Cause::writer) + 1);
 

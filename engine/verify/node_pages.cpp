@@ -1,4 +1,4 @@
-// The cache of engine/verify/node_pages.h.
+// The least recently used page makes room for a new one, and lends it its memory.
 #include "engine/verify/node_pages.h"
 
 #include <algorithm>
@@ -16,6 +16,7 @@ NodePages::Place NodePages::page(std::uint32_t number) {
 }
 
 std::unordered_map<std::uint32_t, NodePages::Page>::iterator NodePages::load(std::uint32_t page) {
+  // Evict the least recently used page, and keep its buffer for the new one.
   Page fresh;
   if (pages_.size() >= capacity_) {
     const auto oldest =
@@ -23,6 +24,7 @@ std::unordered_map<std::uint32_t, NodePages::Page>::iterator NodePages::load(std
     fresh.payload = std::move(oldest->second.payload);
     pages_.erase(oldest);
   }
+  // Read and decode the new page.
   fresh.payload.resize(container_.page_payload_limit());
   fresh.header = container_.read_page(page, fresh.payload, decoder_);
   return pages_.emplace(page, std::move(fresh)).first;

@@ -1,4 +1,4 @@
-// Node pages of a container, decoded and kept while there is room.
+// A small cache of decoded node pages for the whole-file check.
 #pragma once
 
 #include <cstddef>
@@ -11,20 +11,22 @@
 
 namespace ptc {
 
-/// The least recently used pages make room.
+/// Reads node pages of a container and keeps the most recently used ones decoded.
+/// Memory: one decoded page for each page of the capacity.   Threads: not thread-safe.
 class NodePages {
  public:
   /// @param container  must outlive this
-  /// @param capacity   pages, at least 1
+  /// @param capacity   pages that are kept, at least 1
   NodePages(const ContainerReader& container, std::size_t capacity)
       : container_(container), capacity_(capacity) {}
 
+  /// A decoded node page and where its payload lies.
   struct Place {
     NodePage nodes;
-    const std::byte* payload = nullptr;
-    bool raw = false;  ///< the payload lies in the file as it is
+    const std::byte* payload = nullptr;  ///< first decoded byte, for offsets within the page
+    bool raw = false;  ///< the payload is stored uncompressed, so its offsets hold in the file too
   };
-  /// Valid until the next call.
+  /// Returns a page, reading it when it is not kept. The result is valid until the next call.
   /// @throws FormatError, std::system_error
   [[nodiscard]] Place page(std::uint32_t number);
 
@@ -32,7 +34,7 @@ class NodePages {
   struct Page {
     PageHeader header;
     std::vector<std::byte> payload;
-    std::uint64_t used = 0;
+    std::uint64_t used = 0;  ///< clock_ at the last use
   };
 
   std::unordered_map<std::uint32_t, Page>::iterator load(std::uint32_t page);

@@ -1,4 +1,5 @@
-// Page by page (engine/verify/point_runs.h).
+// Runs are cut from one decoded page after another; a run may cross the boundary of two pages.
+// Every point that is taken is added to the totals that finish() compares with the superblock.
 #include "engine/verify/point_runs.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@ constexpr char kOrder[] = "spec/points.md#point-order";
 constexpr char kCounts[] = "spec/container.md#superblock-counts";
 constexpr char kTotals[] = "spec/container.md#superblock-totals";
 
-constexpr double kRelative = 1e-6;  // of totals: sums in another order
+constexpr double kRelative = 1e-6;  // what another order of summation may change in a total
 
 }  // namespace
 
@@ -40,6 +41,7 @@ void TreeReport::page(std::uint32_t page, std::uint64_t from_header, const char*
 
 std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
                                                             std::size_t count) {
+  // Copy the points from their pages.
   block_.clear();
   const std::uint64_t per_page = container_.superblock().points_per_page;
   for (std::uint64_t at = first; at < first + count;) {
@@ -55,6 +57,7 @@ std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
       block_.push_back(points[i]);
     }
   }
+  // Check their order, and add them to the totals.
   for (std::size_t i = 0; i < count; ++i) add(first + i, block_[i]);
   return block_;
 }
@@ -62,20 +65,23 @@ std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
 void PointRuns::finish() const {
   const Superblock& s = container_.superblock();
   if (next_ != s.points)
-    report_.superblock(kCounts, fmt::format("leaves hold {} of {} points", next_, s.points));
+    report_.superblock(kCounts,
+                       fmt::format("the leaves hold {} of the {} points", next_, s.points));
   compare("area", s.area, area_);
   for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
   if (s.bounds_low != low_ || s.bounds_high != high_) {
-    report_.superblock(
-        kTotals, fmt::format("bounds are not those of the points, {} {} {} to {} {} {}", low_[0],
-                             low_[1], low_[2], high_[0], high_[1], high_[2]));
+    report_.superblock(kTotals,
+                       fmt::format("the bounds are not those of the points, which are {} {} {} to "
+                                   "{} {} {}",
+                                   low_[0], low_[1], low_[2], high_[0], high_[1], high_[2]));
   }
 }
 
+/// Checks the order of a point, and adds it to the totals.
 void PointRuns::add(std::uint64_t number, const PointRecord& point) {
   if (point.key < last_) {
     report_.page(page_, kPageHeaderBytes, kOrder,
-                 fmt::format("key of point {} is below the one before", number));
+                 fmt::format("the key of point {} is less than that of the point before", number));
   }
   last_ = point.key;
   const std::array<double, 3> at = container_.header().frame.to_position(decode_morton(point.key));
@@ -89,10 +95,11 @@ void PointRuns::add(std::uint64_t number, const PointRecord& point) {
   next_ = number + 1;
 }
 
+/// Reports a total of the superblock that differs from that of the points by more than rounding.
 void PointRuns::compare(const char* what, double said, double found) const {
   if (std::abs(said - found) <= kRelative * std::max(std::abs(said), std::abs(found))) return;
-  report_.superblock(kTotals,
-                     fmt::format("superblock says {} {}, the points have {}", what, said, found));
+  report_.superblock(kTotals, fmt::format("the superblock records {} {}, but the points give {}",
+                                          what, said, found));
 }
 
 }  // namespace ptc

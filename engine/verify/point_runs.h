@@ -1,5 +1,5 @@
-// Inside the whole-file check: the points of a container, run by run, and what is said of them and
-// of the tree.
+// The points of a container for the whole-file check: one leaf's run after another, with running
+// totals, and the reports of what is wrong with points and tree.
 #pragma once
 
 #include <array>
@@ -16,14 +16,18 @@
 
 namespace ptc {
 
-/// Adds what is wrong to the findings: checksums are right, so that it was written so.
+/// Adds faults of points and tree to the findings, with Cause::writer: the checksums of their pages
+/// are right, so the file was written with these faults.
 class TreeReport {
  public:
+  /// @param container, findings  must outlive this
   TreeReport(const ContainerReader& container, Findings& findings)
       : container_(container), findings_(findings) {}
 
+  /// Reports that the superblock breaks a rule.
   void superblock(const char* clause, const std::string& text) const;
-  /// @param from_header  bytes to what is wrong
+  /// Reports that a page breaks a rule.
+  /// @param from_header  bytes from the start of the page header to the fault
   void page(std::uint32_t page, std::uint64_t from_header, const char* clause,
             const std::string& text) const;
 
@@ -32,12 +36,12 @@ class TreeReport {
   Findings& findings_;
 };
 
-/// Runs of points in their order, with the totals of all that were taken.   Memory: a page, and a
-/// run.
+/// Reads points in the order of the file, checks that their keys ascend, and sums up what the
+/// superblock states about them.   Memory: one page and one run.
 class PointRuns {
  public:
-  /// All must outlive this.
-  /// @param damaged  by page
+  /// @param container, damaged, report  must outlive this
+  /// @param damaged                     by page number, whether the page is damaged
   PointRuns(const ContainerReader& container, const std::vector<bool>& damaged,
             const TreeReport& report)
       : container_(container),
@@ -45,12 +49,14 @@ class PointRuns {
         report_(report),
         payload_(container.page_payload_limit()) {}
 
-  /// Points from `first` on, which must not lie before any taken already; nothing when some are in
-  /// damaged pages. Valid until the next call.
+  /// Returns `count` points from number `first` on; empty when one of them is in a damaged page.
+  /// The points are valid until the next call.
+  /// @param first  not less than the end of any run taken before
   [[nodiscard]] std::optional<std::span<const PointRecord>> take(std::uint64_t first,
                                                                  std::size_t count);
 
-  /// Compares the totals with the superblock's.
+  /// Compares the totals of all points taken with those of the superblock, and reports what
+  /// differs.
   void finish() const;
 
  private:
@@ -62,12 +68,12 @@ class PointRuns {
   const TreeReport& report_;
   PageDecoder decoder_;
   std::vector<std::byte> payload_;
-  std::uint32_t page_ = kNoPage;  ///< in payload_
-  std::uint32_t count_ = 0;       ///< its points
+  std::uint32_t page_ = kNoPage;  ///< the page decoded in payload_
+  std::uint32_t count_ = 0;       ///< points in payload_
   std::vector<PointRecord> block_;
-  MortonKey last_{};
-  std::uint64_t next_ = 0;  ///< behind the last taken
-  double area_ = 0;
+  MortonKey last_{};        ///< key of the last point taken
+  std::uint64_t next_ = 0;  ///< number after the last point taken
+  double area_ = 0;         ///< sum over the points taken, scene units squared
   std::array<double, 3> flux_{};
   std::array<double, 3> low_{};
   std::array<double, 3> high_{};

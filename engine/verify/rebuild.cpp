@@ -1,5 +1,12 @@
-// Two trees side by side: groups leave the builder in the order in which a walk of the stored tree
-// leaves them.
+// Compares two trees as two sequences of groups. The builder emits groups in post-order, children
+// before parents, and a walk through the stored tree visits them in the same order, so that group k
+// of one belongs to group k of the other and neither tree is held in memory:
+//
+//   points -> OctreeBuilder -> group, group, ... -.
+//                                                  equal, but for references to other groups?
+//   node pages -> StoredGroups -> group, group, ..'
+//
+// The digest of the stored tree chains the same groups: digest = xxh3_128(digest | group).
 #include "engine/verify/rebuild.h"
 
 #include <algorithm>
@@ -19,9 +26,10 @@ namespace ptc {
 namespace {
 
 constexpr char kRebuild[] = "spec/nodes.md#tree-digest";
-constexpr std::size_t kBlock = std::size_t{1} << 15;  // points at once
+constexpr std::size_t kBlock = std::size_t{1} << 15;  // points given to the builder at once
 
-/// A group's bytes with 0 where a child is another group: where that lies is the writer's choice.
+/// Returns the bytes of a group with zeros in place of the references to other groups, because the
+/// writer is free to choose where groups lie.
 std::vector<std::byte> content_of(const GroupView& group) {
   const auto bytes = group.bytes();
   std::vector<std::byte> content(bytes.begin(), bytes.end());
@@ -32,7 +40,7 @@ std::vector<std::byte> content_of(const GroupView& group) {
   return content;
 }
 
-/// The groups of a stored tree, children before parents.
+/// Reads the groups of a stored tree in post-order, children before parents.
 class StoredGroups {
  public:
   StoredGroups(const ContainerReader& container, std::size_t cached_pages)
@@ -46,6 +54,7 @@ class StoredGroups {
     std::uint16_t slot = 0;
     std::vector<std::byte> content;
   };
+  /// Returns the next group; empty after the root.
   std::optional<Group> next() {
     if (path_.empty()) return std::nullopt;
     while (!path_.back().children.empty()) {
@@ -61,7 +70,7 @@ class StoredGroups {
  private:
   struct Open {
     Group group;
-    std::vector<ChildRef> children;  ///< groups that were not entered yet, the last first
+    std::vector<ChildRef> children;  ///< child groups not entered yet, in reverse order
   };
 
   void descend(std::uint32_t page, std::uint16_t slot) {
@@ -78,7 +87,7 @@ class StoredGroups {
   std::vector<Open> path_;
 };
 
-/// Compares what the builder emits with what is stored.
+/// Receives the groups of the builder and compares each with the next stored group.
 class Comparison : public GroupSink {
  public:
   Comparison(const ContainerReader& container, std::size_t cached_pages, Findings& findings)
@@ -90,23 +99,27 @@ class Comparison : public GroupSink {
     return {.interior = true};
   }
 
+  /// Reports the first group that differs and how many do.
+  /// @return  the digest of the stored tree
   std::array<std::uint64_t, 2> finish() {
-    while (const auto stored = take()) differ(stored);  // the builder has no such groups
+    while (const auto stored = take()) differ(stored);  // groups that the builder does not have
     if (differing_ == 0) return digest_;
-    findings_.add({.severity = container_.superblock().writer == writer_name() ? Severity::damage
-                                                                               : Severity::warning,
-                   .cause = Cause::writer,
-                   .level = 4,
-                   .offset = container_.entry(first_.page).offset,
-                   .page = first_.page,
-                   .rule = kRebuild,
-                   .text = fmt::format(
-                       "page {}: group {} is not what its points give; {} groups in all are not",
-                       first_.page, first_.slot, differing_)});
+    findings_.add(
+        {.severity =
+             container_.superblock().writer == writer_name() ? Severity::damage : Severity::warning,
+         .cause = Cause::writer,
+         .level = 4,
+         .offset = container_.entry(first_.page).offset,
+         .page = first_.page,
+         .rule = kRebuild,
+         .text = fmt::format("page {}: group {} is not the group that the points give; groups that "
+                             "differ: {}",
+                             first_.page, first_.slot, differing_)});
     return digest_;
   }
 
  private:
+  /// Returns the next stored group, and adds it to the digest.
   std::optional<StoredGroups::Group> take() {
     auto group = stored_.next();
     if (!group) return group;
@@ -127,7 +140,7 @@ class Comparison : public GroupSink {
   StoredGroups stored_;
   std::array<std::uint64_t, 2> digest_{};
   std::uint64_t differing_ = 0;
-  StoredGroups::Group first_;  ///< of these
+  StoredGroups::Group first_;  ///< the first group that differs
 };
 
 }  // namespace

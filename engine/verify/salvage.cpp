@@ -1,4 +1,13 @@
-// From the pages that prove themselves to a new file (spec/recovery.md#salvage).
+// Builds a new file from the pages whose checksums hold (spec/recovery.md#salvage).
+//
+// Points carry over page by page, and the octree is built again from them. Channel values belong to
+// points by rank alone: the k-th attribute page of a group holds the values of the k-th point page.
+// The ranks are the file's, so they are known only where no page is missing from the count; a page
+// whose content is lost keeps its rank:
+//
+//   rank               0        1        2        3
+//   point pages     [ kept ] [ lost ] [ kept ] [ kept ]  ->  points of ranks 0, 2, 3
+//   attribute pages [ kept ] [ kept ] [ lost ] [ kept ]  ->  values of 0 and 3, zeros for rank 2
 #include "engine/verify/salvage.h"
 
 #include <algorithm>
@@ -24,17 +33,18 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
-constexpr std::uint64_t kPageBytes =
-    320;  // of a page of the file: its site, twice where pages moved, and two maps
-constexpr std::uint64_t kPagesOpen = 80;  // of the build: one a level, and some
+// Memory for each page of the file: its site, twice where pages moved, and entries of two maps.
+constexpr std::uint64_t kPageBytes = 320;
+constexpr std::uint64_t kPagesOpen =
+    80;  // pages that the build holds: one for each level, and some
 
-/// A page that is known of, and of a sound one of points the keys at its ends.
+/// A page whose number is known.
 struct Known {
-  const PageSite* site = nullptr;  ///< null: it is lost
-  MortonKey first_key, last_key;
+  const PageSite* site = nullptr;  ///< an intact copy of the page; null when it is lost
+  MortonKey first_key, last_key;   ///< keys of the first and last point of an intact point page
 };
 
-/// Points of the kept pages, page by page.
+/// Streams the points of the kept pages, page by page.
 class KeptPoints : public PointStream {
  public:
   KeptPoints(SurveyedPage& page, FlipBudget& flips,
@@ -64,22 +74,26 @@ class KeptPoints : public PointStream {
   std::uint32_t count_ = 0, at_ = 0;
 };
 
+/// One salvage, from the survey of the damaged file to the finished new one.
 class Salvage {
  public:
   Salvage(const std::filesystem::path& path, const SalvageOptions& options, Progress& progress)
       : file_(path), options_(options), progress_(progress), flips_(options.flip_budget) {}
 
   SalvageReport run(const std::filesystem::path& target) {
+    // Survey the damaged file.
     Findings ignored(0, false);
     survey_ = survey_file(file_, ignored, flips_, false, progress_);
     require_what_it_takes();
     page_.emplace(file_, survey_, true);
+    // Choose the pages to keep.
     find_meta();
     for (const auto& [group, columns] : survey_.columns) by_group_[group];
     find_sound_pages();
     rank_pages();
     if (points_.empty())
-      refuse("spec/recovery.md#survey", "no point page is whole: there is nothing to salvage");
+      refuse("spec/recovery.md#survey", "no point page is intact, so there is nothing to salvage");
+    // Write them as a new file.
     write(target);
     return report_;
   }
@@ -89,13 +103,16 @@ class Salvage {
     throw FormatError(0, rule, text).rebased(0, file_.path().string());
   }
 
+  /// Refuses a file without an identity, one with a feature that forbids repair, and a cap that is
+  /// too small.
   void require_what_it_takes() const {
     if (!survey_.header)
-      refuse(
-          "spec/recovery.md#survey",
-          "neither the header nor a superblock is whole: no page proves that it is of this file");
+      refuse("spec/recovery.md#survey",
+             "neither the header nor a superblock is whole, so no page can be shown to belong to "
+             "this file");
     if (survey_.header->feature_ro_compat != 0)
-      refuse("spec/versions.md#features", "the file uses a feature that forbids to repair it");
+      refuse("spec/versions.md#features",
+             "the file uses a feature that forbids repairing it: use the program that wrote it");
     const std::uint64_t page = std::uint64_t{1} << survey_.header->page_shift;
     const std::uint64_t least = kBaseBytes + kPageBytes * survey_.sites.size() + kPagesOpen * page;
     if (options_.memory_bytes < least) {
@@ -105,18 +122,19 @@ class Salvage {
     }
   }
 
-  using Sites = std::map<std::uint32_t, Known>;  ///< by page
+  using Sites = std::map<std::uint32_t, Known>;  ///< by page number
 
-  /// The map that pages of this kind belong in; null for those that are not kept.
+  /// Returns the map for pages of this kind; null for pages that a salvage does not keep.
   Sites* kind_of(const DirectoryEntry& entry) {
     if (entry.type == PageType::point) return &point_sites_;
     const bool wanted = entry.type == PageType::attribute && by_group_.contains(entry.group);
     return wanted ? &attribute_sites_[entry.group] : nullptr;
   }
 
-  /// Of several sites with one number the first that is sound counts. A page that is not where it
-  /// should be may lie elsewhere, if two were swapped.
+  /// Finds an intact copy of every page. Where several sites have one page number, the first intact
+  /// one counts. A page that is not in its place may lie elsewhere, as after a swap of two pages.
   void find_sound_pages() {
+    // Check all pages where they should lie.
     progress_.begin("check pages", survey_.sites.size(), "pages");
     bool lost = false;
     for (const PageSite& site : survey_.sites) {
@@ -125,6 +143,8 @@ class Salvage {
     }
     progress_.end();
     if (!lost) return;
+    // Search the whole file for the lost ones. What the directory says of a page, other than its
+    // place, must hold for the copy too.
     moved_ = find_pages(file_, *survey_.header, progress_);
     std::map<std::uint32_t, const DirectoryEntry*> listed;
     for (const PageSite& site : survey_.sites) {
@@ -138,7 +158,8 @@ class Salvage {
     }
   }
 
-  /// @return  false when the site should hold a page to be kept and does not
+  /// Takes the page of a site, unless an intact copy of that page is known already.
+  /// @return  false when the page is wanted but is not intact here
   bool consider(const PageSite& site) {
     Sites* const kind = kind_of(site.entry);
     if (kind == nullptr) return true;
@@ -154,13 +175,14 @@ class Salvage {
     return true;
   }
 
-  /// The k-th attribute page of a group lies beside the k-th point page, when none is missing.
+  /// Gives each kept page its rank among the pages of its kind.
   void rank_pages() {
+    // Count the pages that the file had. Where even their number is unknown, ranks mean nothing.
     const std::optional<Superblock>& s = survey_.superblock;
     const std::uint64_t per_page = points_per_page(*survey_.header);
     const std::uint64_t pages = s ? (s->points + per_page - 1) / per_page : point_sites_.size();
-    // Where some are not even known, ranks say nothing.
     const bool all_known = s ? point_sites_.size() == pages : no_number_is_missing();
+    // Rank the point pages, and drop those whose keys lie before the page in front.
     std::uint64_t k = 0;
     MortonKey last_key;
     for (const auto& [number, page] : point_sites_) {
@@ -172,6 +194,7 @@ class Salvage {
     report_.point_pages_before = pages;
     report_.point_pages = points_.size();
     if (s) report_.points_before = s->points;
+    // Rank the attribute pages, and keep those that fit a kept point page.
     for (auto& [group, kept] : by_group_) {
       report_.attribute_pages_before += pages;
       const auto found = attribute_sites_.find(group);
@@ -188,14 +211,15 @@ class Salvage {
     }
   }
 
-  /// Of the pages that a scan found: then it found those between them, too.
+  /// Returns whether the page numbers that a scan found have no gap, so that it found every page up
+  /// to the greatest number.
   [[nodiscard]] bool no_number_is_missing() const {
     std::set<std::uint32_t> numbers;
     for (const PageSite& site : survey_.sites) numbers.insert(site.page);
     return !numbers.empty() && *numbers.rbegin() == numbers.size() - 1;
   }
 
-  /// The meta page once more: a flipped bit in it is no loss.
+  /// Reads the meta page once more, because this time a flipped bit in it can be turned back.
   void find_meta() {
     for (const PageSite& site : survey_.sites) {
       if (site.entry.type != PageType::meta || page_->check(site, 3, flips_)) continue;
@@ -203,17 +227,19 @@ class Salvage {
         survey_.meta = decode_meta(page_->payload());
         survey_.columns = columns_by_group(survey_.meta);
         report_.meta = true;
-      } catch (const FormatError&) {  // lost
+      } catch (const FormatError&) {  // the meta page is lost
       }
     }
   }
 
   void write(const std::filesystem::path& target) {
+    // Open a file with the old frame and page size, and a uuid of its own.
     const std::optional<Superblock>& before = survey_.superblock;
     ContainerWriter writer(target, {.page_shift = survey_.header->page_shift,
                                     .codec = codec(),
                                     .uuid = new_uuid(),
                                     .frame = survey_.header->frame});
+    // Write the points and their octree, then the channels.
     BuildOptions tree;
     if (before) tree.leaf_points = std::max(1U, before->leaf_points);
     KeptPoints points(*page_, flips_, points_);
@@ -221,6 +247,7 @@ class Salvage {
     Superblock after = build_pages(points, writer, tree, ThreadPool(options_.threads), progress_);
     progress_.end();
     for (const auto& [group, kept] : by_group_) write_channels(writer, group, kept, after.points);
+    // Record in the meta page what was kept, and publish the file.
     Meta meta = survey_.meta;
     meta.text.insert_or_assign(
         "salvaged", fmt::format("{} of {} points, {} of {} pages of channels", after.points,
@@ -228,6 +255,7 @@ class Salvage {
                                 report_.attribute_pages, report_.attribute_pages_before));
     report_.superblock = writer.finish(meta, std::move(after));
     report_.points = report_.superblock.points;
+    // Report the kept shares of area and flux.
     const auto share = [](double part, double whole) { return whole > 0 ? part / whole : 1.0; };
     const auto flux = [](const Superblock& s) { return s.flux[0] + s.flux[1] + s.flux[2]; };
     if (!before) return;
@@ -235,6 +263,10 @@ class Salvage {
     report_.flux_share = share(flux(report_.superblock), flux(*before));
   }
 
+  /// Writes the attribute pages of one group. Its kept pages are as long as the old point pages, of
+  /// which some are lost, so their columns move to pages of the new length.
+  /// @param kept    attribute pages by rank; ranks that are missing become zeros
+  /// @param points  in the new file
   void write_channels(ContainerWriter& writer, std::uint16_t group,
                       const std::map<std::uint64_t, const PageSite*>& kept, std::uint64_t points) {
     const std::vector<PackedColumn>& columns = survey_.columns.at(group);
@@ -259,13 +291,14 @@ class Salvage {
     }
   }
 
-  /// That of the first point page.
+  /// Returns the codec of the first kept point page, which the new file uses throughout.
   Codec codec() {
     static_cast<void>(page_->check(*points_.begin()->second, 1, flips_));
     return page_->header().coding.codec;
   }
 
-  /// Pages of the damaged file must not pass for its pages.
+  /// Derives the uuid of the new file from the old one and the kept points. It differs from the old
+  /// one, so that no page of the damaged file can pass for a page of the new one.
   Uuid new_uuid() const {
     std::vector<std::byte> text(survey_.header->uuid.begin(), survey_.header->uuid.end());
     for (const auto& [rank, site] : points_) {
@@ -281,12 +314,12 @@ class Salvage {
   FlipBudget flips_;
   Survey survey_;
   std::optional<SurveyedPage> page_;
-  std::vector<PageSite> moved_;  ///< found by their headers
-  Sites point_sites_;
-  std::map<std::uint16_t, Sites> attribute_sites_;   ///< by group
-  std::map<std::uint64_t, const PageSite*> points_;  ///< by rank
+  std::vector<PageSite> moved_;                      ///< pages that a scan of the file found
+  Sites point_sites_;                                ///< point pages whose numbers are known
+  std::map<std::uint16_t, Sites> attribute_sites_;   ///< attribute pages, by group
+  std::map<std::uint64_t, const PageSite*> points_;  ///< kept point pages, by rank
   std::map<std::uint16_t, std::map<std::uint64_t, const PageSite*>>
-      by_group_;  ///< attribute pages, by rank
+      by_group_;  ///< kept attribute pages, by group and rank
   SalvageReport report_;
 };
 
@@ -297,8 +330,8 @@ SalvageReport salvage_container(const std::filesystem::path& path,
                                 Progress& progress) {
   std::error_code absent;
   if (std::filesystem::equivalent(path, target, absent)) {
-    throw RequestError("target", "what is salvaged goes into another file than " + path.string() +
-                                     ", which stays as it is");
+    throw RequestError("target", "a salvage cannot write to the damaged file itself, " +
+                                     path.string() + ": choose another file");
   }
   return Salvage(path, options, progress).run(target);
 }

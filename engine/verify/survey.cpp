@@ -1,5 +1,14 @@
-// From both ends of a file to its pages, past whatever is broken on the way
-// (spec/recovery.md#survey).
+// Surveys a file from both ends, past whatever is broken on the way (spec/recovery.md#survey).
+// Every structure can be found in two ways, so that the loss of one costs little:
+//
+//   | header | page | page | ... | meta page | directory pages | superblock A | superblock B |
+//       ^______repeated by both superblocks____________________________/               /
+//                                  directory offset and page count <------------------/
+//              ^      ^            page headers, found sector by sector, repeat the directory
+//
+// The survey tries the way of every reader first. Where that fails, it collects what is left: the
+// header from a superblock, a superblock from before the end, the directory page by page, and pages
+// that are listed nowhere from the sectors that begin with a page header.
 #include "engine/verify/survey.h"
 
 #include <algorithm>
@@ -16,9 +25,9 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kScanBytes = std::size_t{1} << 20;
+constexpr std::size_t kScanBytes = std::size_t{1} << 20;  // read at once by a scan, whole sectors
 
-/// Calls body(header, offset) for every sector that begins with the header of a page of this file.
+/// Calls body(header, offset) for every sector that begins with a valid page header of this file.
 template <class Body>
 void for_each_page(const InputFile& file, const FileHeader& header, Progress& progress,
                    const Body& body) {
@@ -31,7 +40,7 @@ void for_each_page(const InputFile& file, const FileHeader& header, Progress& pr
       if (load<std::uint32_t>(part.data(), sector) != kPageMagic) continue;
       try {
         body(decode_page_header(part.subspan(sector), header), at + sector);
-      } catch (const FormatError&) {  // of another file, or damaged: not one of ours
+      } catch (const FormatError&) {  // the header is damaged, or belongs to another file
       }
     }
     progress.advance(part.size());
@@ -39,14 +48,17 @@ void for_each_page(const InputFile& file, const FileHeader& header, Progress& pr
   progress.end();
 }
 
+/// One survey, which fills in a Survey step by step.
 class Surveyor {
  public:
   Surveyor(const InputFile& file, Findings& findings, FlipBudget& flips, Progress& progress)
       : file_(file), findings_(findings), flips_(flips), progress_(progress) {}
 
   Survey run(bool structure_only) {
+    // Establish the identity of the file, without which no page proves itself.
     look_at_header();
     if (!survey_.header) return std::move(survey_);
+    // Find a superblock; then open the file, or collect what is left of it.
     look_at_superblocks();
     if (!open()) {
       if (survey_.superblock) look_at_directory();
@@ -61,6 +73,7 @@ class Surveyor {
   }
 
  private:
+  /// Reads a block, with zeros beyond the end of the file.
   Block read_block(std::uint64_t offset) const {
     Block block{};
     file_.read_at(offset, std::span(block).first(
@@ -68,6 +81,8 @@ class Surveyor {
     return block;
   }
 
+  /// Adds an error and its diagnosis to the findings.
+  /// @param looked_at  file offset of the bytes that were diagnosed
   void add(const FormatError& error, int level, const Diagnosis& diagnosis,
            std::uint64_t looked_at) {
     Finding finding = finding_of(error, level);
@@ -75,6 +90,7 @@ class Surveyor {
     findings_.add(std::move(finding));
   }
 
+  /// Reads the file header, or takes the copy in a superblock when it is damaged.
   void look_at_header() {
     Block block = read_block(0);
     const auto bytes = std::span(block).first(std::min<std::uint64_t>(file_.size(), kBlockBytes));
@@ -101,7 +117,9 @@ class Surveyor {
     return {Cause::writer};
   }
 
-  /// Of the last superblock that is whole, its own copy of the header being all that is known.
+  /// Searches backwards from the end for an intact superblock, and returns its copy of the header.
+  /// A superblock is only valid for a file of its length, so both lengths are tried: that of the
+  /// first and that of the second copy.
   std::optional<FileHeader> repeated_header() const {
     const std::uint64_t blocks = file_.size() / kBlockBytes;
     for (std::uint64_t back = 1; back <= std::min(kSuperblockSearch, blocks); ++back) {
@@ -112,15 +130,17 @@ class Surveyor {
           const FileHeader header = decode_repeated_header(block);
           static_cast<void>(decode_superblock(block, header, length));
           return header;
-        } catch (const FormatError&) {  // the next may be whole
+        } catch (const FormatError&) {  // no superblock of this length: try the next
         }
       }
     }
     return std::nullopt;
   }
 
-  /// Both copies where they should be; else a superblock somewhere before the end.
+  /// Checks both superblocks in their places; where none is intact there, searches for one before
+  /// the end.
   void look_at_superblocks() {
+    // Check both copies.
     const std::uint64_t size = file_.size();
     const bool room = size % kBlockBytes == 0 && size >= 3 * kBlockBytes;
     std::vector<Finding> faults;
@@ -136,9 +156,10 @@ class Surveyor {
       add(error, 0, {Cause::writer}, 0);
     }
     if (!survey_.superblock) {
+      // Look for a superblock before the end: the file is longer or shorter than it was.
       if (const auto length = committed_length(file_, *survey_.header))
         return report_length(*length);
-      // Damaged ones are named; none at all is another matter.
+      // Report damaged superblocks, but leave blocks that show no trace of one to report_end().
       std::erase_if(faults, [](const Finding& f) {
         return code_of(f) == "superblock-magic" && f.cause == Cause::unknown;
       });
@@ -147,6 +168,8 @@ class Surveyor {
     for (Finding& fault : faults) findings_.add(std::move(fault));
   }
 
+  /// Decodes one superblock, and keeps the first that is intact.
+  /// @return  what is wrong with it; empty when it is intact
   std::optional<Finding> look_at_copy(Block block, std::uint64_t offset) {
     const auto decode = [&] { return decode_superblock(block, *survey_.header, file_.size()); };
     try {
@@ -167,6 +190,9 @@ class Surveyor {
     }
   }
 
+  /// Reports that the file is longer or shorter than when it was published, and takes the
+  /// superblock that says so.
+  /// @param committed  length of the file when it was published, bytes
   void report_length(std::uint64_t committed) {
     const std::uint64_t size = file_.size();
     const bool longer = size > committed;
@@ -189,7 +215,9 @@ class Surveyor {
     }
   }
 
-  /// The container as every reader opens it.
+  /// Opens the container as every reader does, and takes over its pages.
+  /// @return  false when there is no superblock for a file of this length, or when the reader
+  ///          refuses the file, which Survey::refusal then explains
   bool open() {
     if (!survey_.superblock || survey_.superblock->file_bytes != file_.size()) return false;
     try {
@@ -209,13 +237,14 @@ class Surveyor {
     return true;
   }
 
+  /// Adds a page that the directory lists.
   void list(std::uint32_t page, const DirectoryEntry& entry) {
     survey_.sites.push_back({entry, page, true});
     if (page >= listed_.size()) listed_.resize(std::size_t{page} + 1);
     listed_[page] = true;
   }
 
-  /// What is left of the directory, page by page.
+  /// Reads what is left of the directory, page by page, and reports its damaged pages.
   void look_at_directory() {
     const Superblock& s = *survey_.superblock;
     std::vector<std::byte> entries;
@@ -223,7 +252,7 @@ class Surveyor {
       const std::uint64_t offset = directory_page_offset(s, i);
       const std::size_t bytes = directory_page_entry_bytes(s, i);
       if (offset + kPageHeaderBytes + bytes > file_.size())
-        break;  // said already: the file is too short
+        break;  // the file is too short, which was reported before
       entries.resize(bytes);
       try {
         read_directory_page(file_, s, i, entries);
@@ -251,6 +280,7 @@ class Surveyor {
     }
   }
 
+  /// Lists the pages of one directory page.
   void list_entries(std::uint32_t directory_page, std::span<const std::byte> bytes) {
     const Superblock& s = *survey_.superblock;
     const std::uint32_t first = directory_page * directory_entries_per_page(s.header);
@@ -258,12 +288,12 @@ class Surveyor {
       try {
         list(first + i, decode_directory_entry(bytes.subspan(i * kDirectoryEntryBytes), s.header,
                                                s.file_bytes));
-      } catch (const FormatError&) {  // the refusal of the whole names it
+      } catch (const FormatError&) {  // Survey::refusal reports the entry
       }
     }
   }
 
-  /// Pages that are not listed, by the header that each has on a sector.
+  /// Adds the pages that the directory does not list, found by their headers.
   void scan() {
     for_each_page(file_, *survey_.header, progress_,
                   [&](const PageHeader& header, std::uint64_t offset) {
@@ -275,6 +305,8 @@ class Surveyor {
                   });
   }
 
+  /// Reports that no superblock was found, and tells an unfinished file from a truncated or zeroed
+  /// one by whether it has a directory.
   void report_end() {
     Finding finding{.cause = Cause::unfinished,
                     .offset = file_.size(),
@@ -283,7 +315,7 @@ class Surveyor {
     if (directory_end_ > 0) {
       const std::uint64_t length = round_up(directory_end_, kBlockBytes) + 2 * kBlockBytes;
       finding.cause = file_.size() < length ? Cause::truncated : Cause::unknown;
-      finding.text = "no superblock at the end, though a directory is there";
+      finding.text = "no superblock at the end, although the file has a directory";
       finding.expected = fmt::format("at least {}", length);
       finding.actual = std::to_string(file_.size());
       Block last = read_block((file_.size() - 1) / kBlockBytes * kBlockBytes);
@@ -292,6 +324,7 @@ class Surveyor {
     findings_.add(std::move(finding));
   }
 
+  /// Reads the meta page of a file that does not open.
   void read_meta() {
     for (const PageSite& site : survey_.sites) {
       if (site.entry.type != PageType::meta) continue;
@@ -300,7 +333,7 @@ class Surveyor {
       try {
         survey_.meta = decode_meta(page.payload());
         survey_.columns = columns_by_group(survey_.meta);
-      } catch (const FormatError&) {  // named when pages are checked
+      } catch (const FormatError&) {  // the check of pages reports it
       }
     }
   }
@@ -310,9 +343,9 @@ class Surveyor {
   FlipBudget& flips_;
   Progress& progress_;
   Survey survey_;
-  std::vector<bool> listed_;  ///< by page
-  bool no_superblock_ = false;
-  std::uint64_t directory_end_ = 0;  ///< of the last directory page that a scan met
+  std::vector<bool> listed_;         ///< by page number, whether the directory lists the page
+  bool no_superblock_ = false;       ///< there is no trace of a superblock
+  std::uint64_t directory_end_ = 0;  ///< end offset of the last directory page that a scan met
 };
 
 }  // namespace

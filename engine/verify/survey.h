@@ -1,4 +1,5 @@
-// What can still be known of a file, whole or damaged: its identity, its commit record, its pages.
+// The survey of a file that may be damaged: its identity, its commit record, and its pages, as far
+// as they can still be known (spec/recovery.md#survey).
 #pragma once
 
 #include <cstdint>
@@ -16,39 +17,42 @@
 
 namespace ptc {
 
-/// A page, as the directory or its own header tells of it.
+/// A page of the file and where it lies, according to the directory or to its own header.
 struct PageSite {
   DirectoryEntry entry;
-  std::uint32_t page = 0;
-  bool listed = false;  ///< by the directory; else found by its header
-  bool sound = true;    ///< false once a fault was found in it
+  std::uint32_t page = 0;  ///< page number
+  bool listed = false;     ///< the directory lists the page; otherwise its header was found by scan
+  bool sound = true;       ///< false once a fault was found in the page
 
+  /// Returns the file offset after the last byte of the stored payload.
   [[nodiscard]] std::uint64_t end() const noexcept {
     return entry.offset + kPageHeaderBytes + entry.stored_bytes;
   }
 };
 
-/// Memory: 48 bytes a page for the sites, and those of ContainerReader.
+/// Everything that a survey could establish about a file.
+/// Memory: 48 bytes for each page, and what ContainerReader takes.
 struct Survey {
-  std::optional<FileHeader> header;            ///< the file's own, or one that a superblock repeats
-  std::optional<Superblock> superblock;        ///< a whole copy, wherever it lies
-  std::unique_ptr<ContainerReader> container;  ///< when it opens as every reader opens it
+  std::optional<FileHeader> header;      ///< from the file's start, or repeated by a superblock
+  std::optional<Superblock> superblock;  ///< an intact copy, wherever it lies
+  std::unique_ptr<ContainerReader> container;  ///< null unless the file opens like any sound file
   std::vector<PageSite> sites;                 ///< all but directory pages, ascending by offset
-  GroupColumns columns;                        ///< of the meta page, when that is whole
-  Meta meta;                                   ///< likewise
-  std::optional<Finding> refusal;  ///< why `container` does not open, when all before it is whole
+  GroupColumns columns;                        ///< columns of the channel groups, from `meta`
+  Meta meta;                                   ///< content of the meta page; empty when it is lost
+  std::optional<Finding> refusal;  ///< why `container` is null although all before it is intact
 };
 
-/// Looks at header, superblocks, length and directory, and adds what is wrong with them to
-/// `findings`. Pages that no whole directory page lists are looked for sector by sector.
-/// @param flips           for telling what damaged them
-/// @param structure_only  looks for no pages that the directory does not list
+/// Examines header, superblocks, length and directory, and adds their faults to `findings`. Pages
+/// that no intact directory page lists are searched for sector by sector.
+/// @param flips           pays for the search for flipped bits
+/// @param structure_only  leaves out the search for pages that the directory does not list
 /// @throws std::system_error
 [[nodiscard]] Survey survey_file(const InputFile& file, Findings& findings, FlipBudget& flips,
                                  bool structure_only, Progress& progress);
 
-/// All pages but those of the directory that begin on a sector with a header whose checksum holds,
-/// ascending.
+/// Searches the file for pages of any type but directory pages: sectors that begin with a page
+/// header whose checksum holds for this file.
+/// @return  the pages, ascending by offset, with `listed` false
 [[nodiscard]] std::vector<PageSite> find_pages(const InputFile& file, const FileHeader& header,
                                                Progress& progress);
 

@@ -1,4 +1,12 @@
-// The rules of one page in the order of spec/container.md#opening, and what its damage looks like.
+// Checks the rules of one page in the order of spec/container.md#opening, and diagnoses what breaks
+// them. Each step may rely on the ones before:
+//
+//   level 1   read | header: magic, checksum, fields | header = directory entry
+//   level 2   payload: checksum
+//   level 3   payload: decodes, and its records keep their rules
+//
+// A fault of level 1 or 2 is damage, whose cause is looked for in the bytes; a fault of level 3
+// under right checksums was written that way.
 #include "engine/verify/surveyed_page.h"
 
 #include <algorithm>
@@ -21,14 +29,16 @@ constexpr char kPageKeys[] = "spec/container.md#page-keys";
 constexpr char kPageLevel[] = "spec/container.md#page-level";
 constexpr char kValues[] = "spec/points.md#attribute-pages";
 
-constexpr std::size_t kPayloadHashAt = 48;  // in the page header
+constexpr std::size_t kPayloadHashAt = 48;  // offset of the payload's checksum in the page header
 
+/// Compares the key range of a page header with that of its records, `whose` they are.
 void check_keys(const PageHeader& header, std::uint64_t first, std::uint64_t last,
                 const char* whose) {
   if (header.first_key == first && header.last_key == last) return;
-  throw FormatError(32, kPageKeys, fmt::format("keys are not those of its {}", whose));
+  throw FormatError(32, kPageKeys, fmt::format("the key range is not that of its {}", whose));
 }
 
+/// Compares the level and the key range of a page header with those of its groups.
 void check_groups(const PageHeader& header, const NodePage& nodes) {
   int least = kMaxLevel;
   std::uint64_t first = ~std::uint64_t{0}, last = 0;
@@ -38,17 +48,20 @@ void check_groups(const PageHeader& header, const NodePage& nodes) {
     last = std::max(last, nodes[slot].cell().high);
   }
   if (least != header.level)
-    throw FormatError(22, kPageLevel, "level is not the least of its groups");
+    throw FormatError(22, kPageLevel, "the level is not the lowest level of its groups");
   check_keys(header, first, last, "groups");
 }
 
-/// Halves and floats are finite: exponents below the greatest.
+/// Checks that the halves and floats of a channel group are finite, which is when not all bits of
+/// the exponent are set.
+/// @param column  the first column of the group
 void check_values(const PageHeader& header, const Meta& meta, const std::byte* column) {
   const auto check = [&]<class T>(T infinity, std::size_t count, const std::string& name) {
     for (std::size_t i = 0; i < count; ++i) {
       if ((load<T>(column, i * sizeof(T)) & infinity) != infinity) continue;
       throw FormatError(0, kValues,
-                        fmt::format("{} of point {} is not finite", name, i % header.record_count));
+                        fmt::format("the value of channel {} for point {} is not finite", name,
+                                    i % header.record_count));
     }
   };
   for (const Channel& channel : meta.channels) {
@@ -60,6 +73,7 @@ void check_values(const PageHeader& header, const Meta& meta, const std::byte* c
   }
 }
 
+/// Returns the finding that reports an error at an offset within a page.
 Finding finding_in(const PageSite& site, int level, const FormatError& error) {
   return finding_of(error.rebased(site.entry.offset, "").in_page(site.page), level);
 }
@@ -67,9 +81,11 @@ Finding finding_in(const PageSite& site, int level, const FormatError& error) {
 }  // namespace
 
 std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, FlipBudget& budget) {
+  // Read as much of the page as the level needs.
   const std::uint64_t offset = site.entry.offset;
   if (site.end() > file_.size()) {
-    Finding finding = finding_in(site, 2, {kPageHeaderBytes, kPayload, "the file ends in it"});
+    Finding finding =
+        finding_in(site, 2, {kPageHeaderBytes, kPayload, "the file ends inside this page"});
     finding.cause = Cause::truncated;
     return finding;
   }
@@ -83,11 +99,13 @@ std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, Flip
     finding.bytes = image_.size();
     return finding;
   }
+  // Check the header, then the payload's checksum.
   if (auto finding = check_header(site, budget)) return finding;
   if (auto finding = check_agreement(site)) return finding;
   if (level < 2) return std::nullopt;
   if (auto finding = check_payload(site, budget)) return finding;
   if (level < 3 || !has_content()) return std::nullopt;
+  // Decode the payload, and check its content.
   payload_.resize(std::max<std::size_t>(payload_.size(), header_.raw_bytes));
   PageRules rules{.columns = &survey_.columns};
   try {
@@ -115,14 +133,17 @@ std::optional<Finding> SurveyedPage::check_header(const PageSite& site, FlipBudg
     Finding finding = finding_in(site, 1, error);
     const std::string code = code_of(finding);
     const auto decode = [&] { static_cast<void>(decode_page_header(bytes, *survey_.header)); };
+    // A header that is right under its checksum was written that way.
     Diagnosis seen = diagnose_sealed(bytes, decode, budget);
     if (code != "page-magic" && code != "page-checksum") seen = {Cause::writer};
+    // A header whose checksum fails although the payload's holds belongs to another file: the
+    // file's uuid is part of the seed of the header's checksum.
     if (code == "page-checksum" && seen.cause == Cause::unknown &&
         image_.size() > kPageHeaderBytes &&
         xxh3_64(stored().first(
             std::min<std::size_t>(stored().size(), load<std::uint32_t>(image_.data(), 12)))) ==
             load<std::uint64_t>(image_.data(), kPayloadHashAt)) {
-      seen = {Cause::stale, "it is a whole page of another file"};
+      seen = {Cause::stale, "it is an intact page of another file"};
     }
     apply(seen, site.entry.offset, finding);
     if (!repaired(finding, site.entry.offset)) return finding;
@@ -168,18 +189,19 @@ bool SurveyedPage::repaired(const Finding& finding, std::uint64_t page_offset) {
   return true;
 }
 
-/// Values of channels whose names are lost say nothing.
+/// Returns whether the payload can be checked: values of channels whose types are lost cannot.
 bool SurveyedPage::has_content() const {
   return header_.type != PageType::attribute || survey_.columns.contains(header_.group);
 }
 
-/// Readers check it when they open the file, which this one may not be for them.
+/// Checks the payload size against the channels. Readers check it when they open a file; this file
+/// may be one that does not open.
 void SurveyedPage::check_channels() const {
   if (header_.type != PageType::attribute) return;
   if (header_.raw_bytes ==
       header_.record_count * group_point_bytes(survey_.meta.channels, header_.group))
     return;
-  throw FormatError(16, kValues, "is not as long as its channels are");
+  throw FormatError(16, kValues, "the payload does not have the size that its channels need");
 }
 
 void SurveyedPage::check_content() const {

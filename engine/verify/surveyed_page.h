@@ -1,4 +1,4 @@
-// One page of a surveyed file, read and held to its rules.
+// The check of a single page of a surveyed file against all rules that concern it alone.
 #pragma once
 
 #include <cstddef>
@@ -10,30 +10,32 @@
 
 namespace ptc {
 
-/// Reads pages. One per thread.   Memory: two pages and what their decoder takes.
+/// Reads and checks pages, one at a time.
+/// Memory: two pages and what their decoder takes.   Threads: not thread-safe; one for each thread.
 class SurveyedPage {
  public:
-  /// Both must outlive this.
-  /// @param repair  a bit whose flip makes a checksum right is flipped, and no fault
+  /// @param file, survey  must outlive this
+  /// @param repair        flip back a bit whose flip makes a checksum right, in memory only, and
+  ///                      report no fault
   SurveyedPage(const InputFile& file, const Survey& survey, bool repair = false)
       : file_(file), survey_(survey), repair_(repair) {}
 
-  /// Reads a page and goes through its rules until one is broken.
-  /// @param level   1: its header; 2: and its payload's checksum; 3: and what it decodes to
-  /// @param budget  for telling what may have damaged it
-  /// @return  what is wrong, or nothing
-  /// @throws std::system_error but for EIO, which is a finding
+  /// Reads a page and checks its rules until one is broken.
+  /// @param level   1: the header; 2: also the payload's checksum; 3: also the decoded content
+  /// @param budget  pays for the diagnosis of damage
+  /// @return  the first fault; empty when there is none
+  /// @throws std::system_error, except for EIO, which is a finding
   [[nodiscard]] std::optional<Finding> check(const PageSite& site, int level, FlipBudget& budget);
 
-  /// Of the page last checked without a finding.
+  /// Returns the header of the page that check() last passed without a finding.
   [[nodiscard]] const PageHeader& header() const noexcept { return header_; }
-  /// Its payload, when the level was 3.
+  /// Returns the decoded payload of the page that check() last passed at level 3.
   [[nodiscard]] std::span<const std::byte> payload() const noexcept {
     return std::span(payload_).first(header_.raw_bytes);
   }
 
  private:
-  /// Its payload as it is stored, from level 2 on.
+  /// Returns the payload as stored; empty below level 2.
   [[nodiscard]] std::span<const std::byte> stored() const noexcept {
     return std::span(image_).subspan(kPageHeaderBytes);
   }
@@ -44,7 +46,8 @@ class SurveyedPage {
   void check_channels() const;
   void check_content() const;
 
-  /// Flips the bit that a finding names, where that is wanted.
+  /// Flips back the bit that a finding names, if this checker repairs.
+  /// @return  whether the bit was flipped
   [[nodiscard]] bool repaired(const Finding& finding, std::uint64_t page_offset);
 
   const InputFile& file_;
@@ -52,8 +55,8 @@ class SurveyedPage {
   bool repair_;
   PageDecoder decoder_;
   PageHeader header_;
-  std::vector<std::byte> image_;
-  std::vector<std::byte> payload_;
+  std::vector<std::byte> image_;    ///< the page as stored, as far as the level needs it
+  std::vector<std::byte> payload_;  ///< decoded
 };
 
 }  // namespace ptc

@@ -1,4 +1,14 @@
-// The levels of a verification, one after another (engine/verify/verify.h).
+// Runs the levels of a verification one after another. Each level examines more of the file and
+// leans on what the levels before found sound:
+//
+//   0 commit     header ............................... superblock A | superblock B
+//   1 directory         header of each page | directory
+//   2 payload           every byte of each page, and the padding between pages
+//   3 content           decoded pages | tree against points | totals
+//   4 rebuild           tree built again from the points, compared bit by bit
+//
+// Levels 0 to 2 work on any file whose identity is known; 3 and 4 need a file that opens, because
+// the tree refers to pages by their numbers. Pages with a fault are excluded from the tree's check.
 #include "engine/verify/verify.h"
 
 #include <algorithm>
@@ -25,7 +35,7 @@ constexpr std::size_t kMaxCachedPages = 1024;
 constexpr std::size_t kMinCachedPages = 8;
 constexpr std::size_t kPagesAtOnce = 256;
 
-/// Part of a file.
+/// A range of bytes of a file, from `begin` up to `end`.
 struct Extent {
   std::uint64_t begin = 0;
   std::uint64_t end = 0;
@@ -52,7 +62,7 @@ class FileCheck {
       if (options_.level >= VerifyLevel::payload && survey_.container) check_padding();
       if (options_.level >= VerifyLevel::content && survey_.container) check_tree(progress);
       if (options_.level >= VerifyLevel::rebuild && report_.tree_checked) rebuild(progress);
-    } catch (const StopVerifying&) {  // it was found
+    } catch (const StopVerifying&) {  // the first damage was found, and no more was asked for
     }
     return report();
   }
@@ -72,12 +82,14 @@ class FileCheck {
     return std::move(report_);
   }
 
+  /// Divides the memory: what is fixed first, and the rest for node pages.
+  /// @throws LimitError when less than kMinCachedPages remain
   void keep_to_cap() {
     if (!survey_.superblock) return;
     const Superblock& s = *survey_.superblock;
     const std::uint64_t page = std::uint64_t{1} << s.header.page_shift;
     const std::uint64_t groups =
-        survey_.container ? s.node_groups : 0;  // a lone superblock may say anything
+        survey_.container ? s.node_groups : 0;  // a superblock alone proves no number of groups
     const std::uint64_t fixed = kBaseBytes + 100 * survey_.sites.size() + groups / 8 +
                                 3 * page * executor_.threads() + 100 * s.leaf_points;
     const std::uint64_t least = fixed + kMinCachedPages * page;
@@ -90,7 +102,7 @@ class FileCheck {
         std::min<std::uint64_t>(kMaxCachedPages, (options_.memory_bytes - fixed) / page));
   }
 
-  /// What keeps readers from opening the file is a finding, unless it was found in a page or the
+  /// Reports why readers refuse the file, unless the same rule was found broken in a page or in the
   /// directory.
   void explain_refusal() {
     if (!survey_.refusal) return;
@@ -98,12 +110,15 @@ class FileCheck {
     if (std::ranges::none_of(findings_.kept(), same)) findings_.add(*survey_.refusal);
   }
 
+  /// Checks the pages in rounds of kPagesAtOnce, so that findings are added in the order of the
+  /// file for any number of threads.
   void check_pages(Progress& progress) {
     progress.begin("check pages", survey_.sites.size(), "pages");
     std::vector<std::unique_ptr<SurveyedPage>> pages(executor_.threads());
     std::vector<std::optional<Finding>> found(kPagesAtOnce);
     report_.pages = 0;
     for (std::size_t first = 0; first < survey_.sites.size(); first += kPagesAtOnce) {
+      // Check one round of pages, while the system reads the next.
       const std::size_t count = std::min(kPagesAtOnce, survey_.sites.size() - first);
       read_ahead(first + count);
       executor_.for_each(count, [&](std::size_t i, unsigned thread) {
@@ -111,6 +126,7 @@ class FileCheck {
         found[i] = pages[thread]->check(survey_.sites[first + i], static_cast<int>(options_.level),
                                         flips_);
       });
+      // Add what they found, in their order.
       *report_.pages += count;
       for (std::size_t i = 0; i < count; ++i) {
         if (!found[i]) continue;
@@ -122,8 +138,8 @@ class FileCheck {
     progress.end();
   }
 
-  /// The pages of the next round, those from `first` on, come from the disk while others are
-  /// checked.
+  /// Asks the system to read the pages of the next round, from page `first` on, ahead of their
+  /// check.
   void read_ahead(std::size_t first) const noexcept {
     if (first >= survey_.sites.size() || options_.level < VerifyLevel::payload) return;
     const std::uint64_t begin = survey_.sites[first].entry.offset;
@@ -132,7 +148,7 @@ class FileCheck {
     if (begin < end) file_.read_ahead(begin, end - begin);
   }
 
-  /// What lies between the pages of a container that opens.
+  /// Checks the bytes between the pages of a container that opens.
   void check_padding() {
     std::uint64_t from = kBlockBytes;
     for (const PageSite& site : survey_.sites) {
@@ -141,7 +157,7 @@ class FileCheck {
     }
     const Superblock& s = *survey_.superblock;
     check_zero({from, s.directory_offset});
-    // Directory pages were checked when the file was opened, all but what pads the last.
+    // Opening the file checked the directory pages, but not the padding after the last of them.
     const std::uint32_t full = directory_entries_per_page(s.header);
     const std::uint64_t entries = s.page_count - (s.directory_pages - 1) * std::uint64_t{full};
     const std::uint64_t last =
@@ -150,6 +166,7 @@ class FileCheck {
         {last + kPageHeaderBytes + entries * kDirectoryEntryBytes, s.file_bytes - 2 * kBlockBytes});
   }
 
+  /// Reports the bytes of a gap that are not zero, from the first to the last, as one finding.
   void check_zero(Extent gap) {
     std::array<std::byte, 2 * kBlockBytes> block;
     Finding finding{.level = 2, .rule = kPadding};
@@ -167,10 +184,11 @@ class FileCheck {
     }
     if (bits == 0) return;
     finding.cause = bits == 1 ? Cause::bit_flip : Cause::unknown;
-    finding.text = "byte between pages is not zero";
+    finding.text = "the space between pages is not zero";
     findings_.add(std::move(finding));
   }
 
+  /// Walks the tree, excluding damaged pages, and takes over what it counted.
   void check_tree(Progress& progress) {
     std::vector<bool> damaged(survey_.container->page_count());
     for (const PageSite& site : survey_.sites) damaged[site.page] = !site.sound;
@@ -194,7 +212,7 @@ class FileCheck {
     try {
       report_.tree_digest =
           compare_rebuilt(*survey_.container, cached_pages_, findings_, executor_, progress);
-    } catch (const FormatError&) {  // points that descend were found before, and have no tree
+    } catch (const FormatError&) {  // points out of order have no tree, and were reported before
     }
     progress.end();
   }

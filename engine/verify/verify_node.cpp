@@ -1,4 +1,12 @@
-// The bounds of quantisation, one function a quantity.
+// Holds each stored quantity of a node to the bounds that quantisation allows, one function for
+// each quantity (engine/verify/verify_node.h lists the bounds).
+//
+// Mean, area, shares and radiance are rounded to the nearest step and may differ either way.
+// Sphere, slab and cone must enclose the points, so that they are rounded outwards, by at most one
+// step.
+//
+//   area      ----[--exact--]----        radius    ----needed[-------]----
+//                  accepted                                  accepted
 #include "engine/verify/verify_node.h"
 
 #include <algorithm>
@@ -20,10 +28,11 @@ constexpr char kSlab[] = "spec/nodes.md#node-slab";
 constexpr char kSums[] = "spec/nodes.md#node-sums";
 constexpr char kCone[] = "spec/nodes.md#node-cone";
 
-constexpr double kRelative = 1e-6;        // sums in another order
-constexpr double kLatticeSlack = 0x1p-8;  // the same for positions up to 2^42 in double
-constexpr double kAngleSlack = 1e-6;      // normals and axes are unit to float precision
+constexpr double kRelative = 1e-6;        // what another order of summation changes in a sum
+constexpr double kLatticeSlack = 0x1p-8;  // what it changes in positions up to 2^42, lattice units
+constexpr double kAngleSlack = 1e-6;      // normals and axes have unit length to float precision
 
+// The ranges of the stored numbers: 16-bit unsigned floats and shared-exponent colours.
 constexpr double kMaxUfloat16 = 0x1.ffp127;
 constexpr double kMinUfloat16 = 0x1p-134;
 constexpr double kMinRgbe = 0x1p-136;
@@ -45,7 +54,7 @@ double dot(const Vec3& a, const Vec3& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// Angle between two vectors; exact to double where they are nearly parallel.
+/// Returns the angle between two vectors [rad], which stays exact where they are nearly parallel.
 double angle_between(const Vec3& a, const Vec3& b) {
   const Vec3 cross{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
   return std::atan2(std::sqrt(dot(cross, cross)), dot(a, b));
@@ -58,9 +67,8 @@ std::optional<Fault> compare_mean(const NodeSummary& stored, const NodeSummary& 
     const double off = exact.mean[k] - stored.mean[k];
     const bool at_end = off > 0 && std::fmod(stored.mean[k], edge) == edge - step;
     if (std::abs(off) > (at_end ? 1.0 : 0.5) * step + kLatticeSlack) {
-      return Fault{kMean,
-                   fmt::format("mean position {} along {} is that of no such points, theirs is {}",
-                               stored.mean[k], "xyz"[k], exact.mean[k])};
+      return Fault{kMean, fmt::format("the mean position {} along {} is not that of the points, {}",
+                                      stored.mean[k], "xyz"[k], exact.mean[k])};
     }
   }
   return {};
@@ -71,12 +79,13 @@ std::optional<Fault> compare_sphere(const NodeSummary& stored, const NodeSummary
   const double least = std::min(needed, kMaxUfloat16) * (1 - kRelative) - kLatticeSlack;
   const double most = (needed + kLatticeSlack) * (1 + 0x1p-8) * (1 + kRelative) + kMinUfloat16;
   if (stored.radius >= least && stored.radius <= most) return {};
-  return Fault{kSphere, fmt::format("sphere of radius {} lattice units about the mean position, "
-                                    "its points take {}",
+  return Fault{kSphere, fmt::format("the sphere about the mean position has a radius of {} lattice "
+                                    "units, but the points need {}",
                                     stored.radius, needed)};
 }
 
-/// Unit normal of the slab that a summary's shares give, zero where there is none.
+/// Returns the unit normal of the slab, which is the direction of the summed facing areas; zero
+/// where they cancel out.
 Vec3 slab_normal(const NodeSummary& node) {
   Vec3 sum{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3],
            node.facing[4] - node.facing[5]};
@@ -95,16 +104,16 @@ std::optional<Fault> compare_slab(const NodeSummary& stored, const NodeSummary& 
   const double least = std::min(needed, kMaxUfloat16) - slack;
   const double most = (needed + slack) * (1 + 0x1p-8) * (1 + kRelative) + kMinUfloat16;
   if (stored.thickness >= least && stored.thickness <= most) return {};
-  return Fault{kSlab, fmt::format("slab of thickness {} lattice units about the mean position, "
-                                  "its points take {}",
+  return Fault{kSlab, fmt::format("the slab about the mean position has a thickness of {} lattice "
+                                  "units, but the points need {}",
                                   stored.thickness, needed)};
 }
 
 std::optional<Fault> compare_area(const NodeSummary& stored, const NodeSummary& exact) {
   const double area = std::min(exact.area, kMaxUfloat16);
   if (std::abs(stored.area - area) <= area * (0x1p-9 + kRelative) + kMinUfloat16) return {};
-  return Fault{kSums,
-               fmt::format("area {} is not the sum {} of its points", stored.area, exact.area)};
+  return Fault{kSums, fmt::format("the area {} is not the sum over the points, {}", stored.area,
+                                  exact.area)};
 }
 
 std::optional<Fault> compare_radiance(const NodeSummary& stored, const NodeSummary& exact,
@@ -115,8 +124,9 @@ std::optional<Fault> compare_radiance(const NodeSummary& stored, const NodeSumma
   for (std::size_t c = 0; c < 3; ++c) {
     const double found = stored.flux[k][c] / stored.facing[k];
     if (std::abs(found - radiance[c]) > greatest * (1.0 / 256 + kRelative) + kMinRgbe) {
-      return Fault{kSums, fmt::format("radiance {} ({}) along {} is not the mean {} of its points",
-                                      found, "rgb"[c], axis_name(k), radiance[c])};
+      return Fault{kSums,
+                   fmt::format("the radiance {} ({}) along {} is not the mean over the points, {}",
+                               found, "rgb"[c], axis_name(k), radiance[c])};
     }
   }
   return {};
@@ -129,7 +139,8 @@ std::optional<Fault> compare_light(const NodeSummary& stored, const NodeSummary&
     const double share = std::min(exact.facing[k] / exact.area, 1.0);
     if (std::abs(found - share) > 0.5 / 65535 + kRelative) {
       return Fault{kSums,
-                   fmt::format("share {} of the area that faces {} is not the {} of its points",
+                   fmt::format("the share {} of the area that faces {} is not that of the points, "
+                               "{}",
                                found, axis_name(k), share)};
     }
     if (!(stored.facing[k] > 0) || !(exact.facing[k] > 0)) continue;
@@ -143,14 +154,17 @@ std::optional<Fault> compare_cone(const NodeSummary& stored, const NodeSummary& 
   constexpr double kCosSlack = 1e-5;
   const double turned = angle_between(widen(stored.cone_axis), widen(exact.cone_axis));
   if (turned > kAxisAngle) {
-    return Fault{kCone,
-                 fmt::format("cone's axis is {} rad off the mean normal of its points", turned)};
+    return Fault{
+        kCone,
+        fmt::format("the cone's axis is {} rad away from the mean normal of the points", turned)};
   }
   const double half = std::acos(std::clamp(static_cast<double>(exact.cone_cos), -1.0, 1.0));
   const double needed = half + turned >= kPiDouble ? -1.0 : std::cos(half + turned);
   const auto found = static_cast<double>(stored.cone_cos);
   if (found <= needed + kCosSlack && found >= needed - 1.0 / 32767 - kCosSlack) return {};
-  return Fault{kCone, fmt::format("cone's cosine {} is not that of its points, {}", found, needed)};
+  return Fault{kCone, fmt::format("the cosine {} of the cone's angle is not the one that the "
+                                  "points need, {}",
+                                  found, needed)};
 }
 
 }  // namespace
@@ -172,6 +186,7 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
   const Vec3 slab = slab_normal(stored);
   const double thickness = stored.thickness + kRelative * stored.radius + kLatticeSlack;
   for (std::size_t i = 0; i < points.size(); ++i) {
+    // Check the disc against the sphere.
     const LatticePoint at = decode_morton(points[i].key);
     const Vec3 position{static_cast<double>(at[0]), static_cast<double>(at[1]),
                         static_cast<double>(at[2])};
@@ -180,9 +195,10 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
     if (reach > radius && stored.radius < kMaxUfloat16) {
       return Fault{kSphere,
                    fmt::format("disc {} of the leaf reaches {} lattice units from the mean "
-                               "position, beyond the sphere's {}",
+                               "position, beyond the sphere's radius of {}",
                                i, reach, stored.radius)};
     }
+    // Check the disc against the slab: a disc tilted against it reaches further.
     const Vec3 normal = widen(decode_octahedral(points[i].normal[0], points[i].normal[1]));
     const double tilt = std::sin(angle_between(slab, normal));
     const double height = std::abs(dot(slab, position) - dot(slab, stored.mean)) +
@@ -190,11 +206,13 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const Poi
     if (height > thickness && stored.thickness < kMaxUfloat16) {
       return Fault{kSlab,
                    fmt::format("disc {} of the leaf reaches {} lattice units from the middle "
-                               "plane, beyond the slab's {}",
+                               "plane, beyond the slab's thickness of {}",
                                i, height, stored.thickness)};
     }
+    // Check the normal against the cone.
     if (dot(normal, axis) < static_cast<double>(stored.cone_cos) - kAngleSlack) {
-      return Fault{kCone, fmt::format("normal {} of the leaf is outside the cone", i)};
+      return Fault{kCone,
+                   fmt::format("the normal of disc {} of the leaf lies outside the cone", i)};
     }
   }
   return {};

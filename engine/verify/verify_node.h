@@ -1,4 +1,4 @@
-// Inside the whole-file check: what a node stores against what lies below it.
+// The whole-file check of one node: the summary that it stores against the points below it.
 #pragma once
 
 #include <optional>
@@ -10,33 +10,39 @@
 
 namespace ptc {
 
-/// A rule that is broken: its clause and how.
+/// A broken rule.
 struct Fault {
-  const char* clause = "";
-  std::string text;
+  const char* clause = "";  ///< anchor of the rule
+  std::string text;         ///< how it is broken, in words
 };
 
-/// Compares a stored summary with the exact one of the same points, within what quantisation may
-/// move (spec/nodes.md#quantisation):
+/// Compares a stored summary with the exact summary of the same points. A stored value may differ
+/// by as much as quantisation moves it (spec/nodes.md#quantisation):
 ///
 ///   mean      half a step of cell edge / 65536; a whole one at the upper end of the cell
 ///   radius    at least exact radius + |stored mean - exact mean|, at most 1 + 2^-8 times that
-///   slab      at least exact thickness + radius |stored normal - exact normal| + |stored mean -
-///   exact
-///             mean| or else the sphere's radius, at most 1 + 2^-8 times that
+///   slab      at least the lesser of
+///               exact thickness + exact radius * |stored normal - exact normal|
+///                               + |stored mean - exact mean|
+///               exact radius    + |stored mean - exact mean|,
+///             at most 1 + 2^-8 times that
 ///   area      2^-9 of itself
 ///   facing    half a step of 1 / 65535 of the area, along each axis
 ///   radiance  1 / 256 of its greatest component, along each axis that faces at all
 ///   cone      axis within 0.018 rad; angle at least that of the exact cone about the stored axis,
 ///             its cosine at most a step of 1 / 32767 below that
 ///
-/// and sums in another order may move: 2^-8 lattice units, 1e-6 of everything else.
-/// @param cell_level  of the group that stores it
+/// plus what a different order of summation moves: 2^-8 lattice units for positions, a relative
+/// 1e-6 for everything else.
+/// @param cell_level  level of the group that stores the summary
+/// @return  the first difference that is too large; empty when there is none
 [[nodiscard]] std::optional<Fault> compare_summary(const NodeSummary& stored,
                                                    const NodeSummary& exact, int cell_level);
 
-/// Checks that the stored sphere and slab hold every disc and the stored cone every normal.
-/// @param unit  lattice unit in scene units
+/// Checks that the stored sphere and slab contain every disc and the stored cone every normal.
+/// @param points  all points of a leaf
+/// @param unit    lattice unit in scene units
+/// @return  the first disc or normal that lies outside; empty when there is none
 [[nodiscard]] std::optional<Fault> check_bounds(const NodeSummary& stored,
                                                 std::span<const PointRecord> points, double unit);
 

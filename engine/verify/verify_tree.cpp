@@ -1,4 +1,14 @@
-// The octree against its points (spec/nodes.md#verify).
+// Checks the octree against its points (spec/nodes.md#verify) in one walk, depth first. Leaves must
+// take the points in their order without a gap, so tree and points are read side by side:
+//
+//   path_    root group > child group > ... > leaf      one open group for each level
+//                                              |
+//   points_  ....read....................[its points].....
+//
+// On the way back up, the exact summary of each child's points is combined into that of its parent,
+// so that every stored summary is compared with one computed from the points alone. Where pages are
+// damaged, the walk skips what they hold: sums above are then unknown and not compared, and the
+// next leaf may begin at a later point.
 #include "engine/verify/verify_tree.h"
 
 #include <algorithm>
@@ -27,20 +37,21 @@ constexpr char kReferences[] = "spec/nodes.md#references";
 constexpr char kCounts[] = "spec/container.md#superblock-counts";
 constexpr char kRoot[] = "spec/container.md#superblock-root";
 
-/// A group, where it lies, and what was found below it so far.
+/// A group on the path from the root, where it lies, and what was found below it so far.
 struct OpenGroup {
   NodeGroup group;
-  std::uint32_t page = 0;
-  std::uint64_t from_header =
-      0;                     ///< where it lies in the page; of its payload when that is compressed
-  std::string place;         ///< for messages
-  std::size_t next = 0;      ///< child to be visited
-  std::uint64_t points = 0;  ///< in the children visited
-  int last_octant = -1;      ///< of the child before
-  bool complete = true;      ///< all children so far were visited whole
-  std::array<NodeSummary, kMaxChildren> exact;  ///< of the children visited
+  std::uint32_t page = 0;         ///< page that the group lies in
+  std::uint64_t from_header = 0;  ///< bytes from the page header to the group, or to the payload if
+                                  ///< that is compressed
+  std::string place;              ///< the group's name in messages, ending in ": "
+  std::size_t next = 0;           ///< the child to visit next
+  std::uint64_t points = 0;       ///< points in the children visited
+  int last_octant = -1;           ///< octant of the child visited last, 0 to 7
+  bool complete = true;           ///< nothing was skipped in the children visited
+  std::array<NodeSummary, kMaxChildren> exact;  ///< exact summaries of the children visited
 };
 
+/// Decodes a group, and notes where it lies for messages.
 OpenGroup open_group(NodePages& pages, std::uint32_t page, std::uint16_t slot) {
   const NodePages::Place place = pages.page(page);
   const auto at = static_cast<std::size_t>(place.nodes[slot].bytes().data() - place.payload);
@@ -53,7 +64,8 @@ OpenGroup open_group(NodePages& pages, std::uint32_t page, std::uint16_t slot) {
   return opened;
 }
 
-/// Which groups were reached: a bit each, numbered through all node pages.
+/// Records which groups were reached, with one bit for each: groups are numbered consecutively
+/// through all node pages.
 class ReachedGroups {
  public:
   explicit ReachedGroups(const ContainerReader& container)
@@ -66,14 +78,14 @@ class ReachedGroups {
     bits_.resize(groups);
   }
 
-  /// False when it was reached before.
+  /// Marks a group as reached. Returns false when it was reached before.
   bool reach(std::uint32_t page, std::uint16_t slot) {
     const std::uint64_t group = first_[page] + slot;
     if (bits_[group]) return false;
     return bits_[group] = true;
   }
 
-  /// Groups that were not reached, page by page.
+  /// Reports the groups that were not reached, with one finding for each page.
   void report_rest(const TreeReport& report) const {
     for (const std::uint32_t page : container_.node_pages()) {
       const auto first = bits_.begin() + static_cast<std::ptrdiff_t>(first_[page]);
@@ -83,17 +95,17 @@ class ReachedGroups {
       const auto others = std::count(missed, last, false) - 1;
       report.page(page, 0, kReferences,
                   fmt::format("group {} is the child of no node{}", missed - first,
-                              others > 0 ? fmt::format(", nor are {} more", others) : ""));
+                              others > 0 ? fmt::format("; other such groups: {}", others) : ""));
     }
   }
 
  private:
   const ContainerReader& container_;
-  std::vector<std::uint64_t> first_;  ///< of a node page's groups
+  std::vector<std::uint64_t> first_;  ///< by page: the number of its first group
   std::vector<bool> bits_;
 };
 
-/// The walk: groups from the root to where it is now.
+/// The walk through the tree. Its path holds the open groups from the root to the current one.
 class TreeWalk {
  public:
   TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged,
@@ -107,10 +119,12 @@ class TreeWalk {
         points_(container, damaged, report_) {}
 
   TreeCounts run() {
+    // Walk the tree.
     if (superblock_.points > 0) {
       enter(superblock_.root_page, superblock_.root_slot);
       while (!path_.empty()) step();
     }
+    // Compare the totals with the superblock's, unless a part was skipped.
     if (!counts_.complete) return counts_;
     reached_.report_rest(report_);
     points_.finish();
@@ -124,21 +138,21 @@ class TreeWalk {
   void require_equal(const char* clause, const char* what, std::uint64_t said,
                      std::uint64_t found) const {
     if (said == found) return;
-    report_.superblock(clause,
-                       fmt::format("superblock says {} {}, the tree has {}", said, what, found));
+    report_.superblock(clause, fmt::format("the superblock records {} {}, but the tree has {}",
+                                           said, what, found));
   }
 
   void fault(const OpenGroup& open, const char* clause, const std::string& text) const {
     report_.page(open.page, open.from_header, clause, open.place + text);
   }
 
-  /// Passes over what the child that is next holds.
+  /// Skips the next child and everything below it.
   void pass_over() {
     resume_ = true;
     leave_incomplete();
   }
 
-  /// Of the child that is next not all was visited.
+  /// Moves on from the next child, and notes that something below it was skipped.
   void leave_incomplete() {
     counts_.complete = false;
     if (path_.empty()) return;
@@ -146,7 +160,7 @@ class TreeWalk {
     ++path_.back().next;
   }
 
-  /// Visits one child, or leaves the innermost group when all were visited.
+  /// Visits the next child of the innermost group, or leaves the group after its last child.
   void step() {
     OpenGroup& open = path_.back();
     if (open.next == open.group.children.size()) {
@@ -161,11 +175,12 @@ class TreeWalk {
     }
   }
 
+  /// Opens a group, unless it is damaged or its place in the tree is wrong.
   void enter(std::uint32_t page, std::uint16_t slot) {
     if (damaged_[page]) return pass_over();
     OpenGroup open = open_group(pages_, page, slot);
     if (!reached_.reach(page, slot)) {
-      fault(open, kReferences, "is the child of two nodes");
+      fault(open, kReferences, "it is the child of two nodes");
       return pass_over();
     }
     if (path_.empty()) {
@@ -183,22 +198,24 @@ class TreeWalk {
     const std::vector<NodeChild>& children = open.group.children;
     if (children.size() > 1) return;
     if (children[0].ref.interior || open.group.level != 0) {
-      fault(open, kChildren, "a root with one child is not a leaf at level 0");
+      fault(open, kChildren, "the root has one child, which is not a leaf at level 0");
     }
   }
 
-  /// @return  false when its level is not below its parent's: going on might never end
+  /// Checks a group against its parent: its level, its cell and its place among the children.
+  /// @return  false when it is not deeper than its parent, so that the walk might never end
   bool check_inside(const OpenGroup& open, OpenGroup& parent) const {
     const NodeGroup& group = open.group;
     const NodeGroup& around = parent.group;
     if (group.level <= around.level) {
       fault(open, kLevel,
-            fmt::format("level {} is not below its parent's {}", group.level, around.level));
+            fmt::format("its level {} is not deeper than its parent's, {}", group.level,
+                        around.level));
       return false;
     }
-    if (group.children.size() < 2) fault(open, kChildren, "has one child and is not the root");
+    if (group.children.size() < 2) fault(open, kChildren, "it has one child but is not the root");
     if (!contains(around, group.cell)) {
-      fault(open, kCell, "cell lies outside its parent's");
+      fault(open, kCell, "its cell lies outside its parent's cell");
     } else {
       check_next_octant(parent, group.cell);
     }
@@ -209,42 +226,49 @@ class TreeWalk {
     return cell_of(key, std::min(group.level, kLatticeBits)) == group.cell;
   }
 
-  /// Children lie in octants of their own, in ascending order. Below the lattice rank tells them
-  /// apart, and a root that is a leaf has no octants.
+  /// Checks that the next child lies in a later octant than the child before it. Below the lattice
+  /// children differ by rank instead, and a root that is a leaf has no octants.
+  /// @param key  of any point of the child
   void check_next_octant(OpenGroup& open, const MortonKey& key) const {
     if (open.group.level >= kLatticeBits || open.group.children.size() == 1) return;
     const int digit = octant(key, open.group.level + 1);
     if (digit <= open.last_octant) {
-      fault(open, kChildren,
-            fmt::format("child {} is not in an octant behind the one before", open.next));
+      fault(
+          open, kChildren,
+          fmt::format("child {} does not lie in a later octant than the child before", open.next));
     }
     open.last_octant = digit;
   }
 
+  /// Reads the points of a leaf, and checks their order, their cell and the leaf's summary.
   void visit_leaf(OpenGroup& open, const ChildRef& ref) {
     const auto child_fault = [&](const char* clause, const std::string& text) {
       fault(open, clause, fmt::format("child {}: {}", open.next, text));
     };
+    // Check that its points follow those of the leaf before, and are not too many.
     if (ref.first_point != next_point_ && !(resume_ && ref.first_point > next_point_)) {
-      child_fault(kLeaf, fmt::format("its points begin with {}, the next is {}", ref.first_point,
-                                     next_point_));
+      child_fault(kLeaf, fmt::format("its points begin with number {}, but the next point is "
+                                     "number {}",
+                                     ref.first_point, next_point_));
       return pass_over();
     }
     resume_ = false;
     next_point_ = ref.first_point + ref.point_count;
     if (ref.point_count > superblock_.leaf_points) {
-      child_fault(kLeaf, fmt::format("has {} points, a leaf has at most {}", ref.point_count,
+      child_fault(kLeaf, fmt::format("it has {} points, but a leaf has at most {}", ref.point_count,
                                      superblock_.leaf_points));
     }
+    // Read them, and check that they lie in one octant of the group's cell.
     const auto points = points_.take(ref.first_point, ref.point_count);
     progress_.advance(ref.point_count);
     if (!points) return pass_over();
     const auto outside = [&](const PointRecord& point) { return !contains(open.group, point.key); };
     if (std::ranges::any_of(*points, outside)) {
-      child_fault(kCell, "points lie outside the cell");
+      child_fault(kCell, "its points lie outside the cell");
     } else {
       check_one_octant(open, *points);
     }
+    // Check the stored bounds point by point, then the whole summary.
     const NodeSummary& stored = open.group.children[open.next].node;
     const double unit = superblock_.header.frame.unit();
     auto wrong = check_bounds(stored, *points, unit);
@@ -257,12 +281,13 @@ class TreeWalk {
     const int level = open.group.level + 1;
     if (level > kLatticeBits || open.group.children.size() == 1) return;
     if (octant(points.front().key, level) != octant(points.back().key, level)) {
-      fault(open, kChildren, fmt::format("child {} lies in two octants", open.next));
+      fault(open, kChildren, fmt::format("child {} has points in more than one octant", open.next));
     }
   }
 
-  /// The child that is next was visited: `exact` is what lies below it.
-  /// @param compare  false when the child was found to be wrong already
+  /// Finishes the next child after all below it was visited.
+  /// @param exact    summary computed from its points
+  /// @param compare  false when the child's summary was already reported as wrong
   void close_child(OpenGroup& open, const NodeSummary& exact, std::uint64_t points, bool compare) {
     const NodeSummary& stored = open.group.children[open.next].node;
     if (const auto wrong =
@@ -274,13 +299,15 @@ class TreeWalk {
     ++open.next;
   }
 
+  /// Closes the innermost group, and combines its children's summaries into that of its parent's
+  /// child.
   void leave() {
     const OpenGroup open = std::move(path_.back());
     path_.pop_back();
     if (!open.complete) return leave_incomplete();
     const std::size_t count = open.group.children.size();
     if (count > 1 && open.points <= superblock_.leaf_points) {
-      fault(open, kLeaf, fmt::format("splits {} points, which are a leaf", open.points));
+      fault(open, kLeaf, fmt::format("it splits {} points, which fit into one leaf", open.points));
     }
     if (path_.empty()) return;
     std::array<const NodeSummary*, kMaxChildren> parts{};
@@ -295,10 +322,11 @@ class TreeWalk {
   NodePages pages_;
   ReachedGroups reached_;
   PointRuns points_;
-  std::vector<OpenGroup> path_;  ///< at most 63: levels ascend
+  std::vector<OpenGroup> path_;  ///< open groups from the root, at most 63 because levels ascend
   TreeCounts counts_;
-  std::uint64_t next_point_ = 0;  ///< of the next leaf
-  bool resume_ = false;           ///< something was passed over: the next leaf may begin later
+  std::uint64_t next_point_ = 0;  ///< number of the point that the next leaf begins with
+  bool resume_ =
+      false;  ///< something was skipped, so that the next leaf may begin at a later point
 };
 
 }  // namespace

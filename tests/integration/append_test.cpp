@@ -168,7 +168,7 @@ TEST_CASE("append: what is damaged, shaded or too far away is refused, and the o
   const std::vector<char> old = bytes_of(place.dir / "a.ptcx");
   BuildRequest request{.inputs = {place.dir / "far.xyz"}, .append = place.dir / "a.ptcx"};
   CHECK_THROWS_WITH(build_container(request, place.dir / "a.ptcx", place.silent),
-                    Catch::Contains("build all anew"));
+                    Catch::Contains("build the whole scene again"));
 
   std::vector<char> damaged = old;
   damaged[damaged.size() / 3] = static_cast<char>(damaged[damaged.size() / 3] ^ 1);
