@@ -1,11 +1,19 @@
 #!/usr/bin/env bash
-# Writes every file of spec/results, one command after another. Nothing else should run meanwhile.
+# Writes every file of spec/results, one ptcbench command after another. Nothing else should run on the
+# machine meanwhile.
 #
 #   tools/measure.sh [--quick] [--list] [--bin DIR] [--work DIR] [--results DIR] [--only NAME] MESH
 #
-# MESH is the Stanford dragon, as tools/demo.sh fetches it. --quick takes seconds a file and shows
-# that each command works; its figures say nothing. --list prints names and commands and runs none.
-# Paths are relative to the root of the tree.
+#   MESH            the Stanford dragon, as tools/demo.sh fetches it
+#   --quick         takes seconds per file and shows that each command works; its figures mean nothing
+#   --list          prints the name and the command of each file, and runs nothing
+#   --bin DIR       directory of ptcbench (build/release/bin)
+#   --work DIR      directory for facts, tables and temporary files (build/measure)
+#   --results DIR   directory for the files of results (spec/results)
+#   --only NAME     writes only NAME.md
+#
+# Paths are relative to the root of the tree. Exit codes: 0 all files are written, 1 some experiments
+# failed (their names are printed), 2 usage.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -22,7 +30,7 @@ while [[ $# -gt 0 ]]; do
     --results) results=$2 && shift ;;
     --only) only=$2 && shift ;;
     -*)
-      echo "measure.sh: unknown option $1" >&2
+      echo "measure.sh: unknown option $1. The head of the script lists the options" >&2
       exit 2
       ;;
     *) mesh=$1 ;;
@@ -32,12 +40,13 @@ done
 if [[ -n $list ]]; then
   mesh=dragon.ply.gz
 elif [[ ! -r $mesh ]]; then
-  echo "measure.sh: give the mesh of the dragon, a file that can be read (tools/demo.sh fetches it)" >&2
+  echo "measure.sh: the mesh '$mesh' cannot be read. Give the mesh of the dragon, which tools/demo.sh fetches" >&2
   exit 2
 fi
 failed=()
 
-# measure NAME EXPERIMENT ARGUMENT... -- QUICK-ARGUMENT...: writes NAME.md
+# measure NAME EXPERIMENT ARGUMENT... -- QUICK-ARGUMENT...
+# Writes NAME.md by `ptcbench EXPERIMENT ARGUMENT...`, or with --quick and the QUICK-ARGUMENTs instead.
 measure() {
   local name=$1 experiment=$2 full=() short=()
   shift 2
@@ -84,6 +93,6 @@ measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 
 if [[ ${#failed[@]} -gt 0 ]]; then
-  echo "measure.sh: failed: ${failed[*]}" >&2
+  echo "measure.sh: these experiments failed: ${failed[*]}" >&2
   exit 1
 fi

@@ -191,9 +191,10 @@ TEST_CASE("chart: each set has a row of panels, each method a curve", "[bench][r
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
   CHECK(titles == std::vector<std::string>{"Camera: occlusion", "Camera: irradiance",
-                                           "Camera: irradiance, worst 1 %", "Camera: lit picture",
+                                           "Camera: irradiance, 99th percentile",
+                                           "Camera: visible difference of the picture",
                                            "Points: occlusion", "Points: irradiance",
-                                           "Points: irradiance, worst 1 %"});
+                                           "Points: irradiance, 99th percentile"});
   const ChartPanel& panel = chart.panels[1];
   REQUIRE(panel.series.size() == 2);
   CHECK(panel.series[0].name == "PTCX");

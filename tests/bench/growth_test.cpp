@@ -161,8 +161,9 @@ TEST_CASE("growth report: a panel for each thing that varied, and three for caps
   const Chart chart = report_of(all_rows(), 3).figures.front().chart;
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
-  CHECK(titles == std::vector<std::string>{"Surfels", "Solid angle", "Depth complexity", "Memory",
-                                           "Memory, wall time", "Reading"});
+  CHECK(titles == std::vector<std::string>{"Surfels", "Solid angle", "Depth complexity",
+                                           "Page cache: CPU time", "Page cache: wall time",
+                                           "Page cache: bytes read"});
   const ChartPanel& surfels = chart.panels[0];
   REQUIRE(surfels.series.size() == 2);
   CHECK(surfels.series[0].name == "PTCX");

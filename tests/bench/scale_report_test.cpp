@@ -109,8 +109,9 @@ TEST_CASE("scale report: panels of time, receivers, memory and bytes; limits are
   const Chart chart = report_of(rows_of({1'000'000, 20'000'000}), 5).figures.front().chart;
   std::vector<std::string> titles;
   for (const ChartPanel& panel : chart.panels) titles.push_back(panel.title);
-  CHECK(titles ==
-        std::vector<std::string>{"Time of a point", "Time of a receiver", "Memory", "Bytes"});
+  CHECK(titles == std::vector<std::string>{"Time per point: build, verify and their limits",
+                                           "Time per receiver: shade", "Peak memory",
+                                           "Bytes moved and stored"});
   const ChartPanel& time = chart.panels[0];
   std::vector<std::string> names;
   for (const ChartSeries& series : time.series) {

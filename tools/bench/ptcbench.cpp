@@ -1,4 +1,9 @@
-// ptcbench: what PTCX costs and how wrong it is, beside its rivals and its limits in the same run.
+// ptcbench: measures the costs and the errors of PTCX, next to those of its rivals and to the
+// limits of the machine, in the same run. Each experiment is a subcommand
+// (tools/bench/experiments):
+//
+//   command line -> Experiment -> Report -> DIR/NAME.json, .csv, .svg, .png     -o DIR
+//                                        -> DIR/NAME.md                         --results DIR
 #include <algorithm>
 #include <filesystem>
 #include <list>
@@ -16,11 +21,11 @@ namespace {
 using namespace ptc::bench;
 
 constexpr char kPurpose[] =
-    "Measures time and error together, against rays at the same scene in the same run; how time\n"
-    "grows, and what each part of the model is worth; sort, build and verification beside the "
-    "disk;\n"
-    "the page cache; and all of it at growing sizes. Draws charts and writes tables. Scenes of\n"
-    "accuracy, error, growth and model are held in memory whole, whatever --memory says.";
+    "Measures the time and the error of PTCX, against rays at the same scene in the same run; how\n"
+    "time grows, and what each part of the model is worth; sort, build and verification, compared\n"
+    "with the disk alone; the page cache; and the whole way at growing sizes. Writes tables and\n"
+    "draws charts. accuracy, error, growth and model hold their scenes in memory whole, whatever\n"
+    "--memory says.";
 constexpr char kExamples[] =
     "  ptcbench accuracy --quick -o charts\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
@@ -41,15 +46,16 @@ constexpr char kExamples[] =
     "charts\n"
     "  ptcbench verify --quick -o charts\n";
 
+/// The options that all experiments take.
 struct Arguments {
-  std::filesystem::path directory;
-  std::filesystem::path results;  ///< empty: no file of results
-  std::string name;               ///< of all files; empty: the experiment's
-  std::string commit;             ///< where the build knows none
+  std::filesystem::path directory;  ///< directory of facts, tables and charts
+  std::filesystem::path results;    ///< directory of NAME.md; empty: none is written
+  std::string name;                 ///< NAME of all files; empty: the experiment's
+  std::string commit;               ///< commit, where the build does not know it
   bool quick = false;
 };
 
-/// Refuses what would name a file in another directory, or a hidden one.
+/// Refuses names of files in other directories, and names of hidden files.
 std::string check_name(const std::string& name) {
   const bool plain = !name.empty() && name.front() != '.' && name.find('/') == std::string::npos;
   return plain ? std::string()
@@ -59,39 +65,44 @@ std::string check_name(const std::string& name) {
 void declare_results(CLI::App& command, Arguments& arguments) {
   constexpr char kGroup[] = "Results";
   command
-      .add_option("--results", arguments.results,
-                  "Also write NAME.md there: machine, commit, date, command, tables and charts")
+      .add_option(
+          "--results", arguments.results,
+          "Also write NAME.md there, with machine, commit, date, command, tables and charts")
       ->type_name("DIR")
       ->group(kGroup);
-  command.add_option("--name", arguments.name, "NAME of all files [default: the command's]")
+  command
+      .add_option("--name", arguments.name,
+                  "NAME of all files that are written [default: the experiment's]")
       ->type_name("NAME")
       ->check(CLI::Validator(check_name, ""))
       ->group(kGroup);
   command
       .add_option("--commit", arguments.commit,
-                  "Commit of the sources, for a program that was built outside of git")
+                  "Commit of the sources, where the program was built outside of git")
       ->type_name("TEXT")
       ->group(kGroup);
 }
 
-/// Declares what all experiments take, and what this one does.
+/// Declares the options of all experiments, and those of this one.
 void declare(Declaration& declaration, const Experiment& experiment, Arguments& arguments) {
   CLI::App& command = declaration.command();
   command.fallthrough();
   command
       .add_option("-o,--output", arguments.directory,
-                  "Directory for NAME.json, and for tables and charts as .csv, .svg and .png")
+                  "Directory for NAME.json, for tables (.csv) and for charts (.svg, .png)")
       ->type_name("DIR")
       ->required();
   command.add_flag("--quick", arguments.quick,
-                   std::string(experiment.quick) + "; what other options say stays");
+                   std::string(experiment.quick) + "; options that are given keep their values");
   experiment.declare(declaration);
   declare_results(command, arguments);
 }
 
+/// Runs an experiment, and writes its files after each part and at the end.
 ptc::Outcome run(const Experiment& experiment, const Arguments& arguments,
                  const ptc::RunOptions& run_options, ptc::Progress& progress,
                  const Circumstances& circumstances) {
+  // Refuse what cannot be measured, before anything is written
   if (experiment.check) experiment.check();
   std::filesystem::create_directories(arguments.directory);
   if (!arguments.results.empty()) std::filesystem::create_directories(arguments.results);
@@ -99,6 +110,7 @@ ptc::Outcome run(const Experiment& experiment, const Arguments& arguments,
     if (!arguments.name.empty()) report.name = arguments.name;
     return report;
   };
+  // Measure
   const std::filesystem::path work =
       run_options.temp_dirs.empty() ? arguments.directory : ptc::roomiest(run_options.temp_dirs);
   const Report report = named(experiment.run(
@@ -106,6 +118,7 @@ ptc::Outcome run(const Experiment& experiment, const Arguments& arguments,
        .run = run_options,
        .progress = progress,
        .publish = [&](const Report& so_far) { write_files(arguments.directory, named(so_far)); }}));
+  // Write the files
   write_files(arguments.directory, report);
   if (!arguments.results.empty()) write_results(arguments.results, report, circumstances);
   return {facts_of(report), text_of(report)};
@@ -114,6 +127,7 @@ ptc::Outcome run(const Experiment& experiment, const Arguments& arguments,
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Declare a subcommand for each experiment
   ptc::Command command("ptcbench", kPurpose, kExamples);
   Arguments arguments;
   std::list<std::pair<Experiment, Declaration>> all;
@@ -127,6 +141,7 @@ int main(int argc, char** argv) {
     auto& [kept, declaration] = all.emplace_back(experiment, Declaration(*app));
     declare(declaration, kept, arguments);
   }
+  // Run the one that was chosen
   command.app().require_subcommand(1);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     const auto& [experiment, declaration] =

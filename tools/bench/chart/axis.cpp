@@ -1,3 +1,10 @@
+// Steps of ticks climb a ladder, and so do their indices:
+//
+//   step    ...  0.2  0.5   1   2   5   10   20   50   100 ...
+//   index   ...   -2   -1   0   1   2    3    4    5     6 ...     index = 3 * exponent + digit
+//
+// Values are computed as digit * 10^exponent or digit / 10^-exponent, which rounds once, so that a
+// tick at 0.3 is the double 0.3 and its label is "0.3".
 #include "tools/bench/chart/axis.h"
 
 #include <algorithm>
@@ -12,13 +19,14 @@
 namespace ptc {
 namespace {
 
-constexpr double kAir = 0.06;       // share of the values' interval added at an end
-constexpr double kMinRatio = 1.25;  // of a log axis: noise is not blown up further
-constexpr double kMax = std::numeric_limits<double>::max() / 4;
-constexpr int kMaxLinear = 8;  // ticks
+constexpr double kAir = 0.06;  // share of the values' interval added at an end
+constexpr double kMinRatio =
+    1.25;  // least high / low of a log axis, so that noise is not magnified
+constexpr double kMax = std::numeric_limits<double>::max() / 4;  // differences stay finite
+constexpr int kMaxLinear = 8;                                    // ticks
 constexpr double kMin = std::numeric_limits<double>::min();
 
-// digit * 10^exponent, rounded once where it can be.
+// Returns digit * 10^exponent, rounded once where that is possible.
 double decimal(double digit, int exponent) {
   return exponent < 0 ? digit / std::pow(10.0, -exponent) : digit * std::pow(10.0, exponent);
 }
@@ -29,7 +37,7 @@ int floor_exponent(double value) {
 
 constexpr std::array<double, 3> kDigits = {1, 2, 5};
 
-// Steps 1, 2, 5, 10, 20 ... have the indices 0, 1, 2, 3, 4 ...; 0.5 has -1.
+// A step of the ladder: 1, 2, 5, 10, 20 ... have the indices 0, 1, 2, 3, 4 ...; 0.5 has -1.
 struct Step {
   explicit Step(int index)
       : exponent(index >= 0 ? index / 3 : -((2 - index) / 3)),
@@ -45,7 +53,8 @@ std::vector<double> linear_ticks(const Axis& axis, unsigned coarseness) {
   int index = 3 * floor_exponent(least);
   while (Step(index).times(1) < least) ++index;
   const Step step(index + static_cast<int>(coarseness));
-  const double first = std::ceil(axis.low / step.times(1)) - 1;  // one less: it may be rounded up
+  const double first =
+      std::ceil(axis.low / step.times(1)) - 1;  // one less, for it may be rounded up
   std::vector<double> ticks;
   for (int i = 0; i <= kMaxLinear + 1; ++i) {
     const double value = step.times(first + i);
@@ -67,6 +76,7 @@ std::vector<double> log_ticks(const Axis& axis, std::span<const double> digits, 
   return ticks;
 }
 
+// A number in raised digits, for exponents.
 std::string superscript(int number) {
   constexpr std::array<std::string_view, 10> kRaised = {"⁰", "¹", "²", "³", "⁴",
                                                         "⁵", "⁶", "⁷", "⁸", "⁹"};
@@ -77,7 +87,7 @@ std::string superscript(int number) {
   return raised;
 }
 
-// 2·10⁻⁴ and, without a factor of 1, 10⁻⁴.
+// A value as "2·10⁻⁴", or as "10⁻⁴" where the factor is 1.
 std::string power_label(double value) {
   int exponent = floor_exponent(value * 1.0000001);
   const std::string digits = fmt::format("{:.6g}", value / decimal(1, exponent));
@@ -96,6 +106,7 @@ bool can_show(double value, bool log) noexcept {
 }
 
 Axis axis_around(std::span<const double> values, bool log) {
+  // Find the values' interval
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const double value : values) {
@@ -103,6 +114,7 @@ Axis axis_around(std::span<const double> values, bool log) {
     low = std::min(low, value);
     high = std::max(high, value);
   }
+  // Add the margin, on a log axis as a factor
   if (log) {
     if (low > high) return {1, 10, true};
     const double span = std::log(high) - std::log(low);
@@ -111,7 +123,7 @@ Axis axis_around(std::span<const double> values, bool log) {
   }
   if (low > high || (low == 0 && high == 0)) return {0, 1, false};
   if (low >= 0 && low <= high / 2) return {0, high * (1 + kAir), false};
-  // Values that differ by their rounding are as good as equal.
+  // Treat values that differ only by rounding as equal
   const double span = high - low;
   const double largest = std::max(std::abs(low), std::abs(high));
   const double air = span > 1e-9 * largest ? span * kAir : largest * 0.1;

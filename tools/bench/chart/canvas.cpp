@@ -1,3 +1,10 @@
+// Shapes and text by cairo. Markers are polygons about as large as a circle, with the first corner
+// at an angle from the right, clockwise as y points down:
+//
+//   circle ()   square []   triangle /\   diamond <>   inverted \/   pentagon
+//
+// The radius of a polygon of n corners and of the circle's area is sqrt(2 pi / (n sin(2 pi / n)))
+// times the circle's.
 #include "tools/bench/chart/canvas.h"
 
 #include <array>
@@ -9,10 +16,10 @@
 namespace ptc {
 namespace {
 
-// Debian installs it with libcairo2, through fontconfig.
+// Debian installs this font with libcairo2, through fontconfig.
 constexpr const char* kFont = "DejaVu Sans";
 
-// Corners of a regular polygon whose area is that of the circle.
+// The corners of a regular polygon with about the area of the circle.
 std::vector<Spot> polygon(Spot centre, int corners, double first_angle) {
   const double angle = 2 * std::numbers::pi / corners;
   const double radius =
@@ -26,7 +33,7 @@ std::vector<Spot> polygon(Spot centre, int corners, double first_angle) {
   return spots;
 }
 
-// Angles from the right, clockwise, as y points down.
+// The corners of a marker; none for the circle.
 std::vector<Spot> corners_of(Spot at, Marker shape) {
   constexpr double kUp = -std::numbers::pi / 2;
   switch (shape) {
@@ -52,7 +59,7 @@ void check(cairo_status_t status) {
   if (status == CAIRO_STATUS_SUCCESS) return;
   if (status == CAIRO_STATUS_NO_MEMORY) throw std::bad_alloc();
   if (status == CAIRO_STATUS_INVALID_STRING) {
-    throw std::invalid_argument("chart: a text is no UTF-8");
+    throw std::invalid_argument("chart: a text is not UTF-8");
   }
   throw std::runtime_error(std::string("chart: ") + cairo_status_to_string(status));
 }
@@ -60,7 +67,7 @@ void check(cairo_status_t status) {
 Canvas::Canvas(const Surface& surface, double scale) : context_(cairo_create(surface.get())) {
   cairo_t* const c = context_.get();
   cairo_scale(c, scale, scale);
-  // Unhinted text is as wide in a picture as in an SVG.
+  // Unhinted text has the same width in a PNG as in an SVG.
   cairo_font_options_t* const options = cairo_font_options_create();
   cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_NONE);
   cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);

@@ -1,4 +1,5 @@
-// What charts are drawn with: shapes and text in units of the SVG, y downwards.
+// What charts are drawn with: shapes and text. Lengths are units of the SVG, and y points
+// downwards.
 #pragma once
 
 #include <memory>
@@ -10,11 +11,13 @@
 
 namespace ptc {
 
+/// A position on the canvas.
 struct Spot {
   double x = 0;
   double y = 0;
 };
 
+/// A rectangle on the canvas.
 struct Box {
   double left = 0;
   double top = 0;
@@ -25,57 +28,67 @@ struct Box {
   [[nodiscard]] double height() const noexcept { return bottom - top; }
 };
 
-/// sRGB, 0 to 1.
+/// A colour in sRGB, each channel from 0 to 1.
 struct Colour {
   double red = 0;
   double green = 0;
   double blue = 0;
 };
 
+/// Which end of a text, or its middle, lies at the given position.
 enum class Align { left, centre, right };
 
+/// How text looks.
 struct TextStyle {
-  double size = 10;
+  double size = 10;  ///< size of the font, units
   Colour colour;
   Align align = Align::left;
   bool bold = false;
 };
 
+/// How a line looks.
 struct Stroke {
   double width = 1;
   Colour colour;
   bool dashed = false;
 };
 
+/// Shapes of the marks at measured points; `inverted` is a triangle on its tip.
 enum class Marker { circle, square, triangle, diamond, inverted, pentagon };
 
+/// Deleter of Surface.
 struct SurfaceDestroy {
   void operator()(cairo_surface_t* surface) const noexcept { cairo_surface_destroy(surface); }
 };
 using Surface = std::unique_ptr<cairo_surface_t, SurfaceDestroy>;
 
-/// Draws on a surface of cairo. Errors are kept there until check().
+/// Draws on a surface of cairo, which remembers the first error until check() throws it.
 class Canvas {
  public:
-  /// @param scale  pixels or points of the surface a unit
+  /// Prepares to draw on a surface, which must outlive the canvas.
+  /// @param scale  pixels or points of the surface for each unit
   Canvas(const Surface& surface, double scale);
 
-  /// Width that text() takes. The same on every kind of surface but for rounding.
+  /// The width that text() takes, equal on all kinds of surfaces except for rounding.
   [[nodiscard]] double text_width(const std::string& text, const TextStyle& style) const;
-  /// @param at  on the base line, at the end that style.align names
+  /// Writes a line of text.
+  /// @param at  position on the base line of the end or middle that style.align names
   void text(Spot at, const std::string& text, const TextStyle& style);
-  /// The same, turned to read upwards.
+  /// Writes a line of text turned by 90 degrees, to be read upwards.
   void text_upwards(Spot at, const std::string& text, const TextStyle& style);
-  /// A line through all spots; nothing for fewer than two.
+  /// Draws a line through all spots, and nothing for fewer than two.
   void line(std::span<const Spot> spots, const Stroke& stroke);
+  /// Fills a box. @param opacity  from 0, invisible, to 1
   void fill(const Box& box, const Colour& colour, double opacity = 1);
-  /// Filled, with a white rim; all shapes look equally large.
+  /// Draws a filled marker with a white rim. All shapes have about the same area.
   void marker(Spot at, Marker shape, const Colour& colour);
-  /// Only what lies inside is drawn, until unclip().
+  /// Restricts drawing to a box until unclip().
   void clip(const Box& box);
+  /// Ends clip().
   void unclip();
 
-  /// @throws std::invalid_argument when a text was no UTF-8, std::bad_alloc, std::runtime_error
+  /// Throws the first error of this canvas, if there was one.
+  /// @throws std::invalid_argument when a text was not UTF-8, std::bad_alloc, std::runtime_error
   void check() const;
 
  private:
@@ -88,11 +101,12 @@ class Canvas {
   std::unique_ptr<cairo_t, ContextDestroy> context_;
 };
 
-/// Reach of a marker from its middle.
+/// The distance from the middle of a marker to its rim, units.
 inline constexpr double kMarkerRadius = 3.9;
 
-/// @throws std::invalid_argument for CAIRO_STATUS_INVALID_STRING, std::bad_alloc for _NO_MEMORY,
-///         std::runtime_error for every other but _SUCCESS
+/// Turns an error of cairo into an exception.
+/// @throws std::invalid_argument for CAIRO_STATUS_INVALID_STRING, std::bad_alloc for
+///         CAIRO_STATUS_NO_MEMORY, std::runtime_error for any other but CAIRO_STATUS_SUCCESS
 void check(cairo_status_t status);
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// Charts as pictures.
+// From a chart to a picture: choose styles, lay out, draw, write.
 #include "tools/bench/chart/chart.h"
 
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace ptc {
 namespace {
 
-// What the outlines of the text no longer say; lines of their own.
+// Everything that a search may look for, one line each: in the SVG itself text is only outlines.
 std::string description(const Chart& chart, const std::vector<SeriesStyle>& styles) {
   std::string text;
   for (const ChartPanel& panel : chart.panels) {
@@ -24,6 +24,7 @@ std::string description(const Chart& chart, const std::vector<SeriesStyle>& styl
   return text;
 }
 
+// The layout, with the text measured on an invisible surface.
 ChartLayout measured_layout(const Chart& chart, const std::vector<SeriesStyle>& styles) {
   const Surface paper(cairo_image_surface_create(CAIRO_FORMAT_A8, 1, 1));
   const Canvas ruler(paper, 1);
@@ -37,7 +38,7 @@ ChartLayout measured_layout(const Chart& chart, const std::vector<SeriesStyle>& 
 
 void write_chart(const std::filesystem::path& target, const Chart& chart) {
   if (chart.panels.empty() || chart.columns == 0) {
-    throw std::invalid_argument("write_chart: no panel or no column");
+    throw std::invalid_argument("write_chart: a chart needs at least one panel and one column");
   }
   const std::vector<SeriesStyle> styles = styles_of(chart);
   const ChartLayout layout = measured_layout(chart, styles);

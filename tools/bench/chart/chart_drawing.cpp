@@ -6,6 +6,7 @@
 namespace ptc {
 namespace {
 
+// Draws lines of text, `step` units apart.
 void draw_lines(Canvas& canvas, const std::vector<std::string>& lines, Spot top_left, double step,
                 const TextStyle& style) {
   double y = top_left.y + style.size;
@@ -15,6 +16,7 @@ void draw_lines(Canvas& canvas, const std::vector<std::string>& lines, Spot top_
   }
 }
 
+// Draws a sample and the name of each series.
 void draw_legend(Canvas& canvas, const ChartLayout& layout,
                  const std::vector<SeriesStyle>& styles) {
   for (const LegendItem& item : layout.legend) {

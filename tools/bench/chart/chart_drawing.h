@@ -1,4 +1,4 @@
-// From a layout to shapes.
+// Draws a chart whose layout is known.
 #pragma once
 
 #include <vector>
@@ -9,15 +9,15 @@
 
 namespace ptc {
 
-/// The whole chart on white.
+/// Draws the whole chart on white.
 void draw_chart(Canvas& canvas, const Chart& chart, const ChartLayout& layout,
                 const std::vector<SeriesStyle>& styles);
 
-/// One panel with its axes; "no data" where no point can be shown.
+/// Draws one panel with its axes; it says "no data" where no point can be shown.
 void draw_panel(Canvas& canvas, const ChartPanel& panel, const PanelLayout& layout,
                 const std::vector<SeriesStyle>& styles);
 
-/// A text's style, smaller where the text would be wider than `width`.
+/// Returns `style`, with a smaller font where the text would be wider than `width`.
 [[nodiscard]] TextStyle fitted(TextStyle style, const std::string& text, double width,
                                const Canvas& canvas);
 

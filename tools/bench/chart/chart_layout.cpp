@@ -1,3 +1,17 @@
+// From top to bottom: title, legend, rows of panels, note. The cell of one panel:
+//
+//   +-cell-----------------------------------+
+//   |             Panel title                |  kPanelTitle
+//   |            +-plot-------------------+  |
+//   | y label 10 |                        |  |
+//   |          1 |                        |  |
+//   |            +------------------------+  |
+//   |              1         10        100   |
+//   |                   x label              |  kBelowPlot
+//   +----------------------------------------+
+//    <-- left --> is equal for all panels, so that the plots of a column line up
+//
+// Ticks are made coarser until their labels keep their distance.
 #include "tools/bench/chart/chart_layout.h"
 
 #include <algorithm>
@@ -8,18 +22,18 @@
 namespace ptc {
 namespace {
 
-constexpr double kMargin = 20;  // around the chart
-constexpr double kLegendRow = 20;
-constexpr double kLegendDistance = 22;
-constexpr double kPanelTitle = 27;  // above the plot
-constexpr double kBelowPlot = 50;   // tick labels and the axis' name
+constexpr double kMargin = 20;          // around the chart
+constexpr double kLegendRow = 20;       // height of a row of the legend
+constexpr double kLegendDistance = 22;  // between two items of the legend
+constexpr double kPanelTitle = 27;      // above the plot
+constexpr double kBelowPlot = 50;       // labels of ticks and of the axis
 constexpr double kRightOfPlot = 22;
-constexpr double kTickLabelGap = 5;    // least distance of two labels in a row
-constexpr double kTickLabelLine = 15;  // least distance of two labels one above the other
-constexpr double kAxisName = 24;       // beside the tick labels of the y axis
+constexpr double kTickLabelGap = 5;    // minimum distance of two labels next to each other
+constexpr double kTickLabelLine = 15;  // minimum distance of two labels one above the other
+constexpr double kAxisName = 24;       // width of the y axis' label, left of the tick labels
 constexpr double kTickLength = 7;      // from the axis to the tick labels
 
-// The fewer columns, the larger the panels.
+// The size of panels, which are larger where there are fewer columns.
 struct CellSize {
   double width, plot_height;
 };
@@ -30,7 +44,7 @@ CellSize cell_size(std::size_t columns) {
   return {345, 205};
 }
 
-// All values that a panel's axis has to hold.
+// All values that the x axis of a panel has to show.
 std::vector<double> x_values(const ChartPanel& panel) {
   std::vector<double> values;
   for (const ChartSeries& series : panel.series) {
@@ -41,6 +55,7 @@ std::vector<double> x_values(const ChartPanel& panel) {
   return values;
 }
 
+// All values that the y axis of a panel has to show, limits included.
 std::vector<double> y_values(const ChartPanel& panel) {
   std::vector<double> values;
   for (const ChartSeries& series : panel.series) {
@@ -52,6 +67,7 @@ std::vector<double> y_values(const ChartPanel& panel) {
   return values;
 }
 
+// Chooses the y axis and the ticks whose labels fit above each other.
 void set_y_axis(const ChartPanel& panel, double plot_height, PanelLayout& layout) {
   layout.y = axis_around(y_values(panel), panel.log_y);
   layout.y_ticks = ticks_that_fit(layout.y, [&](std::span<const double> ticks) {
@@ -63,6 +79,7 @@ void set_y_axis(const ChartPanel& panel, double plot_height, PanelLayout& layout
   });
 }
 
+// Chooses the x axis and the ticks whose labels fit next to each other.
 void set_x_axis(const ChartPanel& panel, const Canvas& ruler, PanelLayout& layout) {
   layout.x = axis_around(x_values(panel), panel.log_x);
   layout.x_ticks = ticks_that_fit(layout.x, [&](std::span<const double> ticks) {
@@ -77,7 +94,7 @@ void set_x_axis(const ChartPanel& panel, const Canvas& ruler, PanelLayout& layou
   });
 }
 
-// Room left of the plots: one width for all panels, so that they stand in line.
+// The room left of the plots: one width for all panels, so that the plots line up.
 double left_of_plots(const std::vector<PanelLayout>& panels, const Canvas& ruler) {
   double widest = 20;
   for (const PanelLayout& panel : panels) {
@@ -88,8 +105,9 @@ double left_of_plots(const std::vector<PanelLayout>& panels, const Canvas& ruler
   return kAxisName + widest + kTickLength;
 }
 
-// @return the height of all panels
+// Places the panels in rows. @return the height of all panels
 double place_panels(const Chart& chart, double top, const Canvas& ruler, ChartLayout& layout) {
+  // Choose the y axes first: the labels of their ticks decide where the plots begin
   const std::size_t columns = std::min<std::size_t>(chart.columns, chart.panels.size());
   const CellSize size = cell_size(columns);
   const double cell_height = kPanelTitle + size.plot_height + kBelowPlot;
@@ -97,6 +115,7 @@ double place_panels(const Chart& chart, double top, const Canvas& ruler, ChartLa
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
     set_y_axis(chart.panels[i], size.plot_height, layout.panels[i]);
   }
+  // Place the cells, and choose the x axes
   const double left = left_of_plots(layout.panels, ruler);
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
     PanelLayout& panel = layout.panels[i];
@@ -115,7 +134,7 @@ double place_panels(const Chart& chart, double top, const Canvas& ruler, ChartLa
   return layout.panels.back().cell.bottom - top;
 }
 
-// @return the height of all rows
+// Places the items of the legend in rows. @return the height of all rows
 double place_legend(const std::vector<SeriesStyle>& styles, double top, const Canvas& ruler,
                     ChartLayout& layout) {
   double x = kMargin;
@@ -145,7 +164,7 @@ bool can_show(const ChartPanel& panel, const ChartPoint& point) noexcept {
 }
 
 std::vector<SeriesStyle> styles_of(const Chart& chart) {
-  // Yellow is left out: it is too pale for a line on white.
+  // Leave out yellow, which is too pale for a line on white
   constexpr std::array<Colour, 7> kColours = {{{0, 0.447, 0.698},      // blue
                                                {0.835, 0.369, 0},      // vermilion
                                                {0, 0.620, 0.451},      // bluish green

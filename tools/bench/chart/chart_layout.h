@@ -1,4 +1,5 @@
-// Where everything of a chart goes, before anything is drawn.
+// Computes where every part of a chart goes, before anything is drawn. Lengths are units of the
+// SVG.
 #pragma once
 
 #include <cstddef>
@@ -21,62 +22,69 @@ constexpr TextStyle kAxisStyle{.size = 11, .colour = kInk, .align = Align::centr
 constexpr TextStyle kTickStyle{.size = 9.5, .colour = kPaleInk};
 constexpr TextStyle kNoteStyle{.size = 9.5, .colour = kPaleInk};
 
-/// How the series of one name look.
+/// The look of all series of one name.
 struct SeriesStyle {
   std::string name;
   Colour colour;
   Marker marker = Marker::circle;
-  bool dashed = false;  ///< in the first panel that has it
+  bool dashed = false;  ///< the line's look in the first panel that has the series
 };
 
-/// One style a name, in the order in which names appear. Colours are those of Okabe and Ito 2008
-/// that stand out from white; markers go through another number of shapes, so that 42 pairs differ.
+/// Chooses a style for each name, in the order in which names appear. The seven colours are those
+/// of Okabe and Ito 2008 that stand out from white; the six markers are taken in turn as well, so
+/// that 42 pairs of colour and marker differ.
 [[nodiscard]] std::vector<SeriesStyle> styles_of(const Chart& chart);
 
+/// One name in the legend.
 struct LegendItem {
-  Spot at;  ///< left end of the sample's line
-  std::size_t style = 0;
+  Spot at;                ///< left end of the sample's line
+  std::size_t style = 0;  ///< index into the styles
 };
 
+/// Where the parts of one panel go.
 struct PanelLayout {
-  Box cell;  ///< with titles and names of values
+  Box cell;  ///< the panel with its title and the labels of its axes
   Box plot;  ///< inside the axes
   Axis x;
   Axis y;
   std::vector<double> x_ticks;
   std::vector<double> y_ticks;
-  std::vector<ChartPanel::Line> limits;  ///< that the y axis can show
+  std::vector<ChartPanel::Line> limits;  ///< lines that the y axis can show
   bool empty = false;                    ///< no point can be shown
 
+  /// The position of a pair of values.
   [[nodiscard]] Spot spot(double x_value, double y_value) const noexcept;
 };
 
+/// Where the parts of a chart go.
 struct ChartLayout {
   double width = 0;
   double height = 0;
   double text_left = 0;
   double title_top = 0;
   double note_top = 0;
-  std::vector<std::string> title;  ///< lines
-  std::vector<std::string> note;
+  std::vector<std::string> title;  ///< lines of the title
+  std::vector<std::string> note;   ///< lines of the note
   std::vector<LegendItem> legend;
   std::vector<PanelLayout> panels;
 };
 
-constexpr double kSeriesWidth = 1.7;  ///< of lines
-constexpr double kTitleLine = 23;
-constexpr double kNoteLine = 13.5;
-constexpr double kLegendSample = 30;  ///< line of a legend's item
-constexpr double kLegendGap = 7;      ///< from there to its name
+constexpr double kSeriesWidth = 1.7;  ///< width of the lines of series
+constexpr double kTitleLine = 23;     ///< height of a line of the title
+constexpr double kNoteLine = 13.5;    ///< height of a line of the note
+constexpr double kLegendSample = 30;  ///< length of the line of an item of the legend
+constexpr double kLegendGap = 7;      ///< gap between that line and the name
 
+/// Lays out a chart of one or more panels.
 /// @param ruler  measures the texts
 [[nodiscard]] ChartLayout lay_out(const Chart& chart, const std::vector<SeriesStyle>& styles,
                                   const Canvas& ruler);
 
-/// Whether a panel can show a point at all.
+/// Whether the axes of a panel can show a point.
 [[nodiscard]] bool can_show(const ChartPanel& panel, const ChartPoint& point) noexcept;
 
-/// Lines no wider than `width` where blanks allow it; line breaks of the text are kept.
+/// Breaks text into lines that are no wider than `width` where blanks allow it. Line breaks of the
+/// text are kept.
 [[nodiscard]] std::vector<std::string> wrapped(const std::string& text, const TextStyle& style,
                                                double width, const Canvas& ruler);
 

@@ -8,11 +8,12 @@
 namespace ptc {
 namespace {
 
-// XYZ with Y = 1 of a chromaticity.
+// The XYZ of a chromaticity (x, y) at luminance Y = 1.
 glm::dvec3 xyz_of_chromaticity(double x, double y) {
   return {x / y, 1, (1 - x - y) / y};
 }
 
+// The matrices between linear RGB and XYZ relative to white.
 struct Srgb {
   glm::dvec3 white = xyz_of_chromaticity(0.3127, 0.3290);
   glm::mat3 relative_xyz_of_rgb;  ///< XYZ over that of white

@@ -1,5 +1,11 @@
 // The colour pipeline, the feature pipeline and their product, in the order and with the letters of
-// Andersson et al. 2020 and its erratum of page 10 (116 instead of 100).
+// Andersson et al. 2020 and its erratum of page 10 (116 instead of 100):
+//
+//   picture -> Y Cx Cz -+-> blur as the eye does -> Hunt L* a* b* -> distance -> colour error c
+//                       |
+//                       `-> Y -> edges and points (first, second derivative) --> feature error f
+//
+//   difference of a pixel = c^(1 - f): colours count more where an edge or a point differs, too
 #include "tools/bench/chart/flip.h"
 
 #include <algorithm>
@@ -25,7 +31,7 @@ struct Sensitivity {
 constexpr Sensitivity kAchromatic = {1, 0.0047, 0, 0};
 constexpr Sensitivity kRedGreen = {1, 0.0053, 0, 0};
 constexpr Sensitivity kBlueYellow = {34.1, 0.04, 13.5, 0.025};
-constexpr double kWidestB = 0.04;  // one radius for all channels
+constexpr double kWidestB = 0.04;  // the widest filter gives one radius for all channels
 
 constexpr float kColourPower = 0.7F;       // qc
 constexpr float kBreak = 0.4F;             // pc: this share of the largest colour error ...
@@ -37,7 +43,8 @@ std::size_t radius_of(double sigma) {
   return static_cast<std::size_t>(std::ceil(3 * sigma));
 }
 
-// Spatial standard deviation [pixels] of exp(-b f^2): exp(-pi^2 x^2 / b), x in degrees.
+// The spatial standard deviation [pixels] of the filter whose spectrum is exp(-b f^2): in space it
+// is exp(-pi^2 x^2 / b), x in degrees.
 double sigma_of(double b, double pixels_per_degree) {
   return std::sqrt(b / 2) / std::numbers::pi * pixels_per_degree;
 }
@@ -47,8 +54,8 @@ Plane blurred(const Plane& plane, double sigma, std::size_t radius) {
   return filter_columns(filter_rows(plane, kernel), kernel);
 }
 
-// The two Gaussians of a channel are summed and made to sum to 1 together. Each is a sqrt(pi / b)
-// exp(-pi^2 r^2 / b), also in two dimensions.
+// A channel as the eye perceives it: filtered by the sum of two Gaussians that is scaled to sum
+// to 1. Each Gaussian is a sqrt(pi / b) exp(-pi^2 r^2 / b), also in two dimensions.
 Plane perceived(const Plane& plane, const Sensitivity& s, double pixels_per_degree) {
   const std::size_t radius = radius_of(sigma_of(kWidestB, pixels_per_degree));
   const double sigma1 = sigma_of(s.b1, pixels_per_degree);
@@ -69,7 +76,7 @@ Plane perceived(const Plane& plane, const Sensitivity& s, double pixels_per_degr
   return first;
 }
 
-// Y, Cx and Cz of a picture clamped to [0, 1].
+// The channels Y, Cx and Cz of a picture clamped to [0, 1].
 std::array<Plane, 3> opponent_planes(const Image& image) {
   std::array<Plane, 3> planes;
   for (Plane& plane : planes) plane = {image.width, image.height, {}};
@@ -82,7 +89,7 @@ std::array<Plane, 3> opponent_planes(const Image& image) {
   return planes;
 }
 
-// What the eye sees of the colours, as L* a* b* with Hunt's adjustment.
+// The colours that the eye sees, as L* a* b* with Hunt's adjustment.
 std::vector<glm::vec3> seen_colours(const std::array<Plane, 3>& planes, double pixels_per_degree) {
   const Plane y = perceived(planes[0], kAchromatic, pixels_per_degree);
   const Plane cx = perceived(planes[1], kRedGreen, pixels_per_degree);
@@ -96,6 +103,7 @@ std::vector<glm::vec3> seen_colours(const std::array<Plane, 3>& planes, double p
   return colours;
 }
 
+// The lengths of the vectors (across, down).
 std::vector<float> magnitude(const Plane& across, const Plane& down) {
   std::vector<float> result(across.values.size());
   for (std::size_t i = 0; i < result.size(); ++i) {
@@ -111,7 +119,7 @@ struct Features {
   std::vector<float> points;
 };
 
-// Strength of edges and points of the lightness, from first and second derivatives.
+// The strength of edges and points in the lightness, from first and second derivatives.
 Features features_of(Plane lightness, double pixels_per_degree) {
   for (float& value : lightness.values) value = (value + 16) / 116;  // 0 to 1
   const double sigma = kFeatureDegrees / 2 * pixels_per_degree;
@@ -126,7 +134,7 @@ Features features_of(Plane lightness, double pixels_per_degree) {
                 filter_columns(smooth, second))};
 }
 
-// 0 to 1; the lower part of the scale gets most of the range.
+// The colour error, 0 to 1, in which the small distances take most of the range.
 float colour_error(float distance, float largest) {
   const float power = std::pow(distance, kColourPower);
   const float bend = kBreak * largest;
@@ -136,6 +144,7 @@ float colour_error(float distance, float largest) {
   return std::min(error, 1.0F);
 }
 
+// The feature error, 0 to 1: the larger of the differences of edges and of points.
 float feature_error(const Features& a, const Features& b, std::size_t i) {
   const float edge = std::abs(a.edges[i] - b.edges[i]);
   const float point = std::abs(a.points[i] - b.points[i]);
@@ -147,13 +156,14 @@ void check(const Image& test, const Image& reference, float pixels_per_degree) {
   const std::size_t count = std::size_t{test.width} * test.height;
   if (count == 0 || test.width != reference.width || test.height != reference.height ||
       test.pixels.size() != count || reference.pixels.size() != count) {
-    throw std::invalid_argument("flip: pictures without pixels or of different sizes");
+    throw std::invalid_argument("flip: the pictures have no pixels or different sizes");
   }
   if (!(pixels_per_degree >= 1 && pixels_per_degree <= 1000)) {
-    throw std::invalid_argument("flip: pixels per degree out of range");
+    throw std::invalid_argument("flip: pixels_per_degree must be from 1 to 1000");
   }
 }
 
+// What the eye sees of one picture.
 struct Seen {
   std::vector<glm::vec3> colours;
   Features features;
@@ -171,7 +181,7 @@ std::vector<float> flip(const Image& test, const Image& reference, float pixels_
   check(test, reference, pixels_per_degree);
   const Seen a = see(test, static_cast<double>(pixels_per_degree));
   const Seen b = see(reference, static_cast<double>(pixels_per_degree));
-  // No two colours of [0, 1]^3 are farther apart than pure green and pure blue.
+  // No two colours of [0, 1]^3 are farther apart than pure green and pure blue
   const float largest =
       std::pow(hyab(hunt_lab_of_rgb({0, 1, 0}), hunt_lab_of_rgb({0, 0, 1})), kColourPower);
   std::vector<float> errors(a.colours.size());

@@ -1,4 +1,4 @@
-// How different two pictures look to somebody who switches between them.
+// How different two pictures look to a person who switches between them.
 #pragma once
 
 #include <vector>
@@ -7,15 +7,16 @@
 
 namespace ptc {
 
-/// A monitor of 3840 pixels and 0.7 m across, seen from 0.7 m.
+/// Pixels per degree of visual angle on a monitor 3840 pixels and 0.7 m wide, seen from 0.7 m.
 inline constexpr float kPixelsPerDegree = 67;
 
-/// LDR-FLIP: visible difference of every pixel, 0 for none to 1 for blue against green.
+/// Computes LDR-FLIP: the visible difference of every pixel, from 0 for none to 1 for blue against
+/// green.
 ///
-/// Both pictures are clamped to [0, 1] first, what is no number to 0, and continue beyond their
-/// edges as their outermost pixels do. The order of the two does not matter.
-/// @param pixels_per_degree  of visual angle, 1 to 1000: more from farther away
-/// @return       row by row from the top, 0 exactly where all pixels around are equal
+/// Both pictures are clamped to [0, 1] first, NaN to 0, and their outermost pixels are repeated
+/// beyond the edges. The result does not depend on which of the two is the reference.
+/// @param pixels_per_degree  of visual angle, 1 to 1000: the more, the farther away the viewer is
+/// @return       differences row by row from the top, exactly 0 where all pixels around are equal
 /// @throws std::invalid_argument when sizes differ, do not fit the pixels or are 0, or
 ///         pixels_per_degree is out of range
 /// Memory: about 80 bytes a pixel.
@@ -24,7 +25,7 @@ inline constexpr float kPixelsPerDegree = 67;
 [[nodiscard]] std::vector<float> flip(const Image& test, const Image& reference,
                                       float pixels_per_degree = kPixelsPerDegree);
 
-/// Mean of flip() over the picture.
+/// The mean of flip() over the picture.
 [[nodiscard]] double mean_flip(const Image& test, const Image& reference,
                                float pixels_per_degree = kPixelsPerDegree);
 

@@ -6,7 +6,7 @@
 namespace ptc {
 namespace {
 
-constexpr double kDotDistance = 1.5;  // units
+constexpr double kDotDistance = 1.5;  // between the dots that stand for a line, units
 
 bool overlap(const Box& a, const Box& b) {
   return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
@@ -42,7 +42,7 @@ std::optional<Box> LabelPlacer::place(std::span<const Box> candidates) {
 }
 
 std::array<Box, 8> boxes_around(Spot spot, double distance, double width, double height) {
-  // -1 before, 0 over, 1 after the spot.
+  // -1: left of or above the spot; 0: at its middle; 1: right of or below it
   struct Side {
     int x, y;
   };
@@ -51,7 +51,8 @@ std::array<Box, 8> boxes_around(Spot spot, double distance, double width, double
   std::array<Box, 8> boxes;
   for (std::size_t i = 0; i < kSides.size(); ++i) {
     const Side side = kSides[i];
-    const double away = side.x != 0 && side.y != 0 ? distance * 0.6 : distance;  // to the corner
+    const double away =
+        side.x != 0 && side.y != 0 ? distance * 0.6 : distance;  // a corner is nearer
     const double x = spot.x + side.x * (away + width / 2);
     const double y = spot.y + side.y * (away + height / 2);
     boxes[i] = {x - width / 2, y - height / 2, x + width / 2, y + height / 2};

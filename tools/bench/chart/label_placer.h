@@ -1,4 +1,4 @@
-// Where labels go beside their points without covering anything.
+// Finds places for labels next to their points where they cover nothing.
 #pragma once
 
 #include <array>
@@ -11,18 +11,19 @@
 
 namespace ptc {
 
-/// Finds room in an area in which markers, lines and earlier labels are in the way.
+/// Finds room for labels in an area where markers, lines and earlier labels are in the way.
 class LabelPlacer {
  public:
   explicit LabelPlacer(const Box& area) : area_(area) {}
 
-  /// Something that labels may not cover.
+  /// Reserves a box that labels may not cover.
   void block(const Box& box);
-  /// A line that labels avoid where they can.
+  /// Adds a line that labels cover as little as possible.
   void avoid(Spot from, Spot to);
 
-  /// The first of the boxes that is inside the area, over nothing that is blocked, and over as
-  /// little of the lines as any. It is blocked from then on.
+  /// Chooses, among the candidates inside the area that cover nothing blocked, the one that covers
+  /// the least of the avoided lines, the first of several. It is blocked from then on.
+  /// @return nothing where there is no such candidate
   [[nodiscard]] std::optional<Box> place(std::span<const Box> candidates);
 
  private:
@@ -31,11 +32,16 @@ class LabelPlacer {
 
   Box area_;
   std::vector<Box> blocked_;
-  std::vector<Spot> avoided_;  // lines as dots
+  std::vector<Spot> avoided_;  ///< dots along the lines
 };
 
-/// Boxes at the eight sides of a spot, above right first, where one looks first.
-/// @param distance  from the spot to a box over, under or beside it, units
+/// Boxes at the eight sides of a spot in order of preference:
+///
+///   2  5  1
+///   8  o  7
+///   4  6  3
+///
+/// @param distance  from the spot to a box above, below, left or right of it, units
 [[nodiscard]] std::array<Box, 8> boxes_around(Spot spot, double distance, double width,
                                               double height);
 

@@ -1,4 +1,10 @@
-// One panel: grid and axes, limits, bars, lines, markers, labels, in this order.
+// Draws one panel from the bottom layer to the top: grid and axes, limits, bars and lines, markers,
+// labels. Whatever is drawn is reported to the placer of labels, which comes last:
+//
+//   blocked (labels never cover it)           markers, bars, other labels
+//   avoided (labels cover as little as can)   lines of series, limits
+//
+// The first series of a panel lies above the others.
 #include <algorithm>
 #include <array>
 
@@ -12,10 +18,10 @@ constexpr Colour kGrid{0.91, 0.91, 0.91};
 constexpr Colour kFrame{0.38, 0.38, 0.38};
 constexpr Colour kLimit{0.45, 0.45, 0.45};
 constexpr double kBarWidth = 1.1;
-constexpr double kCap = 2.6;  // half the height of a bar's ends
-constexpr double kTick = 4;
-constexpr double kLabelInset = 3;  // of labels from the axes
-constexpr double kMinorTick = 2.2;
+constexpr double kCap = 2.6;        // half the height of a bar's ends
+constexpr double kTick = 4;         // length of a tick that has a label
+constexpr double kLabelInset = 3;   // minimum distance of labels from the axes
+constexpr double kMinorTick = 2.2;  // length of a tick without a label
 
 void draw_grid(Canvas& canvas, const PanelLayout& layout) {
   const Box& plot = layout.plot;
@@ -57,6 +63,7 @@ void draw_ticks(Canvas& canvas, const PanelLayout& layout) {
   }
 }
 
+// Draws the two axes, their labels and the panel's title.
 void draw_frame(Canvas& canvas, const ChartPanel& panel, const PanelLayout& layout) {
   const Box& plot = layout.plot;
   canvas.line(std::array{Spot{plot.left, plot.top}, Spot{plot.left, plot.bottom},
@@ -72,7 +79,7 @@ void draw_frame(Canvas& canvas, const ChartPanel& panel, const PanelLayout& layo
                       fitted(kAxisStyle, panel.y_label, plot.height() + 20, canvas));
 }
 
-// Where a series' points lie; a part of a line ends where one cannot be shown.
+// A piece of a series' line: points that can be shown, up to the next one that cannot.
 struct Part {
   std::vector<Spot> spots;
   std::vector<const ChartPoint*> points;
@@ -92,12 +99,14 @@ std::vector<Part> parts_of(const ChartPanel& panel, const PanelLayout& layout,
   return parts;
 }
 
-// An end of a bar that cannot be shown is the point itself, one below a log axis its end.
+// The end of a bar. Where the value cannot be shown the bar ends at the point itself, or at the low
+// end of a log axis for values not above 0.
 double bar_end(double value, double x, const Axis& axis) {
   if (can_show(value, axis.log)) return value;
   return axis.log && value <= 0 ? axis.low : x;
 }
 
+// Draws the bar from the fastest to the slowest run.
 void draw_bar(Canvas& canvas, const PanelLayout& layout, const ChartPoint& point,
               const Colour& colour, LabelPlacer& placer) {
   const Spot low = layout.spot(bar_end(point.x_low, point.x, layout.x), point.y);
@@ -120,13 +129,13 @@ void draw_limits(Canvas& canvas, const PanelLayout& layout, LabelPlacer& placer)
   }
 }
 
-// Sets text off the lines under it.
+// Draws a label on a translucent background that sets it off the lines under it.
 void draw_label(Canvas& canvas, const Box& box, const std::string& label, const TextStyle& style) {
   canvas.fill(box, {1, 1, 1}, 0.7);
   canvas.text({box.left, box.bottom - 0.14 * style.size}, label, style);
 }
 
-// Over or under an end of the line.
+// Draws the labels of limits above or below one end of their lines.
 void draw_limit_labels(Canvas& canvas, const PanelLayout& layout, LabelPlacer& placer) {
   const Box& plot = layout.plot;
   for (const ChartPanel::Line& limit : layout.limits) {
@@ -149,7 +158,7 @@ void draw_limit_labels(Canvas& canvas, const PanelLayout& layout, LabelPlacer& p
 }
 
 void draw_labels(Canvas& canvas, const Part& part, const Colour& colour, LabelPlacer& placer) {
-  // Darker than the line: thin type looks paler.
+  // Thin type looks paler than a line, so its colour is darker.
   const Colour ink{0.6 * colour.red, 0.6 * colour.green, 0.6 * colour.blue};
   const TextStyle style{.size = kTickStyle.size, .colour = ink};
   for (std::size_t i = 0; i < part.spots.size(); ++i) {
@@ -166,7 +175,7 @@ void draw_no_data(Canvas& canvas, const Box& plot) {
   canvas.text(middle, "no data", {.size = 12, .colour = kPaleInk, .align = Align::centre});
 }
 
-// A series as it lies in its panel.
+// A series with the positions of its points in the panel.
 struct PlacedSeries {
   const SeriesStyle& style;
   bool dashed;
@@ -209,17 +218,20 @@ void draw_markers(Canvas& canvas, const PlacedSeries& series, LabelPlacer& place
 
 void draw_panel(Canvas& canvas, const ChartPanel& panel, const PanelLayout& layout,
                 const std::vector<SeriesStyle>& styles) {
+  // Say so where there is nothing to show
   if (layout.empty) {
     draw_frame(canvas, panel, layout);
     draw_no_data(canvas, layout.plot);
     return;
   }
+  // Draw grid and axes
   draw_grid(canvas, layout);
   draw_ticks(canvas, layout);
   draw_frame(canvas, panel, layout);
   const Box& plot = layout.plot;
   LabelPlacer placer({plot.left + kLabelInset, plot.top, plot.right, plot.bottom - kLabelInset});
-  // Lines under all markers, labels over everything; the first series lies over the others.
+  // Draw lines under all markers, and labels over everything; the first series lies above the
+  // others
   const std::vector<PlacedSeries> series = placed(panel, layout, styles);
   canvas.clip(plot);
   draw_limits(canvas, layout, placer);

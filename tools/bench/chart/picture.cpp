@@ -1,4 +1,5 @@
-// Surfaces and files of pictures (picture.h).
+// Draws a picture on a surface of cairo, as SVG text or as the bytes of a PNG, and publishes the
+// file.
 #include "tools/bench/chart/picture.h"
 
 #include <cmath>
@@ -18,10 +19,11 @@
 namespace ptc {
 namespace {
 
-constexpr double kPixelsAUnit = 2;
-constexpr double kMaxUnits = 16000;  // cairo's pictures end at 32767 pixels a side
+constexpr double kPixelsAUnit = 2;   // of a PNG
+constexpr double kMaxUnits = 16000;  // cairo allows 32767 pixels a side
 
-// cairo calls back from C: what goes wrong is returned instead of thrown.
+// Appends a piece of the file to a string. cairo calls this from C, so errors are returned, not
+// thrown.
 cairo_status_t collect(void* bytes, const unsigned char* data, unsigned count) noexcept {
   try {
     static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), count);
@@ -31,7 +33,7 @@ cairo_status_t collect(void* bytes, const unsigned char* data, unsigned count) n
   }
 }
 
-// Text of an XML element; characters that XML does not know become blanks.
+// Escapes the text of an XML element; control characters that XML does not allow become blanks.
 std::string escaped(std::string_view text) {
   std::string result;
   for (const char c : text) {
@@ -48,7 +50,8 @@ std::string escaped(std::string_view text) {
   return result;
 }
 
-// cairo numbers its surfaces through the life of a process and writes the number: it is taken out.
+// Removes the number of the surface, which grows through the life of a process: without it equal
+// pictures have equal bytes.
 std::string without_surface_number(std::string svg) {
   constexpr std::string_view kId = " id=\"surface";
   const std::size_t begin = svg.find(kId);
@@ -94,7 +97,8 @@ std::string png_of(const Picture& picture) {
 void write_picture(const std::filesystem::path& target, const Picture& picture) {
   const std::string ending = lower_extension(target);
   if (ending != ".svg" && ending != ".png") {
-    throw std::invalid_argument("write_picture: neither .svg nor .png: " + target.string());
+    throw std::invalid_argument("write_picture: the name must end in .svg or .png: " +
+                                target.string());
   }
   if (picture.width > kMaxUnits || picture.height > kMaxUnits) {
     throw std::invalid_argument("write_picture: the picture is larger than 16000 units");

@@ -6,6 +6,7 @@
 namespace ptc {
 namespace {
 
+// The values exp(-x^2 / 2 sigma^2) for x from -radius to radius.
 std::vector<double> bell(double sigma, std::size_t radius) {
   std::vector<double> values;
   for (std::size_t i = 0; i <= 2 * radius; ++i) {
@@ -27,7 +28,7 @@ Kernel divided(const std::vector<double>& values, double by) {
   return kernel;
 }
 
-// Weights above 0 sum to 1, the others to -1.
+// Scales weights so that those above 0 sum to 1 and those below 0 to -1.
 Kernel balanced(const std::vector<double>& values) {
   double above = 0;
   double below = 0;
@@ -40,8 +41,8 @@ Kernel balanced(const std::vector<double>& values) {
   return kernel;
 }
 
-// The answer is kernel.sum * centre + sum of weight * (neighbour - centre): the same number, but
-// where all neighbours are equal no rounding is left of it, which a root would make visible.
+// Filters compute kernel.sum * centre + sum of weight * (neighbour - centre). This equals the usual
+// sum, but leaves no rounding error where all neighbours are equal; a later root would magnify it.
 void begin(const float* centre, float sum, float* out, std::size_t count) {
   for (std::size_t x = 0; x < count; ++x) out[x] = sum * centre[x];
 }

@@ -1,4 +1,4 @@
-// Order statistics and moments.
+// Order statistics, moments and a straight line through logarithms.
 #include "tools/bench/chart/statistics.h"
 
 #include <algorithm>
@@ -10,7 +10,8 @@
 namespace ptc {
 namespace {
 
-// Nearest rank: of n values in order the one at ceil(0.99 n), counted from 1.
+// The 99th percentile by nearest rank: the value at ceil(0.99 n), counted from 1, of n sorted
+// values.
 double percentile_99(std::vector<double>& values) {
   const std::size_t rank = values.size() - values.size() / 100;
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank - 1);
@@ -38,7 +39,7 @@ ErrorStatistics statistics_of(std::span<const Value> ours, std::span<const Value
   result.rms = std::sqrt(squares / count);
   result.bias /= count;
   result.reference_mean /= count;
-  // A sum of squares is no number when, and only when, an error is none: such cannot be ordered.
+  // The sum of squares is NaN if and only if an error is: such errors cannot be ordered.
   result.percentile_99 = std::isnan(squares) ? squares : percentile_99(absolute);
   return result;
 }
@@ -48,7 +49,7 @@ ErrorStatistics statistics_of(std::span<const Value> ours, std::span<const Value
 Spread spread_of(std::vector<double> values) {
   const auto is_nan = [](double value) { return std::isnan(value); };
   if (values.empty() || std::ranges::any_of(values, is_nan)) {
-    throw std::invalid_argument("spread_of: no value, or one that is no number");
+    throw std::invalid_argument("spread_of: there is no value, or one is not a number");
   }
   std::ranges::sort(values);
   const std::size_t upper = values.size() / 2;
@@ -85,6 +86,7 @@ PowerLaw fit_power_law(const std::vector<std::pair<double, double>>& points) {
     mean_x += std::log(x) / count;
     mean_y += std::log(y) / count;
   }
+  // Sum the squares around the means
   double xx = 0, xy = 0;
   for (const auto& [x, y] : points) {
     xx += (std::log(x) - mean_x) * (std::log(x) - mean_x);

@@ -29,6 +29,7 @@ std::vector<GatherOptions> AccuracyOptions::default_settings() {
 
 SceneAccuracy measure_accuracy(const BenchScene& scene, const AccuracyOptions& options,
                                const Executor& executor, Progress& progress) {
+  // Prepare the rays of the scene
   SceneAccuracy accuracy{.surfels = scene.surfels().size(),
                          .triangles = scene.mesh().triangles.size()};
   constexpr Sides kSides = Sides::both;
@@ -38,6 +39,7 @@ SceneAccuracy measure_accuracy(const BenchScene& scene, const AccuracyOptions& o
   if (accuracy.triangles > 0) mesh.emplace(scene.mesh(), scene.surfels(), scene.spacing());
   const SceneRays rays{
       .oracle = &oracle, .discs = discs ? &*discs : nullptr, .mesh = mesh ? &*mesh : nullptr};
+  // Measure each set of receivers
   for (const ReceiverSet& set : scene.sets()) {
     if (set.receivers.empty() || std::ranges::find(options.sets, set.name) == options.sets.end())
       continue;

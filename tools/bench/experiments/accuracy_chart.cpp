@@ -18,7 +18,8 @@ struct Measure {
   const char* label;
   Quantity job;
   std::function<double(const AccuracyRow&)> value;
-  std::function<double(const ReferenceNote&)> noise;  ///< of the reference; empty: unknown
+  std::function<double(const ReferenceNote&)>
+      noise;  ///< noise of the reference; empty where it is not known
 };
 
 const std::array<Measure, 4>& measures() {
@@ -29,30 +30,32 @@ const std::array<Measure, 4>& measures() {
        {"irradiance", "RMS error, % of the mean", Quantity::bleeding,
         [](const AccuracyRow& r) { return 100 * r.irradiance.rms; },
         [](const ReferenceNote& n) { return 100 * n.irradiance_noise; }},
-       {"irradiance, worst 1 %",
-        "99th percentile of errors, % of the mean",
+       {"irradiance, 99th percentile",
+        "99th percentile of error, % of the mean",
         Quantity::bleeding,
         [](const AccuracyRow& r) { return 100 * r.irradiance.percentile_99; },
         {}},
-       {"lit picture",
-        "mean FLIP",
+       {"visible difference of the picture",
+        "mean FLIP, 0 to 1",
         Quantity::bleeding,
         [](const AccuracyRow& r) { return r.flip; },
         {}}}};
   return all;
 }
 
+/// The name of a method in legends.
 const char* legend_name(std::string_view method) {
   if (method == "ptcx") return "PTCX";
   if (method == "plain") return "plain gather";
   return method == "embree-discs" ? "Embree, same discs" : "Embree, mesh";
 }
 
-/// Panels of one set; what was not measured has none.
+/// The panels of one set. A quantity that was not measured has no panel.
 std::vector<ChartPanel> panels_of(const SceneAccuracy& scene, const ReferenceNote& note,
                                   const std::string& title, std::span<const Measure> shown) {
   std::vector<ChartPanel> panels;
   for (const Measure& measure : shown) {
+    // Draw one curve for each method
     ChartPanel panel{.title = title + measure.title,
                      .x_label = "CPU time per receiver, \u00b5s",
                      .y_label = measure.label};
@@ -71,6 +74,7 @@ std::vector<ChartPanel> panels_of(const SceneAccuracy& scene, const ReferenceNot
       }
       if (!series.points.empty()) panel.series.push_back(std::move(series));
     }
+    // Add the noise of the reference, below which errors say nothing
     if (panel.series.empty()) continue;
     if (measure.noise) panel.limits.push_back({measure.noise(note), "noise of the reference"});
     panels.push_back(std::move(panel));
@@ -82,36 +86,39 @@ void append(Chart& chart, const std::vector<ChartPanel>& panels) {
   chart.panels.insert(chart.panels.end(), panels.begin(), panels.end());
 }
 
+/// A share as a percentage.
 std::string percent(double share) {
   return std::isfinite(share) ? fmt::format("{:.2g} %", 100 * share)
                               : std::string("an unknown share");
 }
 
 constexpr char kReading[] =
-    "Markers: median of all runs; bars: the fastest and the slowest. Beside them: solid angle in "
-    "sr of PTCX and of the "
-    "plain gather, rays of Embree.\n";
+    "Markers are medians of all runs, bars reach from the fastest to the slowest run. Labels: "
+    "solid "
+    "angle in sr for PTCX and the plain gather, rays per receiver for Embree.\n";
 
 }  // namespace
 
 std::string note_text(const ReferenceNote& note, const SceneAccuracy& scene) {
   std::string text = fmt::format(
-      "{}, {}: {} surfels; errors at {} receivers against {} rays each at the same model, which "
-      "are off by {} of the mean "
-      "occlusion",
+      "{}, {}: {} surfels; errors at {} receivers against {} rays each at the same model, whose "
+      "own "
+      "error is {} of the mean occlusion",
       note.scene, note.set, scene.surfels, note.receivers, note.rays,
       percent(note.occlusion_noise));
   const bool light = note.irradiance_mean > 0;
   if (light) text += fmt::format(" and {} of the mean irradiance", percent(note.irradiance_noise));
   text += ".";
   if (!std::isfinite(note.occlusion_floor)) return text;
-  text += fmt::format(" Discs and mesh differ by {}", percent(note.occlusion_floor));
+  text +=
+      fmt::format(" Rays at the discs and at the mesh differ by {}", percent(note.occlusion_floor));
   if (light) text += " and " + percent(note.irradiance_floor);
   return text + ".";
 }
 
 Chart chart_of(const SceneAccuracy& scene) {
-  Chart chart{.title = "Time against error: " + scene.name(), .note = kReading, .columns = 1};
+  Chart chart{
+      .title = "Time per receiver against error: " + scene.name(), .note = kReading, .columns = 1};
   for (const ReferenceNote& note : scene.references) {
     std::string title = note.set + ": ";
     title.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(title.front())));
@@ -124,7 +131,7 @@ Chart chart_of(const SceneAccuracy& scene) {
 }
 
 Chart chart_of(const std::vector<SceneAccuracy>& scenes) {
-  Chart chart{.title = "Time against error", .note = kReading, .columns = 1};
+  Chart chart{.title = "Time per receiver against error", .note = kReading, .columns = 1};
   for (const SceneAccuracy& scene : scenes) {
     const std::size_t before = chart.panels.size();
     for (const ReferenceNote& note : scene.references) {

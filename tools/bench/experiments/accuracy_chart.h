@@ -1,4 +1,4 @@
-// Figures of error over time, one curve a method.
+// Charts of error over time, with one curve for each method.
 #pragma once
 
 #include <string>
@@ -9,15 +9,16 @@
 
 namespace ptc::bench {
 
-/// What one scene's errors are against, and how good that is: a sentence or two.
+/// One or two sentences about the reference of one scene and set, and its own error.
 [[nodiscard]] std::string note_text(const ReferenceNote& note, const SceneAccuracy& scene);
 
-/// A row of panels for each set of receivers: occlusion, irradiance, the worst of it, the picture.
-/// @param scene  with rows
+/// Makes the chart of one scene, with a row of panels for each set of receivers: occlusion,
+/// irradiance, the 99th percentile of irradiance, the difference of pictures (FLIP).
+/// @param scene  with one row or more
 [[nodiscard]] Chart chart_of(const SceneAccuracy& scene);
 
-/// Occlusion and irradiance of every scene and set.
-/// @param scenes  one or more, with rows
+/// Makes the chart of all scenes, with a panel of occlusion and one of irradiance for each set.
+/// @param scenes  one or more, each with one row or more
 [[nodiscard]] Chart chart_of(const std::vector<SceneAccuracy>& scenes);
 
 }  // namespace ptc::bench

@@ -1,3 +1,4 @@
+// The experiment `ptcbench accuracy`: its table columns, its report and its options.
 #include <bit>
 
 #include "engine/parallel/thread_pool.h"
@@ -10,13 +11,18 @@ namespace ptc::bench {
 namespace {
 
 constexpr char kReading[] =
-    "Time of a receiver against its error. ptcx is the hierarchical gather over its settings, "
-    "plain the gather of one receiver at a time, embree-discs and embree-mesh are Sobol-Owen "
-    "rays at the same discs and at the mesh with baked light, single or in packets, whichever is "
-    "faster. Errors are root mean square, mean and 99th percentile over the mean of rays at the "
-    "same model; occlusion is timed alone by any-hit rays, bleeding is occlusion and irradiance. "
-    "The last two columns tell how much longer Embree takes for the same error.";
+    "Time per receiver against error. Methods: ptcx is the hierarchical gather at settings from "
+    "coarse to fine; plain is a gather of one receiver at a time; embree-discs and embree-mesh are "
+    "Sobol-Owen rays at the same discs and at the mesh with baked light, single or in packets, "
+    "whichever is faster. Quantities: occlusion alone (any-hit rays), or bleeding, which is "
+    "occlusion and irradiance together. Errors are shares of the mean of a reference, which is "
+    "many rays at the model that the method shades: root mean square (RMS), mean (bias) and 99th "
+    "percentile. FLIP is the visible difference of a part of the picture, 0 to 1. A time ratio is "
+    "the time that Embree takes for the same error, divided by the time of the row. Noise is the "
+    "RMS error of the reference itself. A setting of ptcx is a solid angle in sr, a parallax in "
+    "rad and R direction pixels along a cube edge.";
 
+/// A count times 1000 as the mean per receiver; nothing for methods that do not gather.
 Value times_thousand(const AccuracyRow& row, std::uint64_t count) {
   return when(row.counts.receivers > 0, static_cast<double>(count) / 1000);
 }
@@ -26,21 +32,22 @@ const Columns<AccuracyRow>& columns() {
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
       {"set", {"receivers"}, &R::set},
-      {"job", {"of"}, [](const R& r) { return std::string(name_of(r.job)); }},
+      {"job", {"quantity"}, [](const R& r) { return std::string(name_of(r.job)); }},
       {"method", {"method"}, &R::method},
       {"setting", {"setting"}, &R::setting},
-      {"receivers", {"timed"}, &R::receivers},
-      {"us_per_receiver", {"CPU us each", "{:.1f}"}, &R::us_per_receiver},
-      {"wall_us_per_receiver", {"wall us each", "{:.1f}"}, &R::wall_us_per_receiver},
+      {"receivers", {"receivers timed"}, &R::receivers},
+      {"us_per_receiver", {"CPU us/receiver", "{:.1f}"}, &R::us_per_receiver},
+      {"wall_us_per_receiver", {"wall us/receiver", "{:.1f}"}, &R::wall_us_per_receiver},
       {"ao_rms", percent("occlusion RMS %"), path(&R::occlusion, &ErrorStatistics::rms)},
       {"e_rms", percent("irradiance RMS %"), path(&R::irradiance, &ErrorStatistics::rms)},
       {"bias", percent("bias %", "{:+.2f}"), [](const R& r) { return r.error().bias; }},
-      {"p99", percent("p99 %", "{:.1f}"), [](const R& r) { return r.error().percentile_99; }},
-      {"flip", {"FLIP", "{:.4f}"}, &R::flip},
+      {"p99", percent("99th percentile %", "{:.1f}"),
+       [](const R& r) { return r.error().percentile_99; }},
+      {"flip", {"mean FLIP", "{:.4f}"}, &R::flip},
       {"ao_rms_mesh", {}, &R::occlusion_rms_mesh},
       {"e_rms_mesh", {}, &R::irradiance_rms_mesh},
-      {"speedup_discs", {"times, discs", "{:.1f}"}, &R::speedup_discs},
-      {"speedup_mesh", {"times, mesh", "{:.1f}"}, &R::speedup_mesh},
+      {"speedup_discs", {"Embree discs, time ratio", "{:.1f}"}, &R::speedup_discs},
+      {"speedup_mesh", {"Embree mesh, time ratio", "{:.1f}"}, &R::speedup_mesh},
       {"groups", {}, [](const R& r) { return times_thousand(r, r.counts.groups); }},
       {"surfel_blocks", {}, [](const R& r) { return times_thousand(r, r.counts.surfel_blocks); }},
       {"clusters", {}, [](const R& r) { return times_thousand(r, r.counts.clusters); }},
@@ -64,14 +71,15 @@ const Columns<ReferenceRow>& reference_columns() {
       {"set", {"receivers"}, noted(&ReferenceNote::set)},
       {"surfels", {"surfels"}, [](const R& r) { return r.scene->surfels; }},
       {"triangles", {"triangles"}, [](const R& r) { return r.scene->triangles; }},
-      {"receivers", {"checked"}, noted(&ReferenceNote::receivers)},
-      {"rays", {"rays each"}, noted(&ReferenceNote::rays)},
+      {"receivers", {"receivers checked"}, noted(&ReferenceNote::receivers)},
+      {"rays", {"rays/receiver"}, noted(&ReferenceNote::rays)},
       {"ao_mean", {"mean occlusion", kNumber}, noted(&ReferenceNote::occlusion_mean)},
       {"e_mean", {"mean irradiance", kNumber}, noted(&ReferenceNote::irradiance_mean)},
-      {"ao_noise", percent("noise %", kShare), noted(&ReferenceNote::occlusion_noise)},
-      {"e_noise", percent("noise, light %", kShare), noted(&ReferenceNote::irradiance_noise)},
-      {"ao_floor", percent("discs to mesh %", kShare), noted(&ReferenceNote::occlusion_floor)},
-      {"e_floor", percent("discs to mesh, light %", kShare),
+      {"ao_noise", percent("noise, occlusion %", kShare), noted(&ReferenceNote::occlusion_noise)},
+      {"e_noise", percent("noise, irradiance %", kShare), noted(&ReferenceNote::irradiance_noise)},
+      {"ao_floor", percent("discs against mesh, occlusion %", kShare),
+       noted(&ReferenceNote::occlusion_floor)},
+      {"e_floor", percent("discs against mesh, irradiance %", kShare),
        noted(&ReferenceNote::irradiance_floor)}};
   return columns;
 }
@@ -82,7 +90,7 @@ Report report_of(const std::vector<SceneAccuracy>& scenes, unsigned runs) {
   std::vector<AccuracyRow> rows;
   std::vector<ReferenceRow> references;
   Report report{.name = "accuracy",
-                .title = "Time against error",
+                .title = "Time per receiver against error: PTCX, plain gather and Embree",
                 .reading = kReading,
                 .runs = runs,
                 .figures = {{.chart = chart_of(scenes)}}};
@@ -92,9 +100,10 @@ Report report_of(const std::vector<SceneAccuracy>& scenes, unsigned runs) {
     report.figures.push_back({.part = scene.name(), .chart = chart_of(scene)});
   }
   report.tables = {
-      tabulate<AccuracyRow>({.name = "rows", .group = "scene"}, columns(), rows),
-      tabulate<ReferenceRow>({.name = "references", .title = "What the errors are against"},
-                             reference_columns(), references)};
+      tabulate<AccuracyRow>({.name = "rows", .title = "Scene", .group = "scene"}, columns(), rows),
+      tabulate<ReferenceRow>(
+          {.name = "references", .title = "References that the errors are measured against"},
+          reference_columns(), references)};
   return report;
 }
 
@@ -113,21 +122,21 @@ Experiment make_accuracy_experiment() {
     d.points(scene.points, "2M", 200'000);
     d.checked(options->checked, 200);
     add_integer(d.command(), "--reference-rays", options->reference_rays, 16, 65536,
-                "Rays of each half of a reference, a power of two")
+                "Rays per receiver of each of the two halves of a reference, a power of two")
         ->check(is_power_of_two);
     d.repeats(options->repeats, 3);
     d.list("--setting", "SR,RAD,R[,X]", options->settings, parse_setting,
-           "Measure PTCX with this solid angle, parallax, resolution and inflation, in place of a "
-           "list from coarse to fine; repeatable")
+           "Measure PTCX at this solid angle [sr], parallax [rad], resolution [pixels along a cube "
+           "edge] and inflation, in place of a list from coarse to fine; repeatable")
         ->group(kExpert);
     const std::vector<GatherOptions> all = AccuracyOptions::default_settings();
     d.quick("--setting", options->settings, {all[0], all[2], all[3], all[5]});
-    d.words("--method", options->methods, "Measure this method, not all; repeatable")
-        ->group(kExpert);
+    d.words("--method", options->methods, "Measure only this method; repeatable")->group(kExpert);
     d.words("--set", options->sets,
-            "Shade these receivers: pixels of a picture, or the scene's own points; repeatable")
+            "Shade only these receivers: pixels of a picture, or points of the scene; repeatable")
         ->group(kExpert);
-    // In the middle of the picture: as dense as all of it, or less would be shared.
+    // Shade the middle of the picture, not a smaller picture: receivers keep their distance, and so
+    // their share of common work
     d.quick(scene.shaded_width, 192);
     d.quick(scene.shaded_height, 108);
     d.quick(scene.window_width, 48);
@@ -143,16 +152,17 @@ Experiment make_accuracy_experiment() {
       return measure_accuracy(scene, *options, executor, b.progress);
     });
   };
-  return {.name = "accuracy",
-          .purpose =
-              "Time per receiver against error: PTCX over its settings, the plain gather, "
-              "Embree on the same discs and on the mesh",
-          .quick =
-              "Under a minute a scene on two cores: 200k points, fewer receivers of each set "
-              "(192 x 108 pixels, 8k points), 200 of them checked, 3 runs of fewer settings",
-          .declare = declare,
-          .run = run,
-          .check = [scenes] { scenes->check(); }};
+  return {
+      .name = "accuracy",
+      .purpose =
+          "Time per receiver against error: PTCX at settings from coarse to fine, a plain gather, "
+          "and Embree on the same discs and on the mesh",
+      .quick =
+          "Under a minute per scene on two cores: 200k points, fewer receivers of each set "
+          "(192 x 108 pixels, 8k points), 200 of them checked, 3 runs of fewer settings",
+      .declare = declare,
+      .run = run,
+      .check = [scenes] { scenes->check(); }};
 }
 
 }  // namespace ptc::bench

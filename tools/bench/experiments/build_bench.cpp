@@ -1,3 +1,10 @@
+// The input is written once for each size; then builds and the floor take turns, so that they share
+// whatever else the disk does at the time:
+//
+//   run 1:  compact   fast   floor      run 2:  compact   fast   floor      ...
+//
+//   build   input file -> ExternalSorter -> round_points -> build_pages -> container
+//   floor   input file -> a file of the spilled bytes -> a file of the container's bytes
 #include "tools/bench/experiments/build_bench.h"
 
 #include <array>
@@ -22,22 +29,23 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kVerifiedWhole = 2'000'000;
+constexpr std::uint64_t kVerifiedWhole = 2'000'000;  // points up to which the tree is built again
 
-/// The records of a city in a file, and what a build must know of them.
+/// The records of a city in a file, and what a build must know about them.
 struct Input {
   RecordFile file;
   Frame frame;
   std::vector<MortonKey> sample;
 };
 
-/// What came of a build.
+/// The sizes and the content of one build.
 struct Built {
   std::uint64_t spilled = 0, file_bytes = 0, nodes = 0;
-  std::array<std::uint64_t, 2> content{};  ///< digest
+  std::array<std::uint64_t, 2> content{};  ///< digest (Superblock::content_xxh3)
   StoredBytes stored;
 };
 
+/// Runs all builds that were asked for.
 class BuildRun {
  public:
   BuildRun(const BuildBenchOptions& options, const std::filesystem::path& work,
@@ -64,8 +72,8 @@ class BuildRun {
 
  private:
   [[nodiscard]] Input make_input(std::uint64_t points) {
-    constexpr std::uint64_t kFiles =
-        3;  // input, what is spilled, container; a city has up to 5 % more points
+    // Room for the input, the spilled records and the container; a city has up to 5 % more points
+    constexpr std::uint64_t kFiles = 3;
     require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20,
                  fmt::format("{} records", points));
     Input input{.file = RecordFile(work_), .frame = {}, .sample = {}};
@@ -81,7 +89,9 @@ class BuildRun {
     return input;
   }
 
+  /// Runs all profiles and the floor under one cap, and adds their rows.
   void at_cap(const std::string& panel, const Input& input, std::uint64_t cap) {
+    // Run profiles and floor in turn
     std::map<std::string, std::pair<TimedRuns, Built>> methods;
     TimedRuns floor;
     progress_.begin("build", options_.repeats * options_.profiles.size(), "runs");
@@ -103,6 +113,7 @@ class BuildRun {
       });
     }
     progress_.end();
+    // Add a row for each profile, and one for the floor
     for (const auto& [profile, result] : methods) {
       const auto& [times, built] = result;
       BuildRow& row = add_row(panel, profile, input, times);
@@ -130,7 +141,9 @@ class BuildRun {
                                        .resident_bytes = times.resident});
   }
 
+  /// Builds a container at target_ under a cap.
   [[nodiscard]] Built build(const Input& input, Profile profile, std::uint64_t cap) {
+    // Sort the input
     Built built;
     const MemoryBudget budget = budget_of(cap, "this build");
     ExternalSorter sorter({.memory_bytes = budget.rest("the sort", kMinSortBytes),
@@ -143,6 +156,7 @@ class BuildRun {
            block = reader.next())
         sorter.add(block);
     }
+    // Build the tree and write the container
     ContainerWriter writer(target_, {.codec = codec_of(profile), .frame = input.frame});
     const std::unique_ptr<PointStream> sorted = sorter.finish();
     const std::unique_ptr<PointStream> rounded =
@@ -157,16 +171,20 @@ class BuildRun {
     return built;
   }
 
-  /// Sound, and the same as under other caps. Adds what pages take.
+  /// Checks that the container is sound, has all points and has the content of other caps; records
+  /// the bytes of its pages.
+  /// @throws DataError otherwise
   void require_right(const Input& input, const std::string& profile, Built& built) {
     const VerifyLevel level =
         input.file.records() <= kVerifiedWhole ? VerifyLevel::rebuild : VerifyLevel::payload;
     Progress silent;
     const VerifyReport report =
         verify_container(target_, {.level = level, .threads = run_.threads}, silent);
-    if (!report.sound()) throw DataError(fmt::format("{}: the container is not sound", profile));
+    if (!report.sound())
+      throw DataError(fmt::format("{}: the container that was built is not sound", profile));
     if (report.superblock->points != input.file.records())
-      throw DataError(fmt::format("{}: points were lost", profile));
+      throw DataError(
+          fmt::format("{}: the container has another number of points than the input", profile));
     const auto [known, is_new] =
         contents_.try_emplace({input.file.records(), profile}, built.content);
     if (known->second != built.content)

@@ -1,4 +1,5 @@
-// The whole build, from unsorted records to a container, against the disk.
+// The whole build, from unsorted records to a container, compared with the disk alone: the
+// experiment `ptcbench build`.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +15,11 @@
 
 namespace ptc::bench {
 
+/// What `ptcbench build` measures. Panel "points": builds of growing size under the run's cap.
+/// Panel "cap": the largest size under each of the caps.
 struct BuildBenchOptions {
-  std::vector<std::uint64_t> points{1'000'000, 5'000'000, 20'000'000};  ///< of the city, ascending
-  /// Caps under which the largest of them is built, ascending. The others are built under the run's
-  /// cap.
+  std::vector<std::uint64_t> points{1'000'000, 5'000'000, 20'000'000};  ///< points of the city
+  /// Memory caps under which the panel "cap" builds the largest city, bytes, ascending.
   std::vector<std::uint64_t> caps{std::uint64_t{128} << 20, std::uint64_t{256} << 20,
                                   std::uint64_t{512} << 20, std::uint64_t{1} << 30,
                                   std::uint64_t{2} << 30};
@@ -26,37 +28,40 @@ struct BuildBenchOptions {
   unsigned repeats = 5;
 };
 
-/// One measurement. Methods: compact and fast, the profiles, from a file of records of 40 bytes in
-/// the city's order through sort and tree to a published container; floor, a disk that moves the
-/// same bytes: reads the input, writes and reads what is spilled, and writes as much as the
-/// container has.
+/// One measurement.
+///
+///   method            what is timed
+///   compact, fast     the profile's build: file of records of 40 bytes in the city's order -> sort
+///                     -> tree -> published container
+///   floor             the disk moves the same bytes: the input is read, the spilled bytes are
+///                     written and read, and as many bytes as the container has are written
 struct BuildRow {
   std::string panel, method;
   std::uint64_t points = 0;
   unsigned threads = 0;
-  std::uint64_t memory_bytes = 0;  ///< cap; 0 of the floor
+  std::uint64_t memory_bytes = 0;  ///< cap; 0 for the floor
   Spread wall;                     ///< seconds
   Spread cpu;                      ///< seconds, user and system, all threads
-  std::uint64_t moved_bytes = 0;   ///< read and written, all passes
+  std::uint64_t moved_bytes = 0;   ///< read and written by all passes together
   std::uint64_t input_bytes = 0;
-  std::uint64_t resident_bytes = 0;  ///< most at once during a run, less what was there before it
+  std::uint64_t resident_bytes = 0;  ///< maximum during a run, less those before it
   std::uint64_t nodes = 0;
-  double bytes_per_point = 0, bytes_per_node = 0;  ///< on the disk, of pages of points and of nodes
+  double bytes_per_point = 0, bytes_per_node = 0;  ///< StoredBytes
 };
 
-/// Runs everything asked for in one process; the profiles and the floor of a size and cap in turn.
-/// Of each, one container is verified whole, tree and all (level 4) up to 2 million points, else
-/// every byte of it (level 2); all of one size and profile must have the same content whatever the
-/// cap.
-/// @param work  directory for the files; they are gone at the end
+/// Runs everything that was asked for in one process; profiles and floor of a size and cap take
+/// turns. The first container of each is verified: its tree is built again up to 2 million points
+/// (level 4), else every byte is checked (level 2). All containers of a size and profile must have
+/// the same content, whatever the cap.
+/// @param work    directory for the files, which are gone at the end
+/// @param report  called with all rows so far, whenever there are more
 /// @throws std::system_error (ENOSPC) before a file is written that the disk has no room for;
-/// DataError when a
-///         container is wrong
+///         DataError when a container is wrong
 [[nodiscard]] std::vector<BuildRow> measure_build(
     const BuildBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const std::function<void(const std::vector<BuildRow>&)>& report = {});
 
-/// Files "build": the rows, and charts over points and over the cap.
+/// Makes the report "build": the rows, and a chart over points and over the cap.
 [[nodiscard]] Report report_of(const std::vector<BuildRow>& rows, unsigned runs);
 
 }  // namespace ptc::bench

@@ -1,3 +1,13 @@
+// Two kinds of runs. A HitRun looks up pages that are in the cache, millions of times. Its four
+// variants find a page at different levels:
+//
+//   pointers                 table of pointers -> page: no cache could be faster
+//   first level              reader's own slots -> page
+//   second level, clock/LRU  reader's own slots (miss) -> shared table -> page
+//
+// A ShadeRun shades receivers with a cache that has frames for a share of the pages, empty at
+// first, and with the file out of the system's cache. All ShadeRuns of a panel take turns, and must
+// agree to the last bit.
 #include "tools/bench/experiments/cache_bench.h"
 
 #include <algorithm>
@@ -24,21 +34,23 @@
 namespace ptc::bench {
 namespace {
 
+/// Whether two lists of shadings are equal bit by bit.
 bool same(const std::vector<Shading>& a, const std::vector<Shading>& b) {
   static_assert(std::is_trivially_copyable_v<Shading>);
   return std::memcmp(a.data(), b.data(), a.size() * sizeof(Shading)) == 0;
 }
 
-/// Shades the scene's points with a cache of some frames that is empty at first, as is the
-/// system's.
+/// Shades the scene's points with a page cache of some frames. Both it and the system's cache are
+/// empty of the file's pages when a run begins.
 class ShadeRun {
  public:
+  /// A variant of shading.
   struct Way {
-    std::string name;
+    std::string name;  ///< CacheRow::method
     BackEnd back_end = BackEnd::pread;
     Replacement replacement = Replacement::clock;
     bool read_ahead = true;
-    bool shuffled = false;  ///< blocks of receivers from all over the scene
+    bool shuffled = false;  ///< each block has receivers from all over the scene
   };
 
   ShadeRun(const BenchScene& scene, const Way& way, double cap, unsigned threads)
@@ -62,14 +74,15 @@ class ShadeRun {
   void run() {
     forget(scene_.container().file());
     PageCache cache(scene_.container(), cache_options_);
-    const ThreadPool executor(
-        threads_);  // of this run alone: the least of all there are limits the others
+    // An executor that lives during this run only: while several exist, the smallest one limits the
+    // threads of all.
+    const ThreadPool executor(threads_);
     const std::uint64_t before = disk_bytes();
     times_.run([&] {
       Shader shader(scene_.container(), {.cache = &cache}, executor);
       Progress silent;
-      // A call shades its receivers in the order of the Z-curve: each block of a shuffled set is a
-      // call of its own.
+      // A call shades its receivers in the order of the Z-curve. A shuffled set is therefore shaded
+      // by one call for each block.
       const std::size_t step = way_.shuffled ? Shader::kBlock : receivers_.size();
       for (std::size_t at = 0; at < receivers_.size(); at += step) {
         const std::size_t count = std::min(step, receivers_.size() - at);
@@ -115,14 +128,15 @@ class ShadeRun {
   std::uint64_t disk_ = 0;
 };
 
-/// Looks up pages that are there, in no order, none twice in a row.
+/// Looks up pages that are in the cache, in random order, none twice in a row.
 class HitRun {
  public:
   static constexpr std::uint32_t kPages = 256;
   static constexpr std::size_t kLookups = 4'000'000;
 
-  /// @param slots  of a reader's own level: kPages, so that it has all of them, or 1, so that it
-  /// has none
+  /// @param slots  slots of a reader's own level: kPages, so that it finds every page there, or 1,
+  /// so
+  ///               that it finds none
   HitRun(const ContainerReader& container, const std::string& method, Replacement replacement,
          std::uint32_t slots, unsigned threads)
       : method_(method),
@@ -133,6 +147,7 @@ class HitRun {
                            .threads = threads,
                            .replacement = replacement,
                            .local_slots = slots}) {
+    // Draw the sequence of pages
     std::mt19937 random(1);
     std::uint32_t last = 0;
     for (std::uint32_t& page : sequence_) {
@@ -140,13 +155,16 @@ class HitRun {
       while (page == last && pages_ > 1);
       last = page;
     }
+    // Load all pages, and add up what the lookups must find
     PageReader reader(cache_);
     for (std::uint32_t page = 0; page < pages_; ++page)
       payloads_.push_back(reader.pin(page).payload());
     for (const std::uint32_t page : sequence_) expected_ += static_cast<unsigned>(*payloads_[page]);
   }
 
-  /// @param pointers  reads through a table of pointers instead: what no cache could be faster than
+  /// Looks up the sequence once in each thread.
+  /// @param pointers  read through a table of pointers instead of the cache
+  /// @throws DataError when a lookup returned other bytes than the page's
   void run(bool pointers) {
     std::vector<std::uint64_t> sums(threads_);
     times_.run([&] {
@@ -158,7 +176,7 @@ class HitRun {
     });
     for (const std::uint64_t sum : sums) {
       if (sum != expected_)
-        throw DataError(method_ + ": a lookup brought other bytes than the page's");
+        throw DataError(method_ + ": a lookup returned other bytes than the page's");
     }
   }
 
@@ -203,6 +221,7 @@ class HitRun {
   TimedRuns times_;
 };
 
+/// Runs all panels that were asked for.
 class CacheRun {
  public:
   CacheRun(const CacheBenchOptions& options, const std::filesystem::path& work,
@@ -282,7 +301,7 @@ class CacheRun {
     progress_.end();
   }
 
-  /// Those that the system has, the last one also without read-ahead.
+  /// Measures the back ends that the system has, io_uring also without read-ahead.
   void measure_back_ends(const BenchScene& scene) {
     std::vector<ShadeRun::Way> ways{{.name = "pread"}, {.name = "mmap", .back_end = BackEnd::mmap}};
     try {
@@ -292,16 +311,17 @@ class CacheRun {
       ways.push_back({.name = "io_uring", .back_end = BackEnd::io_uring});
       ways.push_back(
           {.name = "io_uring, no read-ahead", .back_end = BackEnd::io_uring, .read_ahead = false});
-    } catch (const std::system_error&) {  // then there is no row of it
+    } catch (const std::system_error&) {  // a back end that the system lacks has no row
     }
     shade_under_caps("back-end", scene, ways, thread_counts(threads_));
   }
 
+  /// Measures growing numbers of threads by replacement, at the middle cap.
   void measure_threads(const BenchScene& scene) {
     std::vector<std::unique_ptr<ShadeRun>> runs;
     for (const unsigned threads : options_.threads) {
       if (threads > 1 && threads * Shader::kBlock > options_.receivers)
-        break;  // a block has one thread
+        break;  // a block is shaded by one thread, so further threads would be idle
       for (const auto& way :
            {ShadeRun::Way{.name = "clock"}, {.name = "LRU", .replacement = Replacement::lru}}) {
         runs.push_back(std::make_unique<ShadeRun>(scene, way, options_.middle_cap, threads));
@@ -310,6 +330,7 @@ class CacheRun {
     shade("threads", runs);
   }
 
+  /// Measures all ways under all caps with each number of threads.
   void shade_under_caps(const std::string& panel, const BenchScene& scene,
                         const std::vector<ShadeRun::Way>& ways,
                         const std::vector<unsigned>& threads) {
@@ -323,6 +344,7 @@ class CacheRun {
     shade(panel, runs);
   }
 
+  /// Runs everything in turn, compares the results and adds the rows.
   void shade(const std::string& panel, const std::vector<std::unique_ptr<ShadeRun>>& runs) {
     progress_.begin("shade, " + panel, options_.repeats * runs.size(), "runs");
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
@@ -332,11 +354,13 @@ class CacheRun {
       }
     }
     progress_.end();
+    // Compare with the first run over the same order of receivers
     for (const auto& run : runs) {
       const auto& first = *std::ranges::find_if(
           runs, [&](const auto& r) { return r->way().shuffled == run->way().shuffled; });
       if (!same(first->results(), run->results())) {
-        throw DataError(panel + ", " + run->way().name + ": other values than with other caps");
+        throw DataError(panel + ", " + run->way().name +
+                        ": shaded values differ from those under another cap");
       }
       add(run->row(panel));
     }

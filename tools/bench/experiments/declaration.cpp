@@ -11,13 +11,14 @@
 namespace ptc::bench {
 namespace {
 
+/// The words as "one|two|three".
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : "|") + word;
   return text;
 }
 
-/// Refuses what is none of these words.
+/// Refuses any word but these.
 CLI::Validator one_of(const std::vector<std::string>& known) {
   const auto check = [known](const std::string& text) {
     const bool found = std::ranges::find(known, text) != known.end();
@@ -26,6 +27,7 @@ CLI::Validator one_of(const std::vector<std::string>& known) {
   return {check, ""};
 }
 
+/// The scenes that can be named, for the help and for errors.
 constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
 
 }  // namespace
@@ -66,7 +68,7 @@ void Declaration::scenes(SceneList& scenes) {
   command_
       ->add_option("scenes", scenes.texts_,
                    std::string(kScenes) +
-                       "; +backdrop behind a mesh's name sets it on a ground before a wall "
+                       "; +backdrop after a mesh's name sets it on a ground before a wall "
                        "[default: fractal window city, fractal with --quick]")
       ->type_name("SCENE");
   quick("scenes", scenes.texts_, {scenes.texts_.front()});
@@ -88,12 +90,12 @@ void Declaration::points(std::vector<std::uint64_t>& points, const std::string& 
 
 void Declaration::checked(unsigned& checked, unsigned less) {
   add_integer(*command_, "--checked", checked, 10, 1'000'000,
-              "Receivers of each set whose error is measured");
+              "Receivers whose error is measured, of each set");
   quick("--checked", checked, less);
 }
 
 void Declaration::repeats(unsigned& repeats, unsigned less) {
-  add_integer(*command_, "--repeats", repeats, 1, 1000, "Runs of every measurement");
+  add_integer(*command_, "--repeats", repeats, 1, 1000, "Runs of each measurement");
   quick("--repeats", repeats, less);
 }
 

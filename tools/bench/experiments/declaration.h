@@ -16,17 +16,17 @@
 
 namespace ptc::bench {
 
-/// "SR,RAD,R[,X]": solid angle, parallax, resolution, inflation. Refuses what a gather does not
-/// take.
+/// Parses "SR,RAD,R[,X]": solid angle, parallax, resolution, inflation.
+/// @throws CLI::ValidationError for values that a gather does not accept
 [[nodiscard]] GatherOptions parse_setting(const std::string& text);
 
 /// The scenes that an experiment goes through.
 class SceneList {
  public:
-  /// Finds them. @throws DataError for files that cannot be read, std::invalid_argument as
-  /// parse_scenes()
+  /// Parses the list and checks that its files can be read.
+  /// @throws DataError for a file that cannot be read; RequestError as parse_scenes()
   void check();
-  /// After check().
+  /// The scenes in the order of the command line. @pre check() was called
   [[nodiscard]] const std::vector<SceneChoice>& choices() const noexcept { return choices_; }
 
  private:
@@ -35,38 +35,49 @@ class SceneList {
   std::vector<SceneChoice> choices_;
 };
 
-/// Declares options of one command. What is declared must stay where it is.
+/// Declares the options of one command. The variables that options set must outlive the parsing.
 class Declaration {
  public:
   explicit Declaration(CLI::App& command) : command_(&command) {}
 
+  /// The command, for options of other kinds.
   [[nodiscard]] CLI::App& command() const noexcept { return *command_; }
 
-  /// --quick sets a value, unless this option is given.
+  /// Makes --quick set a value, unless the option that sets it is given, too.
   template <class Value>
   void quick(const std::string& option, Value& value, std::type_identity_t<Value> less) {
     quick_.push_back([command = command_, option, &value, less = std::move(less)] {
       if (option.empty() || command->count(option) == 0) value = less;
     });
   }
-  /// --quick sets a value that has no option.
+  /// Makes --quick set a value that has no option.
   template <class Value>
   void quick(Value& value, std::type_identity_t<Value> less) {
     quick("", value, std::move(less));
   }
-  /// Does what --quick does, once the command is parsed.
+  /// Sets all values of --quick. @pre the command is parsed
   void shorten() const;
 
-  /// The positional arguments; --quick leaves the first of the default scenes.
+  /// Declares the scenes as positional arguments; with --quick the default is the first scene
+  /// alone.
   void scenes(SceneList& scenes);
-  /// --points of a scene. @param shown  the default as the help has it
+  /// Declares --points of a scene.
+  /// @param shown  the default as the help shows it
+  /// @param less   the value of --quick
   void points(std::uint64_t& points, const char* shown, std::uint64_t less);
-  /// --points, repeatable; ascending.
+  /// Declares a repeatable --points, whose values are put in ascending order.
+  /// @param less  the values of --quick
   void points(std::vector<std::uint64_t>& points, const std::string& description,
               std::vector<std::uint64_t> less);
+  /// Declares --checked, the number of receivers whose error is measured.
+  /// @param less  the value of --quick
   void checked(unsigned& checked, unsigned less);
+  /// Declares --repeats, the number of runs.
+  /// @param less  the value of --quick
   void repeats(unsigned& repeats, unsigned less);
-  /// Any number of values, each parsed by itself; numbers are put in ascending order.
+  /// Declares a repeatable option whose values replace the default ones. Integers are put in
+  /// ascending order.
+  /// @param parse  makes a value of the text of one option, or throws CLI::ValidationError
   template <class Value, class Parse>
   CLI::Option* list(const char* name, const char* type, std::vector<Value>& values,
                     const Parse& parse, const std::string& description) {
@@ -79,7 +90,7 @@ class Declaration {
         ->type_name(type)
         ->allow_extra_args(false);
   }
-  /// Some of the words that are in `chosen`, repeatable.
+  /// Declares a repeatable option that chooses some of the words that `chosen` holds.
   CLI::Option* words(const char* name, std::vector<std::string>& chosen, const char* description);
 
  private:

@@ -1,5 +1,9 @@
-// What a user waits for: each program's work on a scene, one after the other, and the error of what
-// comes out.
+// The experiment `ptcbench demo`: what a user waits for. The work of each program on a scene, one
+// after the other, and the error of the picture:
+//
+//   input -> build -> .ptcx -+-> verify
+//                            +-> shade -> .ply        with one bounce, and without
+//                            `-> render -> .exr -> check against rays (not timed)
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -18,25 +22,26 @@ namespace ptc::bench {
 namespace {
 
 constexpr char kReading[] =
-    "The work of ptcbuild, ptcverify, ptcshade and ptcrender on a scene under one memory cap, as "
-    "one process does it: reading the inputs, everything between, and writing the outputs. Peaks "
-    "are what a stage adds to the program. CPU us each is the time of the gather alone. The errors "
-    "are those of some of the picture's receivers against rays at the same surfels and at the "
-    "mesh, "
-    "RMS and mean of the difference, and without what the rays themselves are off.";
+    "The work of ptcbuild, ptcverify, ptcshade and ptcrender on a scene under one memory cap, done "
+    "by one process: reading the inputs, everything between, and writing the outputs. Peak memory "
+    "is what a stage adds to the program. Gather CPU is the time of the gather alone. Errors are "
+    "the root mean square (RMS) and the mean (bias) of the difference between some of the "
+    "picture's receivers and rays, at the same surfels and at the mesh, without the error of the "
+    "rays themselves; those of irradiance are shares of its mean.";
 
 constexpr std::uint64_t kCheckBytes = std::uint64_t{4} << 30;  ///< cap of the check against rays
 
 constexpr std::array kStages{"build", "verify", "shade", "shade, no bounce", "render"};
 
+/// What `ptcbench demo` measures.
 struct DemoOptions {
   SceneOptions scene;
-  std::uint64_t receivers = 0;  ///< of both shadings; 0: all points
+  std::uint64_t receivers = 0;  ///< points that each shading shades; 0: all
   std::vector<std::string> stages{kStages.begin(), kStages.end()};
-  std::array<unsigned, 2> size{960, 540};
-  unsigned samples = 4;
-  unsigned checked = 2000;
-  unsigned check_rays = 4096;
+  std::array<unsigned, 2> size{960, 540};  ///< pixels of the picture
+  unsigned samples = 4;                    ///< samples per pixel, a square number
+  unsigned checked = 2000;                 ///< receivers whose error is measured
+  unsigned check_rays = 4096;              ///< rays per checked receiver
   unsigned repeats = 5;
 
   [[nodiscard]] bool has(std::string_view stage) const {
@@ -44,7 +49,7 @@ struct DemoOptions {
   }
 };
 
-/// One stage of one scene. Counts are of the last run.
+/// One stage of one scene. Counts are those of the last run.
 struct DemoRow {
   std::string scene, stage;
   std::uint64_t memory_bytes = 0;
@@ -55,15 +60,16 @@ struct DemoRow {
   std::optional<LightingReport> shaded;
 };
 
-/// The picture against rays.
+/// The error of the picture against rays at one model.
 struct DemoError {
   std::string scene, against;
   std::size_t receivers = 0;
   unsigned rays = 0;
   CheckError error;
-  double ray_us = 0;  ///< CPU time of the rays of one receiver
+  double ray_us = 0;  ///< CPU time of the rays, per receiver
 };
 
+/// Everything that was measured on one scene.
 struct SceneDemo {
   std::vector<DemoRow> rows;
   std::vector<DemoError> errors;
@@ -81,18 +87,18 @@ const Columns<DemoRow>& columns() {
       {"threads", {"threads"}, &R::threads},
       {"wall_seconds", {"wall s", "{:.2f}"}, &R::wall},
       {"cpu_seconds", {"CPU s", "{:.2f}"}, &R::cpu},
-      {"resident_bytes", {"peak MiB", "{:.0f}", kMebi}, &R::resident_bytes},
+      {"resident_bytes", {"peak memory MiB", "{:.0f}", kMebi}, &R::resident_bytes},
       {"points", {"surfels"}, &R::points},
       {"nodes", {"nodes"}, &R::nodes},
       {"file_bytes", {"file MiB", "{:.1f}", kMebi}, &R::file_bytes},
       {"receivers", {"receivers"}, shaded([](const LightingReport& s) { return s.receivers; })},
-      {"us_per_receiver", {"CPU us each", "{:.1f}"}, shaded([](const LightingReport& s) {
+      {"us_per_receiver", {"gather CPU us/receiver", "{:.1f}"}, shaded([](const LightingReport& s) {
          return 1e6 * s.shade_cpu_seconds /
                 static_cast<double>(std::max<std::uint64_t>(1, s.receivers));
        })},
       {"hit_rate", percent("cache hits %", "{:.3f}"),
        shaded([](const LightingReport& s) { return s.cache.hit_rate(); })},
-      {"read_bytes", {"read MiB", "{:.0f}", kMebi}, shaded([](const LightingReport& s) {
+      {"read_bytes", {"cache read MiB", "{:.0f}", kMebi}, shaded([](const LightingReport& s) {
          return s.cache.bytes_read;
        })}};
   return columns;
@@ -103,19 +109,20 @@ const Columns<DemoError>& error_columns() {
   const auto error = [](auto member) { return path(&R::error, member); };
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
-      {"against", {"against"}, &R::against},
+      {"against", {"rays at"}, &R::against},
       {"receivers", {"receivers"}, &R::receivers},
-      {"rays", {"rays each"}, &R::rays},
+      {"rays", {"rays/receiver"}, &R::rays},
       {"occlusion_mean", {"mean occlusion", "{:.3f}"}, error(&CheckError::occlusion_mean)},
       {"occlusion_rms", {"occlusion RMS", "{:.4f}"}, error(&CheckError::occlusion_rms)},
-      {"occlusion_bias", {"bias", "{:+.4f}"}, error(&CheckError::occlusion_bias)},
+      {"occlusion_bias", {"occlusion bias", "{:+.4f}"}, error(&CheckError::occlusion_bias)},
       {"irradiance_rms", percent("irradiance RMS %"), error(&CheckError::irradiance_rms)},
-      {"irradiance_bias", percent("bias %", "{:+.2f}"), error(&CheckError::irradiance_bias)},
-      {"ray_us_per_receiver", {"rays, CPU us each", "{:.0f}"}, &R::ray_us}};
+      {"irradiance_bias", percent("irradiance bias %", "{:+.2f}"),
+       error(&CheckError::irradiance_bias)},
+      {"ray_us_per_receiver", {"CPU us of the rays/receiver", "{:.0f}"}, &R::ray_us}};
   return columns;
 }
 
-/// All stages of one scene.
+/// Runs all stages of one scene in turn.
 class DemoRun {
  public:
   DemoRun(const SceneChoice& choice, const DemoOptions& options, const Bench& bench)
@@ -145,6 +152,7 @@ class DemoRun {
   }
 
  private:
+  /// Runs and times one stage, an index into kStages.
   void run(std::size_t stage) {
     Progress silent;
     times_[stage].run([&] {
@@ -211,7 +219,8 @@ class DemoRun {
             .shaded = reports_[stage]};
   }
 
-  /// A picture of half the size, whose rays have room for all surfels at once.
+  /// Compares a picture of half the size with rays. The memory cap is raised so that the rays have
+  /// room for all surfels at once.
   void check(std::vector<DemoError>& errors) const {
     RenderRequest request = render_request();
     request.size = {std::max(1U, options_.size[0] / 2), std::max(1U, options_.size[1] / 2)};
@@ -248,13 +257,15 @@ Report report_of(const std::vector<SceneDemo>& scenes, unsigned runs) {
     rows.insert(rows.end(), scene.rows.begin(), scene.rows.end());
     errors.insert(errors.end(), scene.errors.begin(), scene.errors.end());
   }
-  return {.name = "demo",
-          .title = "A scene from input to picture",
-          .reading = kReading,
-          .runs = runs,
-          .tables = {tabulate<DemoRow>({.name = "rows", .group = "scene"}, columns(), rows),
-                     tabulate<DemoError>({.name = "errors", .title = "Error of the picture"},
-                                         error_columns(), errors)}};
+  return {
+      .name = "demo",
+      .title = "Time and memory from input to picture, and the error of the picture",
+      .reading = kReading,
+      .runs = runs,
+      .tables = {
+          tabulate<DemoRow>({.name = "rows", .title = "Scene", .group = "scene"}, columns(), rows),
+          tabulate<DemoError>({.name = "errors", .title = "Error of the picture against rays"},
+                              error_columns(), errors)}};
 }
 
 }  // namespace
@@ -266,9 +277,9 @@ Experiment make_demo_experiment() {
     d.scenes(*scenes);
     d.points(options->scene.points, "2M", 50'000);
     add_count(d.command(), "--receivers", options->receivers,
-              "Shade so many of the points, spread evenly [default: all]")
+              "Shade this many of the points, spread evenly [default: all]")
         ->default_str("");
-    d.words("--stage", options->stages, "Measure this stage, not all; repeatable");
+    d.words("--stage", options->stages, "Measure only this stage; repeatable");
     d.checked(options->checked, 200);
     d.repeats(options->repeats, 2);
     d.quick(options->size, {192, 108});
@@ -283,8 +294,8 @@ Experiment make_demo_experiment() {
   return {
       .name = "demo",
       .purpose =
-          "A scene from input to picture: time and memory of build, verification, "
-          "shading and rendering, and the error of the picture against rays",
+          "From input to picture: time and memory of build, verification, shading and rendering, "
+          "and the error of the picture against rays",
       .quick = "A few seconds: 50k points, a picture of 192 x 108, 200 receivers checked, 2 runs",
       .declare = declare,
       .run = run,

@@ -8,7 +8,7 @@
 namespace ptc::bench {
 
 std::uint64_t disk_bytes() {
-  std::ifstream facts("/proc/self/io");
+  std::ifstream facts("/proc/self/io");  // lines of "key: value", proc(5)
   std::string key;
   for (std::uint64_t value = 0; facts >> key >> value;) {
     if (key == "read_bytes:") return value;

@@ -1,4 +1,4 @@
-// Reads that reach the disk, and what they brought.
+// Makes reads reach the disk, and counts the bytes that disks delivered.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,11 @@
 
 namespace ptc::bench {
 
-/// Bytes that disks gave to this process so far; 0 where the system does not say.
+/// The number of bytes that this process has read from disks so far; 0 where the system does not
+/// report it.
 [[nodiscard]] std::uint64_t disk_bytes();
 
-/// Takes what the system keeps of a file out of its cache, where that can be done.
+/// Asks the system to drop a file's pages from its cache. Pages that are dirty or mapped may stay.
 void forget(const InputFile& file);
 
 }  // namespace ptc::bench

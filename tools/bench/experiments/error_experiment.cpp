@@ -1,3 +1,4 @@
+// The experiment `ptcbench error`: its table columns, its charts and its options.
 #include <string>
 
 #include <fmt/format.h>
@@ -10,13 +11,15 @@ namespace ptc::bench {
 namespace {
 
 constexpr char kReading[] =
-    "What was asked of --error, and what came of it. Errors are the larger of occlusion and "
-    "irradiance, RMS over the mean, against rays at the same surfels at receivers that had no "
-    "part in choosing the setting; against the mesh they have the surfels' own error in them. "
-    "Where what was asked was not met, the finest setting was taken. Pilots: receivers of the "
-    "same run that chose the setting; their share is of the CPU time of the whole run. The "
-    "ladder has every setting that --error chooses from.";
+    "The error that was asked for with --error, and the error that was measured. An error is the "
+    "larger one of occlusion and irradiance: root mean square (RMS) over the mean, against rays at "
+    "the same surfels, at receivers that had no part in choosing the setting. Errors against the "
+    "mesh also contain the error of the surfels themselves. Pilots are receivers of the same run "
+    "by which the setting was chosen; their share is of the CPU time of the whole run. Where the "
+    "error asked was not met, the finest setting was taken. A setting is a solid angle in sr, a "
+    "parallax in rad and R direction pixels along a cube edge.";
 
+/// A setting as tables show it.
 std::string setting_text(float solid_angle, float parallax, unsigned resolution) {
   return fmt::format("{} sr, {} rad, R {}", solid_angle, parallax, resolution);
 }
@@ -33,12 +36,12 @@ const Columns<ErrorRow>& columns() {
       {"asked", percent("asked %", "{:.4g}"), &R::asked},
       {"met", {"met"}, tuning(&TuningReport::met)},
       {"measured", percent("measured %"), &R::measured},
-      {"measured_mesh", percent("to the mesh %"),
+      {"measured_mesh", percent("measured against mesh %"),
        [](const R& r) { return r.check.mesh ? r.check.mesh->relative() : kNone; }},
-      {"at_pilots", percent("at pilots %"),
+      {"at_pilots", percent("measured at pilots %"),
        [](const R& r) { return r.tuning.measured.relative(); }},
-      {"checked", {"checked"}, [](const R& r) { return r.check.receivers; }},
-      {"check_rays", {"rays each"}, [](const R& r) { return r.check.rays; }},
+      {"checked", {"receivers checked"}, [](const R& r) { return r.check.receivers; }},
+      {"check_rays", {"rays/receiver"}, [](const R& r) { return r.check.rays; }},
       {"setting", {}, tuning(&TuningReport::setting)},
       {"gather",
        {"setting"},
@@ -49,12 +52,12 @@ const Columns<ErrorRow>& columns() {
       {"solid_angle", {}, gather(&GatherOptions::solid_angle)},
       {"parallax", {}, gather(&GatherOptions::parallax)},
       {"resolution", {}, gather(&GatherOptions::resolution)},
-      {"receivers", {"shaded"}, &R::receivers},
-      {"us_per_receiver", {"CPU us each", "{:.1f}"}, &R::us_per_receiver},
-      {"wall_us_per_receiver", {"wall us each", "{:.1f}"}, &R::wall_us_per_receiver},
+      {"receivers", {"receivers shaded"}, &R::receivers},
+      {"us_per_receiver", {"CPU us/receiver", "{:.1f}"}, &R::us_per_receiver},
+      {"wall_us_per_receiver", {"wall us/receiver", "{:.1f}"}, &R::wall_us_per_receiver},
       {"pilots", {"pilots"}, tuning(&TuningReport::pilots)},
       {"pilot_rays", {}, tuning(&TuningReport::rays)},
-      {"pilot_share", percent("pilots' share %", "{:.1f}"), &R::pilot_share}};
+      {"pilot_share", percent("pilots, CPU share %", "{:.1f}"), &R::pilot_share}};
   return columns;
 }
 
@@ -72,7 +75,7 @@ const Columns<RungRow>& rung_columns() {
   };
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
-      {"setting", {"number"}, &R::setting},
+      {"setting", {"setting no."}, &R::setting},
       {"gather",
        {"setting"},
        [](const R& r) {
@@ -83,16 +86,17 @@ const Columns<RungRow>& rung_columns() {
       {"parallax", {}, rung(&Rung::parallax)},
       {"resolution", {}, rung(&Rung::resolution)},
       {"us_per_receiver",
-       {"CPU us each", "{:.1f}"},
+       {"CPU us/receiver", "{:.1f}"},
        [](const R& r) { return r.measured.us_per_receiver; }},
-      {"occlusion", percent("occlusion %"),
+      {"occlusion", percent("occlusion RMS %"),
        [](const R& r) {
          const CheckError& e = r.measured.error;
          return e.occlusion_mean > 0 ? e.occlusion_rms / e.occlusion_mean : 0.0;
        }},
-      {"irradiance", percent("irradiance %"),
+      {"irradiance", percent("irradiance RMS %"),
        [](const R& r) { return r.measured.error.irradiance_rms; }},
-      {"error", percent("error %"), [](const R& r) { return r.measured.error.relative(); }}};
+      {"error", percent("larger of both %"),
+       [](const R& r) { return r.measured.error.relative(); }}};
   return columns;
 }
 
@@ -105,15 +109,20 @@ const Columns<SceneErrors>& slope_columns() {
   return columns;
 }
 
+/// Makes the chart: measured against asked for each scene and set, and error against time for each
+/// scene.
 Chart chart_of(const std::vector<SceneErrors>& scenes) {
-  ChartPanel asked{.title = "Measured and asked", .x_label = "asked, %", .y_label = "measured, %"};
-  ChartPanel ladder_panel{.title = "The settings, points of the scene",
+  ChartPanel asked{.title = "Measured error against error asked",
+                   .x_label = "error asked, %",
+                   .y_label = "error measured, %"};
+  ChartPanel ladder_panel{.title = "Error against time at all settings",
                           .x_label = "CPU time per receiver, \u00b5s",
                           .y_label = "RMS error, % of the mean"};
   ChartSeries limit{.name = "asked", .dashed = true};
-  Chart chart{.title = "The error that was asked for", .columns = 2};
+  Chart chart{.title = "Measured error against the error asked with --error", .columns = 2};
   chart.note = std::string(kReading) + "\n";
   for (const SceneErrors& scene : scenes) {
+    // Show measured against asked, and once the line on which both are equal
     for (const char* set : {"points", "camera"}) {
       ChartSeries series{.name = scene.name + ", " + set};
       for (const ErrorRow& row : scene.rows) {
@@ -124,6 +133,7 @@ Chart chart_of(const std::vector<SceneErrors>& scenes) {
       }
       asked.series.push_back(std::move(series));
     }
+    // Show error against time over the ladder
     ChartSeries rungs{.name = scene.name + ", points"};
     for (const RungError& rung : scene.rungs) {
       rungs.points.push_back({.x = rung.us_per_receiver, .y = 100 * rung.error.relative()});
@@ -147,16 +157,20 @@ Report report_of(const std::vector<SceneErrors>& scenes, unsigned runs) {
     for (std::size_t i = 0; i < scene.rungs.size(); ++i)
       rungs.push_back({scene.name, i, scene.rungs[i]});
   }
-  return {.name = "error",
-          .title = "The error that was asked for",
-          .reading = kReading,
-          .runs = runs,
-          .tables = {tabulate<ErrorRow>({.name = "rows"}, columns(), rows),
-                     tabulate<RungRow>({.name = "ladder", .title = "The ladder", .group = "scene"},
-                                       rung_columns(), rungs),
-                     tabulate<SceneErrors>({.name = "slopes", .title = "Slopes of the ladder"},
-                                           slope_columns(), scenes)},
-          .figures = {{.chart = chart_of(scenes)}}};
+  return {
+      .name = "error",
+      .title = "Measured error against the error asked with --error",
+      .reading = kReading,
+      .runs = runs,
+      .tables = {tabulate<ErrorRow>({.name = "rows"}, columns(), rows),
+                 tabulate<RungRow>({.name = "ladder",
+                                    .title = "All settings that --error chooses from",
+                                    .group = "scene"},
+                                   rung_columns(), rungs),
+                 tabulate<SceneErrors>(
+                     {.name = "slopes", .title = "How the error falls with time over all settings"},
+                     slope_columns(), scenes)},
+      .figures = {{.chart = chart_of(scenes)}}};
 }
 
 Experiment make_error_experiment() {
@@ -167,7 +181,8 @@ Experiment make_error_experiment() {
     d.scenes(*scenes);
     d.points(options->scene.points, "500k", 50'000);
     d.checked(options->checked, 400);
-    add_integer(d.command(), "--check-rays", options->rays, 16, 1 << 20, "Rays for each of them");
+    add_integer(d.command(), "--check-rays", options->rays, 16, 1 << 20,
+                "Rays for each checked receiver");
     d.quick(options->scene.width, 320);
     d.quick(options->scene.height, 180);
   };
@@ -178,9 +193,9 @@ Experiment make_error_experiment() {
   };
   return {.name = "error",
           .purpose =
-              "Error measured against --error asked, of points and of a picture; error "
-              "against time over the settings that --error chooses from",
-          .quick = "Small: 50k points, a picture of 320 x 180, 400 receivers checked of each run",
+              "Measured error against the error asked with --error, for points and for a picture; "
+              "error against time at all settings that --error chooses from",
+          .quick = "50k points, a picture of 320 x 180, 400 receivers checked of each run",
           .declare = declare,
           .run = run,
           .check = [scenes] { scenes->check(); }};

@@ -12,7 +12,7 @@
 namespace ptc::bench {
 namespace {
 
-/// Seconds of the stage that shades.
+/// Wall seconds of the stage that shades.
 double shading_seconds(const LightingReport& report) {
   double sum = 0;
   for (const auto& [stage, seconds] : report.seconds) {
@@ -35,7 +35,8 @@ ErrorRow row_of(const std::string& scene, const char* set, const LightingReport&
           .pilot_share = pilots / std::max(1e-9, pilots + report.shade_cpu_seconds)};
 }
 
-/// Whole blocks of the scene's points, evenly spread: what shading all of them meets.
+/// Whole blocks of the scene's points, evenly spread, so that locality is that of shading all
+/// points.
 std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, float lift) {
   const std::span<const std::uint32_t> pages = container.point_pages();
   const std::size_t per_page = std::max(1U, container.superblock().points_per_page);
@@ -70,6 +71,7 @@ double SceneErrors::slope() const {
 SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,
                            const std::filesystem::path& work, const RunOptions& run,
                            Progress& progress) {
+  // Build the scene and prepare the requests
   const WorkFile scene(work, ".ptcx"), points(work, ".ply"), picture(work, ".exr");
   const LitScene lit = build_scene(choice, options.scene, scene.path(), run, progress);
   const CheckRequest check{.receivers = options.checked, .rays = options.rays};
@@ -81,6 +83,7 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   render.camera = lit.camera;
   render.samples = 1;
   const PictureTarget target{.path = picture.path()};
+  // Shade points and picture once for each error asked
   SceneErrors errors{.name = choice.name};
   for (const double asked : options.asked) {
     shade.error = render.error = asked;
@@ -89,6 +92,7 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
     errors.rows.push_back(
         row_of(choice.name, "camera", render_picture(render, std::span(&target, 1), progress)));
   }
+  // Climb the ladder of all settings
   const ContainerReader container(scene.path());
   const ThreadPool executor(run.threads);
   errors.surfels = container.superblock().points;

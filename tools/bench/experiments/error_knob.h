@@ -1,4 +1,5 @@
-// What is asked of --error, and what comes of it; the errors of its settings.
+// The error that --error is asked for compared with the error measured, and the errors of all
+// settings that --error chooses from: the experiment `ptcbench error`.
 #pragma once
 
 #include <array>
@@ -13,48 +14,51 @@
 
 namespace ptc::bench {
 
+/// What `ptcbench error` measures.
 struct ErrorOptions {
   SceneOptions scene;
-  std::vector<double> asked{0.1, 0.05, 0.03, 0.02};  ///< shares
+  std::vector<double> asked{0.1, 0.05, 0.03, 0.02};  ///< values of --error, shares
   unsigned checked = 1000;  ///< receivers of each run that are compared with rays
-  unsigned rays = 8192;     ///< for each of them
-  unsigned climbed = 64;    ///< blocks of points that every setting shades
+  unsigned rays = 8192;     ///< rays for each of those receivers
+  unsigned climbed = 64;    ///< number of blocks of points that every setting shades
 };
 
-/// One run that was asked for an error.
+/// One run of ptcshade or ptcrender with --error.
 struct ErrorRow {
-  std::string scene, set;  ///< "points" of ptcshade, or the "camera" of ptcrender
-  double asked = 0;
+  std::string scene, set;  ///< set: "points" for ptcshade, "camera" for ptcrender
+  double asked = 0;        ///< value of --error, a share
   TuningReport tuning;
   CheckReport check;
-  std::uint64_t receivers = 0;
-  double us_per_receiver = 0;  ///< CPU time, without the pilots'
-  double wall_us_per_receiver = kNone;
-  double pilot_share = 0;  ///< of the CPU time of gather and pilots together
+  std::uint64_t receivers = 0;          ///< number of receivers shaded
+  double us_per_receiver = 0;           ///< CPU time, without that of the pilots
+  double wall_us_per_receiver = kNone;  ///< wall time of the stage that shades
+  double pilot_share = 0;               ///< CPU time of the pilots over that of the whole run
 
+  /// The error against rays at the same surfels, a share.
   [[nodiscard]] double measured() const noexcept { return check.discs.relative(); }
 };
 
-/// Errors of a scene's points over the whole ladder, coarse to fine.
+/// The runs of one scene, and the errors of its points at every setting of the ladder, coarse to
+/// fine.
 struct SceneErrors {
   std::string name;
   std::uint64_t surfels = 0;
   std::vector<ErrorRow> rows;
   std::vector<RungError> rungs;
 
-  /// Exponent of error over time by least squares of logarithms.
+  /// The exponent by which error depends on time over the ladder (fit_power_law()).
   [[nodiscard]] double slope() const;
 };
 
-/// Builds the scene, shades its points and its picture once for each error asked.
-/// @param work  a directory with room for the container and what is shaded, which go again
+/// Builds the scene, and shades its points and its picture once for each error asked.
+/// @param work  a directory with room for the container and the outputs, which are gone at the end
 /// @throws DataError, RequestError, std::system_error as build_container()
 [[nodiscard]] SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,
                                          const std::filesystem::path& work, const RunOptions& run,
                                          Progress& progress);
 
-/// Files "error": the rows, the ladder of all settings, its slopes, and a chart of measured against
-/// asked and of error against time.
+/// Makes the report "error": the rows, the ladder of all settings, its slopes, and a chart of
+/// measured against asked and of error against time.
 /// @param scenes  one or more
 [[nodiscard]] Report report_of(const std::vector<SceneErrors>& scenes, unsigned runs = 1);
 

@@ -1,4 +1,8 @@
-// What a command of ptcbench is: options with what --quick makes of them, and a measurement.
+// A command of ptcbench: options, with the values that --quick gives them, and a measurement.
+//
+//   declare() -> command line -> shorten() with --quick -> check() -> run() -> Report -> files
+//
+// While it runs it publishes the report of each part that is measured.
 #pragma once
 
 #include <filesystem>
@@ -20,15 +24,17 @@ struct Bench {
   std::function<void(const Report&)> publish;  ///< takes the report of what was measured so far
 };
 
+/// One command of ptcbench.
 struct Experiment {
-  const char* name;     ///< the command's word, and the name of its files
-  const char* purpose;  ///< what is measured, against what
-  const char* quick;    ///< what --quick does, for the help
+  const char* name;     ///< word on the command line, and name of the files
+  const char* purpose;  ///< help text: what is measured against what
+  const char* quick;    ///< help text: what --quick does
   /// Declares the experiment's own options.
   std::function<void(Declaration&)> declare;
+  /// Measures, and returns the report.
   /// @throws DataError when an answer is wrong; std::system_error
   std::function<Report(const Bench&)> run;
-  /// Refuses what cannot be measured, before anything is written; may be empty.
+  /// Refuses requests that cannot be measured, before anything is written; may be empty.
   /// @throws CLI::ValidationError, std::invalid_argument for options; DataError for files
   std::function<void()> check{};
 };
@@ -46,8 +52,9 @@ struct Experiment {
 [[nodiscard]] Experiment make_sort_experiment();
 [[nodiscard]] Experiment make_verify_experiment();
 
-/// Publishes the report of the rows so far as they come. @return the report of all
-/// @param measure  calls its last argument whenever there are more rows
+/// Runs an experiment that measures rows, and publishes a report whenever there are more rows.
+/// @param measure  calls its last argument with all rows so far
+/// @return the report of all rows
 template <class Row, class Options>
 [[nodiscard]] Report measure_rows(
     std::vector<Row> (*measure)(const Options&, const std::filesystem::path&, const RunOptions&,
@@ -60,7 +67,9 @@ template <class Row, class Options>
                    options.repeats);
 }
 
-/// The same for scenes. @param measure  takes a SceneChoice and gives what report_of() takes
+/// Measures scene after scene, and publishes a report after each.
+/// @param measure  function of a SceneChoice, whose results report_of() takes
+/// @return the report of all scenes
 template <class Measure>
 [[nodiscard]] Report measure_scenes(const SceneList& scenes, unsigned runs, const Bench& bench,
                                     const Measure& measure) {

@@ -1,3 +1,12 @@
+// Each panel varies one thing and keeps the others:
+//
+//   panel         scene                        varies               compared with
+//   surfels       city, growing                surfels              rays, Embree
+//   solid-angle   city of middle_points        solid angle          rays
+//   depth         sheets of middle_points      number of sheets     rays
+//   cap           the largest city             page cache, threads  rays
+//
+// Scenes of more than ray_reach surfels are shaded without rays.
 #include "tools/bench/experiments/growth.h"
 
 #include <algorithm>
@@ -22,6 +31,7 @@
 namespace ptc::bench {
 namespace {
 
+/// A row in which nothing has been measured yet.
 GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene,
                  const Executor& executor) {
   return {.panel = panel,
@@ -41,11 +51,11 @@ GrowthRow row_of(const std::string& panel, double x, const BenchScene& scene,
           .bytes = kNone};
 }
 
-/// Shades the scene's own points with a page cache of some size that is empty at first.
+/// Shades points of the scene with a page cache of some size that is empty when a run begins.
 class CapRun {
  public:
-  /// @param share  of all pages, decoded, that the cache holds
-  /// @param max_bytes  that the cache takes, whatever the share
+  /// @param share      frames of the cache as a share of all pages
+  /// @param max_bytes  upper limit of the cache's bytes, whatever the share
   CapRun(const BenchScene& scene, double share, unsigned threads,
          std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max())
       : scene_(scene), executor_(threads), results_(scene.sets().front().receivers.size()) {
@@ -84,7 +94,7 @@ class CapRun {
   CacheStatistics cache_;
 };
 
-/// Some receivers of a scene and what rays at its discs say of them.
+/// Some receivers of a scene, and their reference by rays at its discs.
 class Truth {
  public:
   Truth(const BenchScene& scene, const GrowthOptions& options, const Executor& executor) {
@@ -97,6 +107,7 @@ class Truth {
     reference_ = make_reference(set, checked_, {.half = options.reference_rays}, trace, executor);
   }
 
+  /// Sets the errors of a row. @param results  shadings of all receivers of the scene
   void compare(const std::vector<Shading>& results, GrowthRow& row) const {
     std::vector<Shading> ours;
     for (const std::size_t i : checked_.receivers) ours.push_back(results[i]);
@@ -109,6 +120,7 @@ class Truth {
   Reference reference_;
 };
 
+/// Runs all panels that were asked for.
 class GrowthRun {
  public:
   using Report = std::function<void(const std::vector<GrowthRow>&)>;
@@ -139,6 +151,7 @@ class GrowthRun {
     return std::ranges::find(options_.panels, panel) != options_.panels.end();
   }
 
+  /// Runs a part, and reports all rows so far.
   template <class... Arguments>
   void tell(void (GrowthRun::*part)(Arguments...), Arguments... arguments) {
     (this->*part)(arguments...);
@@ -156,7 +169,9 @@ class GrowthRun {
     return {choice, options, work_, run_, progress_};
   }
 
-  /// Time and error at a list of settings, and of Embree around these errors.
+  /// Measures time and error at a list of settings, and for "surfels" the time of Embree around
+  /// these errors.
+  /// @param at  GrowthRow::x of each setting
   void measure_settings(const BenchScene& scene, const std::string& panel,
                         const std::vector<double>& at, const std::vector<GatherOptions>& settings) {
     const std::vector<std::string> methods =
@@ -215,10 +230,12 @@ class GrowthRun {
   }
 
   void measure_caps() {
+    // Build the scene, and trace the reference where rays can reach
     const std::uint64_t points = options_.points.back();
     const BenchScene scene = make_scene({.name = "city"}, points);
     std::optional<Truth> truth;
     if (in_reach(points)) truth.emplace(scene, options_, executor_);
+    // Shade under all caps in turn
     std::vector<std::unique_ptr<CapRun>> runs;
     for (const unsigned threads : thread_counts(executor_.threads())) {
       for (const double cap : options_.caps)
@@ -232,6 +249,7 @@ class GrowthRun {
       }
     }
     progress_.end();
+    // Add the rows
     for (std::size_t i = 0; i < runs.size(); ++i) {
       GrowthRow row = row_of("cap", options_.caps[i % options_.caps.size()], scene, executor_);
       runs[i]->fill(row);
@@ -252,8 +270,8 @@ class GrowthRun {
 }  // namespace
 
 std::uint64_t build_disk_bytes(std::uint64_t points) noexcept {
-  constexpr std::uint64_t kRecord = kSpilledBytes,
-                          kContainer = 64;  // of a point: spilled by the sort; pages
+  // Bytes of a point in the spilled records and in the pages of the container
+  constexpr std::uint64_t kRecord = kSpilledBytes, kContainer = 64;
   return points * (kRecord + kContainer);
 }
 

@@ -1,3 +1,4 @@
+// The experiment `ptcbench growth`: its table columns, its charts and its options.
 #include <cmath>
 
 #include <fmt/format.h>
@@ -10,42 +11,45 @@ namespace {
 
 constexpr char kTime[] = "CPU time per receiver, \u00b5s";
 constexpr char kReading[] =
-    "Receivers are the scene's own points in blocks of neighbours, spread evenly. Errors are RMS "
-    "over the mean of rays at the same discs, in the same run; where there is none, nothing was "
-    "checked against rays. Embree: how much longer it takes for the error of PTCX, with single "
-    "rays or packets, whichever is faster. A cap is the share of all pages, decoded, that the "
-    "page cache has frames for; the cache is empty when a run begins, and the files are in the "
-    "system's cache. In charts the errors of irradiance, or the cache's hit rates, stand beside "
-    "the markers.";
+    "Time per receiver of PTCX, against the number of surfels, the solid angle of the gather, the "
+    "sheets that lie behind each other, and the size of the page cache. Receivers are points of "
+    "the scene in blocks of neighbours, spread evenly; they get occlusion and irradiance. Errors "
+    "are root mean square (RMS) over the mean of rays at the same discs; where a row has none, "
+    "nothing was checked against rays. A time ratio is the time that Embree takes, on the same "
+    "discs or on the mesh, for the error of irradiance of PTCX, divided by the time of PTCX; the "
+    "faster of single rays and packets counts. Cap: frames of the page cache, as a share of all "
+    "pages; the cache is empty when a run begins, and the file is in the system's cache. Labels in "
+    "the charts are the error of irradiance, or the hit rate of the page cache.";
 
 const Columns<GrowthRow>& columns() {
   using R = GrowthRow;
-  static const Columns<R> columns{{"panel", {"over"}, &R::panel},
-                                  {"x", {"at", "{:.5g}"}, &R::x},
-                                  {"scene", {"scene"}, &R::scene},
-                                  {"surfels", {"surfels"}, &R::surfels},
-                                  {"threads", {"threads"}, &R::threads},
-                                  {"receivers", {"receivers"}, &R::receivers},
-                                  {"us_per_receiver", {"CPU us each", "{:.1f}"}, &R::us},
-                                  {"wall_us_per_receiver", {"wall us each", "{:.1f}"}, &R::wall_us},
-                                  {"ao_rms", percent("occlusion RMS %"), &R::occlusion_rms},
-                                  {"e_rms", percent("irradiance RMS %"), &R::irradiance_rms},
-                                  {"speedup_discs", {"times, discs", "{:.1f}"}, &R::speedup_discs},
-                                  {"speedup_mesh", {"times, mesh", "{:.1f}"}, &R::speedup_mesh},
-                                  {"hit_rate", percent("hits %", "{:.3f}"), &R::hit_rate},
-                                  {"pages_per_receiver", {"pages read each", "{:.4f}"}, &R::pages},
-                                  {"bytes_per_receiver", {"bytes read each", "{:.1f}"}, &R::bytes}};
+  static const Columns<R> columns{
+      {"panel", {"varied"}, &R::panel},
+      {"x", {"value", "{:.8g}"}, &R::x},
+      {"scene", {"scene"}, &R::scene},
+      {"surfels", {"surfels"}, &R::surfels},
+      {"threads", {"threads"}, &R::threads},
+      {"receivers", {"receivers"}, &R::receivers},
+      {"us_per_receiver", {"CPU us/receiver", "{:.1f}"}, &R::us},
+      {"wall_us_per_receiver", {"wall us/receiver", "{:.1f}"}, &R::wall_us},
+      {"ao_rms", percent("occlusion RMS %"), &R::occlusion_rms},
+      {"e_rms", percent("irradiance RMS %"), &R::irradiance_rms},
+      {"speedup_discs", {"Embree discs, time ratio", "{:.1f}"}, &R::speedup_discs},
+      {"speedup_mesh", {"Embree mesh, time ratio", "{:.1f}"}, &R::speedup_mesh},
+      {"hit_rate", percent("cache hits %", "{:.3f}"), &R::hit_rate},
+      {"pages_per_receiver", {"pages read/receiver", "{:.4f}"}, &R::pages},
+      {"bytes_per_receiver", {"bytes read/receiver", "{:.1f}"}, &R::bytes}};
   return columns;
 }
 
-/// Adds a point where there is a value.
+/// Adds a point to a series unless y is NaN.
 void add_point(ChartPanel& panel, const std::string& name, double x, double y,
                const std::string& label = {}) {
   if (std::isfinite(y))
     series_of(panel, name, false).points.push_back({.x = x, .y = y, .label = label});
 }
 
-/// Time of PTCX, and of Embree at its error.
+/// Makes a panel of the time of PTCX, and of the time of Embree at the same error.
 ChartPanel time_panel(const std::vector<GrowthRow>& rows, const std::string& name,
                       const char* title, const char* x_label) {
   ChartPanel panel{.title = title, .x_label = x_label, .y_label = kTime};
@@ -60,7 +64,7 @@ ChartPanel time_panel(const std::vector<GrowthRow>& rows, const std::string& nam
   return panel;
 }
 
-/// A line for each number of threads.
+/// Makes a panel over the size of the page cache, with a line for each number of threads.
 ChartPanel cap_panel(const std::vector<GrowthRow>& rows, const char* title, const char* y_label,
                      double (*value)(const GrowthRow&)) {
   ChartPanel panel{.title = title, .x_label = "page cache, % of all pages", .y_label = y_label};
@@ -73,15 +77,17 @@ ChartPanel cap_panel(const std::vector<GrowthRow>& rows, const char* title, cons
 }
 
 Chart chart_of(const std::vector<GrowthRow>& rows) {
-  Chart chart{.title = "How the time of a receiver grows", .note = kReading, .columns = 3};
+  Chart chart{.title = "Time per receiver against surfels, solid angle, depth and memory",
+              .note = kReading,
+              .columns = 3};
   add_panel(chart, time_panel(rows, "surfels", "Surfels", "surfels of the city"));
   add_panel(chart, time_panel(rows, "solid-angle", "Solid angle", "solid angle, sr"));
   add_panel(chart, time_panel(rows, "depth", "Depth complexity", "sheets above the ground"));
-  add_panel(chart,
-            cap_panel(rows, "Memory", kTime, [](const GrowthRow& r) { return r.us.median; }));
-  add_panel(chart, cap_panel(rows, "Memory, wall time", "wall time per receiver, \u00b5s",
+  add_panel(chart, cap_panel(rows, "Page cache: CPU time", kTime,
+                             [](const GrowthRow& r) { return r.us.median; }));
+  add_panel(chart, cap_panel(rows, "Page cache: wall time", "wall time per receiver, \u00b5s",
                              [](const GrowthRow& r) { return r.wall_us.median; }));
-  add_panel(chart, cap_panel(rows, "Reading", "bytes read per receiver",
+  add_panel(chart, cap_panel(rows, "Page cache: bytes read", "bytes read per receiver",
                              [](const GrowthRow& r) { return r.bytes; }));
   return chart;
 }
@@ -90,10 +96,10 @@ Chart chart_of(const std::vector<GrowthRow>& rows) {
 
 Report report_of(const std::vector<GrowthRow>& rows, unsigned runs) {
   return {.name = "growth",
-          .title = "How the time of a receiver grows",
+          .title = "Time per receiver against surfels, solid angle, depth and memory",
           .reading = kReading,
           .runs = runs,
-          .tables = {tabulate<GrowthRow>({.name = "rows", .title = "Over", .group = "panel"},
+          .tables = {tabulate<GrowthRow>({.name = "rows", .title = "Varied", .group = "panel"},
                                          columns(), rows)},
           .figures = {{.chart = chart_of(rows)}}};
 }
@@ -101,30 +107,31 @@ Report report_of(const std::vector<GrowthRow>& rows, unsigned runs) {
 Experiment make_growth_experiment() {
   const auto options = std::make_shared<GrowthOptions>();
   const auto declare = [options](Declaration& d) {
-    d.points(
-        options->points,
-        "Surfels of a city, in place of 500k, 2M, 6M and 20M; repeatable; the greatest is also "
-        "shaded under caps. Above 40M without a check by rays",
-        {50'000, 150'000, 500'000});
-    d.words("--panel", options->panels, "Measure against this, not all; repeatable");
+    d.points(options->points,
+             "Surfels of the city, in place of 500k, 2M, 6M and 20M; repeatable; the largest city "
+             "is also "
+             "shaded with small page caches. Above 40M errors are not measured",
+             {50'000, 150'000, 500'000});
+    d.words("--panel", options->panels, "Vary only this; repeatable");
     d.checked(options->checked, 100);
     d.repeats(options->repeats, 3);
     d.quick(options->middle_points, 50'000);
     d.quick(options->solid_angles, {0.1F, 0.01F, 0.001F});
     d.quick(options->layers, {1, 4, 16});
-    d.quick(options->caps, {1, 0.29, 0.09});  // so few pages have nothing to spare below that
+    d.quick(options->caps, {1, 0.29, 0.09});  // the pages are too few for smaller shares
     d.quick(options->own_points, 8'192);
     d.quick(options->reference_rays, 4096);
   };
-  return {.name = "growth",
-          .purpose =
-              "Time per receiver against surfels, solid angle, depth complexity and memory, "
-              "with its error",
-          .quick =
-              "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them "
-              "checked, 3 runs, no cap below 9 %",
-          .declare = declare,
-          .run = [options](const Bench& b) { return measure_rows(measure_growth, *options, b); }};
+  return {
+      .name = "growth",
+      .purpose =
+          "Time per receiver, with its error, against surfels, solid angle, depth complexity and "
+          "memory",
+      .quick =
+          "Under a minute on two cores: at most 500k surfels, 8k receivers, 100 of them "
+          "checked, 3 runs, no cap below 9 %",
+      .declare = declare,
+      .run = [options](const Bench& b) { return measure_rows(measure_growth, *options, b); }};
 }
 
 }  // namespace ptc::bench

@@ -1,4 +1,4 @@
-// The gather on each instruction set that the machine has.
+// The experiment `ptcbench instructions`: the gather on each instruction set that the machine has.
 #include <hwy/targets.h>
 
 #include "engine/parallel/thread_pool.h"
@@ -12,27 +12,29 @@ namespace ptc::bench {
 namespace {
 
 constexpr char kReading[] =
-    "Points of the city in blocks of neighbours, occlusion and bleeding at the default setting, "
-    "all pages in memory; the instruction sets in turn. Errors are RMS over the mean of rays at "
-    "the "
-    "same discs. Difference: RMS of irradiance from the best instruction set, over the mean.";
+    "Shading of points of the procedural city, in blocks of neighbours, on each instruction set in "
+    "turn: occlusion and irradiance at the default setting, all pages in memory. Errors are root "
+    "mean square (RMS) over the mean of rays at the same discs. The difference is the RMS "
+    "difference of irradiance from that of the best instruction set, over its mean.";
 
+/// What `ptcbench instructions` measures.
 struct InstructionOptions {
-  std::uint64_t points = 2'000'000;  ///< of the city
-  std::uint64_t receivers = 20'000;
-  unsigned checked = 300;
-  unsigned reference_rays = 16384;
+  std::uint64_t points = 2'000'000;  ///< points of the city
+  std::uint64_t receivers = 20'000;  ///< receivers among these points
+  unsigned checked = 300;            ///< receivers whose error is measured
+  unsigned reference_rays = 16384;   ///< rays per checked receiver and half of the reference
   unsigned repeats = 5;
 };
 
+/// One instruction set.
 struct InstructionRow {
   std::string instructions;
   std::uint64_t surfels = 0;
   unsigned threads = 0;
   std::size_t receivers = 0;
-  Spread us, wall_us;
+  Spread us, wall_us;                            ///< CPU time and wall time per receiver
   double occlusion_rms = 0, irradiance_rms = 0;  ///< against rays
-  double difference = 0;                         ///< from the best
+  double difference = 0;                         ///< RMS from the best instruction set
 };
 
 const Columns<InstructionRow>& columns() {
@@ -42,15 +44,15 @@ const Columns<InstructionRow>& columns() {
       {"surfels", {"surfels"}, &R::surfels},
       {"threads", {"threads"}, &R::threads},
       {"receivers", {"receivers"}, &R::receivers},
-      {"us_per_receiver", {"CPU us each", "{:.1f}"}, &R::us},
-      {"wall_us_per_receiver", {"wall us each", "{:.1f}"}, &R::wall_us},
+      {"us_per_receiver", {"CPU us/receiver", "{:.1f}"}, &R::us},
+      {"wall_us_per_receiver", {"wall us/receiver", "{:.1f}"}, &R::wall_us},
       {"ao_rms", percent("occlusion RMS %"), &R::occlusion_rms},
       {"e_rms", percent("irradiance RMS %"), &R::irradiance_rms},
-      {"difference", percent("difference %", "{:.2g}"), &R::difference}};
+      {"difference", percent("irradiance difference %", "{:.2g}"), &R::difference}};
   return columns;
 }
 
-/// While it lives, all gathers take one instruction set.
+/// Restricts all gathers to one instruction set during its lifetime.
 class OnlyInstructions {
  public:
   explicit OnlyInstructions(std::int64_t target) { choose(target); }
@@ -66,6 +68,7 @@ class OnlyInstructions {
 };
 
 Report measure(const InstructionOptions& options, const Bench& bench) {
+  // Build the scene, choose receivers, trace the reference
   const ThreadPool executor(bench.run.threads);
   const BenchScene scene(
       {.name = "city"},
@@ -84,6 +87,7 @@ Report measure(const InstructionOptions& options, const Bench& bench) {
   PageCache cache(container, {.memory_bytes = PageCache::bytes_for(container, executor.threads(),
                                                                    container.page_count()),
                               .threads = executor.threads()});
+  // Shade on each instruction set in turn
   const std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
   std::vector<Costs> costs(targets.size());
   std::vector<std::vector<Shading>> results(targets.size());
@@ -98,6 +102,7 @@ Report measure(const InstructionOptions& options, const Bench& bench) {
     }
   }
   bench.progress.end();
+  // Compare with the reference and with the best instruction set
   std::vector<InstructionRow> rows;
   for (std::size_t i = 0; i < targets.size(); ++i) {
     const std::vector<float> irradiance = irradiance_of(results[i]);
@@ -113,7 +118,7 @@ Report measure(const InstructionOptions& options, const Bench& bench) {
          .difference = relative_rms(irradiance, irradiance_of(results.front()))});
   }
   return {.name = "instructions",
-          .title = "Instruction sets",
+          .title = "Time per receiver on each instruction set",
           .reading = kReading,
           .runs = options.repeats,
           .tables = {tabulate<InstructionRow>({.name = "rows"}, columns(), rows)}};
@@ -126,7 +131,8 @@ Experiment make_instructions_experiment() {
   const auto declare = [options](Declaration& d) {
     add_count(d.command(), "--points", options->points, "Points of the city")->default_str("2M");
     d.quick("--points", options->points, 50'000);
-    add_count(d.command(), "--receivers", options->receivers, "Of them, in blocks of neighbours")
+    add_count(d.command(), "--receivers", options->receivers,
+              "Receivers among these points, in blocks of neighbours")
         ->default_str("20k");
     d.quick("--receivers", options->receivers, 8'192);
     d.checked(options->checked, 100);
@@ -135,8 +141,8 @@ Experiment make_instructions_experiment() {
   };
   return {.name = "instructions",
           .purpose =
-              "Time of a receiver on each instruction set that the machine has, and how far "
-              "apart their results are",
+              "Time per receiver on each instruction set that the machine has, and how far their "
+              "results differ",
           .quick = "A few seconds: 50k points, 8k receivers, 100 of them checked, 2 runs",
           .declare = declare,
           .run = [options](const Bench& bench) { return measure(*options, bench); }};

@@ -16,7 +16,7 @@
 namespace ptc::bench {
 namespace {
 
-/// Bytes of all pages, as they are stored.
+/// The bytes of all pages as they are stored.
 double stored_bytes(const ContainerReader& container) {
   double sum = 0;
   for (std::uint32_t page = 0; page < container.page_count(); ++page)
@@ -24,7 +24,7 @@ double stored_bytes(const ContainerReader& container) {
   return sum;
 }
 
-/// The same points under another tree.
+/// Builds a container of the same points with another number of points in a leaf.
 std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::uint32_t leaf_points,
                                              const std::filesystem::path& work) {
   return make_temporary_container(work, [&](const std::filesystem::path& path) {
@@ -38,7 +38,7 @@ std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::u
   });
 }
 
-/// The gather of PTCX at the default setting but for its pixels, and against rays.
+/// Measures the gather of PTCX, at the default setting except for the resolution, against rays.
 class GatherStudy {
  public:
   GatherStudy(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
@@ -81,6 +81,7 @@ void compare(ModelRow& row, std::span<const Shading> ours, std::span<const Shadi
 SceneModel measure_model(const BenchScene& scene, const ModelOptions& options,
                          const std::filesystem::path& work, const Executor& executor,
                          Progress& progress) {
+  // Choose the receivers
   const ReceiverSet& set = scene.sets().front();
   if (set.name != "camera" || set.receivers.empty()) {
     throw DataError(scene.name() + ": nothing to measure: the camera sees nothing");
@@ -89,6 +90,7 @@ SceneModel measure_model(const BenchScene& scene, const ModelOptions& options,
   std::vector<Receiver> receivers;
   for (const std::size_t i : checked.receivers) receivers.push_back(set.receivers[i]);
 
+  // Trace their reference
   progress.begin(scene.name() + ", reference", 0, "rays");
   const DiscRays oracle(scene.surfels(), Sides::both, {});
   const auto trace = [&](const Receiver& r, unsigned rays, std::uint64_t seed) {
@@ -97,6 +99,7 @@ SceneModel measure_model(const BenchScene& scene, const ModelOptions& options,
   const Reference reference =
       make_reference(set, checked, {.half = options.reference_rays}, trace, executor);
   progress.end();
+  // Study payloads
   SceneModel model{.scene = scene.name(),
                    .surfels = scene.surfels().size(),
                    .nodes = scene.container().superblock().nodes,
@@ -106,6 +109,7 @@ SceneModel measure_model(const BenchScene& scene, const ModelOptions& options,
                    .irradiance_noise = reference.irradiance_noise,
                    .rows = study_payloads(scene, receivers, options, executor, progress)};
 
+  // Study leaves, directions and pages
   const GatherStudy gathers(scene, set, checked, reference, executor);
   progress.begin(scene.name() + ", leaves, directions",
                  options.leaf_points.size() + options.resolutions.size(), "rows");
@@ -119,7 +123,7 @@ SceneModel measure_model(const BenchScene& scene, const ModelOptions& options,
     progress.advance(1);
   }
   for (const unsigned resolution : options.resolutions) {
-    constexpr double kPixelBytes = 8;  // nearness and colour
+    constexpr double kPixelBytes = 8;  // nearness and colour of a pixel
     const ModelRow row{.axis = "directions",
                        .variant = std::to_string(resolution),
                        .bytes = 6 * kPixelBytes * resolution * resolution,

@@ -1,3 +1,9 @@
+// The experiment `ptcbench model`: its table columns, its charts and its options.
+//
+// A chart has eight panels:
+//
+//   payload: error over bytes (irradiance, occlusion)     payload: error over time (the same two)
+//   leaf: error over bytes, error over time               directions: error over time, pages
 #include <algorithm>
 #include <functional>
 #include <utility>
@@ -16,14 +22,18 @@ using Measure = std::function<double(const ModelRow&)>;
 constexpr char kTime[] = "CPU time per receiver, \u00b5s";
 constexpr char kError[] = "RMS error, % of the mean";
 constexpr char kReading[] =
-    "What each part of the model costs and is worth. Payloads: plain gather of one receiver at a "
-    "time, the same cut through the same tree, so that only what a node tells of its surfels "
-    "differs; against all surfels in the same pixels. Node: all columns, bounds too. Exact: the "
-    "sum over the node's own surfels, none in front of another, which payloads approximate. Leaf "
-    "and directions: PTCX at its default setting, against rays. Pages: bytes and CPU time to "
-    "decode, points as they lie, packed, or rounded and packed; rounded points lie at most 0.001 "
-    "of their radius from where they were. In charts the left marker of a payload is as stored, "
-    "the right one as floats, and solid angles go from coarse to fine over time.";
+    "What each part of the model costs, in bytes and time, and is worth, in error. Errors are root "
+    "mean square (RMS) over the mean of the reference. Payload: what a node holds of the areas and "
+    "radiance of its surfels; SH n is spherical harmonics up to degree n; receivers are gathered "
+    "one at a time with the same cut through the same tree, and errors are against all surfels in "
+    "the same pixels. The payload \"exact\" is the sum over the node's surfels, none in front of "
+    "another, which the others approximate. Node: all columns of a node, bounds included, as "
+    "floats or as stored. Leaf (points in it) and directions (pixels along a cube edge): PTCX at "
+    "its default setting, errors against rays. Pages: stored bytes and CPU time to decode of "
+    "points "
+    "as they lie, packed, or rounded and packed, and of nodes; rounding moves a point by at most "
+    "0.001 of its radius. In charts of payloads over bytes the left marker is as stored, the right "
+    "one as floats; over time, solid angles go from coarse to fine.";
 
 double occlusion(const ModelRow& row) {
   return 100 * row.occlusion.rms;
@@ -39,20 +49,22 @@ const Columns<ModelRow>& columns() {
       {"axis", {"part"}, &R::axis},
       {"variant", {"variant"}, &R::variant},
       {"form", {"form"}, &R::form},
-      {"solid_angle", {"sr", "{:.2g}"}, &R::solid_angle},
+      {"solid_angle", {"solid angle sr", "{:.2g}"}, &R::solid_angle},
       {"bytes", {"bytes", "{:.1f}"}, &R::bytes},
-      {"per", {"of a"}, &R::per},
-      {"us_per_receiver", {"CPU us each", "{:.1f}"}, &R::us},
-      {"wall_us_per_receiver", {"wall us each", "{:.1f}"}, &R::wall_us},
-      {"evaluate_us", {"to evaluate us", "{:.1f}"}, &R::evaluate_us},
-      {"decode_ns", {"to decode ns", "{:.1f}"}, &R::decode_ns},
-      {"moved_radii", {"moved, radii", "{:.2g}"}, &R::moved},
+      {"per", {"per"}, &R::per},
+      {"us_per_receiver", {"CPU us/receiver", "{:.1f}"}, &R::us},
+      {"wall_us_per_receiver", {"wall us/receiver", "{:.1f}"}, &R::wall_us},
+      {"evaluate_us", {"payload CPU us/receiver", "{:.1f}"}, &R::evaluate_us},
+      {"decode_ns", {"CPU ns to decode", "{:.1f}"}, &R::decode_ns},
+      {"moved_radii", {"moved at most, radii", "{:.2g}"}, &R::moved},
       {"ao_rms", percent("occlusion RMS %"), path(&R::occlusion, &ErrorStatistics::rms)},
       {"ao_bias", {}, path(&R::occlusion, &ErrorStatistics::bias)},
       {"ao_p99", {}, path(&R::occlusion, &ErrorStatistics::percentile_99)},
       {"e_rms", percent("irradiance RMS %"), path(&R::irradiance, &ErrorStatistics::rms)},
-      {"e_bias", percent("bias %", "{:+.2f}"), path(&R::irradiance, &ErrorStatistics::bias)},
-      {"e_p99", percent("p99 %", "{:.1f}"), [](const R& r) { return r.irradiance.percentile_99; }}};
+      {"e_bias", percent("irradiance bias %", "{:+.2f}"),
+       path(&R::irradiance, &ErrorStatistics::bias)},
+      {"e_p99", percent("irradiance 99th percentile %", "{:.1f}"),
+       [](const R& r) { return r.irradiance.percentile_99; }}};
   return columns;
 }
 
@@ -62,8 +74,8 @@ const Columns<SceneModel>& scene_columns() {
       {"scene", {"scene"}, &R::scene},
       {"surfels", {"surfels"}, &R::surfels},
       {"nodes", {"nodes"}, &R::nodes},
-      {"receivers", {"pixels"}, &R::receivers},
-      {"rays", {"rays each"}, &R::rays},
+      {"receivers", {"receivers (pixels)"}, &R::receivers},
+      {"rays", {"rays/receiver"}, &R::rays},
       {"ao_noise", percent("noise, occlusion %", "{:.2g}"), &R::occlusion_noise},
       {"e_noise", percent("noise, irradiance %", "{:.2g}"), &R::irradiance_noise}};
   return columns;
@@ -71,14 +83,13 @@ const Columns<SceneModel>& scene_columns() {
 
 std::string note_text(const SceneModel& scene) {
   return fmt::format(
-      "{}: {} surfels, {} nodes; {} pixels of the camera; {} rays each are off by {:.2g} % of the "
-      "mean "
-      "occlusion and {:.2g} % of the mean irradiance.\n",
+      "{}: {} surfels, {} nodes; receivers are {} pixels of the camera; the error of the reference "
+      "of {} rays each is {:.2g} % of the mean occlusion and {:.2g} % of the mean irradiance.\n",
       scene.scene, scene.surfels, scene.nodes, scene.receivers, scene.rays,
       100 * scene.occlusion_noise, 100 * scene.irradiance_noise);
 }
 
-/// The middle one of the solid angles of payloads.
+/// The middle one of the solid angles at which payloads were measured.
 double middle_angle(const SceneModel& scene) {
   std::vector<double> angles;
   for (const ModelRow& row : scene.rows) {
@@ -88,10 +99,11 @@ double middle_angle(const SceneModel& scene) {
   return angles.empty() ? kNone : angles[angles.size() / 2];
 }
 
+/// Makes a panel of error over bytes of a node, at the middle solid angle.
 ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what, const Measure& error) {
   const double angle = middle_angle(scene);
   ChartPanel panel{.title = fmt::format("Payload at {:.2g} sr: {}", angle, what),
-                   .x_label = "bytes of a node",
+                   .x_label = "bytes per node",
                    .y_label = kError};
   const auto add = [&](const std::string& name, const ModelRow& row, const std::string& label) {
     series_of(panel, name, false)
@@ -111,6 +123,7 @@ ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what, const 
   return panel;
 }
 
+/// Makes a panel of error over time, with a line for each payload as stored.
 ChartPanel payloads_over_time(const SceneModel& scene, const char* what, const Measure& error) {
   ChartPanel panel{.title = fmt::format("Payload: {}", what), .x_label = kTime, .y_label = kError};
   for (const ModelRow& row : scene.rows) {
@@ -124,6 +137,7 @@ ChartPanel payloads_over_time(const SceneModel& scene, const char* what, const M
   return panel;
 }
 
+/// Makes a panel of the errors of the gather over a cost of its tree or its pixels.
 ChartPanel gathers_over(const SceneModel& scene, const char* axis, const char* title,
                         const char* x_label, const Measure& x) {
   ChartPanel panel{.title = title, .x_label = x_label, .y_label = kError};
@@ -138,10 +152,11 @@ ChartPanel gathers_over(const SceneModel& scene, const char* axis, const char* t
   return panel;
 }
 
+/// Makes a panel of the time to decode over stored bytes, with a line for each form.
 ChartPanel pages(const SceneModel& scene) {
-  ChartPanel panel{.title = "Pages",
-                   .x_label = "bytes of a point or node",
-                   .y_label = "CPU time to decode it, ns"};
+  ChartPanel panel{.title = "Compression of pages",
+                   .x_label = "stored bytes per point or node",
+                   .y_label = "CPU time to decode one, ns"};
   for (const ModelRow& row : scene.rows) {
     if (row.axis != "pages") continue;
     series_of(panel, row.form, false)
@@ -153,7 +168,7 @@ ChartPanel pages(const SceneModel& scene) {
 Chart chart_of(const SceneModel& scene) {
   const auto bytes = [](const ModelRow& row) { return row.bytes; };
   const auto time = [](const ModelRow& row) { return row.us.median; };
-  Chart chart{.title = "What the model costs and is worth: " + scene.scene,
+  Chart chart{.title = "Error against bytes and time of each part of the model: " + scene.scene,
               .note = std::string(kReading) + "\n" + note_text(scene),
               .columns = 4};
   for (ChartPanel& panel : std::vector<ChartPanel>{
@@ -161,9 +176,9 @@ Chart chart_of(const SceneModel& scene) {
            payloads_over_bytes(scene, "occlusion", occlusion),
            payloads_over_time(scene, "irradiance", irradiance),
            payloads_over_time(scene, "occlusion", occlusion),
-           gathers_over(scene, "leaf", "Points of a leaf", "bytes of a point, with its nodes",
+           gathers_over(scene, "leaf", "Points in a leaf: bytes", "bytes per point, nodes included",
                         bytes),
-           gathers_over(scene, "leaf", "Points of a leaf", kTime, time),
+           gathers_over(scene, "leaf", "Points in a leaf: time", kTime, time),
            gathers_over(scene, "directions", "Directions: pixels along a cube edge", kTime, time),
            pages(scene)}) {
     add_panel(chart, std::move(panel));
@@ -176,16 +191,18 @@ Chart chart_of(const SceneModel& scene) {
 Report report_of(const std::vector<SceneModel>& scenes, unsigned runs) {
   std::vector<ModelRow> rows;
   Report report{.name = "model",
-                .title = "What the model costs and is worth",
+                .title = "Error against bytes and time of each part of the model",
                 .reading = kReading,
                 .runs = runs};
   for (const SceneModel& scene : scenes) {
     rows.insert(rows.end(), scene.rows.begin(), scene.rows.end());
     report.figures.push_back({.part = scene.scene, .chart = chart_of(scene)});
   }
-  report.tables = {tabulate<ModelRow>({.name = "rows", .group = "axis"}, columns(), rows),
-                   tabulate<SceneModel>({.name = "scenes", .title = "Scenes and references"},
-                                        scene_columns(), scenes)};
+  report.tables = {
+      tabulate<ModelRow>({.name = "rows", .title = "Part of the model", .group = "axis"}, columns(),
+                         rows),
+      tabulate<SceneModel>({.name = "scenes", .title = "Scenes and references"}, scene_columns(),
+                           scenes)};
   return report;
 }
 
@@ -208,15 +225,16 @@ Experiment make_model_experiment() {
       return measure_model(scene, *options, b.work, executor, b.progress);
     });
   };
-  return {.name = "model",
-          .purpose =
-              "Error against bytes and against time: what a node may hold (surfel, lobes, "
-              "vector, cube, spherical harmonics), its rounding, points of a leaf, "
-              "direction pixels; page compression",
-          .quick = "Under a minute on two cores: 100k points, 150 receivers checked, 2 runs",
-          .declare = declare,
-          .run = run,
-          .check = [scenes] { scenes->check(); }};
+  return {
+      .name = "model",
+      .purpose =
+          "Error against bytes and against time of each part of the model: the payload of a node "
+          "(surfel, lobes, vector, cube, spherical harmonics), its rounding, points in a leaf, "
+          "direction pixels; compression of pages",
+      .quick = "Under a minute on two cores: 100k points, 150 receivers checked, 2 runs",
+      .declare = declare,
+      .run = run,
+      .check = [scenes] { scenes->check(); }};
 }
 
 }  // namespace ptc::bench

@@ -1,4 +1,10 @@
-// Flips, holes, pages in the wrong place, wrong lengths, transfers as text.
+// Flipped bits, holes, pages in the wrong place, wrong lengths, transfers as text. Each kind turns
+// the number k of a way into one change:
+//
+//   flip_bit      bit k of the file                     swap_pages   pages k / n and k mod n of n
+//   zero_sector   sector k                              copy_page    page k / n over page k mod n
+//   swap_words    words k and k + 1 of 8 bytes          truncate     the first k bytes stay
+//   append        1 + 97 (k / 2) bytes, 0 or 0xa5       as_text      the k-th conversion of text
 #include "tools/bench/experiments/mutations.h"
 
 #include <algorithm>
@@ -8,8 +14,8 @@ namespace {
 
 using Pages = std::span<const PagePlace>;
 
-constexpr std::size_t kSector = 512;
-constexpr std::size_t kMaxAppended = 10000;
+constexpr std::size_t kSector = 512;         // bytes
+constexpr std::size_t kMaxAppended = 10000;  // bytes
 
 auto at(Bytes& bytes, std::size_t offset) {
   return bytes.begin() + static_cast<std::ptrdiff_t>(offset);
@@ -24,6 +30,7 @@ bool flip_bit(const Bytes& whole, Pages, std::size_t k, Bytes& out) {
   return true;
 }
 
+/// Overwrites bytes with one value. @return whether that changes the file
 bool fill(const Bytes& whole, std::size_t offset, std::size_t bytes, std::byte value, Bytes& out) {
   out = whole;
   std::fill_n(at(out, offset), std::min(bytes, out.size() - offset), value);
@@ -80,6 +87,7 @@ bool remove_bytes(const Bytes& whole, Pages, std::size_t k, Bytes& out) {
   return true;
 }
 
+/// Converts the file as transfers in text mode do.
 bool as_text(const Bytes& whole, Pages, std::size_t k, Bytes& out) {
   constexpr std::byte kCr{'\r'}, kLf{'\n'};
   out.clear();
@@ -97,11 +105,11 @@ bool as_text(const Bytes& whole, Pages, std::size_t k, Bytes& out) {
       case 2:  // CR to LF
         out.push_back(b == kCr ? kLf : b);
         break;
-      case 3:  // ends at Ctrl-Z
+      case 3:  // cut at the first Ctrl-Z
         if (b == std::byte{0x1a}) return true;
         out.push_back(b);
         break;
-      case 4:  // seven bits
+      case 4:  // the eighth bit cleared
         out.push_back(b & std::byte{0x7f});
         break;
       default:  // Latin-1 to UTF-8

@@ -1,5 +1,10 @@
-// Changes small containers of every profile in all ways of mutations.h and counts what a
-// verification and a reader make of each.
+// The experiment `ptcbench mutations`: changes small containers of every profile in all ways of
+// mutations.h, and counts how many changes a verification and a reader detect.
+//
+//   parent                                    child, one at a time
+//   fork ---------------------------------->  for each way: write the changed file, verify, read
+//   watch Tally::next in shared memory   <--  next, tried, accepted, misread
+//   killed or exited: count a crash or a hang, fork again at the way after it
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -29,26 +34,26 @@ namespace {
 
 constexpr char kReading[] =
     "Small containers of every profile, with and without channels, are changed in every way of "
-    "each "
-    "kind. Found: the verification calls the file unsound. Accepted: it finds nothing. Misread: a "
-    "reader that loads every page gave other bytes without a word. Each change is tried in a child "
-    "process, so that a crash or a hang is counted, too.";
+    "each kind. Found: the verification reports a finding. Accepted: it reports none. Misread: a "
+    "reader that loads every page returned other bytes without an error. Each change is tried in a "
+    "child process, so that crashes and hangs are counted, too.";
 
-constexpr auto kPatience = std::chrono::seconds(20);
-constexpr std::size_t kFew = 500;     // ways: of so few all are tried
-constexpr std::size_t kPoints = 150;  // of a container
+constexpr auto kPatience = std::chrono::seconds(20);  // for one way; longer is a hang
+constexpr std::size_t kFew = 500;                     // kinds with fewer ways are tried whole
+constexpr std::size_t kPoints = 150;                  // of a container
 constexpr std::uint8_t kPageShift = 12;
-constexpr std::size_t kEnoughTried = 1000;
+constexpr std::size_t kEnoughTried = 1000;  // fewer ways in all say nothing
 
-/// What a child tells its parent while it works.
+/// The counts that a child shares with its parent while it works.
 struct Tally {
-  std::size_t next = 0;  ///< way that it is at
+  std::size_t next = 0;  ///< number of the way that is tried now
   std::size_t tried = 0;
   std::size_t accepted = 0;
   std::size_t misread = 0;
   std::size_t first_accepted = 0;
 };
 
+/// The counts of one kind of change.
 struct MutationRow {
   std::string change;
   std::size_t tried = 0, accepted = 0, misread = 0, crashes = 0, hangs = 0;
@@ -76,14 +81,16 @@ const Columns<MutationRow>& columns() {
   return columns;
 }
 
+/// A container that is changed.
 struct Subject {
-  std::string name;
+  std::string name;            ///< its profile
   std::filesystem::path path;  ///< where changed files are written
-  Bytes whole;
+  Bytes whole;                 ///< the file as it was written
   std::vector<PagePlace> pages;
-  Bytes content;
+  Bytes content;  ///< content_of() the file as it was written
 };
 
+/// Reads a whole file.
 Bytes read_file(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(file), {});
@@ -91,6 +98,7 @@ Bytes read_file(const std::filesystem::path& path) {
   return {bytes.begin(), bytes.end()};
 }
 
+/// Writes a changed file. @throws DataError
 void write_file(const std::filesystem::path& path, const Bytes& bytes) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file.write(reinterpret_cast<const char*>(bytes.data()),
@@ -110,7 +118,7 @@ Bytes content_of(const std::filesystem::path& path) {
   return all;
 }
 
-/// A cloud of surfels at random in the unit cube, the same each time.
+/// Writes a cloud of random surfels in the unit cube, the same ones each time.
 void write_cloud(const std::filesystem::path& path) {
   std::mt19937_64 bits(3);
   const auto number = [&] {
@@ -127,8 +135,9 @@ void write_cloud(const std::filesystem::path& path) {
   }
 }
 
-/// Containers to change.
+/// Builds the containers that are changed.
 std::vector<Subject> make_subjects(const Bench& bench, const WorkFile& changed) {
+  // Build and shade a scene
   const WorkFile cloud(bench.work, ".xyz"), scene(bench.work, "-scene.ptcx"),
       lit(bench.work, "-lit.ptcx");
   Progress silent;
@@ -139,6 +148,7 @@ std::vector<Subject> make_subjects(const Bench& bench, const WorkFile& changed) 
                    .run = {.threads = 1}},
                   scene.path(), silent);
   shade_container({{.scene = scene.path(), .run = {.threads = 1}}}, lit.path(), silent);
+  // Recode it in every profile
   struct Kind {
     const char* name;
     Profile profile;
@@ -171,20 +181,21 @@ bool verification_finds_it(const std::filesystem::path& path) {
   Progress silent;
   try {
     return !verify_container(path, {.threads = 1, .flip_budget = 0}, silent).sound();
-  } catch (const std::runtime_error&) {  // the file changed while it was looked at, or such
+  } catch (const std::runtime_error&) {  // an error is a finding, too
     return true;
   }
 }
 
+/// Whether a reader returns other bytes without an error.
 bool reader_is_misled(const Subject& subject) {
   try {
     return content_of(subject.path) != subject.content;
-  } catch (const std::runtime_error&) {  // refused
+  } catch (const std::runtime_error&) {  // the reader refused the file
     return false;
   }
 }
 
-/// In a child: ways from tally.next on.
+/// Tries the ways from tally.next on; runs in a child process.
 void work(const Subject& subject, const Mutation& mutation, std::size_t every, Tally& tally) {
   Bytes changed;
   for (; tally.next < mutation.count; tally.next += every) {
@@ -197,7 +208,8 @@ void work(const Subject& subject, const Mutation& mutation, std::size_t every, T
   }
 }
 
-/// Waits for a child, and ends it when it stays at one way for too long. @return as waitpid()
+/// Waits for a child, and kills it when it stays at one way for more than kPatience.
+/// @return the status of waitpid()
 int wait_patiently(pid_t child, const Tally& tally) {
   int status = 0;
   std::size_t seen = ~std::size_t{0};
@@ -213,20 +225,23 @@ int wait_patiently(pid_t child, const Tally& tally) {
   return status;
 }
 
+/// Tries every `every`-th way of one kind on one container.
 MutationRow try_all(const Subject& subject, const Mutation& mutation, std::size_t every,
                     Progress& progress) {
+  // Share a tally with the children
   void* const shared =
       ::mmap(nullptr, sizeof(Tally), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (shared == MAP_FAILED) throw std::bad_alloc();
   auto& tally = *new (shared) Tally;
   MutationRow row{.change = mutation.name};
+  // Fork a child, and another one after each crash or hang
   while (tally.next < mutation.count) {
     const pid_t child = ::fork();
     if (child == 0) {
       ::signal(SIGALRM, SIG_DFL);
       try {
         work(subject, mutation, every, tally);
-      } catch (...) {  // what a reader must not let through
+      } catch (...) {  // counts as a crash
         ::abort();
       }
       ::_exit(0);
@@ -238,6 +253,7 @@ MutationRow try_all(const Subject& subject, const Mutation& mutation, std::size_
         fmt::format("{}, {}: way {} ended the process", subject.name, mutation.name, tally.next));
     tally.next += every;
   }
+  // Take over the counts
   row.tried = tally.tried;
   row.accepted = tally.accepted;
   row.misread = tally.misread;
@@ -251,18 +267,19 @@ MutationRow try_all(const Subject& subject, const Mutation& mutation, std::size_
 
 Report report_of(const std::vector<MutationRow>& rows, std::size_t every) {
   Report report{.name = "mutations",
-                .title = "Does a change to a file go unseen?",
+                .title = "Changes to a file that a verification and a reader detect",
                 .reading = kReading,
                 .runs = 0,
                 .tables = {tabulate<MutationRow>({.name = "rows"}, columns(), rows)}};
   if (every > 1) {
     report.notes = {
-        fmt::format("Of kinds with {} ways or more, one in {} was tried.", kFew, every)};
+        fmt::format("Of kinds with {} ways or more, one way in {} was tried.", kFew, every)};
   }
   return report;
 }
 
-/// @throws DataError when a change was not found
+/// Tries all kinds on all containers.
+/// @throws DataError when a change was not found, or too few were tried
 Report measure(std::size_t every, const Bench& bench) {
   const WorkFile changed(bench.work, "-changed.ptcx");
   const std::vector<Subject> subjects = make_subjects(bench, changed);
@@ -286,8 +303,8 @@ Report measure(std::size_t every, const Bench& bench) {
   rows.push_back(all);
   bench.publish(report_of(rows, every));
   if (all.tried < kEnoughTried || !all.all_found()) {
-    throw DataError(fmt::format("mutations: {} of {} were found, {} misread", all.found(),
-                                all.tried, all.misread));
+    throw DataError(fmt::format("mutations: {} of {} changes were found, {} were misread",
+                                all.found(), all.tried, all.misread));
   }
   return report_of(rows, every);
 }
@@ -298,14 +315,14 @@ Experiment make_mutations_experiment() {
   const auto every = std::make_shared<std::uint64_t>(1);
   const auto declare = [every](Declaration& d) {
     add_integer(d.command(), "--every", *every, 1, 1'000'000,
-                "Try one way in N of the kinds that have many");
+                "Try one way in N of the kinds of change that have at least 500");
     d.quick("--every", *every, 1009);
   };
   return {.name = "mutations",
           .purpose =
-              "Whether a verification and a reader find every change to a file: flipped bits, "
-              "holes, pages in the wrong place, wrong lengths, transfers as text",
-          .quick = "A few seconds: one way in 1009 of the kinds that have many",
+              "How many changes to a file a verification and a reader detect: flipped bits, holes, "
+              "pages in the wrong place, wrong lengths, transfers as text",
+          .quick = "A few seconds: one way in 1009 of the kinds of change that have at least 500",
           .declare = declare,
           .run = [every](const Bench& bench) { return measure(*every, bench); }};
 }

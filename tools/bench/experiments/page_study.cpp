@@ -1,4 +1,5 @@
-// What codecs, packing and rounding make of a scene's pages, and how long it takes to undo.
+// Study of the axis pages (model.h): the bytes of a scene's pages after rounding, packing and
+// coding, and the CPU time to decode them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,12 +19,13 @@
 namespace ptc::bench {
 namespace {
 
-/// A page as it is in memory.
+/// A page as it lies in memory, with the columns by which it can be packed.
 struct Payload {
   std::vector<std::byte> bytes;
   PayloadColumns columns;
 };
 
+/// The pages of nodes.
 std::vector<Payload> node_payloads(const ContainerReader& container) {
   std::vector<Payload> pages;
   std::vector<std::byte> buffer(container.page_payload_limit());
@@ -35,11 +37,13 @@ std::vector<Payload> node_payloads(const ContainerReader& container) {
   return pages;
 }
 
+/// The pages of points.
 struct PointPayloads {
   std::vector<Payload> pages;
-  double moved = 0;  ///< farthest that a point was, in its own radii
+  double moved = 0;  ///< maximum of moved() over all points
 };
 
+/// The distance between two positions of a point, in its radii.
 double moved(const PointRecord& from, const PointRecord& to, const Frame& frame) {
   if (to.radius <= 0) return 0;
   const std::array<double, 3> a = frame.to_position(decode_morton(from.key)),
@@ -47,6 +51,7 @@ double moved(const PointRecord& from, const PointRecord& to, const Frame& frame)
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / static_cast<double>(to.radius);
 }
 
+/// Encodes the points, rounded or as they are, page by page.
 PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
   const Frame& frame = container.header().frame;
   ContainerPoints originals(container), points(container);
@@ -55,7 +60,8 @@ PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
       rounded ? round_points(points, frame.unit(), executor) : nullptr;
   PointPayloads out;
   std::vector<PointRecord> from(container.superblock().points_per_page), to(from.size());
-  while (const std::size_t count = originals.next(from)) {  // both hand out page by page
+  while (const std::size_t count =
+             originals.next(from)) {  // both streams return one page at a time
     const std::size_t same = rounding ? rounding->next(to) : points.next(to);
     if (same != count) throw std::logic_error("point_payloads: streams differ");
     for (std::size_t i = 0; i < count; ++i)
@@ -66,11 +72,12 @@ PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
   return out;
 }
 
-/// Codes pages and decodes them again.
+/// Encodes pages, and measures the time to decode them.
 class PageStudy {
  public:
   PageStudy(const BenchScene& scene, unsigned repeats) : scene_(scene), repeats_(repeats) {}
 
+  /// Measures one codec and level on pages of one form.
   /// @param form  points, packed, rounded or nodes
   [[nodiscard]] ModelRow measure(const std::vector<Payload>& pages, const std::string& form,
                                  Codec codec, int level) const {

@@ -1,3 +1,10 @@
+// Each payload is a pair of functions: fit() makes numbers of a node's surfels, see() evaluates
+// them towards a viewer. What they approximate is, over a node's surfels of area A_i, normal n_i
+// and radiance L_i, seen from the unit direction w:
+//
+//   front(w)    = sum A_i max(0, n_i . w)          projected area of the surfels that face w
+//   back(w)     = sum A_i max(0, -n_i . w)         projected area of the others
+//   radiance(w) = sum A_i max(0, n_i . w) L_i / front(w)
 #include "tools/bench/experiments/payload.h"
 
 #include <algorithm>
@@ -24,10 +31,11 @@ void put(float* p, const glm::vec3& v) {
   for (int k = 0; k < 3; ++k) p[k] = v[k];
 }
 
-// A surfel: area, normal, radiance.
+// Payload "surfel". Numbers: area, unit normal, radiance.
 
 constexpr std::size_t kSurfelCount = 7;
 
+/// Makes one surfel of some: sums of area, means of normal and radiance weighted by area.
 void fit_one(std::span<const Surfel> some, float* out) {
   float area = 0;
   glm::vec3 normal(0), light(0);
@@ -52,9 +60,11 @@ Seen see_surfel(const float* p, const glm::vec3& toward) {
       .front = std::max(0.0F, along), .back = std::max(0.0F, -along), .radiance = vector_at(p + 4)};
 }
 
-// Two lobes: each a surfel that stands for those whose normals are nearest to its own (Lloyd 1982).
+// Payload "two lobes". Numbers: two surfels, each of which stands for the surfels whose normals are
+// nearest to its own (Lloyd 1982).
 
 void fit_lobes(const NodeSummary&, std::span<const Surfel> below, float* out) {
+  // Begin at the normal farthest from the mean, and the one farthest from that
   std::array<glm::vec3, 2> axis{};
   glm::vec3 mean(0);
   for (const Surfel& s : below) mean += area_of(s) * s.normal;
@@ -65,6 +75,7 @@ void fit_lobes(const NodeSummary&, std::span<const Surfel> below, float* out) {
   };
   axis[0] = farthest(mean);
   axis[1] = farthest(axis[0]);
+  // Assign surfels to the nearer axis, and take the means as new axes
   std::array<std::vector<Surfel>, 2> parts;
   for (int round = 0; round < 4; ++round) {
     for (auto& part : parts) part.clear();
@@ -87,8 +98,10 @@ Seen see_lobes(const float* p, const glm::vec3& toward) {
       .radiance = front > 0 ? (a.front * a.radiance + b.front * b.radiance) / front : glm::vec3(0)};
 }
 
-// The vector model, of area and of area times radiance: what faces one way, and a rest that faces
-// every way alike. Area; then vectors over it, with sums before those of light.
+// Payload "vector". A sum of normals says how much faces one way; the rest is taken to face every
+// way equally. Numbers: area; sum of area times normal; then for red, green and blue the sum of
+// area times radiance, and the sum of area times radiance times normal. All but the first are
+// divided by the area.
 
 constexpr std::size_t kVectorCount = 16;
 
@@ -108,7 +121,8 @@ void fit_vector(const NodeSummary&, std::span<const Surfel> below, float* out) {
   for (std::size_t i = 1; i < kVectorCount && area > 0; ++i) out[i] /= area;
 }
 
-/// Share that faces: half a cosine of the vector, a quarter of the rest.
+/// The share that faces a direction: the cosine of the vector where it is above 0, and a quarter of
+/// the rest.
 float facing(float sum, const glm::vec3& vector, const glm::vec3& toward) {
   return std::max(0.0F, glm::dot(vector, toward)) + std::max(0.0F, sum - glm::length(vector)) / 4;
 }
@@ -122,9 +136,9 @@ Seen see_vector(const float* p, const glm::vec3& toward) {
   return seen;
 }
 
-// The ambient cube of spec/nodes.md: area, shares of it that face each axis, radiance towards each
-// axis. Areas are seen as sums over the faces, colours as the ratio of two such sums
-// (spec/shading.md#splats).
+// Payload "cube", the ambient cube of spec/nodes.md. Numbers: area, shares of it that face each of
+// six axes, radiance towards each axis. Areas are sums over the faces, colours are ratios of two
+// such sums (spec/shading.md#splats).
 
 void fit_cube(const NodeSummary& node, std::span<const Surfel>, float* out) {
   out[0] = static_cast<float>(node.area);
@@ -153,11 +167,12 @@ Seen see_cube(const float* p, const glm::vec3& toward) {
   return seen;
 }
 
-// Spherical harmonics of the projected area and of the projected area times radiance: area, then
-// coefficients over it, those of area, which begin at degree 1, before those of red, green, blue.
+// Payloads "SH n": spherical harmonics, up to degree n, of the projected area and of the projected
+// area times radiance. Numbers: area; then coefficients divided by it: of the area from degree 1
+// on, then of red, green and blue from degree 0 on.
 
-/// Degrees of max(0, cos): 1/4 P_0 + 1/2 P_1 + 5/16 P_2 - 3/32 P_4 + ...; over pi as Ramamoorthi
-/// and Hanrahan 2001.
+/// The clamped cosine by degrees: max(0, cos) = 1/4 P_0 + 1/2 P_1 + 5/16 P_2 - 3/32 P_4 + ... These
+/// are the coefficients of Ramamoorthi and Hanrahan 2001 divided by pi.
 constexpr std::array kClampedCosine{0.25F, 0.5F, 0.3125F, 0.0F, -0.09375F};
 
 constexpr std::size_t square(std::size_t n) {
@@ -184,7 +199,7 @@ void fit_harmonics(const NodeSummary&, std::span<const Surfel> below, float* out
         out[n * channel + i] *= kClampedCosine[l] / area;
     }
   }
-  out[0] = area;  // of area itself the first coefficient is known
+  out[0] = area;  // the coefficient of degree 0 of the area is known, so its place holds the area
 }
 
 template <std::size_t kDegree>
@@ -192,14 +207,15 @@ Seen see_harmonics(const float* p, const glm::vec3& toward) {
   constexpr std::size_t n = square(kDegree + 1);
   std::array<float, n> basis;
   spherical_harmonics(kDegree, toward, basis.data());
-  float even = kClampedCosine[0],
-        odd = 0;  // degrees whose sign is the same seen from behind, and the others
+  // Sum even degrees, which are equal seen from behind, and odd degrees, which change their sign
+  float even = kClampedCosine[0], odd = 0;
   for (std::size_t l = 1; l <= kDegree; ++l) {
     float& sum = l % 2 == 0 ? even : odd;
     for (std::size_t i = square(l); i < square(l + 1); ++i) sum += p[i] * basis[i];
   }
   Seen seen{.front = p[0] * std::max(0.0F, even + odd), .back = p[0] * std::max(0.0F, even - odd)};
-  constexpr float kMin = 1e-3F;  // of the area: less is what is left of waves
+  // Divide the light by the area, unless that is only the ripple of the truncated series
+  constexpr float kMin = 1e-3F;
   if (even + odd <= kMin) return seen;
   for (int c = 0; c < 3; ++c) {
     const float* const light = p + n * static_cast<std::size_t>(c + 1);
@@ -210,7 +226,7 @@ Seen see_harmonics(const float* p, const glm::vec3& toward) {
   return seen;
 }
 
-/// Area, and so many halves.
+/// Payload::fields of an area and this many halves.
 std::string halves(std::size_t count) {
   std::string fields(count + 1, 'h');
   fields.front() = 'u';
@@ -291,7 +307,8 @@ Seen see_exactly(std::span<const Surfel> below, const glm::vec3& toward) {
 void spherical_harmonics(std::size_t degree, const glm::vec3& unit, float* out) {
   constexpr std::size_t kMax = 4;
   using Square = std::array<std::array<float, kMax + 1>, kMax + 1>;
-  static const Square scale = [] {  // sqrt(2 (l - m)! / (l + m)!), 1 where m is 0
+  // Scale P_lm by sqrt(2 (l - m)! / (l + m)!), or by 1 where m is 0
+  static const Square scale = [] {
     Square s{};
     for (std::size_t l = 0; l <= kMax; ++l) {
       for (std::size_t m = 0; m <= l; ++m) {
@@ -301,10 +318,10 @@ void spherical_harmonics(std::size_t degree, const glm::vec3& unit, float* out) 
     }
     return s;
   }();
-  float cosine = 1, sine = 0,
-        diagonal = 1;  // real and imaginary part of (x + i y)^m; P_mm over sine^m
+  // Step m: cosine and sine are the parts of (x + i y)^m, diagonal is P_mm over the sine^m of z
+  float cosine = 1, sine = 0, diagonal = 1;
   for (std::size_t m = 0; m <= degree; ++m) {
-    float before = 0, legendre = diagonal;  // P_(l-1)m, P_lm by recurrence in l
+    float before = 0, legendre = diagonal;  // P_(l-1)m and P_lm, by recurrence in l
     for (std::size_t l = m; l <= degree; ++l) {
       out[l * l + l + m] = scale[l][m] * legendre * cosine;
       if (m > 0) out[l * l + l - m] = scale[l][m] * legendre * sine;

@@ -1,4 +1,10 @@
-// Payloads of nodes, when nothing else differs: every receiver by itself, the same cut for all.
+// Study of the axes payload and node (model.h). Nothing but the payload differs between two rows:
+// each receiver is gathered by itself, with one cut through one tree for all payloads.
+//
+//   points -> Tree -> cut -+-> nodes -> see() of the payload -> discs -+-> pixels -> shading
+//                          `-> near points ----------------------------'
+//
+// The reference draws all surfels into the same pixels, so the pixels' own error cancels.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -21,29 +27,30 @@
 namespace ptc::bench {
 namespace {
 
-constexpr double kBoundsBytes =
-    22;  // of a child (spec/nodes.md): reference, mean, radius, cone, thickness
-constexpr double kFloatNodeBytes = 8 + 34 * sizeof(float);  // reference and all numbers
+// Bytes of reference, mean, radius, cone and thickness of a child (spec/nodes.md).
+constexpr double kBoundsBytes = 22;
+// Bytes of a child as floats: the reference and 34 numbers.
+constexpr double kFloatNodeBytes = 8 + 34 * sizeof(float);
 
+/// A node of the tree.
 struct Node {
-  NodeSummary summary;
-  // Of it in scene units:
-  glm::dvec3 mean{0};
-  glm::vec3 normal{0};  // mean over area, not unit
-  float flatness = 0;   // its length
-  float radius = 0, thickness = 0;
-  std::uint64_t first_point = 0, points = 0;
-  std::uint32_t first_child = 0, children = 0;  // no children: a leaf
+  NodeSummary summary;                          ///< summary in cell coordinates
+  glm::dvec3 mean{0};                           ///< scene units
+  glm::vec3 normal{0};                          ///< mean over the area, not unit
+  float flatness = 0;                           ///< length of `normal`
+  float radius = 0, thickness = 0;              ///< scene units
+  std::uint64_t first_point = 0, points = 0;    ///< all points below it
+  std::uint32_t first_child = 0, children = 0;  ///< no children: a leaf
 };
 
-/// What one receiver sees: nodes that stand for their points, and points.
+/// What one receiver sees: nodes that stand for all their points, and single points.
 struct Cut {
   std::vector<std::uint32_t> nodes;
   std::vector<std::uint64_t> points;
 };
 
-/// A container's octree in memory, built anew from its points: summaries as sums and bounds were
-/// found, or as they come back from a node page.
+/// The octree of a container in memory, built again from its points. Its summaries are those of the
+/// builder, in floating point, or those that were rounded by a node page.
 class Tree {
  public:
   Tree(const ContainerReader& container, bool stored)
@@ -70,6 +77,7 @@ class Tree {
     return {.interior = true, .page = static_cast<std::uint32_t>(groups_.size() - 1)};
   }
 
+  /// Encodes a group into a node page and decodes it.
   static NodeGroup through_page(const NodeGroup& group) {
     NodePageEncoder page(std::size_t{1} << 12);
     page.add(group);
@@ -104,13 +112,13 @@ class Tree {
 
   Frame frame_;
   bool stored_;
-  std::vector<Node> nodes_;  // siblings next to each other, children before parents
-  std::vector<std::pair<std::uint32_t, std::uint32_t>>
-      groups_;  // first node, how many; by the page of a reference
+  std::vector<Node> nodes_;  ///< siblings next to each other, children before parents
+  /// First node and number of nodes of each group, by the page of a reference to it.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> groups_;
   ChildRef root_;
 };
 
-/// By the rules of PlainGather.
+/// Cuts the tree by the rules of PlainGather.
 Cut Tree::cut(std::span<const Surfel> surfels, const Receiver& receiver, float solid_angle) const {
   Cut cut;
   std::vector<std::uint32_t> stack;
@@ -141,19 +149,21 @@ Cut Tree::cut(std::span<const Surfel> surfels, const Receiver& receiver, float s
   return cut;
 }
 
+/// A disc relative to its receiver.
 struct Disc {
   glm::vec3 to, normal;
   float radius;
   std::uint32_t rgbe;
 };
 
+/// Evaluates a payload of a node towards a viewer.
 using See = std::function<Seen(std::uint32_t node, const glm::vec3& toward)>;
 
 std::uint32_t pack(const glm::vec3& colour) {
   return encode_rgbe({colour.r, colour.g, colour.b});
 }
 
-/// A payload's numbers for every node of a tree.
+/// Fits a payload to every node of a tree. @return count() numbers for each node
 std::vector<float> fit_all(const Payload& payload, const Tree& tree,
                            std::span<const Surfel> surfels, const Executor& executor) {
   const std::vector<Node>& nodes = tree.nodes();
@@ -172,6 +182,7 @@ See seen_by(const Payload& payload, const std::vector<float>& numbers) {
       };
 }
 
+/// Shades the receivers with any payload, and compares with all surfels in the same pixels.
 class Study {
  public:
   Study(const BenchScene& scene, std::span<const Receiver> receivers, const ModelOptions& options,
@@ -187,7 +198,7 @@ class Study {
     shade_brute_force(scene.surfels(), receivers, truth_, grid_, Sides::both, executor);
   }
 
-  /// Cuts at a solid angle, which rows are measured at from then on.
+  /// Cuts a tree for all receivers. Rows are measured with these cuts from then on.
   void set_cuts(const Tree& tree, float solid_angle) {
     tree_ = &tree;
     solid_angle_ = solid_angle;
@@ -195,6 +206,7 @@ class Study {
         [&](std::size_t i) { cuts_[i] = tree.cut(scene_.surfels(), receivers_[i], solid_angle); });
   }
 
+  /// Measures one payload. The time of a receiver is that of its cut, its payloads and its pixels.
   [[nodiscard]] ModelRow measure(const char* axis, const char* variant, const char* form,
                                  double bytes, const See& see) {
     Costs evaluate, whole;
@@ -227,7 +239,7 @@ class Study {
         [&] { executor_.for_each(receivers_.size(), [&](std::size_t i, unsigned) { body(i); }); });
   }
 
-  /// Discs that stand for the nodes of a cut.
+  /// Makes the discs that stand for the nodes of receiver i's cut.
   void add_discs(std::size_t i, const See& see) {
     discs_[i].clear();
     for (const std::uint32_t at : cuts_[i].nodes) {
@@ -246,6 +258,7 @@ class Study {
     }
   }
 
+  /// Draws the discs and points of receiver i, and sums the pixels.
   [[nodiscard]] Shading draw(std::size_t i) const {
     DirectionBuffer buffer(grid_.resolution());
     DiscQueue queue;
@@ -282,11 +295,13 @@ class Study {
 std::vector<ModelRow> study_payloads(const BenchScene& scene, std::span<const Receiver> receivers,
                                      const ModelOptions& options, const Executor& executor,
                                      Progress& progress) {
+  // Build the trees, with summaries as floats and as stored
   const std::span<const Surfel> surfels = scene.surfels();
   const Tree exact(scene.container(), false), stored(scene.container(), true);
   progress.begin(scene.name() + ", payloads", options.solid_angles.size() * (payloads().size() + 1),
                  "rows");
   Study study(scene, receivers, options, executor);
+  // Fit all payloads
   std::vector<std::vector<float>> floats, rounded;
   for (const Payload& payload : payloads()) {
     floats.push_back(fit_all(payload, exact, surfels, executor));
@@ -300,6 +315,7 @@ std::vector<ModelRow> study_payloads(const BenchScene& scene, std::span<const Re
       payloads().begin());
   const std::vector<float> as_stored = fit_all(payloads()[cube], stored, surfels, executor);
 
+  // Measure them at each solid angle
   std::vector<ModelRow> rows;
   for (const float solid_angle : options.solid_angles) {
     study.set_cuts(exact, solid_angle);

@@ -10,14 +10,15 @@
 namespace ptc::bench {
 
 double time_at(const std::vector<TimedError>& measured, double error) {
-  const TimedError* above = nullptr;  // the least error above, and the greatest below
-  const TimedError* below = nullptr;
+  const TimedError* above = nullptr;  // the point of the least error that is not smaller
+  const TimedError* below = nullptr;  // the point of the greatest error that is not larger
   for (const TimedError& m : measured) {
     if (m.error >= error && (!above || m.error < above->error)) above = &m;
     if (m.error <= error && (!below || m.error > below->error)) below = &m;
   }
   if (!above || !below) return std::numeric_limits<double>::quiet_NaN();
   if (above->error <= below->error) return above->us;
+  // Interpolate on the straight line through both points, in logarithms
   const double share = std::log(above->error / error) / std::log(above->error / below->error);
   return std::exp((1 - share) * std::log(above->us) + share * std::log(below->us));
 }

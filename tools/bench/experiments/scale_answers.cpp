@@ -16,12 +16,14 @@
 namespace ptc::bench {
 namespace {
 
+/// A property of the PLY's points.
 struct Property {
   std::string name;
   std::size_t bytes = 0;  ///< 4: float, 8: double
 };
 
-/// @param header  up to end_header
+/// Lists the properties of a PLY.
+/// @param header  text of the header before end_header
 std::vector<Property> properties_of(const std::string& header) {
   std::vector<Property> properties;
   std::istringstream words(header);
@@ -34,6 +36,7 @@ std::vector<Property> properties_of(const std::string& header) {
   return properties;
 }
 
+/// Reads a float or a double.
 double value_at(const std::byte* at, std::size_t bytes) {
   double wide = 0;
   float narrow = 0;
@@ -54,7 +57,9 @@ void require_whole(const VerifyReport& report, std::uint64_t asked, std::uint64_
                                 asked, sorted, points));
   }
   const std::uint64_t off = std::max(points, asked) - std::min(points, asked);
-  if (off > asked / 20) throw DataError(fmt::format("{} points: {} came", asked, points));
+  if (off > asked / 20)
+    throw DataError(
+        fmt::format("{} points: the city has {}, which is more than 5 % off", asked, points));
 }
 
 void require_same(const ScaleAnswers& first, const ScaleAnswers& now) {
@@ -67,6 +72,7 @@ void require_same(const ScaleAnswers& first, const ScaleAnswers& now) {
 }
 
 std::uint64_t digest_of_values(const std::filesystem::path& ply, std::uint64_t points) {
+  // Read the file and its header
   const InputFile file(ply);
   std::vector<std::byte> bytes(static_cast<std::size_t>(file.size()));
   file.read_at(0, bytes);
@@ -75,6 +81,7 @@ std::uint64_t digest_of_values(const std::filesystem::path& ply, std::uint64_t p
   const std::size_t end = text.find(kEnd);
   if (end == std::string_view::npos) throw DataError(ply.string() + ": no end_header");
   const std::vector<Property> properties = properties_of(std::string(text.substr(0, end)));
+  // Check every value
   std::size_t row = 0;
   for (const Property& property : properties) row += property.bytes;
   const std::byte* at = bytes.data() + end + kEnd.size();

@@ -1,3 +1,8 @@
+// For each size, every run goes once through all stages and limits. Container and records are never
+// on the disk together:
+//
+//   build -> scene -> verify -> shade -> values      limits: build floor, verify floor, memcpy
+//   |<------- container on the disk ------->|        |<---- records on the disk ---->|
 #include "tools/bench/experiments/scale_bench.h"
 
 #include <algorithm>
@@ -22,11 +27,11 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kVerifiedWhole = 2'000'000;
-constexpr std::size_t kCopiedBytes = std::size_t{64}
-                                     << 20;  // at once: far more than processors cache
+constexpr std::uint64_t kVerifiedWhole = 2'000'000;  // points up to which the tree is built again
+// Bytes of one memcpy, far more than the caches of processors hold.
+constexpr std::size_t kCopiedBytes = std::size_t{64} << 20;
 
-/// Runs of one stage, and what the disk gave in the last of them.
+/// The runs of one stage, and the bytes read from the disk in the last run.
 struct StageRuns {
   TimedRuns times;
   std::uint64_t disk_bytes = 0;
@@ -46,9 +51,10 @@ struct SizeRuns {
   StoredBytes stored;
   LightingReport shaded;
   bool rebuilt = false;
-  ScaleAnswers answers;  ///< of the first
+  ScaleAnswers answers;  ///< answers of the first run
 };
 
+/// Runs all sizes that were asked for.
 class ScaleRun {
  public:
   ScaleRun(const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run,
@@ -76,11 +82,11 @@ class ScaleRun {
   }
 
  private:
-  /// What a build spills goes as the container grows, so that the larger of both is the most there
-  /// is at once.
+  /// Checks the room for the largest size, and notes it. Spilled records are deleted as the
+  /// container grows, so the maximum on the disk is the larger one of both.
   void tell_space(std::uint64_t points) {
-    const std::uint64_t spilled =
-        points * kSpilledBytes * 21 / 20;  // a city has up to 5 % more points
+    // A city has up to 5 % more points.
+    const std::uint64_t spilled = points * kSpilledBytes * 21 / 20;
     require_room({&work_, 1}, spilled, fmt::format("{} points", points));
     progress_.note(
         space_text(require_build_space(points, spilled, Profile::compact, {&work_, 1}, scene_),
@@ -93,11 +99,14 @@ class ScaleRun {
     progress_.advance(1);
   }
 
+  /// Runs the three stages once, and checks the container. @return their answers
   ScaleAnswers run_stages(std::uint64_t points, SizeRuns& runs, bool first) {
+    // Build
     Progress silent;
     stage(runs.build, [&] {
       runs.built = build_container({.city_points = points, .run = run_}, scene_, silent);
     });
+    // Verify from the disk
     forget(InputFile(scene_));
     VerifyReport report;
     VerifyOptions verification{
@@ -105,6 +114,7 @@ class ScaleRun {
     stage(runs.verify, [&] { report = verify_container(scene_, verification, silent); });
     require_whole(report, points, runs.built.sort.points);
     const std::uint64_t made = report.superblock->points;
+    // Build the tree of the first container again, unless it is large
     if (first) {
       if (made <= kVerifiedWhole) {
         verification.level = VerifyLevel::rebuild;
@@ -114,6 +124,7 @@ class ScaleRun {
       }
       runs.stored = stored_bytes(ContainerReader(scene_));
     }
+    // Shade from the disk
     forget(InputFile(scene_));
     ShadeRequest request{{.scene = scene_, .run = run_}};
     request.count = options_.receivers;
@@ -124,7 +135,7 @@ class ScaleRun {
     return {.points = made, .content = report.superblock->content_xxh3, .values = values};
   }
 
-  /// The disk and the memory alone, without the container beside them.
+  /// Runs the limits once: the disk alone and the memory alone, while no container is on the disk.
   void run_limits(SizeRuns& runs) {
     const std::uint64_t spilled = runs.built.sort.spilled_bytes,
                         container = runs.built.superblock.file_bytes;

@@ -1,3 +1,8 @@
+// One entry for each method, setting and quantity, and for rays both single and in packets:
+//
+//   trace references -> entries: ptcx, plain, embree-discs, embree-mesh
+//   repeats times:      run every entry once                      (measure())
+//   then:               rows -> keep faster packets -> errors -> speedups   (rows())
 #include "tools/bench/experiments/set_run.h"
 
 #include <algorithm>
@@ -13,13 +18,13 @@ namespace {
 constexpr ErrorStatistics kNoErrors{
     .rms = kNone, .bias = kNone, .percentile_99 = kNone, .reference_mean = kNone};
 
-/// Room for all pages: nothing that is timed waits for the disk.
+/// A cache with room for all pages, so that nothing that is timed waits for the disk.
 CacheOptions whole_scene(const ContainerReader& container, unsigned threads) {
   return {.memory_bytes = PageCache::bytes_for(container, threads, container.page_count()),
           .threads = threads};
 }
 
-/// Counts of a receiver in the mean, times a thousand.
+/// The mean counts of a receiver, times 1000.
 GatherCounts mean_counts(const GatherCounts& counts) {
   if (counts.receivers == 0) return {};
   const auto mean = [&](std::uint64_t count) { return count * 1000 / counts.receivers; };
@@ -42,7 +47,7 @@ std::string setting_text(const GatherOptions& options) {
 
 }  // namespace
 
-/// A method to be measured, and what becomes of it.
+/// A method at one setting, the times of its runs and its shadings.
 struct SetRun::Entry {
   std::string method, setting;
   std::vector<Quantity> jobs;
@@ -73,6 +78,7 @@ SetRun::SetRun(const BenchScene& scene, const ReceiverSet& set, const AccuracyOp
 SetRun::~SetRun() = default;
 
 void SetRun::trace_references(const SceneRays& rays) {
+  // The rays of references, with a window where pictures are compared
   const auto with_window = [&](bool window) {
     return ReferenceRays{.half = options_.reference_rays,
                          .window = window ? options_.window_rays : 0};
@@ -87,6 +93,7 @@ void SetRun::trace_references(const SceneRays& rays) {
   const auto trace_oracle = [&](const Receiver& receiver, unsigned count, std::uint64_t seed) {
     return rays.oracle->trace(receiver, count, seed);
   };
+  // Trace the reference of each model
   const bool gathers = options_.measures("ptcx") || options_.measures("plain");
   ours_ = make_reference(set_, checked_, with_window(gathers), trace_oracle, executor_);
   if (rays.discs) discs_ = trace_baseline(*rays.discs, true);
@@ -154,7 +161,7 @@ void SetRun::measure(Progress& progress) {
 
 std::vector<AccuracyRow> SetRun::rows() {
   std::vector<AccuracyRow> rows = timed_rows();
-  keep_faster_packets(rows);  // before errors are found: pictures of the window take time
+  keep_faster_packets(rows);  // first, for the errors of rows that are dropped would take time
   for (AccuracyRow& row : rows) compare(row);
   set_speedups(rows);
   return rows;

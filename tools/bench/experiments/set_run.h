@@ -1,4 +1,4 @@
-// All methods on one set of receivers of one scene.
+// Measures all methods on one set of receivers of one scene.
 #pragma once
 
 #include <memory>
@@ -13,15 +13,17 @@
 
 namespace ptc::bench {
 
-/// Rays at one scene, which outlive what is measured against them.
+/// The ray tracers of one scene. They must outlive the SetRun.
 struct SceneRays {
-  const DiscRays* oracle = nullptr;    ///< truth for ptcx and plain
-  const RayBaseline* discs = nullptr;  ///< null: not measured
+  const DiscRays* oracle = nullptr;    ///< the reference of ptcx and plain
+  const RayBaseline* discs = nullptr;  ///< null: embree-discs is not measured
   const RayBaseline* mesh = nullptr;   ///< null for a cloud
 };
 
-/// Measures everything in turn, as often as asked: what disturbs the machine for a while disturbs
-/// all.
+/// Runs every method and setting once, then all of them again, and so on. A disturbance of the
+/// machine that lasts a while then slows all methods, not one:
+///
+///   run 1: ptcx, plain, embree-discs, embree-mesh   run 2: ptcx, plain, ...
 class SetRun {
  public:
   /// Traces the references. All arguments outlive this.
@@ -29,22 +31,31 @@ class SetRun {
          const SceneRays& rays, const Executor& executor, Progress& progress);
   ~SetRun();
 
+  /// Times all methods, AccuracyOptions::repeats runs each.
   void measure(Progress& progress);
-  /// Of the faster of single rays and packets, with speedups. Call once.
+  /// Returns the rows, with errors and speedups. Of single rays and packets only the faster stay.
+  /// @pre called once, after measure()
   [[nodiscard]] std::vector<AccuracyRow> rows();
+  /// Describes the reference of ptcx and plain.
   [[nodiscard]] ReferenceNote note() const;
 
  private:
   struct Entry;
 
+  /// Traces the reference of each model that a method shades.
   void trace_references(const SceneRays& rays);
   void add(std::string method, std::string setting, std::vector<Quantity> jobs,
            const Reference& reference, std::unique_ptr<Method> run);
+  /// Adds the settings of ptcx and plain.
   void add_gathers();
+  /// Adds the rays of embree-discs or embree-mesh.
   void add_rays(const std::string& name, const RayBaseline& baseline, const Reference& reference);
+  /// The rows with times and without errors.
   [[nodiscard]] std::vector<AccuracyRow> timed_rows() const;
   [[nodiscard]] Entry& entry_of(const AccuracyRow& row);
+  /// Sets the errors of a row.
   void compare(AccuracyRow& row);
+  /// Occlusion and bleeding, or occlusion alone in a scene without light.
   [[nodiscard]] std::vector<Quantity> both_jobs() const;
 
   const BenchScene& scene_;

@@ -1,3 +1,8 @@
+// Records carry their number in the radiance, so that a result can be checked without a second
+// copy: neighbours must ascend by (key, number), which also means stable, and the sum of hashes of
+// all records must be that of the input.
+//
+//   record   | key: 128 bits | ... | radiance: number, 3 x 16 bits | ... |    40 bytes
 #include "tools/bench/experiments/sort_bench.h"
 
 #include <algorithm>
@@ -19,13 +24,14 @@
 namespace ptc::bench {
 namespace {
 
+/// A hash of a number; different numbers give different hashes.
 std::uint64_t mixed(std::uint64_t i) noexcept {
   return splitmix64(i * kSplitMixStep);
 }
 
-constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;
+constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;  // half of a key has 63 bits
 
-/// The i-th of n keys in an order that needs no scene.
+/// The i-th of n keys, in any order but "city".
 MortonKey key_at(const std::string& order, std::uint64_t i, std::uint64_t n) noexcept {
   if (order == "random") return {mixed(2 * i) & kKeyMask, mixed(2 * i + 1) & kKeyMask};
   if (order == "sorted") return {i * (kKeyMask / n), mixed(i) & kKeyMask};
@@ -35,7 +41,7 @@ MortonKey key_at(const std::string& order, std::uint64_t i, std::uint64_t n) noe
   return mixed(~i) % 2 == 0 ? MortonKey{0, near} : MortonKey{kKeyMask, kKeyMask - near};
 }
 
-/// Calls sink(records) for all records of an order. Their radiance holds their number.
+/// Calls sink(records) for all records of an order, whose radiance holds their number.
 template <class Sink>
 void generate(const std::string& order, std::uint64_t points, const Sink& sink) {
   std::vector<PointRecord> block(4096);
@@ -67,7 +73,8 @@ std::uint64_t number_of(const PointRecord& r) noexcept {
   return std::uint64_t{r.radiance[0]} << 32 | std::uint64_t{r.radiance[1]} << 16 | r.radiance[2];
 }
 
-/// Sums over records in any order, and whether they come in the right one.
+/// The checksum of a sequence of records, which does not depend on their order, and whether they
+/// are sorted.
 class Check {
  public:
   void add(const PointRecord& r) noexcept {
@@ -76,10 +83,12 @@ class Check {
       sorted_ &= last_.key < r.key || (last_.key == r.key && number_of(last_) < number_of(r));
     last_ = r;
   }
+  /// Checks that the records are sorted and are those of the input. @throws DataError otherwise
   void require_sorted(const Check& input, const char* method) const {
-    if (!sorted_) throw DataError(fmt::format("{}: records are not in order", method));
+    if (!sorted_)
+      throw DataError(fmt::format("{}: the records are not sorted, or not stable", method));
     if (sum_ != input.sum_ || count_ != input.count_)
-      throw DataError(fmt::format("{}: other records came out", method));
+      throw DataError(fmt::format("{}: the output has other records than the input", method));
   }
 
  private:
@@ -92,6 +101,7 @@ bool by_key(const PointRecord& a, const PointRecord& b) noexcept {
   return a.key < b.key;
 }
 
+/// Runs all sorts that were asked for.
 class SortRun {
  public:
   SortRun(const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
@@ -130,6 +140,7 @@ class SortRun {
   }
 
   void in_memory(const std::string& order, std::uint64_t points) {
+    // Make the input
     std::vector<PointRecord> input;
     input.reserve(points);
     Check expected;
@@ -138,6 +149,7 @@ class SortRun {
       for (const PointRecord& r : block) expected.add(r);
     });
     std::vector<PointRecord> records(input.size()), scratch(input.size());
+    // Run all methods in turn, and check ours once
     TimedRuns ours, tbb, std_sort, copy;
     progress_.begin("sort in memory", options_.repeats, "runs");
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
@@ -158,6 +170,7 @@ class SortRun {
       progress_.advance(1);
     }
     progress_.end();
+    // Add the rows
     add_row("memory", order, "ptcx", input.size(), ours);
     add_row("memory", order, "tbb", input.size(), tbb);
     add_row("memory", order, "std::sort", input.size(), std_sort).threads = 1;
@@ -173,10 +186,12 @@ class SortRun {
   }
 
   void on_disk(const std::string& order, std::uint64_t points) {
-    constexpr std::uint64_t kFiles = 3;  // input, what is spilled or between copies, and output; a
-                                         // city has up to 5 % more points
+    // Room for input, spilled records (or the floor's first copy) and output; a city has up to 5 %
+    // more points
+    constexpr std::uint64_t kFiles = 3;
     require_room({&work_, 1}, kFiles * points * sizeof(PointRecord) * 21 / 20,
                  fmt::format("{} records", points));
+    // Write the input
     RecordFile input(work_);
     RecordWriter writer(input);
     Check expected;
@@ -189,12 +204,14 @@ class SortRun {
     writer.finish();
     progress_.end();
     const std::vector<MortonKey> sample = sample_of(input);
+    // Check one run, which is not timed
     TimedRuns ours, floor;
     std::uint64_t spilled = 0;
     progress_.begin("sort on disk", options_.repeats, "runs");
-    Check found;  // by a run that counts for nothing else
+    Check found;
     sort_file(input, sample, &found);
     found.require_sorted(expected, "external sort");
+    // Run sort and floor in turn
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
       ours.run([&] { spilled = sort_file(input, sample, nullptr); });
       floor.run([&] {
@@ -212,8 +229,9 @@ class SortRun {
     add_row("disk", order, "floor", input.records(), floor).moved_bytes = 4 * input.bytes();
   }
 
-  /// @param check  of what comes out, or null
-  /// @return bytes spilled
+  /// Sorts from file to file.
+  /// @param check  adds every record of the output; may be null
+  /// @return the number of bytes spilled
   std::uint64_t sort_file(const RecordFile& input, std::span<const MortonKey> sample,
                           Check* check) {
     ExternalSorter sorter(

@@ -5,7 +5,7 @@
 namespace ptc::bench {
 
 StoredBytes stored_bytes(const ContainerReader& container) {
-  std::uint64_t points = 0, nodes = 0;
+  std::uint64_t points = 0, nodes = 0;  // bytes
   for (const DirectoryEntry& entry : container.entries()) {
     if (entry.type == PageType::point) points += extent_bytes(entry.stored_bytes);
     if (entry.type == PageType::node) nodes += extent_bytes(entry.stored_bytes);

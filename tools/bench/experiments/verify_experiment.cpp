@@ -1,4 +1,5 @@
-// What a verification costs at each level, beside reading the file.
+// The experiment `ptcbench verify`: time and memory of a verification at each level, compared with
+// reading the file.
 #include <array>
 #include <fstream>
 
@@ -19,27 +20,28 @@ namespace ptc::bench {
 namespace {
 
 constexpr char kReading[] =
-    "A container of the city, sound, verified at each level: 0 header and superblocks, 1 the "
-    "directory and page headers, 2 every byte's checksum, 3 what pages hold and every node against "
-    "its points, 4 the tree built again and compared bit by bit. Read is one thread that reads the "
-    "file from end to end. Warm: the file is in the system's cache; cold: it is not. Peaks are "
-    "what "
-    "a run adds to the program.";
+    "Verification of a sound container of the procedural city at each level: 0 checks header and "
+    "superblocks, 1 also directory and page headers, 2 also the checksum of every byte, 3 also the "
+    "content of pages and every node against its points, 4 also builds the tree again and compares "
+    "it bit by bit. Read: one thread reads the file from end to end. Warm: the file is in the "
+    "system's cache; cold: it is not. Peak memory is what a run adds to the program.";
 
 constexpr std::array kLevels{VerifyLevel::commit, VerifyLevel::directory, VerifyLevel::payload,
                              VerifyLevel::content, VerifyLevel::rebuild};
 
+/// What `ptcbench verify` measures.
 struct VerifyBenchOptions {
-  std::uint64_t points = 20'000'000;  ///< of the city
+  std::uint64_t points = 20'000'000;  ///< points of the city
   unsigned repeats = 5;
 };
 
+/// One level, or reading, with a warm or cold cache.
 struct VerifyRow {
   std::string work;    ///< "level N", or "read"
   std::string system;  ///< "warm" or "cold"
   std::uint64_t points = 0, file_bytes = 0;
   unsigned threads = 0;
-  std::uint64_t memory_bytes = 0;  ///< cap
+  std::uint64_t memory_bytes = 0;  ///< cap; 0 for reading
   Spread wall, cpu;                ///< seconds
   std::uint64_t resident_bytes = 0;
 };
@@ -58,9 +60,9 @@ const Columns<VerifyRow>& columns() {
       {"wall_seconds", {"wall s", "{:.4f}"}, &R::wall},
       {"cpu_seconds", {"CPU s", "{:.4f}"}, &R::cpu},
       {"bytes_per_second",
-       {"GB a second", "{:.2f}", kGiga},
+       {"file GB/s", "{:.2f}", kGiga},
        [](const R& r) { return static_cast<double>(r.file_bytes) / r.wall.median; }},
-      {"resident_bytes", {"peak MiB", "{:.1f}", kMebi}, &R::resident_bytes}};
+      {"resident_bytes", {"peak memory MiB", "{:.1f}", kMebi}, &R::resident_bytes}};
   return columns;
 }
 
@@ -72,10 +74,11 @@ void read_through(const std::filesystem::path& path) {
   }
 }
 
-/// One kind of work on a container, again and again.
+/// One kind of work on a container, and the times of its runs.
 class VerifyRun {
  public:
-  /// @param level  none: the file is read, no more
+  /// @param level  none: the file is only read
+  /// @param cold   the file leaves the system's cache before each run
   VerifyRun(const std::filesystem::path& container, std::optional<VerifyLevel> level, bool cold,
             const RunOptions& run)
       : container_(container), level_(level), cold_(cold), run_(run) {}
@@ -92,7 +95,7 @@ class VerifyRun {
     });
     const bool counts = level_ >= VerifyLevel::content;
     if (!report.sound() || (counts && report.points != expected.points))
-      throw DataError("the container is not sound");
+      throw DataError("the container that was built is not sound");
   }
 
   [[nodiscard]] VerifyRow row(const Superblock& container) const {
@@ -116,12 +119,14 @@ class VerifyRun {
 };
 
 Report measure(const VerifyBenchOptions& options, const Bench& bench) {
+  // Build the container
   require_room({&bench.work, 1}, build_disk_bytes(options.points),
                fmt::format("{} points", options.points));
   const WorkFile file(bench.work, ".ptcx");
   const Superblock container = build_container({.city_points = options.points, .run = bench.run},
                                                file.path(), bench.progress)
                                    .superblock;
+  // Run all levels in turn, warm and cold
   std::vector<VerifyRun> runs;
   for (const bool cold : {false, true}) {
     for (const VerifyLevel level : kLevels) runs.emplace_back(file.path(), level, cold, bench.run);
@@ -139,7 +144,7 @@ Report measure(const VerifyBenchOptions& options, const Bench& bench) {
   std::vector<VerifyRow> rows;
   for (const VerifyRun& run : runs) rows.push_back(run.row(container));
   return {.name = "verify",
-          .title = "Verification",
+          .title = "Time and memory of a verification at each level",
           .reading = kReading,
           .runs = options.repeats,
           .tables = {tabulate<VerifyRow>({.name = "rows"}, columns(), rows)}};
@@ -154,11 +159,12 @@ Experiment make_verify_experiment() {
     d.quick("--points", options->points, 200'000);
     d.repeats(options->repeats, 3);
   };
-  return {.name = "verify",
-          .purpose = "Time and memory of a verification at each level, beside reading the file",
-          .quick = "A few seconds: 200k points, 3 runs",
-          .declare = declare,
-          .run = [options](const Bench& bench) { return measure(*options, bench); }};
+  return {
+      .name = "verify",
+      .purpose = "Time and memory of a verification at each level, compared with reading the file",
+      .quick = "A few seconds: 200k points, 3 runs",
+      .declare = declare,
+      .run = [options](const Bench& bench) { return measure(*options, bench); }};
 }
 
 }  // namespace ptc::bench

@@ -9,6 +9,7 @@
 namespace ptc::bench {
 namespace {
 
+/// The picture of the window: 1 - occlusion in grey, or direct and gathered light times `gain`.
 Image picture(const ReceiverSet& set, std::span<const Shading> shadings, Quantity job,
               const glm::vec3& sky, float gain) {
   Image image{.width = set.window_width, .height = set.window_height};
@@ -30,7 +31,7 @@ Image picture(const ReceiverSet& set, std::span<const Shading> shadings, Quantit
   return image;
 }
 
-/// The exposure that shows all but the brightest fiftieth.
+/// The gain at which all but the brightest fiftieth of the pixels are at most 1.
 float exposure(const Image& image) {
   std::vector<float> values;
   for (const glm::vec3& p : image.pixels) values.push_back(std::max({p.r, p.g, p.b}));

@@ -1,4 +1,4 @@
-// The window of the camera's picture, for those who look at pictures rather than at numbers.
+// Compares the window of the camera's picture as a viewer sees it.
 #pragma once
 
 #include <span>
@@ -7,9 +7,9 @@
 
 namespace ptc::bench {
 
-/// Mean FLIP of the window between two shadings of it: grey for occlusion, else surfaces as they
-/// are lit, at an exposure that shows all but the brightest fiftieth of the reference. NaN when the
-/// set has no window.
+/// Returns the mean FLIP between two shadings of the window. The picture shows occlusion in grey,
+/// or else lit surfaces at an exposure that shows all but the brightest fiftieth of the reference.
+/// NaN when the set has no window.
 /// @param ours, reference  one for each pixel that sees something
 /// @param sky              radiance that arrives where nothing covers it
 [[nodiscard]] double window_flip(const ReceiverSet& set, std::span<const Shading> ours,

@@ -1,4 +1,4 @@
-// Files that an experiment needs while it runs.
+// Names of files that an experiment needs while it runs.
 #pragma once
 
 #include <unistd.h>
@@ -10,10 +10,11 @@
 
 namespace ptc::bench {
 
-/// A name in a directory that no other process takes. Its file goes when this ends, or when a
-/// signal ends the process.
+/// A hidden name in a directory that no other process takes. Its file is deleted when this object
+/// ends, or when a signal ends the process.
 class WorkFile {
  public:
+  /// @param ending  of the name; distinguishes several files of one process
   WorkFile(const std::filesystem::path& directory, const std::string& ending)
       : path_(directory / (".ptcbench-" + std::to_string(::getpid()) + ending)), name_(path_) {}
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

@@ -13,9 +13,10 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::size_t kNeighbours = 8;
-constexpr float kAlike = 0.7F;  // cosine between normals of one surface
+constexpr std::size_t kNeighbours = 8;  // surfels among which a texel chooses
+constexpr float kAlike = 0.7F;          // least cosine between normals of one surface
 
+/// What nanoflann asks of a point set.
 struct Cloud {
   std::span<const Surfel> surfels;
   [[nodiscard]] std::size_t kdtree_get_point_count() const { return surfels.size(); }
@@ -30,7 +31,7 @@ struct Cloud {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud,
                                                  3, std::size_t>;
 
-/// The nearest of a few that faces the same way, else the nearest.
+/// The radiance, as rgbe, of the nearest neighbour that faces the same way, else of the nearest.
 std::uint32_t nearest_radiance(const Tree& tree, std::span<const Surfel> surfels,
                                const glm::dvec3& at, const glm::vec3& normal) {
   std::array<std::size_t, kNeighbours> found{};
@@ -56,12 +57,12 @@ std::uint16_t texels_along(float length, double spacing) {
 template <class Radiance>
 void Lightmap::fill(const Grid& grid, const Radiance& radiance) {
   const unsigned columns = grid.columns, rows = grid.rows;
-  // A texel that the far edge cuts is read at the middle of what is left of it: on the edge itself
-  // what lies beyond would be as near.
+  // A texel that the far edge cuts takes its radiance from the middle of the part inside: on the
+  // edge itself, surfels beyond it would be as near.
   const float most = 1 - 1 / (3 * static_cast<float>(std::max(columns, rows)));
   for (unsigned row = 0; row < rows; ++row) {
     for (unsigned column = 0; column < columns; ++column) {
-      // Those past the far edge stay black, but for one row: rounding leads at() there.
+      // Texels beyond the far edge stay black, except the first ones: rounding can lead at() there.
       if (column * rows + row * columns > columns * rows + std::max(columns, rows)) break;
       const float x = (static_cast<float>(column) + 0.5F) / static_cast<float>(columns);
       const float y = (static_cast<float>(row) + 0.5F) / static_cast<float>(rows);
@@ -72,6 +73,7 @@ void Lightmap::fill(const Grid& grid, const Radiance& radiance) {
 }
 
 Lightmap::Lightmap(const Mesh& mesh, std::span<const Surfel> surfels, double spacing) {
+  // Give each triangle a grid
   grids_.resize(mesh.triangles.size());
   std::uint64_t count = 0;
   const auto corner = [&](std::size_t triangle, std::size_t k) {
@@ -83,6 +85,7 @@ Lightmap::Lightmap(const Mesh& mesh, std::span<const Surfel> surfels, double spa
     count += std::uint64_t{grids_[t].columns} * grids_[t].rows;
   }
   texels_.resize(count);
+  // Find the surfel for each texel
   const Cloud cloud{surfels};
   const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   const ThreadPool executor;

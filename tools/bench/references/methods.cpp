@@ -1,3 +1,9 @@
+// Three methods behind one interface. The gather shades the whole set, since neighbours share its
+// work; the others shade each receiver by itself, so it is enough to time the checked ones:
+//
+//   set      . . . . . . . . . . . . . . . .   GatherMethod times all of them
+//   checked    *     *   *         *     *     PlainMethod and RayMethod time these
+//   window           - - - - -                 shaded once more, not timed, by result()
 #include "tools/bench/references/methods.h"
 
 #include <algorithm>
@@ -11,6 +17,7 @@
 namespace ptc::bench {
 namespace {
 
+/// The hierarchical gather, as ptcshade runs it.
 class GatherMethod : public Method {
  public:
   GatherMethod(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
@@ -25,7 +32,7 @@ class GatherMethod : public Method {
   Cost run() override {
     Progress silent;
     const Cost cost = timed([&] { shader_.shade(set_.receivers, results_, silent); });
-    static_cast<void>(shader_.cache_statistics());  // gives back the readers of the shared cache
+    static_cast<void>(shader_.cache_statistics());  // returns its readers to the shared cache
     return cost;
   }
   [[nodiscard]] std::size_t receivers() const override { return results_.size(); }
@@ -46,7 +53,7 @@ class GatherMethod : public Method {
   std::vector<Shading> results_;
 };
 
-/// Methods that shade receivers one by one: only those checked are timed.
+/// A method that shades each receiver by itself: only the checked receivers are timed.
 class OneByOne : public Method {
  public:
   OneByOne(const ReceiverSet& set, const Checked& checked, const Executor& executor)
@@ -81,6 +88,7 @@ class OneByOne : public Method {
   std::vector<Shading> last_;
 };
 
+/// The plain gather, with one object for each thread.
 class PlainMethod : public OneByOne {
  public:
   PlainMethod(const BenchScene& scene, const ReceiverSet& set, const Checked& checked,
@@ -94,7 +102,7 @@ class PlainMethod : public OneByOne {
 
   Cost run() override {
     const Cost cost = OneByOne::run();
-    for (auto& gather : gathers_) gather.reset();  // the cache has readers for one method
+    for (auto& gather : gathers_) gather.reset();  // the cache has readers for one method at a time
     return cost;
   }
   [[nodiscard]] Shadings result() override {
@@ -118,6 +126,7 @@ class PlainMethod : public OneByOne {
   std::vector<std::unique_ptr<PlainGather>> gathers_;
 };
 
+/// Rays; the index of a receiver is the seed of its rays.
 class RayMethod : public OneByOne {
  public:
   RayMethod(const RayBaseline& baseline, const ReceiverSet& set, const Checked& checked,
@@ -137,15 +146,18 @@ class RayMethod : public OneByOne {
 }  // namespace
 
 Checked choose_checked(const BenchScene& scene, const ReceiverSet& set, unsigned wanted) {
+  // Draw receivers at random
   Checked checked;
   std::vector<std::size_t> all(set.receivers.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
-  std::mt19937_64 bits;  // its default seed
+  std::mt19937_64 bits;  // its default seed gives the same choice each time
   std::ranges::sample(all, std::back_inserter(checked.receivers), wanted, bits);
+  // Put neighbours next to each other
   const Frame& frame = scene.container().header().frame;
   std::ranges::sort(checked.receivers, {}, [&](std::size_t i) {
     return receiver_key(frame, set.receivers[i].position, 0);
   });
+  // Take the window's pixels that see something
   for (const Pixel& pixel : set.window) {
     if (pixel.receiver != ReceiverSet::kNone) checked.window.push_back(pixel.receiver);
   }

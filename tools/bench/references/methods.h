@@ -1,4 +1,4 @@
-// Ways to shade the same receivers, timed alike.
+// Ways to shade the same receivers, all timed in the same way.
 #pragma once
 
 #include <memory>
@@ -14,50 +14,56 @@
 
 namespace ptc::bench {
 
-/// Which receivers of a set count: those whose error is measured, and the window of the picture.
+/// The receivers of a set that are compared with a reference: a random choice, whose error is
+/// measured, and the window of the picture.
 struct Checked {
   std::vector<std::size_t> receivers;  ///< indices into the set, neighbours next to each other
-  std::vector<std::size_t> window;     ///< likewise, one for each pixel that sees something
+  std::vector<std::size_t> window;     ///< indices, one for each pixel that sees something
 };
 
-/// A random choice of receivers in the order of the Z-curve, the same each time, and the window's.
+/// Chooses receivers at random, the same ones each time, and puts them in the order of the Z-curve.
+/// @param wanted  receivers whose error is measured; all where the set has fewer
 [[nodiscard]] Checked choose_checked(const BenchScene& scene, const ReceiverSet& set,
                                      unsigned wanted);
 
-/// Shadings of them, in the same order.
+/// The shadings of the receivers of a Checked, each list in its order.
 struct Shadings {
   std::vector<Shading> checked, window;
 };
 
+/// One way to shade, set up for one set of receivers.
 class Method {
  public:
   virtual ~Method() = default;
-  /// Shades all its receivers once.
+  /// Shades all receivers that it times once. @return what that took
   virtual Cost run() = 0;
-  /// Receivers that run() times.
+  /// The number of receivers that run() shades.
   [[nodiscard]] virtual std::size_t receivers() const = 0;
-  /// What the last run gave; the window may take a run of its own.
+  /// The shadings of the last run(). Those of the window may be computed by this call.
   [[nodiscard]] virtual Shadings result() = 0;
-  /// What all runs together did; zeros of methods that do not gather.
+  /// The counts of all runs together; zeros where the method does not gather.
   [[nodiscard]] virtual GatherCounts counts() const { return {}; }
 };
 
-/// The hierarchical gather of the whole set, pages in `cache`.
+/// Makes the hierarchical gather of all receivers of the set, which takes pages from `cache`.
 [[nodiscard]] std::unique_ptr<Method> make_gather(const ContainerReader& container, const Sky& sky,
                                                   const ReceiverSet& set, const Checked& checked,
                                                   const GatherOptions& options, PageCache& cache,
                                                   const Executor& executor);
-/// The plain gather of those checked.
+/// Makes the plain gather of the checked receivers: one after another, each from the root, without
+/// what neighbours share.
 [[nodiscard]] std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& set,
                                                  const Checked& checked,
                                                  const GatherOptions& options, PageCache& cache,
                                                  const Executor& executor);
-/// Rays from those checked.
+
+/// How a ray tracer shades.
 struct RaySetting {
   RayBaseline::Job job;
   RayBaseline::Packets packets;
-  unsigned rays;
+  unsigned rays;  ///< rays per receiver, a power of two from 16 to 65536
 };
+/// Makes rays from the checked receivers.
 [[nodiscard]] std::unique_ptr<Method> make_rays(const RayBaseline& baseline, const ReceiverSet& set,
                                                 const Checked& checked, const RaySetting& setting,
                                                 const Executor& executor);

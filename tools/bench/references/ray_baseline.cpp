@@ -1,3 +1,12 @@
+// Occlusion is the share of cosine-distributed rays that hit something, irradiance is pi times the
+// mean radiance that they find:
+//
+//      .   |   .        n rays: Sobol points of the unit square, scrambled by the receiver's seed
+//        . | .          (Owen) and mapped to the hemisphere, so that each ray has the same weight
+//   ------ o ------     o is the receiver
+//
+// Embree traverses 16 rays at once with profit where they point alike. The samples are therefore
+// taken in the Z-order of the square, and each 16 successive ones make a packet.
 #include "tools/bench/references/ray_baseline.h"
 
 #include <algorithm>
@@ -24,10 +33,11 @@ namespace {
 
 constexpr unsigned kPacket = 16;
 
-/// Sample numbers of n Sobol points in an order in which neighbours point alike: by the box that
-/// they fall into. Owen's scramble keeps those who share a box together.
+/// The numbers of n Sobol points along the Z-curve of the square, an order in which neighbours
+/// point in similar directions. Owen's scramble keeps points that share a box of the square
+/// together, so one order serves all seeds.
 std::vector<std::uint32_t> coherent_order(unsigned n) {
-  // The points of a fixed seed: any scramble would do.
+  // Take the points of a fixed seed: the order is as good for any other scramble
   const SquarePoints points(0);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> keys(n);
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -56,14 +66,15 @@ struct RayBaseline::Impl {
   glm::dvec3 origin{0};
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  std::array<std::vector<std::uint32_t>, 17> orders;  // by the logarithm of the rays
+  std::array<std::vector<std::uint32_t>, 17> orders;  ///< [i]: coherent_order() of 2^i rays
 
   ~Impl() {
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
   }
 
-  /// A disc's back is clear to those within two radii.
+  /// Discards hits of a disc's back by rays that begin within two radii of its centre, and of all
+  /// backs where only fronts block light (spec/shading.md#sides).
   static void pass_near_backs(const RTCFilterFunctionNArguments* args) {
     const auto& impl = *static_cast<const Impl*>(args->geometryUserPtr);
     for (unsigned i = 0; i < args->N; ++i) {
@@ -80,6 +91,7 @@ struct RayBaseline::Impl {
     }
   }
 
+  /// Opens the device and an empty scene.
   void begin() {
     device = rtcNewDevice(nullptr);
     if (!device) throw std::runtime_error("Embree: no device");
@@ -88,6 +100,7 @@ struct RayBaseline::Impl {
     for (std::size_t i = 4; i < orders.size(); ++i) orders[i] = coherent_order(1U << i);
   }
 
+  /// Puts the only geometry into the scene, and builds Embree's tree.
   void finish(RTCGeometry geometry) {
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
@@ -96,7 +109,7 @@ struct RayBaseline::Impl {
     if (rtcGetDeviceError(device) != RTC_ERROR_NONE) throw std::bad_alloc();
   }
 
-  /// Radiance that leaves a hit towards the ray.
+  /// Radiance that leaves a hit towards the origin of the ray.
   [[nodiscard]] glm::vec3 radiance(unsigned primitive, float u, float v, const glm::vec3& normal,
                                    const glm::vec3& along) const {
     if (glm::dot(normal, along) >= 0) return glm::vec3(0);
@@ -106,6 +119,7 @@ struct RayBaseline::Impl {
 
 namespace {
 
+/// A buffer of the geometry, which owns it. @throws std::bad_alloc
 template <class T>
 T* new_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t bytes,
               std::size_t count) {
@@ -118,12 +132,14 @@ T* new_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::s
 
 RayBaseline::RayBaseline(std::span<const Surfel> discs, Sides sides)
     : impl_(std::make_unique<Impl>()) {
+  // Put the origin in the middle, so that floats serve best
   impl_->discs = discs;
   impl_->sides = sides;
   impl_->begin();
   Bounds bounds;
   for (const Surfel& s : discs) bounds.add(s.position);
   if (!bounds.empty()) impl_->origin = (bounds.low + bounds.high) * 0.5;
+  // Fill Embree's buffers: centre and radius, normal
   RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
   auto* vertices =
       new_buffer<float>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, 16, discs.size());
@@ -137,6 +153,7 @@ RayBaseline::RayBaseline(std::span<const Surfel> discs, Sides sides)
     }
     vertices[4 * i + 3] = discs[i].radius;
   }
+  // Let the filter decide on backs
   rtcSetGeometryUserData(geometry, impl_.get());
   rtcSetGeometryIntersectFilterFunction(geometry, &Impl::pass_near_backs);
   rtcSetGeometryOccludedFilterFunction(geometry, &Impl::pass_near_backs);
@@ -164,13 +181,13 @@ RayBaseline::~RayBaseline() = default;
 
 namespace {
 
-/// Sums of one receiver, whichever way the rays went out.
+/// What the rays of one receiver found together.
 struct Sums {
-  unsigned covered = 0;
-  glm::vec3 light{0};
+  unsigned covered = 0;  ///< rays that hit something
+  glm::vec3 light{0};    ///< sum of the radiance at the hits
 };
 
-/// Sets ray i of a packet, or the one ray.
+/// Sets ray i of a packet, whose fields are arrays, or the only ray.
 template <class Ray>
 void set_ray(Ray& ray, unsigned i, const glm::vec3& from, const glm::vec3& along) {
   const auto put = [i](auto& field, auto value) {
@@ -195,6 +212,7 @@ void set_ray(Ray& ray, unsigned i, const glm::vec3& from, const glm::vec3& along
 
 using Directions = std::span<const glm::vec3>;
 
+/// Counts the directions that something blocks, one ray at a time.
 Sums occlude_single(RTCScene scene, const glm::vec3& from, Directions directions) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -218,6 +236,7 @@ RTCIntersectContext coherent_context() {
   return context;
 }
 
+/// Counts the directions that something blocks, 16 rays at a time.
 Sums occlude_packets(RTCScene scene, const glm::vec3& from, Directions directions) {
   RTCIntersectContext context = coherent_context();
   alignas(64) const std::array<int, kPacket> valid = kAllValid;
@@ -231,7 +250,7 @@ Sums occlude_packets(RTCScene scene, const glm::vec3& from, Directions direction
   return sums;
 }
 
-/// @param light  of (primitive, u, v, normal, along)
+/// Counts hits and adds up the light that `light(primitive, u, v, normal, along)` gives for them.
 template <class Light>
 Sums intersect_single(RTCScene scene, const glm::vec3& from, Directions directions,
                       const Light& light) {
@@ -252,6 +271,7 @@ Sums intersect_single(RTCScene scene, const glm::vec3& from, Directions directio
   return sums;
 }
 
+/// Does the work of intersect_single() with 16 rays at a time.
 template <class Light>
 Sums intersect_packets(RTCScene scene, const glm::vec3& from, Directions directions,
                        const Light& light) {
@@ -281,9 +301,11 @@ Sums intersect_packets(RTCScene scene, const glm::vec3& from, Directions directi
 
 Shading RayBaseline::trace(const Receiver& receiver, Job job, Packets packets, unsigned rays,
                            std::uint64_t seed) const {
+  // Choose the directions
   const std::size_t exponent = static_cast<std::size_t>(std::countr_zero(rays));
   if (!std::has_single_bit(rays) || rays < kPacket || exponent >= impl_->orders.size()) {
-    throw std::invalid_argument("RayBaseline: the rays are a power of two from 16 to 65536");
+    throw std::invalid_argument(
+        "RayBaseline: the number of rays must be a power of two from 16 to 65536");
   }
   const glm::vec3 from(receiver.position - impl_->origin);
   const Basis frame(receiver.normal);
@@ -292,6 +314,7 @@ Shading RayBaseline::trace(const Receiver& receiver, Job job, Packets packets, u
   std::ranges::transform(impl_->orders[exponent], directions.begin(), [&](std::uint32_t i) {
     return frame.to_world(cosine_direction(points.square(i)));
   });
+  // Trace them
   const auto light = [&](unsigned primitive, float u, float v, const glm::vec3& normal,
                          const glm::vec3& along) {
     return impl_->radiance(primitive, u, v, normal, along);
@@ -301,6 +324,7 @@ Shading RayBaseline::trace(const Receiver& receiver, Job job, Packets packets, u
                                                 impl_->scene, from, directions)
                     : single ? intersect_single(impl_->scene, from, directions, light)
                              : intersect_packets(impl_->scene, from, directions, light);
+  // Each ray has the same weight
   Shading shading;
   shading.occlusion = static_cast<float>(sums.covered) / static_cast<float>(rays);
   shading.irradiance = sums.light * (std::numbers::pi_v<float> / static_cast<float>(rays));

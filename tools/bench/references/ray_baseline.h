@@ -12,27 +12,34 @@
 
 namespace ptc::bench {
 
-/// Cosine-distributed Sobol-Owen rays at discs or triangles; light at hits is looked up, not
-/// computed, as in a bake. Threads: calls may be made concurrently.
+/// Cosine-distributed Sobol-Owen rays at discs or triangles. The radiance at a hit is looked up,
+/// not computed, as in a bake.
+///
+/// Threads: trace() may be called concurrently.
 class RayBaseline {
  public:
   enum class Job {
     occlusion,  ///< any-hit rays
     bleeding,   ///< closest-hit rays: occlusion and irradiance
   };
+  /// Whether Embree gets one ray at a time, or 16 rays of similar direction.
   enum class Packets { single, sixteen };
 
-  /// Oriented discs, their radiance on the front; backs as spec/shading.md#sides has them. Of
-  /// coplanar discs a ray meets either. They must outlive this.
+  /// Prepares oriented discs, which have their radiance on the front; their backs follow
+  /// spec/shading.md#sides. Which of several coplanar discs a ray meets is not defined. The discs
+  /// must outlive this.
+  /// @throws std::runtime_error without an Embree device; std::bad_alloc
   RayBaseline(std::span<const Surfel> discs, Sides sides);
-  /// Triangles with a lightmap: every texel, about `spacing` wide, has the radiance of the nearest
-  /// surfel that faces its way. Backs are black.
+  /// Prepares triangles with a lightmap: every texel, about `spacing` scene units wide, has the
+  /// radiance of the nearest surfel that faces its way. Backs are black.
+  /// @throws std::runtime_error without an Embree device; std::bad_alloc
   RayBaseline(const Mesh& mesh, std::span<const Surfel> radiance, double spacing);
   ~RayBaseline();
 
-  /// Occlusion, and irradiance when the job asks for it.
+  /// Shades one receiver: occlusion, and irradiance when the job asks for it.
   /// @param rays  a power of two from 16 to 65536
-  /// @throws std::invalid_argument at another number
+  /// @param seed  of the rays' directions
+  /// @throws std::invalid_argument for any other number of rays
   [[nodiscard]] Shading trace(const Receiver& receiver, Job job, Packets packets, unsigned rays,
                               std::uint64_t seed) const;
 

@@ -32,9 +32,11 @@ Reference make_reference(const ReceiverSet& set, const Checked& checked, const R
     });
     return results;
   };
+  // Trace the two halves, and the window
   constexpr std::uint64_t kFirst = std::uint64_t{1} << 40, kSecond = std::uint64_t{2} << 40;
   const std::vector<Shading> a = trace_all(checked.receivers, rays.half, kFirst);
   const std::vector<Shading> b = trace_all(checked.receivers, rays.half, kSecond);
+  // Take the mean of the halves
   Reference reference;
   if (rays.window > 0) reference.window = trace_all(checked.window, rays.window, kFirst);
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -43,7 +45,8 @@ Reference make_reference(const ReceiverSet& set, const Checked& checked, const R
     s.irradiance = 0.5F * (a[i].irradiance + b[i].irradiance);
     reference.mean.push_back(s);
   }
-  // Halves differ by sqrt(2) times the error of one, their mean has 1 / sqrt(2) of it.
+  // The halves differ by sqrt(2) times the error of one half, and the error of their mean is that
+  // error over sqrt(2): half of their difference.
   reference.occlusion_noise = 0.5 * relative_rms(occlusion_of(a), occlusion_of(b));
   reference.irradiance_noise = 0.5 * relative_rms(irradiance_of(a), irradiance_of(b));
   return reference;

@@ -47,7 +47,8 @@ Spread Costs::cpu_us(std::size_t count) const {
 
 std::uint64_t TimedRuns::begin() {
   return_freed_memory();
-  // Where the system does not allow this, the peak is that of all runs so far.
+  // "5" resets the peak (Linux, proc(5)). Where the system does not allow this, the peak is that of
+  // all runs so far.
   std::ofstream("/proc/self/clear_refs") << "5";
   return resident_bytes();
 }

@@ -10,18 +10,18 @@
 
 namespace ptc::bench {
 
-/// One thread, and all of them where there are more.
+/// The numbers of threads that experiments compare: 1, and `threads` where that is more.
 [[nodiscard]] std::vector<unsigned> thread_counts(unsigned threads);
 
-/// Seconds that something took.
+/// Seconds that a piece of work took.
 struct Cost {
-  double wall = 0;
-  double cpu = 0;  ///< of all threads, user and system
+  double wall = 0;  ///< seconds on the clock
+  double cpu = 0;   ///< seconds of all threads together, user and system
 
   Cost& operator+=(const Cost& other) noexcept;
 };
 
-/// Time since it was made.
+/// Measures the time since it was made.
 class Stopwatch {
  public:
   Stopwatch();
@@ -31,6 +31,7 @@ class Stopwatch {
   Cost start_;
 };
 
+/// Calls body(). @return what that took
 template <class Body>
 [[nodiscard]] Cost timed(const Body& body) {
   const Stopwatch stopwatch;
@@ -38,21 +39,22 @@ template <class Body>
   return stopwatch.cost();
 }
 
-/// Times of several runs.
+/// Times of several runs of the same work.
 struct Costs {
   std::vector<double> wall, cpu;  ///< seconds
 
   void add(const Cost& cost);
-  /// Microseconds of one of `count` things that each run did.
+  /// Wall time in microseconds for each of the `count` items that a run works on.
   [[nodiscard]] Spread wall_us(std::size_t count) const;
+  /// CPU time in microseconds for each of the `count` items that a run works on.
   [[nodiscard]] Spread cpu_us(std::size_t count) const;
 };
 
-/// Times of the runs of one method, and the most memory that one of them took.
+/// Times of the runs of one method, and the maximum of memory that one of them took.
 struct TimedRuns : Costs {
-  std::uint64_t resident = 0;  ///< most bytes at once during a run, less what was there before it
+  std::uint64_t resident = 0;  ///< maximum of bytes during a run, less those before it
 
-  /// Calls body() and measures it.
+  /// Calls body(), and records its time and memory.
   template <class Body>
   void run(const Body& body) {
     const std::uint64_t before = begin();
@@ -61,8 +63,9 @@ struct TimedRuns : Costs {
   }
 
  private:
-  /// The peak begins anew. @return resident bytes
+  /// Resets the system's record of the peak. @return resident bytes
   [[nodiscard]] static std::uint64_t begin();
+  /// Takes the peak since begin() into account. @param resident_before  what begin() returned
   void end(std::uint64_t resident_before);
 };
 

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::string_view kChanged = "-dirty";
 
-/// What stands behind "KEY :" in a file of the system; empty where it does not.
+/// The text behind "KEY :" in a file such as /proc/cpuinfo; empty where there is no such line.
 std::string fact_of(const char* file, std::string_view key) {
   std::ifstream facts(file);
   for (std::string line; std::getline(facts, line);) {
@@ -61,7 +61,8 @@ double load_of_a_minute() {
   return ::getloadavg(&load, 1) == 1 ? load : 0;
 }
 
-/// The last name of a path, whatever stands before the path in an argument.
+/// An argument with its path cut to the last name. The path begins behind "--option=", behind "-o",
+/// or at the first character.
 std::string public_word(std::string_view word) {
   if (word.find('/') == std::string_view::npos) return std::string(word);
   std::size_t path = 0;

@@ -3,8 +3,8 @@
 
 namespace ptc::bench {
 
-/// As git describe has it, with "-dirty" at its end where files were changed; empty where it is not
-/// known.
+/// The commit as git describe names it, with "-dirty" at its end where files were changed; empty
+/// where the build did not know it.
 extern const char* const kBuiltCommit;
 
 }  // namespace ptc::bench

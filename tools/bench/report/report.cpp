@@ -1,3 +1,5 @@
+// Facts, tables and charts of a report as files. Each file is published whole, so that a reader
+// never sees half of one while the experiment goes on.
 #include "tools/bench/report/report.h"
 
 #include <algorithm>
@@ -56,7 +58,7 @@ void write_files(const std::filesystem::path& directory, const Report& report) {
   write_text(directory / (report.name + ".json"), facts_of(report).dump(2) + "\n");
   for (const Table& table : report.tables) {
     if (table.rows.empty()) continue;
-    const bool first = &table == &report.tables.front();
+    const bool first = &table == &report.tables.front();  // its file has the report's name alone
     write_text(directory / (file_name(report, first ? "" : table.caption.name) + ".csv"),
                csv_of(table));
   }

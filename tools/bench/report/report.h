@@ -1,4 +1,9 @@
-// What an experiment found: tables, charts, and the words that tell how to read them.
+// What an experiment found: tables, charts, and the words that say how to read them. One report
+// gives all files of an experiment:
+//
+//   Report -> NAME.json, NAME.csv, NAME-TABLE.csv    facts, for programs (write_files())
+//          -> NAME-PART.svg, NAME-PART.png           charts (write_figures())
+//          -> NAME.md                                everything, for people (write_results())
 #pragma once
 
 #include <filesystem>
@@ -12,44 +17,47 @@
 
 namespace ptc::bench {
 
+/// A chart with the name of its files.
 struct Figure {
-  std::string part;  ///< after the report's name and a dash in that of its files; may be empty
+  std::string part;  ///< PART of NAME-PART.svg; empty: NAME.svg
   Chart chart;
 };
 
+/// What one command of ptcbench gives.
 struct Report {
-  std::string name;  ///< of its files, without ending
-  std::string title;
+  std::string name;                  ///< NAME of its files, without ending
+  std::string title;                 ///< what was measured, a few words
   std::string reading;               ///< what is measured against what, and how to read it
-  unsigned runs = 1;                 ///< of each measurement; 0: nothing was timed
+  unsigned runs = 1;                 ///< runs of each measurement; 0: nothing was timed
   std::vector<Table> tables;         ///< one or more
-  std::vector<std::string> notes{};  ///< a sentence or more each, about these figures
+  std::vector<std::string> notes{};  ///< sentences about these numbers, one paragraph each
   std::vector<Figure> figures{};
 };
 
-/// The series of a panel that has this name, a new one if there is none.
+/// Finds the series of this name in a panel, or adds it.
 [[nodiscard]] ChartSeries& series_of(ChartPanel& panel, const std::string& name, bool dashed);
 
-/// Adds a panel that shows something.
+/// Adds a panel without its empty series; a panel without any points is left out.
 void add_panel(Chart& chart, ChartPanel panel);
 
-/// NAME-PART, or NAME where the part is empty: what files are called, without their ending.
+/// The name of a file without its ending: NAME-PART, or NAME where the part is empty.
 [[nodiscard]] std::string file_name(const Report& report, const std::string& part);
 
-/// Writes a whole file or none. @throws std::system_error
+/// Writes a file, which is published whole or not at all. @throws std::system_error
 void write_text(const std::filesystem::path& path, const std::string& text);
 
-/// {"rows": [...], "TABLE": [...]}: json_of() of each table by its name.
+/// Returns {"rows": [...], "TABLE": [...]}: json_of() of each table under the table's name.
 [[nodiscard]] nlohmann::ordered_json facts_of(const Report& report);
 
-/// All tables and notes.
+/// All tables and notes as text for a terminal.
 [[nodiscard]] std::string text_of(const Report& report);
 
-/// Writes the charts as NAME-PART.svg and .png. @throws as write_chart()
+/// Writes the charts as NAME-PART.svg and NAME-PART.png; charts without panels are left out.
+/// @throws std::system_error, std::invalid_argument as write_chart()
 void write_figures(const std::filesystem::path& directory, const Report& report);
 
-/// Writes NAME.json, the first table as NAME.csv, each other as NAME-TABLE.csv, and the charts.
-/// @throws std::system_error
+/// Writes NAME.json, the first table as NAME.csv, each further table as NAME-TABLE.csv, and the
+/// charts. @throws std::system_error, std::invalid_argument as write_chart()
 void write_files(const std::filesystem::path& directory, const Report& report);
 
 }  // namespace ptc::bench

@@ -5,17 +5,18 @@
 namespace ptc::bench {
 namespace {
 
-/// What a reader must know before a number is quoted; empty where nothing is against it.
+/// What a reader must know before quoting a number; empty where there is nothing of that kind.
 std::string reservations(const Report& report, const Circumstances& c) {
   std::string text;
   if (report.runs > 0 && report.runs < kEnoughRuns) {
-    text += fmt::format("**Fewer than {} runs ({})**: the spread is not known well.\n", kEnoughRuns,
-                        report.runs);
+    text += fmt::format("**Fewer than {} runs ({})**: medians and ranges are uncertain.\n",
+                        kEnoughRuns, report.runs);
   }
   if (c.changed) text += "**Built from a tree with changes that were not committed.**\n";
   return text.empty() ? text : text + "\n";
 }
 
+/// The table of machine, system, commit, date, command and runs.
 std::string head_of(const Report& report, const Circumstances& c) {
   constexpr double kGibi = 1 << 30;
   const auto row = [](const char* what, const std::string& fact) {
@@ -33,6 +34,7 @@ std::string head_of(const Report& report, const Circumstances& c) {
              report.runs > 0 ? std::to_string(report.runs) : "1, of counts that do not vary");
 }
 
+/// Each chart as a picture in SVG that links to the PNG.
 std::string links_of(const Report& report) {
   std::string text;
   for (const Figure& figure : report.figures) {

@@ -1,4 +1,5 @@
-// Files of results: one Markdown file for each command, with all that tells what it is worth.
+// Files of results: one Markdown file for each command, with everything that a reader needs to
+// judge the numbers.
 #pragma once
 
 #include <filesystem>
@@ -9,14 +10,16 @@
 
 namespace ptc::bench {
 
-/// Fewer runs than this are stated in the file.
+/// A file says so at its top when there were fewer runs than this.
 inline constexpr unsigned kEnoughRuns = 5;
 
-/// Title, how to read it, what it ran on, tables, notes, and links to the charts.
+/// The Markdown of a report: title, how to read it, reservations, machine and command, tables,
+/// notes, and links to the charts.
 [[nodiscard]] std::string results_text(const Report& report, const Circumstances& circumstances);
 
-/// Writes NAME.md and the charts beside it. Each file is there whole or as it was before.
-/// @throws std::system_error; as write_chart()
+/// Writes NAME.md, and the charts into the same directory. Each file is replaced whole or not at
+/// all.
+/// @throws std::system_error, std::invalid_argument as write_chart()
 void write_results(const std::filesystem::path& directory, const Report& report,
                    const Circumstances& circumstances);
 

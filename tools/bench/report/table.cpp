@@ -1,3 +1,10 @@
+// From cells to four kinds of text. People see a part for each value of the grouping column, and no
+// column that is empty in that part; programs see everything:
+//
+//   scene  method  s            ### fractal           ### city
+//   fractal  a     1            | method | s |        | method | s |
+//   fractal  b     2     ->     | a      | 1 |        | a      | 3 |
+//   city     a     3            | b      | 2 |
 #include "tools/bench/report/table.h"
 
 #include <algorithm>
@@ -12,6 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// One function for each alternative of a variant.
 template <class... Cases>
 struct Overloaded : Cases... {
   using Cases::operator()...;
@@ -33,14 +41,14 @@ Json json_of(const Value& value) {
                     value);
 }
 
-/// Whether a column has runs: then each of its cells is three members.
+/// Whether a column holds spreads: then each of its cells takes three members.
 bool has_runs(const Table& table, std::size_t column) {
   return std::ranges::any_of(table.rows, [&](const std::vector<Value>& row) {
     return std::holds_alternative<Spread>(row[column]);
   });
 }
 
-/// "12,345,678"
+/// A count with its digits in groups of three: "12,345,678".
 std::string grouped(std::uint64_t count) {
   std::string digits = std::to_string(count);
   for (std::size_t at = digits.size(); at > 3;) digits.insert(at -= 3, ",");
@@ -70,7 +78,7 @@ std::string text_of(const Value& value, const Shown& shown) {
                     value);
 }
 
-/// A part of a table as people see it.
+/// The part of a table that belongs to one value of the grouping column, as people see it.
 struct Part {
   std::string title;
   std::vector<std::string> headings;
@@ -83,7 +91,7 @@ std::string title_of(const Table& table, const std::string& group) {
   return table.caption.title + ": " + group;
 }
 
-/// Columns that have a heading and, in one of these rows, a value.
+/// Makes a part of the columns that have a heading and a value in at least one of these rows.
 Part part_of(const Table& table, const std::vector<const std::vector<Value>*>& rows,
              const std::string& group) {
   Part part{.title = title_of(table, group),
@@ -103,7 +111,7 @@ Part part_of(const Table& table, const std::vector<const std::vector<Value>*>& r
   return part;
 }
 
-/// One part for each value of the column that groups, in the order in which they first come.
+/// Makes one part for each value of the grouping column, in the order of first appearance.
 std::vector<Part> parts_of(const Table& table) {
   const auto key = std::ranges::find(table.headings, table.caption.group, &Table::Heading::key);
   const auto column = static_cast<std::size_t>(key - table.headings.begin());
@@ -123,13 +131,13 @@ std::vector<Part> parts_of(const Table& table) {
   return parts;
 }
 
-/// Letters, where text is UTF-8.
+/// The number of characters of a UTF-8 text.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(std::ranges::count_if(
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
 }
 
-/// A cell of a CSV file: nothing for null, words in quotes.
+/// A cell of a CSV file: empty for null, words in quotes.
 std::string csv_cell(const Json& value) {
   if (value.is_null()) return {};
   if (!value.is_string()) return value.dump();
@@ -139,7 +147,7 @@ std::string csv_cell(const Json& value) {
   return cell + '"';
 }
 
-/// A cell of Markdown must not end early.
+/// A cell of Markdown, with its vertical bars escaped so that it does not end early.
 std::string markdown_cell(const std::string& text) {
   std::string cell;
   for (const char c : text) cell += c == '|' ? std::string("\\|") : std::string(1, c);
@@ -188,6 +196,7 @@ std::string text_of(const Table& table) {
   for (const Part& part : parts_of(table)) {
     if (!text.empty()) text += "\n";
     if (!part.title.empty()) text += part.title + "\n";
+    // Measure the columns
     std::vector<std::vector<std::string>> lines{part.headings};
     lines.insert(lines.end(), part.rows.begin(), part.rows.end());
     std::vector<std::size_t> widths(part.headings.size());
@@ -195,6 +204,7 @@ std::string text_of(const Table& table) {
       for (std::size_t i = 0; i < line.size(); ++i)
         widths[i] = std::max(widths[i], width_of(line[i]));
     }
+    // Pad the cells, words on the right and numbers on the left
     for (const auto& line : lines) {
       std::string words;
       for (std::size_t i = 0; i < line.size(); ++i) {

@@ -1,3 +1,17 @@
+// From the name of a scene to what is measured:
+//
+//   name -> build request -> container -> surfels, mesh    what rays are traced against
+//                                |   `--> points           every n-th block of neighbouring points
+//                                `------> camera           what the pixels of a picture see:
+//
+//   +---------------------------+
+//   | picture                   |   width x height
+//   |   +-------------------+   |
+//   |   | shaded: receivers |   |   shaded_width x shaded_height
+//   |   |   +-----------+   |   |
+//   |   |   |  window   |   |   |   window_width x window_height, compared as a picture (FLIP)
+//   |   |   +-----------+   |   |
+//   +---------------------------+
 #include "tools/bench/scenes/bench_scene.h"
 
 #include <algorithm>
@@ -25,7 +39,7 @@ namespace {
 
 constexpr std::uint64_t kMaxSurfels = 250'000'000;
 
-/// A name that charts, tables and file systems take.
+/// The file's name without its ending, in characters that charts, tables and file systems accept.
 std::string plain_name(const std::filesystem::path& file) {
   const std::string whole = file.filename().string();
   std::string name = whole.substr(0, whole.find('.', 1));
@@ -39,7 +53,7 @@ std::string plain_name(const std::filesystem::path& file) {
 
 using Hits = std::vector<std::optional<PrimaryHit>>;
 
-/// Receivers where pixels see something, and the window in their middle.
+/// A receiver for each pixel that sees something, and the window in the middle of the pixels.
 ReceiverSet camera_set(const Hits& hits, unsigned width, unsigned height,
                        const SceneOptions& options) {
   ReceiverSet set{.name = "camera",
@@ -48,6 +62,8 @@ ReceiverSet camera_set(const Hits& hits, unsigned width, unsigned height,
   const unsigned left = (width - set.window_width) / 2, top = (height - set.window_height) / 2;
   for (unsigned y = 0; y < height; ++y) {
     for (unsigned x = 0; x < width; ++x) {
+      // `left` and `top` are unsigned: in front of the window the differences wrap to large
+      // numbers.
       const auto& hit = hits[std::size_t{y} * width + x];
       const bool inside = x - left < set.window_width && y - top < set.window_height;
       if (inside) set.window.push_back({.receiver = ReceiverSet::kNone});
@@ -73,10 +89,13 @@ SceneChoice parse_scene(const std::string& text) {
     rest.resize(rest.size() - kBackdrop.size());
     choice.backdrop = true;
   }
-  if (rest.empty()) throw RequestError("scenes", "'" + text + "': a scene without a name");
+  if (rest.empty())
+    throw RequestError("scenes",
+                       "'" + text + "': names no scene. Give fractal, window, city or a file");
   choice.name = rest;
   if (rest == "fractal" || rest == "window" || rest == "city") {
-    if (choice.backdrop) throw RequestError("scenes", text + ": a backdrop is for files of meshes");
+    if (choice.backdrop)
+      throw RequestError("scenes", text + ": only the file of a mesh can stand before a backdrop");
     return choice;
   }
   choice.file = rest;
@@ -122,15 +141,17 @@ SceneRequest request_scene(const SceneChoice& choice, const SceneOptions& option
 LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
                      const std::filesystem::path& target, const RunOptions& run,
                      Progress& progress) {
+  // Read or make the mesh
   auto [request, lit] = request_scene(choice, options, run);
   std::vector<MeshCamera> cameras;
   const bool procedural = request.mesh != nullptr;
   if (!choice.file.empty()) {
-    Progress silent;  // the build reads the file once more and notes what is left out
+    Progress silent;  // the build reads the file again and reports what it leaves out
     lit.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, silent, &cameras);
   } else if (!procedural && options.rays) {
     lit.mesh = city_mesh(options.points);
   }
+  // Build the container, and take light and camera from it
   build_container(request, target, progress);
   const ContainerReader container(target);
   lit.lights = recorded_lights(container, progress);
@@ -161,6 +182,7 @@ double BenchScene::spacing() const {
 
 void BenchScene::add_camera(const SceneOptions& options, const Executor& executor,
                             Progress& progress) {
+  // Prepare the view: triangles where there is a mesh, else surfels
   const Camera& camera = lit_.camera;
   std::optional<RayScene> rays;
   std::optional<DirectLight> light;
@@ -174,6 +196,7 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
     view = view_mesh(*rays, *light, {.sun_rays = 1, .area_rays = 4, .sky_rays = 0}, camera, 1,
                      options.lift * radius);
   }
+  // Trace the pixels in the picture's middle
   const unsigned width = std::min(options.shaded_width, camera.width);
   const unsigned height = std::min(options.shaded_height, camera.height);
   const unsigned left = (camera.width - width) / 2, top = (camera.height - height) / 2;
@@ -185,7 +208,8 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
   sets_.push_back(camera_set(hits, width, height, options));
 }
 
-/// Whole blocks of neighbours, evenly spread: what shading all points meets.
+/// Adds whole blocks of neighbouring points, evenly spread over the scene: the locality is that of
+/// shading all points.
 void BenchScene::add_points(const SceneOptions& options) {
   ReceiverSet set{.name = "points"};
   const std::uint64_t points = container_->superblock().points;
@@ -197,7 +221,7 @@ void BenchScene::add_points(const SceneOptions& options) {
   std::size_t taken = 0;
   for (std::size_t at = 0; const std::size_t count = all.next(block); ++at) {
     if (taken == wanted) break;
-    if (blocks > 0 && at != blocks * taken / wanted) continue;
+    if (blocks > 0 && at != blocks * taken / wanted) continue;  // not the next evenly spread block
     ++taken;
     for (std::size_t i = 0; i < count; ++i) {
       set.receivers.push_back(lifted(to_surfel(block[i], container_->header().frame), options.lift,

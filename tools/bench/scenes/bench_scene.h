@@ -1,4 +1,5 @@
-// A scene that is measured: its container, what rays need of it, and who receives light.
+// A scene that is measured: its container, the surfels and the mesh that rays need, and the sets of
+// receivers that are shaded.
 #pragma once
 
 #include <cstdint>
@@ -16,69 +17,82 @@
 
 namespace ptc::bench {
 
-/// Which scene: "fractal", "window", "city", or a mesh's or cloud's file.
+/// The choice of a scene: one of the words "fractal", "window" and "city", or the file of a mesh or
+/// a cloud.
 struct SceneChoice {
-  std::string name;  ///< in charts and their files: the word, or the file's name without ending
-  std::filesystem::path file;  ///< empty for the words
+  std::string name;  ///< name in charts and files: the word, or the file's name without ending
+  std::filesystem::path file;  ///< empty where the scene is a word
   bool backdrop = false;       ///< the mesh stands on a ground before a wall
-  unsigned layers = 0;         ///< of make_layers(), instead of a word or a file
+  unsigned layers = 0;         ///< above 0: make_layers() of this many sheets
 };
-/// @param text  a word, or a path with "+backdrop" appended where wanted
-/// @throws RequestError when a word has a backdrop, or there is neither word nor path
+
+/// Parses the choice of one scene.
+/// @param text  a word, or a path, to which "+backdrop" may be appended
+/// @throws RequestError when a word has a backdrop, or the text names no scene
 [[nodiscard]] SceneChoice parse_scene(const std::string& text);
-/// Likewise; where names are equal the later ones end in "-2", "-3" and so on.
+/// Parses the choices of several scenes. Where names are equal, the later ones end in "-2", "-3"
+/// and so on.
+/// @throws RequestError as parse_scene()
 [[nodiscard]] std::vector<SceneChoice> parse_scenes(const std::vector<std::string>& texts);
 
-/// What a pixel of the camera's picture shows besides the light that is gathered.
+/// What a pixel of the camera's picture shows in addition to the light that is gathered.
 struct Pixel {
-  std::size_t receiver = 0;
-  glm::vec3 albedo{0};
-  glm::vec3 direct{0};
+  std::size_t receiver = 0;  ///< index into ReceiverSet::receivers, or ReceiverSet::kNone
+  glm::vec3 albedo{0};       ///< share of the arriving light that the surface reflects, 0 to 1
+  glm::vec3 direct{0};       ///< emission, and reflected light of suns and lamps
 };
 
-/// Receivers of one kind.
+/// The receivers of one kind: what the pixels of a picture see, or points of the scene itself.
 struct ReceiverSet {
   std::string name;  ///< "camera" or "points"
   std::vector<Receiver> receivers;
-  /// Of the camera: a window in the middle of those pixels, row by row; receiver is kNone where
-  /// nothing is seen.
+  /// The Pixel::receiver of a pixel that sees nothing.
   static constexpr std::size_t kNone = ~std::size_t{0};
+  /// The pixels of a window in the middle of the camera's picture, row by row from the top; empty
+  /// for "points".
   std::vector<Pixel> window;
-  unsigned window_width = 0, window_height = 0;
+  unsigned window_width = 0, window_height = 0;  ///< pixels
 };
 
+/// How large a scene is, and which receivers it has. Lengths of pictures are pixels.
 struct SceneOptions {
-  std::uint64_t points = 2'000'000;    ///< surfels wanted; clouds have as many as they have
-  unsigned width = 640, height = 360;  ///< of the camera's picture
+  std::uint64_t points = 2'000'000;    ///< surfels wanted of a mesh or the city; clouds stay whole
+  unsigned width = 640, height = 360;  ///< pixels of the camera's picture
   unsigned shaded_width = 640,
-           shaded_height = 360;  ///< in its middle, whose pixels are receivers; 0: none
-  unsigned window_width = 128, window_height = 72;  ///< in the middle of that, to compare pictures
-  std::uint64_t own_points = 100'000;               ///< of the scene's points as receivers, in runs
-  float lift = 0.15F;                               ///< as ShadeRequest::lift
-  bool rays = true;                    ///< surfels and mesh are loaded, which rays need
-  Profile profile = Profile::compact;  ///< of the container
-  int levels_per_stream = 1;           ///< as BuildOptions::levels_per_stream
-  std::uint8_t page_shift = 16;        ///< as BuildRequest::page_shift
+           shaded_height = 360;  ///< part in the picture's middle that is shaded; 0: none
+  unsigned window_width = 128, window_height = 72;  ///< part in its middle for FLIP
+  std::uint64_t own_points = 100'000;  ///< receivers among the scene's points, in blocks
+  float lift = 0.15F;                  ///< value of ShadeRequest::lift
+  bool rays = true;                    ///< load the surfels and the mesh, which rays need
+  Profile profile = Profile::compact;  ///< profile of the container
+  int levels_per_stream = 1;           ///< value of BuildOptions::levels_per_stream
+  std::uint8_t page_shift = 16;        ///< value of BuildRequest::page_shift
 };
 
-/// What build_container() is asked for, and what belongs to a procedural scene.
+/// The request for build_container(), together with what belongs to a procedural scene.
 struct SceneRequest {
   BuildRequest build;
-  LitScene lit;  ///< mesh, light and camera of a procedural scene but the city; else empty
+  LitScene lit;  ///< mesh, light and camera; empty for the city and files
 };
+
+/// Translates a choice of scene into the request for its build.
 [[nodiscard]] SceneRequest request_scene(const SceneChoice& choice, const SceneOptions& options,
                                          const RunOptions& run);
 
 /// Builds a scene's container.
-/// @return  its mesh (empty for a cloud), the light and the camera that belong to it
+/// @param target  path of the container
+/// @return  the scene's mesh (empty for a cloud) with the light and the camera that belong to it
 /// @throws DataError, RequestError, std::system_error as build_container()
 [[nodiscard]] LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
                                    const std::filesystem::path& target, const RunOptions& run,
                                    Progress& progress);
 
-/// Builds the container, loads what rays need, finds the receivers.
+/// A scene with its container, its surfels, its mesh and its receivers, ready to be measured.
+///
+/// Memory: the surfels and the mesh whole, where SceneOptions::rays asks for them.
 class BenchScene {
  public:
+  /// Builds the container, loads what rays need and finds the receivers.
   /// @param work  a directory with room for the container, which has no name there once it is open
   /// @throws DataError, RequestError, std::system_error as build_container()
   BenchScene(const SceneChoice& choice, const SceneOptions& options,
@@ -86,11 +100,14 @@ class BenchScene {
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const ContainerReader& container() const noexcept { return *container_; }
+  /// The surfels in the container's order; empty without SceneOptions::rays.
   [[nodiscard]] const std::vector<Surfel>& surfels() const noexcept { return surfels_; }
-  /// Empty for a cloud.
+  /// The mesh that was sampled; empty for a cloud.
   [[nodiscard]] const Mesh& mesh() const noexcept { return lit_.mesh; }
   [[nodiscard]] const LightRig& lights() const noexcept { return lit_.lights; }
+  /// Distance between neighbouring surfels, scene units.
   [[nodiscard]] double spacing() const;
+  /// The receivers of the camera, where they are asked for, and then those of the scene's points.
   [[nodiscard]] const std::vector<ReceiverSet>& sets() const noexcept { return sets_; }
 
  private:

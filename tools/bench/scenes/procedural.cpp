@@ -1,3 +1,21 @@
+// Three meshes that are made from formulas and fixed seeds, so that they are equal on every
+// machine.
+//
+// fractal: octaves of value noise, each twice as fine and half as high as the one before, give the
+// height of a terrain and the displacement of the balls on it. A third of the triangles are balls.
+//
+// window: a room of boxes, which share no vertices. From above, x to the right and z downwards:
+//
+//                white
+//         +---------------------+
+//         |     +-------+       |
+//     red |     | table |       :  window, with sun, sky and ground beyond
+//         |     +-------+  ball :
+//         | cupboard            |
+//         +---------------------+
+//                green
+//
+// layers: sheets of tiles over the ground, half of the tiles missing at random.
 #include "tools/bench/scenes/procedural.h"
 
 #include <algorithm>
@@ -12,7 +30,8 @@
 namespace ptc::bench {
 namespace {
 
-/// A smooth random field: values at the corners of a lattice, blended (Perlin 1985, value noise).
+/// A smooth random field in [-1, 1]: values at the corners of a lattice, blended between them
+/// (Perlin 1985, value noise).
 float value_noise(const glm::vec3& p, std::uint64_t seed) {
   const glm::vec3 low(std::floor(p.x), std::floor(p.y), std::floor(p.z));
   const glm::vec3 t = p - low;
@@ -32,7 +51,7 @@ float value_noise(const glm::vec3& p, std::uint64_t seed) {
   return 2 * sum - 1;
 }
 
-/// Octaves of noise, each twice as fine and half as high.
+/// The sum of octaves of noise, each twice as fine and half as high as the one before.
 float fractal_noise(glm::vec3 p, int octaves, std::uint64_t seed) {
   float sum = 0, height = 1;
   for (int i = 0; i < octaves; ++i) {
@@ -49,12 +68,13 @@ void add_triangle(Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c,
   mesh.material_of.push_back(material);
 }
 
-constexpr float kWidth = 100;
+constexpr float kWidth = 100;  // of the terrain, units
 
 float terrain_height(float x, float z) {
   return 6 * fractal_noise({x / 14, 0.5F, z / 14}, 8, 1);
 }
 
+/// Adds a square of terrain, two triangles for each quad.
 /// @param side  quads along an edge
 void add_terrain(Mesh& mesh, unsigned side) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
@@ -102,6 +122,8 @@ Ball make_ball(int rounds) {
   return ball;
 }
 
+/// Adds a ball whose surface noise displaces.
+/// @param roughness  height of the noise as a share of the radius; 0: a smooth ball
 void add_ball(Mesh& mesh, const Ball& ball, const glm::vec3& centre, float radius, float roughness,
               std::uint64_t seed, std::uint16_t material) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
@@ -114,7 +136,7 @@ void add_ball(Mesh& mesh, const Ball& ball, const glm::vec3& centre, float radiu
     add_triangle(mesh, first + a, first + b, first + c, material);
 }
 
-/// A box, fronts outwards.
+/// Adds a box of 12 triangles that face outwards.
 void add_box(Mesh& mesh, const glm::vec3& low, const glm::vec3& high, std::uint16_t material) {
   constexpr std::array<std::array<std::uint32_t, 4>, 6> kQuads{
       {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}};
@@ -133,16 +155,18 @@ void add_box(Mesh& mesh, const glm::vec3& low, const glm::vec3& high, std::uint1
 }  // namespace
 
 LitScene make_fractal(std::uint64_t triangles) {
+  // Name the materials
   LitScene scene;
   scene.mesh.materials = {{.name = "terrain", .albedo = {0.55F, 0.5F, 0.4F}},
                           {.name = "moss", .albedo = {0.25F, 0.5F, 0.2F}},
                           {.name = "clay", .albedo = {0.65F, 0.25F, 0.15F}}};
-  // A third of the triangles are balls of 2,048, the rest is terrain.
+  // Divide the triangles: a third for balls of 2,048, the rest for the terrain
   const Ball ball = make_ball(4);
   const std::uint64_t balls = triangles / 3 / ball.triangles.size();
   const std::uint64_t rest = triangles - balls * ball.triangles.size();
   const auto side = static_cast<unsigned>(std::lround(std::sqrt(static_cast<double>(rest) / 2)));
   add_terrain(scene.mesh, std::max(1U, side));
+  // Set the balls on the terrain
   const SquarePoints places(17);
   for (std::uint32_t i = 0; i < balls; ++i) {
     const glm::vec2 at = (places.square(i) - 0.5F) * (0.96F * kWidth);
@@ -151,6 +175,7 @@ LitScene make_fractal(std::uint64_t triangles) {
     add_ball(scene.mesh, ball, {at.x, terrain_height(at.x, at.y) + 0.6F * radius, at.y}, radius,
              0.3F, 100 + i, static_cast<std::uint16_t>(1 + i % 2));
   }
+  // Add the light and the camera
   scene.lights.suns.push_back({.to_sun = glm::normalize(glm::vec3(0.5F, 0.6F, 0.3F))});
   scene.lights.sky.radiance = {0.6F, 0.7F, 0.9F};
   scene.camera = {.position = {38, 16, 44}, .look_at = {4, -2, 6}, .width = 640, .height = 360};
@@ -158,6 +183,7 @@ LitScene make_fractal(std::uint64_t triangles) {
 }
 
 LitScene make_window_room() {
+  // Name the materials
   LitScene scene;
   Mesh& mesh = scene.mesh;
   mesh.materials = {{.name = "white", .albedo = glm::vec3(0.75F)},
@@ -165,6 +191,7 @@ LitScene make_window_room() {
                     {.name = "green", .albedo = {0.12F, 0.5F, 0.12F}},
                     {.name = "wood", .albedo = {0.5F, 0.32F, 0.18F}},
                     {.name = "ground", .albedo = {0.3F, 0.35F, 0.25F}}};
+  // Add the room: floor, ceiling and the three whole walls
   const glm::vec3 size(6, 3, 4);
   constexpr float kWall = 0.25F;
   add_box(mesh, {-kWall, -kWall, -kWall}, {size.x + kWall, 0, size.z + kWall}, 3);  // floor
@@ -173,12 +200,13 @@ LitScene make_window_room() {
   add_box(mesh, {-kWall, 0, -kWall}, {0, size.y, size.z + kWall}, 1);
   add_box(mesh, {0, 0, -kWall}, {size.x, size.y, 0}, 0);
   add_box(mesh, {0, 0, size.z}, {size.x, size.y, size.z + kWall}, 2);
-  // The wall with the window: 1.6 x 1.4 m, 0.9 m above the floor.
+  // Add the wall around the window, which is 1.6 x 1.4 m, 0.9 m above the floor
   const glm::vec3 low(size.x, 0.9F, 1.2F), high(size.x + kWall, 2.3F, 2.8F);
   add_box(mesh, {low.x, 0, 0}, {high.x, low.y, size.z}, 0);
   add_box(mesh, {low.x, high.y, 0}, {high.x, size.y, size.z}, 0);
   add_box(mesh, {low.x, low.y, 0}, {high.x, high.y, low.z}, 0);
   add_box(mesh, {low.x, low.y, high.z}, {high.x, high.y, size.z}, 0);
+  // Add the furniture, and the ground outside
   add_box(mesh, {1.2F, 0.68F, 1.1F}, {3.0F, 0.74F, 2.1F}, 3);  // table
   for (int leg = 0; leg < 4; ++leg) {
     const glm::vec3 at(leg % 2 == 0 ? 1.25F : 2.89F, 0, leg / 2 == 0 ? 1.15F : 1.99F);
@@ -187,7 +215,8 @@ LitScene make_window_room() {
   add_box(mesh, {0.02F, 0, 2.9F}, {0.6F, 2.1F, 3.9F}, 3);  // cupboard
   add_ball(mesh, make_ball(5), {3.9F, 0.45F, 2.7F}, 0.45F, 0, 0, 0);
   add_ball(mesh, make_ball(4), {2.0F, 0.92F, 1.6F}, 0.18F, 0.3F, 5, 2);
-  add_box(mesh, {size.x + kWall, -kWall, -4}, {size.x + 9, -kWall / 2, 8}, 4);  // what lies outside
+  add_box(mesh, {size.x + kWall, -kWall, -4}, {size.x + 9, -kWall / 2, 8}, 4);  // ground outside
+  // Add the light and the camera
   scene.lights.suns.push_back(
       {.to_sun = glm::normalize(glm::vec3(0.75F, 0.6F, 0.12F)), .irradiance = glm::vec3(30)});
   scene.lights.sky.radiance = {2.0F, 2.4F, 3.0F};
@@ -206,6 +235,7 @@ LitScene make_layers(unsigned layers) {
   mesh.materials = {{.name = "ground", .albedo = glm::vec3(0.6F)},
                     {.name = "red", .albedo = {0.6F, 0.2F, 0.15F}},
                     {.name = "blue", .albedo = {0.2F, 0.3F, 0.6F}}};
+  // A square tile in the plane y = low.y that faces up or down
   const auto add_tile = [&mesh](const glm::vec3& low, float width, bool up,
                                 std::uint16_t material) {
     const auto a = static_cast<std::uint32_t>(mesh.positions.size());
@@ -215,6 +245,7 @@ LitScene make_layers(unsigned layers) {
     add_triangle(mesh, a, up ? a + 1 : a + 2, up ? a + 2 : a + 1, material);
     add_triangle(mesh, a, up ? a + 2 : a + 3, up ? a + 3 : a + 2, material);
   };
+  // Lay the ground, and the sheets over it
   add_tile({0, 0, 0}, kTiles, true, 0);
   for (unsigned layer = 1; layer <= layers; ++layer) {
     for (int tile = 0; tile < kTiles * kTiles; ++tile) {
@@ -226,6 +257,7 @@ LitScene make_layers(unsigned layers) {
       add_tile(at, 1, (bits & 2) != 0, (bits & 4) != 0 ? 1 : 2);
     }
   }
+  // Add the light and the camera
   scene.lights.suns.push_back({.to_sun = glm::normalize(glm::vec3(0.5F, 0.6F, 0.3F))});
   scene.lights.sky.radiance = {0.6F, 0.7F, 0.9F};
   scene.camera = {.position = {50, 30, 55}, .look_at = {16, 2, 16}, .width = 640, .height = 360};

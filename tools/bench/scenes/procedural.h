@@ -1,4 +1,4 @@
-// Scenes that need no file: what ptcbench measures beside real ones.
+// Scenes that need no file: ptcbench measures them in addition to those that are read from files.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,24 @@ struct LitScene {
   Camera camera;
 };
 
-/// Rough terrain under displaced balls: no wall is flat, every triangle is about as small as the
-/// next. +y up, 100 units wide.
-/// @param triangles  from 1000 on, as many come within 10 %
+/// Makes rough terrain under displaced balls: nothing is flat, and all triangles are of about one
+/// size. +y is up, and the terrain is 100 units wide.
+/// @param triangles  wanted; from 1000 on, the mesh has this many within 10 %
 [[nodiscard]] LitScene make_fractal(std::uint64_t triangles);
 
-/// A room of 6 x 3 x 4 m with thick walls, one red and one green, a table, a cupboard and a ball,
-/// lit through one window by sun and sky: most of its light has met a surface.
+/// Makes a room of 6 x 3 x 4 m with thick walls, one red and one green, a table, a cupboard and two
+/// balls, lit through one window by sun and sky: most of the light in it has met a surface before.
+/// +y is up, and the unit is a metre.
 [[nodiscard]] LitScene make_window_room();
 
-/// Ground under sheets of tiles, half of them missing at random, one tile's width above each other:
-/// what lies behind a surface grows with their number. +y up, 32 tiles wide.
+/// Makes ground under sheets of tiles. Half of the tiles are missing at random, so the number of
+/// surfaces behind a surface grows with the number of sheets (depth complexity):
+///
+///   sheet 2   ==  ====    ==  ==    sheets are one tile's width apart; +y is up
+///   sheet 1   ====  ==  ====
+///   ground    ==================    32 tiles wide, each of 1 x 1 unit
+///
+/// @param layers  sheets above the ground
 [[nodiscard]] LitScene make_layers(unsigned layers);
 
 }  // namespace ptc::bench

@@ -1,3 +1,9 @@
+// A file is cut into blocks of RecordFile::kBlock records, and kTransfers buffers take the blocks
+// in turn. Reader and writer both stay ahead of the caller:
+//
+//   blocks of the file   | 0 | 1 | 2 | 3 | 4 | 5 | ...      block b is in buffer b mod kTransfers
+//   RecordWriter          written by threads   ^ filled by the caller
+//   RecordReader           ^ used by the caller  2, 3, 4 read by threads
 #include "tools/bench/scenes/record_file.h"
 
 #include <algorithm>
@@ -53,7 +59,7 @@ RecordWriter::RecordWriter(RecordFile& file) : file_(file), buffers_(kTransfers 
 void RecordWriter::write(std::span<const PointRecord> records) {
   while (!records.empty()) {
     const std::size_t slot = next_ % writing_.size();
-    if (filled_ == 0 && writing_[slot].valid()) writing_[slot].get();
+    if (filled_ == 0 && writing_[slot].valid()) writing_[slot].get();  // its buffer is free again
     const std::size_t count = std::min(records.size(), RecordFile::kBlock - filled_);
     std::ranges::copy(
         records.first(count),
@@ -101,7 +107,7 @@ void RecordReader::read_ahead() {
 }
 
 std::span<const PointRecord> RecordReader::next() {
-  if (next_ > 0) read_ahead();  // where the block was that the caller has no more use for
+  if (next_ > 0) read_ahead();  // into the buffer of the block that the caller has finished
   if (next_ == blocks_of(file_)) return {};
   const std::uint64_t block = next_++;
   const std::size_t slot = block % reading_.size();

@@ -1,4 +1,5 @@
-// Point records on the disk, read and written from end to end past the page cache.
+// Point records on the disk, read and written from end to end past the system's page cache. They
+// are the input of the sorts and builds that are measured, and give the time of the disk alone.
 #pragma once
 
 #include <array>
@@ -18,74 +19,80 @@
 
 namespace ptc::bench {
 
-/// A file without a name, gone with its object.
+/// A file of point records. It has no name and is gone with its object.
 class RecordFile {
  public:
+  /// Creates an empty file in a directory. @throws std::system_error
   explicit RecordFile(const std::filesystem::path& directory)
       : file_(std::make_unique<DirectFile>(directory)) {}
 
-  /// Records that are transferred at once: whole blocks of the disk.
+  /// The number of records that one transfer moves: whole blocks of the disk, about 4 MB.
   static constexpr std::size_t kBlock = 200 * kPageRecords;
   static_assert(kBlock * sizeof(PointRecord) % kDirectBytes == 0);
 
   [[nodiscard]] std::uint64_t records() const noexcept { return records_; }
   [[nodiscard]] std::uint64_t bytes() const noexcept { return records_ * sizeof(PointRecord); }
-  /// Writes so many records of noise from the file's beginning.
+  /// Fills the file with this many records of random bits.
   void fill(std::uint64_t records);
-  /// Reads all and writes as many bytes again to another file, or in its own place, which then
-  /// holds no more.
-  /// @param most  bytes to write when that is less; the other file's records are those that are
-  /// whole in them
+  /// Reads this file whole and writes its bytes to another file, which holds nothing else then. The
+  /// other file may be this one.
+  /// @param most  bytes to write at most; a record that they hold only in part does not count as
+  ///              one of the other file's
   void copy_to(RecordFile& other, std::uint64_t most = ~std::uint64_t{0}) const;
 
  private:
   friend class RecordWriter;
   friend class RecordReader;
-  [[nodiscard]] std::size_t block_bytes(
-      std::uint64_t block) const noexcept;  ///< rounded up to the disk's blocks
+  /// Bytes that a transfer of block `block` moves, rounded up to the disk's blocks.
+  [[nodiscard]] std::size_t block_bytes(std::uint64_t block) const noexcept;
 
   std::unique_ptr<DirectFile> file_;
   std::uint64_t records_ = 0;
 };
 
-/// Appends to a file, blocks being written while the next is filled.
+/// Appends records to a file. Up to kTransfers blocks are written while the next is filled.
 class RecordWriter {
  public:
   explicit RecordWriter(RecordFile& file);
+  /// Appends records. @throws std::system_error of this write or an earlier one
   void write(std::span<const PointRecord> records);
-  /// Writes what is left. Without it the file's end is missing.
+  /// Writes the last, partly filled block, and waits for all writes. Without this call the file's
+  /// end is missing. @throws std::system_error
   void finish();
 
  private:
   void flush();
   RecordFile& file_;
   Arena buffers_;
-  std::size_t filled_ = 0;  ///< records of the block that is next
-  std::uint64_t next_ = 0;  ///< block
+  std::size_t filled_ = 0;  ///< records in the block that is written next
+  std::uint64_t next_ = 0;  ///< block that is written next
   std::array<std::future<void>, kTransfers> writing_;
 };
 
-/// Reads a file in order, the next blocks while one is in use.
+/// Reads a file in order. The next blocks are read while the caller uses one.
 class RecordReader {
  public:
   explicit RecordReader(const RecordFile& file);
   ~RecordReader();
-  /// Up to kBlock records, valid until the next call; none at the end.
+  /// Returns the next records, at most RecordFile::kBlock; none at the end. They are valid until
+  /// the next call. @throws std::system_error
   [[nodiscard]] std::span<const PointRecord> next();
 
  private:
   void read_ahead();
   const RecordFile& file_;
   Arena buffers_;
-  std::uint64_t next_ = 0, ahead_ = 0;  ///< blocks: to be handed out, to be read
+  std::uint64_t next_ = 0, ahead_ = 0;  ///< blocks: handed out next, read next
   std::array<std::future<void>, kTransfers> reading_;
 };
 
-/// Keys spread evenly over a file, as a build takes them of its input.
+/// Returns keys at even steps through a file, at most 100,000, as a build samples its input.
 [[nodiscard]] std::vector<MortonKey> sample_of(const RecordFile& input);
 
-/// The procedural city in blocks of up to 4,096 records, in the order of its blocks of houses.
-/// @return the frame of their keys
+/// Makes the procedural city and hands it to `sink`, at most 4,096 records at once, block of houses
+/// by block of houses.
+/// @param points  wanted of the city, as make_city() takes them
+/// @return the frame of the records' keys
 Frame for_each_city_record(std::uint64_t points,
                            const std::function<void(std::span<const PointRecord>)>& sink);
 
