@@ -1,4 +1,7 @@
-// The pinhole's geometry and its JSON record.
+// The geometry of the pinhole and its JSON record.
+//
+// The picture plane is put at distance 1 from the position. There the picture is
+// 2 tan(vertical_fov / 2) high, so that one pixel measures 2 half_height() / height both ways.
 #include "engine/scene/camera.h"
 
 #include <cmath>
@@ -22,6 +25,7 @@ bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+// Half the height of the picture on a plane at distance 1.
 double half_height(const Camera& camera) {
   return std::tan(0.5 * static_cast<double>(camera.vertical_fov));
 }
@@ -33,6 +37,7 @@ CameraAxes axes_of(const Camera& camera) {
   const double distance = glm::length(view);
   const glm::dvec3 forward = distance > 0 ? view / distance : glm::dvec3(0, 0, -1);
   glm::dvec3 right = glm::cross(forward, glm::dvec3(camera.up));
+  // Negated, so that an `up` with a NaN in it is replaced as one along the view is.
   if (!(glm::length(right) > 1e-6 * glm::length(glm::dvec3(camera.up)))) {
     right =
         glm::cross(forward, std::abs(forward.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, -1));

@@ -28,6 +28,7 @@ const Json* JsonFields::find(const char* name) {
 double JsonFields::number(const Json& value, const char* name, const Range& range) const {
   if (!value.is_number()) fail(std::string(name) + " must be a number");
   const double number = value.get<double>();
+  // Negated, so that no NaN passes.
   if (!(number >= range.low && number <= range.high)) {
     fail(std::string(name) + " must lie in [" + Json(range.low).dump() + ", " +
          Json(range.high).dump() + "]");
@@ -80,7 +81,7 @@ Json parse_json(const std::string& text, const std::string& where) {
   try {
     return Json::parse(text);
   } catch (const Json::exception& error) {
-    throw DataError(where + ": not JSON: " + error.what());
+    throw DataError(where + " is not JSON: " + error.what());
   }
 }
 

@@ -1,4 +1,9 @@
-// A receiver's hemisphere, ray by ray.
+// Monte Carlo over the hemisphere of a receiver.
+//
+// Cosine rays have the density cos / pi, so the irradiance, the integral of L cos over the
+// hemisphere, is pi times the mean radiance that the rays see, and the occlusion is the share of
+// rays that hit. Each hit needs the irradiance at its own place: shadow rays give the direct part,
+// and one more cosine ray, followed recursively, gives the part that comes over further bounces.
 #include "engine/scene/mesh_reference.h"
 
 #include <cmath>
@@ -18,7 +23,7 @@ bool is_double_sided(const Mesh& mesh, std::uint32_t triangle) {
   return mesh.materials[mesh.material_of[triangle]].double_sided;
 }
 
-// The surface that a cosine ray from a hit meets.
+// Traces one cosine ray from a hit and returns the surface that it meets.
 std::optional<SurfaceHit> follow(const RayScene& scene, const SurfaceHit& hit,
                                  const glm::vec3& normal, std::uint64_t seed) {
   const std::optional<glm::dvec3> origin = step_off(scene, hit.position, normal);
@@ -28,14 +33,18 @@ std::optional<SurfaceHit> follow(const RayScene& scene, const SurfaceHit& hit,
   return scene.closest(*origin, direction, 0, std::numeric_limits<double>::infinity());
 }
 
-// Radiance that leaves a hit towards where the ray came from.
+// Returns the radiance that leaves a hit towards the ray's origin.
+// @param emits  whether the emission of the hit's own surface counts
 glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const SurfaceHit& hit,
                       const LightPaths& paths, bool emits, std::uint64_t seed) {
   if (!hit.front && !is_double_sided(scene.mesh(), hit.triangle)) return glm::vec3(0);
+  // Reflect the direct light, and add the emission.
   const glm::vec3 normal = hit.front ? hit.normal : -hit.normal;
   const DirectLight::Result direct = light.irradiance(hit.position, normal, paths.sampling, seed);
   glm::vec3 radiance = hit.albedo / kPi * (direct.local + direct.sky);
   if (hit.front && emits) radiance += hit.emission;
+  // Reflect the light of further bounces along one ray. The factor of a cosine ray is the albedo:
+  // albedo / pi times cos over the density cos / pi.
   if (paths.bounces <= 1) return radiance;
   const std::uint64_t next_seed = splitmix64(seed);
   if (const auto next = follow(scene, hit, normal, next_seed)) {
@@ -51,6 +60,7 @@ glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const Sur
 RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm::dvec3& position,
                      const glm::vec3& normal, unsigned rays, const LightPaths& paths,
                      std::uint64_t seed) {
+  // Find where the rays begin.
   RayTraced result;
   const glm::vec3 unit = glm::normalize(normal);
   if (rays == 0 || !std::isfinite(unit.x + unit.y + unit.z)) return result;
@@ -59,6 +69,7 @@ RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm:
     result.occlusion = 1;
     return result;
   }
+  // Trace the rays and sum what they see.
   const Basis frame(unit);
   const SquarePoints points(seed);
   unsigned hits = 0;
@@ -73,6 +84,7 @@ RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm:
       result.sky += light.rig().sky.at(direction);
     }
   }
+  // Turn the sums into means over the hemisphere.
   const auto count = static_cast<float>(rays);
   result.occlusion = static_cast<float>(hits) / count;
   result.irradiance *= kPi / count;

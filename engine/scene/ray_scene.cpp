@@ -1,4 +1,17 @@
-// Embree's device and scene behind two queries, and the surface at a hit.
+// Embree's device and scene behind two queries, and the surface data at a hit.
+//
+// Embree computes in float, which has 24 bits: a scene far from zero, or a ray that begins far
+// outside, would lose the mesh in rounding. So every ray goes through three frames, all parallel:
+//
+//     world (double)  --- minus Mesh::origin, minus middle --->  local (double)
+//     local (double)  --- step to the box around the mesh  --->  Embree (float)
+//
+//                        +-----------+
+//      o - - - skipped - |--> mesh   |   The first part of the ray is skipped in double, so that
+//                        +-----------+   the float origin lies at the box.
+//
+// A hit comes back as a triangle and two barycentric coordinates, and its position is computed
+// again from the corners in double.
 #include "engine/scene/ray_scene.h"
 
 #include <algorithm>
@@ -21,17 +34,19 @@
 namespace ptc {
 namespace {
 
-// Embree's own limit is 1.8e18, and it does not forgive a ray beyond it.
+// Reports whether Embree can take a vector. Its own limit is 1.8e18, and it does not check that a
+// ray keeps to it. Comparisons with a NaN are false.
 bool is_sane(const glm::vec3& v) {
   constexpr float kMax = 1e18f;
   return std::abs(v.x) <= kMax && std::abs(v.y) <= kMax && std::abs(v.z) <= kMax;
 }
 
+// Throws the error that a device has pending, if any.
 void check_device(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_OUT_OF_MEMORY) {
-    // As operator new does: a program's handler goes first, because Embree may call std::terminate
-    // when it has to release a scene without memory.
+    // Call the program's handler first, as operator new does: Embree may call std::terminate when
+    // it has to release a scene without memory.
     if (const std::new_handler handler = std::get_new_handler()) handler();
     throw std::bad_alloc();
   }
@@ -40,7 +55,7 @@ void check_device(RTCDevice device) {
   }
 }
 
-// Owns what rtcNew... returned.
+// Owns a handle that one of Embree's rtcNew... functions returned; null is allowed.
 template <typename Handle, void (*release)(Handle)>
 class Owned {
  public:
@@ -56,9 +71,9 @@ class Owned {
   Handle handle_;
 };
 
-// Unit vector along v, or the fallback when v has no direction.
+// Returns the unit vector along v, or the fallback when v has no direction.
 glm::dvec3 direction_of(const glm::dvec3& v, const glm::dvec3& fallback) {
-  // Scaled first: the square of a tiny triangle's normal underflows.
+  // Scale first, because the square of a tiny triangle's normal underflows.
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (!(largest > 0) || !std::isfinite(largest)) return fallback;
   return glm::normalize(v / largest);
@@ -87,12 +102,14 @@ RTCRay to_embree(const LocalRay& ray) {
   return out;
 }
 
-// Piece [begin, end] of the line origin + t direction that lies inside a box; empty: begin > end.
+// An interval of t on the line origin + t direction; it is empty when begin > end.
 struct Stretch {
   double begin = -std::numeric_limits<double>::infinity();
   double end = std::numeric_limits<double>::infinity();
 };
 
+// Returns the stretch of a line inside the box of half extents `half` around zero, by clipping the
+// line with the three pairs of planes (Kay and Kajiya 1986).
 Stretch inside_box(const glm::dvec3& origin, const glm::dvec3& direction, const glm::dvec3& half) {
   Stretch s;
   for (int axis = 0; axis < 3; ++axis) {
@@ -116,26 +133,34 @@ void check_mesh(const Mesh& mesh) {
     if (!holds) throw RequestError("mesh", std::string("mesh: ") + what);
   };
   require(mesh.normals.empty() || mesh.normals.size() == vertices,
-          "normals are not one per vertex");
-  require(mesh.uvs.empty() || mesh.uvs.size() == vertices, "uvs are not one per vertex");
-  require(mesh.material_of.size() == mesh.triangles.size(), "materials are not one per triangle");
-  for (const glm::vec3& p : mesh.positions) require(is_sane(p), "a position is beyond 1e18");
+          "the number of normals differs from that of vertices");
+  require(mesh.uvs.empty() || mesh.uvs.size() == vertices,
+          "the number of texture coordinates differs from that of vertices");
+  require(mesh.material_of.size() == mesh.triangles.size(),
+          "the number of material indices differs from that of triangles");
+  for (const glm::vec3& p : mesh.positions)
+    require(is_sane(p), "a position is not finite or beyond 1e18: scale the mesh");
   for (const auto& corners : mesh.triangles) {
-    for (const std::uint32_t corner : corners) require(corner < vertices, "corner out of range");
+    for (const std::uint32_t corner : corners)
+      require(corner < vertices, "a triangle has a vertex index out of range");
   }
   for (const std::uint16_t material : mesh.material_of) {
-    require(material < mesh.materials.size(), "material out of range");
+    require(material < mesh.materials.size(), "a triangle has a material index out of range");
   }
 }
 
 struct RayScene::Impl {
   explicit Impl(const Mesh& source);
 
+  // Finds the middle and the extent of the mesh, and from them the epsilon.
   void measure();
+  // Hands the mesh to Embree and builds its tree.
   void build();
+  // Returns a ray in Embree's frame, or nothing when it cannot meet the mesh.
   [[nodiscard]] std::optional<LocalRay> localise(const glm::dvec3& origin,
                                                  const glm::vec3& direction, double near,
                                                  double far) const;
+  // Returns the interpolated normal, mirrored where it points to the back of the triangle.
   [[nodiscard]] glm::dvec3 shading_normal(const std::array<std::uint32_t, 3>& corners, double u,
                                           double v, const glm::dvec3& geometric) const;
   [[nodiscard]] glm::vec3 albedo(const Material& material,
@@ -143,8 +168,8 @@ struct RayScene::Impl {
                                  float v) const;
 
   const Mesh& mesh;
-  std::atomic<std::int64_t> bytes = 0;  // what Embree holds
-  glm::vec3 middle{0};                  // Embree's zero, in the mesh's frame
+  std::atomic<std::int64_t> bytes = 0;  // that Embree holds, as its monitor reports them
+  glm::vec3 middle{0};                  // the zero of Embree's frame, relative to Mesh::origin
   glm::dvec3 half_extent{0};
   double epsilon = 0;
   Owned<RTCDevice, rtcReleaseDevice> device;
@@ -184,6 +209,7 @@ void RayScene::Impl::measure() {
 }
 
 void RayScene::Impl::build() {
+  // Copy the positions, relative to the middle, and share the triangles.
   const Owned<RTCGeometry, rtcReleaseGeometry> geometry(
       rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
   auto* const positions = static_cast<glm::vec3*>(
@@ -196,7 +222,8 @@ void RayScene::Impl::build() {
                              mesh.triangles.size());
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene, geometry);
-  // Robust: watertight at edges, and what a ray hits does not depend on the shape of the tree.
+  // Build a robust tree: watertight at edges, and what a ray hits does not depend on the shape of
+  // the tree.
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   rtcCommitScene(scene);
   check_device(device);
@@ -207,8 +234,10 @@ void RayScene::Impl::build() {
 std::optional<LocalRay> RayScene::Impl::localise(const glm::dvec3& origin,
                                                  const glm::vec3& direction, double near,
                                                  double far) const {
+  // Move the origin to the middle of the mesh.
   const glm::dvec3 local = (origin - mesh.origin) - glm::dvec3(middle);
   const glm::dvec3 along(direction);
+  // Skip the part of the ray before the box.
   double skipped = 0;
   if (glm::any(glm::greaterThan(glm::abs(local), half_extent + epsilon))) {
     const Stretch inside = inside_box(local, along, half_extent + 2 * epsilon);
@@ -216,6 +245,7 @@ std::optional<LocalRay> RayScene::Impl::localise(const glm::dvec3& origin,
     if (!(inside.begin <= inside.end && inside.end >= near && inside.begin <= far)) return {};
     skipped = std::max(inside.begin, 0.0);
   }
+  // Round to float, and refuse what Embree cannot take.
   const LocalRay ray{glm::vec3(local + along * skipped), direction,
                      static_cast<float>(std::max(near - skipped, 0.0)),
                      static_cast<float>(far - skipped), skipped};
@@ -232,7 +262,7 @@ glm::dvec3 RayScene::Impl::shading_normal(const std::array<std::uint32_t, 3>& co
   const glm::dvec3 normal = direction_of(blended, geometric);
   if (!std::isfinite(glm::dot(normal, geometric))) return geometric;
   const double side = glm::dot(normal, geometric);
-  return side < 0 ? normal - 2 * side * geometric : normal;  // mirrored at the surface
+  return side < 0 ? normal - 2 * side * geometric : normal;  // mirror it at the surface
 }
 
 glm::vec3 RayScene::Impl::albedo(const Material& material,
@@ -289,7 +319,8 @@ bool RayScene::occluded(const glm::dvec3& origin, const glm::vec3& direction, do
 
 SurfaceHit RayScene::surface(std::uint32_t triangle, float u, float v) const {
   const Mesh& mesh = impl_->mesh;
-  if (triangle >= mesh.triangles.size()) throw std::invalid_argument("RayScene: no such triangle");
+  if (triangle >= mesh.triangles.size())
+    throw std::invalid_argument("RayScene: the triangle's index is out of range");
   const auto& corners = mesh.triangles[triangle];
   const glm::dvec3 a(mesh.positions[corners[0]]);
   const glm::dvec3 ab = glm::dvec3(mesh.positions[corners[1]]) - a;

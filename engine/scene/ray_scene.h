@@ -1,4 +1,4 @@
-// The mesh under rays (Embree).
+// The mesh as rays see it: closest hits, shadow tests and surface data, on top of Embree.
 #pragma once
 
 #include <cstdint>
@@ -11,50 +11,66 @@
 
 namespace ptc {
 
-/// @throws RequestError when an index is out of range, an array has the wrong length or a
-///         position is beyond 1e18
+/// Checks that a mesh can be traced: every index and array length fits, and every position is at
+/// most 1e18 from the mesh's origin on each axis.
+/// @throws RequestError when it cannot; the message says why
 void check_mesh(const Mesh& mesh);
 
+/// A point of a mesh's surface and the material there.
 struct SurfaceHit {
-  double distance = 0;
-  std::uint32_t triangle = 0;
-  glm::dvec3 position{0};
+  double distance = 0;            ///< along the ray from its origin, scene units; 0 without a ray
+  std::uint32_t triangle = 0;     ///< index in Mesh::triangles
+  glm::dvec3 position{0};         ///< scene units, Mesh::origin included
   glm::vec3 geometric_normal{0};  ///< unit, of the triangle's front side (counter-clockwise)
-  glm::vec3 normal{0};            ///< unit, interpolated; on the side of the geometric normal
-  glm::vec3 albedo{0};            ///< material at the hit, texture included
-  glm::vec3 emission{0};
-  bool front = true;  ///< the ray met the front side
+  glm::vec3 normal{0};    ///< unit, interpolated; never on the back side of the geometric normal
+  glm::vec3 albedo{0};    ///< reflectance of the material, times its texture there
+  glm::vec3 emission{0};  ///< radiance that the front side emits, W/(m^2 sr)
+  bool front = true;      ///< whether the ray met the front side
 };
 
-/// Closest-hit and any-hit queries on a mesh. Threads: may be called concurrently.
+/// Closest-hit and any-hit queries on a mesh.
 ///
 /// Rays are moved into a frame at the middle of the mesh, in double, before they become float, so
 /// that the precision is that of the mesh's extent wherever the mesh lies and wherever the ray
 /// begins. A ray through a shared edge or vertex never slips through; it hits either triangle.
-/// Memory: bytes(), about 80 a triangle.
+/// Memory: bytes(), about 80 bytes for each triangle. Threads: const members may be called
+/// concurrently.
 class RayScene {
  public:
+  /// Builds Embree's tree over the mesh.
   /// @param mesh  must outlive this and not change
-  /// @throws RequestError as check_mesh()
+  /// @throws RequestError when check_mesh() does; std::bad_alloc; std::runtime_error when Embree
+  ///         reports another error
   explicit RayScene(const Mesh& mesh);
   ~RayScene();
 
+  /// Returns the mesh that the constructor was given.
   [[nodiscard]] const Mesh& mesh() const noexcept;
-  /// What Embree holds: its tree and a copy of the positions.
+  /// Returns the bytes that Embree holds: its tree and a copy of the positions.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
-  /// @param origin     scene units; the hit is beyond `near`
-  /// @param direction  unit; a ray with a NaN in it, or beyond 1e18, misses
+  /// Returns the first surface point on a ray, or nothing when the ray misses.
+  /// @param origin     scene units
+  /// @param direction  unit; a ray that holds a NaN, or a number beyond 1e18, misses
+  /// @param near, far  interval of distances that count, scene units; `far` may be infinite
   [[nodiscard]] std::optional<SurfaceHit> closest(const glm::dvec3& origin,
                                                   const glm::vec3& direction, double near,
                                                   double far) const;
+  /// Reports whether any surface lies on a ray between `near` and `far`. Its parameters are those
+  /// of closest(), and it is faster.
   [[nodiscard]] bool occluded(const glm::dvec3& origin, const glm::vec3& direction, double near,
                               double far) const;
-  /// Distance to step off a surface at p so that rays do not meet it again: 16 float ulps of half
-  /// the mesh's largest extent.
+  /// Returns the distance by which a ray's origin steps off a surface so that the ray does not
+  /// meet that surface again, scene units: 16 float ulps of half the mesh's largest extent.
   [[nodiscard]] double epsilon() const noexcept;
-  /// Surface data of a point given by barycentric coordinates: u is the weight of the triangle's
-  /// second corner, v of its third. A texture's row 0 is at texture coordinate 1 (OBJ's sense).
-  /// @throws std::invalid_argument when there is no such triangle
+  /// Returns the surface data of a point that is given by barycentric coordinates.
+  ///
+  ///     corner 2 (v = 1)
+  ///        |\            position = (1 - u - v) corner 0 + u corner 1 + v corner 2
+  ///        | \           Row 0 of a texture is at texture coordinate 1, as OBJ has it.
+  ///        +--- corner 1 (u = 1)
+  ///     corner 0
+  ///
+  /// @throws std::invalid_argument when `triangle` is out of range
   [[nodiscard]] SurfaceHit surface(std::uint32_t triangle, float u, float v) const;
 
  private:

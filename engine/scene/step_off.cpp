@@ -1,12 +1,16 @@
-// A point where two walls meet may lie, once rounded, on the far side of the wall it touches; rays
-// from there would let light in. So it is moved into its own triangle, which ends at the wall, and
-// lifted; then whatever shows its back from there, nearer than the triangle, is a lid over the
-// point.
+// How a point p is moved to a clear origin o, with e the epsilon of the scene.
+//
+// A point where two walls meet may lie, once rounded, on the far side of the wall that it touches;
+// rays from there would let light in. So the point first moves inwards in its own triangle, which
+// ends at the wall, and then rises:
 //
 //        wall |
 //             |   8 e    o
 //             |<-------->| 2 e
 //   ----------p----------+--------- own triangle
+//
+// A ray from o down to the own triangle then looks for a lid: a surface that shows its back
+// between o and the triangle lies over the point, and no light reaches the point at all.
 #include "engine/scene/step_off.h"
 
 #include <algorithm>
@@ -20,17 +24,19 @@
 namespace ptc {
 namespace {
 
-constexpr double kLift = 2;  // epsilons
-constexpr double kInset = 8;
-constexpr double kLidBelow = 1.75;  // nearer than the own surface, rounding allowed for
+constexpr double kLift = 2;         // epsilons that the origin rises above the surface
+constexpr double kInset = 8;        // epsilons that it keeps from the edges of its triangle
+constexpr double kLidBelow = 1.75;  // epsilons below the origin where a lid is looked for: nearer
+                                    // than the own surface, with room for rounding
 
-// The point of a triangle next to p that keeps `margin` from all edges; the place that is farthest
-// from them when the triangle is too small for that.
+// Returns the point of a triangle near p that keeps `margin` from all edges; of a triangle that is
+// too small for that, the point that is farthest from its edges.
 glm::dvec3 inset(const std::array<glm::dvec3, 3>& corner, const glm::dvec3& p, double margin) {
   const glm::dvec3 normal = glm::cross(corner[1] - corner[0], corner[2] - corner[0]);
   const double square = glm::dot(normal, normal);
   if (!(square > 0)) return p;
-  // A barycentric weight is the distance from the opposite edge over the height above it.
+  // Compare each barycentric weight, which is the distance from the opposite edge over the height
+  // above it, with the least weight that keeps the margin.
   std::array<double, 3> least{}, excess{};
   double sum_least = 0;
   double sum_excess = 0;
@@ -46,6 +52,7 @@ glm::dvec3 inset(const std::array<glm::dvec3, 3>& corner, const glm::dvec3& p, d
     sum_excess += excess[i];
   }
   if (is_inside) return p;
+  // Share out what the least weights leave in proportion to the excess of each weight.
   const double room = std::max(0.0, 1 - sum_least);
   const double scale = room > 0 ? room / sum_excess : 0;
   glm::dvec3 result(0);
@@ -56,19 +63,22 @@ glm::dvec3 inset(const std::array<glm::dvec3, 3>& corner, const glm::dvec3& p, d
   return result;
 }
 
-// The triangle at the point. Rounding may have put the point just beside it, and another may lie in
-// the same place and look the other way, so the surroundings are searched for one that fronts the
-// normal's side.
+// Finds the triangle at the point. Rounding may have put the point just off its triangle, and
+// another triangle may lie in the same place and face the other way, so the surroundings are
+// searched for a triangle whose front is on the normal's side.
 std::optional<SurfaceHit> own_surface(const RayScene& scene, const glm::dvec3& position,
                                       const glm::vec3& normal) {
   const double e = scene.epsilon();
-  // What lies up to `slack` above or below the point, seen from `height`.
+  // Look down from `height` at what lies up to `slack` above or below the point; lengths are in
+  // epsilons.
   const auto around = [&](const glm::vec3& aside, double height, double slack) {
     const glm::dvec3 from = position + e * (height * glm::dvec3(normal) + glm::dvec3(aside));
     return scene.closest(from, -normal, (height - slack) * e, (height + slack) * e);
   };
+  // Look at the point itself.
   std::optional<SurfaceHit> own = around(glm::vec3(0), kLift, kLift - kLidBelow);
   if (own && own->front) return own;
+  // Look from higher up for a triangle that leans, whose plane passes through the point.
   const auto is_at_point = [&](const SurfaceHit& hit) {
     const double off = glm::dot(glm::dvec3(hit.geometric_normal), position - hit.position);
     return std::abs(off) < (kLift - kLidBelow) * e;
@@ -76,6 +86,7 @@ std::optional<SurfaceHit> own_surface(const RayScene& scene, const glm::dvec3& p
   if (const auto leaning = around(glm::vec3(0), kInset, kInset); leaning && is_at_point(*leaning)) {
     if (leaning->front) return leaning;
   }
+  // Look a little to each side of the point.
   const Basis basis(normal);
   for (const glm::vec3& aside : {basis.x, -basis.x, basis.y, -basis.y}) {
     const auto other = around(static_cast<float>(kInset) * aside, kLift, kLift - kLidBelow);
@@ -97,10 +108,11 @@ std::optional<glm::dvec3> step_off(const RayScene& scene, const glm::dvec3& posi
   for (std::size_t i = 0; i < 3; ++i) {
     corner[i] = glm::dvec3(mesh.positions[mesh.triangles[own->triangle][i]]);
   }
-  // Along the geometric normal: an interpolated one may lie nearly in the surface.
+  // Rise along the geometric normal, because an interpolated one may lie nearly in the surface.
   const glm::vec3 up = own->front ? own->geometric_normal : -own->geometric_normal;
   const glm::dvec3 inside = mesh.origin + inset(corner, position - mesh.origin, kInset * e);
   const glm::dvec3 origin = inside + kLift * e * glm::dvec3(up);
+  // Look for a lid between the origin and the own triangle.
   const auto lid = scene.closest(origin, -up, 0, kLidBelow * e);
   if (lid && !lid->front) return {};
   return origin;

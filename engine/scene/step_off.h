@@ -1,4 +1,4 @@
-// Where rays from a surface point begin.
+// Finds where the rays from a surface point begin.
 #pragma once
 
 #include <optional>
@@ -10,10 +10,14 @@
 namespace ptc {
 
 /// Moves a surface point off its surface, and away from the edges of its triangle, by a few
-/// epsilons of the scene, so that rays from it meet what is there and only that.
-/// @param normal  unit, on the side from which light is wanted
-/// @return        nothing when another surface lies over the point within that distance: it sits in
-///                an acute corner or under a contact, where no light comes
+/// RayScene::epsilon(). Rays from there meet every surface around the point except its own, and
+/// none of them slips through a neighbouring wall.
+/// @param position  scene units, on the surface or within rounding of it
+/// @param normal    unit, on the side from which light is wanted
+/// @return          the origin for rays, scene units; nothing when another surface lies over the
+///                  point within that distance. Such a point sits in an acute corner or under a
+///                  contact, where no light comes.
+/// Threads: may be called concurrently.
 [[nodiscard]] std::optional<glm::dvec3> step_off(const RayScene& scene, const glm::dvec3& position,
                                                  const glm::vec3& normal);
 

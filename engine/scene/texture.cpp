@@ -1,4 +1,5 @@
-// Bilinear lookups. Pixel (i, j) has its centre at (i + 1/2, j + 1/2).
+// Bilinear lookups. Pixel (i, j) has its centre at (i + 1/2, j + 1/2), so a place x lies between
+// the centres of the pixels floor(x - 1/2) and floor(x - 1/2) + 1.
 #include "engine/scene/texture.h"
 
 #include <algorithm>
@@ -10,9 +11,10 @@
 namespace ptc {
 namespace {
 
+// What lies beyond the last pixel: the first one again, or the last one repeated.
 enum class Border { wrap, end };
 
-// Two neighbouring pixels of a row or column and the share of the second.
+// Two neighbouring pixels of a row or column, and the share of the second one in the blend.
 struct Pair {
   unsigned first;
   unsigned second;
@@ -40,6 +42,7 @@ glm::vec3 blend(const Image& image, const Pair& x, const Pair& y) {
   return glm::mix(top, bottom, y.share);
 }
 
+// The part of a coordinate behind the point, in [0, 1); 0 for one that is not finite.
 double fraction(float coordinate) {
   if (!std::isfinite(coordinate)) return 0;
   return static_cast<double>(coordinate) - std::floor(static_cast<double>(coordinate));

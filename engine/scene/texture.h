@@ -1,4 +1,4 @@
-// Looking up a picture at a texture coordinate.
+// Bilinear lookups in pictures, by texture coordinate or by place on a panorama.
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -8,12 +8,16 @@
 
 namespace ptc {
 
-/// Bilinear value at (u, v), which wraps around; v = 1 is the top of row 0. A coordinate that is
-/// not finite counts as 0; an empty picture is white.
+/// Returns the bilinear value of a texture that repeats in both directions.
+/// @param uv  texture coordinates; v = 1 is the top of row 0. A coordinate that is not finite
+///            counts as 0.
+/// @return    white where the picture has no pixels
 [[nodiscard]] glm::vec3 sample_texture(const Image& image, const glm::vec2& uv);
 
-/// Bilinear value at a place in pixels (0 at the left or top border), where columns wrap around and
-/// rows end: a latitude-longitude map.
+/// Returns the bilinear value of a latitude-longitude map. Columns wrap around; the first and the
+/// last row go on beyond the map as they are.
+/// @param image  has at least one pixel
+/// @param x, y   place in pixels; 0 is the left or the top border of the picture
 [[nodiscard]] glm::vec3 sample_panorama(const Image& image, double x, double y);
 
 }  // namespace ptc

@@ -1,3 +1,4 @@
+// Bounds the height of a receiver in double before it becomes float.
 #include "engine/shade/lift.h"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Finds damaged pages by reading them. Two threads that find a page's state unknown both read the
+// page; damage is a fact of the file, so both store the same state, and the states need no lock.
 #include "engine/shade/lost_pages.h"
 
 #include "format/error.h"

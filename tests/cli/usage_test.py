@@ -159,7 +159,7 @@ class Usage(ProgramTest):
         sky = os.fsdecode(os.fsencode(self.here) + b"/sky\xff.png")
         self.succeed("ptcrender", self.scene, *SMALL_PICTURE, "-o", sky)
         message = self.fail_with(2, "ptcbuild", self.mesh, "-o", self.here / "p.ptcx", "--sky", sky, errors="replace")
-        self.assertIn("no UTF-8", message)
+        self.assertIn("not UTF-8", message)
 
     def test_endings_in_capitals_mean_what_small_ones_do(self):
         self.succeed("ptcshade", self.scene, "-o", self.here / "o.PLY")

@@ -1,4 +1,26 @@
-// Choosing emissive triangles and places on them.
+// Chooses emissive triangles, and places on them, for the shadow rays of one point.
+//
+// Three steps, each of which brings the density closer to the light that really arrives:
+//
+//     all emitters --(1)--> at most 64 candidates --(2)--> one emitter --(3)--> a place on it
+//
+// (1) Of more than 64 emitters, 64 are drawn with replacement in proportion to their power, in
+//     constant time each, by an alias table (Walker 1977, built in Vose's form).
+// (2) A candidate is chosen in proportion to w = e / (64 p), where e estimates the light that it
+//     may give to this point, and p is the probability that step (1) drew it. The sum of all w
+//     estimates the sum of e over all emitters, so that (sum of w) / e corrects for the choice:
+//     resampled importance sampling (Talbot, Cline and Egbert 2005). With all emitters as
+//     candidates, w = e.
+// (3) The place is uniform in the solid angle that the triangle subtends at the point (Arvo 1995),
+//     where an emitter that is close or large would otherwise flicker:
+//
+//           b
+//          / \        Unit directions a, b, c from the point x to the corners span a triangle on
+//         /   \       the unit sphere around x, whose area is the solid angle:
+//        a-----c          tan(area / 2) = |a . (b x c)| / (1 + a.b + b.c + c.a)
+//         \   /       (Van Oosterom and Strackee 1983)
+//          \ /
+//           x
 #include "engine/scene/light/area_lights.h"
 
 #include <algorithm>
@@ -12,21 +34,22 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kChoices = 64;
+constexpr std::size_t kChoices = 64;  // candidates for each point, at most
 
 double brightness(const glm::vec3& c) {
   return static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
 }
 
-// An emitter seen from a point: unit directions to its corners.
+// An emitter as seen from a point.
 struct View {
-  std::array<glm::dvec3, 3> corner;
-  std::array<glm::dvec3, 3> direction;
-  glm::dvec3 normal;  // unit, of the emitting side
-  double area = 0;
-  double solid_angle = 0;
+  std::array<glm::dvec3, 3> corner;     // relative to the point
+  std::array<glm::dvec3, 3> direction;  // unit, towards the corners
+  glm::dvec3 normal;                    // unit, of the emitting side
+  double area = 0;                      // scene units squared
+  double solid_angle = 0;               // steradians
 };
 
+// Returns the solid angle of a triangle, steradians, from unit directions to its corners.
 // Source: Van Oosterom and Strackee 1983, The solid angle of a plane triangle.
 double solid_angle(const std::array<glm::dvec3, 3>& d) {
   const double volume = std::abs(glm::dot(d[0], glm::cross(d[1], d[2])));
@@ -34,7 +57,9 @@ double solid_angle(const std::array<glm::dvec3, 3>& d) {
   return 2 * std::atan2(volume, base);
 }
 
-// False when no light goes from the emitter's front to the point, or the point lies in its plane.
+// Fills the view of an emitter from a point.
+// @return  false when no light goes from the emitter's front to the point: the point lies behind
+//          it, or in its plane
 bool look_at(const Emitter& emitter, const glm::vec3& position, View& view) {
   const glm::dvec3 eye(position);
   for (std::size_t i = 0; i < 3; ++i) view.corner[i] = glm::dvec3(emitter.corner[i]) - eye;
@@ -53,12 +78,14 @@ bool look_at(const Emitter& emitter, const glm::vec3& position, View& view) {
   return view.solid_angle > 0;
 }
 
-// Positive exactly where the emitter may give light to the point.
+// Estimates the light that an emitter may give to a point: brightness times solid angle times the
+// greatest cosine among its corners and its middle, at least 0.05. It is positive exactly where the
+// emitter may give light, which makes the choice by it unbiased.
 double expected_light(const Emitter& emitter, const glm::vec3& position, const glm::vec3& normal) {
   View view;
   if (!look_at(emitter, position, view)) return 0;
   const glm::dvec3 n(normal);
-  double best = 0;  // a triangle is above the horizon where one of its corners is
+  double best = 0;  // a triangle reaches above the horizon where one of its corners does
   for (const glm::dvec3& d : view.direction) best = std::max(best, glm::dot(n, d));
   if (best <= 0) return 0;
   const glm::dvec3 middle = view.corner[0] + view.corner[1] + view.corner[2];
@@ -66,13 +93,20 @@ double expected_light(const Emitter& emitter, const glm::vec3& position, const g
   return brightness(emitter.radiance) * view.solid_angle * best;
 }
 
+// Returns the unit vector along the part of v that is square to a unit axis.
 glm::dvec3 square_to(const glm::dvec3& v, const glm::dvec3& axis) {
   return glm::normalize(v - glm::dot(v, axis) * axis);
 }
 
-// A direction uniform in the spherical triangle.
+// Turns a uniform point of the unit square into a direction that is uniform in the spherical
+// triangle of three unit directions a, b, c.
+//
+// The first coordinate chooses a point c' on the arc from a to c, so that the triangle a b c' has
+// that share of the area; the second one chooses a direction on the arc from b to c', uniform in
+// its cosine to b.
 // Source: Arvo 1995, Stratified sampling of spherical triangles.
 glm::dvec3 sample_solid_angle(const std::array<glm::dvec3, 3>& d, const glm::vec2& square) {
+  // Find the angles of the triangle, and from them its area, the spherical excess.
   const glm::dvec3 ab = glm::normalize(glm::cross(d[0], d[1]));
   const glm::dvec3 bc = glm::normalize(glm::cross(d[1], d[2]));
   const glm::dvec3 ca = glm::normalize(glm::cross(d[2], d[0]));
@@ -81,6 +115,7 @@ glm::dvec3 sample_solid_angle(const std::array<glm::dvec3, 3>& d, const glm::vec
   };
   const double alpha = angle(ab, ca);
   const double excess = alpha + angle(bc, ab) + angle(ca, bc) - kPiDouble;
+  // Find the point c' whose triangle has the wanted part of the area; q is the cosine from a to it.
   const double part = static_cast<double>(square.x) * excess;
   const double s = std::sin(part - alpha);
   const double t = std::cos(part - alpha);
@@ -89,25 +124,28 @@ glm::dvec3 sample_solid_angle(const std::array<glm::dvec3, 3>& d, const glm::vec
   const double q = std::clamp(
       ((v * t - u * s) * std::cos(alpha) - v) / ((v * s + u * t) * std::sin(alpha)), -1.0, 1.0);
   const glm::dvec3 c = q * d[0] + std::sqrt(1 - q * q) * square_to(d[2], d[0]);
+  // Go along the arc from b to c'.
   const double z = 1 - static_cast<double>(square.y) * (1 - glm::dot(c, d[1]));
   return z * d[1] + std::sqrt(std::max(0.0, 1 - z * z)) * square_to(c, d[1]);
 }
 
+// Turns a uniform point of the unit square into a place that is uniform in the area of a triangle.
 glm::dvec3 sample_area(const std::array<glm::dvec3, 3>& corner, const glm::vec2& square) {
   const double root = std::sqrt(static_cast<double>(square.x));
   const double v = root * static_cast<double>(square.y);
   return (1 - root) * corner[0] + (root - v) * corner[1] + v * corner[2];
 }
 
-// A place on the emitter, and cosine times solid angle it stands for.
+// A place on an emitter.
 struct Place {
-  glm::dvec3 offset{0};  // from the eye
-  double weight = 0;
+  glm::dvec3 offset{0};  // from the point that receives the light
+  double weight = 0;     // cosine at the receiver times the solid angle that the place stands for
 };
 
 Place sample_place(const View& view, const glm::dvec3& normal, const glm::vec2& square) {
-  // Below this the two differ by little, and the spherical excess loses its digits.
-  constexpr double kSmall = 1e-3;
+  // Sample by solid angle, except of small triangles, where that differs little from sampling by
+  // area, and the spherical excess loses its digits.
+  constexpr double kSmall = 1e-3;  // steradians
   if (view.solid_angle > kSmall) {
     const glm::dvec3 d = sample_solid_angle(view.direction, square);
     const double slope = glm::dot(d, view.normal);
@@ -116,6 +154,7 @@ Place sample_place(const View& view, const glm::dvec3& normal, const glm::vec2& 
       return {d * distance, std::max(0.0, glm::dot(normal, d)) * view.solid_angle};
     }
   }
+  // Sample by area: the place stands for area times cosine over distance squared.
   const glm::dvec3 offset = sample_area(view.corner, square);
   const double distance = glm::length(offset);
   if (!(distance > 0)) return {};
@@ -127,6 +166,7 @@ Place sample_place(const View& view, const glm::dvec3& normal, const glm::vec2& 
 }  // namespace
 
 AreaLights::AreaLights(const Mesh& mesh) {
+  // Collect the triangles that emit, and their power up to a factor.
   std::vector<double> power;
   double total = 0;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -143,7 +183,7 @@ AreaLights::AreaLights(const Mesh& mesh) {
     power.push_back(given);
     total += given;
   }
-  // Walker 1977, in Vose's form: columns below the mean are filled up from those above it.
+  // Divide the emitters into those below and above the mean power, which is 1 column.
   const std::size_t count = emitters_.size();
   table_.resize(count);
   std::vector<std::uint32_t> small, large;
@@ -152,6 +192,7 @@ AreaLights::AreaLights(const Mesh& mesh) {
     power[i] *= static_cast<double>(count) / total;
     (power[i] < 1 ? small : large).push_back(static_cast<std::uint32_t>(i));
   }
+  // Fill up each column below the mean from an emitter above it (Walker 1977, in Vose's form).
   while (!small.empty() && !large.empty()) {
     const std::uint32_t low = small.back();
     const std::uint32_t high = large.back();
@@ -198,6 +239,7 @@ void AreaLights::choose_by_power(const glm::vec3& position, const glm::vec3& nor
 
 void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsigned count,
                         std::uint64_t seed, std::vector<EmitterSample>& out) const {
+  // Find the candidates.
   out.clear();
   thread_local std::vector<Choice> choices;
   choices.clear();
@@ -207,6 +249,7 @@ void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsi
     choose_by_power(position, normal, seed ^ 1, choices);
   }
   if (choices.empty()) return;
+  // Choose a candidate by its weight for each sample, and a place on it.
   const SquarePoints points(seed);
   const double total = choices.back().sum;
   for (std::uint32_t i = 0; i < count; ++i) {

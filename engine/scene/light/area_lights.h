@@ -1,4 +1,4 @@
-// The emissive triangles of a mesh as lights.
+// The emissive triangles of a mesh as lights: places on them that shadow rays aim at.
 #pragma once
 
 #include <cstdint>
@@ -13,52 +13,71 @@ namespace ptc {
 
 /// A triangle that emits on its front side. Coordinates are relative to Mesh::origin.
 struct Emitter {
-  glm::vec3 corner[3];
-  glm::vec3 radiance{0};
+  glm::vec3 corner[3];    ///< counter-clockwise as seen from the emitting side
+  glm::vec3 radiance{0};  ///< W/(m^2 sr)
 };
 
-/// A place on an emitter to which a shadow ray goes.
+/// A place on an emitter that a shadow ray aims at.
 struct EmitterSample {
   glm::vec3 position{0};    ///< relative to Mesh::origin
   glm::vec3 normal{0};      ///< unit, of the emitting side
-  glm::vec3 irradiance{0};  ///< that the point gets by this sample when nothing is between
+  glm::vec3 irradiance{0};  ///< contribution of this sample when nothing is in between, W/m^2
 };
 
-/// Chooses emitters by what each may give to a point: its brightness, its solid angle and the
-/// cosine there. Up to 64 emitters all stand for choice; of more, 64 are drawn by power for each
-/// point (resampled importance sampling: Talbot, Cline and Egbert 2005).
+/// Chooses shadow ray targets on the emissive triangles of a mesh.
+///
+/// Emitters are chosen in proportion to what each may give to the point: its brightness times its
+/// solid angle times the cosine there. When there are at most 64 emitters, all of them are
+/// candidates. Of more, 64 candidates are drawn by power for each point (resampled importance
+/// sampling: Talbot, Cline and Egbert 2005).
 class AreaLights {
  public:
+  /// Collects the emitters of a mesh. The mesh is not used afterwards.
   explicit AreaLights(const Mesh& mesh);
 
+  /// Reports whether no triangle emits.
   [[nodiscard]] bool empty() const noexcept { return emitters_.empty(); }
-  /// `count` samples whose irradiances, where seen, sum up to an unbiased estimate.
+  /// Draws samples whose irradiances, summed over those that the point sees, are an unbiased
+  /// estimate of the light of all emitters.
   /// @param position  relative to Mesh::origin
-  /// @param out       is overwritten; fewer than `count` when some cannot give light
+  /// @param normal    unit
+  /// @param count     wanted samples
+  /// @param out       is overwritten; it holds fewer than `count` samples when some cannot give
+  ///                  light
   void sample(const glm::vec3& position, const glm::vec3& normal, unsigned count,
               std::uint64_t seed, std::vector<EmitterSample>& out) const;
 
  private:
+  /// A candidate for the choice at one point.
   struct Choice {
     std::uint32_t emitter = 0;
-    double expected = 0;  // what it may give, in brightness
-    double sum = 0;       // of the weights up to and including this
+    double expected = 0;  ///< what the emitter may give to the point, in brightness
+    double sum = 0;       ///< sum of the weights of the candidates up to and including this
   };
+  /// Makes every emitter that may give light to the point a candidate.
   void choose_all(const glm::vec3& position, const glm::vec3& normal,
                   std::vector<Choice>& out) const;
+  /// Draws the candidates by power, and keeps those that may give light to the point.
   void choose_by_power(const glm::vec3& position, const glm::vec3& normal, std::uint64_t seed,
                        std::vector<Choice>& out) const;
+  /// Returns the emitter that a number in [0, 1) picks in proportion to power.
   [[nodiscard]] std::uint32_t draw(double unit) const;
 
   std::vector<Emitter> emitters_;
-  // Walker's alias table: a column keeps its own emitter up to `keep`, and gives the rest to
-  // another.
+  /// A column of Walker's alias table: it keeps its own emitter up to `keep`, and gives the rest to
+  /// another.
+  ///
+  ///     1 +-----+-----+-----+
+  ///       |  2  |  2  |     |     Three emitters of powers 0.4, 0.6 and 2 times the mean: each
+  ///       |.....|.....|  2  |     column has the height 1, and columns 0 and 1 are filled up with
+  ///       |  0  |  1  |     |     what emitter 2 has in excess.
+  ///     0 +-----+-----+-----+
   struct Column {
-    float keep = 1;
-    std::uint32_t other = 0;
+    float keep = 1;           ///< share of the column's own emitter, in (0, 1]
+    std::uint32_t other = 0;  ///< the emitter that has the rest
   };
-  std::vector<Column> table_;
-  std::vector<float> share_;  // of the total power
+  std::vector<Column> table_;  ///< a column for each emitter
+  std::vector<float> share_;   ///< share of the total power, for each emitter
 };
 
 }  // namespace ptc

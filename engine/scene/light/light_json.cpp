@@ -1,4 +1,14 @@
-// The light rig as JSON, and the picture it names.
+// The JSON record of a light rig, and the picture that it names.
+//
+// A container records the rig that lit its points, so that a later run can light the same scene the
+// same way. The record holds the path and the digest of the sky's picture, not the picture itself:
+//
+//     to_json()              rig, picture in memory   ->  text with path and digest
+//     light_rig_from_json()  text                     ->  rig with path and digest, no picture
+//     load_sky_map()         that rig                 ->  picture read, its digest compared
+//
+// light_rig_from_json(to_json(rig)) is exact: numbers keep all their digits, and directions that
+// are unit within rounding stay as they are.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -24,7 +34,8 @@ constexpr Range kPlace{-kMaxLightDistance, kMaxLightDistance};
 constexpr Range kLight{0, kMax};
 constexpr Range kAngle{0, 1.5707964};
 
-// A null in the text would be a number lost; better to say so when it is written.
+// Checks that every number can be written. JSON has null in place of numbers that are not finite,
+// so such a number would be lost without a word.
 void require_finite(const Json& json) {
   for (const Json& value : json) {
     if (value.is_structured()) require_finite(value);
@@ -34,11 +45,12 @@ void require_finite(const Json& json) {
   }
 }
 
+// Normalises a direction that was read. @throws DataError when it is zero
 void make_unit(glm::vec3& direction, const char* name, const JsonFields& fields) {
   const glm::dvec3 wide(direction);
   const double length = glm::length(wide);
   if (length == 0) fields.fail(std::string(name) + " must not be zero");
-  // What is unit but for rounding stays as it is, so that a rig survives the round trip.
+  // Keep what is unit but for rounding, so that a rig survives the round trip.
   if (std::abs(length - 1) > 1e-5) direction = glm::vec3(wide / length);
 }
 
@@ -92,6 +104,7 @@ Sky read_sky(const Json& json, const std::string& where) {
   return sky;
 }
 
+// Reads an array of lights by `read`, which also takes the element's name for messages.
 template <typename Light, typename Read>
 void read_list(JsonFields& fields, const char* name, std::vector<Light>& lights, Read read) {
   const Json* list = fields.find(name);
@@ -106,6 +119,7 @@ void read_list(JsonFields& fields, const char* name, std::vector<Light>& lights,
 }  // namespace
 
 std::string to_json(const LightRig& rig) {
+  // Write the suns and the point lights.
   Json suns = Json::array();
   for (const Sun& sun : rig.suns) {
     suns.push_back({{"to_sun", to_json_array(sun.to_sun)},
@@ -117,11 +131,12 @@ std::string to_json(const LightRig& rig) {
     points.push_back({{"position", to_json_array(point.position)},
                       {"intensity", to_json_array(point.intensity)}});
   }
+  // Write the sky, its map by path and digest.
   Json sky{{"radiance", to_json_array(rig.sky.radiance)}, {"up", to_json_array(rig.sky.up)}};
   if (!is_utf8(rig.sky.map_path)) {
     throw RequestError("lights",
-                       "the name of the sky's picture is no UTF-8, as records of lights "
-                       "are: rename it");
+                       "the name of the sky's picture is not UTF-8, so the lights cannot be "
+                       "recorded: rename the picture");
   }
   if (!rig.sky.map_path.empty()) {
     sky["map"] = rig.sky.map_path;
@@ -144,12 +159,14 @@ LightRig light_rig_from_json(const std::string& text) {
   return rig;
 }
 
+// Seeds the digest with the size, so that pictures of other proportions differ.
 std::uint64_t image_xxh3(const Image& image) {
   const std::uint64_t seed = std::uint64_t{image.width} << 32 | image.height;
   return std::max<std::uint64_t>(1, xxh3_64(std::as_bytes(std::span(image.pixels)), seed));
 }
 
 SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory) {
+  // Find the file: where it was recorded, else in the given directory.
   if (sky.map_path.empty()) return SkyMap::none;
   const std::filesystem::path recorded(sky.map_path);
   const std::filesystem::path beside = directory / recorded.filename();
@@ -160,6 +177,7 @@ SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory) {
                     " that lit the scene does not exist, and neither does " + beside.string() +
                     ": put it there, or give a sky");
   }
+  // Read it, and compare its digest with the recorded one.
   sky.map = std::make_shared<const Image>(read_image(is_there ? recorded : beside));
   const bool same = sky.map_xxh3 == 0 || sky.map_xxh3 == image_xxh3(*sky.map);
   return same ? SkyMap::same : SkyMap::changed;

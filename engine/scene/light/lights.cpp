@@ -1,4 +1,21 @@
-// Direct irradiance: suns, point lights, emissive triangles and the sky, by shadow rays.
+// Direct irradiance at a surface point: suns, point lights, emissive triangles and the sky, each by
+// its own shadow rays.
+//
+// The irradiance is the integral of radiance times cosine over the hemisphere, and each kind of
+// light has the estimator that suits it:
+//
+//     sun        directions uniform over its projected disc; each stands for an equal share
+//     point      one ray; intensity times cosine over distance squared
+//     emitters   places chosen by what each emitter may give (area_lights.h)
+//     sky        cosine rays, and with a map as many rays by its brightness, combined by the
+//                balance heuristic (Veach and Guibas 1995)
+//
+//                  n
+//                  |    / ray, from an origin that is clear of the surface (step_off.h)
+//                  |   /
+//     -------------x-------------
+//
+// Each kind takes its own scrambled Sobol sequence, so that the errors of two kinds are unrelated.
 #include "engine/scene/light/lights.h"
 
 #include <algorithm>
@@ -24,12 +41,12 @@ constexpr double kFar = std::numeric_limits<double>::infinity();
 
 // A place where light is received.
 struct Receiver {
-  glm::dvec3 position;
-  glm::dvec3 origin;  // of rays: clear of the surface
-  glm::vec3 normal;
+  glm::dvec3 position;  // on the surface
+  glm::dvec3 origin;    // where rays begin: clear of the surface
+  glm::vec3 normal;     // unit
   std::uint64_t seed;
 
-  // Sample points of one kind of light, unrelated to those of another.
+  // Returns the sample points for one kind of light, unrelated to those for another.
   [[nodiscard]] SquarePoints points(std::uint64_t kind) const {
     return SquarePoints(splitmix64(seed) + kind);
   }
@@ -45,6 +62,7 @@ bool is_light(const glm::vec3& v) {
   return is_finite(v) && v.x >= 0 && v.y >= 0 && v.z >= 0;
 }
 
+// Returns the unit vector along v. @throws RequestError when it has no direction
 glm::vec3 checked_direction(const glm::vec3& v) {
   const glm::vec3 unit = glm::normalize(v);
   if (!is_finite(unit))
@@ -52,10 +70,13 @@ glm::vec3 checked_direction(const glm::vec3& v) {
   return unit;
 }
 
+// Returns the rig with its directions normalised.
+// @throws RequestError when a number makes no sense
 LightRig checked(LightRig rig) {
   const auto require = [](bool holds, const char* what) {
     if (!holds) throw RequestError("lights", what);
   };
+  // Check suns and point lights.
   for (Sun& sun : rig.suns) {
     sun.to_sun = checked_direction(sun.to_sun);
     require(is_light(sun.irradiance), "the irradiance of a sun is negative or not finite");
@@ -69,6 +90,7 @@ LightRig checked(LightRig rig) {
         away.x <= kMaxLightDistance && away.y <= kMaxLightDistance && away.z <= kMaxLightDistance,
         "a coordinate of a point light is not finite, or beyond 1e150");
   }
+  // Check the sky and its map.
   rig.sky.up = checked_direction(rig.sky.up);
   require(is_light(rig.sky.radiance), "the radiance of the sky is negative or not finite");
   if (const Image* map = rig.sky.map.get()) {
@@ -106,24 +128,29 @@ struct DirectLight::Impl {
     sky_is_black = !is_lit(rig.sky.radiance) || (sky_density && sky_density->is_black());
   }
 
+  // Irradiance from one sun, one point light, all emitters and the sky, W/m^2.
   [[nodiscard]] glm::vec3 from_sun(const Sun& sun, const Receiver& at, const SquarePoints& points,
                                    unsigned rays) const;
   [[nodiscard]] glm::vec3 from_point(const PointLight& point, const Receiver& at) const;
   [[nodiscard]] glm::vec3 from_emitters(const Receiver& at, unsigned rays) const;
+  // Reports whether something stands between the receiver and a place.
   [[nodiscard]] bool is_hidden(const Receiver& at, const glm::dvec3& end) const;
   [[nodiscard]] glm::vec3 from_sky(const Receiver& at, unsigned rays) const;
+  // Returns what one ray adds to the estimate of the sky.
   [[nodiscard]] glm::vec3 along_sky_ray(const Receiver& at, const glm::vec3& direction,
                                         float cosine_rays, float map_rays, float map_density) const;
 
   const RayScene& scene;
   LightRig rig;
   AreaLights area;
-  std::optional<SkyDensity> sky_density;  // when there is a map
+  std::optional<SkyDensity> sky_density;  // only when the sky has a map that gives light
   bool sky_is_black = true;
 };
 
-// The disc of the sun is uniform, so directions are drawn by the cosine to its middle, which is the
-// measure of "irradiance on a surface that faces it": each ray stands for the same share of it.
+// The disc of the sun has one radiance, so directions are drawn with a density in proportion to the
+// cosine to its middle. That is the measure of "irradiance on a surface that faces the sun", so
+// each ray stands for the same share of it, and its irradiance on the receiver is that share times
+// the cosine at the receiver over the cosine to the middle.
 glm::vec3 DirectLight::Impl::from_sun(const Sun& sun, const Receiver& at,
                                       const SquarePoints& points, unsigned rays) const {
   const float widest = std::sin(std::min(sun.angular_radius, 0.5f * kPi));
@@ -142,7 +169,7 @@ glm::vec3 DirectLight::Impl::from_sun(const Sun& sun, const Receiver& at,
   return sun.irradiance * (sum / static_cast<float>(rays));
 }
 
-// Distances and angles are those at the surface; only the ray begins off it.
+// Measures distances and angles at the surface; only the shadow ray begins off it.
 glm::vec3 DirectLight::Impl::from_point(const PointLight& point, const Receiver& at) const {
   const glm::dvec3 offset = point.position - at.position;
   const double distance = glm::length(offset);
@@ -159,7 +186,7 @@ glm::vec3 DirectLight::Impl::from_emitters(const Receiver& at, unsigned rays) co
   area.sample(local, at.normal, rays, splitmix64(at.seed) + kArea, samples);
   glm::vec3 sum(0);
   for (const EmitterSample& sample : samples) {
-    // The ray ends before the emitter, as it begins off the receiver.
+    // End the ray a little before the emitter, as it begins a little off the receiver.
     const glm::dvec3 end = scene.mesh().origin + glm::dvec3(sample.position) +
                            2 * scene.epsilon() * glm::dvec3(sample.normal);
     if (!is_hidden(at, end)) sum += sample.irradiance;
@@ -173,8 +200,9 @@ bool DirectLight::Impl::is_hidden(const Receiver& at, const glm::dvec3& end) con
   return distance > 0 && scene.occluded(at.origin, glm::vec3(offset / distance), 0, distance);
 }
 
-// The balance heuristic: a direction counts once, by the sum of all densities that could have
-// brought it (Veach and Guibas 1995).
+// Weighs a ray by the balance heuristic: L cos over the sum of all densities that could have
+// brought its direction, each times its number of rays (Veach and Guibas 1995). So a direction that
+// both samplings may bring does not count twice.
 glm::vec3 DirectLight::Impl::along_sky_ray(const Receiver& at, const glm::vec3& direction,
                                            float cosine_rays, float map_rays,
                                            float map_density) const {
@@ -186,6 +214,7 @@ glm::vec3 DirectLight::Impl::along_sky_ray(const Receiver& at, const glm::vec3& 
 }
 
 glm::vec3 DirectLight::Impl::from_sky(const Receiver& at, unsigned rays) const {
+  // Divide the rays among the two densities.
   if (sky_is_black || rays == 0) return glm::vec3(0);
   const unsigned map_rays = sky_density ? rays / 2 : 0;
   const unsigned cosine_rays = rays - map_rays;
@@ -193,12 +222,14 @@ glm::vec3 DirectLight::Impl::from_sky(const Receiver& at, unsigned rays) const {
   const auto by_map = static_cast<float>(map_rays);
   const Basis frame(at.normal);
   glm::vec3 sum(0);
+  // Trace rays by the cosine.
   const SquarePoints hemisphere = at.points(kSky);
   for (std::uint32_t i = 0; i < cosine_rays; ++i) {
     const glm::vec3 direction = frame.to_world(cosine_direction(hemisphere.square(i)));
     const float density = map_rays > 0 ? sky_density->density(direction) : 0;
     sum += along_sky_ray(at, direction, by_cosine, by_map, density);
   }
+  // Trace rays by the brightness of the map.
   const SquarePoints map = at.points(kSkyMap);
   for (std::uint32_t i = 0; i < map_rays; ++i) {
     const SkyDensity::Sample sample = sky_density->sample(map.square(i));
@@ -222,6 +253,7 @@ DirectLight::Result DirectLight::irradiance(const glm::dvec3& position, const gl
   if (!is_finite(unit) || !std::isfinite(glm::dot(position, position))) return {};
   const std::optional<glm::dvec3> origin = step_off(impl_->scene, position, unit);
   if (!origin) return {};
+  // Add up the lights. A result that overflows counts as black.
   const Receiver at{position, *origin, unit, seed};
   Result result;
   for (std::size_t i = 0; i < impl_->rig.suns.size(); ++i) {

@@ -1,5 +1,18 @@
-// The sky map's geometry, and sampling it by inverting its cumulated brightness: rows first, then
-// the pixel in the row, then a place around the pixel as far as its light spreads.
+// The geometry of a latitude-longitude map, and directions drawn by its brightness.
+//
+// Drawing inverts the cumulated weight of the pixels: first the row, then the pixel in the row,
+// then a place around the pixel, as far as its light spreads when the map is interpolated.
+//
+//     weight of a pixel = brightness x sine of its row's polar angle (its solid angle)
+//
+//     rows_      |--0--|----1----|-2-|--3--|   the second coordinate of the square times the total
+//     columns_   |-0-|------1------|2|         the first coordinate, among the pixels of that row
+//     tent          /\                         the rest of each, spread over two pixels' widths
+//                  /  \                        as bilinear interpolation spreads the pixel
+//              -1   0   1  pixels
+//
+// So the density at a place is the bilinear blend of the weights around it, over their sum;
+// density() computes it for any direction, as the balance heuristic needs (lights.cpp).
 #include "engine/scene/light/sky_map.h"
 
 #include <algorithm>
@@ -18,23 +31,26 @@ bool has_map(const Sky& sky) {
   return sky.map && !sky.map->pixels.empty();
 }
 
+// Returns the sum of the channels; what is negative or not finite counts as black.
 double brightness(const glm::vec3& c) {
   const double sum = static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
   return sum > 0 && std::isfinite(sum) ? sum : 0;
 }
 
-// An offset from a pixel's centre, in pixels, that is likely as bilinear interpolation weighs it:
-// the density falls from 1 at the centre to 0 at the neighbours'.
+// Turns a uniform number into an offset from a pixel's centre, in pixels. Its density is the weight
+// that bilinear interpolation gives to the pixel: it falls from 1 at the centre to 0 at the
+// neighbours' centres.
 double tent(double unit) {
   return unit < 0.5 ? std::sqrt(2 * unit) - 1 : 1 - std::sqrt(2 - 2 * unit);
 }
 
-// Which interval of a list of cumulated shares holds a value, and where in it, in [0, 1].
+// An interval in a list of cumulated shares.
 struct Found {
-  std::size_t index;
-  double within;
+  std::size_t index;  // of the interval
+  double within;      // where in it the value lies, in [0, 1]
 };
 
+// Finds the interval that holds a value; one without width counts as hit in its middle.
 template <typename Iterator>
 Found find_share(Iterator first, Iterator last, double value) {
   const auto at = std::min(std::upper_bound(first, last, value), last - 1);
@@ -47,8 +63,8 @@ Found find_share(Iterator first, Iterator last, double value) {
 }  // namespace
 
 SkyOrientation::SkyOrientation(const glm::vec3& up) : y_(glm::normalize(glm::dvec3(up))) {
-  // The smallest rotation that takes +y to u, applied to +x and +z: v -> v + k x v + k x (k x v) /
-  // (1 + u.y), with k = y x u; for u = -y half a turn about x.
+  // Apply the smallest rotation that takes +y to u to +x and +z: v -> v + k x v + k x (k x v) /
+  // (1 + u.y), with k = y x u; for u = -y take half a turn about x.
   if (y_.y < -1 + 1e-12) {
     x_ = {1, 0, 0};
     z_ = {0, 0, -1};
@@ -100,8 +116,11 @@ double SkyDensity::weight(unsigned column, unsigned row) const {
   return brightness(map_->at(column, row)) * sines_[row];
 }
 
-// The weights, interpolated as the map is, over their sum; from places to solid angle by the sine.
+// Interpolates the weights as the map is interpolated, and divides by their sum. That is a density
+// over the places of the map, whose unit square covers 2 pi times pi radians; the sine of the polar
+// angle makes it a density over solid angle.
 float SkyDensity::density_at(const glm::dvec2& place) const {
+  // Find the four pixels around the place: columns wrap around, rows end.
   const double x = place.x * map_->width - 0.5;
   const double y = place.y * map_->height - 0.5;
   const double share_x = x - std::floor(x);
@@ -111,6 +130,7 @@ float SkyDensity::density_at(const glm::dvec2& place) const {
   const double most = map_->height - 1.0;
   const auto upper = static_cast<unsigned>(std::clamp(std::floor(y), 0.0, most));
   const auto lower = static_cast<unsigned>(std::clamp(std::floor(y) + 1, 0.0, most));
+  // Blend their weights.
   const double value =
       (1 - share_y) * ((1 - share_x) * weight(column, upper) + share_x * weight(next, upper)) +
       share_y * ((1 - share_x) * weight(column, lower) + share_x * weight(next, lower));
@@ -126,7 +146,8 @@ SkyDensity::Sample SkyDensity::sample(const glm::vec2& square) const {
   const Found column = find_share(first, first + map_->width, static_cast<double>(square.x));
   const double x = static_cast<double>(column.index) + 0.5 + tent(column.within);
   const double y = static_cast<double>(row.index) + 0.5 + tent(row.within);
-  // Columns wrap around; beyond the first and the last row, the map goes on as it is there.
+  // Bring the place back onto the map: columns wrap around, and beyond the first and the last row
+  // the map goes on as it is there.
   const double turn = x / map_->width - std::floor(x / map_->width);
   const double rise = std::abs(y) / map_->height;
   const glm::dvec2 place(turn < 1 ? turn : 0, rise > 1 ? 2 - rise : rise);

@@ -1,4 +1,5 @@
-// A latitude-longitude sky: where a direction falls on the map, and directions by brightness.
+// A latitude-longitude sky: where a direction falls on the map, and how to draw directions by
+// brightness.
 #pragma once
 
 #include <memory>
@@ -11,46 +12,60 @@
 
 namespace ptc {
 
-/// Between world directions and the map's turn and rise, each in [0, 1): x over the width from the
-/// left, y over the height from the top. See Sky for the sense.
+/// Converts between world directions and places on a latitude-longitude map.
+///
+/// A place is a pair of shares: x is the turn, a share of the map's width from the left border, in
+/// [0, 1); y is the rise, a share of its height from the upper border, in [0, 1]. Sky has the
+/// picture of the map's sense.
 class SkyOrientation {
  public:
+  /// Turns the map by the smallest rotation that takes +y to `up`.
+  /// @param up  of any length except 0
   explicit SkyOrientation(const glm::vec3& up);
 
+  /// Returns the place that shows a direction.
+  /// @param direction  unit
   [[nodiscard]] glm::dvec2 place_of(const glm::vec3& direction) const;
+  /// Returns the unit direction that a place shows.
   [[nodiscard]] glm::vec3 direction_at(const glm::dvec2& place) const;
 
  private:
-  glm::dvec3 x_, y_, z_;  // the map's axes in the world
+  glm::dvec3 x_, y_, z_;  ///< the map's axes in the world
 };
 
-/// Directions with a density that follows the map's brightness, bilinear as the map is.
-/// Memory: 4 bytes a pixel.
+/// Draws directions with a density that follows the brightness of a map, interpolated as the map
+/// itself is.
+/// Memory: 4 bytes for each pixel.   Threads: const members may be called concurrently.
 class SkyDensity {
  public:
-  /// @param sky  has a map
+  /// Sums up the brightness of a sky's map.
+  /// @param sky  has a map with pixels
   explicit SkyDensity(const Sky& sky);
 
+  /// A direction and the density that it was drawn with.
   struct Sample {
-    glm::vec3 direction{0};
-    float density = 0;  ///< per steradian
+    glm::vec3 direction{0};  ///< unit
+    float density = 0;       ///< per steradian
   };
+  /// Turns a uniform point of the unit square into a direction by brightness.
   [[nodiscard]] Sample sample(const glm::vec2& square) const;
-  /// Density with which sample() gives `direction`, per steradian.
+  /// Returns the density with which sample() gives `direction`, per steradian.
   [[nodiscard]] float density(const glm::vec3& direction) const;
-  /// True when no direction is brighter than 0.
+  /// Reports whether no direction is brighter than 0; then there is nothing to draw.
   [[nodiscard]] bool is_black() const noexcept { return !(rows_.back() > 0); }
 
  private:
-  // What a pixel weighs: its brightness times the solid angle of its row.
+  /// Returns the weight of a pixel: its brightness times the solid angle of a pixel of its row, up
+  /// to a factor.
   [[nodiscard]] double weight(unsigned column, unsigned row) const;
+  /// Returns the density at a place of the map, per steradian.
   [[nodiscard]] float density_at(const glm::dvec2& place) const;
 
   SkyOrientation orientation_;
   std::shared_ptr<const Image> map_;
-  std::vector<double> sines_;   // of each row's middle: its solid angle, up to a factor
-  std::vector<double> rows_;    // weight of all rows up to and including this
-  std::vector<float> columns_;  // within a row, the share up to and including this pixel
+  std::vector<double> sines_;   ///< sine of the polar angle at the middle of each row
+  std::vector<double> rows_;    ///< weight of all rows up to and including each
+  std::vector<float> columns_;  ///< within each row, the share up to and including each pixel
 };
 
 }  // namespace ptc

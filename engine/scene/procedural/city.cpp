@@ -1,4 +1,19 @@
 // The city as a stream of surfels, and as a mesh.
+//
+// Both come from the facets of build_block(), one block at a time, so the size of the city takes
+// memory only as a mesh. Points lie in rows along u, each in the middle of its cell but for a
+// jitter of a quarter cell:
+//
+//       v                                  v
+//       ^  +-----+-----+-----+             ^  +
+//       |  |  .  |.    |   . |   row 1     |  | .\          The rows of a triangle shorten
+//       |  +-----+-----+-----+             |  |---\         with height, so that every cell
+//       |  | .   |   . |  .  |   row 0     |  | .| .\       has about the same area.
+//       |  +-----+-----+-----+             |  +------+
+//       +-----------------------> u        +-----------> u
+//
+// A facet too small for two points owes its share to the next such facet (`carry`), so that the
+// many small leaves of trees get their points in the mean.
 #include "engine/scene/procedural/city.h"
 
 #include <algorithm>
@@ -15,19 +30,21 @@
 namespace ptc {
 namespace {
 
-constexpr double kSpacing = 0.25;               // metres
-constexpr std::uint64_t kCountedBlocks = 1024;  // beyond, their mean stands for the rest
+constexpr double kSpacing = 0.25;               // metres between neighbouring points
+constexpr std::uint64_t kCountedBlocks = 1024;  // blocks whose points are counted one by one; their
+                                                // mean stands for further blocks
 
-// How points lie on a facet: rows along u, of as many points as the row is long.
+// The layout of the points on one facet: rows along u, each with as many points as it is long.
 class FacetRows {
  public:
-  // @param carry  points owed by facets too small for a whole one; taken from and added to
+  // @param carry  points that small facets before this one still owe; is updated
   FacetRows(const Facet& facet, float spacing, float& carry)
       : taper_(facet.is_triangle ? 1.0f : 0.0f) {
     const float length = glm::length(facet.u);
     const float twice = glm::length(glm::cross(facet.u, facet.v));
     area_ = facet.is_triangle ? 0.5f * twice : twice;
     const float wanted = area_ / (spacing * spacing);
+    // Give a small facet the whole points among what is owed by now, in one row.
     if (wanted < 2) {
       carry += wanted;
       rows_ = carry >= 1 ? 1 : 0;
@@ -39,6 +56,7 @@ class FacetRows {
       each_ = spacing * spacing;
       return;
     }
+    // Lay rows one spacing apart over the height of the facet.
     rows_ = static_cast<std::uint32_t>(std::max(1.0f, std::round(twice / length / spacing)));
     across_ = std::max(1.0f, length / spacing);
     for (std::uint32_t row = 0; row < rows_; ++row) count_ += in_row(row);
@@ -53,22 +71,24 @@ class FacetRows {
     return static_cast<std::uint32_t>(
         std::max(1.0f, std::round(across_ * width(height(row, 0.5f)))));
   }
-  // Share of v at a place in a row, and what share of u the facet is wide there.
+  // Returns the share of v at a place in a row. @param within  place across the row, in [0, 1]
   [[nodiscard]] float height(std::uint32_t row, float within) const {
     return (static_cast<float>(row) + within) / static_cast<float>(rows_) * shrink_;
   }
+  // Returns the share of u that the facet is wide at a height.
   [[nodiscard]] float width(float height) const { return shrink_ * (1 - taper_ * height); }
 
  private:
-  float taper_;       // 1: the rows of a triangle shorten to nothing
-  float shrink_ = 1;  // a small triangle's points lie in the parallelogram at its corner
+  float taper_;       // 1 in a triangle, whose rows shorten to nothing; 0 in a parallelogram
+  float shrink_ = 1;  // 0.5 in a small triangle: its points lie in the parallelogram at its corner
   float area_ = 0;
   float across_ = 0;  // points in a row of full length
-  float each_ = 0;    // area for each
+  float each_ = 0;    // area for each point
   std::uint32_t rows_ = 0;
   std::uint32_t count_ = 0;
 };
 
+// Counts the points of a block without making them.
 std::uint64_t count_block(std::uint64_t index, float spacing) {
   std::uint64_t count = 0;
   float carry = 0.5f;
@@ -91,19 +111,22 @@ std::uint64_t count_blocks(const Layout& layout) {
   return count;
 }
 
-// As many blocks as give the count at the usual spacing; when the last is much too many, a spacing
-// that is a little wider.
+// Takes as many blocks as give the count at the usual spacing; where the last block brings far too
+// many points, a slightly wider spacing.
 Layout lay_out(std::uint64_t count) {
+  // Count blocks until they have enough points.
   Layout layout;
   std::uint64_t have = 0;
   while (have < count && layout.blocks < kCountedBlocks) {
     have += count_block(layout.blocks++, static_cast<float>(kSpacing));
   }
+  // Extrapolate a large city from the mean of its first blocks.
   if (have < count) {
     const double mean = static_cast<double>(have) / static_cast<double>(layout.blocks);
     layout.blocks = static_cast<std::uint64_t>(std::ceil(static_cast<double>(count) / mean));
     return layout;
   }
+  // Widen the spacing of a small city until its count is met within 1.5 %.
   for (int round = 0; round < 12; ++round) {
     const double excess = static_cast<double>(have) / static_cast<double>(count);
     if (count == 0 || std::abs(excess - 1) < 0.015) break;
@@ -115,9 +138,10 @@ Layout lay_out(std::uint64_t count) {
 
 constexpr glm::vec3 kToSun(0.45f, 0.84f, 0.3f);
 constexpr glm::vec3 kSunIrradiance(3.0f, 2.8f, 2.4f);
-constexpr glm::vec3 kSkyIrradiance(0.7f, 0.85f, 1.1f);  // of a facet that looks up
+constexpr glm::vec3 kSkyIrradiance(0.7f, 0.85f, 1.1f);  // on a facet that looks up
 
-// Sun and sky without shadows: what the sky shows of a facet depends on its tilt alone.
+// Returns the radiance that sun and sky reflect off a facet, without shadows: how much of the sky
+// the facet sees depends on its tilt alone.
 glm::vec3 radiance_of(const glm::vec3& albedo, const glm::vec3& normal) {
   const glm::vec3 to_sun = glm::normalize(kToSun);
   const glm::vec3 sun = kSunIrradiance * std::max(0.0f, glm::dot(normal, to_sun));
@@ -125,15 +149,18 @@ glm::vec3 radiance_of(const glm::vec3& albedo, const glm::vec3& normal) {
   return albedo / kPi * (sun + sky);
 }
 
+// Appends the surfels of a facet.
+// @param block  the low corner of its block, metres
 void sample_facet(const Facet& facet, const FacetRows& rows, const glm::dvec3& block,
                   std::uint64_t seed, std::vector<Surfel>& out) {
+  // Set what all surfels of the facet share. A surfel stands for 2 r^2 of surface.
   Surfel surfel;
   surfel.normal = glm::normalize(glm::cross(facet.u, facet.v));
   surfel.radius = std::sqrt(0.5f * rows.area_each());
   surfel.albedo = city_albedo(facet.colour);
   surfel.radiance = radiance_of(surfel.albedo, surfel.normal);
   const glm::dvec3 corner = block + glm::dvec3(facet.corner);
-  // Off the middle of the cell by up to a quarter of it.
+  // Place a point in each cell, off its middle by up to a quarter of the cell.
   const auto jitter = [](std::uint32_t bits) { return 0.25f + 0.5f * to_unit(bits); };
   for (std::uint32_t row = 0; row < rows.rows(); ++row) {
     const std::uint32_t count = row == 0 && rows.rows() == 1 ? rows.count() : rows.in_row(row);
@@ -148,6 +175,7 @@ void sample_facet(const Facet& facet, const FacetRows& rows, const glm::dvec3& b
   }
 }
 
+// Streams the surfels of the blocks, of which it holds one at a time.
 class CitySource final : public PointSource {
  public:
   explicit CitySource(std::uint64_t count) : layout_(lay_out(count)) {}
@@ -166,7 +194,7 @@ class CitySource final : public PointSource {
   }
 
  private:
-  // The next block that has points.
+  // Makes the points of the next block that has any. @return  false after the last block
   bool fetch() {
     points_.clear();
     taken_ = 0;
@@ -186,10 +214,11 @@ class CitySource final : public PointSource {
 
   Layout layout_;
   std::uint64_t block_ = 0;
-  std::vector<Surfel> points_;  // of one block
-  std::size_t taken_ = 0;
+  std::vector<Surfel> points_;  // of the current block
+  std::size_t taken_ = 0;       // points of it that were handed out
 };
 
+// Appends a facet to a mesh as one or two triangles.
 void add_facet(const Facet& facet, const glm::dvec3& block, Mesh& mesh) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   const auto put = [&](const glm::vec3& p) { mesh.positions.emplace_back(block + glm::dvec3(p)); };
@@ -221,7 +250,7 @@ Bounds city_bounds(std::uint64_t count) {
   const Layout layout = lay_out(count);
   Bounds bounds;
   if (layout.blocks == 0) return bounds;
-  // The last block lies on the widest ring. Ledges stay within their block.
+  // The last block lies on the widest ring of the spiral, and ledges stay within their block.
   const BlockPlace last = block_place(layout.blocks - 1);
   const auto ring = static_cast<double>(std::max(std::abs(last.column), std::abs(last.row)));
   const double reach = (ring + 0.5) * kBlockMetres;
@@ -231,13 +260,17 @@ Bounds city_bounds(std::uint64_t count) {
 }
 
 Mesh city_mesh(std::uint64_t count) {
+  // Refuse a city whose ground alone has too many vertices.
   const Layout layout = lay_out(count);
   constexpr std::uint64_t kMax = 0xFFFFFFFF;
   const auto require = [](bool fits) {
     if (!fits)
-      throw RequestError("city_points", "a mesh of so large a city has 2^32 vertices or more");
+      throw RequestError("city_points",
+                         "as a mesh, a city of this size has 2^32 vertices or more: ask for fewer "
+                         "`city_points`");
   };
   require(layout.blocks < kMax / 3 / kGroundTriangles);
+  // Make a material of each colour.
   Mesh mesh;
   for (std::uint32_t colour = 0; colour < kCityColours; ++colour) {
     Material material;
@@ -245,6 +278,7 @@ Mesh city_mesh(std::uint64_t count) {
     material.albedo = city_albedo(colour);
     mesh.materials.push_back(material);
   }
+  // Add the blocks.
   for (std::uint64_t i = 0; i < layout.blocks; ++i) {
     const BlockPlace place = block_place(i);
     const std::vector<Facet> facets = build_block(place);

@@ -1,4 +1,20 @@
-// Ground, pavement, buildings and trees from a hash of the block's place.
+// One block of the city, built from dice that the block's place seeds: the same place always gets
+// the same block, whatever was built before.
+//
+// Seen from above, lengths in metres:
+//
+//     +---------------------------+  16
+//     |  street (ground, asphalt) |
+//     |   +-------------------+   |  13.8     pavement: a slab over the highest ground below it
+//     |   |  +-------------+  |   |  12.6     lot: a park, one building, or two with an alley
+//     |   |  |     lot     |  |   |
+//     |   |  +-------------+  |   |  3.4
+//     |   |       trees       |   |
+//     |   +-------------------+   |  2.2
+//     +---------------------------+  0
+//
+// Everything is made of flat facets: boxes, without a bottom where they stand on something, and
+// icosahedra for leaves. The ground is a sum of waves of the world's x and z, so that blocks join.
 #include "engine/scene/procedural/city_block.h"
 
 #include <algorithm>
@@ -22,9 +38,10 @@ enum Colour : std::uint8_t {
   kRoofBox,
   kAwning,
   kShutter,
-  kFirstWall  // the rest are walls
+  kFirstWall  // this colour and all after it are for walls
 };
 
+// Reflectance of each colour, red, green and blue.
 constexpr std::array<glm::vec3, kCityColours> kAlbedo = {{
     {0.12f, 0.12f, 0.13f},
     {0.18f, 0.34f, 0.10f},
@@ -45,11 +62,12 @@ constexpr std::array<glm::vec3, kCityColours> kAlbedo = {{
 }};
 
 constexpr float kBlock = static_cast<float>(kBlockMetres);
-constexpr float kKerb = 2.2f;    // from the block's border to the pavement
-constexpr float kLot = 3.4f;     // and to the buildings
-constexpr int kGroundCells = 8;  // a side
+constexpr float kKerb = 2.2f;    // metres from the block's border to the pavement
+constexpr float kLot = 3.4f;     // metres from the block's border to the buildings
+constexpr int kGroundCells = 8;  // squares of ground along a side of the block
 static_assert(2 * kGroundCells * kGroundCells == kGroundTriangles);
 
+// A stream of random choices that a place seeds.
 class Dice {
  public:
   explicit Dice(const BlockPlace& place)
@@ -69,11 +87,13 @@ class Dice {
   std::uint64_t state_;
 };
 
+// Returns the height of the ground at a place of the world, metres.
 float ground_height(double x, double z) {
   return static_cast<float>(1.8 * std::sin(x / 97) * std::cos(z / 83) +
                             0.2 * std::sin(x / 17 + 1) * std::sin(z / 19));
 }
 
+// Collects the facets of one block.
 class Builder {
  public:
   explicit Builder(const BlockPlace& place) : corner_(block_corner(place)), dice_(place) {}
@@ -94,6 +114,7 @@ class Builder {
   }
 
  private:
+  // Returns the height of the ground at a place of the block.
   [[nodiscard]] float height(float x, float z) const {
     return ground_height(corner_.x + static_cast<double>(x), corner_.z + static_cast<double>(z));
   }
@@ -102,6 +123,7 @@ class Builder {
     facets_.push_back({a, b - a, c - a, colour, true});
   }
 
+  // Adds a box whose faces look outwards. Its bottom is left out where it stands on something.
   void box(const glm::vec3& low, const glm::vec3& high, std::uint8_t colour, bool has_bottom) {
     const glm::vec3 x(high.x - low.x, 0, 0);
     const glm::vec3 y(0, high.y - low.y, 0);
@@ -129,7 +151,7 @@ class Builder {
     }
   }
 
-  // A slab that the ground does not pierce. @return its top
+  // Adds a slab that the ground does not pierce. @return  the height of its top
   float pavement() {
     const float end = kBlock - kKerb;
     const auto [low, high] =
@@ -158,20 +180,24 @@ class Builder {
     building({gap + 0.8f, top, kLot}, {end, top, end});
   }
 
+  // Adds a building on the rectangle between two corners at the height of the pavement.
   void building(const glm::vec3& low, const glm::vec3& base_high) {
+    // Choose its height and colour, and raise the walls.
     const float storey = dice_.between(2.9f, 3.5f);
     const int storeys = dice_.whole(2, 6) + (dice_.chance(0.2f) ? dice_.whole(2, 7) : 0);
     const glm::vec3 high(base_high.x, low.y + storey * static_cast<float>(storeys), base_high.z);
     const auto wall = static_cast<std::uint8_t>(dice_.whole(kFirstWall, kCityColours - 1));
     box(low - glm::vec3(0, 0.1f, 0), high, wall, false);
+    // Put a ledge and awnings on each storey.
     for (int i = 1; i <= storeys; ++i) {
       const float y = low.y + storey * static_cast<float>(i);
-      const bool is_roof = i == storeys;  // its top lies over that of the walls, not in it
+      const bool is_roof = i == storeys;  // the roof lies above the top of the walls, not in it
       const glm::vec3 out(is_roof ? 0.45f : 0.3f, is_roof ? 0.06f : 0, is_roof ? 0.45f : 0.3f);
       box(glm::vec3(low.x, y - 0.2f, low.z) - out, glm::vec3(high.x, y, high.z) + out, kLedge,
           true);
       front(low, high, y - storey, storey);
     }
+    // Put boxes on the roof.
     const int boxes = dice_.whole(2, 5);
     for (int i = 0; i < boxes; ++i) {
       const glm::vec3 size(dice_.between(0.6f, 1.6f), dice_.between(0.5f, 2),
@@ -182,7 +208,7 @@ class Builder {
     }
   }
 
-  // Awnings over the windows of one storey, on the two sides that look along x.
+  // Adds awnings over the windows of one storey, on the two sides that look along x.
   void front(const glm::vec3& low, const glm::vec3& high, float floor, float storey) {
     const std::uint8_t colour = dice_.chance(0.5f) ? kAwning : kShutter;
     const int windows = static_cast<int>((high.z - low.z) / 2.6f);
@@ -208,11 +234,12 @@ class Builder {
     }
   }
 
-  // An icosahedron: two poles, and two rings of five turned against each other.
+  // Adds an icosahedron: two poles, and two rings of five corners turned against each other.
   void clump(const glm::vec3& centre, float radius, std::uint8_t colour) {
-    constexpr float kRise = 0.4472136f;  // of a ring: 1 / sqrt(5)
-    constexpr float kRing = 0.8944272f;
-    constexpr float kTurn = 1.2566371f;  // a fifth of a turn
+    constexpr float kRise = 0.4472136f;  // height of a ring over the middle: 1 / sqrt(5)
+    constexpr float kRing = 0.8944272f;  // radius of a ring: 2 / sqrt(5)
+    constexpr float kTurn = 1.2566371f;  // a fifth of a turn, radians
+    // Place the corners of both rings.
     const float start = dice_.between(0, kTurn);
     std::array<glm::vec3, 5> upper, lower;
     for (std::size_t i = 0; i < 5; ++i) {
@@ -221,6 +248,7 @@ class Builder {
       upper[i] = centre + radius * glm::vec3(kRing * std::sin(a), kRise, kRing * std::cos(a));
       lower[i] = centre + radius * glm::vec3(kRing * std::sin(b), -kRise, kRing * std::cos(b));
     }
+    // Join them with each other and with the poles.
     const glm::vec3 top = centre + glm::vec3(0, radius, 0);
     const glm::vec3 bottom = centre - glm::vec3(0, radius, 0);
     for (std::size_t i = 0; i < 5; ++i) {
@@ -241,13 +269,15 @@ class Builder {
 
 BlockPlace block_place(std::uint64_t index) {
   if (index == 0) return {};
-  // Ring r holds the blocks from (2r - 1)^2 to (2r + 1)^2 - 1, on four sides of 2r.
+  // Find the ring: ring r holds the blocks from (2r - 1)^2 to (2r + 1)^2 - 1, on four sides of 2r
+  // blocks each.
   auto ring = static_cast<std::int64_t>((std::sqrt(static_cast<double>(index)) + 1) / 2);
   const auto begin_of = [](std::int64_t r) {
     return static_cast<std::uint64_t>((2 * r - 1) * (2 * r - 1));
   };
   while (begin_of(ring) > index) --ring;
   while (begin_of(ring + 1) <= index) ++ring;
+  // Find the side, and the step along it.
   const auto along = static_cast<std::int64_t>(index - begin_of(ring));
   const std::int64_t side = along / (2 * ring);
   const std::int64_t step = along % (2 * ring);

@@ -1,4 +1,27 @@
-// Lloyd's method with a hash grid of the clusters' middles.
+// Lloyd's method, with a hash grid of the clusters' middles.
+//
+// A round assigns each point to the nearest middle, which makes the clusters Voronoi cells, and
+// then moves each middle to the mean of its points. Both steps lower the sum of squared distances,
+// so the rounds converge, to cells that are nearly hexagons (Lloyd 1982; Du, Faber and Gunzburger
+// 1999):
+//
+//     equal stretches            after some rounds
+//     +----+--+-----+            /  \ /  \ /  \          Steps of 1.7 times the way to the mean
+//     | x  |x | x   |    --->   |  x |  x |  x |         reach the same evenness in half as many
+//     +--+-+--+--+--+            \  / \  / \  /          rounds; the last round takes 1.
+//
+// The nearest middle of every point is the inner loop. Three things make it fast:
+//
+// - Middles lie in a grid whose cells are as wide as clusters are apart, so that the nearest one is
+//   in the point's cell or one of its 26 neighbours. Where the spacing varies there is a grid for
+//   each power of two of it.
+// - Points are visited cell by cell, so the middles around a cell are gathered once, in columns
+//   (NearClusters), and a loop without branches finds the nearest.
+// - The loop finds the least distance and its row in one number:
+//
+//       31                       7 6        0
+//       [ square of the distance | row       ]    floats that are not negative are ordered as their
+//         upper 25 bits            0 to 127       bits are, so one integer minimum finds both
 #include "engine/scene/sampling/clusters.h"
 
 #include <algorithm>
@@ -16,13 +39,15 @@
 namespace ptc {
 namespace {
 
-// Surfaces that turn by more than 75 degrees do not share a cluster.
+// Cosine between a point's normal and its cluster's, at least: surfaces that turn by more than 75
+// degrees do not share a cluster.
 constexpr float kMinCosine = 0.26f;
 
-// Going beyond the middle takes half as many rounds to the same evenness.
+// How far a cluster moves towards the middle of its members, over the distance to it. Overshooting
+// takes half as many rounds to the same evenness.
 constexpr float kStride = 1.7f;
 
-// The points' bounding box, to put cells on it.
+// The bounding box of the points, which the grids lie on.
 struct Box {
   glm::vec3 low;
   float widest;
@@ -38,7 +63,7 @@ struct Box {
   }
 };
 
-// Clusters near a cell, as columns that a loop without branches goes through.
+// The clusters near one cell of a grid, in columns that a loop without branches goes through.
 class NearClusters {
  public:
   void clear() {
@@ -60,7 +85,9 @@ class NearClusters {
     table.kind[row] = static_cast<float>(cluster.kind);
   }
 
-  // Makes `owner` the nearest that p may join, if the square of its distance is below `best`.
+  // Finds the nearest cluster that p may join.
+  // @param best   squared distance of the owner so far; is lowered with it
+  // @param owner  is replaced when the cluster is nearer than that
   void find_nearest(const SurfacePoint& p, float& best, std::uint32_t& owner) const {
     for (std::size_t first = 0; first < size_; first += kRows) {
       const std::int32_t least = tables_[first / kRows].least(p, std::min(size_ - first, kRows));
@@ -74,14 +101,14 @@ class NearClusters {
  private:
   static constexpr std::size_t kRows = 128;
   static constexpr std::int32_t kRowMask = 127;
-  static constexpr float kNever = 1e36f;  // beyond all squares, and no infinity
+  static constexpr float kNever = 1e36f;  // finite, and greater than every squared distance
   using Column = std::array<float, kRows>;
 
   struct Table {
     Column x, y, z, normal_x, normal_y, normal_z, kind;
 
-    // The least square of a distance, its last 7 bits replaced by the row: positive floats are
-    // ordered as their bits are.
+    // Returns the least squared distance, its lowest 7 bits replaced by the row. A cluster that p
+    // may not join is put at a distance beyond all others instead of being skipped.
     [[nodiscard]] std::int32_t least(const SurfacePoint& p, std::size_t rows) const {
       const auto own_kind = static_cast<float>(p.kind);
       std::int32_t least = std::numeric_limits<std::int32_t>::max();
@@ -108,14 +135,15 @@ class NearClusters {
   std::vector<std::uint32_t> indices_;
 };
 
-// Clusters by the cell they lie in. Cells are as wide as the clusters are apart; where that
-// differs, there is a grid for each power of two of it.
+// Finds clusters by the cell that they lie in. The cells of a level are as wide as its clusters are
+// apart; each level's cells are half as wide as those of the level before.
 class ClusterGrid {
  public:
   static constexpr std::size_t kLevels = 8;
 
   ClusterGrid(const Box& box, float widest_cell) : low_(box.low) {
-    // 19 bits an axis: a patch that is wider than so many cells is sparse, and larger cells do.
+    // Keep cell indices within 19 bits on each axis. A patch that is wider than that many cells is
+    // sparse, and larger cells serve it as well.
     const float least = box.widest / 524000;
     for (std::size_t level = 0; level < kLevels; ++level) {
       cell_[level] = std::max({std::ldexp(widest_cell, -static_cast<int>(level)), least,
@@ -123,37 +151,41 @@ class ClusterGrid {
     }
   }
 
-  // The grid for clusters that are `reach` apart.
+  // Returns the finest level whose cells are at least `reach` wide.
   [[nodiscard]] std::size_t level_of(float reach) const {
     std::size_t level = 0;
     while (level + 1 < kLevels && cell_[level + 1] >= reach) ++level;
     return level;
   }
 
+  // Replaces the contents by these clusters. @param levels  the level of each
   void rebuild(std::span<const Cluster> clusters, std::span<const std::size_t> levels) {
+    // Sort the clusters by cell.
     entries_.clear();
     used_.clear();
     for (std::uint32_t i = 0; i < clusters.size(); ++i) {
       entries_.push_back({key_of(levels[i], cell_at(clusters[i].position, levels[i])), i});
     }
     std::sort(entries_.begin(), entries_.end());
+    // Note which levels have clusters.
     for (std::size_t level = 0; level < kLevels; ++level) {
       if (std::find(levels.begin(), levels.end(), level) != levels.end()) used_.push_back(level);
     }
+    // Hash the first cluster of each cell.
     table_.assign(std::bit_ceil(2 * entries_.size() + 1), kEmpty);
     for (std::uint32_t i = 0; i < entries_.size(); ++i) {
       if (i == 0 || entries_[i].first != entries_[i - 1].first) *slot(entries_[i].first) = i;
     }
   }
 
-  // Those that have clusters.
+  // Returns the levels that have clusters.
   [[nodiscard]] std::span<const std::size_t> used_levels() const { return used_; }
 
   [[nodiscard]] std::uint64_t cell_key(std::size_t level, const glm::vec3& p) const {
     return key_of(level, cell_at(p, level));
   }
 
-  // Calls visit(cluster) for those in the cell around `p` and its 26 neighbours.
+  // Calls visit(cluster) for each cluster in the cell around `p` and in its 26 neighbours.
   template <typename Visit>
   void near(std::size_t level, const glm::vec3& p, const Visit& visit) {
     const Cell middle = cell_at(p, level);
@@ -170,17 +202,20 @@ class ClusterGrid {
   using Cell = std::array<std::uint64_t, 3>;
   static constexpr std::uint32_t kEmpty = ~0u;
 
-  // From 1 on, so that a neighbour before the first is no special case.
+  // Counts cells from 1 on, so that a neighbour before the first cell is no special case.
   [[nodiscard]] Cell cell_at(const glm::vec3& p, std::size_t level) const {
     const glm::vec3 at = (p - low_) / cell_[level];
     const auto index = [](float c) { return static_cast<std::uint64_t>(std::max(c, 0.0f)) + 1; };
     return {index(at.x), index(at.y), index(at.z)};
   }
 
+  // Packs a cell into a number: level in 4 bits, then z, y and x in 20 bits each.
   static std::uint64_t key_of(std::size_t level, const Cell& c) {
     return std::uint64_t{level} << 60 | c[2] << 40 | c[1] << 20 | c[0];
   }
 
+  // Returns the slot of a cell by linear probing: that with its first entry, or the empty one where
+  // it would go.
   std::uint32_t* slot(std::uint64_t key) {
     std::size_t i = splitmix64(key) & (table_.size() - 1);
     while (table_[i] != kEmpty && entries_[table_[i]].first != key) {
@@ -198,12 +233,13 @@ class ClusterGrid {
   }
 
   glm::vec3 low_;
-  std::array<float, kLevels> cell_{};
-  std::vector<std::size_t> used_;
+  std::array<float, kLevels> cell_{};  // width of the cells of each level
+  std::vector<std::size_t> used_;      // levels that have clusters
   std::vector<std::pair<std::uint64_t, std::uint32_t>> entries_;  // cell and cluster, sorted
-  std::vector<std::uint32_t> table_;  // open addressing: the first entry of each cell
+  std::vector<std::uint32_t> table_;  // open addressing: index of the first entry of each cell
 };
 
+// The state of one run of the method.
 class Lloyd {
  public:
   Lloyd(std::span<const SurfacePoint> points, std::size_t count, std::vector<std::uint32_t>& owners)
@@ -211,7 +247,8 @@ class Lloyd {
     sort_by_cell();
   }
 
-  // @param stride  how far to go towards the members' middle, 1: all the way
+  // Assigns the points, and moves the clusters.
+  // @param stride  how far to go towards the members' middle; 1 goes all the way
   void round(float stride) {
     grid_.rebuild(clusters_, levels_);
     cached_cell_.fill(~std::uint64_t{0});
@@ -220,6 +257,7 @@ class Lloyd {
     split_largest();
   }
 
+  // Drops the clusters without members, and numbers the owners of all points accordingly.
   std::vector<Cluster> finish() {
     std::vector<std::uint32_t> members(clusters_.size());
     for (const std::uint32_t owner : owners_) ++members[owner];
@@ -234,7 +272,8 @@ class Lloyd {
   }
 
  private:
-  // Equal stretches; the widest of them sets the grids.
+  // Makes equal stretches of the points the first clusters. The largest of them sets the width of
+  // the grids' cells.
   ClusterGrid begin(std::size_t count) {
     owners_.resize(points_.size());
     std::vector<double> area(count);
@@ -251,7 +290,8 @@ class Lloyd {
     return grid;
   }
 
-  // The cells stay while clusters move: points of a cell one after another share its list.
+  // Orders the points by cell. The cells stay while clusters move, and points that follow each
+  // other in one cell share its list of clusters.
   void sort_by_cell() {
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed(points_.size());
     for (std::uint32_t i = 0; i < points_.size(); ++i) {
@@ -263,6 +303,8 @@ class Lloyd {
                    [](const auto& k) { return k.second; });
   }
 
+  // Moves each cluster by `stride` of the way to the middle of its members, and turns it to their
+  // mean normal, or to that of any member where the normals cancel out.
   void move_to_middles(float stride) {
     sums_.assign(clusters_.size(), {});
     for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -282,7 +324,8 @@ class Lloyd {
     }
   }
 
-  // Clusters that lost all members go to the largest, where the next round shares out its points.
+  // Moves clusters that lost all members to members of the largest clusters, whose points the next
+  // round divides.
   void split_largest() {
     std::vector<std::uint32_t> lost, largest;
     for (std::uint32_t c = 0; c < clusters_.size(); ++c) {
@@ -301,7 +344,8 @@ class Lloyd {
     }
   }
 
-  // Leaves the point where it is when no cluster near it faces its way.
+  // Gives a point to the nearest cluster of its kind that faces its way. Where there is none among
+  // the cells around it, its owner stays.
   void join_nearest(std::uint32_t i) {
     const SurfacePoint& p = points_[i];
     float best = 1e30f;
@@ -310,6 +354,7 @@ class Lloyd {
     }
   }
 
+  // Returns the clusters of a level around a point, from the cache while the cell is the same.
   const NearClusters& near(std::size_t level, const glm::vec3& p) {
     const std::uint64_t cell = grid_.cell_key(level, p);
     if (cell != cached_cell_[level]) {
@@ -320,23 +365,24 @@ class Lloyd {
     return cached_[level];
   }
 
+  // Sums over the members of a cluster.
   struct Sum {
     glm::dvec3 position{0};
     glm::vec3 normal{0};
     std::uint32_t count = 0;
-    std::uint32_t any = 0;  // one of the members
+    std::uint32_t any = 0;  // index of one of the members
   };
 
   std::span<const SurfacePoint> points_;
   std::vector<std::uint32_t>& owners_;
   Box box_;
-  std::vector<std::uint32_t> order_;  // of the points, by cell
+  std::vector<std::uint32_t> order_;  // indices of the points, by cell
   std::vector<Cluster> clusters_;
-  std::vector<std::size_t> levels_;
+  std::vector<std::size_t> levels_;  // of the grid, for each cluster
   std::vector<Sum> sums_;
-  std::array<std::uint64_t, ClusterGrid::kLevels> cached_cell_{};
-  std::array<NearClusters, ClusterGrid::kLevels> cached_;
-  ClusterGrid grid_;  // last: begin() fills what is above
+  std::array<std::uint64_t, ClusterGrid::kLevels> cached_cell_{};  // key of the cell, by level
+  std::array<NearClusters, ClusterGrid::kLevels> cached_;          // the clusters around it
+  ClusterGrid grid_;  // last, because begin() fills the members above
 };
 
 }  // namespace

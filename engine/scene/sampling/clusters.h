@@ -1,4 +1,4 @@
-// Grouping points of a surface into compact clusters of about equal size.
+// Groups points of a surface into compact clusters of about equal size.
 #pragma once
 
 #include <cstdint>
@@ -11,19 +11,23 @@
 
 namespace ptc {
 
-/// A group: its middle, and its members' mean normal, unit.
+/// A group of surface points.
 struct Cluster {
-  glm::vec3 position{0};
-  glm::vec3 normal{0};
-  std::uint32_t kind = 0;
+  glm::vec3 position{0};   ///< mean position of the members, relative to Mesh::origin
+  glm::vec3 normal{0};     ///< mean normal of the members, unit
+  std::uint32_t kind = 0;  ///< SurfacePoint::kind, which all members share
 };
 
-/// Clusters by Lloyd's method: equal stretches of the points to begin with, then `rounds` times
-/// each point joins the nearest cluster that faces its way, and each cluster moves to its members'
-/// middle. The middles end up regularly spaced, each near the middle of what it stands for.
-/// @param points  in an order that keeps neighbours together, kinds and opposite sides apart
-/// @param count   at most points.size(); more are as many
-/// @param owners  is overwritten: for each point its cluster; every cluster has a member
+/// Clusters points by Lloyd's method. The middles end up regularly spaced, each near the middle of
+/// the surface that it stands for.
+///
+/// Clusters begin as equal stretches of the points. Then, `rounds` times, each point joins the
+/// nearest cluster of its kind that faces its way, and each cluster moves to the middle of its
+/// members.
+/// @param points  in an order that keeps neighbours together, and kinds and opposite sides apart
+/// @param count   wanted clusters; a number above points.size() counts as points.size()
+/// @param rounds  0 keeps the equal stretches
+/// @param owners  is overwritten with the cluster of each point; every cluster has a member
 /// @return        `count` clusters, or fewer when some lost all members
 /// Source: Lloyd 1982; Du, Faber and Gunzburger 1999.
 [[nodiscard]] std::vector<Cluster> cluster_points(std::span<const SurfacePoint> points,

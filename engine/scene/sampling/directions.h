@@ -1,4 +1,4 @@
-// Directions around an axis, from points of the unit square.
+// Turns points of the unit square into directions around an axis.
 #pragma once
 
 #include <algorithm>
@@ -13,12 +13,16 @@
 namespace ptc {
 
 /// A right-handed frame whose third axis is a given unit vector.
+///
+/// The frame is the one that the shortest rotation from +z to the axis gives, or from -z where the
+/// axis points downwards: so the division below never comes near zero.
 /// Source: Duff et al. 2017, Building an orthonormal basis, revisited.
 struct Basis {
-  glm::vec3 x;
-  glm::vec3 y;
-  glm::vec3 z;
+  glm::vec3 x;  ///< unit, square to the axis
+  glm::vec3 y;  ///< unit, square to the axis and to x
+  glm::vec3 z;  ///< the axis
 
+  /// Builds the frame. @param axis  unit
   explicit Basis(const glm::vec3& axis) noexcept : z(axis) {
     const float sign = std::copysign(1.0f, axis.z);
     const float a = -1.0f / (sign + axis.z);
@@ -27,13 +31,22 @@ struct Basis {
     y = {b, sign + axis.y * axis.y * a, -axis.y};
   }
 
+  /// Returns a vector of this frame in the axes that x, y and z are given in.
   [[nodiscard]] glm::vec3 to_world(const glm::vec3& v) const noexcept {
     return x * v.x + y * v.y + z * v.z;
   }
 };
 
-/// A unit vector about +z whose distance from the axis, squared, is uniform in [0, widest^2):
-/// cosine-distributed over the hemisphere when `widest` is 1, over a cap of that sine below.
+/// Returns a unit vector about +z whose density is in proportion to its cosine to +z.
+///
+///            z                A point uniform in the disc of radius `widest` is lifted onto the
+///            |  . - .         unit sphere (Malley's method): the area element of the sphere times
+///            |/       \       its cosine is the area element of the disc.
+///     -------+----x----+--
+///                widest
+///
+/// @param square  a point of the unit square: the squared distance from the axis, and the turn
+/// @param widest  sine of the cap's half angle, in [0, 1]; 1 covers the hemisphere
 [[nodiscard]] inline glm::vec3 cosine_direction(const glm::vec2& square,
                                                 float widest = 1) noexcept {
   const float r = widest * std::sqrt(square.x);

@@ -1,4 +1,22 @@
 // Sample points that fill the unit square evenly, scrambled by a seed.
+//
+// The Sobol sequence in two dimensions is a (0, 2) sequence: of any 2^k points from a multiple of
+// 2^k on, exactly one falls into each box of every partition into 2^k boxes. Four points (k = 2):
+//
+//     +---+---+---+---+
+//     |   |   | x |   |
+//     +---+---+---+---+
+//     | x |   |   |   |     one point in each column (boxes of 1/4 x 1),
+//     +---+---+---+---+     in each row (1 x 1/4)
+//     |   |   |   | x |     and in each quadrant (1/2 x 1/2)
+//     +---+---+---+---+
+//     |   | x |   |   |
+//     +---+---+---+---+
+//
+// Owen's scramble flips the digits of each coordinate at random, each digit by those above it,
+// which keeps that property and makes estimates unbiased. As a hash of a number with its bits
+// reversed, it takes a few multiplications (Laine and Karras 2011): the product by an even number
+// carries only from lower to higher bits.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +27,12 @@
 
 namespace ptc {
 
-/// The top 24 bits as a number in [0, 1).
+/// Returns the top 24 bits as a number in [0, 1).
 [[nodiscard]] constexpr float to_unit(std::uint32_t bits) noexcept {
   return static_cast<float>(bits >> 8) * 0x1p-24f;
 }
 
+/// Returns the bits of a number in the opposite order: bit 0 becomes bit 31.
 [[nodiscard]] constexpr std::uint32_t reverse_bits(std::uint32_t x) noexcept {
   x = (x >> 16) | (x << 16);
   x = ((x & 0x00FF00FFu) << 8) | ((x >> 8) & 0x00FF00FFu);
@@ -22,8 +41,8 @@ namespace ptc {
   return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
 }
 
-/// Owen's nested uniform scramble of a number whose bits are reversed: each bit is flipped or not
-/// by what lies below it.
+/// Returns Owen's nested uniform scramble of a number whose bits are reversed. Each bit is flipped
+/// or not depending on the seed and on the bits below it.
 /// Source: Laine and Karras 2011, Stratified sampling for stochastic transparency, section 3.1.
 [[nodiscard]] constexpr std::uint32_t scramble_reversed(std::uint32_t x,
                                                         std::uint32_t seed) noexcept {
@@ -35,24 +54,26 @@ namespace ptc {
   return x;
 }
 
-/// Owen-scrambled points of the Sobol sequence: any 2^k points from a multiple of 2^k on fall one
-/// each into the 2^k boxes of every shape 2^-a x 2^-(k-a).
+/// Owen-scrambled points of the Sobol sequence. Of any 2^k points from a multiple of 2^k on,
+/// exactly one falls into each of the 2^k boxes of size 2^-a x 2^-(k-a), for every a from 0 to k.
 /// Source: Sobol 1967; Owen 1995; Burley 2020, Practical hash-based Owen scrambling.
 class SquarePoints {
  public:
+  /// Chooses one of 2^64 scrambles.
   explicit constexpr SquarePoints(std::uint64_t seed) noexcept : seed_(splitmix64(seed)) {}
 
+  /// Returns the point of an index, in [0, 1) x [0, 1).
   [[nodiscard]] constexpr glm::vec2 square(std::uint32_t index) const noexcept {
     return {to_unit(reverse_bits(scramble_reversed(index, low(seed_)))),
             to_unit(reverse_bits(
                 scramble_reversed(reverse_bits(second_dimension(index)), high(seed_))))};
   }
 
-  /// A further coordinate, evenly spread by itself and independent of square(); of 53 bits, to
-  /// choose from very many.
+  /// Returns a further coordinate of an index, in [0, 1), evenly spread by itself and independent
+  /// of square(). It has 53 bits, enough to choose from very many things.
   [[nodiscard]] constexpr double line(std::uint32_t index) const noexcept {
     const std::uint64_t seed = splitmix64(seed_);
-    // A shuffle that keeps blocks of 2^k together.
+    // Shuffle the index so that blocks of 2^k stay together.
     const std::uint32_t shuffled = reverse_bits(scramble_reversed(reverse_bits(index), low(seed)));
     const std::uint64_t upper = reverse_bits(scramble_reversed(shuffled, high(seed)));
     const std::uint64_t bits = upper << 32 | high(splitmix64(seed + index));
@@ -66,7 +87,13 @@ class SquarePoints {
   static constexpr std::uint32_t high(std::uint64_t x) noexcept {
     return static_cast<std::uint32_t>(x >> 32);
   }
-  // Direction numbers of the second dimension: Pascal's triangle modulo 2, row by row.
+  // Returns a coordinate of the second dimension. Its direction numbers are the rows of Pascal's
+  // triangle modulo 2:
+  //
+  //     1            Each row is the one above it XOR the same shifted by one.
+  //     1 1
+  //     1 0 1
+  //     1 1 1 1
   static constexpr std::uint32_t second_dimension(std::uint32_t index) noexcept {
     std::uint32_t result = 0;
     for (std::uint32_t row = 0x80000000u; index != 0; index >>= 1, row ^= row >> 1) {

@@ -1,5 +1,20 @@
-// Surfels from a mesh, a patch of some thousand at a time: spread points, group them, place a
-// surfel in each group, light it.
+// Turns a mesh into surfels, one patch of some 8192 surfels at a time.
+//
+//     surface of a patch      16 points a surfel      groups of points       one surfel each
+//                             evenly spread           (Lloyd's method)
+//     +-----------+           +-----------+           +-----+-----+          +-----------+
+//     |\    |    /|           |. . . . . .|           |. . .|. . .|          |   _     _  |
+//     | \   |   / |   --->    | . . . . . |   --->    | . . | . . |   --->   |  ( )   ( ) |
+//     |  \  |  /  |           |. . . . . .|           |. . .|. . .|          |   -     -  |
+//     +-----------+           +-----------+           +-----+-----+          +-----------+
+//       triangles             surface_patches.h       clusters.h             place(), reflected()
+//
+// The points measure a group: its area, mean normal, albedo and emission. The surfel lies at the
+// middle of its group; the light is traced from 4 of the points, which share the surfel's rays.
+// Patches depend on nothing but the mesh and the options, so threads make them in any number and
+// they come out in order.
+//
+// What each step gains against rays at the mesh is measured in spec/shading.md#from-a-mesh.
 #include "engine/scene/sampling/sampler.h"
 
 #include <algorithm>
@@ -27,12 +42,12 @@ namespace {
 
 constexpr double kPatchSurfels = 8192;
 constexpr unsigned kPointsPerSurfel = 16;
-constexpr unsigned kRounds = 6;
-constexpr unsigned kLitPoints = 4;  // of a surfel's points, evenly spread
-constexpr double kMinNormal = 0.1;  // length of a mean normal that means something
+constexpr unsigned kRounds = 6;     // of Lloyd's method
+constexpr unsigned kLitPoints = 4;  // points of a surfel that light is traced from, evenly spread
+constexpr double kMinNormal = 0.1;  // least length of a mean normal that is used
 constexpr double kMaxAcross = 3e5;  // spacings along the side of a square as large as the mesh
 
-// What each of some points takes of a number of rays.
+// Returns the rays of one lit point, of those that a surfel has; rounded up.
 unsigned share(unsigned rays) {
   return (rays + kLitPoints - 1) / kLitPoints;
 }
@@ -45,17 +60,20 @@ glm::vec3 finite_or_black(const glm::vec3& c) {
   return std::isfinite(c.x + c.y + c.z) ? c : glm::vec3(0);
 }
 
+// Returns the options with a spacing. @throws RequestError when an option makes no sense
 SamplingOptions resolved(const Mesh& mesh, SamplingOptions options) {
+  // Find the spacing.
   const auto require = [](bool holds, const char* field, const char* what) {
     if (!holds) throw RequestError(field, what);
   };
   require(options.spacing >= 0 && std::isfinite(options.spacing), "sampling.spacing",
           "`sampling.spacing` is negative or not finite");
   if (options.spacing == 0) options.spacing = spacing_for(mesh, options.count);
-  // Memory follows the number of surfels, if slowly.
+  // Limit the number of surfels, because memory grows with it, if slowly.
   const double side = spacing_for(mesh, 1);
   require(side == 0 || side / options.spacing <= kMaxAcross, "sampling.spacing",
           "`sampling.spacing` is too small for a mesh of this size");
+  // Check what belongs to the camera.
   if (options.camera) {
     require(options.pixels_per_surfel > 0 && std::isfinite(options.pixels_per_surfel),
             "sampling.pixels_per_surfel", "`sampling.pixels_per_surfel` is not positive");
@@ -67,10 +85,12 @@ SamplingOptions resolved(const Mesh& mesh, SamplingOptions options) {
   return options;
 }
 
-// Barycentric coordinates of the triangle's point nearest to p.
+// Returns the barycentric coordinates of the triangle's point that is nearest to p. The plane has
+// seven regions: three where a corner is nearest, three where an edge is, and the triangle itself.
 // Source: Ericson 2005, Real-time collision detection, section 5.1.5.
 glm::vec2 nearest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                               const glm::dvec3& c) {
+  // Test the corners.
   const glm::dvec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
   const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
   if (d1 <= 0 && d2 <= 0) return {0, 0};
@@ -78,6 +98,7 @@ glm::vec2 nearest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const gl
   if (d3 >= 0 && d4 <= d3) return {1, 0};
   const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
   if (d6 >= 0 && d5 <= d6) return {0, 1};
+  // Test the edges.
   const double across_c = d1 * d4 - d3 * d2;
   if (across_c <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
   const double across_b = d5 * d2 - d1 * d6;
@@ -87,21 +108,25 @@ glm::vec2 nearest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const gl
     const double v = (d4 - d3) / ((d4 - d3) + (d5 - d6));
     return {1 - v, v};
   }
+  // Take the foot of the perpendicular on the face.
   const double sum = across_a + across_b + across_c;
   return {across_b / sum, across_c / sum};
 }
 
-// What a group of points says of its surfel.
+// Sums over the points of a group, which describe its surfel.
 struct Group {
-  double area = 0;  // one side's
+  double area = 0;  // of one side, scene units squared
   glm::dvec3 albedo{0};
   glm::dvec3 emission{0};
   glm::dvec3 normal{0};
-  std::vector<std::uint32_t> members;  // ascending, so neighbours follow each other
-  std::uint32_t nearest = 0;           // the point nearest to the middle
-  float distance = std::numeric_limits<float>::infinity();
+  std::vector<std::uint32_t> members;  // indices of the points, ascending: neighbours follow each
+                                       // other
+  std::uint32_t nearest = 0;           // index of the point that is nearest to the middle
+  float distance = std::numeric_limits<float>::infinity();  // of that point from the middle
 };
 
+// Streams the surfels of a mesh. It makes a few patches at a time, in parallel, and hands them out
+// in order.
 class MeshSource final : public PointSource {
  public:
   MeshSource(const DirectLight& light, const RayScene& scene, const SamplingOptions& options,
@@ -134,7 +159,8 @@ class MeshSource final : public PointSource {
   }
 
  private:
-  // Makes the next patches, a few for each thread so that none waits long for the others.
+  // Makes the next patches, a few for each thread so that no thread waits long for the others.
+  // @return  false after the last patch
   bool fetch() {
     const std::size_t count =
         std::min<std::size_t>(patches_.size() - done_, std::size_t{4} * executor_.threads());
@@ -147,6 +173,7 @@ class MeshSource final : public PointSource {
   }
 
   [[nodiscard]] std::vector<Surfel> make_patch(std::size_t index) const;
+  // Sums up the points of each cluster.
   [[nodiscard]] std::vector<Group> sum_up(const std::vector<SurfacePoint>& points,
                                           const std::vector<std::uint32_t>& owners,
                                           const std::vector<Cluster>& clusters) const;
@@ -159,14 +186,14 @@ class MeshSource final : public PointSource {
   const DirectLight& light_;
   const RayScene& scene_;
   SamplingOptions options_;
-  LightSampling lit_point_;  // for each of a surfel's points
+  LightSampling lit_point_;  // shadow rays for each lit point of a surfel
   const Executor& executor_;
   SpacingField field_;
   SurfacePatches patches_;
   std::size_t done_ = 0;                    // patches made so far
-  std::vector<std::vector<Surfel>> ready_;  // patches made and not yet all given away
-  std::size_t patch_ = 0;                   // of ready_, the one being given away
-  std::size_t taken_ = 0;                   // surfels of it that are gone
+  std::vector<std::vector<Surfel>> ready_;  // patches that are made and not all handed out
+  std::size_t patch_ = 0;                   // index in ready_ of the one being handed out
+  std::size_t taken_ = 0;                   // surfels of it that were handed out
 };
 
 std::vector<Group> MeshSource::sum_up(const std::vector<SurfacePoint>& points,
@@ -191,10 +218,11 @@ std::vector<Group> MeshSource::sum_up(const std::vector<SurfacePoint>& points,
   return groups;
 }
 
-// A surfel at the middle of its group, on the triangle of the point nearest to that, across the
-// group's mean normal; away from edges that it sticks out over.
+// Places a surfel at the middle of its group, on the triangle of the point that is nearest to the
+// middle, across the group's mean normal, and moves it away from edges that it sticks out over.
 Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest,
                          const Cluster& cluster) const {
+  // Find the place on the mesh that is nearest to the middle.
   const Mesh& mesh = scene_.mesh();
   const auto& c = mesh.triangles[nearest.triangle];
   glm::vec2 uv =
@@ -202,6 +230,7 @@ Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest,
                           glm::dvec3(mesh.positions[c[1]]), glm::dvec3(mesh.positions[c[2]]));
   if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = nearest.uv;
   const SurfaceHit at = scene_.surface(nearest.triangle, uv.x, uv.y);
+  // Take the means of the group, and the normal there when the group's normals cancel out.
   const auto count = static_cast<double>(group.members.size());
   const double length = glm::length(group.normal);
   Surfel surfel;
@@ -213,8 +242,9 @@ Surfel MeshSource::place(const Group& group, const SurfacePoint& nearest,
   return surfel;
 }
 
-// Light reflected by a group in the mean: by those of a few points that are not buried. Nothing
-// when all are.
+// Returns the mean radiance that a group reflects on one side, from those of a few of its points
+// that are not buried, or nothing when all of them are.
+// @param side  1 for the front, -1 for the back
 std::optional<glm::vec3> MeshSource::reflected(const Group& group,
                                                std::span<const SurfacePoint> points, float side,
                                                std::uint64_t seed) const {
@@ -236,14 +266,16 @@ std::optional<glm::vec3> MeshSource::reflected(const Group& group,
 }
 
 std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
+  // Spread points over the patch, and group them.
   const SurfacePatch patch = patches_.spread(index, kPointsPerSurfel);
   std::vector<std::uint32_t> owners;
   const std::vector<Cluster> clusters =
       cluster_points(patch.points, patch.surfels, kRounds, owners);
   const std::vector<Group> groups = sum_up(patch.points, owners, clusters);
 
+  // Light and place a surfel for each group that is not buried, two where both sides count.
   std::vector<Surfel> surfels;
-  double covered = 0;  // sum of 2 r^2, with those that are buried
+  double covered = 0;  // sum of 2 r^2 of all surfels, buried ones as well
   for (std::size_t i = 0; i < clusters.size(); ++i) {
     const Group& group = groups[i];
     const SurfacePoint& nearest = patch.points[group.nearest];
@@ -263,6 +295,7 @@ std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
     surfel.radiance = back.value_or(glm::vec3(0));
     surfels.push_back(surfel);
   }
+  // Scale the radii so that the surfels have the area of the patch.
   const auto scale = static_cast<float>(std::sqrt(patch.area / covered));
   for (Surfel& surfel : surfels) surfel.radius *= scale;
   return surfels;

@@ -1,4 +1,6 @@
-// The spacing near a camera.
+// The spacing in the view of a camera: the distance to the camera times the angle of the pixels
+// that may lie between two surfels. A ball counts as in view unless it lies wholly behind the
+// camera or beyond one side of the view's pyramid.
 #include "engine/scene/sampling/spacing_field.h"
 
 #include <algorithm>
@@ -30,7 +32,8 @@ bool SpacingField::is_in_view(const glm::dvec3& centre, double radius) const {
   const glm::dvec3 offset = centre - eye_;
   const double ahead = glm::dot(offset, axes_.forward);
   if (ahead < -radius) return false;
-  // Distance from a side plane of the view pyramid; its normal has length hypot(1, half).
+  // Compare the distance from a side plane of the view's pyramid; the plane's normal (1, half) has
+  // the length hypot(1, half).
   const auto within = [&](double aside, double half) {
     return std::abs(aside) - ahead * half <= radius * std::hypot(1.0, half);
   };

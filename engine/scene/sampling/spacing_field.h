@@ -1,4 +1,4 @@
-// How far apart surfels should be, here and there.
+// The wanted distance between surfels at each place of a scene.
 #pragma once
 
 #include <optional>
@@ -10,27 +10,36 @@
 
 namespace ptc {
 
-/// The wanted spacing of a region: the base spacing, finer in a camera's view.
+/// The wanted spacing of surfels: the base spacing everywhere, finer in a camera's view.
+///
+///     spacing ^            __________   outside the view, and far from the camera
+///             |          /
+///             |        /                in the view: distance times angle
+///             |  ____/                  near the camera: the finest spacing
+///             +-------------------> distance from the camera
 class SpacingField {
  public:
-  /// @param options  with a spacing that is resolved (positive)
+  /// Takes the spacing and the camera of the options.
+  /// @param options  has a spacing above 0
   explicit SpacingField(const SamplingOptions& options);
 
-  /// Spacing that suits all of a ball: the finest that any of its points asks for.
+  /// Returns the spacing that suits all of a ball, scene units: the finest that any of its points
+  /// asks for.
   [[nodiscard]] double at(const glm::dvec3& centre, double radius) const;
-  /// False when it is the same everywhere.
+  /// Reports whether the spacing depends on the place.
   [[nodiscard]] bool varies() const noexcept { return angle_ != 0; }
 
  private:
+  /// Reports whether any part of a ball may lie in the enlarged view.
   [[nodiscard]] bool is_in_view(const glm::dvec3& centre, double radius) const;
 
-  double spacing_;
-  double finest_;
-  double angle_ = 0;  // between neighbours as the camera sees them; 0: no camera
-  glm::dvec3 eye_{0};
+  double spacing_;     ///< base spacing, scene units
+  double finest_;      ///< minimum spacing, scene units
+  double angle_ = 0;   ///< between neighbours as the camera sees them, radians; 0: no camera
+  glm::dvec3 eye_{0};  ///< position of the camera
   CameraAxes axes_{};
-  double half_width_ = 0;  // of the view at distance 1, enlarged
-  double half_height_ = 0;
+  double half_width_ = 0;   ///< half the width of the enlarged view at distance 1
+  double half_height_ = 0;  ///< half the height of the enlarged view at distance 1
 };
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// Geometry of a triangle's parts.
+// The geometry of a triangle's parts.
 #include "engine/scene/sampling/sub_triangle.h"
 
 #include <cstddef>
@@ -8,7 +8,8 @@
 namespace ptc {
 namespace {
 
-// The corner from which the longest edge leads to the next; of equal ones the first.
+// Returns the corner from which the longest edge leads to the next corner; of equally long edges it
+// takes the first, so that every caller cuts the same triangle the same way.
 std::size_t longest_from(const std::array<glm::dvec3, 3>& corner) {
   std::size_t longest = 0;
   double most = -1;

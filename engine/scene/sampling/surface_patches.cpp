@@ -1,4 +1,20 @@
-// Cutting and sorting the surface, and spreading points over a patch of it.
+// Cuts and sorts the surface of a mesh, and spreads points over a patch of it.
+//
+// Triangles come in any size and order, and surfels are wanted everywhere alike. So the surface is
+// laid out as a line whose length is the number of surfels wanted, in two levels:
+//
+//     mesh    ->  pieces, up to 32 spacings wide  ->  sorted along the Z-curve  ->  patches
+//     patch   ->  parts, up to 1 spacing wide     ->  sorted within the patch   ->  points
+//
+// The points of a patch lie at equal steps of that line. Point k owns the weight from k to k + 1
+// steps, and lies in the part, or the half of it and so on, where the middle of its step falls:
+//
+//     parts    |----a----|--b--|-c-|------d------|---e---|     lengths are weights
+//     steps    |-----+-----+-----+-----+-----+-----+-----|
+//     points      0     1     2     3     4     5     6
+//
+// Within that half it is set at random, so that the points are even without being regular. Areas
+// are shared out by the same steps, so they add up exactly, even where a step spans many parts.
 #include "engine/scene/sampling/surface_patches.h"
 
 #include <algorithm>
@@ -17,19 +33,24 @@
 namespace ptc {
 namespace {
 
-constexpr double kPieceSpacings = 32;        // a piece is at most so wide,
-constexpr double kVaryingPieceSpacings = 8;  // so that it has one spacing nearly,
-constexpr double kPieceWeight = 0.1;         // or wants at most so many surfels
-constexpr double kPartSpacings = 1;          // the same of a part of it
-constexpr double kPartWeight = 0.0156;
-constexpr std::uint32_t kDeepest = 1u << 30;  // so that a path fits 32 bits
+// A piece is cut until it is narrow, or wants few surfels. Narrower where the spacing varies, so
+// that a piece has nearly one spacing.
+constexpr double kPieceSpacings = 32;
+constexpr double kVaryingPieceSpacings = 8;
+constexpr double kPieceWeight = 0.1;  // surfels
+// A part of a piece is cut until it is this narrow, or wants this few surfels.
+constexpr double kPartSpacings = 1;
+constexpr double kPartWeight = 0.0156;        // surfels
+constexpr std::uint32_t kDeepest = 1u << 30;  // no longer path is cut, so that all fit 32 bits
 
 double widest_side(const Bounds& bounds) {
   const glm::dvec3 extent = bounds.high - bounds.low;
   return std::max({extent.x, extent.y, extent.z});
 }
 
-// Place on the Z-curve through a box of 2^bits cells along its widest side: 3 bits for each.
+// Returns the place of a point on the Z-curve through a box, a number of 3 * `bits` bits. The box
+// has 2^bits cells along its widest side.
+// @param offset  from the low corner of the box
 std::uint64_t place_on_curve(const glm::dvec3& offset, double widest, int bits) {
   const double most = std::ldexp(1.0, bits) - 1;
   const auto cell = [&](double at) {
@@ -38,19 +59,20 @@ std::uint64_t place_on_curve(const glm::dvec3& offset, double widest, int bits) 
   return encode_morton({cell(offset.x) << 21, cell(offset.y) << 21, cell(offset.z) << 21}).high;
 }
 
-// A part of a patch, below a spacing wide.
+// A part of a patch, narrower than a spacing or nearly without weight.
 struct Part {
-  std::array<glm::vec2, 3> uv;
+  std::array<glm::vec2, 3> uv;  // barycentric coordinates of its corners
   std::uint32_t triangle;
-  double spacing;
-  double weight;
+  double spacing;  // wanted there
+  double weight;   // area over spacing squared
 };
 
-// All parts of a patch, in an order that keeps neighbours together.
+// All parts of a patch, which sort() puts in an order that keeps neighbours together.
 class Parts {
  public:
   explicit Parts(const Mesh& mesh) : mesh_(mesh) {}
 
+  // Cuts a piece of surface into parts and adds them.
   void add(std::uint32_t triangle, const SubTriangle& shape, double spacing) {
     const double weight = shape.area() / (spacing * spacing);
     if (!(weight > 0)) return;
@@ -69,8 +91,11 @@ class Parts {
     keys_.emplace_back(0, static_cast<std::uint32_t>(keys_.size()));
   }
 
+  // Returns the weight of all parts.
   [[nodiscard]] double weight() const { return total_; }
+  // Returns the area of all parts; both sides of double-sided materials count.
   [[nodiscard]] double area() const { return area_; }
+  // Returns SurfacePoint::kind of the points on a part.
   [[nodiscard]] std::uint32_t kind_of(const Part& part) const {
     const Material& material = mesh_.materials[mesh_.material_of[part.triangle]];
     const bool emits = material.emission != glm::vec3(0);
@@ -89,8 +114,11 @@ class Parts {
     return shape;
   }
 
-  // Sorts by kind, then the axis that the normal follows most, so that the two sides of an edge or
-  // of a thin wall are apart, then along the curve: 2, 3 and 54 bits.
+  // Sorts the parts by kind, then by the axis that the normal follows most, so that the two sides
+  // of an edge or of a thin wall are apart, then along the Z-curve:
+  //
+  //     58  57 56   54 53                     0
+  //     [ kind ][ side ][ place on the Z-curve ]
   void sort() {
     if (parts_.empty()) return;
     const double widest = widest_side(bounds_);
@@ -109,6 +137,7 @@ class Parts {
   }
 
  private:
+  // Returns the axis that a normal follows most: twice its number, and 1 more where it is negative.
   static std::uint32_t side_of(const glm::dvec3& normal) {
     const glm::dvec3 size = glm::abs(normal);
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
@@ -117,14 +146,13 @@ class Parts {
 
   const Mesh& mesh_;
   std::vector<Part> parts_;
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys_;
-  double total_ = 0;
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys_;  // sort key and index of each part
+  double total_ = 0;                                           // weight
   double area_ = 0;
-  Bounds bounds_;
+  Bounds bounds_;  // of the parts' centres
 };
 
-// Walks the parts and sets points: point k owns the weight from k to k + 1 steps, and lies where
-// its middle falls.
+// Walks along the parts and sets the points.
 class Spread {
  public:
   Spread(const Parts& parts, std::uint64_t seed, std::span<SurfacePoint> out)
@@ -133,6 +161,7 @@ class Spread {
         seed_(seed),
         out_(out) {}
 
+  // Goes on by one part: shares out its area, and sets the points whose middles fall on it.
   void walk(const Part& part) {
     const double begin = walked_;
     walked_ += part.weight;
@@ -143,7 +172,7 @@ class Spread {
     if (first < last) place(parts_.shape_of(part), begin, walked_, first, last);
   }
 
-  // Rounding may leave the last point just beyond the end.
+  // Sets the last point where rounding has left its middle just beyond the end.
   void finish() {
     if (part_ != nullptr && from(walked_) < out_.size()) {
       put(parts_.shape_of(*part_), out_.size() - 1);
@@ -151,12 +180,14 @@ class Spread {
   }
 
  private:
-  // First point whose middle is not before `weight`.
+  // Returns the first point whose middle is not before `weight`.
   [[nodiscard]] std::size_t from(double weight) const {
     const double index = std::max(0.0, std::ceil(weight / step_ - 0.5));
     return std::min(static_cast<std::size_t>(index), out_.size());
   }
 
+  // Adds the surface between two weights to the areas of the points that own it.
+  // @param square  area of one unit of weight: the spacing squared
   void share_area(double begin, double end, double square) {
     auto k = std::min(static_cast<std::size_t>(begin / step_), out_.size() - 1);
     for (;; ++k) {
@@ -168,6 +199,8 @@ class Spread {
     }
   }
 
+  // Sets the points from k up to k_end on a shape that covers the weight from `begin` to `end`:
+  // halves the shape until each half has one point.
   void place(const SubTriangle& shape, double begin, double end, std::size_t k, std::size_t k_end) {
     if (k == k_end) return;
     if (k_end - k == 1) return put(shape, k);
@@ -177,7 +210,9 @@ class Spread {
     place(shape.half(true), middle, end, k_middle, k_end);
   }
 
+  // Sets point k at random on a shape.
   void put(const SubTriangle& shape, std::size_t k) {
+    // Choose barycentric coordinates, uniform in the area.
     const std::uint64_t hash = splitmix64(seed_ + k);
     double a = static_cast<double>(to_unit(static_cast<std::uint32_t>(hash)));
     double b = static_cast<double>(to_unit(static_cast<std::uint32_t>(hash >> 32)));
@@ -185,6 +220,7 @@ class Spread {
       a = 1 - a;
       b = 1 - b;
     }
+    // Fill in the point there.
     const auto blend = [&](const auto& v) { return (1 - a - b) * v[0] + a * v[1] + b * v[2]; };
     SurfacePoint& point = out_[k];
     point.triangle = part_->triangle;
@@ -195,11 +231,11 @@ class Spread {
   }
 
   const Parts& parts_;
-  double step_;
+  double step_;  // weight of each point
   std::uint64_t seed_;
   std::span<SurfacePoint> out_;
-  double walked_ = 0;
-  const Part* part_ = nullptr;
+  double walked_ = 0;           // weight of the parts so far
+  const Part* part_ = nullptr;  // the last one of them
 };
 
 }  // namespace
@@ -220,7 +256,8 @@ SubTriangle SurfacePatches::shape_of(const Piece& piece) const {
 }
 
 double SurfacePatches::spacing_of(const SubTriangle& shape) const {
-  // No corner is farther from the centre than two thirds of the longest edge.
+  // Ask for a ball around the piece: no corner is farther from the centre than two thirds of the
+  // longest edge.
   return field_.at(mesh_.origin + shape.centre(), 0.67 * shape.longest_edge());
 }
 
@@ -239,6 +276,7 @@ void SurfacePatches::cut(std::uint32_t triangle, const SubTriangle& shape, std::
 }
 
 void SurfacePatches::sort_along_curve() {
+  // Key each piece by the place of its centre in the box around the mesh.
   if (pieces_.empty()) return;
   Bounds bounds;
   for (const glm::vec3& p : mesh_.positions) bounds.add(glm::dvec3(p));
@@ -248,6 +286,7 @@ void SurfacePatches::sort_along_curve() {
   for (const Piece& piece : pieces_) {
     keyed.emplace_back(place_on_curve(shape_of(piece).centre() - bounds.low, widest, 21), piece);
   }
+  // Sort by place, and by name among equal places, so that the order is the same everywhere.
   std::sort(keyed.begin(), keyed.end(), [](const auto& a, const auto& b) {
     if (a.first != b.first) return a.first < b.first;
     return std::pair(a.second.triangle, a.second.path) <
@@ -258,6 +297,7 @@ void SurfacePatches::sort_along_curve() {
 }
 
 void SurfacePatches::join(double surfels) {
+  // Close a patch whenever it has enough weight.
   begins_ = {0};
   weights_ = {0};
   double sum = 0;
@@ -269,7 +309,7 @@ void SurfacePatches::join(double surfels) {
     begins_.push_back(i + 1);
     weights_.push_back(sum);
   }
-  // No scrap at the end.
+  // Join a scrap at the end with the patch before it.
   const std::size_t last = size();
   if (last > 1 && weights_[last] - weights_[last - 1] < 0.5 * surfels) {
     begins_.erase(begins_.end() - 2);
@@ -278,6 +318,7 @@ void SurfacePatches::join(double surfels) {
 }
 
 std::uint64_t SurfacePatches::surfels_before(std::size_t patch) const {
+  // Round the weight; the first patch has one surfel at least.
   const double rounded = std::round(weights_[patch]);
   if (patch == 0) return 0;
   return static_cast<std::uint64_t>(std::max(1.0, rounded));
@@ -288,17 +329,20 @@ std::uint64_t SurfacePatches::surfels() const noexcept {
 }
 
 SurfacePatch SurfacePatches::spread(std::size_t patch, unsigned points_per_surfel) const {
+  // Cut the patch into parts.
   Parts parts(mesh_);
   for (std::size_t i = begins_[patch]; i < begins_[patch + 1]; ++i) {
     const SubTriangle shape = shape_of(pieces_[i]);
     parts.add(pieces_[i].triangle, shape, spacing_of(shape));
   }
+  // Find the number of surfels: the rounded weight at its end less that at its beginning.
   SurfacePatch result;
-  if (!(parts.weight() > 0)) return result;  // too little for a double
+  if (!(parts.weight() > 0)) return result;  // the weight is too little for a double
   result.first = surfels_before(patch);
   result.surfels = surfels_before(patch + 1) - result.first;
   result.area = parts.area();
   result.points.resize(result.surfels * points_per_surfel);
+  // Set the points along the sorted parts.
   parts.sort();
   Spread spread(parts, result.first * points_per_surfel, result.points);
   parts.visit_sorted([&](const Part& part) { spread.walk(part); });

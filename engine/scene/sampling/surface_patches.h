@@ -1,4 +1,4 @@
-// A mesh cut into patches of surface, and points spread evenly over each.
+// Cuts a mesh into patches of surface, and spreads points evenly over each.
 #pragma once
 
 #include <cstddef>
@@ -16,59 +16,78 @@ namespace ptc {
 
 /// A point that stands for a small share of the surface.
 struct SurfacePoint {
-  std::uint32_t triangle = 0;
-  glm::vec2 uv{0};         ///< barycentric, as RayScene::surface()
-  glm::vec3 position{0};   ///< relative to Mesh::origin
-  glm::vec3 normal{0};     ///< unit, of the triangle
-  std::uint32_t kind = 0;  ///< bit 0: emits; bit 1: double-sided
-  double area = 0;         ///< one side's, of what it stands for
+  std::uint32_t triangle = 0;  ///< index in Mesh::triangles
+  glm::vec2 uv{0};             ///< barycentric coordinates as RayScene::surface() takes them
+  glm::vec3 position{0};       ///< relative to Mesh::origin
+  glm::vec3 normal{0};         ///< unit, geometric normal of the triangle
+  std::uint32_t kind = 0;      ///< bit 0: emits; bit 1: double-sided
+  double area = 0;             ///< of the surface that it stands for, one side only
 };
 
-/// Points of one patch, and the surfels that they want.
+/// The points of one patch, and the number of surfels that they are to become.
 struct SurfacePatch {
   std::vector<SurfacePoint> points;
-  std::uint64_t first = 0;    ///< surfels of all patches before
-  std::uint64_t surfels = 0;  ///< one for both sides
-  double area = 0;            ///< of the surface, both sides of double-sided materials
+  std::uint64_t first = 0;    ///< number of surfels of all patches before this one
+  std::uint64_t surfels = 0;  ///< number of surfels; the two sides of a material count as one
+  double area = 0;            ///< of the surface; both sides of double-sided materials count
 };
 
-/// The surface as a line along which wanted surfels are counted, cut into stretches.
+/// The surface of a mesh as a line along which wanted surfels are counted, cut into stretches.
 ///
 /// Triangles are halved until they are a few spacings wide, and these pieces are sorted along the
-/// Z-curve, so that a stretch is a compact patch whatever the tessellation. A piece's weight is its
-/// area in units of its spacing, squared: the surfels wanted there.
-/// Memory: 8 bytes a piece, 24 while they are sorted.
+/// Z-curve, so that a stretch is a compact patch whatever the tessellation. The weight of a piece
+/// is its area over its spacing squared: the number of surfels that are wanted there.
+///
+///     pieces    |--|-|---|--|-----|-|--|--|---|-|--|    along the Z-curve, as long as their weight
+///     patches   |----------------|--------------|--     about `surfels` each
+///
+/// Memory: 8 bytes for each piece; 24 while they are sorted.
+/// Threads: const members may be called concurrently.
 class SurfacePatches {
  public:
-  /// @param surfels  wanted in one patch, roughly
+  /// Cuts and sorts the surface.
+  /// @param mesh, field  must outlive this
+  /// @param surfels      wanted in one patch, roughly
   SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels);
 
+  /// Returns the number of patches.
   [[nodiscard]] std::size_t size() const noexcept { return begins_.size() - 1; }
-  /// Surfels of all patches.
+  /// Returns the number of surfels of all patches together.
   [[nodiscard]] std::uint64_t surfels() const noexcept;
 
-  /// Spreads `points_per_surfel` points for each surfel: cuts the patch into parts below a spacing,
-  /// sorts them by kind, by the axis they face, and along the Z-curve, and sets points at equal
-  /// steps of the weight. They come in that order, and their areas add up to the patch's.
+  /// Spreads points evenly over a patch.
+  ///
+  /// Cuts the patch into parts narrower than a spacing, sorts them by kind, by the axis that they
+  /// face, and along the Z-curve, and sets points at equal steps of the weight.
+  /// @param patch              below size()
+  /// @param points_per_surfel  number of points for each surfel
+  /// @return  the points in that order; their areas add up to the area of one side of the patch
   [[nodiscard]] SurfacePatch spread(std::size_t patch, unsigned points_per_surfel) const;
 
  private:
-  // Which part of which triangle: below its leading 1, a bit for each halving, the first on top.
+  /// A part of a triangle. Below its leading 1, the path has a bit for each halving, the first one
+  /// on top: 0b1 is the whole triangle, 0b110 the first half of the second half.
   struct Piece {
     std::uint32_t triangle;
     std::uint32_t path;
   };
+  /// Appends a part of a triangle as one piece, or cuts it further.
   void cut(std::uint32_t triangle, const SubTriangle& shape, std::uint32_t path);
+  /// Sorts the pieces along the Z-curve.
   void sort_along_curve();
+  /// Joins successive pieces to patches of `surfels` surfels.
   void join(double surfels);
+  /// Returns the shape of a piece, cut again from its triangle.
   [[nodiscard]] SubTriangle shape_of(const Piece& piece) const;
+  /// Returns the finest spacing that any point of a piece asks for.
   [[nodiscard]] double spacing_of(const SubTriangle& shape) const;
+  /// Returns the number of surfels of all patches before one.
   [[nodiscard]] std::uint64_t surfels_before(std::size_t patch) const;
   const Mesh& mesh_;
   const SpacingField& field_;
   std::vector<Piece> pieces_;
-  std::vector<std::size_t> begins_;  // first piece of each patch, and the end
-  std::vector<double> weights_;      // of all patches before each, and the total
+  std::vector<std::size_t> begins_;  ///< index of the first piece of each patch, then of the end
+  std::vector<double> weights_;      ///< weight of all patches before each, then the total
 };
 
 }  // namespace ptc

@@ -1,4 +1,20 @@
-// Short rays around a surfel (surroundings.h).
+// Short rays around a surfel that find where the surface ends.
+//
+// Along each of 16 directions, rays down through the plane of the disc say whether the surface goes
+// on at a distance, and halving finds where it ends. With e the distance of the end in a direction,
+// the disc moves against the moment
+//
+//     m = 1/r * integral over directions of direction * (r^2 - e^2) / 2
+//
+// which is the integral of the unit direction over the area that sticks out, divided by r; it is 0
+// where nothing sticks out.
+//
+//          |  |  | down
+//     -----+--v--v.........       position, normal up, the disc's radius r to the right;
+//     position    ^                the surface ends at the distance e
+//                 e
+//
+// spec/shading.md#from-a-mesh has the figures.
 #include "engine/scene/sampling/surroundings.h"
 
 #include <cmath>
@@ -15,20 +31,23 @@ namespace {
 
 constexpr int kDirections = 16;
 constexpr int kHalvings = 4;
-constexpr float kOwnHeight = 0.2F;  // radii: the surface lies within it at the centre,
-constexpr float kSteepness = 0.7F;  // and rises or falls by so much more of the distance
-constexpr float kClearance =
-    0.1F;  // radii over the surface where the way to an edge is looked along
+// The surface is looked for up to this height over and under the disc's plane: kOwnHeight radii at
+// the centre, and kSteepness of the distance more.
+constexpr float kOwnHeight = 0.2F;
+constexpr float kSteepness = 0.7F;
+constexpr float kClearance = 0.1F;  // radii over the plane at which the way to an edge is checked
 
-// A disc at d radii from a straight edge lacks, to first order, the moment
-//   m = sin a - d^2 log((1 + sin a) / cos a),  cos a = d,
-// and sticks out as much as it leaves open between its like at d = 0.909, the mean half chord over
-// the square that it circumscribes: 0.909 - d is 0.76 m within 0.04 for all d from 0.2 on.
+// How far a disc moves for its moment m, in radii. A disc whose centre is d radii from a straight
+// edge has, to first order,
+//   m = sin a - d^2 log((1 + sin a) / cos a),  cos a = d.
+// It sticks out as much as it leaves uncovered between itself and the discs next to it at
+// d = 0.909, the mean half chord over the square that it circumscribes. The way there, 0.909 - d,
+// is 0.76 m within 0.04 for all d from 0.2 on.
 constexpr float kMovePerMoment = 0.76F;
 
 constexpr unsigned kBuriedRays = 8;
 
-// Whether there is surface over or under the place at `distance` from the centre.
+// Reports whether there is surface over or under the place at `distance` from the centre.
 bool goes_on(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
              const glm::vec3& direction, float distance, float radius) {
   const float height = kSteepness * distance + kOwnHeight * radius;
@@ -37,8 +56,8 @@ bool goes_on(const RayScene& scene, const glm::dvec3& position, const glm::vec3&
   return scene.occluded(above, -normal, 0, 2 * static_cast<double>(height));
 }
 
-// Distance at which the surface ends in a direction; the radius where it does not, or something is
-// before it.
+// Returns the distance at which the surface ends in a direction, or the radius where it goes on, or
+// where another surface stands in the way.
 float reach(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
             const glm::vec3& direction, float radius) {
   if (goes_on(scene, position, normal, direction, radius, radius)) return radius;

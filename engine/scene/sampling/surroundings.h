@@ -1,5 +1,5 @@
-// What lies around a place on a mesh: where the surface ends beside it, and whether it lies inside
-// a solid.
+// Examines what lies around a place on a mesh: where the surface ends next to it, and whether the
+// place lies inside a solid.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,30 @@
 
 namespace ptc {
 
-/// How far a disc of `radius` moves in its plane, away from edges of the surface that it sticks out
-/// over, until it sticks out about as much as it leaves uncovered. 0 where the surface goes on all
-/// around, or another surface stands where it ends: what sticks out behind that is not seen.
+/// Returns how far a disc moves in its plane, away from the edges of the surface that it sticks out
+/// over, until it sticks out about as much as it leaves uncovered.
+///
+///        . - .                        . - .
+///      /      |\                    /       |
+///     |   x   | |     --->         |   x    |)    | is the edge of the surface
+///      \      |/                    \       |
+///        ' - '                        ' - '
+///
+/// The result is 0 where the surface goes on all around, or where another surface stands at its
+/// end: what sticks out behind that one is not seen.
 /// @param position  on the surface or near it, scene units
 /// @param normal    unit
+/// @param radius    of the disc, scene units
 /// @return          scene units; shorter than 1.1 radii
 [[nodiscard]] glm::vec3 move_inwards(const RayScene& scene, const glm::dvec3& position,
                                      const glm::vec3& normal, float radius);
 
-/// Whether a place sees nothing but backs of one-sided triangles: it lies inside a solid, or on a
-/// face that touches another. Of 8 cosine rays none escapes and at most one meets a front (of a
-/// solid sunk into the same one). Deterministic in `seed`.
+/// Reports whether a place sees nothing but backs of one-sided triangles: it lies inside a solid,
+/// or on a face that touches another.
+///
+/// Of 8 cosine rays from a buried place none escapes, and at most one meets a front, which is that
+/// of a second solid sunk into the same one. The result is deterministic in `seed`.
+/// @param position  scene units
 /// @param normal  unit, on the side that is asked about
 [[nodiscard]] bool is_buried(const RayScene& scene, const glm::dvec3& position,
                              const glm::vec3& normal, std::uint64_t seed);

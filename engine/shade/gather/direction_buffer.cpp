@@ -1,3 +1,17 @@
+// The geometry of the direction cube, and buffers over it.
+//
+// A pixel of a face sees a rectangle of the plane w = 1. The solid angle of the part of the plane
+// between the axes and a corner (u, v) is atan(u v / sqrt(u^2 + v^2 + 1)), so the exact solid angle
+// of a pixel is a sum over its four corners with alternating signs:
+//
+//     v + step  -+-------+
+//                |  px   |     S(u + step, v + step) - S(u, v + step)
+//     v         ++-------+       - S(u + step, v)    + S(u, v)
+//                u    u + step
+//
+// The weights of all pixels of the cube then add up to 4 pi but for rounding. A weight is stored
+// divided by the length of (1, u, v), so that the product with n . (1, u, v), which is linear along
+// a row, is solid angle times cosine.
 #include "engine/shade/gather/direction_buffer.h"
 
 #include <algorithm>
@@ -13,13 +27,14 @@
 namespace ptc {
 namespace {
 
-/// Solid angle of the part of a cube face below and left of (u, v), up to a constant.
+/// Returns the solid angle between the axes of a face's plane and the point (u, v), sr; negative
+/// where one of the coordinates is.
 double corner_solid_angle(double u, double v) {
   return std::atan2(u * v, std::sqrt(u * u + v * v + 1));
 }
 
-/// A rotation far from every symmetry of the axes; other variants turn on about a fixed axis by the
-/// golden angle, which comes near no multiple of a quarter soon.
+/// Returns a rotation far from every symmetry of the axes. Each further variant turns about a fixed
+/// axis by the golden angle, whose multiples come near no quarter turn soon.
 glm::mat3 tilted_frame(unsigned variant) {
   const glm::vec3 z = glm::normalize(glm::vec3(0.36F, 0.48F, 0.8F));
   const glm::vec3 x = glm::normalize(glm::cross(glm::vec3(0.2F, 1.0F, 0.1F), z));
@@ -28,7 +43,8 @@ glm::mat3 tilted_frame(unsigned variant) {
   return tilt * glm::mat3_cast(glm::angleAxis(angle, glm::normalize(glm::vec3(0.5F, -0.7F, 0.4F))));
 }
 
-/// Rows of each face with a pixel (1, u, v) of which axis . (1, u, v) + cone_sin |(1, u, v)| > 0.
+/// Returns the rows of each face that have a pixel above the horizon: axis . (1, u, v) + cone_sin
+/// |(1, u, v)| > 0 for some u in [-1, 1]. The bound takes the longest (1, u, v) for all pixels.
 FaceRows rows_over(const CubeGeometry& cube, const Horizon& horizon) {
   const glm::vec3 n = cube.rotation * horizon.axis;
   const float slack = horizon.cone_sin * 1.7320509F;  // the longest (1, u, v)
@@ -52,12 +68,14 @@ DirectionGrid::DirectionGrid(unsigned resolution,
                              unsigned variant)
     : variant_(variant) {
   if (resolution == 0 || resolution > kMaxResolution || resolution % 16 != 0) {
-    throw std::invalid_argument("DirectionGrid: the resolution is 16, 32, 48 or 64");
+    throw std::invalid_argument("DirectionGrid: the resolution must be 16, 32, 48 or 64");
   }
+  // Compute the pixel centres; the lanes past the last one are NaN, which is inside no disc.
   const double step = 2.0 / resolution;
   for (unsigned i = 0; i < resolution; ++i)
     centre_.push_back(static_cast<float>((i + 0.5) * step - 1));
   centre_.resize(resolution + DiscQueue::kReadLanes, std::numeric_limits<float>::quiet_NaN());
+  // Compute the weights of the pixels.
   for (unsigned y = 0; y < resolution; ++y) {
     for (unsigned x = 0; x < resolution; ++x) {
       const double u = x * step - 1, v = y * step - 1;
@@ -69,6 +87,7 @@ DirectionGrid::DirectionGrid(unsigned resolution,
       weight_.push_back(static_cast<float>(solid_angle) / length);
     }
   }
+  // Compute the weights of the borders between neighbouring pixels.
   edge_u_.resize(weight_.size());
   edge_v_.resize(weight_.size());
   for (std::size_t at = 0; at < weight_.size(); ++at) {
@@ -83,6 +102,7 @@ DirectionGrid::DirectionGrid(unsigned resolution,
                .edge_v = edge_v_.data(),
                .resolution = static_cast<int>(resolution),
                .rotation = tilted_frame(variant)};
+  // Sample the sky four times in each pixel, because maps are sharper than pixels.
   if (!sky) return;
   const glm::mat3 to_world = glm::transpose(geometry_.rotation);
   const std::size_t plane = std::size_t{resolution} * resolution;
@@ -90,7 +110,6 @@ DirectionGrid::DirectionGrid(unsigned resolution,
   for (int face = 0; face < 6; ++face) {
     const CubeFace a(face);
     for (std::size_t pixel = 0; pixel < plane; ++pixel) {
-      // Four samples a pixel: maps are sharper than pixels.
       glm::vec3 sum(0);
       for (int sub = 0; sub < 4; ++sub) {
         const float shift = static_cast<float>(step) * 0.25F;
@@ -128,6 +147,7 @@ void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Si
 
 Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
                                  std::span<const glm::vec3> offsets) const noexcept {
+  // Turn the normal and the offsets into the axes of the cube, and sum over its pixels.
   const glm::mat3& rotation = grid.geometry_.rotation;
   ViewOffsets turned{};
   for (std::size_t i = 0; i < offsets.size(); ++i) {
@@ -138,6 +158,7 @@ Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& nor
   sum_pixels(grid.geometry_, {nearness_.data(), rgbe_.data()},
              grid.sky_.empty() ? nullptr : grid.sky_.data(), rotation * normal,
              offsets.empty() ? nullptr : &turned, sums);
+  // Divide by the sum of all weights instead of pi, so that an empty cube gives exactly 0.
   Shading shading;
   shading.occlusion = sums.covered / sums.total;
   shading.irradiance = sums.light * (kPi / sums.total);

@@ -1,4 +1,4 @@
-// A cube of direction pixels around a receiver: what covers each of them, and how light adds up.
+// A cube of direction pixels around a receiver: what covers each pixel, and the sums over them.
 #pragma once
 
 #include <cstdint>
@@ -15,69 +15,93 @@ namespace ptc {
 
 /// The geometry of the pixels, shared by all buffers of a run: directions, exact solid angles, sky.
 ///
+///           +------+
+///          /  +y  /|      Each of the 6 faces has resolution^2 pixels. Seen from the centre, pixel
+///         +------+ |      (u, v) of a face looks along w + u (its row's axis) + v (its column's
+///         |  +z  |+x      axis), u and v in [-1, 1].
+///         |      |/
+///         +------+
+///
 /// The cube is turned away from the world's axes, so that walls and floors do not line up with
-/// pixel rows; each variant another way.
+/// rows of pixels. Each variant turns it another way.
+/// Threads: const members may be called concurrently.
 class DirectionGrid {
  public:
+  /// Computes the geometry, and samples the sky four times in each pixel.
   /// @param resolution  pixels along a cube edge, a multiple of 16, at most 64
+  /// @param sky         radiance that arrives from a direction (unit, away from the receiver),
+  ///                    W/(m^2 sr); empty where there is no sky
+  /// @param variant     selects the rotation of the cube
   /// @throws std::invalid_argument at another resolution
-  /// @param sky  radiance from a direction (unit, away from the receiver), or empty: no sky
   DirectionGrid(unsigned resolution, const std::function<glm::vec3(const glm::vec3&)>& sky,
                 unsigned variant = 0);
   DirectionGrid(const DirectionGrid&) = delete;
   DirectionGrid& operator=(const DirectionGrid&) = delete;
 
+  /// Returns the number of pixels along a cube edge.
   [[nodiscard]] unsigned resolution() const noexcept {
     return static_cast<unsigned>(geometry_.resolution);
   }
+  /// Returns the variant that the constructor was given.
   [[nodiscard]] unsigned variant() const noexcept { return variant_; }
-  /// From the world to the axes of the cube.
+  /// Returns the rotation from the world to the axes of the cube.
   [[nodiscard]] const glm::mat3& rotation() const noexcept { return geometry_.rotation; }
 
  private:
   friend class DirectionBuffer;
   unsigned variant_;
-  std::vector<float> centre_;          // resolution: pixel centres in [-1, 1]
-  std::vector<float> inverse_length_;  // resolution^2: 1 / |(1, u, v)|
-  std::vector<float> weight_;          // resolution^2: solid angle / length
-  std::vector<float> edge_u_;          // as CubeGeometry has them
-  std::vector<float> edge_v_;
-  std::vector<float> sky_;  // by face: planes of red, green, blue; or empty
-  CubeGeometry geometry_;   // of the above, and the rotation
+  std::vector<float> centre_;          ///< resolution: pixel centres in [-1, 1]
+  std::vector<float> inverse_length_;  ///< resolution^2: 1 / |(1, u, v)|
+  std::vector<float> weight_;          ///< resolution^2: solid angle / |(1, u, v)|
+  std::vector<float> edge_u_;          ///< resolution^2: CubeGeometry::edge_u
+  std::vector<float> edge_v_;          ///< resolution^2: CubeGeometry::edge_v
+  std::vector<float> sky_;             ///< planes of red, green and blue for each face; or empty
+  CubeGeometry geometry_;              ///< pointers to the arrays above, and the rotation
 };
 
-/// Directions over the horizon of some normal of a cone.
+/// The directions above the horizon of at least one normal of a cone.
 struct Horizon {
-  glm::vec3 axis{0};  ///< unit
-  float cone_sin =
-      2;  ///< sine of the cone's half angle, which is below a right one; above 1: every direction
+  glm::vec3 axis{0};  ///< axis of the cone, unit
+  /// Sine of the cone's half angle, which is below a right angle. A number above 1 stands for every
+  /// direction.
+  float cone_sin = 2;
 };
 
-/// Nearest coverer of every direction pixel and its RGBE colour.
+/// What covers each direction pixel: its nearness and its RGBE colour.
+///
+/// Memory: 6 resolution^2 + 4 resolution pixels of 8 bytes, 4 without colours.
+/// Threads: one thread at a time; several buffers may share a grid.
 class DirectionBuffer {
  public:
-  /// @param resolution  of the grids that it will be used with
-  /// @param coloured    false: what covers has no colour, irradiance is 0
+  /// Makes an empty buffer.
+  /// @param resolution  that of the grids that it will be used with
+  /// @param coloured    false leaves colours out, so that resolve() gives an irradiance of 0
   explicit DirectionBuffer(unsigned resolution, bool coloured = true);
 
+  /// Uncovers all pixels.
   void clear() noexcept;
+  /// Takes over the pixels of another buffer of the same resolution and colouring.
   void copy(const DirectionBuffer& other) noexcept;
 
-  /// Draws discs exactly: every pixel whose ray meets one. Coplanar overlapping discs divide at the
-  /// line between their centres. The order of drawing does not matter.
-  /// @param viewpoint  what the discs are relative to, below kViewpoints
-  /// @param horizon    pixels below it may be left as they are
+  /// Draws discs exactly: each covers every pixel whose centre ray meets it before what was drawn
+  /// there. Coplanar overlapping discs divide at the line half way between their centres. The order
+  /// of drawing does not matter.
+  /// @param sides      which sides of the discs cover
+  /// @param viewpoint  the number of the point that the discs are relative to, below kViewpoints
+  /// @param horizon    pixels below it need not be drawn
   void draw(const DirectionGrid& grid, const DiscQueue& discs, Sides sides, unsigned viewpoint = 0,
             const Horizon& horizon = {}) noexcept;
 
-  /// Sums over the hemisphere of `normal`.
-  /// @param offsets  of the receiver from each viewpoint; those that follow are 0. Empty: from none
+  /// Sums up the hemisphere above a receiver.
+  /// @param normal   unit, in the world's axes
+  /// @param offsets  where the receiver lies relative to each viewpoint, in the unit of the discs;
+  ///                 viewpoints beyond the last offset are the receiver itself
   [[nodiscard]] Shading resolve(const DirectionGrid& grid, const glm::vec3& normal,
                                 std::span<const glm::vec3> offsets = {}) const noexcept;
 
  private:
-  std::vector<float> nearness_;      // CubePixels
-  std::vector<std::uint32_t> rgbe_;  // empty without colours
+  std::vector<float> nearness_;      ///< CubePixels::nearness
+  std::vector<std::uint32_t> rgbe_;  ///< CubePixels::rgbe; empty without colours
 };
 
 }  // namespace ptc

@@ -1,3 +1,4 @@
+// Places receivers on the Z-curve, and bounds the receivers of a cell.
 #include "engine/shade/gather/receiver_cell.h"
 
 #include <algorithm>
@@ -11,8 +12,9 @@ namespace ptc {
 MortonKey receiver_key(const Frame& frame, const glm::dvec3& position, unsigned variant) {
   LatticePoint q = frame.to_lattice({position.x, position.y, position.z});
   if (variant == 0) return encode_morton(q);
-  // Half the lattice, moved by up to the other half: multiples of the roots of x^4 = x + 1, modulo
-  // 1 (Roberts 2018), spread evenly.
+  // Put the scene into half of the lattice, moved by up to the other half. The shifts of successive
+  // variants spread evenly over the cube: multiples, modulo 1, of the powers -1, -2 and -3 of the
+  // root of x^4 = x + 1 (Roberts 2018).
   constexpr std::array<double, 3> kStep{0.8191725134, 0.6710436067, 0.5497004779};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double whole = 0;
@@ -30,8 +32,9 @@ ReceiverCell::ReceiverCell(std::span<const PlacedReceiver> receivers, double uni
     has_horizon = true;
     return;
   }
+  // Find the mean position and normal. Positions are summed relative to the first one, so that
+  // scenes far from the origin lose nothing.
   glm::vec3 normals(0);
-  // Sums relative to the first, so that far-off scenes lose nothing.
   const glm::dvec3 origin = receivers[0].position;
   glm::dvec3 offsets(0);
   for (const PlacedReceiver& r : receivers) {
@@ -42,6 +45,7 @@ ReceiverCell::ReceiverCell(std::span<const PlacedReceiver> receivers, double uni
   const float length = std::sqrt(glm::dot(normals, normals));
   axis = length > 0 ? normals / length : glm::vec3(0, 0, 1);
   cone_cos = length > 0 ? 1.0F : -1.0F;
+  // Bound the sphere, the cone and the depth.
   double farthest = 0;
   double lowest = 0;
   for (const PlacedReceiver& r : receivers) {

@@ -1,3 +1,5 @@
+// Follows references through the page cache. A page is checked when it is loaded, so what is left
+// to check here is that a reference leads somewhere and that no walk goes in circles.
 #include "engine/shade/gather/scene_view.h"
 
 #include <array>
@@ -35,6 +37,7 @@ PinnedGroup SceneReader::group(std::uint32_t page, std::uint16_t slot) {
 }
 
 unsigned SceneReader::lost_children(std::uint32_t page, std::uint16_t slot) {
+  // Copy the references, because looking at their pages needs the pin.
   std::array<ChildRef, 8> children;
   int count = 0;
   {
@@ -65,7 +68,7 @@ void WalkLimit::take_group() {
 
 void WalkLimit::take_points(std::uint64_t count) {
   if (count > points_)
-    view_.fail("spec/nodes.md#node-leaf", "leaves hold more points than there are");
+    view_.fail("spec/nodes.md#node-leaf", "leaves hold more points than the file has");
   points_ -= count;
 }
 

@@ -1,4 +1,5 @@
-// The octree of a container as a gather walks it.
+// The octree of a container as a gather walks it: references lead from groups to groups and to
+// points, through the page cache.
 #pragma once
 
 #include <cstdint>
@@ -11,25 +12,37 @@
 
 namespace ptc {
 
-/// What shading needs of a container besides its pages; shared by all threads.
+/// The facts of a container that shading needs in addition to its pages.
+/// Threads: shared by all; const members may be called concurrently.
 class SceneView {
  public:
-  /// @param lost  outlives the view: pages found damaged are left out; null: they are errors
+  /// Takes the facts from the superblock.
+  /// @param container  must outlive this
+  /// @param lost       must outlive this; collects damaged pages, which are then left out. Null
+  ///                   makes them errors.
   explicit SceneView(const ContainerReader& container, LostPages* lost = nullptr);
 
+  /// Returns the frame of the scene.
   [[nodiscard]] const Frame& frame() const noexcept { return frame_; }
+  /// Returns the conversion between scene units and edges of the frame.
   [[nodiscard]] const SceneScale& scale() const noexcept { return scale_; }
+  /// Returns the number of points in the container.
   [[nodiscard]] std::uint64_t points() const noexcept { return points_; }
+  /// Returns the number of node groups in the container.
   [[nodiscard]] std::uint64_t groups() const noexcept { return groups_; }
+  /// Returns the number of points on each point page but the last.
   [[nodiscard]] std::uint32_t points_per_page() const noexcept { return points_per_page_; }
-  /// The root group; not interior when the container is empty.
+  /// Returns the reference to the root group; it is not interior when the container is empty.
   [[nodiscard]] const ChildRef& root() const noexcept { return root_; }
+  /// Returns the set of damaged pages, or null when they are errors.
   [[nodiscard]] LostPages* lost() const noexcept { return lost_; }
-  /// Page that holds a point.
+  /// Returns the page that holds a point.
+  /// @param point  below points()
   [[nodiscard]] std::uint32_t point_page(std::uint64_t point) const {
     return container_->point_pages()[static_cast<std::size_t>(point / points_per_page_)];
   }
-  /// Throws a FormatError that names the file, and the superblock as the place: the tree belies it.
+  /// Throws a FormatError that names the file, and as the place its superblock, whose counts the
+  /// tree contradicts.
   [[noreturn]] void fail(const char* clause, const char* text) const;
 
  private:
@@ -55,16 +68,20 @@ class PinnedGroup {
   GroupView group_;
 };
 
-/// One thread's way into the octree. What it gives pins a page, so one result lives at a time.
+/// Reads groups and points of the octree for one thread. What it returns pins a page, so one result
+/// lives at a time.
 class SceneReader {
  public:
+  /// Takes a reader of the cache.
+  /// @param view, cache  must outlive this; of the same container
   SceneReader(const SceneView& view, PageCache& cache) : view_(view), pages_(cache) {}
 
+  /// Returns the view that the constructor was given.
   [[nodiscard]] const SceneView& view() const noexcept { return view_; }
-  /// Finds a group.
-  /// @throws FormatError when its page does not hold it
+  /// Returns a group.
+  /// @throws FormatError when the reference leads to no group, or the page is damaged
   [[nodiscard]] PinnedGroup group(std::uint32_t page, std::uint16_t slot);
-  /// Finds the children of a group that need a lost page: bit i for child i.
+  /// Returns which children of a group need a lost page: bit i for child i.
   [[nodiscard]] unsigned lost_children(std::uint32_t page, std::uint16_t slot);
   /// Pins the page that holds a point.
   [[nodiscard]] PageGuard points(std::uint64_t point) {
@@ -72,27 +89,31 @@ class SceneReader {
   }
 
  private:
+  /// Reports whether a child needs a lost page.
   [[nodiscard]] bool is_lost(const ChildRef& child);
 
   const SceneView& view_;
   PageReader pages_;
 };
 
-/// What one walk down the tree may still meet: no group or point twice, so a walk ends whatever the
-/// references say.
+/// Counts what one walk down the tree meets. A walk that meets more groups or points than the
+/// container has met one of them twice and is stopped, so every walk ends, whatever the references
+/// in the file say.
 class WalkLimit {
  public:
+  /// Begins a walk.
   explicit WalkLimit(const SceneView& view)
       : view_(view), groups_(view.groups()), points_(view.points()) {}
 
-  /// @throws FormatError when more were met than there are
+  /// Counts a group. @throws FormatError when the walk met more groups than the container has
   void take_group();
+  /// Counts points. @throws FormatError when the walk met more points than the container has
   void take_points(std::uint64_t count);
 
  private:
   const SceneView& view_;
-  std::uint64_t groups_;
-  std::uint64_t points_;
+  std::uint64_t groups_;  ///< groups that the walk may still meet
+  std::uint64_t points_;  ///< points that the walk may still meet
 };
 
 }  // namespace ptc

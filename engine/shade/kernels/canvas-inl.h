@@ -1,5 +1,10 @@
-// Pixels that discs are drawn on, a vector at a time. Included by a file that is compiled once per
-// instruction set, so it is guarded once per instruction set.
+// The pixels that discs are drawn on, a vector at a time. The file is included by a file that is
+// compiled once for each instruction set, so it is guarded once for each instruction set.
+//
+// Covering keeps the greatest nearness of each pixel, and of equal ones the least colour. Minimum
+// and maximum do not depend on order, so neither does the picture, whatever the order in which
+// threads, pages and queues bring the discs. The viewpoint in the lowest 4 bits of the nearness
+// takes part in the comparison; it changes a nearness by at most 2^-19 of it.
 #if defined(PTC_SHADE_CANVAS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PTC_SHADE_CANVAS_INL_H
 #undef PTC_SHADE_CANVAS_INL_H
@@ -26,23 +31,34 @@ using VF = hn::VFromD<F>;
 using VU = hn::VFromD<U>;
 using MF = hn::Mask<F>;
 
-/// Height of the shallow paraboloid that stands for a disc, over its radius
-/// (spec/shading.md#surfels).
+/// Depth of the rim of the shallow paraboloid that stands for a disc, over the disc's radius. It
+/// divides coplanar overlapping discs half way between their centres (spec/shading.md#surfels):
+///
+///     nearness
+///        ^    _-~-_ _-~-_
+///        |  -      X      -       X is half way between the centres, where both discs are
+///        |-       - -       -     equally near
+///        +---------------------
 constexpr float kBump = 0.01F;
 
-/// The pixels that are drawn on from one viewpoint.
+/// The pixels of a cube as they are drawn on from one viewpoint.
 template <bool kColoured>
 class Canvas {
  public:
   Canvas(const CubeGeometry& geometry, const CubePixels& pixels, unsigned viewpoint)
       : cube(geometry), pixels_(pixels), viewpoint_(hn::Set(U(), viewpoint)) {}
 
-  /// Covers a vector of pixels from `at` on.
+  /// Covers a vector of pixels.
+  /// @param at      index of the first one
+  /// @param near    nearness of the disc at each; one below 0 covers nothing
+  /// @param inside  pixels whose ray meets the disc
   HWY_INLINE void cover(std::ptrdiff_t at, VF near, MF inside, VU colour) const {
+    // Put the number of the viewpoint into the lowest bits.
     const F f;
     const U u;
     near = hn::BitCast(
         f, hn::Or(hn::AndNot(hn::Set(u, kViewpoints - 1U), hn::BitCast(u, near)), viewpoint_));
+    // Take the disc where it is nearer than what is there.
     float* nearness = pixels_.nearness + at;
     const auto old_near = hn::LoadU(f, nearness);
     if constexpr (kColoured) {

@@ -1,4 +1,42 @@
-// Discs drawn into the pixels of a direction buffer (direction_kernels.h).
+// Draws discs into the pixels of a direction buffer: every pixel whose centre ray meets a disc.
+//
+// A disc goes through four stages, each on a vector of discs or pixels:
+//
+//     DiscQueue --> CubeLanes --> FaceQueue --> FaceDiscs --> Canvas
+//     world         cube axes,    axes of each  bounds and    pixels
+//                   culling       face it may   forms
+//                                 reach
+//     close discs:  CubeLanes --> draw_wide_disc() of wide_discs-inl.h
+//
+// Seen through a face, the disc of centre c, normal n and radius r lies around the projected centre
+// (u0, v0) = (cu, cv) / cw. The ray p = (1, u0 + du, v0 + dv) meets the disc's plane n . x = h,
+// h = c . n, at t = cw / w, where
+//
+//     w = 1 + alpha du + beta dv,    alpha = nu cw / h,    beta = nv cw / h.
+//
+// With p0 = (1, u0, v0) and L^2 = p0 . p0, the distance from the centre there is
+//
+//     |t p - c|^2 = (cw / w)^2 F(du, dv),
+//     F = L^2 (w - 1)^2 - 2 (w - 1)(u0 du + v0 dv) + du^2 + dv^2
+//       = aa du^2 + 2 ab du dv + bb dv^2,
+//     aa = 1 + alpha (alpha L^2 - 2 u0),    bb = 1 + beta (beta L^2 - 2 v0),
+//     ab = alpha (beta L^2 - v0) - beta u0,
+//
+// so that a pixel costs no division:
+//
+//     inside    F < (r / cw)^2 w^2
+//     nearness  1 / t = w / cw, less kBump F / (r L) for the paraboloid of canvas-inl.h
+//
+// The bounds of the disc along u are the planes through the viewpoint and the v axis that touch it.
+// The plane of u has the normal k = (-u, 1, 0) in (w, u, v), and touches the disc where
+//
+//     (c . k)^2 = r^2 (|k|^2 - (n . k)^2),
+//
+// a quadratic in u, with p = r^2 (1 - nw^2) - cw^2 and q = cu cw + r^2 nu nw:
+//
+//     u = (q -+ r sqrt(s)) / -p,    s = cw^2 + cu^2 - (cw nu - cu nw)^2 - r^2 nv^2.
+//
+// p is below 0 where the whole disc is in front of the viewpoint; elsewhere the bound is the face.
 #include <algorithm>
 #include <bit>
 
@@ -17,25 +55,24 @@ HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
-constexpr float kSlack = 1e-3F;  // pixels: rounding of a disc's bounds
+constexpr float kSlack = 1e-3F;  // pixels by which bounds are widened for rounding
 constexpr int kChunk = 64;       // discs that are sorted by face at once
 
-/// Discs on one face of the cube, set up for their pixels. A pixel at (du, dv) from the projected
-/// centre sees the disc's plane at t = cw / w, w = 1 + alpha du + beta dv, and the disc itself
-/// where
-///   aa du^2 + 2 ab du dv + bb dv^2 < (radius / cw)^2 w^2.
+/// A vector of discs on their faces, set up for their pixels. The names are those of the equations
+/// above.
 struct FaceDiscs {
   alignas(64) float u0[kLanes], v0[kLanes];
-  float aa[kLanes], ab2[kLanes], bb[kLanes];
+  float aa[kLanes], ab2[kLanes], bb[kLanes];  ///< aa, 2 ab, bb
   float alpha[kLanes], beta[kLanes];
-  float square[kLanes];   // (radius / cw)^2
-  float inverse[kLanes];  // 1 / cw
-  float bump[kLanes];     // nearness lost per unit of the quadratic form
-  std::int32_t x0[kLanes], x1[kLanes], y0[kLanes], y1[kLanes];
-  std::int32_t first[kLanes];  // pixel of the face
+  float square[kLanes];   ///< (radius / cw)^2
+  float inverse[kLanes];  ///< 1 / cw
+  float bump[kLanes];     ///< nearness lost for each unit of F
+  std::int32_t x0[kLanes], x1[kLanes], y0[kLanes], y1[kLanes];  ///< columns and rows, x1 and y1 not
+                                                                ///< included
+  std::int32_t first[kLanes];  ///< index of the first pixel of the face
 };
 
-/// What a vector of pixels needs of a disc.
+/// One of these discs, spread over the lanes that draw its pixels.
 struct FaceDisc {
   VF aa, alpha, square, inverse, bump, u0;
   VU colour;
@@ -54,8 +91,9 @@ struct FaceDisc {
         bb(discs.bb[i]),
         beta(discs.beta[i]) {}
 
-  /// @param at  the pixels
-  /// @param v   of their row
+  /// Draws the disc on a vector of pixels of one row.
+  /// @param u, v  of the pixels
+  /// @param at    index of the first one
   template <class CanvasType>
   HWY_INLINE void draw(const CanvasType& canvas, VF u, float v, std::ptrdiff_t at) const {
     const F f;
@@ -70,8 +108,9 @@ struct FaceDisc {
   }
 };
 
-/// Draws a disc that reaches into one vector of each of so many rows at most. The rows that it does
-/// not reach are drawn too, without a branch; past the face, centres are NaN and nothing is inside.
+/// Draws a disc that reaches into one vector of each of at most kRows rows. Rows that it does not
+/// reach are drawn as well, without a branch; past the end of the face, centres are NaN and nothing
+/// is inside.
 template <int kRows, class CanvasType>
 HWY_INLINE void draw_narrow(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i,
                             std::uint32_t rgbe) {
@@ -84,7 +123,7 @@ HWY_INLINE void draw_narrow(const CanvasType& canvas, const FaceDiscs& discs, st
   }
 }
 
-/// Draws a disc of any size.
+/// Draws a disc of any size, row by row.
 template <class CanvasType>
 HWY_INLINE void draw_broad(const CanvasType& canvas, const FaceDiscs& discs, std::size_t i,
                            std::uint32_t rgbe) {
@@ -98,22 +137,22 @@ HWY_INLINE void draw_broad(const CanvasType& canvas, const FaceDiscs& discs, std
   }
 }
 
-/// Discs in the axes of the cube, a lane each.
+/// A vector of discs in the axes of the cube.
 struct CubeLanes {
-  VF c[3], n[3];  // centre, normal
+  VF c[3], n[3];  ///< centre and normal
   VF radius, radius2;
-  VF height;  // c . n
+  VF height;  ///< c . n
 };
 
-/// Discs in the axes of the faces that their centres lie before, a lane each.
+/// A vector of discs, each in the axes of its face.
 struct FaceLanes {
   VF cw, cu, cv, nw, nu, nv;
   VF radius, radius2;
 };
 
-/// Discs in the axes of the faces that see them, in columns.
+/// Discs in the axes of the faces that may see them, in columns.
 struct FaceQueue {
-  static constexpr int kCapacity = 3 * kChunk + kLanes;  // a disc is before three faces at most
+  static constexpr int kCapacity = 3 * kChunk + kLanes;  // a disc may be seen by three faces
   alignas(64) float cw[kCapacity];
   float cu[kCapacity], cv[kCapacity], nw[kCapacity], nu[kCapacity], nv[kCapacity],
       radius[kCapacity];
@@ -126,6 +165,7 @@ HWY_INLINE VF dot(const VF (&a)[3], const VF (&b)[3]) {
   return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], hn::Mul(a[2], b[2])));
 }
 
+/// Loads a vector of discs and turns them into the axes of the cube.
 HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs, int begin) {
   const F f;
   const VF c[3] = {hn::LoadU(f, discs.x + begin), hn::LoadU(f, discs.y + begin),
@@ -145,6 +185,7 @@ HWY_INLINE CubeLanes load_discs(const CubeGeometry& cube, const DiscQueue& discs
   return turned;
 }
 
+/// Draws the discs of a mask one after another as wide discs.
 template <class CanvasType>
 HWY_INLINE void draw_wide_discs(const CanvasType& canvas, const FaceRows& rows,
                                 const CubeLanes& discs, MF mask, VU colour) {
@@ -164,12 +205,12 @@ HWY_INLINE void draw_wide_discs(const CanvasType& canvas, const FaceRows& rows,
   }
 }
 
-/// Pixels that discs may cover.
+/// The pixels that a vector of discs may cover.
 struct FaceBounds {
-  hn::VFromD<I> x0, x1, y0, y1;
-  MF seen;  // those that may cover some
+  hn::VFromD<I> x0, x1, y0, y1;  ///< columns and rows; x1 and y1 are not included
+  MF seen;                       ///< discs that may cover a pixel at all
 
-  /// Discs of so many rows at most that begin and end in one vector.
+  /// Returns the discs of at most that many rows whose columns fit one vector.
   HWY_INLINE MF within(int rows) const {
     const I i;
     const auto narrow = hn::Lt(hn::Sub(x1, x0), hn::Set(i, static_cast<int>(hn::Lanes(i)) + 1));
@@ -184,15 +225,17 @@ struct FaceBounds {
   }
 };
 
-/// @param first_row, end_row  of the pixels that matter
+/// Bounds a vector of discs on their faces.
+/// @param first_row, end_row  rows that matter, for each disc
 HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I> first_row,
                                 hn::VFromD<I> end_row) {
+  // Find p, which both axes share. Where the disc reaches the plane of the viewpoint, the bound is
+  // the whole face.
   const F f;
   const I i;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
-  // Bounds along u: (cu - u cw)^2 = r^2 |k|^2 - r^2 (n.k)^2 with k = (-u, 1, 0) in (w, u, v).
   const auto ew2 = hn::Mul(d.radius2, hn::Max(zero, hn::NegMulAdd(d.nw, d.nw, one)));
-  const auto p = hn::NegMulAdd(d.cw, d.cw, ew2);  // ew^2 - cw^2, below 0 where the disc is in front
+  const auto p = hn::NegMulAdd(d.cw, d.cw, ew2);
   const auto whole = hn::Ge(p, hn::Mul(hn::Set(f, -1e-4F), d.radius2));
   const auto per_p = hn::Div(hn::Set(f, -1.0F), p);
   const float edge = static_cast<float>(resolution);
@@ -201,7 +244,7 @@ HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I
     return hn::Min(hn::Max(hn::MulAdd(at, scale, hn::Set(f, 0.5F * edge + slack)), zero),
                    hn::Set(f, edge));
   };
-  // The span of pixels whose centres lie within middle -+ half.
+  // Bound one axis by the pixels whose centres lie within middle -+ half.
   const auto span = [&](VF cx, VF nx, VF ny, hn::VFromD<I>& first, hn::VFromD<I>& end) {
     const auto q = hn::MulAdd(cx, d.cw, hn::Mul(d.radius2, hn::Mul(nx, d.nw)));
     const auto cross = hn::MulSub(d.cw, nx, hn::Mul(cx, d.nw));
@@ -220,14 +263,15 @@ HWY_INLINE FaceBounds bounds_of(const FaceLanes& d, int resolution, hn::VFromD<I
   b.y0 = hn::Max(b.y0, first_row);
   b.y1 = hn::Min(b.y1, end_row);
   b.seen = hn::RebindMask(f, hn::And(hn::Lt(b.x0, b.x1), hn::Lt(b.y0, b.y1)));
-  // Whole vectors where that takes no more of them.
+  // Begin at a multiple of a vector where that takes no more vectors.
   const int lanes = static_cast<int>(hn::Lanes(i));
   const auto aligned = hn::And(b.x0, hn::Set(i, -lanes));
   b.x0 = hn::IfThenElse(hn::Lt(hn::Sub(b.x1, aligned), hn::Set(i, lanes + 1)), aligned, b.x0);
   return b;
 }
 
-/// Stores what says which pixels discs cover, and how near.
+/// Stores the forms that say which pixels the discs cover, and how near.
+/// @param per_height  1 / h
 HWY_INLINE void store_forms(const FaceLanes& d, VF per_height, FaceDiscs& out) {
   const F f;
   const auto one = hn::Set(f, 1.0F), two = hn::Set(f, 2.0F);
@@ -250,19 +294,22 @@ HWY_INLINE void store_forms(const FaceLanes& d, VF per_height, FaceDiscs& out) {
   hn::StoreU(hn::Div(hn::Set(f, kBump), hn::Mul(d.radius, hn::Sqrt(length2))), f, out.bump);
 }
 
-/// Appends discs to the faces that may see them, each across every axis on the side where its
-/// centre is. A disc seen under less than 30 degrees reaches no face whose side its centre is not
-/// on.
+/// Appends discs to the faces that may see them. On each axis that is at most the face on the side
+/// of the disc's centre: the disc is farther away than two radii, so it is seen within 30 degrees
+/// of its centre, while every direction of a face is at least 35.3 degrees from the plane through
+/// the viewpoint that is parallel to it.
 HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQueue& out) {
   const F f;
   const I i;
   const U u32;
   for (int axis = 0; axis < 3; ++axis) {
+    // Find the discs whose bounding spheres reach the pyramid of the face.
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const auto cw = hn::Abs(discs.c[axis]),
-               far = hn::Add(cw, discs.radius);  // no sphere around the disc reaches beyond
+               far = hn::Add(cw, discs.radius);  // nothing of the disc is farther along the axis
     const auto reaches = [&](VF c) { return hn::Lt(hn::Sub(hn::Abs(c), discs.radius), far); };
     const auto seen = hn::And(mask, hn::And(reaches(discs.c[u]), reaches(discs.c[v])));
+    // Append them in the axes of the face; that at -w has its axis w reversed.
     const auto negative = hn::Lt(discs.c[axis], hn::Zero(f));
     const std::size_t at = out.size;
     append(cw, seen, f, out.cw + at);
@@ -279,8 +326,9 @@ HWY_INLINE void add_to_faces(const CubeLanes& discs, MF mask, VU colour, FaceQue
   }
 }
 
-/// Discs that cross a face's plane beside their centres: set up for that face, they would lose
-/// their figures in divisions by next to nothing.
+/// Returns the discs within three radii whose centres lie close to the plane through the viewpoint
+/// that is parallel to a face. Set up for that face, cw would be next to nothing, and the forms
+/// would lose their digits in divisions by it.
 HWY_INLINE MF across_faces(const CubeLanes& discs, VF distance2) {
   const F f;
   const auto beside =
@@ -289,7 +337,7 @@ HWY_INLINE MF across_faces(const CubeLanes& discs, VF distance2) {
                  hn::Lt(distance2, hn::Mul(hn::Set(f, 9.0F), discs.radius2)));
 }
 
-/// Draws the discs of a queue.
+/// Draws the discs of a queue, a vector of discs at a time.
 template <class CanvasType>
 HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const FaceQueue& queue) {
   const F f;
@@ -297,6 +345,7 @@ HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const
   const CubeGeometry& cube = canvas.cube;
   FaceDiscs set;
   for (std::size_t begin = 0; begin < queue.size; begin += hn::Lanes(f)) {
+    // Load the discs, and find the pixels that they may cover.
     const auto load = [&](const float* column) { return hn::LoadU(f, column + begin); };
     const auto radius = load(queue.radius);
     const FaceLanes d{load(queue.cw), load(queue.cu), load(queue.cv), load(queue.nw),
@@ -307,6 +356,7 @@ HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const
                                         hn::GatherIndex(i, rows.end, face));
     mask = hn::And(mask, bounds.seen);
     if (hn::AllFalse(f, mask)) continue;
+    // Set up their forms.
     const auto height = hn::MulAdd(d.cw, d.nw, hn::MulAdd(d.cu, d.nu, hn::Mul(d.cv, d.nv)));
     store_forms(d, hn::Div(hn::Set(f, 1.0F), height), set);
     hn::StoreU(hn::Mul(face, hn::Set(i, cube.resolution * cube.resolution)), i, set.first);
@@ -318,8 +368,8 @@ HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const
         body(k, rgbe[k]);
       }
     };
-    // One by one their numbers of rows cannot be foretold, and a branch mistaken costs as much as
-    // two rows.
+    // Draw them sorted by size: a branch on the number of rows of each disc cannot be predicted,
+    // and a mispredicted one costs as much as two rows.
     const auto two = hn::And(mask, bounds.within(2)),
                four = hn::AndNot(two, hn::And(mask, bounds.within(4)));
     for_each(two, [&](std::size_t k, std::uint32_t c) { draw_narrow<2>(canvas, set, k, c); });
@@ -329,6 +379,7 @@ HWY_INLINE void draw_queue(const CanvasType& canvas, const FaceRows& rows, const
   }
 }
 
+/// Draws all discs, sorting kChunk of them by face at a time.
 template <class CanvasType>
 void draw_all(const CanvasType& canvas, const FaceRows& rows, const DiscQueue& discs, Sides sides) {
   const F f;
@@ -338,16 +389,19 @@ void draw_all(const CanvasType& canvas, const FaceRows& rows, const DiscQueue& d
   for (int chunk = 0; chunk < discs.size; chunk += kChunk) {
     queue.size = 0;
     for (int begin = chunk; begin < std::min(discs.size, chunk + kChunk); begin += lanes) {
+      // Cull discs without extent, and backs that are clear: all of them, or those within two
+      // radii.
       const CubeLanes d = load_discs(canvas.cube, discs, begin);
       const auto back = hn::Ge(d.height, hn::Zero(f));
       const auto distance2 = dot(d.c, d.c);
       const auto close = hn::Lt(distance2, hn::Mul(hn::Set(f, 4.0F), d.radius2));
       auto drawn = hn::And(hn::FirstN(f, static_cast<std::size_t>(discs.size - begin)),
                            hn::Gt(d.radius, hn::Zero(f)));
-      // Backs are clear to receivers within two radii.
       drawn = hn::AndNot(sides == Sides::front ? back : hn::And(back, close), drawn);
+      // Make backs black.
       const auto colour =
           hn::IfThenZeroElse(hn::RebindMask(u, back), hn::LoadU(u, discs.rgbe + begin));
+      // Draw close discs at once, and queue the others for their faces.
       const auto wide = hn::And(drawn, hn::Or(close, across_faces(d, distance2)));
       if (!hn::AllFalse(f, wide)) draw_wide_discs(canvas, rows, d, wide, colour);
       add_to_faces(d, hn::AndNot(wide, drawn), colour, queue);

@@ -1,5 +1,24 @@
-// What gathering clusters and gathering surfels have in common, a lane each. Included by files that
-// are compiled once per instruction set, so it is guarded once per instruction set.
+// The mathematics that gathering clusters and gathering surfels share; every function works on all
+// lanes of a vector. The file is included by files that are compiled once for each instruction set,
+// so it is guarded once for each instruction set.
+//
+// The horizon. A thing is dropped when it lies below the horizons of all receivers of a cell. Their
+// normals n lie in a cone of half angle phi about the axis a, and a thing at the vector p, at the
+// angle theta to a, rises over the horizon of n by p . n. The greatest rise is that of the normal
+// that leans most towards p:
+//
+//            a    n                            theta > phi:  |p| cos(theta - phi)
+//            ^   ^         p                     = cos phi (p . a) + sin phi |p - (p . a) a|
+//            |phi/      .
+//            |  /    .                         theta <= phi: |p|, because some normal points at p
+//            | /  .  theta, from a to p
+//            |/.
+//     -------x------------- horizon of a
+//
+// highest() adds how far receivers lie below the centre, and max_rise() what the extent of the
+// thing adds: a slab of half thickness `thick` and radius `wide` reaches thick + wide sin(angle
+// between n and the slab's normal) along n, and the greatest such sine over the cone follows from
+// the same addition theorem. Source: spec/shading.md#horizon.
 #if defined(PTC_SHADE_GATHER_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PTC_SHADE_GATHER_INL_H
 #undef PTC_SHADE_GATHER_INL_H
@@ -28,24 +47,31 @@ using VF = hn::VFromD<F>;
 using VU = hn::VFromD<U>;
 using MF = hn::Mask<F>;
 
-constexpr float kSeam = 0.5F;  // width of a seam in units of rho / h
+/// Width of a seam over rho / h, the cell's radius over its height above the plane of the thing.
+constexpr float kSeam = 0.5F;
 
+/// Loads 16-bit numbers, as nodes store them.
 HWY_INLINE VU load_u16(const std::byte* at) {
   return hn::PromoteTo(U(), hn::LoadU(U16(), reinterpret_cast<const std::uint16_t*>(at)));
 }
+/// Converts whole numbers below 2^31 to floats.
 HWY_INLINE VF to_float(VU v) {
   return hn::ConvertTo(F(), hn::BitCast(I(), v));
 }
+/// Loads unsigned 16-bit floats: the exponent and the upper 8 bits of the mantissa of a float
+/// (format/scalar.h).
 HWY_INLINE VF load_ufloat16(const std::byte* at) {
   return hn::BitCast(F(), hn::ShiftLeft<15>(load_u16(at)));
 }
 
+/// A vector of three dimensions in each lane.
 struct Vec {
   VF x, y, z;
 };
 HWY_INLINE VF dot(const Vec& a, const Vec& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
+/// Returns the same vector in each lane.
 HWY_INLINE Vec spread(const glm::vec3& v) {
   return {hn::Set(F(), v.x), hn::Set(F(), v.y), hn::Set(F(), v.z)};
 }
@@ -53,7 +79,16 @@ HWY_INLINE Vec scaled(const Vec& v, VF by) {
   return {hn::Mul(v.x, by), hn::Mul(v.y, by), hn::Mul(v.z, by)};
 }
 
-/// A number on [-1, 1] squared unfolded into a unit vector (format/scalar.cpp).
+/// Unfolds a point of the square [-1, 1]^2 into a unit vector: the octahedral map, whose scalar
+/// twin is in format/scalar.h.
+///
+///     +-----+-----+       The inner diamond |u| + |v| <= 1 is the upper half of the octahedron
+///     | L / | \ L |       seen from above; the four corner triangles L are the faces of the lower
+///     | /   |   \ |       half, folded outwards. The point on the octahedron is normalised.
+///     +-----+-----+ u
+///     | \   |   / |
+///     | L \ | / L |
+///     +-----+-----+
 HWY_INLINE Vec unfold(VF u, VF v) {
   const F f;
   const auto one = hn::Set(f, 1.0F);
@@ -65,17 +100,18 @@ HWY_INLINE Vec unfold(VF u, VF v) {
   return scaled(n, hn::Div(one, hn::Sqrt(dot(n, n))));
 }
 
-/// As encode_rgbe(), but a component that rounds up to 256 stays 255.
+/// Packs colours as encode_rgbe() does, except that a component that rounds up to 256 stays 255.
 HWY_INLINE VU pack_rgbe(VF r, VF g, VF b) {
   const F f;
   const I i;
   const U u;
   const auto greatest = hn::Max(r, hn::Max(g, b));
-  // 2^e > greatest: the exponent field of a float is e + 126.
+  // Find the least e with 2^e > greatest: the exponent field of that float is e + 126.
   const auto field = hn::ShiftRight<23>(hn::BitCast(u, greatest));
   const auto exponent = hn::BitCast(i, hn::Add(field, hn::Set(u, 2U)));  // e + 128
   const auto scale =
       hn::BitCast(f, hn::ShiftLeft<23>(hn::Sub(hn::Set(i, 263), exponent)));  // 2^(8 - e)
+  // Round each component to a byte.
   const auto byte = [&](VF c) {
     return hn::BitCast(
         u, hn::ConvertTo(i, hn::Min(hn::MulAdd(c, scale, hn::Set(f, 0.5F)), hn::Set(f, 255.0F))));
@@ -83,17 +119,18 @@ HWY_INLINE VU pack_rgbe(VF r, VF g, VF b) {
   const auto packed =
       hn::Or(hn::Or(byte(r), hn::ShiftLeft<8>(byte(g))),
              hn::Or(hn::ShiftLeft<16>(byte(b)), hn::ShiftLeft<24>(hn::BitCast(u, exponent))));
-  // Below 2^-100 nothing is bright enough to see, and the scale would overflow.
+  // Take black below 2^-100: nothing there is bright enough to see, and the scale would overflow.
   return hn::IfThenElseZero(hn::RebindMask(u, hn::Gt(greatest, hn::Set(f, 0x1p-100F))), packed);
 }
 
+/// Returns the mask of bits, the first lane in bit 0.
 HWY_INLINE MF mask_of(unsigned bits) {
   const U u;
   alignas(64) static constexpr std::uint32_t kBit[8] = {1, 2, 4, 8, 16, 32, 64, 128};
   return hn::RebindMask(F(), hn::TestBit(hn::Set(u, bits), hn::LoadU(u, kBit)));
 }
 
-/// Appends the lanes of a mask.
+/// Appends the discs in the lanes of a mask to a queue.
 HWY_INLINE void push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal, VF radius,
                      VU rgbe) {
   const F f;
@@ -109,19 +146,20 @@ HWY_INLINE void push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal
   queue.size += static_cast<int>(append(rgbe, hn::RebindMask(u, mask), u, queue.rgbe + at));
 }
 
-/// Of lengths relative to a cell, over them: what floats may be off after a few operations.
+/// Relative rounding error of cell-relative lengths after a few float operations.
 constexpr float kRounding = 4e-7F;
 
-/// How high the direction to a thing reaches over the horizon of any receiver of the cell, as a
-/// length: to . n at its greatest over the normals of the cone, how far receivers lie below the
-/// centre, and what rounding may take from both.
-/// @param along  to . axis
+/// Returns how high the middle of a thing may rise over the horizon of any receiver of the cell, a
+/// length: the greatest p . n over the normals of the cone, plus how far receivers lie below the
+/// centre, plus what rounding may take from both.
+/// @param distance2  |p|^2, p the thing's middle relative to the centre
+/// @param along      p . axis
 HWY_INLINE VF highest(const ReceiverCell& cell, VF distance2, VF along) {
   const F f;
   const auto across = hn::Sqrt(hn::Max(hn::NegMulAdd(along, along, distance2), hn::Zero(f)));
   const auto turned =
       hn::MulAdd(hn::Set(f, cell.cone_cos), along, hn::Mul(hn::Set(f, cell.cone_sin), across));
-  // Inside the cone the greatest is the distance itself.
+  // Inside the cone the greatest p . n is the distance itself.
   const auto inside =
       hn::Gt(hn::Mul(hn::Set(f, cell.cone_sin), along), hn::Mul(hn::Set(f, cell.cone_cos), across));
   const auto distance = hn::Sqrt(distance2);
@@ -130,8 +168,8 @@ HWY_INLINE VF highest(const ReceiverCell& cell, VF distance2, VF along) {
   return hn::Add(hn::IfThenElse(inside, distance, turned), below);
 }
 
-/// Half the extent of a slab along any normal of the cone: at most `thick` along the slab's normal
-/// and `wide` across it.
+/// Returns the greatest half extent of a slab along any normal of the cone. The slab reaches
+/// `thick` along its own normal and `wide` across it, on both sides of its middle.
 /// @param cosine  of the angle between the slab's normal and the cone's axis
 HWY_INLINE VF max_rise(const ReceiverCell& cell, VF cosine, VF thick, VF wide) {
   const F f;
@@ -139,15 +177,26 @@ HWY_INLINE VF max_rise(const ReceiverCell& cell, VF cosine, VF thick, VF wide) {
   const auto cone_cos = hn::Set(f, cell.cone_cos), cone_sin = hn::Set(f, cell.cone_sin);
   auto tilt = hn::MulAdd(sine, cone_cos, hn::Mul(hn::Abs(cosine), cone_sin));
   const auto edge_on =
-      hn::Lt(hn::Mul(hn::Abs(cosine), cone_cos), hn::Mul(sine, cone_sin));  // to some normal
+      hn::Lt(hn::Mul(hn::Abs(cosine), cone_cos), hn::Mul(sine, cone_sin));  // square to some normal
   tilt = hn::IfThenElse(edge_on, hn::Set(f, 1.0F), tilt);
   return hn::MulAdd(wide, tilt, thick);
 }
 
-/// Distance up to which the children of a cell draw what the cell draws too
-/// (spec/shading.md#seams).
-/// @param height  of the cell's centre over the plane of the thing, not negative
-/// @param above   how far the thing's top stands over the horizon of the centre; d its distance
+/// Returns the distance up to which the children of a cell draw a thing that the cell draws, too:
+/// (1 + s) times shared_from.
+///
+///     x centre             rho / k     (1 + s) rho / k
+///     |                       |              |
+///     +-----------------------+--------------+--------------- surface
+///     |children draw ----------------------->|
+///                             |the cell draws, as its centre sees it ----->
+///
+/// A receiver that is farther from the surface than the centre would see a gap between the two
+/// parts, were s 0. s = min(1, rho / 2 h) min(1, sine of the elevation of the thing's top), because
+/// light weighs little at the horizon. Source: spec/shading.md#seams.
+/// @param height  h, of the cell's centre over the plane of the thing, not negative
+/// @param above   how far the thing's top stands over the horizon of the centre
+/// @param d       distance of the thing from the centre
 HWY_INLINE VF seam_end(const CellTest& test, VF height, VF above, VF d) {
   const F f;
   const auto one = hn::Set(f, 1.0F);

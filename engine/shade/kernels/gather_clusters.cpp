@@ -1,3 +1,32 @@
+// Decides what becomes of clusters, and turns those that are drawn into discs.
+//
+// A cluster is a bounding sphere (radius r), a slab across its mean normal (thickness), an area A,
+// and an ambient cube: for each of the 6 axes, the share f of the area that faces it, and the mean
+// radiance L of that share. The mean normal S, the sum of area times normal over A, is the
+// difference of opposite shares. Towards a receiver, in the unit direction w, three faces of the
+// cube look:
+//
+//            +---+y---+  / w      front = sum of |w_k| f_k over the three faces that look at w
+//            |        | /         back  = front - S . w
+//           -x    x   +x          projected area = A max(front, back)
+//            |        |           (A front when backs are clear)
+//            +---y----+
+//
+// A flat cluster, |S| > 0.9, is drawn as one surfel. Any other is an ellipsoid of revolution about
+// S, of the ratio s between its axes. Its silhouette is that of a disc:
+//
+//                  S                  c = cosine between S and w
+//              ____|____     / w      q = sqrt(c^2 + s^2 (1 - c^2)), its foreshortening
+//          . '     |     ' .          the disc's normal lies in the plane of S and w, at the
+//         (        x        )         cosine q to w
+//          ' . ___ s ___ . '          radius^2 = inflation A max(front, back) / (pi q),
+//                                     at most 0.55 r^2
+//
+// The radiance is that of the fronts, sum of |w_k| f_k L_k, spread over the disc: dimmed where
+// backs outweigh fronts twice. spec/shading.md#splats has the rules and what they gain; the plain
+// gather (engine/shade/reference/plain_gather.cpp) has the same rules without vectors. The cut
+// through the octree is that of Kontkanen, Tabellion and Overbeck 2011, shared by the receivers of
+// a cell.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -20,26 +49,28 @@ namespace {
 
 constexpr float kMaxStoredArea = 0x1.ffp127F;  // the greatest finite ufloat16
 
-/// Clusters relative to a cell's centre.
+/// A vector of clusters relative to a cell's centre, in edges of the frame.
 struct Clusters {
-  Vec to;
-  VF radius, thickness;
-  Vec mean;    // normal over area, not unit
-  VF length;   // of the mean: 1 where all surfels face one way
-  Vec normal;  // unit; NaN where the mean is zero
-  VF distance2;
+  Vec to;                ///< mean position
+  VF radius, thickness;  ///< of the bounding sphere, and of the slab
+  Vec mean;              ///< S: sum of area times normal over the area, not unit
+  VF length;             ///< |S|: 1 where all surfels face one way
+  Vec normal;            ///< unit, along S; NaN where S is zero
+  VF distance2;          ///< |to|^2
 };
 
+/// Computes the members that follow from the others.
 HWY_INLINE void set_derived(Clusters& c) {
   c.length = hn::Sqrt(dot(c.mean, c.mean));
   c.normal = scaled(c.mean, hn::Div(hn::Set(F(), 1.0F), c.length));
   c.distance2 = dot(c.to, c.to);
 }
 
-/// How far they may reach over the horizon of some receiver; not above it where negative.
+/// Returns how far clusters may reach over the horizon of some receiver; what is not above 0 is
+/// under the horizon of all.
 HWY_INLINE VF top(const CellTest& test, const Clusters& c) {
   const Vec axis = spread(test.cell.axis);
-  // What lies in the sphere and in the slab; of a mean normal of zero, NaN, the sphere alone.
+  // Take the lesser of sphere and slab. A mean normal of zero gives NaN, and so the sphere.
   auto rise = max_rise(test.cell, dot(c.normal, axis), c.thickness, c.radius);
   rise = hn::IfThenElse(hn::Lt(rise, c.radius), rise, c.radius);
   return hn::Add(highest(test.cell, c.distance2, dot(c.to, axis)), rise);
@@ -49,14 +80,19 @@ HWY_INLINE MF over_horizon(const CellTest& test, const Clusters& c) {
   return hn::Gt(top(test, c), hn::Zero(F()));
 }
 
+/// The decision about each cluster of a vector.
 struct Verdict {
   MF drawn, open, keep;
-  MF stand_in;  ///< of those drawn: not small enough, but closed
+  MF stand_in;  ///< drawn clusters that are not small enough, but closed
 };
 
-/// What becomes of clusters over the horizon.
-/// @param closed  those that are not to be opened, however large they are
+/// Decides about clusters that reach over the horizon (gather_kernels.h has the table).
+/// @param d       distances
+/// @param wanted  clusters to decide about
+/// @param closed  clusters that are not to be opened, however large they are
 HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wanted, MF closed) {
+  // Find those that are small, as seen from the nearest place of the cell; closed ones count as
+  // small.
   const F f;
   const auto limit = hn::Set(f, test.limit), rho = hn::Set(f, test.cell.radius),
              shared_from = hn::Set(f, test.shared_from);
@@ -65,14 +101,16 @@ HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wante
   const auto fine = hn::Lt(r2, hn::Mul(limit, hn::Mul(nearest, nearest)));  // for every receiver
   const auto small = hn::And(wanted, hn::Or(fine, closed));
   const auto large = hn::AndNot(small, wanted);
+  // Draw small ones that are far enough to share.
   const auto drawn = hn::And(small, hn::Ge(d, shared_from));
   const auto stand_in = hn::AndNot(fine, drawn);
   if (test.last) return {drawn, large, hn::FirstN(f, 0), stand_in};
-  // Open now what the children would open anyway, or what opens into shared parts.
+  // Open large ones that every receiver would open, or whose parts are all far enough to share.
   const auto farthest = hn::Add(d, rho);
   const auto opens = hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from),
                             hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
-  // Of what faces many ways, some part is always seen from the front.
+  // Keep small ones in the seam. Some part of a cluster that faces many ways is seen from the front
+  // everywhere, so the height over its plane counts as d (1 - |S|) at least.
   const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), c.length), hn::Zero(f)));
   const auto height = hn::Max(hn::Abs(dot(c.to, c.mean)), scattered);
   const auto above = hn::Add(dot(c.to, spread(test.cell.axis)), hn::Add(c.radius, rho));
@@ -81,9 +119,10 @@ HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wante
           stand_in};
 }
 
-/// Counts clusters drawn in place of their children, and what these may cover of a receiver's
-/// hemisphere, weighted by the cosine (spec/shading.md#damage): no more than the cluster's sphere,
-/// nor than a wedge as wide as the sphere and as high as the cluster reaches over the horizon.
+/// Counts clusters that are drawn in place of their children, and bounds the cosine-weighted share
+/// of a receiver's hemisphere that they may cover: that of the cluster's sphere, or that of a wedge
+/// as wide as the sphere and as high as the cluster reaches over the horizon, whichever is less.
+/// Source: spec/shading.md#damage.
 HWY_INLINE void count_stand_ins(const CellTest& test, MF mask, const Clusters& c, VF d,
                                 CellOutput& out) {
   const F f;
@@ -101,9 +140,19 @@ HWY_INLINE void count_stand_ins(const CellTest& test, MF mask, const Clusters& c
   out.stand_in_share += hn::GetLane(hn::SumOfLanes(f, hn::IfThenElseZero(mask, share)));
 }
 
-/// Clusters all of whose surfels show their backs to every receiver.
+/// Returns the clusters all of whose surfels show their backs to every receiver.
+///
+/// All normals lie in a cone of half angle gamma about the cluster's axis, and all ways from a
+/// receiver to a surfel in a sphere of radius r + rho around the way p between the centres. So
+/// every surfel shows its back where
+///
+///     angle(axis, p) + gamma + asin((r + rho) / |p|) < 90 degrees
+///     axis . p > sin gamma sqrt(|p|^2 - (r + rho)^2) + cos gamma (r + rho),
+///
+/// and taking 1 for cos gamma is on the safe side.
 HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test, const Vec& to,
                          VF distance2, VF radius) {
+  // Decode the cone.
   const F f;
   const I i;
   const auto cosine = hn::Mul(
@@ -117,28 +166,34 @@ HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test
   };
   const Vec axis =
       unfold(coordinate(hn::ShiftLeft<24>(packed)), coordinate(hn::ShiftLeft<16>(packed)));
+  // Compare the angles.
   const auto reach = hn::Add(radius, hn::Set(f, test.cell.radius));
   const auto clear = hn::NegMulAdd(reach, reach, distance2);
   auto sine = hn::Sqrt(hn::Max(hn::NegMulAdd(cosine, cosine, hn::Set(f, 1.0F)), hn::Zero(f)));
-  sine = hn::Add(sine, hn::Set(f, 0.02F));  // the axis is rounded
+  sine = hn::Add(sine, hn::Set(f, 0.02F));  // allows for the rounding of the axis
   const auto least = hn::MulAdd(sine, hn::Sqrt(hn::Max(clear, hn::Zero(f))), reach);
   return hn::And(hn::And(hn::Gt(cosine, hn::Set(f, 0.05F)), hn::Gt(clear, hn::Zero(f))),
                  hn::Gt(dot(axis, to), least));
 }
 
 /// Appends clusters as discs (spec/shading.md#splats).
-/// @param cube  share() of the area that faces along an axis, radiance() of it as rgbe; against the
-/// axis where the
-///     mask says so
+/// @param mask      clusters to draw
+/// @param distance  of each cluster
+/// @param area      of each cluster, scene units squared
+/// @param cube      gives share(axis, negative), the share of the area that faces an axis, and
+///                  radiance(axis, negative), its RGBE; lanes of `negative` mean the opposite axis
 template <class Cube>
 HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, VF distance,
                               VF area, const Cube& cube, DiscQueue& queue) {
+  // Convert the area. One that did not fit its field is only known to be large, and counts as
+  // infinite: the sphere limits the disc.
   const F f;
   const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
-  // What does not fit the field is only known to be large: the sphere limits it.
   const auto known = hn::Lt(area, hn::Set(f, kMaxStoredArea));
   area = hn::Mul(hn::Mul(area, hn::Set(f, test.areas[0])), hn::Set(f, test.areas[1]));
   area = hn::IfThenElse(known, area, hn::Inf(f));
+  // Sum up the three faces that look at the receiver, and find the projected area. Fronts less
+  // backs are the mean normal's projection.
   const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
   const VF along_axis[3] = {toward.x, toward.y, toward.z};
   VF weight[3], front = zero;
@@ -146,12 +201,12 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
     weight[k] = hn::Mul(hn::Abs(along_axis[k]), cube.share(k, hn::Lt(along_axis[k], zero)));
     front = hn::Add(front, weight[k]);
   }
-  // Fronts less backs are the mean normal's.
   const auto projected =
       test.sides == Sides::both ? hn::Max(front, hn::Sub(front, dot(c.mean, toward))) : front;
   mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
 
-  // The silhouette of an ellipsoid is that of a disc across it, turned towards the receiver.
+  // Find the normal of the disc: the cluster's own where it is flat, else that of the disc with the
+  // ellipsoid's silhouette, turn * normal + rest * toward.
   const auto flat = hn::Gt(c.length, hn::Set(f, kFlat)),
              directed = hn::Gt(c.length, hn::Set(f, kDirected));
   const Vec normal{hn::IfThenElseZero(directed, c.normal.x),
@@ -168,6 +223,7 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
   const Vec disc_normal{hn::MulAdd(turn, normal.x, hn::Mul(rest, toward.x)),
                         hn::MulAdd(turn, normal.y, hn::Mul(rest, toward.y)),
                         hn::MulAdd(turn, normal.z, hn::Mul(rest, toward.z))};
+  // Find its radius: from half the area where it is flat, else from the projected area.
   const auto seen =
       hn::Mul(hn::Set(f, test.inflation / kPi), hn::Div(hn::Mul(area, projected), foreshortened));
   const auto wanted = hn::IfThenElse(flat, hn::Mul(area, hn::Set(f, 0.5F)), seen);
@@ -175,10 +231,10 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
       hn::Mul(hn::IfThenElse(flat, one, hn::Set(f, kSolid)), hn::Mul(c.radius, c.radius));
   const auto radius2 = hn::IfThenElse(hn::Lt(wanted, most), wanted, most);
 
+  // Find its radiance: that of the fronts over what they are spread over. Backs dim a cluster that
+  // is not flat, but only half of them count, since most are hidden; a flat disc has a black back.
   VU colour = hn::Zero(U());
   if (test.bleeding) {
-    // What is not flat is dimmed by its backs, of which most are hidden; a flat disc has a black
-    // one.
     const auto over =
         hn::IfThenElse(flat, front, hn::Max(front, hn::Mul(hn::Set(f, kDark), projected)));
     const auto mix = hn::IfThenElse(hn::Gt(over, zero), hn::Div(one, over), zero);
@@ -195,8 +251,9 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
   push(queue, mask, c.to, disc_normal, hn::Sqrt(radius2), colour);
 }
 
-/// Appends clusters to those left to the children. Positions are rounded to their distance, so the
-/// bounds grow by that.
+/// Appends clusters to those left to the children. Positions are rounded relative to their
+/// distance, so radius and thickness grow by that rounding.
+/// @param payload  index of each cluster's payload
 HWY_INLINE void leave(NearClusters& left, MF mask, const Clusters& c, VF distance, VU payload) {
   const F f;
   const U u;
@@ -213,9 +270,10 @@ HWY_INLINE void leave(NearClusters& left, MF mask, const Clusters& c, VF distanc
   left.size += append(payload, hn::RebindMask(u, mask), u, left.payload.data() + at);
 }
 
-/// Eight children of a group from `first` on, in columns of the page.
+/// The children of a group, read from the columns of its page.
 class GroupLanes {
  public:
+  /// Finds the step of position codes: the edge of the group's cell over 2^16.
   GroupLanes(const GroupView& group, const CellTest& test)
       : group_(group), corner_(decode_morton(group.cell())), test_(test) {
     const int level = group.level();
@@ -225,11 +283,12 @@ class GroupLanes {
     step_ = static_cast<float>(edge * test.unit / 65536);
   }
 
+  /// Loads a vector of children, from number `first` on.
   HWY_INLINE Clusters load(int first) {
     const F f;
     const int at = 2 * first;
     const auto step = hn::Set(f, step_), unit = hn::Set(f, static_cast<float>(test_.unit));
-    // Around discs as large as they may be, and where they are.
+    // Bound the radius by what encloses discs that are as large as they may be.
     const auto most = hn::Set(f, 2 * SceneScale::kMaxRadius);
     const auto offset = [&](std::size_t k, double centre) {
       return hn::Set(f,
@@ -251,12 +310,14 @@ class GroupLanes {
     return c;
   }
 
+  /// Draws the children of a mask among those that load() returned last.
   HWY_INLINE void draw(int first, MF mask, const Clusters& c, VF distance, DiscQueue& queue) const {
     draw_clusters(test_, mask, c, distance, load_ufloat16(group_.area() + 2 * first),
                   Cube{*this, first}, queue);
   }
 
  private:
+  /// The ambient cubes of a vector of children, as draw_clusters() takes them.
   struct Cube {
     const GroupLanes& lanes;
     int first;
@@ -275,16 +336,19 @@ class GroupLanes {
   };
 
   const GroupView& group_;
-  LatticePoint corner_;
+  LatticePoint corner_;  ///< of the group's cell
   const CellTest& test_;
-  float step_;
-  VF share_[6];
+  float step_;   ///< edges of the frame for one step of a position code
+  VF share_[6];  ///< shares of the area of the children that load() returned last
 };
 
-/// Payloads of clusters that a cell left, one a lane.
+/// Payloads of clusters that a cell left, one in each lane, gathered by 4-byte words:
+///
+///     word   0 .. 5   6 .. 11   12     13, 14      15
+///            rgbe     share     area   reference   kind
 class PayloadLanes {
  public:
-  /// @param index  of each among the payloads
+  /// Refers to payloads. @param index  of the payload of each lane
   PayloadLanes(const ClusterPayload* payloads, VU index)
       : base_(reinterpret_cast<const float*>(payloads)),
         word_(hn::ShiftLeft<4>(hn::BitCast(I(), index))) {}
@@ -303,6 +367,7 @@ class PayloadLanes {
   }
 
  private:
+  /// Returns the word of an axis relative to that of the positive axis.
   HWY_INLINE hn::VFromD<I> face(MF negative) const {
     const I i;
     return hn::Add(word_, hn::IfThenElseZero(hn::RebindMask(i, negative), hn::Set(i, 1)));
@@ -312,7 +377,7 @@ class PayloadLanes {
   hn::VFromD<I> word_;
 };
 
-/// The payload of a child.
+/// Returns the payload of a child of a group.
 ClusterPayload payload_of(const GroupView& group, int i, bool closed) {
   ClusterPayload payload;
   for (int k = 0; k < 6; ++k) {
@@ -338,18 +403,21 @@ unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& t
   GroupLanes loader(group, test);
   unsigned opened = 0;
   for (int first = 0; first < group.size(); first += lanes) {
+    // Drop children that no receiver sees.
     auto wanted = hn::FirstN(f, static_cast<std::size_t>(group.size() - first));
     const Clusters c = loader.load(first);
     if (test.cell.has_horizon) wanted = hn::And(wanted, over_horizon(test, c));
     if (test.sides == Sides::front)
       wanted = hn::AndNot(faces_away(group, first, test, c.to, c.distance2, c.radius), wanted);
     if (hn::AllFalse(f, wanted)) continue;
+    // Draw and open those that are settled.
     const auto d = hn::Sqrt(c.distance2);
     const MF shut = mask_of(closed >> first);
     const Verdict verdict = judge(test, c, d, wanted, shut);
     if (closed != 0) count_stand_ins(test, verdict.stand_in, c, d, out);
     if (!hn::AllFalse(f, verdict.drawn)) loader.draw(first, verdict.drawn, c, d, out.queue);
     opened |= bits_of(f, verdict.open) << first;
+    // Leave the others, with new payloads.
     if (hn::AllFalse(f, verdict.keep)) continue;
     const auto next = static_cast<std::uint32_t>(out.payloads.size());
     unsigned rest = bits_of(f, verdict.keep);
@@ -373,6 +441,7 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
   const std::size_t lanes = hn::Lanes(f);
   const Vec moved = spread(move);
   for (; from < near.size && !out.queue.full(); from += lanes) {
+    // Load clusters relative to this cell's centre, and drop those that no receiver sees.
     const auto load = [&](const std::vector<float>& column) {
       return hn::LoadU(f, column.data() + from);
     };
@@ -385,6 +454,7 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
     auto wanted = hn::FirstN(f, near.size - from);
     if (test.cell.has_horizon) wanted = hn::And(wanted, over_horizon(test, c));
     if (hn::AllFalse(f, wanted)) continue;
+    // Decide what becomes of the others.
     const auto d = hn::Sqrt(c.distance2);
     const auto payload = hn::LoadU(u, near.payload.data() + from);
     MF shut = hn::FirstN(f, 0);
@@ -395,6 +465,7 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
     }
     const Verdict verdict = judge(test, c, d, wanted, shut);
     if (test.damaged) count_stand_ins(test, verdict.stand_in, c, d, out);
+    // Draw, open and leave them.
     if (!hn::AllFalse(f, verdict.drawn)) {
       const PayloadLanes cube(out.payloads.data(),
                               hn::IfThenElseZero(hn::RebindMask(u, verdict.drawn), payload));

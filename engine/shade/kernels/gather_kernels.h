@@ -1,4 +1,22 @@
-// What a gather asks of eight clusters or surfels at once, compiled for every instruction set.
+// The decisions of a gather for up to eight clusters or surfels at once, compiled for every
+// instruction set.
+//
+// A cell of receivers looks at a thing, a cluster or a surfel, and does one of four things with it:
+//
+//     drop    it lies below the horizon of every receiver, or shows them only clear backs
+//     draw    it is small enough, and far enough to look the same to all receivers of the cell
+//     open    it is a cluster that is too large for every receiver, or far enough although it is
+//             too large for some: its children are looked at for this cell
+//     keep    it is near, or only some receivers would open it: the cells within look at it again
+//
+//                  near: d < rho / parallax         far
+//     small        keep                             draw
+//     not small    open when every receiver of      open
+//                  the cell would, else keep
+//
+// d is the distance from the cell's centre and rho the cell's radius; a surfel is always small.
+// A small thing just beyond the border is drawn and kept as well, so that no gap opens
+// (spec/shading.md#seams). A cell of one receiver draws or opens everything.
 #pragma once
 
 #include <cstddef>
@@ -18,52 +36,57 @@ namespace ptc {
 
 /// A receiver cell with the limits of its gather. Lengths are in edges of the frame.
 struct CellTest {
-  ReceiverCell cell;
-  double unit = SceneScale::kLatticeUnit;  ///< lattice unit
-  SceneScale::Factors lengths{1, 1};       ///< from scene units
-  SceneScale::Factors areas{1, 1};         ///< likewise
-  float limit = 0;                         ///< a cluster is small when r^2 < limit d^2
-  float shared_from = 0;  ///< distance from which the cell settles things for all its receivers
-  float inflation = 1;
-  Sides sides = Sides::both;
-  bool bleeding = true;  ///< colours are wanted
-  bool last = false;     ///< nothing is left to children: everything is settled
-  bool damaged = false;  ///< some clusters may be closed: they are drawn, not opened
+  ReceiverCell cell;                       ///< its radius and depth in edges of the frame
+  double unit = SceneScale::kLatticeUnit;  ///< lattice unit, edges of the frame
+  SceneScale::Factors lengths{1, 1};       ///< convert lengths from scene units to edges
+  SceneScale::Factors areas{1, 1};         ///< convert areas from scene units to edges
+  float limit = 0;            ///< a cluster of radius r at distance d is small when r^2 < limit d^2
+  float shared_from = 0;      ///< distance from which the cell settles things for all receivers
+  float inflation = 1;        ///< GatherOptions::inflation
+  Sides sides = Sides::both;  ///< sides of surfels that stop light
+  bool bleeding = true;       ///< whether colours are wanted
+  bool last = false;          ///< whether everything is settled and nothing left to children
+  bool damaged = false;       ///< whether some clusters may be closed: drawn, and never opened
 };
 
-/// What a cell draws, and what it leaves; all relative to its centre.
+/// The output of a cell: what it draws, and what it leaves to its children. Positions are relative
+/// to its centre.
 struct CellOutput {
-  DiscQueue& queue;
-  NearLists* left;                        ///< null when `last`
-  std::vector<ClusterPayload>& payloads;  ///< of the clusters left, appended
+  DiscQueue& queue;                       ///< discs to draw, appended
+  NearLists* left;                        ///< things left to children, appended; null when `last`
+  std::vector<ClusterPayload>& payloads;  ///< payloads of the clusters that are left, appended
   unsigned stand_ins = 0;  ///< closed clusters that were drawn and would have been opened
-  float stand_in_share =
-      0;  ///< of the hemisphere that they may cover, for any receiver of the cell
+  /// Share of the hemisphere that the stand-ins may cover, for any receiver of the cell.
+  float stand_in_share = 0;
 };
 
 /// Looks at the children of a group.
-/// @param closed  bit i: child i cannot be opened; 0 unless the test is of a damaged scene
-/// @param out  its queue has room for 8
-/// @return  bit i: child i is replaced by its own children
+/// @param closed  bit i: child i cannot be opened; 0 unless `test.damaged`
+/// @param out     its queue has room for 8 discs
+/// @return        bit i: child i is to be replaced by its own children
 unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& test,
                       CellOutput& out);
 
-/// Looks at clusters that the cell around left, from index `from` on, until the queue is full.
-/// @param move    of positions, from that cell's centre to this one's
-/// @param opened  indices of payloads of clusters that are replaced by their children, appended
-/// @return  the first index that it has not looked at
+/// Looks at clusters that the enclosing cell left, from index `from` on, until the queue is full.
+/// @param move    is added to positions: the enclosing cell's centre relative to this one's
+/// @param opened  payload indices of clusters that are to be replaced by their children, appended
+/// @return        the first index that it has not looked at; near.size at the end
 std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move,
                             const CellTest& test, CellOutput& out,
                             std::vector<std::uint32_t>& opened);
 
-/// Looks at surfels of a page.
-/// @param payload, count  of a point page; up to 64 bytes past it may be read
-/// @param first, number   of them, at most 8
-/// @param out  its queue has room for 8
+/// Looks at surfels of a point page.
+/// @param payload  of the page; up to 64 bytes past its end may be read
+/// @param count    number of points on the page
+/// @param first    index of the first surfel to look at
+/// @param number   how many surfels to look at, at most 8
+/// @param out      its queue has room for 8 discs
 void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first,
                          unsigned number, const CellTest& test, CellOutput& out);
 
-/// Looks at surfels that the cell around left, as gather_clusters().
+/// Looks at surfels that the enclosing cell left, from index `from` on, until the queue is full.
+/// @param move  is added to positions: the enclosing cell's centre relative to this one's
+/// @return      the first index that it has not looked at; near.size at the end
 std::size_t gather_surfels(const NearSurfels& near, std::size_t from, const glm::vec3& move,
                            const CellTest& test, CellOutput& out);
 

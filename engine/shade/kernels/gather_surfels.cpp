@@ -1,3 +1,21 @@
+// Decides what becomes of surfels: drop, draw or keep (gather_kernels.h). A surfel is a disc, and
+// the distance that counts is that of its nearest point, because a receiver that stands over a disc
+// sees it change with every step, however far away its middle is:
+//
+//            x centre of the cell
+//            |\                        height = |to . n|      over the plane of the disc
+//            | \  d                    aside^2 = |to|^2 - height^2
+//     height |  \                      beyond = max(aside - radius, 0)
+//            |   \                     d^2 = beyond^2 + height^2
+//            +----=======o=======
+//            beyond      radius        o is the middle, at `aside` from the foot of the height
+//
+// The back of a disc is clear to receivers within two radii of its middle. Where that holds for
+// some receivers of a cell and not for others, the disc is kept, however far it is.
+//
+// Surfels come from a page in columns (spec/points.md#point-page), or from the lists that the
+// enclosing cell left. Coordinates of a page are 42-bit lattice numbers, more than a float holds,
+// so the centre is taken off in integers first.
 #include <algorithm>
 #include <cmath>
 
@@ -15,17 +33,19 @@ HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
-/// Surfels relative to a cell's centre.
+/// A vector of surfels relative to a cell's centre, in edges of the frame.
 struct Surfels {
   Vec to, normal;
   VF radius;
 };
 
-/// Draws, leaves or drops surfels.
-/// @param colour  gives their rgbe, when it is needed
+/// Draws, keeps or drops surfels.
+/// @param wanted  surfels to look at
+/// @param colour  returns their RGBE; is called only when it is needed
 template <class Colour>
 HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const Colour& colour,
                        CellOutput& out) {
+  // Drop what lies under every horizon, and backs where none counts.
   const F f;
   const U u;
   const ReceiverCell& cell = test.cell;
@@ -40,19 +60,18 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   const auto height = dot(s.to, s.normal);
   if (test.sides == Sides::front) wanted = hn::And(wanted, hn::Lt(height, hn::Set(f, cell.radius)));
   if (hn::AllFalse(f, wanted)) return;
-  // Distance of the disc's nearest point: who stands on a disc sees it change with every step,
-  // however far its middle.
+  // Draw what is far enough, by the distance of the disc's nearest point.
   const auto aside = hn::Sqrt(hn::Max(hn::NegMulAdd(height, height, d2), hn::Zero(f)));
   const auto beyond = hn::Max(hn::Sub(aside, s.radius), hn::Zero(f));
   const auto d = hn::Sqrt(hn::MulAdd(beyond, beyond, hn::Mul(height, height)));
   auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
+  // Keep what is near or in the seam.
   auto keep = hn::FirstN(f, 0);
   if (!test.last) {
     const auto rho = hn::Set(f, cell.radius);
     const auto above = hn::Add(dot(s.to, axis), hn::Add(s.radius, rho));
     keep = hn::And(wanted, hn::Lt(d, seam_end(test, hn::Abs(height), above, d)));
-    // Backs are clear within two radii: of a disc's, that may be so for some receivers of the cell
-    // alone.
+    // Keep, and do not draw, what shows a clear back to some receivers of the cell alone.
     const auto reach = hn::Add(s.radius, s.radius), middle = hn::Sqrt(d2);
     const auto clear_to_some =
         hn::And(hn::Lt(hn::Sub(middle, rho), reach), hn::Gt(height, hn::Neg(rho)));
@@ -61,6 +80,7 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
     drawn = hn::AndNot(divided, drawn);
     keep = hn::Or(keep, hn::And(wanted, divided));
   }
+  // Append to the queue and to the list.
   if (hn::AllFalse(f, hn::Or(drawn, keep))) return;
   const VU rgbe = test.bleeding ? colour() : hn::Zero(u);
   if (!hn::AllFalse(f, drawn)) push(out.queue, drawn, s.to, s.normal, s.radius, rgbe);
@@ -77,14 +97,22 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   left.size += append(rgbe, hn::RebindMask(u, keep), u, left.rgbe.data() + at);
 }
 
-/// Coordinates of a page relative to a centre. @param unit  lattice unit, in what they are wanted
-/// in
+/// Returns coordinates of a page relative to a centre.
+///
+///     41                   16 15             0     The centre's half is subtracted from each half
+///     [ upper 26 bits        | lower 16 bits ]     in 32-bit integers, and the differences become
+///                                                  floats.
+///
+/// So the result is rounded relative to its own size, not to the size of the scene. A centre far
+/// outside the frame is clamped to 2^46 units, and what is beyond is subtracted as a float.
+/// @param low     lower 32 bits of the coordinates
+/// @param high10  upper 10 bits of the coordinates
+/// @param centre  lattice units
+/// @param unit    lattice unit, expressed in the unit that the coordinates are wanted in
 HWY_INLINE VF relative(VU low, VU high10, double centre, double unit) {
   const F f;
   const I i;
   const U u;
-  // Lattice coordinates have 42 bits: 26 high and 16 low ones are exact in 32-bit arithmetic. A
-  // receiver far outside the frame keeps its distance in the float that is taken off last.
   const double whole = std::floor(std::clamp(centre, -0x1p46, 0x1p46));
   const auto integer = static_cast<std::int64_t>(whole);
   const auto upper = hn::Or(hn::ShiftRight<16>(low), hn::ShiftLeft<16>(high10));
@@ -108,6 +136,7 @@ void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uin
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
   const std::size_t n = count;
   for (unsigned from = 0; from < number; from += lanes) {
+    // Find the columns: one that `bytes_before` bytes of each point precede begins at that times n.
     const std::size_t k = first + std::size_t{from};
     const auto word = [&](std::size_t bytes_before) {
       return hn::LoadU(u,
@@ -122,6 +151,7 @@ void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uin
       return hn::Max(hn::Mul(hn::ConvertTo(f, hn::PromoteTo(i, bits)), hn::Set(f, 1.0F / 32767)),
                      hn::Set(f, -1.0F));
     };
+    // Decode the surfels; their radiance only when it is needed.
     const Surfels s{
         .to = {relative(word(0), hn::And(high, ten), centre.x, test.unit),
                relative(word(4), hn::And(hn::ShiftRight<10>(high), ten), centre.y, test.unit),

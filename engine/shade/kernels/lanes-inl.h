@@ -1,5 +1,13 @@
-// Steps that several kernels share, a lane each. Included by files that are compiled once per
-// instruction set, so it is guarded once per instruction set.
+// Steps that several kernels share; every function works on all lanes of a vector. The file is
+// included by files that are compiled once for each instruction set, so it is guarded once for each
+// instruction set.
+//
+// append() is the heart of the gather: most of what is tested is dropped, and the rest is packed
+// before it is stored.
+//
+//     lanes   [ a  b  c  d  e  f  g  h ]
+//     mask    [ .  x  .  x  x  .  .  x ]
+//     stored  [ b  d  e  h | anything  ]     returns 4; the next append() begins after h
 #if defined(PTC_SHADE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PTC_SHADE_LANES_INL_H
 #undef PTC_SHADE_LANES_INL_H
@@ -18,7 +26,7 @@ namespace ptc::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// The lanes of a mask, the first in bit 0.
+/// Returns the lanes of a mask as bits, the first lane in bit 0.
 template <class D>
 HWY_INLINE unsigned bits_of(D d, hn::Mask<D> mask) {
   static_assert(hn::MaxLanes(D()) <= 16);
@@ -28,7 +36,8 @@ HWY_INLINE unsigned bits_of(D d, hn::Mask<D> mask) {
 }
 
 #if HWY_TARGET == HWY_AVX2
-/// For each mask of 8 lanes the numbers of those in it, four bits each, the first in the lowest.
+/// For each mask of 8 lanes, the numbers of the lanes in it, four bits each, the first in the
+/// lowest bits: mask 0b10011010 has 0x7431.
 struct PackedLanes {
   std::uint32_t lanes[256] = {};
   constexpr PackedLanes() {
@@ -42,12 +51,12 @@ struct PackedLanes {
 static constexpr PackedLanes kPackedLanes;
 #endif
 
-/// Writes the lanes of a mask side by side, and anything behind them up to a vector's length.
+/// Writes the lanes of a mask next to each other, and anything behind them up to a vector's length.
 ///
-/// Packed in a register: stores that pack made the gather 1.5 to 2.4 times slower on Zen 4. On AVX2
-/// by a table of our own: that of Highway 1.0.3 is copied to the stack, 1 KiB each time, when GCC
-/// 12 compiles it.
-/// @return  how many
+/// The lanes are packed in a register: instructions that pack while they store made the gather 1.5
+/// to 2.4 times slower on Zen 4. AVX2 uses the table above, because GCC 12 copies the table of
+/// Highway 1.0.3 to the stack, 1 KiB each time.
+/// @return  the number of lanes in the mask
 template <class D, class T>
 HWY_INLINE std::size_t append(hn::VFromD<D> lanes, hn::Mask<D> mask, D d, T* to) {
 #if HWY_TARGET == HWY_AVX2
@@ -64,14 +73,20 @@ HWY_INLINE std::size_t append(hn::VFromD<D> lanes, hn::Mask<D> mask, D d, T* to)
 #endif
 }
 
-/// Colours of RGBE: bytes, as floats, and what they are multiplied by.
+/// Colours of RGBE as a product: byte * scale is the value of a channel.
 template <class D>
 struct UnpackedRgbe {
-  hn::VFromD<D> byte[3];
-  hn::VFromD<D> scale;
+  hn::VFromD<D> byte[3];  ///< red, green and blue, 0 to 255
+  hn::VFromD<D> scale;    ///< 2^(e - 136)
 };
 
-/// m 2^(e - 136) for each byte m; exponents up to 9 are black here.
+/// Unpacks colours.
+///
+///     31      24 23   16 15    8 7     0
+///     [ e       | blue  | green | red  ]      channel = byte * 2^(e - 136)
+///
+/// The scale is built as a float of exponent field e - 9, so colours of an exponent up to 9, which
+/// are below 2^-119, are black.
 template <class D>
 HWY_INLINE UnpackedRgbe<D> unpack_rgbe(D f, hn::VFromD<hn::RebindToUnsigned<D>> rgbe) {
   const hn::RebindToUnsigned<D> u;

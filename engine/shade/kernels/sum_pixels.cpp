@@ -1,4 +1,33 @@
-// Sums over the pixels of a direction buffer (direction_kernels.h).
+// Sums over the pixels of a direction buffer, corrected for parallax to first order.
+//
+// The weight of a pixel is its exact solid angle times the cosine to the normal n, 0 below the
+// horizon. Cells of receivers draw what is far as their centre sees it, so a receiver at the offset
+// o from the centre sees it displaced. In the axes of a face, a point at t (1, u, v) moves by
+//
+//     (u o_w - o_u, v o_w - o_v) / t
+//
+// on the plane w = 1. To first order only the borders between pixels matter: each moves as the
+// nearer of its two pixels does, since that one hides the other, and the weight that the border
+// sweeps passes from the pixel that shrinks to the one that grows:
+//
+//          a          b                 a            b
+//     +---------+---------+        +-----------+-------+     shift, in pixels, at most 4
+//     |  near   |   far   |  --->  |  near     |  far  |     weight(a) += shift * weight of border
+//     +---------+---------+        +-----------+-------+     weight(b) -= shift * weight of border
+//               |--> shift                     |
+//
+// This is the derivative of visibility, which is all at edges (Ward and Heckbert 1992 take it from
+// strata of rays, Li et al. 2018 from sampled edges). A border between two pixels that are covered
+// alike changes nothing, because what one loses the other gains.
+//
+// A row is summed a vector of pixels at a time. What passes to the right stays in registers, and
+// what passes down is kept in an array of one row:
+//
+//     row y      [ px ][ px ][ px ]      right: from lane to lane, `carried` from vector to vector
+//                   |     |     |        below: `down`, written in row y and read in row y + 1
+//     row y + 1  [ px ][ px ][ px ]
+//
+// The sum of all weights and the bent normal are not corrected.
 #include <cmath>
 
 #include "engine/shade/kernels/direction_kernels.h"
@@ -20,9 +49,9 @@ using WI = hn::RebindToSigned<W>;
 using WU = hn::RebindToUnsigned<W>;
 using VW = hn::VFromD<W>;
 
-constexpr float kMaxShift = 4;  // pixels: beyond it the first order says nothing
+constexpr float kMaxShift = 4;  // pixels; beyond that the first order says nothing
 
-/// An entry of a table of kViewpoints for each lane.
+/// Returns an entry of a table of kViewpoints numbers for each lane.
 HWY_INLINE VW look_up(const float* table, hn::VFromD<WI> index) {
   const W f;
   if constexpr (hn::MaxLanes(f) == 16) {
@@ -38,32 +67,35 @@ HWY_INLINE VW look_up(const float* table, hn::VFromD<WI> index) {
   }
 }
 
-/// Sums, a lane each.
+/// PixelSums, one in each lane, with directions in the axes of a face.
 struct LaneSums {
   VW total, covered, light[3], sky[3], open[3];
 };
 
-/// A face: pixels, and the receiver's normal and places in its axes.
+/// A face of the cube: its pixels, and the receiver's normal and offsets in its axes.
 struct FaceView {
   const CubeGeometry& cube;
   const float* nearness;
-  const std::uint32_t* rgbe;  ///< or null
+  const std::uint32_t* rgbe;  ///< null without colours
   const float* sky;           ///< 3 planes, or null
-  float nw, nu, nv;
+  float nw, nu, nv;           ///< the receiver's normal, unit
   alignas(64) float offset_w[kViewpoints], offset_u[kViewpoints], offset_v[kViewpoints];
 
-  /// Cosine to a row of directions (1, u, v), without what u adds.
+  /// Returns n . (1, 0, v), the part of n . (1, u, v) that a row of pixels shares.
   [[nodiscard]] float cosine(float v) const { return nw + nv * v; }
+  /// Reports whether any direction of a row may lie above the horizon.
   [[nodiscard]] bool sees(int y) const { return cosine(cube.centre[y]) + std::abs(nu) > 0; }
+  /// Returns n . (1, u, v), 0 below the horizon. @param row  cosine(v)
   HWY_INLINE VW cosine(VW u, float row) const {
     const W f;
     return hn::Max(hn::Zero(f), hn::MulAdd(hn::Set(f, nu), u, hn::Set(f, row)));
   }
 
-  /// How far the edge between two pixels moves towards the second, in pixels: as the nearer of them
-  /// does.
-  /// @param at      coordinate of the edge along the axis
-  /// @param offset  of the receiver along the axis, by viewpoint
+  /// Returns how far the border between two pixels moves towards the second, in pixels: as the
+  /// nearer of them does.
+  /// @param a, b    nearness of both pixels
+  /// @param at      coordinate of the border along the axis
+  /// @param offset  of the receiver along the axis, for each viewpoint
   HWY_INLINE VW shift_of(VW a, VW b, VW at, const float* offset) const {
     const W f;
     const WI i;
@@ -76,10 +108,12 @@ struct FaceView {
   }
 };
 
-/// Adds up a row.
-/// @tparam kMoves  the nearer of two neighbours takes over weight as it moves
-/// @param last  no row below is seen
-/// @param down  weights that come from the row above; then those that pass to the row below
+/// Adds up a row of pixels.
+/// @tparam kMoves  whether borders move
+/// @param last     whether no further row is above the horizon
+/// @param down     weights that pass to this row from the row before; is overwritten with those
+/// that
+///                 pass to the next row
 template <bool kMoves>
 HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTRICT down,
                         LaneSums& sums) {
@@ -97,11 +131,13 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
                                     hn::Set(WI(), static_cast<int>(hn::Lanes(f)) - 1)));
   auto carried = zero, row_open = zero;
   for (int x = 0; x < cube.resolution; x += static_cast<int>(hn::Lanes(f))) {
+    // Weigh the pixels.
     const auto at = static_cast<std::size_t>(y * cube.resolution + x);
     const float* here = face.nearness + at;
     const auto near = hn::LoadU(f, here), pu = hn::LoadU(f, cube.centre + x);
     const auto own = hn::Mul(face.cosine(pu, row), hn::LoadU(f, cube.weight + at));
     auto weight = own;
+    // Move the borders to the right and to the next row.
     if constexpr (kMoves) {
       const auto u = hn::Add(pu, hn::Set(f, half_step));
       const auto right = hn::Mul(face.shift_of(near, hn::LoadU(f, here + 1), u, face.offset_u),
@@ -120,6 +156,7 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
           hn::Add(own, hn::Add(hn::Sub(right, from_left), hn::Sub(below, hn::LoadU(f, down + x))));
       hn::StoreU(below, f, down + x);
     }
+    // Add up what covers, its colour, and the sky elsewhere.
     const auto empty = hn::Eq(near, zero);
     const auto covered = hn::IfThenZeroElse(empty, weight);
     sums.total = hn::Add(sums.total, own);
@@ -133,6 +170,7 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
       sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at),
                                sums.sky[k]);
     }
+    // Add up the uncovered directions; what a row shares is multiplied once, at its end.
     const auto direction =
         hn::IfThenElseZero(empty, hn::Mul(own, hn::LoadU(f, cube.inverse_length + at)));
     row_open = hn::Add(row_open, direction);
@@ -142,6 +180,7 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
   sums.open[2] = hn::MulAdd(row_open, hn::Set(f, cube.centre[y]), sums.open[2]);
 }
 
+/// Adds up the rows of a face that are above the horizon.
 template <bool kMoves>
 HWY_INLINE void add_face(const FaceView& face, LaneSums& sums) {
   alignas(64) float down[kMaxResolution] = {};
@@ -161,6 +200,7 @@ void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* 
   VW open[3] = {zero, zero, zero};
   const std::size_t plane =
       static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
+  // Add up each face in its own axes, and turn its directions into those of the cube.
   for (int i = 0; i < 6; ++i) {
     const CubeFace axes(i);
     FaceView face{.cube = cube,
@@ -186,6 +226,7 @@ void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* 
     open[axes.u] = hn::Add(open[axes.u], lane.open[1]);
     open[axes.v] = hn::Add(open[axes.v], lane.open[2]);
   }
+  // Add up the lanes.
   const auto total = [&](VW lanes) { return hn::GetLane(hn::SumOfLanes(f, lanes)); };
   sums.total = total(lane.total);
   sums.covered = total(lane.covered);

@@ -1,3 +1,4 @@
+// Decodes surfels, and draws all of them for each receiver.
 #include "engine/shade/reference/brute_force.h"
 
 #include <string>
@@ -16,7 +17,7 @@ std::vector<Surfel> load_surfels(const ContainerReader& container, std::uint64_t
   if (count > limit) {
     throw RequestError("limit",
                        container.path().string() + ": " + std::to_string(count) +
-                           " points are too many for a reference in memory; the limit is " +
+                           " points are too many for a reference in memory, whose limit is " +
                            std::to_string(limit));
   }
   std::vector<Surfel> surfels;
@@ -40,6 +41,7 @@ void shade_brute_force(std::span<const Surfel> surfels, std::span<const Receiver
                        std::span<Shading> results, const DirectionGrid& grid, Sides sides,
                        const Executor& executor) {
   executor.for_each(receivers.size(), [&](std::size_t i, unsigned) {
+    // Draw every surfel that reaches above the receiver's horizon, a queue at a time.
     DirectionBuffer buffer(grid.resolution());
     DiscQueue queue;
     for (const Surfel& s : surfels) {

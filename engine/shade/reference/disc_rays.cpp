@@ -1,4 +1,17 @@
-// Embree rays at oriented discs (engine/shade/reference/brute_force.h).
+// Embree rays at oriented discs, with the rule by which overlapping discs divide.
+//
+// A disc counts at the depth of a shallow paraboloid, t + kBump e^2 / r, with e the distance of the
+// hit from the disc's centre and r its radius (spec/shading.md#surfels). Embree knows flat discs
+// only, so each ray is traced twice:
+//
+//     1. Find the nearest flat disc, at t. No paraboloid is deeper than kBump r below its disc, so
+//        whatever wins lies between t and t + kBump r of that disc.
+//     2. Trace that short stretch again. A filter looks at every disc there and rejects it, after
+//     it
+//        has noted the one of least bumped depth.
+//
+// The filter also lets rays through backs that are clear. All lengths are in edges of the scene's
+// frame, as in the gather.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -14,9 +27,9 @@
 namespace ptc {
 namespace {
 
-constexpr float kBump = 0.01F;  // height of the paraboloid over the disc's radius, as draw_discs()
+constexpr float kBump = 0.01F;  // depth of the paraboloid's rim over the radius, as draw_discs()
 
-/// A stream of uniform numbers in [0, 1).
+/// A stream of uniform numbers in [0, 1): SplitMix64.
 class Uniform {
  public:
   explicit Uniform(std::uint64_t seed) : state_(seed) {}
@@ -33,11 +46,12 @@ class Uniform {
 }  // namespace
 
 struct DiscRays::Impl {
+  /// One ray's state, which Embree hands to the filter.
   struct Context {
-    RTCIntersectContext embree;  // first: Embree hands back a pointer to it
+    RTCIntersectContext embree;  ///< first, because Embree hands back a pointer to it
     const Impl* discs;
-    bool choose = false;  // second pass: keep the disc with the least bumped depth
-    float best = 0;
+    bool choose = false;  ///< second pass: note the disc of least bumped depth
+    float best = 0;       ///< that depth
     unsigned best_disc = RTC_INVALID_GEOMETRY_ID;
   };
 
@@ -53,13 +67,16 @@ struct DiscRays::Impl {
     if (device) rtcReleaseDevice(device);
   }
 
+  /// Returns the centre of a disc relative to the origin, in edges of the frame.
   [[nodiscard]] glm::vec3 centre(unsigned i) const {
     return space.scale.way(space.origin, surfels[i].position);
   }
   [[nodiscard]] float radius(unsigned i) const { return space.scale.radius(surfels[i].radius); }
 
-  /// One candidate of one ray: whether the disc stops it, and which of overlapping discs wins.
+  /// Decides about one disc that a ray meets: whether the disc stops the ray and, in the second
+  /// pass, whether it is the one of least bumped depth.
   static void filter(const RTCFilterFunctionNArguments* args) {
+    // Reject backs that are clear.
     if (args->valid[0] != -1) return;
     const auto& ray = *reinterpret_cast<const RTCRay*>(args->ray);
     const auto& hit = *reinterpret_cast<const RTCHit*>(args->hit);
@@ -73,6 +90,7 @@ struct DiscRays::Impl {
       args->valid[0] = 0;
       return;
     }
+    // Note the disc if it is the best so far, and reject it, so that Embree goes on to the next.
     if (!context.choose) return;
     const glm::vec3 off = along * ray.tfar - to;
     const float depth = ray.tfar + kBump / radius * glm::dot(off, off);
@@ -100,14 +118,16 @@ struct DiscRays::Impl {
     return ray;
   }
 
-  /// Replaces what a ray met before where a disc here is met before that.
+  /// Replaces what a ray has met so far where a disc here is nearer.
   void meet(const glm::vec3& from, const glm::vec3& along, DiscHit& met) const {
+    // Find the nearest flat disc.
     Context context{};
     rtcInitIntersectContext(&context.embree);
     context.discs = this;
     RTCRayHit ray = make_ray(from, along, 0, met.depth);
     rtcIntersect1(scene, &context.embree, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+    // Find the least bumped depth among the discs just behind it.
     const float t = ray.ray.tfar;
     const float slack = 1e-6F * t;
     const float deepest = t + kBump * radius(ray.hit.primID) + slack;
@@ -115,6 +135,7 @@ struct DiscRays::Impl {
     context.best = met.depth;
     RTCRayHit again = make_ray(from, along, t - slack, std::min(deepest, met.depth));
     rtcIntersect1(scene, &context.embree, &again);
+    // Take the nearest disc at its deepest where rounding has left the second pass without any.
     if (context.best_disc == RTC_INVALID_GEOMETRY_ID) {
       if (deepest >= met.depth) return;
       context.best = deepest;
@@ -129,6 +150,7 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
                    std::function<glm::vec3(const glm::vec3&)> sky,
                    const std::optional<Space>& space)
     : impl_(std::make_unique<Impl>()) {
+  // Choose the frame.
   impl_->surfels = surfels;
   impl_->sides = sides;
   impl_->sky = std::move(sky);
@@ -141,6 +163,7 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
     impl_->space = {(low + high) * 0.5,
                     SceneScale(frame_around({low.x, low.y, low.z}, {high.x, high.y, high.z}))};
   }
+  // Make the buffers: four floats of a disc's centre and radius, three of its normal.
   impl_->device = rtcNewDevice(nullptr);
   if (!impl_->device) throw std::runtime_error("Embree: no device");
   impl_->scene = rtcNewScene(impl_->device);
@@ -150,6 +173,7 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
   auto* normals = static_cast<float*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_NORMAL, 0, RTC_FORMAT_FLOAT3, 12, surfels.size()));
   if (surfels.size() > 0 && (!vertices || !normals)) throw std::bad_alloc();
+  // Fill them, and build the tree.
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     const glm::vec3 c = impl_->centre(static_cast<unsigned>(i));
     for (int k = 0; k < 3; ++k) {
@@ -169,8 +193,8 @@ DiscRays::~DiscRays() = default;
 
 namespace {
 
-/// Calls body(i, along) for cosine-distributed directions, one in each cell of a square.
-/// @param side  of the square
+/// Calls body(i, along) for cosine-distributed directions, one in each cell of a square grid of
+/// side x side cells. The same seed gives the same directions.
 template <class Body>
 void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const Body& body) {
   const glm::vec3 tangent =
@@ -189,6 +213,7 @@ void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const B
   }
 }
 
+/// Returns the side of the largest square grid of at most that many rays.
 unsigned side_of(std::size_t rays) {
   return static_cast<unsigned>(std::sqrt(static_cast<double>(rays)));
 }
@@ -215,6 +240,7 @@ Shading DiscRays::sum(const Receiver& receiver, std::uint64_t seed, std::span<co
       if (sky_at) sky += sky_at(along);
     }
   });
+  // Turn the sums into means over the hemisphere, whose cosine-weighted measure is pi.
   const double count = static_cast<double>(side) * side;
   Shading shading;
   shading.occlusion = static_cast<float>(covered / count);

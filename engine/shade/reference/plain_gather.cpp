@@ -1,3 +1,16 @@
+// The gather of one receiver, written to be read.
+//
+//     stack = root
+//     while the stack is not empty
+//       pop a node
+//       of its children, drop what lies below the horizon
+//       draw a cluster whose bounding sphere is below the solid angle
+//       push every other one, or draw its points
+//     sum up the pixels
+//
+// This is the gather of Kontkanen, Tabellion and Overbeck 2011 with exact discs in place of their
+// splats. The kernels in engine/shade/kernels do the same for cells of receivers with vector
+// instructions; gather_clusters.cpp has the pictures of a cluster and its disc.
 #include "engine/shade/reference/plain_gather.h"
 
 #include <algorithm>
@@ -16,15 +29,15 @@
 namespace ptc {
 namespace {
 
-/// A child of a group, relative to a receiver, in scene units.
+/// A child of a group relative to a receiver, in scene units.
 struct Cluster {
-  glm::vec3 to{0};
+  glm::vec3 to{0};  ///< mean position
   float radius = 0;
   float area = 0;
   float thickness = 0;
-  std::array<float, 6> facing{};  // shares of the area
-  glm::vec3 mean{0};              // normal over area, not unit
-  float flatness = 0;             // its length
+  std::array<float, 6> facing{};  ///< share of the area that faces each axis
+  glm::vec3 mean{0};              ///< sum of area times normal over the area; not unit
+  float flatness = 0;             ///< length of `mean`
 };
 
 float share_at(const GroupView& group, int axis, int child) {
@@ -32,7 +45,10 @@ float share_at(const GroupView& group, int axis, int child) {
          static_cast<float>(kFacingSteps);
 }
 
+/// Decodes child i of a group.
+/// @param from  position of the receiver, scene units
 Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const glm::dvec3& from) {
+  // Decode the position relative to the group's cell.
   const LatticePoint corner = decode_morton(group.cell());
   const double step = cell_edge(group.level()) / kMeanSteps;
   const std::array<const std::byte*, 3> columns{group.mean_x(), group.mean_y(), group.mean_z()};
@@ -43,6 +59,7 @@ Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const gl
         static_cast<double>(corner[axis]) + step * GroupView::u16_at(columns[axis], i);
     c.to[k] = static_cast<float>(frame.origin[axis] + at * frame.unit() - from[k]);
   }
+  // Decode the shape; the mean normal is the difference of opposite shares.
   const auto unit = static_cast<float>(frame.unit());
   c.radius = unit * decode_ufloat16(GroupView::u16_at(group.radius(), i));
   c.thickness = unit * decode_ufloat16(GroupView::u16_at(group.thickness(), i));
@@ -53,11 +70,11 @@ Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const gl
   return c;
 }
 
-/// What leaves towards a receiver by the three faces of the ambient cube that look at it, over the
-/// cluster's area.
+/// The light that leaves a cluster towards a receiver by the three faces of the ambient cube that
+/// look at it.
 struct Front {
-  float area = 0;
-  glm::vec3 radiance{0};  ///< times area
+  float area = 0;         ///< projected area of the fronts over the cluster's area
+  glm::vec3 radiance{0};  ///< sum of their radiance times that area
 };
 
 Front front_of(const GroupView& group, int i, const Cluster& c, const glm::vec3& toward) {
@@ -78,6 +95,7 @@ std::uint32_t pack(const glm::vec3& colour) {
   return encode_rgbe({colour.r, colour.g, colour.b});
 }
 
+/// Appends the disc of a cluster to the queue.
 void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options,
                   DiscQueue& queue) {
   const glm::vec3 toward = -glm::normalize(c.to);
@@ -99,7 +117,8 @@ Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float proje
   const float length = glm::length(shape.mean);
   if (length > kFlat)
     return {shape.mean / length, std::min(shape.radius, std::sqrt(shape.area / 2)), true};
-  // The silhouette of an ellipsoid is that of a disc across it, turned towards the receiver.
+  // Take the disc that has the silhouette of an ellipsoid about the mean normal, or of a ball where
+  // there is no direction.
   Splat splat{.normal = toward};
   float foreshortened = 1;
   if (length > kDirected) {
@@ -125,6 +144,7 @@ float height_of_top(const glm::vec3& to, const glm::vec3& normal, float radius,
 }
 
 Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) {
+  // Draw the cut through the octree.
   grid_ = &grid;
   buffer_.clear();
   queue_.size = 0;
@@ -141,6 +161,7 @@ Shading PlainGather::shade(const Receiver& receiver, const DirectionGrid& grid) 
       visit_points(next, receiver);
     }
   }
+  // Draw the rest of the queue, and sum up the pixels.
   buffer_.draw(grid, queue_, options_.sides);
   ++counts_.receivers;
   return buffer_.resolve(grid, receiver.normal);

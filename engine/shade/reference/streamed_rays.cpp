@@ -1,3 +1,5 @@
+// Divides the cap: a quarter of it, at most 64 MiB, for the hits of a batch of rays, and the rest
+// for one part of the surfels with its tree.
 #include "engine/shade/reference/streamed_rays.h"
 
 #include <algorithm>
@@ -6,7 +8,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kSurfelBytes = sizeof(Surfel) + DiscRays::kBytes;
+constexpr std::uint64_t kSurfelBytes = sizeof(Surfel) + DiscRays::kBytes;  // decoded, and its tree
 
 }  // namespace
 
@@ -24,6 +26,7 @@ StreamedRays::StreamedRays(const ContainerReader& scene, Sides sides,
 }
 
 void StreamedRays::load(std::size_t part) {
+  // Read the pages of the part, after the tree of the last one is gone.
   if (rays_ && loaded_ == part) return;
   rays_.reset();
   const auto pages = scene_.point_pages().subspan(
@@ -32,6 +35,7 @@ void StreamedRays::load(std::size_t part) {
   surfels_.clear();
   surfels_.reserve(pages.size() * scene_.superblock().points_per_page);
   append_surfels(scene_, pages, surfels_);
+  // Build its tree in the frame of the whole scene, the same for every part.
   const Superblock& whole = scene_.superblock();
   const glm::dvec3 low(whole.bounds_low[0], whole.bounds_low[1], whole.bounds_low[2]);
   const glm::dvec3 high(whole.bounds_high[0], whole.bounds_high[1], whole.bounds_high[2]);
@@ -42,6 +46,7 @@ void StreamedRays::load(std::size_t part) {
 
 void StreamedRays::trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
                          std::span<Shading> results, const Executor& executor, Progress& progress) {
+  // Find how many receivers have room for their rays at once.
   const auto side = static_cast<std::size_t>(std::sqrt(static_cast<double>(rays)));
   const std::size_t rays_of_each = side * side;
   const std::size_t batch = std::clamp<std::size_t>(hit_count_ / rays_of_each, 1,
@@ -50,6 +55,7 @@ void StreamedRays::trace(std::span<const Receiver> receivers, unsigned rays, std
   const auto hits_of = [&](std::size_t i) {
     return std::span(hits).subspan(i * rays_of_each, rays_of_each);
   };
+  // Let the rays of a batch meet every part, and sum them up.
   for (std::size_t first = 0; first < receivers.size(); first += batch) {
     const std::size_t count = std::min(batch, receivers.size() - first);
     std::ranges::fill(hits, DiscHit{});

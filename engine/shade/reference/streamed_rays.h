@@ -1,4 +1,4 @@
-// Rays at the discs of a container of any size.
+// Traces rays at the discs of a container of any size, under a memory cap.
 #pragma once
 
 #include <cstddef>
@@ -14,35 +14,49 @@
 
 namespace ptc {
 
-/// DiscRays under a cap: holds as many surfels at a time as the cap has room for, and lets every
-/// ray meet one part after the other. Results do not depend on the cap.
+/// DiscRays under a cap. It holds as many surfels at a time as the cap has room for, and lets every
+/// ray meet one part of the scene after the other:
+///
+///     for each batch of receivers
+///       for each part of the point pages: load it, let all rays of the batch meet it
+///       sum up the rays
+///
+/// Results do not depend on the cap.
 class StreamedRays {
  public:
+  /// Minimum cap, bytes.
   static constexpr std::uint64_t kMinBytes = std::uint64_t{16} << 20;
 
   /// Loads the first part.
-  /// @param sky           as DiscRays
-  /// @param memory_bytes  cap, kMinBytes at least
+  /// @param scene         must outlive this
+  /// @param sides         which sides of surfels stop rays
+  /// @param sky           radiance that arrives from a direction (unit); empty where there is no
+  /// sky
+  /// @param memory_bytes  cap, at least kMinBytes
   StreamedRays(const ContainerReader& scene, Sides sides,
                std::function<glm::vec3(const glm::vec3&)> sky, std::uint64_t memory_bytes);
 
-  /// Traces receivers with seeds that follow `seed`, as DiscRays::trace().
-  /// @param progress  advances by one a receiver
+  /// Traces receivers as DiscRays::trace() does. Receiver i takes `seed` + i.
+  /// @param rays      number of rays for each receiver, rounded down to a square number
+  /// @param results   as many as receivers, in their order
+  /// @param progress  advances by one for each receiver
+  /// @throws FormatError when a page is damaged
   void trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
              std::span<Shading> results, const Executor& executor, Progress& progress);
 
  private:
+  /// Loads a part, unless it is the one that is loaded.
   void load(std::size_t part);
 
   const ContainerReader& scene_;
   Sides sides_;
   std::function<glm::vec3(const glm::vec3&)> sky_;
-  std::size_t hit_count_;  // rays that may be under way at once
-  std::size_t pages_of_part_;
-  std::size_t parts_;
-  std::vector<Surfel> surfels_;  // of the part that is loaded
-  std::optional<DiscRays> rays_;
-  std::size_t loaded_ = 0;  // valid while rays_ is
+  std::size_t hit_count_;         ///< maximum number of rays in a batch
+  std::size_t pages_of_part_;     ///< point pages in each part but the last
+  std::size_t parts_;             ///< number of parts
+  std::vector<Surfel> surfels_;   ///< of the loaded part
+  std::optional<DiscRays> rays_;  ///< at those surfels
+  std::size_t loaded_ = 0;        ///< number of the loaded part, while rays_ has a value
 };
 
 }  // namespace ptc
