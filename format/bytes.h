@@ -1,4 +1,5 @@
-// Little-endian numbers in a span of bytes: the one way that format/ reads and fills structures.
+// Little-endian numbers in a span of bytes: the only way in which format/ reads and fills the
+// structures of a file.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +15,15 @@
 namespace ptc {
 
 static_assert(std::endian::native == std::endian::little,
-              "numbers are copied as they lie in files");
+              "numbers are copied as they lie in files, which are little-endian");
 
-/// What load() and store() take: numbers, and points of three.
+/// This is true for the types that load() and store() accept: numbers, and arrays of three doubles.
 template <class T>
 inline constexpr bool kIsStored =
     std::is_arithmetic_v<T> || std::is_same_v<T, std::array<double, 3>>;
 
-/// The number at `at`, which the caller has checked to lie inside.
+/// Reads the number that starts `at` bytes into `bytes`. Its alignment does not matter.
+/// @pre the caller has checked that the number lies inside the bytes
 template <class T>
 [[nodiscard]] T load(const std::byte* bytes, std::size_t at) noexcept {
   static_assert(kIsStored<T>);
@@ -30,13 +32,15 @@ template <class T>
   return value;
 }
 
+/// Writes a number `at` bytes into `bytes`. Its alignment does not matter.
+/// @pre the caller has checked that the number lies inside the bytes
 template <class T>
 void store(std::byte* bytes, std::size_t at, T value) noexcept {
   static_assert(kIsStored<T>);
   std::memcpy(bytes + at, &value, sizeof value);
 }
 
-/// Position of the first byte that is not zero; bytes.size() when all are.
+/// Returns the position of the first byte that is not zero, or bytes.size() when all are zero.
 [[nodiscard]] inline std::size_t first_nonzero(std::span<const std::byte> bytes) noexcept {
   const auto found = std::ranges::find_if(bytes, [](std::byte b) { return b != std::byte{0}; });
   return static_cast<std::size_t>(found - bytes.begin());

@@ -3,7 +3,7 @@
 
 #include <xxhash.h>
 #ifdef PTC_XXHASH_DISPATCH
-#include <xxh_x86dispatch.h>  // the same functions for the widest vectors of the processor
+#include <xxh_x86dispatch.h>  // chooses functions for the widest vectors of the processor
 #endif
 
 namespace ptc {

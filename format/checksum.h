@@ -1,4 +1,4 @@
-// XXH3, the one checksum of the format (spec/checksums.md).
+// XXH3, the only checksum of the format (spec/checksums.md).
 #pragma once
 
 #include <array>
@@ -8,21 +8,22 @@
 
 namespace ptc {
 
-/// XXH3-64 without a seed.
+/// Returns XXH3-64 of the bytes without a seed.
 [[nodiscard]] std::uint64_t xxh3_64(std::span<const std::byte> bytes) noexcept;
-/// XXH3-64 under a seed; seed 0 is no seed.
+/// Returns XXH3-64 of the bytes under a seed. Seed 0 gives the hash without a seed.
 [[nodiscard]] std::uint64_t xxh3_64(std::span<const std::byte> bytes, std::uint64_t seed) noexcept;
-/// {low, high} halves of XXH3-128.
+/// Returns XXH3-128 of the bytes without a seed, as {low half, high half}.
 [[nodiscard]] std::array<std::uint64_t, 2> xxh3_128(std::span<const std::byte> bytes) noexcept;
 
-/// The sum, half by half, of xxh3_128() of every `size` bytes: the same for a set of records in
-/// whatever order.
-/// @param bytes  a multiple of `size`
+/// Returns the sum of xxh3_128() over records of `size` bytes, each half added modulo 2^64. The sum
+/// does not depend on the order of the records.
+/// @param bytes  a whole number of records: its length is a multiple of `size`
 [[nodiscard]] std::array<std::uint64_t, 2> xxh3_128_sum(std::span<const std::byte> bytes,
                                                         std::size_t size) noexcept;
-/// The sum of xxh3_64() of the first `size` of every `stride` bytes, the first under `seed`, the
-/// next under seed + 1 and so on.
-/// @param bytes  a multiple of `stride`
+/// Returns the sum modulo 2^64 of xxh3_64() over records that are `stride` bytes apart. The hash of
+/// record i covers the first `size` bytes of the record and has the seed `seed` + i, so the sum
+/// depends on the order of the records.
+/// @param bytes  a whole number of records: its length is a multiple of `stride`
 [[nodiscard]] std::uint64_t xxh3_64_sum(std::span<const std::byte> bytes, std::size_t size,
                                         std::size_t stride, std::uint64_t seed) noexcept;
 

@@ -1,5 +1,5 @@
-// XXH3 of many short records: the library's functions compiled in, a call for each takes as long as
-// its hash.
+// XXH3 of many short records. The functions of the library are compiled in here, because a call
+// would take as long as the hash of a record.
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 

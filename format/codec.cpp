@@ -1,4 +1,10 @@
-// Page compression with zstd and LZ4, one frame or block a page (spec/container.md#codecs).
+// Page compression with zstd and LZ4, one frame or block for each page (spec/container.md#codecs).
+//
+//   zstd:  one frame, a single segment with its content size and without a dictionary
+//   LZ4:   | decoded bytes u32 | one block |
+//
+// Both say how many bytes they decode to. The decoder compares that number with the page before it
+// decodes, so a payload can never write past its room or need memory beyond a page.
 #include "format/codec.h"
 
 #include <algorithm>
@@ -19,11 +25,13 @@ namespace {
 
 constexpr char kFrameClause[] = "spec/container.md#codec-frame";
 constexpr char kBlockClause[] = "spec/container.md#codec-block";
-constexpr int kWindowLog = 20;           // the greatest page: every frame is a single segment
+constexpr int kWindowLog = 20;           // log2 of the greatest page: every frame is one segment
 constexpr std::size_t kLengthBytes = 4;  // in front of an LZ4 block
 
-// Bytes that a frame decodes to, when it is whole and needs no dictionary or window beyond them:
-// magic, descriptor (bits 7-6 width of the content size, 5 single segment, 1-0 dictionary), size.
+// Returns the number of bytes that a frame declares to decode to. It checks that the payload is
+// exactly one frame that needs neither a dictionary nor a window beyond these bytes. A frame begins
+// with magic, descriptor (bits 7-6 width of the content size, 5 single segment, 1-0 dictionary) and
+// content size.
 unsigned long long check_frame(std::span<const std::byte> stored) {
   if (stored.size() < 5 || load<std::uint32_t>(stored.data(), 0) != ZSTD_MAGICNUMBER) {
     throw FormatError(0, kFrameClause, "payload is not a zstd frame");
@@ -40,6 +48,7 @@ unsigned long long check_frame(std::span<const std::byte> stored) {
   return ZSTD_getFrameContentSize(stored.data(), stored.size());
 }
 
+// Turns an error of zstd into an exception.
 void check(std::size_t result) {
   if (ZSTD_getErrorCode(result) == ZSTD_error_memory_allocation) throw std::bad_alloc();
   if (ZSTD_isError(result)) throw std::invalid_argument(ZSTD_getErrorName(result));
@@ -65,7 +74,7 @@ PageEncoder::~PageEncoder() {
   ZSTD_freeCCtx(static_cast<ZSTD_CCtx*>(context_));
 }
 
-// Into at most `limit` bytes; false when they do not suffice.
+// Compresses into at most `limit` bytes of `out`. Returns false when they do not suffice.
 bool PageEncoder::compress(std::span<const std::byte> from, std::size_t limit,
                            std::vector<std::byte>& out) {
   out.resize(limit);
@@ -90,6 +99,7 @@ bool PageEncoder::compress(std::span<const std::byte> from, std::size_t limit,
 Coding PageEncoder::encode(std::span<const std::byte> raw, std::vector<std::byte>& out,
                            const PayloadColumns& columns) {
   if (codec_ != Codec::raw) {
+    // Pack the columns, unless that lengthens them.
     Coding coding{.codec = codec_};
     std::span<const std::byte> from = raw;
     if (!columns.columns.empty()) {
@@ -99,6 +109,7 @@ Coding PageEncoder::encode(std::span<const std::byte> raw, std::vector<std::byte
         coding.filter = Filter::columns;
       }
     }
+    // Compress, unless that saves less than a sixteenth.
     if (compress(from, raw.size() * 15 / 16, out)) return coding;
   }
   out.assign(raw.begin(), raw.end());
@@ -119,7 +130,7 @@ std::span<const std::byte> PageDecoder::expand(Codec codec, std::span<const std:
   if (codec == Codec::zstd) {
     const unsigned long long bytes = check_frame(stored);
     if (bytes < least || bytes > limit) {
-      throw FormatError(5, kFrameClause, "zstd frame declares another size than the page's");
+      throw FormatError(5, kFrameClause, "zstd frame declares a size other than the page's");
     }
     const std::size_t size = ZSTD_decompressDCtx(static_cast<ZSTD_DCtx*>(context_), room.data(),
                                                  bytes, stored.data(), stored.size());
@@ -131,7 +142,7 @@ std::span<const std::byte> PageDecoder::expand(Codec codec, std::span<const std:
     throw FormatError(0, kBlockClause, "payload is too short for an LZ4 block");
   const auto bytes = load<std::uint32_t>(stored.data(), 0);
   if (bytes < least || bytes > limit) {
-    throw FormatError(0, kBlockClause, "LZ4 block declares another size than the page's");
+    throw FormatError(0, kBlockClause, "LZ4 block declares a size other than the page's");
   }
   const int size =
       LZ4_decompress_safe(reinterpret_cast<const char*>(stored.data() + kLengthBytes),
@@ -148,7 +159,8 @@ void PageDecoder::decode(Coding coding, std::span<const std::byte> stored, std::
                          const PayloadColumns& columns) {
   if (coding.codec == Codec::raw) {
     if (stored.size() != out.size()) {
-      throw FormatError(0, "spec/container.md#page-length", "raw payload has another size");
+      throw FormatError(0, "spec/container.md#page-length",
+                        "raw payload has a size other than the page's");
     }
     std::ranges::copy(stored, out.begin());
     return;
@@ -157,7 +169,7 @@ void PageDecoder::decode(Coding coding, std::span<const std::byte> stored, std::
     static_cast<void>(expand(coding.codec, stored, out.size(), out.size(), out));
     return;
   }
-  packed_.resize(out.size());  // packing does not lengthen
+  packed_.resize(out.size());  // packed columns are never longer than the payload
   const std::span<const std::byte> packed = expand(coding.codec, stored, 1, out.size(), packed_);
   try {
     unpack_columns(packed, columns.count, columns.columns, out);

@@ -1,4 +1,13 @@
 // The file header and the directory (spec/container.md#file-header, spec/container.md#directory).
+//
+//   file header   | magic | version | features | uuid | constants | frame | 0 | XXH3 | 0 ... 4095 |
+//                 0       8         16         40     56          64      96  120    128
+//
+//   entry         | offset | stored | raw | payload XXH3 | type | group | records |
+//                 0        8        12    16             24     26      28        32
+//
+// The fields are decoded in the order in which the spec lists the rules, so that damage is told
+// apart from another version: magic, length, checksum, version, features, and the rest then.
 #include "format/container.h"
 
 #include <algorithm>
@@ -14,7 +23,8 @@
 namespace ptc {
 namespace {
 
-//   89 'P' 'T' 'C' 0d 0a 1a 0a: a seven-bit channel, a text-mode copy and a C string all break it
+// The bytes 89 'P' 'T' 'C' 0d 0a 1a 0a, which break when a channel strips the eighth bit, a copy
+// translates line ends, or a program stops at 1a.
 constexpr std::uint64_t kFileMagic = 0x0a1a0a0d43545089;
 constexpr std::uint64_t kHeaderSeed = 0x4441454858435450;  // "PTCXHEAD"
 constexpr std::uint32_t kByteOrderMark = 0x01020304;
@@ -25,7 +35,7 @@ constexpr std::size_t kHeaderHashAt = 120;
 constexpr std::uint64_t kKnownIncompat = 0;
 constexpr std::size_t kOriginAt = 64;
 constexpr std::size_t kEdgeAt = 88;
-constexpr double kMaxWhole = 0x1p53;  // whole numbers up to here are doubles
+constexpr double kMaxWhole = 0x1p53;  // doubles hold all whole numbers up to here
 
 void check_constants(const std::byte* p) {
   constexpr char kConstants[] = "spec/container.md#header-constants";
@@ -43,6 +53,7 @@ void check_constants(const std::byte* p) {
   }
 }
 
+// Checks that the lattice points of a frame are doubles (spec/morton.md#frame).
 void check_frame(const Frame& frame) {
   constexpr char kFrame[] = "spec/container.md#header-frame";
   const auto bits = std::bit_cast<std::uint64_t>(frame.edge);
@@ -54,7 +65,7 @@ void check_frame(const Frame& frame) {
     const double steps = origin / frame.unit();
     if (!(steps >= -kMaxWhole && steps <= kMaxWhole - 0x1p42) || std::rint(steps) != steps) {
       throw FormatError(kOriginAt, kFrame,
-                        "origin is not a multiple of the unit, or beyond 2^53 units");
+                        "origin is not a multiple of the unit, or is beyond 2^53 units");
     }
   }
 }
@@ -98,6 +109,7 @@ Block encode_file_header(const FileHeader& header) {
 }
 
 FileHeader decode_file_header(std::span<const std::byte> bytes) {
+  // Check that the block is a whole header.
   if (bytes.size() < 8 || load<std::uint64_t>(bytes.data(), 0) != kFileMagic) {
     throw FormatError(0, "spec/container.md#header-magic", "not a PTCX file");
   }
@@ -110,6 +122,8 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
     throw FormatError(kHeaderHashAt, "spec/container.md#header-checksum",
                       "file header's checksum is wrong");
   }
+
+  // Check that this version and its features are known.
   FileHeader header;
   header.major = load<std::uint16_t>(p, 8);
   header.minor = load<std::uint16_t>(p, 10);
@@ -121,8 +135,11 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
   header.feature_ro_compat = load<std::uint64_t>(p, 24);
   header.feature_compat = load<std::uint64_t>(p, 32);
   if ((header.feature_incompat & ~kKnownIncompat) != 0) {
-    throw FormatError(16, "spec/container.md#header-features", "file needs an unknown feature");
+    throw FormatError(16, "spec/container.md#header-features",
+                      "file needs a feature that this program does not know");
   }
+
+  // Read and check everything else.
   check_constants(p);
   std::ranges::copy(bytes.subspan(40, 16), header.uuid.begin());
   header.page_shift = load<std::uint8_t>(p, 56);
@@ -162,6 +179,8 @@ DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const Fi
     throw FormatError(bytes.size(), "spec/container.md#directory", "directory entry is truncated");
   }
   const std::byte* const p = bytes.data();
+
+  // Read the fields and check those that a page header has, too.
   DirectoryEntry entry;
   entry.offset = load<std::uint64_t>(p, 0);
   entry.stored_bytes = load<std::uint32_t>(p, 8);
@@ -176,6 +195,8 @@ DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const Fi
   if (entry.type == PageType::directory) {
     throw FormatError(24, "spec/container.md#directory-listing", "directory lists itself");
   }
+
+  // Check that the page lies between the header and the superblocks.
   constexpr char kExtent[] = "spec/container.md#directory-extent";
   if (entry.offset % kSectorBytes != 0) {
     throw FormatError(0, kExtent, "page does not start on a sector");

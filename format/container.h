@@ -1,5 +1,19 @@
-// The structures around the pages: header, page header, directory entry, superblock
+// The structures around the pages: file header, page header, directory entry and superblock
 // (spec/container.md).
+//
+//   0        4096                    directory_offset     file_bytes - 8192  file_bytes - 4096
+//   | file   | page ... page ... page | directory page ... | superblock       | superblock        |
+//   | header |                        |                    | A                | B                 |
+//
+// The file header identifies the file and is written first. Every page starts on a sector of 512
+// bytes and opens with a page header of 64 bytes, so pages can be found without the directory. The
+// directory says where each page lies. The two equal superblocks are the commit record: they are
+// written last, and a file that has neither is unfinished.
+//
+// Each structure has an encode function that writes a value as it lies in the file and a decode
+// function that accepts untrusted bytes: it checks every rule that the bytes can break alone and
+// throws FormatError with the offset of the broken field. Rules that join several structures belong
+// to the reader of the file (engine/store).
 #pragma once
 
 #include <array>
@@ -13,167 +27,187 @@
 namespace ptc {
 
 inline constexpr std::size_t kBlockBytes =
-    4096;  ///< header, superblocks; the directory starts on it
-inline constexpr std::size_t kSectorBytes = 512;  ///< pages start on it
+    4096;  ///< size of the file header and of each superblock; alignment of the directory
+inline constexpr std::size_t kSectorBytes = 512;  ///< alignment of pages, bytes
+/// Rounds a number of bytes up to a multiple of `unit`.
 /// @param unit  kSectorBytes for pages, kBlockBytes for the directory
 [[nodiscard]] constexpr std::uint64_t round_up(std::uint64_t bytes, std::uint64_t unit) noexcept {
   return (bytes + unit - 1) / unit * unit;
 }
-inline constexpr std::size_t kPageHeaderBytes = 64;
+inline constexpr std::size_t kPageHeaderBytes = 64;      ///< in front of every page's payload
 inline constexpr std::uint32_t kPageMagic = 0x70435450;  ///< "PTCp", the first bytes of a page
 inline constexpr std::size_t kDirectoryEntryBytes = 32;
-inline constexpr std::uint32_t kNoPage = 0xffffffff;
-inline constexpr std::uint64_t kMaxPages = 0xfffffffe;
+inline constexpr std::uint32_t kNoPage = 0xffffffff;    ///< number that no page has
+inline constexpr std::uint64_t kMaxPages = 0xfffffffe;  ///< greatest number of pages in a file
 
+/// The kind of payload that a page has; the values are those of the page header.
 enum class PageType : std::uint16_t { node = 1, point = 2, directory = 3, meta = 4, attribute = 5 };
+/// The compression of a payload; the values are those of the page header.
 enum class Codec : std::uint8_t { raw = 0, zstd = 1, lz4 = 2 };
+/// The step that precedes the compression of a payload; the values are those of the page header.
 enum class Filter : std::uint8_t { none = 0, columns = 1 };
 
-/// How a payload lies in the file: filtered first, then compressed.
+/// The form in which a payload is stored in the file. Writers filter first and compress then.
 struct Coding {
   Codec codec = Codec::raw;
   Filter filter = Filter::none;
   friend bool operator==(const Coding&, const Coding&) = default;
 };
 
+/// The identity of a file's content. Files of different content have different ones.
 using Uuid = std::array<std::byte, 16>;
-/// One that follows from what `text` says.
+/// Returns a Uuid that depends on the bytes of `text` only: their XXH3-128.
 [[nodiscard]] Uuid uuid_of(std::span<const std::byte> text) noexcept;
 
-/// Bytes 0 to 4095 of a file: who it is. Written once, before anything else.
+/// The file header, bytes 0 to 4095 of a file: its identity and what its pages rely on. It is
+/// written once, before anything else.
 struct FileHeader {
   std::uint16_t major = 1;
   std::uint16_t minor = 0;
-  std::uint64_t feature_incompat = 0;   ///< an unknown bit: refuse to open
-  std::uint64_t feature_ro_compat = 0;  ///< an unknown bit: read, but do not copy or repair
-  std::uint64_t feature_compat = 0;     ///< an unknown bit: ignore
-  Uuid uuid{};                          ///< salts every page header's checksum
+  std::uint64_t feature_incompat = 0;   ///< readers refuse a file with an unknown bit
+  std::uint64_t feature_ro_compat = 0;  ///< an unknown bit allows reading, but no copy or repair
+  std::uint64_t feature_compat = 0;     ///< readers ignore unknown bits
+  Uuid uuid{};                          ///< salts the checksum of every page header
   std::uint8_t page_shift = 16;         ///< page size is 2^page_shift bytes, 12 to 20
-  Frame frame;
+  Frame frame;                          ///< the lattice on which all points lie
 };
 
-/// 64 bytes in front of every page's payload.
+/// The page header: 64 bytes in front of every page's payload.
 struct PageHeader {
   PageType type = PageType::node;
   Coding coding;
-  std::uint32_t page_id = 0;
-  std::uint32_t stored_bytes = 0;  ///< payload as it lies in the file
-  std::uint32_t raw_bytes = 0;     ///< payload decoded, at most page size - 64
-  std::uint16_t group = 0;         ///< attribute pages: which channel group; else 0
-  std::uint16_t level = 0;         ///< node pages: least level of its groups; else 0xffff
-  std::uint32_t record_count = 0;  ///< points, node groups, entries or 1
-  std::uint64_t first_key = 0;     ///< least high half of its points' keys or groups' cells
-  std::uint64_t last_key = 0;      ///< greatest
+  std::uint32_t page_id = 0;       ///< number of the page, its place in the directory
+  std::uint32_t stored_bytes = 0;  ///< length of the payload in the file
+  std::uint32_t raw_bytes = 0;     ///< length of the decoded payload, at most page size - 64
+  std::uint16_t group = 0;         ///< channel group of an attribute page; else 0
+  std::uint16_t level = 0;         ///< least level of a node page's groups; else 0xffff
+  std::uint32_t record_count = 0;  ///< points, node groups or directory entries; 1 in a meta page
+  std::uint64_t first_key = 0;     ///< least high half of the points' keys or groups' cells
+  std::uint64_t last_key = 0;      ///< greatest high half of the points' keys or groups' cells
   std::uint64_t payload_xxh3 = 0;  ///< XXH3-64 of the stored payload
 };
 
-/// Where a page lies. The n-th entry of the directory is page n.
+/// A directory entry: where a page lies, and the facts of its header. The n-th entry is page n.
 struct DirectoryEntry {
-  std::uint64_t offset = 0;  ///< of the page header, bytes from the start of the file
-  std::uint32_t stored_bytes = 0;
-  std::uint32_t raw_bytes = 0;
-  std::uint64_t payload_xxh3 = 0;
+  std::uint64_t offset = 0;        ///< bytes from the start of the file to the page header
+  std::uint32_t stored_bytes = 0;  ///< length of the payload in the file
+  std::uint32_t raw_bytes = 0;     ///< length of the decoded payload
+  std::uint64_t payload_xxh3 = 0;  ///< XXH3-64 of the stored payload
   PageType type = PageType::node;
-  std::uint16_t group = 0;
-  std::uint32_t record_count = 0;
+  std::uint16_t group = 0;         ///< channel group of an attribute page; else 0
+  std::uint32_t record_count = 0;  ///< as PageHeader::record_count
   friend bool operator==(const DirectoryEntry&, const DirectoryEntry&) = default;
 };
 
-/// What the directory says of a page with this header.
+/// Returns the directory entry of a page that has this header and starts at `offset`.
 [[nodiscard]] inline DirectoryEntry entry_of(const PageHeader& page,
                                              std::uint64_t offset) noexcept {
   return {offset,    page.stored_bytes, page.raw_bytes,   page.payload_xxh3,
           page.type, page.group,        page.record_count};
 }
 
-/// The commit record, twice at the end of the file: a file without one is unfinished.
+/// The superblock: the commit record, which stands twice at the end of the file. A file without a
+/// superblock is unfinished.
 struct Superblock {
-  FileHeader header;             ///< repeated, must equal bytes 0 to 119
-  std::uint64_t file_bytes = 0;  ///< must equal the file's length
-  std::uint32_t page_count = 0;
-  std::uint32_t directory_pages = 0;
-  std::uint64_t directory_offset = 0;
-  std::uint64_t directory_xxh3 = 0;  ///< XXH3-64 of all entries, concatenated
-  std::uint32_t meta_page = kNoPage;
-  std::uint32_t root_page = kNoPage;  ///< root group; kNoPage when there are no points
-  std::uint16_t root_slot = 0;
-  std::uint16_t levels = 0;           ///< greatest group level + 1; 0 when there are no nodes
-  std::uint32_t leaf_points = 0;      ///< a cell with no more points is not split
-  std::uint32_t points_per_page = 0;  ///< every point page but the last holds so many
+  FileHeader header;                   ///< copy of the file header; must equal its bytes 8 to 119
+  std::uint64_t file_bytes = 0;        ///< must equal the length of the file
+  std::uint32_t page_count = 0;        ///< pages in the directory; its own pages are not counted
+  std::uint32_t directory_pages = 0;   ///< pages that the directory takes
+  std::uint64_t directory_offset = 0;  ///< bytes from the start of the file to the directory
+  std::uint64_t directory_xxh3 = 0;    ///< XXH3-64 of all entries, concatenated
+  std::uint32_t meta_page = kNoPage;   ///< number of the meta page
+  std::uint32_t root_page = kNoPage;   ///< page of the root group; kNoPage without points
+  std::uint16_t root_slot = 0;         ///< slot of the root group in that page
+  std::uint16_t levels = 0;            ///< greatest level of a group + 1; 0 without nodes
+  std::uint32_t leaf_points = 0;       ///< a cell with at most this many points is not split
+  std::uint32_t points_per_page = 0;   ///< points in every point page but the last
   std::uint64_t points = 0;
-  std::uint64_t nodes = 0;  ///< children of all groups, the root not counted
+  std::uint64_t nodes = 0;  ///< children of all groups; the root is not counted
   std::uint64_t node_groups = 0;
-  std::array<double, 3> bounds_low{};  ///< of the points' positions, discs not counted
-  std::array<double, 3> bounds_high{};
-  double area = 0;               ///< sum of 2 r^2
-  std::array<double, 3> flux{};  ///< sum of 2 r^2 times radiance
-  /// XXH3-128 over (type, group, count, payload hash) of every page: {low, high}.
+  std::array<double, 3> bounds_low{};   ///< low corner of the points' positions, without discs
+  std::array<double, 3> bounds_high{};  ///< high corner of the points' positions, without discs
+  double area = 0;                      ///< sum of 2 radius^2, scene units squared
+  std::array<double, 3> flux{};         ///< sum of 2 radius^2 times radiance, RGB
+  /// The content digest: XXH3-128 over (type, group, count, payload hash) of every page: {low,
+  /// high}.
   std::array<std::uint64_t, 2> content_xxh3{};
-  std::string writer;  ///< at most 63 bytes of UTF-8
+  std::string writer;  ///< name of the program that wrote the file, at most 63 bytes of UTF-8
 };
 
+/// A file header or superblock as it lies in the file.
 using Block = std::array<std::byte, kBlockBytes>;
 
-/// The first block of a file. Features and version are written as given.
+/// Encodes the first block of a file. Features and version are written as given.
 [[nodiscard]] Block encode_file_header(const FileHeader& header);
+/// Decodes and checks the first block of a file.
 /// @param bytes  the first 4096 bytes, or fewer when the file is shorter
 /// @throws FormatError for a wrong magic, checksum, version, limit or unknown incompatible feature
 [[nodiscard]] FileHeader decode_file_header(std::span<const std::byte> bytes);
-/// The file header as a superblock repeats it, for files that lost theirs.
-/// @param superblock  at least 120 bytes, its checksum right
+/// Decodes the copy of the file header in a superblock, for files whose own header is lost.
+/// @param superblock  at least 120 bytes of a superblock whose checksum is right
 /// @throws FormatError as decode_file_header()
 [[nodiscard]] FileHeader decode_repeated_header(std::span<const std::byte> superblock);
 
-/// Writes the header whose checksum holds for this file, number and type only.
+/// Encodes a page header. Its checksum is valid only in this file, under this page number and type.
+/// @param uuid  FileHeader::uuid of the file
 void encode_page_header(const PageHeader& header, const Uuid& uuid,
                         std::span<std::byte, kPageHeaderBytes> out);
+/// Decodes and checks a page header. The caller checks that page_id is the number that it expects.
 /// @param bytes  at least kPageHeaderBytes
-/// @throws FormatError when magic, checksum (under this uuid), type, codec or a limit is wrong.
-///         That page_id is the number it should be is left to the caller
+/// @throws FormatError when magic, checksum (under the uuid of `file`), type, codec or a limit is
+///         wrong
 [[nodiscard]] PageHeader decode_page_header(std::span<const std::byte> bytes,
                                             const FileHeader& file);
 
-/// Writes an entry.
+/// Encodes a directory entry.
 void encode_directory_entry(const DirectoryEntry& entry,
                             std::span<std::byte, kDirectoryEntryBytes> out) noexcept;
+/// Decodes a directory entry and checks it without regard to other entries.
 /// @param bytes       at least kDirectoryEntryBytes
-/// @param file_bytes  length of the file: the page must lie between its header and superblocks
-/// @throws FormatError when a field breaks a rule that it can break alone
+/// @param file_bytes  length of the file; the page must lie between its header and superblocks
+/// @throws FormatError when a field is out of range or the page lies outside the file's pages
 [[nodiscard]] DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes,
                                                     const FileHeader& file,
                                                     std::uint64_t file_bytes);
 
-/// Most entries that one directory page holds.
+/// Returns the number of entries in a full directory page.
 [[nodiscard]] std::uint32_t directory_entries_per_page(const FileHeader& file) noexcept;
-/// Bytes that the directory of so many pages takes in the file, headers and padding included.
+/// Returns the bytes that a directory of `page_count` entries takes in the file, including page
+/// headers and padding.
 [[nodiscard]] std::uint64_t directory_bytes(const FileHeader& file,
                                             std::uint32_t page_count) noexcept;
 
-/// The last blocks of a file. @throws std::invalid_argument when `writer` is too long or no UTF-8
+/// Encodes a superblock; the file ends in this block twice.
+/// @throws std::invalid_argument when `writer` has more than 63 bytes or is not UTF-8
 [[nodiscard]] Block encode_superblock(const Superblock& superblock);
+/// Decodes and checks a superblock.
 /// @param file        the decoded first block, which the superblock must repeat
-/// @param file_bytes  the file's actual length
-/// @throws FormatError when magic or checksum is wrong, when it belongs to another file or length,
-///         or when its numbers contradict each other
+/// @param file_bytes  the actual length of the file
+/// @throws FormatError when magic or checksum is wrong, when the superblock belongs to another file
+///         or to a file of another length, or when its numbers contradict each other
 [[nodiscard]] Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader& file,
                                            std::uint64_t file_bytes);
 
-/// Content digest: independent of the uuid and of where pages lie (spec/checksums.md#digest).
+/// Computes the content digest of a file (spec/checksums.md#digest), which depends neither on the
+/// uuid nor on where the pages lie.
 class ContentDigest {
  public:
+  /// Starts a digest over no pages. @throws std::bad_alloc when there is no memory for its state
   ContentDigest();
   ~ContentDigest();
   ContentDigest(ContentDigest&&) noexcept;
   ContentDigest& operator=(ContentDigest&&) noexcept;
-  void add(const DirectoryEntry& entry);  ///< in page order
-  /// {low, high} halves for the pages added so far.
+  /// Adds the next page. Pages are added by ascending number.
+  void add(const DirectoryEntry& entry);
+  /// Returns the digest of the pages that were added so far, as {low half, high half}.
   [[nodiscard]] std::array<std::uint64_t, 2> value() const;
 
  private:
-  void* state_;
+  void* state_;  ///< XXH3_state_t; null once moved from
 };
 
-/// That of all pages. @param pages  in page order
+/// Returns the content digest of all pages of a file.
+/// @param pages  entries by ascending page number
 [[nodiscard]] std::array<std::uint64_t, 2> content_digest(std::span<const DirectoryEntry> pages);
 
 }  // namespace ptc

@@ -1,5 +1,5 @@
-// The content digest: XXH3-128 over what the directory says of each page, placement left out
-// (spec/checksums.md#digest).
+// The content digest: XXH3-128 over the type, group, record count and payload hash of each page,
+// but not its place in the file (spec/checksums.md#digest).
 #include <xxhash.h>
 #ifdef PTC_XXHASH_DISPATCH
 #include <xxh_x86dispatch.h>

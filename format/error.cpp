@@ -1,4 +1,4 @@
-// The text of a FormatError (format/error.h).
+// The message of a FormatError: "PATH: offset N: page P: TEXT (CLAUSE)".
 #include "format/error.h"
 
 #include <utility>

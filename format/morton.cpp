@@ -1,4 +1,4 @@
-// Bit interleaving and the frame (spec/morton.md).
+// Bit interleaving, and the frame around a box (spec/morton.md).
 #include "format/morton.h"
 
 #include <algorithm>
@@ -10,10 +10,10 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kHalfMask = (std::uint64_t{1} << kHalfBits) - 1;
-constexpr int kMinExponent = -960;      // edge 2^-960: the unit 2^-1002 is a normal double
-constexpr double kMaxBound = 0x1p1000;  // origin + edge stays finite
+constexpr int kMinExponent = -960;      // the unit of an edge 2^-960, 2^-1002, is a normal double
+constexpr double kMaxBound = 0x1p1000;  // keeps origin + edge finite
 
-// Bit i to bit 3 i for 21 bits, halving the stride at each step (Morton 1966; steps as in
+// Moves bit i to bit 3 i for 21 bits, halving the stride at each step (Morton 1966; steps as in
 // Raman and Wise 2008, "Converting to and from Dilated Integers").
 std::uint64_t spread(std::uint64_t v) noexcept {
   v = (v | v << 32) & 0x001f00000000ffff;
@@ -24,13 +24,13 @@ std::uint64_t spread(std::uint64_t v) noexcept {
   return v;
 }
 
-// A half of a key with its digits below `digits` (0 to 21) cleared.
+// Returns a half of a key with all but its first `digits` (0 to 21) octal digits cleared.
 std::uint64_t leading_digits(std::uint64_t half, int digits) noexcept {
   return digits == 0 ? 0 : half >> (63 - 3 * digits) << (63 - 3 * digits);
 }
 
-// True when every multiple of `unit` in the cube over [low, high] is a double, and rounding puts
-// both corners inside. Divisions by a power of two are exact.
+// Says whether every multiple of `unit` in the cube over [low, high] is a double, and rounding puts
+// both ends inside. Divisions by a power of two are exact.
 bool fits(double low, double high, double unit) noexcept {
   constexpr double kExact = 0x1p53;
   const double first = std::floor(low / unit);
@@ -68,7 +68,7 @@ LatticePoint Frame::to_lattice(const std::array<double, 3>& position) const noex
   const double per_unit = 0x1p42 / edge;
   LatticePoint point;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // Both terms are whole numbers, so nothing but the rounding to the lattice rounds.
+    // Both terms are whole numbers, so their difference adds no rounding error.
     const double steps = std::rint(position[axis] * per_unit) - origin[axis] * per_unit;
     const bool inside = steps > 0 && steps < static_cast<double>(kLatticeMax);
     point[axis] = inside ? static_cast<std::uint64_t>(steps) : steps > 0 ? kLatticeMax : 0;
@@ -85,6 +85,7 @@ std::array<double, 3> Frame::to_position(const LatticePoint& point) const noexce
 }
 
 Frame frame_around(const std::array<double, 3>& low, const std::array<double, 3>& high) {
+  // Measure the box.
   double extent = 0;
   double magnitude = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -96,9 +97,10 @@ Frame frame_around(const std::array<double, 3>& low, const std::array<double, 3>
     extent = std::max(extent, high[axis] - low[axis]);
     magnitude = std::max(magnitude, reach);
   }
-  if (magnitude == 0) return {};  // every point at the origin: any edge is exact
+  if (magnitude == 0) return {};  // every point is the origin, which any edge holds exactly
 
-  // No edge below the extent, nor below magnitude / 2^11, can fit; one of the next few does.
+  // Find the least edge that fits. No edge below the extent or below magnitude / 2^11 can; one of
+  // the next few powers of two does.
   const double least = std::max({extent, magnitude * 0x1p-11, 0x1p-960});
   int exponent = std::max(std::ilogb(least), kMinExponent);
   const auto all_fit = [&](double unit) {
@@ -107,6 +109,7 @@ Frame frame_around(const std::array<double, 3>& low, const std::array<double, 3>
   };
   while (!all_fit(std::ldexp(1.0, exponent - kLatticeBits))) ++exponent;
 
+  // Round the low corner down to the lattice.
   Frame frame;
   frame.edge = std::ldexp(1.0, exponent);
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -1,5 +1,9 @@
-// Sibling groups: the check that makes later reads safe, and the way back to numbers
+// Sibling groups: the check that makes later reads safe, and the decoding of their numbers
 // (spec/nodes.md#node-page).
+//
+// Each slot must name the place where the group before it ends, and the last group must end with
+// the payload. So one pass over the page proves that no group overlaps another, that no byte is
+// left over, and that every later read through any slot stays inside.
 #include "format/node_page.h"
 
 #include <algorithm>
@@ -13,10 +17,10 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kKeyLimit = std::uint64_t{1} << 63;
-constexpr std::uint16_t kUfloat16Limit = 0xff00;  // from here on infinity and NaN
+constexpr std::uint64_t kKeyLimit = std::uint64_t{1} << 63;  // halves of keys have 63 bits
+constexpr std::uint16_t kUfloat16Limit = 0xff00;  // patterns from here on are infinity and NaN
 
-// Checks one group that lies whole in the payload, `at` bytes from its start.
+// Checks a group that lies whole in the payload, `at` bytes from its start.
 class GroupCheck {
  public:
   GroupCheck(const std::byte* payload, std::size_t at, std::uint32_t page_count,
@@ -45,7 +49,7 @@ class GroupCheck {
       fail(0, "spec/nodes.md#node-cell", "cell has digits below its level");
     }
     if (view_.interior_mask() >> view_.size() != 0) {
-      fail(18, "spec/nodes.md#node-mask", "interior mask names a child that is not there");
+      fail(18, "spec/nodes.md#node-mask", "interior mask names a child that does not exist");
     }
   }
 
@@ -126,6 +130,7 @@ NodeSummary decode_summary(const GroupView& group, int i) {
 NodePage::NodePage(std::span<const std::byte> payload, std::uint32_t group_count,
                    std::uint32_t page_count, std::uint64_t points)
     : payload_(payload.data()), count_(group_count) {
+  // Check the slot table.
   constexpr char kSlots[] = "spec/nodes.md#node-slots";
   const std::size_t table_end = sizeof(std::uint16_t) * std::size_t{group_count};
   std::size_t at = round_to_slot(table_end);
@@ -135,17 +140,19 @@ NodePage::NodePage(std::span<const std::byte> payload, std::uint32_t group_count
   if (first_nonzero(payload.subspan(table_end, at - table_end)) != at - table_end) {
     throw FormatError(table_end, "spec/nodes.md#node-zero", "padding is not zero");
   }
-  // Groups follow each other without a gap, so none overlaps and no byte is left over.
+
+  // Check the groups, which follow each other without a gap.
   for (std::uint32_t slot = 0; slot < group_count; ++slot) {
     const std::size_t entry = sizeof(std::uint16_t) * std::size_t{slot};
     if (load<std::uint16_t>(payload_, entry) * kSlotUnit != at) {
-      throw FormatError(entry, kSlots, "group does not start where the one before ends");
+      throw FormatError(entry, kSlots, "group does not start where the group before it ends");
     }
     const std::size_t room = payload.size() - at;
     if (room < kGroupHeadBytes) throw FormatError(at, kSlots, "group ends past the payload");
     const auto n = load<std::uint8_t>(payload_, at + 17);
     if (n < 1 || n > kMaxChildren) {
-      throw FormatError(at + 17, "spec/nodes.md#node-children", "group has not 1 to 8 children");
+      throw FormatError(at + 17, "spec/nodes.md#node-children",
+                        "group does not have 1 to 8 children");
     }
     const std::size_t bytes = round_to_slot(group_content_bytes(n));
     if (bytes > room) throw FormatError(at, kSlots, "group ends past the payload");

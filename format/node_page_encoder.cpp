@@ -1,4 +1,14 @@
-// Summaries to columns: every bound is rounded outwards (spec/nodes.md#quantisation).
+// Encodes summaries as columns (spec/nodes.md#quantisation).
+//
+// Shading relies on bounds: sphere and slab hold all discs, the cone holds all normals. So every
+// bound is rounded outwards. A reader sees only stored values, so a bound is first widened by the
+// error of what it refers to:
+//
+//   sphere about the mean        radius + |mean - stored mean|
+//   slab across a normal         thickness + |mean - stored mean| + radius * |normal - stored one|
+//   cone about an axis           half angle + angle(axis, stored axis)
+//
+// Areas, shares and radiance are not bounds; they are rounded to nearest.
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -17,13 +27,13 @@ namespace {
 constexpr std::size_t kMaxPayload = (0xffff + 1) * kSlotUnit;
 constexpr double kMaxFloat = std::numeric_limits<float>::max();
 
-// Least float that is not below x, which is not negative.
+// Returns the least float that is not below x >= 0, or the greatest float.
 float float_above(double x) noexcept {
   const auto nearest = static_cast<float>(std::min(x, kMaxFloat));
   return nearest < x ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
 }
 
-// Nearest whole number to x >= 0, halves up.
+// Returns the whole number nearest to x >= 0, halves up.
 std::uint16_t to_u16(double x) noexcept {
   const double shifted = x + 0.5;
   return static_cast<std::uint16_t>(shifted);
@@ -33,6 +43,7 @@ float to_float(double x) noexcept {
   return static_cast<float>(std::min(x, kMaxFloat));
 }
 
+// Says whether x is finite and not negative.
 bool sane(double x) noexcept {
   return x >= 0 && x <= std::numeric_limits<double>::max();
 }
@@ -54,10 +65,12 @@ std::uint64_t encode_ref(const ChildRef& ref) noexcept {
   return ref.first_point | std::uint64_t{ref.point_count} << kFirstPointBits;
 }
 
-// cos(a + d) rounded down, where a is the cone's half angle and d the angle between its axis and
-// the stored one; -1 when a + d reaches pi. Square roots only: the same bytes on every machine.
+// Returns cos(a + d) rounded down, where a is the cone's half angle and d the angle between its
+// axis and the stored one; -1 when a + d reaches pi. It uses square roots only, which give the same
+// bytes on every machine.
 std::int16_t encode_cone_cos(const NodeSummary& node, std::uint16_t stored_axis) noexcept {
-  constexpr double kFloatSlack = 4e-7;  // normals and axes are unit to float precision
+  constexpr double kFloatSlack = 4e-7;  // normals and axes are unit vectors to float precision
+  // Find the angle d by its sine and cosine, up to a common factor.
   const std::array<float, 3> b = decode_octahedral8(stored_axis);
   const auto& a = node.cone_axis;
   std::array<double, 3> cross;
@@ -70,16 +83,18 @@ std::int16_t encode_cone_cos(const NodeSummary& node, std::uint16_t stored_axis)
   }
   const double sine = std::sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
   const double length = std::sqrt(sine * sine + dot * dot);
+  // Add it to the half angle: cos(a + d) = cos a cos d - sin a sin d.
   const double c = node.cone_cos;
   double widened = -1;
   if (length > 0 && c + dot / length > 0) {
     widened = (c * dot - std::sqrt(std::max(0.0, 1 - c * c)) * sine) / length;
   }
+  // Round down.
   const double steps = std::max((widened - kFloatSlack) * kCosSteps, -kCosSteps);
   return static_cast<std::int16_t>(static_cast<int>(steps + kCosSteps + 1) - 32768);  // floor
 }
 
-// Writes the columns of one child of a group of n.
+// Writes the columns of child i of a group of n.
 class ChildEncoder {
  public:
   ChildEncoder(std::byte* group, std::size_t n, std::size_t i, const LatticePoint& corner,
@@ -101,7 +116,8 @@ class ChildEncoder {
     store(group_, column_at(n_, column) + 2 * i_, value);
   }
 
-  // Sphere and slab, widened by what rounding moves the mean and turns the normal of the slab.
+  // Writes mean, sphere and slab. The sphere and the slab are widened by as much as rounding moves
+  // the mean, the slab also by as much as rounding turns its normal.
   void encode_bounds(const NodeSummary& node) {
     double moved_squared = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -114,7 +130,7 @@ class ChildEncoder {
     }
     double radius = node.radius;
     double thickness = node.thickness + node.radius * turn_of_slab(node);
-    if (moved_squared > 0) {  // one part in 2^50 covers the roundings of these lines
+    if (moved_squared > 0) {  // a relative 2^-50 covers the rounding errors of these lines
       radius = (radius + std::sqrt(moved_squared)) * (1 + 0x1p-50);
       thickness = (thickness + std::sqrt(moved_squared)) * (1 + 0x1p-50);
     }
@@ -122,8 +138,9 @@ class ChildEncoder {
     put(kThickness, encode_ufloat16_up(float_above(std::min(thickness, radius))));
   }
 
-  // Distance between the unit normals of the slab as it is and as the stored shares give it; 1
-  // where there is none, so that the slab is as thick as the sphere.
+  // Returns the distance between the exact unit normal of the slab and the one that the stored
+  // shares give. It is 1 when one of them does not exist, so that the slab becomes as thick as the
+  // sphere.
   [[nodiscard]] double turn_of_slab(const NodeSummary& node) const noexcept {
     std::array<double, 3> exact;
     std::array<double, 3> stored;
@@ -149,6 +166,7 @@ class ChildEncoder {
     return std::sqrt(apart);
   }
 
+  // Writes area, shares and radiance.
   void encode_light(const NodeSummary& node) {
     const std::uint16_t area = encode_ufloat16(to_float(node.area));
     put(kArea, area);
@@ -177,9 +195,11 @@ class ChildEncoder {
 void append_group(const NodeGroup& group, std::vector<std::byte>& out) {
   const std::size_t n = group.children.size();
   if (n < 1 || n > kMaxChildren)
-    throw std::invalid_argument("append_group: no or too many children");
+    throw std::invalid_argument("append_group: a group must have 1 to 8 children");
   assert(group.level >= 0 && group.level <= kMaxLevel);
   assert(cell_of(group.cell, std::min(group.level, kLatticeBits)) == group.cell);
+
+  // Write the head and the padding.
   const std::size_t at = out.size();
   out.resize(at + round_to_slot(group_content_bytes(n)));
   std::byte* const to = out.data() + at;
@@ -187,6 +207,8 @@ void append_group(const NodeGroup& group, std::vector<std::byte>& out) {
   store(to, 8, group.cell.low);
   store(to, 16, static_cast<std::uint8_t>(group.level));
   store(to, 17, static_cast<std::uint8_t>(n));
+
+  // Write the columns, child by child.
   const LatticePoint corner = decode_morton(group.cell);
   std::uint8_t interior_mask = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -216,7 +238,8 @@ bool NodePageEncoder::fits(std::size_t children) const noexcept {
 
 std::uint16_t NodePageEncoder::new_slot(std::size_t children) {
   if (children < 1 || children > kMaxChildren || !fits(children)) {
-    throw std::invalid_argument("NodePageEncoder: no or too many children, or no room for them");
+    throw std::invalid_argument(
+        "NodePageEncoder: a group must have 1 to 8 children and fit the page");
   }
   slots_.push_back(
       static_cast<std::uint16_t>(groups_.size() / kSlotUnit));  // take() adds the table's size

@@ -1,4 +1,8 @@
 // The loops of packing (spec/points.md#packed-columns).
+//
+// A column goes through three loops: its values are loaded into an array of numbers, their
+// differences become zigzag codes, and the codes are split into byte planes. The loops are plain,
+// so that the compiler makes vectors of them (format/instruction_sets.h).
 #include <bit>
 #include <vector>
 
@@ -13,6 +17,7 @@ void load_all(const std::byte* column, std::vector<Value>& values) noexcept {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = load<T>(column, i * sizeof(T));
 }
 
+// Loads a column of 8, 16 or 32 bits.
 void load_column(const std::byte* payload, const PackedColumn& column,
                  std::vector<std::uint32_t>& values) noexcept {
   const std::byte* const from = payload + column.before * values.size();
@@ -21,6 +26,7 @@ void load_column(const std::byte* payload, const PackedColumn& column,
   load_all<std::uint32_t>(from, values);
 }
 
+// Loads a coordinate of a point page: 32 bits from its own column, 10 from the column `high`.
 void load_coordinates(const std::byte* payload, const PackedColumn& column,
                       std::vector<std::uint64_t>& values) noexcept {
   load_all<std::uint32_t>(payload + column.before * values.size(), values);
@@ -32,6 +38,7 @@ void load_coordinates(const std::byte* payload, const PackedColumn& column,
   }
 }
 
+// Returns the bits that are set in any of the values.
 template <class Value>
 Value bits_of(const std::vector<Value>& values) noexcept {
   Value seen = 0;
@@ -39,11 +46,12 @@ Value bits_of(const std::vector<Value>& values) noexcept {
   return seen;
 }
 
-// Differences to the value before, as zigzag numbers without the zero bits that all values end in.
+// Computes the differences between neighbours as zigzag codes, without the `shift` zero bits that
+// all values end in.
 template <class Value>
 void difference(const std::vector<Value>& values, unsigned bits, unsigned shift,
                 std::vector<Value>& codes) noexcept {
-  const unsigned width = bits - shift;  // of what is left
+  const unsigned width = bits - shift;  // bits of a code
   const auto all = static_cast<Value>(mask(width));
   codes[0] = 0;
   for (std::size_t i = 1; i < values.size(); ++i) {
@@ -53,6 +61,7 @@ void difference(const std::vector<Value>& values, unsigned bits, unsigned shift,
   }
 }
 
+// Appends a packed column: its head and its planes.
 template <class Value>
 void pack(const std::vector<Value>& values, unsigned bits, std::vector<Value>& codes,
           std::vector<std::byte>& packed) {
@@ -61,6 +70,7 @@ void pack(const std::vector<Value>& values, unsigned bits, std::vector<Value>& c
   difference(values, bits, shift, codes);
   const auto planes = static_cast<unsigned>(std::bit_width(bits_of(codes)) + 7) / 8;
 
+  // Write the head, then byte after byte of all codes.
   const std::size_t at = packed.size(), n = values.size();
   packed.resize(at + kHeadBytes + planes * n);
   std::byte* const p = packed.data() + at;

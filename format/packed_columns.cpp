@@ -1,5 +1,11 @@
-// Differences from value to value, zigzagged, one byte plane after another
-// (spec/points.md#packed-columns).
+// Unpacking of columns, and their order (spec/points.md#packed-columns).
+//
+//   head   | shift u8 | planes u8 | base u64 |      then `planes` planes of n bytes
+//
+//   value of point i = value of point i - 1 + (step of code i << shift), from base on
+//
+// The packed bytes are untrusted: read_head() checks that the planes it announces are there. The
+// sums may overflow and wrap, which is part of the format.
 #include "format/packed_columns.h"
 
 #include <algorithm>
@@ -18,7 +24,7 @@ constexpr char kPacked[] = "spec/points.md#packed-columns";
 constexpr std::array<PackedColumn, 13> kPointColumns{{
     {0, kCoordinateBits},
     {4, kCoordinateBits},
-    {8, kCoordinateBits},  // x y z
+    {8, kCoordinateBits},  // x, y, z
     {16, 32},              // radius
     {20, 16},
     {22, 16},  // normal
@@ -27,18 +33,19 @@ constexpr std::array<PackedColumn, 13> kPointColumns{{
     {28, 16, 6},  // radiance: g, r - g, b - g
     {31, 8},
     {30, 8, 9},
-    {32, 8, 9},  // albedo likewise
+    {32, 8, 9},  // albedo: g, r - g, b - g
     {33, 8},     // flags
 }};
 
-/// A column as it is packed, its head checked.
+// A packed column whose head was checked.
 struct Head {
-  unsigned shift = 0;
-  unsigned planes = 0;
-  std::uint64_t base = 0;
-  const std::byte* codes = nullptr;
+  unsigned shift = 0;                // zero bits that all values end in
+  unsigned planes = 0;               // bytes of a code that are stored
+  std::uint64_t base = 0;            // value before the first step
+  const std::byte* codes = nullptr;  // the planes
 };
 
+// Reads and checks the head of the column that starts at `at`, and that its planes are there.
 Head read_head(std::span<const std::byte> packed, std::size_t at, unsigned bits, std::size_t n) {
   if (packed.size() - at < kHeadBytes)
     throw FormatError(at, kPacked, "packed columns end in a column's head");
@@ -57,6 +64,7 @@ Head read_head(std::span<const std::byte> packed, std::size_t at, unsigned bits,
   return head;
 }
 
+// Calls put(i, value) for the values of a column with a fixed number of planes.
 template <unsigned kPlanes, class Put>
 void sum_planes(const Head& head, std::size_t n, const Put& put) {
   std::uint64_t value = head.base;
@@ -69,7 +77,7 @@ void sum_planes(const Head& head, std::size_t n, const Put& put) {
   }
 }
 
-/// Hands out the values of a column one after another, with more bits than it has.
+// Calls put(i, value) for each value of a column. Bits above the column's are not masked off.
 template <class Put>
 void sum_up(const Head& head, std::size_t n, const Put& put) {
   switch (head.planes) {
@@ -90,6 +98,7 @@ void sum_up(const Head& head, std::size_t n, const Put& put) {
   }
 }
 
+// Stores the values of a column of type T, added to those of the column `minus` if there is one.
 template <class T>
 void unpack_values(const Head& head, std::size_t n, const std::byte* minus, std::byte* to) {
   if (minus == nullptr) {
@@ -102,6 +111,8 @@ void unpack_values(const Head& head, std::size_t n, const std::byte* minus, std:
   });
 }
 
+// Stores a coordinate of a point page: 32 bits in its own column, 10 in the column `high`, which x
+// starts and y and z complete.
 void unpack_coordinates(const Head& head, std::size_t n, const PackedColumn& column,
                         std::byte* payload) {
   std::byte* const low = payload + column.before * n;
@@ -136,7 +147,7 @@ void check_packed_size(std::size_t bytes, std::uint32_t count,
     row = std::max(row, column.before + width);
   }
   if (count == 0 || bytes != row * count)
-    throw std::invalid_argument("packed columns: a payload of another size");
+    throw std::invalid_argument("packed columns: the size of the payload does not match");
 }
 
 std::span<const PackedColumn> packed_point_columns() noexcept {

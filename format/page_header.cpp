@@ -1,4 +1,13 @@
 // The 64 bytes in front of every page (spec/container.md#page-header).
+//
+//   | magic | type | codec | filter | page_id | stored | raw | group | level | records | 0 |
+//   0       4      6       7        8         12       16    20      22      24        28
+//   | first_key | last_key | payload XXH3 | header XXH3 |
+//   32          40         48             56            64
+//
+// The checksum of the header is seeded by the uuid of the file, the page number and the type. So it
+// is right only in this file, for this number and this type, and a page that was swapped,
+// misdirected or left over from another file is found.
 #include <algorithm>
 
 #include "format/bytes.h"
@@ -16,11 +25,10 @@ namespace {
 constexpr std::size_t kPageHashAt = 56;
 constexpr std::uint16_t kNoLevel = 0xffff;
 constexpr std::uint32_t kMaxGroupCount = 0xffff;
-constexpr std::uint64_t kKeyLimit = std::uint64_t{1} << 63;
+constexpr std::uint64_t kKeyLimit = std::uint64_t{1} << 63;  // halves of keys have 63 bits
 constexpr char kFields[] = "spec/container.md#page-fields";
 
-// The header's hash under this seed holds for this file, this number and this type only, so a page
-// that was swapped, misdirected or left over from another file is found.
+// Returns the seed of a page header's checksum (spec/checksums.md#page-seed).
 std::uint64_t page_seed(const Uuid& uuid, std::uint32_t page_id, std::uint16_t type) noexcept {
   std::array<std::byte, 22> salt;
   std::ranges::copy(uuid, salt.begin());
@@ -29,6 +37,7 @@ std::uint64_t page_seed(const Uuid& uuid, std::uint32_t page_id, std::uint16_t t
   return xxh3_64(salt);
 }
 
+// Says whether a page of this type and size can have as many records as it says.
 bool record_count_fits(const PageFacts& facts) noexcept {
   switch (static_cast<PageType>(facts.type)) {
     case PageType::node:
@@ -45,12 +54,13 @@ bool record_count_fits(const PageFacts& facts) noexcept {
   return false;
 }
 
+// Reads codec and filter and checks that a page of this type may have them.
 Coding decode_coding(const std::byte* p, PageType type) {
   const auto codec = load<std::uint8_t>(p, 6), filter = load<std::uint8_t>(p, 7);
   constexpr char kCodec[] = "spec/container.md#page-codec";
   if (codec > static_cast<std::uint8_t>(Codec::lz4)) throw FormatError(6, kCodec, "unknown codec");
   if (type == PageType::directory && codec != 0)
-    throw FormatError(6, kCodec, "directory page is compressed");
+    throw FormatError(6, kCodec, "a directory page is compressed");
   constexpr char kFilter[] = "spec/container.md#page-filter";
   if (filter > static_cast<std::uint8_t>(Filter::columns))
     throw FormatError(7, kFilter, "unknown filter");
@@ -119,6 +129,7 @@ void encode_page_header(const PageHeader& header, const Uuid& uuid,
 }
 
 PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader& file) {
+  // Check magic and checksum.
   if (bytes.size() < kPageHeaderBytes) {
     throw FormatError(bytes.size(), "spec/container.md#page-header", "page header is truncated");
   }
@@ -134,6 +145,8 @@ PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader
     throw FormatError(kPageHashAt, "spec/container.md#page-checksum",
                       "page header's checksum is wrong");
   }
+
+  // Read the fields.
   header.stored_bytes = load<std::uint32_t>(p, 12);
   header.raw_bytes = load<std::uint32_t>(p, 16);
   header.group = load<std::uint16_t>(p, 20);
@@ -143,13 +156,14 @@ PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader
   header.last_key = load<std::uint64_t>(p, 40);
   header.payload_xxh3 = load<std::uint64_t>(p, 48);
 
+  // Check their rules.
   check_page_facts({type, header.group, header.stored_bytes, header.raw_bytes, header.record_count},
                    file);
   header.type = static_cast<PageType>(type);
   header.coding = decode_coding(p, header.type);
   if ((header.coding.codec == Codec::raw) != (header.stored_bytes == header.raw_bytes)) {
     throw FormatError(12, "spec/container.md#page-length",
-                      "stored_bytes equals raw_bytes without codec raw, or the reverse");
+                      "stored_bytes equals raw_bytes without codec raw, or differs with codec raw");
   }
   if (load<std::uint32_t>(p, 28) != 0) throw FormatError(28, kFields, "reserved field is not zero");
   check_level_and_keys(header);

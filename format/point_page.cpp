@@ -1,4 +1,12 @@
 // Columns of surfels (spec/points.md#point-page).
+//
+//   | x: 4 n bytes | y | z | high | radius | normal u: 2 n bytes | v | radiance r | g | b | ...
+//
+// Every page is verified when it is loaded, so the checks are loops that compilers make vectors of.
+// The costly rule is that points follow the Z-curve. It does not need their keys: of two points,
+// the one that comes first is decided by the axis whose coordinates differ in the most significant
+// bit (Chan 2002). A loop over whole columns only says whether a rule is broken; the place is found
+// by a second look, which is rare.
 #include "format/point_page.h"
 
 #include <algorithm>
@@ -16,11 +24,11 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kPointBytes = 34;
-constexpr int kHighBits = kLatticeBits - 32;  // bits of each coordinate in the column `high`
+constexpr int kHighBits = kLatticeBits - 32;  // of each coordinate in the column `high`
 constexpr std::uint32_t kHighMask = (1u << kHighBits) - 1;
 constexpr std::uint32_t kHighLimit = 1u << (3 * kHighBits);
 
-// First byte of each column, in bytes a point.
+// Bytes per point in front of each column.
 constexpr std::size_t kPosition = 0;  // x, y, z
 constexpr std::size_t kHigh = 12;
 constexpr std::size_t kRadius = 16;
@@ -29,18 +37,19 @@ constexpr std::size_t kRadiance = 24;
 constexpr std::size_t kAlbedo = 30;
 constexpr std::size_t kFlags = 33;
 
-// The order of points along the Z-curve is checked in 32-bit lanes: first the upper 31 bits of each
-// coordinate, then, where those are all equal, the lower 11.
+// The order of points along the Z-curve is checked in 32-bit lanes: the upper 31 bits of each
+// coordinate first and then, where these are equal on all axes, the lower 11.
 //
 //   bit 41 ....... 11 | 10 ...... 0
 constexpr int kLowerBits = 11;
-constexpr std::size_t kRunPoints = 128;  // a run's lanes stay in the first-level cache
+constexpr std::size_t kRunPoints = 128;  // so that the lanes of a run stay in the L1 cache
 
+// The upper or lower parts of the coordinates of a run of points and the point behind it.
 struct Lanes {
   std::array<std::array<std::int32_t, kRunPoints + 1>, 3> axes;
 };
 
-// Upper or lower parts of the coordinates of points first to first + n - 1.
+// Loads the upper or lower parts of the coordinates of points first to first + n - 1.
 void split(const std::byte* payload, std::size_t count, std::size_t first, std::size_t n,
            bool upper, Lanes& out) noexcept {
   const std::byte* const high = payload + kHigh * count + 4 * first;
@@ -57,7 +66,8 @@ void split(const std::byte* payload, std::size_t count, std::size_t first, std::
   }
 }
 
-// Truth is all bits one and falsehood zero, so that compilers make vectors of the loops below.
+// A truth value with all bits one for true and zero for false, so that compilers make vectors of
+// the loops below.
 using Mask = std::int32_t;
 
 inline Mask below(std::int32_t a, std::int32_t b) noexcept {
@@ -67,14 +77,14 @@ inline Mask choose(Mask m, Mask yes, Mask no) noexcept {
   return (m & yes) | (~m & no);
 }
 
-// Most significant bit of a below that of b; neither is negative (Chan 2002, "Closest-point
-// problems simplified"; here as one comparison).
+// Says whether the most significant bit of a is below that of b; neither is negative (Chan 2002,
+// "Closest-point problems simplified"; here as one comparison).
 inline Mask below_msb(std::int32_t a, std::int32_t b) noexcept {
   return below(a, b & ~a);
 }
 
-// Whether point j comes after point i: the axis whose coordinates differ in the most significant
-// bit decides, z before y before x among equals.
+// Says whether point j comes after point i. The axis whose coordinates differ in the most
+// significant bit decides; among equals z decides before y, and y before x.
 inline Mask follows(const Lanes& p, std::size_t i, std::size_t j) noexcept {
   const auto& [x, y, z] = p.axes;
   const std::int32_t differ_x = x[i] ^ x[j];
@@ -89,15 +99,17 @@ inline Mask equal(const Lanes& p, std::size_t i, std::size_t j) noexcept {
   return ((x[i] ^ x[j]) | (y[i] ^ y[j]) | (z[i] ^ z[j])) == 0 ? -1 : 0;
 }
 
-// True when each of n points is followed or equalled by the next of the n + 1.
+// Says whether each of n points is followed or equalled by the next one.
 bool run_ascends(const std::byte* payload, std::size_t count, std::size_t first,
                  std::size_t n) noexcept {
+  // Compare the upper bits.
   Lanes upper;
   split(payload, count, first, n + 1, true, upper);
   Mask ascends = -1;
   for (std::size_t i = 0; i < n; ++i) ascends &= follows(upper, i, i + 1);
-  if (ascends != 0) return true;  // usual: points of real scenes differ in the upper bits
+  if (ascends != 0) return true;  // the usual case: points of real scenes differ in the upper bits
 
+  // Compare the lower bits where the upper ones are equal.
   Lanes lower;
   split(payload, count, first, n + 1, false, lower);
   ascends = -1;
@@ -108,7 +120,8 @@ bool run_ascends(const std::byte* payload, std::size_t count, std::size_t first,
   return ascends != 0;
 }
 
-// Index of the first point whose successor comes before it on the Z-curve; count - 1 when none.
+// Returns the index of the first point whose successor comes before it on the Z-curve, or that of
+// the last point.
 std::size_t first_descent(const PointPage& page, const std::byte* payload) noexcept {
   const std::size_t last = page.size() - 1;
   for (std::size_t first = 0; first < last; first += kRunPoints) {
@@ -121,8 +134,9 @@ std::size_t first_descent(const PointPage& page, const std::byte* payload) noexc
   return last;
 }
 
-// True when every value is below the limit, which is at most the type's top bit: adding what the
-// limit lacks to the top bit sets that bit for all others, or it was set before.
+// Says whether every value is below a limit that is at most the top bit of the type. Adding the
+// difference between the top bit and the limit sets the top bit of every value that is not, unless
+// it was set before.
 template <class T>
 bool all_below(const std::byte* column, std::size_t count, T limit) noexcept {
   constexpr T kTop = static_cast<T>(T{1} << (8 * sizeof(T) - 1));
@@ -135,6 +149,7 @@ bool all_below(const std::byte* column, std::size_t count, T limit) noexcept {
   return (seen & kTop) == 0;
 }
 
+// Says whether a point has numbers that a page may hold; radiance may be a negative zero.
 [[maybe_unused]] bool storable(const PointRecord& point) noexcept {
   const auto usual = [](std::uint16_t half) { return half < 0x7c00 || half == 0x8000; };
   return point.radius >= 0 && point.radius <= std::numeric_limits<float>::max() &&
@@ -174,8 +189,10 @@ std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
   Columns columns(static_cast<std::uint32_t>(points.size()));
   PositionBlock q;
   for (std::size_t first = 0; first < points.size(); first += kPositionBlock) {
+    // Decode the positions of a block of points.
     const auto block = points.subspan(first, std::min(kPositionBlock, points.size() - first));
     decode_positions(block, q);
+    // Write the block to each column.
     const auto fill = [&](std::size_t bytes_before, auto&& value) {
       for (std::size_t i = 0; i < block.size(); ++i) columns.put(bytes_before, first + i, value(i));
     };
@@ -203,7 +220,7 @@ std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
 PointPage::PointPage(std::span<const std::byte> payload, std::uint32_t count)
     : payload_(payload.data()), count_(count) {
   if (count == 0 || payload.size() != point_page_bytes(count)) {
-    throw FormatError(0, "spec/points.md#point-size", "payload's size does not suit its points");
+    throw FormatError(0, "spec/points.md#point-size", "payload does not have 34 bytes a point");
   }
 }
 
@@ -224,7 +241,7 @@ void PointPage::verify() const {
   const std::size_t descent = first_descent(*this, payload_);
   if (descent + 1 < count_) {
     throw FormatError(4 * (descent + 1), "spec/points.md#point-order",
-                      "point " + std::to_string(descent + 1) + " precedes the one before");
+                      "point " + std::to_string(descent + 1) + " precedes the point before it");
   }
   verify_column<std::uint32_t>(kRadius, 0x7f800000, "spec/points.md#point-radius",
                                "radius is negative or not finite");
@@ -235,8 +252,8 @@ void PointPage::verify() const {
   verify_column<std::uint8_t>(kFlags, 1, "spec/points.md#point-flags", "flags are not zero");
 }
 
-// Bit patterns of numbers that are not negative are ordered like the numbers, and all others are
-// above them: one limit finds negative numbers, infinities and NaN.
+// Compares bit patterns. Those of numbers that are not negative are ordered like the numbers, and
+// all others are above them, so one limit finds negative numbers, infinities and NaN.
 template <class T>
 void PointPage::verify_column(std::size_t bytes_before, T limit, const char* clause,
                               const char* text) const {

@@ -1,4 +1,4 @@
-// One surfel on its way from the source to the file: what the sort moves.
+// The record of one surfel on its way from the input to the file; the external sort moves these.
 #pragma once
 
 #include <array>
@@ -12,25 +12,27 @@
 
 namespace ptc {
 
-/// A surfel with its place on the Z-curve in front. The key is the position.
+/// A surfel whose position is given by its place on the Z-curve.
 struct PointRecord {
-  MortonKey key;
+  MortonKey key;                            ///< position on the lattice of the scene's Frame
   float radius = 0;                         ///< scene units; the disc circumscribes its square cell
-  std::array<std::int16_t, 2> normal{};     ///< octahedral
-  std::array<std::uint16_t, 3> radiance{};  ///< half, outgoing, W / (m^2 sr)
-  std::array<std::uint8_t, 3> albedo{};     ///< diffuse reflectance, v / 255
+  std::array<std::int16_t, 2> normal{};     ///< octahedral u and v
+  std::array<std::uint16_t, 3> radiance{};  ///< outgoing, RGB as half patterns, W / (m^2 sr)
+  std::array<std::uint8_t, 3> albedo{};     ///< diffuse reflectance, RGB in steps of 1 / 255
   std::uint8_t flags = 0;                   ///< 0; reserved
   std::array<std::uint8_t, 6> reserved{};   ///< 0
 };
 static_assert(sizeof(PointRecord) == 40 && std::is_trivially_copyable_v<PointRecord>);
 
-/// Lattice coordinates of up to kPositionBlock points, an array an axis.
+/// The greatest number of points in a PositionBlock.
 inline constexpr std::size_t kPositionBlock = 256;
+/// The lattice coordinates of up to kPositionBlock points, one array for each axis.
 using PositionBlock = std::array<std::array<std::uint64_t, kPositionBlock>, 3>;
 
 /// Decodes the keys of points into lattice coordinates.
 /// @param points  at most kPositionBlock
-/// @param out     its front is filled
+/// @param out     receives the coordinates; entries from points.size() on keep their values
+/// @param set     one that has_instructions()
 void decode_positions(std::span<const PointRecord> points, PositionBlock& out,
                       InstructionSet set = widest_instructions()) noexcept;
 

@@ -1,4 +1,5 @@
-// Small number types, rounded the same way on every machine (spec/README.md#types).
+// Small number types (spec/README.md#types). Only operations that IEEE 754 rounds exactly are used,
+// so every machine gives the same bits.
 #include "format/scalar.h"
 
 #include <algorithm>
@@ -7,15 +8,16 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint16_t kMaxUfloat16 = 0xfeff;  // exponent 255 is infinity and NaN
+constexpr std::uint16_t kMaxUfloat16 = 0xfeff;  // exponent 255 stands for infinity and NaN
 
-// Nearest integer, halves away from zero; exact for the magnitudes used here.
+// Returns the nearest integer, halves away from zero. It is exact for the magnitudes used here.
 int nearest(float x) noexcept {
   return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f);
 }
 
-// The direction on the square [-1, 1]^2: the upper half of the octahedron in the middle, the lower
-// half folded out over the diagonals.
+// Returns the point on the square [-1, 1]^2 that stands for a direction. The upper half of the
+// octahedron lies in the diamond in the middle, the lower half is folded out over the edges of the
+// diamond.
 //
 //      +---^---+
 //      | / | \ |    inside the diamond z >= 0, outside z < 0
@@ -40,10 +42,10 @@ std::uint16_t encode_half(float x) noexcept {
   if (magnitude > 0x7f800000) return 0;                                           // NaN
   if (magnitude >= 0x477fe000) return static_cast<std::uint16_t>(sign | 0x7bff);  // 65504 and above
   std::uint32_t rounded;
-  if (magnitude >= 0x38800000) {  // 2^-14: normal; the carry of rounding runs into the exponent
+  if (magnitude >= 0x38800000) {  // normal, from 2^-14 on: rounding may carry into the exponent
     const std::uint32_t rebased = magnitude - (112u << 23);
     rounded = (rebased + 0xfff + (rebased >> 13 & 1)) >> 13;
-  } else {  // adding 2^-1 leaves x in units of 2^-24 in the low bits, rounded to even
+  } else {  // subnormal: adding 2^-1 leaves x in units of 2^-24 in the low bits, rounded to even
     const float shifted = std::bit_cast<float>(magnitude) + 0.5f;
     rounded = std::bit_cast<std::uint32_t>(shifted) - std::bit_cast<std::uint32_t>(0.5f);
   }
@@ -66,7 +68,7 @@ std::uint16_t encode_ufloat16(float x) noexcept {
 std::uint32_t encode_rgbe(const std::array<float, 3>& rgb) noexcept {
   const float greatest = std::max({rgb[0], rgb[1], rgb[2], 0.0f});
   if (!(greatest > 0)) return 0;
-  // The exponent e with greatest in [2^(e-1), 2^e), kept in [-128, 127].
+  // Find the exponent e with greatest in [2^(e-1), 2^e), clamped to [-128, 127].
   const double wide = greatest;
   const int biased = static_cast<int>(std::bit_cast<std::uint64_t>(wide) >> 52) - 1022;
   const int exponent = std::clamp(biased, -128, 127);

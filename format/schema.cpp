@@ -1,4 +1,13 @@
 // The meta page (spec/points.md#schema).
+//
+//   | channels u32 | texts u32 | channel, 40 bytes | ... | text | text | ...
+//
+//   channel:  | name, 32 bytes with zeros | type | components | group u16 | 0 u32 |
+//   text:     | key bytes u32 | value bytes u32 | key | value |
+//
+// Every Meta has exactly one encoding: channels by ascending group, texts by ascending key. The
+// decoder refuses all others. It compares every count and length with what is left of the payload
+// before it reads that far.
 #include "format/schema.h"
 
 #include <algorithm>
@@ -17,14 +26,14 @@ constexpr std::size_t kHeadBytes = 8;      // channel count, text count
 constexpr std::size_t kChannelBytes = 40;  // name[32], type, components, group, 0
 constexpr std::size_t kNameBytes = 32;
 constexpr std::size_t kTextHeadBytes = 8;   // bytes of key, bytes of value
-constexpr std::size_t kMaxGroupBytes = 34;  // as many as a core record: the page always fits
+constexpr std::size_t kMaxGroupBytes = 34;  // as in a core record, so that the page always fits
 constexpr std::uint8_t kMaxComponents = 16;
 
 bool known(ChannelType type) noexcept {
   return type >= ChannelType::u8 && type <= ChannelType::f32;
 }
 
-// What is wrong with the channels as a whole or with the last of them; null when nothing is.
+// Returns what is wrong with the channels as a whole or with the last of them, or null.
 const char* fault(std::span<const Channel> channels) {
   const Channel& last = channels.back();
   if (!is_name(last.name)) return "channel name is not 1 to 31 of a-z 0-9 _ .";
@@ -32,9 +41,10 @@ const char* fault(std::span<const Channel> channels) {
   if (last.components == 0 || last.components > kMaxComponents) return "components is not 1 to 16";
   if (last.group == 0 || last.group > kMaxGroup) return "channel group is not 1 to 255";
   const auto earlier = channels.first(channels.size() - 1);
-  if (!earlier.empty() && earlier.back().group > last.group) return "channels are not by group";
+  if (!earlier.empty() && earlier.back().group > last.group)
+    return "channels are not by ascending group";
   const auto same = [&](const Channel& c) { return c.name == last.name; };
-  if (std::ranges::any_of(earlier, same)) return "two channels have one name";
+  if (std::ranges::any_of(earlier, same)) return "two channels have the same name";
   if (group_point_bytes(channels, last.group) > kMaxGroupBytes) {
     return "channels of one group take more than 34 bytes a point";
   }
@@ -55,7 +65,8 @@ Channel decode_channel(std::span<const std::byte> bytes, std::size_t at) {
   return channel;
 }
 
-// One key and its value from the front of `rest`, which is shortened.
+// Reads a key and its value from the front of `rest`, which is shortened. The views refer to the
+// payload.
 std::pair<std::string_view, std::string_view> decode_text(std::span<const std::byte>& rest,
                                                           std::size_t at) {
   constexpr char kSize[] = "spec/points.md#meta-size";
@@ -71,7 +82,7 @@ std::pair<std::string_view, std::string_view> decode_text(std::span<const std::b
   rest = rest.subspan(std::size_t{key_bytes} + value_bytes);
   if (!is_name(key) || !is_utf8(value)) {
     throw FormatError(at, "spec/points.md#meta-text",
-                      "text's key is no name or its value no UTF-8");
+                      "a text's key is not a name, or its value is not UTF-8");
   }
   return {key, value};
 }
@@ -88,6 +99,7 @@ std::size_t channel_bytes(ChannelType type) noexcept {
 }
 
 std::vector<std::byte> encode_meta(const Meta& meta) {
+  // Write the channels.
   std::vector<std::byte> out(kHeadBytes + kChannelBytes * meta.channels.size());
   store(out.data(), 0, static_cast<std::uint32_t>(meta.channels.size()));
   store(out.data(), 4, static_cast<std::uint32_t>(meta.text.size()));
@@ -101,9 +113,12 @@ std::vector<std::byte> encode_meta(const Meta& meta) {
     store(p, 33, channel.components);
     store(p, 34, channel.group);
   }
+
+  // Append the texts.
   for (const auto& [key, value] : meta.text) {
     if (!is_name(key) || !is_utf8(value)) {
-      throw std::invalid_argument("encode_meta: text's key is no name or its value no UTF-8");
+      throw std::invalid_argument(
+          "encode_meta: a text's key is not a name, or its value is not UTF-8");
     }
     std::array<std::byte, kTextHeadBytes> head;
     store(head.data(), 0, static_cast<std::uint32_t>(key.size()));
@@ -126,6 +141,8 @@ Meta decode_meta(std::span<const std::byte> payload) {
   if (channel_count > rest.size() / kChannelBytes) {
     throw FormatError(0, kSize, "channels run past the end of the meta page");
   }
+
+  // Read the channels.
   const auto here = [&] { return payload.size() - rest.size(); };
   Meta meta;
   for (std::uint32_t i = 0; i < channel_count; ++i) {
@@ -135,11 +152,13 @@ Meta decode_meta(std::span<const std::byte> payload) {
     }
     rest = rest.subspan(kChannelBytes);
   }
+
+  // Read the texts, which must end with the payload.
   for (std::uint32_t i = 0; i < text_count; ++i) {
     const std::size_t at = here();
     const auto [key, value] = decode_text(rest, at);
     if (!meta.text.empty() && meta.text.rbegin()->first >= key) {
-      throw FormatError(at, "spec/points.md#meta-text", "text's keys are not ascending");
+      throw FormatError(at, "spec/points.md#meta-text", "the keys of texts are not ascending");
     }
     meta.text.emplace_hint(meta.text.end(), key, value);
   }

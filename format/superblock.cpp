@@ -1,4 +1,12 @@
 // The commit record (spec/container.md#superblock).
+//
+//   0      8                  120                          328          392      4088
+//   | magic | bytes 8 to 119  | length, directory, root,  | writer,    | zeros  | XXH3 of all |
+//   | u64   | of the header   | counts, totals, digest    | 64 bytes   |        | before, u64 |
+//
+// decode_superblock() checks from the outside in: first that the block is whole and belongs to this
+// file, then that its numbers do not contradict each other. What the pages themselves hold is
+// compared with these numbers by the reader and the verifier.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,6 +34,7 @@ constexpr std::array<std::array<std::size_t, 2>, 3> kReserved{
     {{172, 176}, {200, 232}, {kWriterAt + kWriterBytes, kHashAt}}};
 constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 48;
 
+// Checks what binds the block to its file: magic, checksum, file header and length.
 void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
                   std::uint64_t file_bytes) {
   if (bytes.size() < kBlockBytes || load<std::uint64_t>(bytes.data(), 0) != kMagic) {
@@ -42,7 +51,7 @@ void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
   if (!std::ranges::equal(bytes.subspan(kIdentityAt, kIdentityBytes),
                           std::span(identity).subspan(kIdentityAt, kIdentityBytes))) {
     throw FormatError(kIdentityAt, "spec/container.md#superblock-header",
-                      "superblock belongs to another file header");
+                      "superblock repeats another file header");
   }
   const auto recorded = load<std::uint64_t>(p, 120);
   if (recorded != file_bytes || file_bytes % kBlockBytes != 0) {
@@ -52,6 +61,7 @@ void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
   }
 }
 
+// Checks that the directory has the size of its pages and ends where the superblocks begin.
 void check_directory(const Superblock& s) {
   constexpr char kPages[] = "spec/container.md#superblock-pages";
   if (s.page_count == 0 || s.page_count > kMaxPages) {
@@ -70,6 +80,7 @@ void check_directory(const Superblock& s) {
   if (s.meta_page >= s.page_count) throw FormatError(152, kPages, "meta_page is not a page");
 }
 
+// Checks the counts of points and nodes and the place of the root.
 void check_tree(const Superblock& s) {
   constexpr char kRoot[] = "spec/container.md#superblock-root";
   constexpr char kCounts[] = "spec/container.md#superblock-counts";
@@ -94,6 +105,7 @@ void check_tree(const Superblock& s) {
   }
 }
 
+// Checks that bounds, area and flux are numbers that sums of points can have.
 void check_totals(const Superblock& s) {
   constexpr char kTotals[] = "spec/container.md#superblock-totals";
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -127,6 +139,7 @@ Block encode_superblock(const Superblock& s) {
   if (s.writer.size() >= kWriterBytes || !is_utf8(s.writer)) {
     throw std::invalid_argument("encode_superblock: writer is not UTF-8 of at most 63 bytes");
   }
+  // Write the fields; reserved bytes stay zero.
   Block block{};
   std::byte* const p = block.data();
   store(p, 0, kMagic);
@@ -152,6 +165,7 @@ Block encode_superblock(const Superblock& s) {
   store(p, 312, s.content_xxh3[0]);
   store(p, 320, s.content_xxh3[1]);
   std::ranges::copy(std::as_bytes(std::span(s.writer)), p + kWriterAt);
+  // Seal everything before the checksum.
   store(p, kHashAt, xxh3_64(std::span(block).first(kHashAt), kMagic));
   return block;
 }
@@ -159,6 +173,8 @@ Block encode_superblock(const Superblock& s) {
 Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader& file,
                              std::uint64_t file_bytes) {
   check_sealed(bytes, file, file_bytes);
+
+  // Read the fields.
   const std::byte* const p = bytes.data();
   Superblock s;
   s.header = file;
@@ -183,6 +199,7 @@ Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader&
   s.content_xxh3 = {load<std::uint64_t>(p, 312), load<std::uint64_t>(p, 320)};
   s.writer = decode_writer(bytes);
 
+  // Check their rules and the reserved bytes.
   check_directory(s);
   check_tree(s);
   check_totals(s);

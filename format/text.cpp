@@ -1,4 +1,4 @@
-// UTF-8 and names (spec/README.md#types).
+// The rules of UTF-8 and of names (spec/README.md#types).
 #include "format/text.h"
 
 #include <algorithm>
@@ -7,8 +7,9 @@
 namespace ptc {
 namespace {
 
-// Bytes of the sequence that starts `text`; 0 when it is not well-formed. The range of the second
-// byte rules out overlong forms, surrogates and code points past U+10FFFF (RFC 3629, section 4).
+// Returns the length of the sequence at the front of `text`, or 0 when it is not well-formed. The
+// range of the second byte rules out overlong forms, surrogates and code points past U+10FFFF
+// (RFC 3629, section 4).
 std::size_t sequence_bytes(std::string_view text) noexcept {
   const auto at = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint8_t lead = at(0);

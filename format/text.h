@@ -1,4 +1,4 @@
-// Rules for the few strings that a file carries (spec/README.md#types).
+// The rules for the few strings that a file carries (spec/README.md#types).
 #pragma once
 
 #include <cstddef>
@@ -7,13 +7,13 @@
 
 namespace ptc {
 
-/// True for well-formed UTF-8 (RFC 3629) without NUL.
+/// Says whether a text is well-formed UTF-8 (RFC 3629) without NUL.
 [[nodiscard]] bool is_utf8(std::string_view text) noexcept;
 
-/// True for 1 to 31 bytes of [a-z0-9_.].
+/// Says whether a text can name a channel or key a text: 1 to 31 bytes of [a-z0-9_.].
 [[nodiscard]] bool is_name(std::string_view text) noexcept;
 
-/// The bytes seen as characters.
+/// Returns a view of the bytes as characters, valid as long as the bytes.
 [[nodiscard]] inline std::string_view as_text(std::span<const std::byte> bytes) noexcept {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }

@@ -1,6 +1,13 @@
-// Any sequence of operations on page caches over a container, whole or damaged, damaged and mended
-// meanwhile, by any page number: a page is what a direct read gives or was, stays so until its
-// reader takes another, and is refused only where a direct read is; counts add up.
+// Property, for any sequence of operations on a page cache over a container: a page is what a
+// direct read returns, stays the same until its reader asks for another, and is refused only where
+// a direct read is refused. The counts of the cache add up.
+//
+// The container has two forms, each sound or damaged, and a step may put the other form in its
+// place. So a page may be that of either form. A step is one of:
+//
+//   change the form of the file   1 of 32        remove a reader   1 of 32
+//   add a reader if there is none at its seat, and get a page: mostly an existing one, often the
+//   same, at times of any number
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -32,6 +39,7 @@ Bytes make_sample(Codec codec, std::uint32_t points) {
   return test::read_file(path);
 }
 
+// Returns one of four containers, by codec and number of points.
 const Bytes& sample(std::size_t which) {
   static const std::array<Bytes, 4> samples{
       make_sample(Codec::raw, 0), make_sample(Codec::raw, 130), make_sample(Codec::zstd, 300),
@@ -39,7 +47,7 @@ const Bytes& sample(std::size_t which) {
   return samples[which % samples.size()];
 }
 
-/// Some bytes of the file changed; with `sealed` no checksum tells.
+// Changes up to three bytes of a file and mostly repairs the checksums.
 Bytes damage(Bytes file, fuzz::ByteSource& from) {
   const std::size_t changes = from.take() % 4;
   const bool sealed = from.take() % 4 != 0;
@@ -51,7 +59,7 @@ Bytes damage(Bytes file, fuzz::ByteSource& from) {
   return file;
 }
 
-/// What direct reads give of each page; nothing where they refuse it.
+// The payload of each page as a direct read returns it, or nothing where that is refused.
 using Payloads = std::vector<std::optional<Bytes>>;
 
 Payloads read_directly(const ContainerReader& container) {
@@ -68,18 +76,20 @@ Payloads read_directly(const ContainerReader& container) {
   return payloads;
 }
 
+// A cache over one file, with up to four readers and a seat for one too many.
 class Session {
  public:
   Session(const fuzz::MemoryFile& file, const std::array<Bytes, 2>& forms,
           const ContainerReader& container)
       : file_(file), forms_(forms), container_(container) {
-    for (std::size_t i = 2; i-- > 0;) {  // the first form is in the file when this is over
+    for (std::size_t i = 2; i-- > 0;) {  // backwards, so that the file ends in its first form
       file_.write(forms_[i]);
       payloads_[i] = read_directly(container_);
     }
   }
 
   void run(fuzz::ByteSource& from) {
+    // Choose options.
     CacheOptions options;
     options.threads = 1 + from.take() % kReaders;
     options.local_slots = from.take() % 3 == 0 ? 0 : 1U << from.take() % 10;
@@ -88,12 +98,14 @@ class Session {
     options.replacement = kind / 2 % 2 == 0 ? Replacement::clock : Replacement::lru;
     const std::uint64_t frames = from.take() % 24;
     options.memory_bytes = PageCache::bytes_for(container_, options.threads, frames) + from.take();
+
+    // Take steps until the bytes are used up.
     try {
       PageCache cache(container_, options);
       while (!from.empty()) step(cache, options, from);
       for (auto& seat : seats_) seat.reader.reset();
       check_counts(cache.statistics(), frames);
-    } catch (const std::invalid_argument&) {  // a cap below the least, or more slots than frames
+    } catch (const std::invalid_argument&) {  // a cap below the minimum, or more slots than frames
       require(frames < std::uint64_t{2} * options.threads || options.local_slots > 0);
     }
   }
@@ -103,7 +115,7 @@ class Session {
   struct Seat {
     std::unique_ptr<PageReader> reader;
     std::optional<PageGuard> view;  ///< pins a page of the reader
-    const Bytes* shows = nullptr;   ///< what `view` must stay
+    const Bytes* shows = nullptr;   ///< the payload that `view` must keep
   };
 
   void step(PageCache& cache, const CacheOptions& options, fuzz::ByteSource& from) {
@@ -116,7 +128,7 @@ class Session {
       return seat.reader.reset();
     }
     if (!seat.reader && !sit(cache, options, seat)) return;
-    // Mostly pages that there are, often the same; any number at times.
+    // Get a page, then check the views of all seats.
     const std::uint32_t page =
         what % 8 == 2 ? from.take<std::uint32_t>() : from.take() % (container_.page_count() + 1);
     get(seat, page);
@@ -124,6 +136,7 @@ class Session {
       require(other.shows == nullptr || shows(*other.view, *other.shows));
   }
 
+  // Adds a reader at a seat, and checks that it is refused exactly when all are in use.
   bool sit(PageCache& cache, const CacheOptions& options, Seat& seat) {
     const auto sitting =
         std::ranges::count_if(seats_, [](const Seat& s) { return s.reader != nullptr; });
@@ -137,6 +150,7 @@ class Session {
     }
   }
 
+  // Gets a page and compares it with the direct reads of both forms.
   void get(Seat& seat, std::uint32_t page) {
     seat.shows = nullptr;
     seat.view.reset();
@@ -159,6 +173,7 @@ class Session {
             reinterpret_cast<std::uintptr_t>(seat.view->payload()) % 64 == 0);
   }
 
+  // Says whether a view holds a payload.
   static bool shows(const PageGuard& view, const Bytes& payload) {
     return std::ranges::equal(std::span(view.payload(), view.bytes()), payload);
   }
@@ -175,9 +190,9 @@ class Session {
   const fuzz::MemoryFile& file_;
   const std::array<Bytes, 2>& forms_;
   const ContainerReader& container_;
-  std::array<Payloads, 2> payloads_;
+  std::array<Payloads, 2> payloads_;  // of each form
   std::array<Seat, kReaders + 1> seats_;
-  std::uint64_t lookups_ = 0;
+  std::uint64_t lookups_ = 0;  // calls of get() that the cache must count
 };
 
 }  // namespace

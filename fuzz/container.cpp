@@ -1,5 +1,5 @@
-// Any bytes as a container: ContainerReader opens it and reads every page, the same by either
-// access and as promised, or throws FormatError; the verifier does not accept what the reader
+// Property, for any bytes as a container: ContainerReader opens the file and reads every page, with
+// the values that it promises, or throws FormatError. The verifier does not accept what the reader
 // refuses.
 #include <algorithm>
 #include <cmath>
@@ -19,6 +19,7 @@ namespace {
 using ptc::ContainerReader;
 using ptc::fuzz::require;
 
+// Runs a body and says whether it ended without FormatError.
 template <class Body>
 bool accepts(const Body& body) {
   try {
@@ -29,7 +30,7 @@ bool accepts(const Body& body) {
   }
 }
 
-/// What read_page() promises of the pages that it gives.
+// Checks what read_page() promises of a page that it returns.
 void check_promises(const ContainerReader& reader, const ptc::PageHeader& page,
                     const std::byte* payload) {
   for (std::uint32_t slot = 0; page.type == ptc::PageType::node && slot < page.record_count;
@@ -50,6 +51,8 @@ void check_promises(const ContainerReader& reader, const ptc::PageHeader& page,
   }
 }
 
+// Reads a page whole, then its stored payload, then its header. A read that checks less must accept
+// whatever one that checks more has accepted.
 bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecoder& decoder) {
   std::vector<std::byte> read(reader.page_payload_limit()), stored;
   ptc::PageHeader header;
@@ -61,6 +64,7 @@ bool read_page(const ContainerReader& reader, std::uint32_t page, ptc::PageDecod
   return whole;
 }
 
+// Opens a file, reads all pages, and says whether nothing was refused.
 bool read_all(const std::filesystem::path& path) {
   bool whole = true;
   return accepts([&] {

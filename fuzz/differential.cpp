@@ -1,9 +1,9 @@
-// Any bytes as a container: the verifier and spec/reader.py accept the same files, with the same
-// content digest, and refuse by the same rule where the spec orders the rules: those of the file
-// header (container.md#file-header).
+// Property, for any bytes as a container: the verifier and spec/reader.py accept the same files,
+// with the same content digest. They refuse a file by the same rule where the spec orders the
+// rules, which it does for the file header (container.md#file-header).
 //
-// Where several other rules are broken at once each may name its own. reader.py does not compare
-// summaries: files that the verifier refuses for these alone it accepts
+// When several other rules are broken at once, each reader may name its own. reader.py does not
+// compare summaries, so it accepts files that the verifier refuses for these alone
 // (spec/README.md#the-second-reader).
 #include <sys/wait.h>
 #include <unistd.h>
@@ -27,7 +27,7 @@ namespace {
 
 using ptc::fuzz::require;
 
-/// fuzz/reader_server.py, as long as this process runs.
+// The process of fuzz/reader_server.py, which runs as long as this object.
 class SecondReader {
  public:
   SecondReader() {
@@ -53,13 +53,14 @@ class SecondReader {
   SecondReader(const SecondReader&) = delete;
   SecondReader& operator=(const SecondReader&) = delete;
 
+  // Returns what reader.py says about a file: "valid DIGEST", "broken CLAUSE" or "failed TEXT".
   std::string ask(const std::filesystem::path& path) const {
     const std::string line = path.string() + "\n";
     require(write(paths_, line.data(), line.size()) == static_cast<ssize_t>(line.size()));
     std::string verdict;
     for (char c = 0; c != '\n'; verdict += c) {
       ssize_t count = 0;
-      while ((count = read(verdicts_, &c, 1)) < 0 && errno == EINTR) {  // libFuzzer's clock
+      while ((count = read(verdicts_, &c, 1)) < 0 && errno == EINTR) {  // libFuzzer sets timers
       }
       require(count == 1);
     }
@@ -68,12 +69,12 @@ class SecondReader {
   }
 
  private:
-  int paths_ = -1;
-  int verdicts_ = -1;
+  int paths_ = -1;     // pipe to the server, a path on each line
+  int verdicts_ = -1;  // pipe from the server, a verdict on each line
 };
 
-/// What the verifier says, as reader_server.py says it of the first rule: "valid DIGEST", or
-/// "broken RULE" of each.
+// Returns what the verifier says in the words of reader_server.py: "valid DIGEST", or "broken RULE"
+// for each finding.
 std::vector<std::string> judge(const std::filesystem::path& path) {
   ptc::Progress silent;
   const ptc::VerifyReport report = verify_container(
@@ -85,6 +86,7 @@ std::vector<std::string> judge(const std::filesystem::path& path) {
   return {"valid " + ptc::hex(digest[1]) + ptc::hex(digest[0])};
 }
 
+// Says whether a verdict is about a summary, which reader.py does not check.
 bool is_of_summaries(std::string_view verdict) {
   for (const char* rule : {"mean", "sphere", "slab", "sums", "cone"}) {
     if (verdict == std::string("broken spec/nodes.md#node-") + rule) return true;
@@ -92,6 +94,7 @@ bool is_of_summaries(std::string_view verdict) {
   return false;
 }
 
+// Says whether the verdicts of the verifier and of reader.py may stand for the same file.
 bool agree(const std::vector<std::string>& first, std::string_view second) {
   const auto is_header = [](std::string_view verdict) {
     return verdict.starts_with("broken spec/container.md#header-");

@@ -1,9 +1,9 @@
-// Any bytes, the first of which picks a reader, as mesh, cloud or picture, plain or gzipped: the
-// reader gives what its header promises, or throws DataError, or std::system_error where a file
-// beside it is missing.
+// Property, for any bytes as a mesh, cloud or picture, plain or compressed: the reader returns what
+// its header promises, or throws DataError, or std::system_error when a file that the bytes name is
+// missing.
 //
-// What follows the first zero byte of an OBJ is the MTL "a.mtl" beside it, of a glTF the buffer
-// "a.bin".
+// The first byte picks the reader. What follows the first zero byte of an OBJ becomes the MTL file
+// "a.mtl" in the same directory; what follows that of a glTF becomes the buffer "a.bin".
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -86,10 +86,11 @@ void read_cloud(const Path& path) {
   require(!file.info.count || *file.info.count == points);
 }
 
+// A reader under test.
 struct Reader {
-  const char* name;
-  void (*read)(const Path&);
-  const char* beside = nullptr;  ///< name of the file that follows behind a zero byte
+  const char* name;              // of the file, whose ending says what it is
+  void (*read)(const Path&);     // reads the file and checks the result
+  const char* beside = nullptr;  // name of the second file, which follows behind a zero byte
 };
 constexpr std::array<Reader, 15> kReaders{{{"a.obj", read_mesh_file, "a.mtl"},
                                            {"a.ply", read_mesh_file},
@@ -113,6 +114,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const Reader& reader = kReaders[data[0] % kReaders.size()];
   std::span bytes(reinterpret_cast<const std::byte*>(data) + 1, size - 1);
+
+  // Split off the second file.
   std::optional<fuzz::MemoryFile> beside;
   const auto zero =
       static_cast<std::size_t>(std::ranges::find(bytes, std::byte{0}) - bytes.begin());
@@ -120,6 +123,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     beside.emplace(bytes.subspan(zero + 1), reader.beside);
     bytes = bytes.first(zero);
   }
+
+  // Read the file.
   const fuzz::MemoryFile file(bytes, reader.name);
   try {
     reader.read(file.path());

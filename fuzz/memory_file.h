@@ -1,4 +1,4 @@
-// A file in memory that can be opened by name.
+// A file in memory that can be opened by its name.
 #pragma once
 
 #include <sys/mman.h>
@@ -12,9 +12,11 @@
 
 namespace ptc::fuzz {
 
-/// Bytes under a name in a directory of this process, for as long as it lives.
+/// A file in memory (memfd) with a name in a directory of this process. The name is removed when
+/// this object is destroyed. If the system refuses a call, the process aborts.
 class MemoryFile {
  public:
+  /// Makes a file of these bytes. A file of the same name is replaced.
   MemoryFile(std::span<const std::byte> bytes, const std::string& name)
       : fd_(memfd_create("fuzz", 0)), path_(directory() / name) {
     if (fd_ < 0) std::abort();
@@ -31,14 +33,16 @@ class MemoryFile {
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
 
+  /// Returns the path under which the file can be opened.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  /// Puts other bytes in their place; as many, while a reader has it open.
+  /// Overwrites the file from its front. While a reader has the file open, the number of bytes must
+  /// not change.
   void write(std::span<const std::byte> bytes) const {
     if (pwrite(fd_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
       std::abort();
   }
 
-  /// Removed when the process ends.
+  /// Returns the directory of this process, which is removed when the process ends.
   static const std::filesystem::path& directory() {
     static const struct Directory {
       std::filesystem::path path =

@@ -1,7 +1,14 @@
-// libFuzzer's mutator of containers: changes fields of any structure, records of any payload,
-// compressed ones included, and then, seven times in eight, repairs all checksums, so that rules
-// are what is reached. Half the time it starts from a good vector: most files of a corpus are
-// refused, and what comes behind the refusal is not reached.
+// The mutator of containers for libFuzzer.
+//
+// Random bytes hardly ever pass a checksum, so a plain mutator would test nothing but checksums.
+// This one knows the structures of a container:
+//
+//   find_layout()  --> change 1 to 3 fields, records or lengths  --> seal()
+//   file header, superblocks, page headers, entries, payloads        repairs all checksums,
+//   (decoded, changed and encoded again when compressed)             seven times in eight
+//
+// Half the time it starts from a good vector in place of the given file, because most files of a
+// corpus are refused, and rules behind the refusal would not be reached.
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -23,6 +30,7 @@ extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, st
 namespace ptc::fuzz {
 namespace {
 
+// A number inside a structure: its offset and its length, 1 to 8 bytes.
 struct Field {
   std::size_t at;
   std::size_t bytes;
@@ -59,7 +67,7 @@ constexpr std::array<Field, 14> kPageFields{{{0, 4},
                                              {48, 8}}};
 constexpr std::array<Field, 7> kEntryFields{
     {{0, 8}, {8, 4}, {12, 4}, {16, 8}, {24, 2}, {26, 2}, {28, 4}}};
-/// Where a page header repeats the fields of its entry.
+// Offsets in a page header of the fields of kEntryFields.
 constexpr std::array<std::size_t, 7> kRepeats{0, 12, 16, 48, 4, 20, 24};
 constexpr std::array<Field, 34> kSuperFields{
     {{0, 8},   {8, 8},   {56, 1},  {120, 8}, {128, 4}, {132, 4}, {136, 8}, {144, 8}, {152, 4},
@@ -67,6 +75,7 @@ constexpr std::array<Field, 34> kSuperFields{
      {200, 8}, {232, 8}, {240, 8}, {248, 8}, {256, 8}, {264, 8}, {272, 8}, {280, 8}, {288, 8},
      {296, 8}, {304, 8}, {312, 8}, {320, 8}, {328, 8}, {384, 8}, {392, 8}}};
 
+// A mutation of one file.
 class Mutation {
  public:
   Mutation(std::vector<std::byte>& file, std::size_t max_bytes, unsigned seed)
@@ -91,11 +100,13 @@ class Mutation {
   }
 
   void mutate(const Layout& layout) {
+    // Change the file header, a superblock or any byte.
     const std::size_t super = layout.superblock + 4096 * (below(8) == 0 ? 1 : 0);
     const std::size_t what = below(layout.pages.empty() ? 4 : 20);
     if (what == 0) return change(0, any(kHeaderFields));
     if (what < 3) return change(super, any(kSuperFields));
     if (what == 3) return change(0, {below(file_.size() - 8), 1});
+    // Change a page, its entry, the directory or, most often, its payload.
     const Layout::Page& page = any(layout.pages);
     if (what < 6) return change(page.header, any(kPageFields));
     if (what < 8) return change(page.entry, any(kEntryFields));
@@ -105,7 +116,7 @@ class Mutation {
     change_payload(page);
   }
 
-  /// A number of 1 to 8 bytes: a near one, a boundary, one of the superblock's, or any.
+  // Replaces a number by a near one, a boundary, one of the superblock's numbers, or any number.
   void change(std::size_t base, Field field) {
     std::uint64_t value = 0;
     std::byte* const at = &file_[base + field.at];
@@ -133,7 +144,7 @@ class Mutation {
     std::memcpy(at, &value, field.bytes);
   }
 
-  /// A fact of a page that its header and its entry agree on.
+  // Changes a fact of a page in its entry and in its header, so that they agree.
   void change_both(const Layout::Page& page) {
     const std::size_t which = below(kEntryFields.size() - 1) + 1;
     const Field field = kEntryFields[which];
@@ -145,7 +156,7 @@ class Mutation {
     if (a != b) std::swap_ranges(&file_[a], &file_[a] + bytes, &file_[b]);
   }
 
-  /// One entry more, a copy of another, or one less; counts follow.
+  // Adds an entry that is a copy of another one, or removes one, and adapts all counts.
   void resize_directory(const Layout& layout) {
     const Layout::DirectoryPage& page = layout.directory.back();
     const bool more = below(2) == 0;
@@ -168,17 +179,21 @@ class Mutation {
     }
   }
 
-  /// Decodes, changes records, and codes again by any codec, a packed payload as packed.
+  // Decodes a payload, changes records, and encodes it by any codec. A packed payload is changed in
+  // its packed form.
   void change_payload(const Layout::Page& page) {
+    // Decode the payload, or change a byte of one that does not decode.
     std::vector<std::byte> raw;
     const std::span stored(&file_[page.header + 64], page.stored_bytes);
     if (!decode(static_cast<unsigned>(file_[page.header + 6]), stored, raw) || raw.empty()) {
       return change(page.header + 64, {below(page.stored_bytes), 1});
     }
+
+    // Change up to two fields; texts of the meta page may also change their length.
     const auto type = load<std::uint16_t>(file_.data(), page.header + 4);
     const std::size_t count = load<std::uint32_t>(file_.data(), page.header + 24);
     const bool packed = file_[page.header + 7] != std::byte{0};
-    file_.swap(raw);  // change() works on the file
+    file_.swap(raw);  // because change() works on the file
     for (std::size_t i = below(3); i > 0; --i)
       change(0, packed ? byte_field() : record_field(type, count));
     file_.swap(raw);
@@ -207,7 +222,7 @@ class Mutation {
 
   Field byte_field() { return {below(file_.size()), 1}; }
 
-  /// A field of a payload's records, or any byte of it.
+  // Returns a field of a payload's records, or any byte of it.
   Field record_field(unsigned type, std::size_t count) {
     Field field = byte_field();
     if (type == 1 && count > 0) field = node_field(count);
@@ -219,6 +234,7 @@ class Mutation {
     return field.at + field.bytes <= file_.size() ? field : byte_field();
   }
 
+  // Returns a slot, a field of a group's head, a part of a reference, or a number of a column.
   Field node_field(std::size_t count) {
     const std::size_t slot = below(count);
     if (below(8) == 0 || 2 * slot + 2 > file_.size()) return {2 * slot, 2};
@@ -226,7 +242,7 @@ class Mutation {
     constexpr std::array<Field, 7> kGroup{
         {{0, 8}, {8, 8}, {16, 1}, {17, 1}, {18, 1}, {19, 1}, {20, 4}}};
     constexpr std::array<Field, 3> kReference{
-        {{0, 4}, {4, 2}, {6, 2}}};  // page, slot, points of a leaf
+        {{0, 4}, {4, 2}, {6, 2}}};  // page, slot, number of points of a leaf
     const std::size_t what = below(16);
     if (what < 7) return {group + kGroup[what].at, kGroup[what].bytes};
     if (what < 12) {
@@ -236,7 +252,7 @@ class Mutation {
     return {group + 32 + 2 * below(240), 2};
   }
 
-  /// Writes a page's payload over the old one, and moves what follows when it has grown.
+  // Writes a payload in place of the old one, and moves what follows when it does not fit.
   void put(const Layout::Page& page, const std::vector<std::byte>& raw, bool packed) {
     std::vector<std::byte> stored;
     const Coding coding = PageEncoder(static_cast<Codec>(below(3))).encode(raw, stored);
@@ -254,8 +270,8 @@ class Mutation {
     if (!packed) set_both(16, 12, raw.size());
   }
 
-  /// Zeros behind a page; offsets of what they move follow. @return false when the file would be
-  /// too long
+  // Inserts zeros behind a page and adapts the offsets of what they move. Returns false when the
+  // file would be too long.
   bool insert_zeros(const Layout::Page& page, std::size_t bytes) {
     const Layout layout = find_layout(file_);
     if (file_.size() + bytes > max_bytes_ || page.entry < page.header) return false;
@@ -277,7 +293,7 @@ class Mutation {
   std::vector<std::byte>& file_;
   std::size_t max_bytes_;
   std::minstd_rand random_;
-  std::vector<std::uint64_t> numbers_;  ///< of the superblock
+  std::vector<std::uint64_t> numbers_;  // values of the superblock's fields
 };
 
 std::vector<std::vector<std::byte>> read_good_vectors() {

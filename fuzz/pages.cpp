@@ -1,5 +1,9 @@
-// Any bytes: the decoders of header, superblock, page header, meta, point and node pages, codecs
-// and packed columns return values that can be read whole, or throw FormatError.
+// Property, for any bytes: the decoders of file header, superblock, page header, meta, point and
+// node pages, codecs and packed columns return values that can be read completely, or throw
+// FormatError.
+//
+// The first four bytes are the number of records (two bytes), the codec and the filter; a payload
+// follows.
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -13,6 +17,7 @@
 
 namespace {
 
+// Runs a body, which may throw FormatError but nothing else.
 template <class Body>
 void expect_format_error(const Body& body) {
   try {

@@ -1,6 +1,6 @@
-"""spec/reader.py as a server: a path a line in, a verdict a line out, "valid DIGEST" or "broken CLAUSE".
+"""Runs spec/reader.py as a server: it reads a path from each line and answers with a line.
 
-What is neither, an exception of Python or of the system, is "failed" and its text.
+The answer is "valid DIGEST", "broken CLAUSE", or "failed TEXT" after any other exception.
 """
 
 import os

@@ -1,10 +1,9 @@
 // Runs files through a fuzz target, for builds without libFuzzer:
 //
-//   replay_NAME DIR...        every file below the directories
-//   replay_NAME --odd SOURCE  every odd file of the shared data, behind each of 16 first bytes: by
-//   every reader.
-//                             The data is where PTC_SHARED says, else beside SOURCE; without it
-//                             exit code 77
+//   replay_NAME DIR...        runs every file below the directories
+//   replay_NAME --odd SOURCE  runs every odd file of the shared data behind each of 16 first bytes,
+//                             so that every reader gets it. The data is where PTC_SHARED says, or
+//                             in the directory next to SOURCE; without it the exit code is 77
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -23,7 +22,7 @@ void run(const std::vector<char>& bytes) {
   LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
 }
 
-/// @return how many files there were
+// Calls body(bytes) for every regular file below a directory and returns the number of files.
 template <class Body>
 std::size_t for_each_file(const std::filesystem::path& directory, const Body& body) {
   std::size_t files = 0;
@@ -37,6 +36,7 @@ std::size_t for_each_file(const std::filesystem::path& directory, const Body& bo
   return files;
 }
 
+// Runs the odd files and returns the exit code.
 int run_odd(const std::filesystem::path& source) {
   const char* const given = std::getenv("PTC_SHARED");
   const auto shared = given != nullptr ? std::filesystem::path(given) : source / "../shared";

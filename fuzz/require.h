@@ -1,4 +1,4 @@
-// How a target says that its property is broken.
+// The check by which a fuzz target reports that its property is broken.
 #pragma once
 
 #include <cstdio>
@@ -6,7 +6,7 @@
 
 namespace ptc::fuzz {
 
-/// Aborts, naming the line, unless it holds.
+/// Aborts unless `holds` is true, and names the line of the caller.
 inline void require(bool holds, int line = __builtin_LINE()) {
   if (holds) return;
   std::fprintf(stderr, "property broken at line %d of the target\n", line);

@@ -1,5 +1,5 @@
-// Any bytes as a damaged container: what is salvaged passes the verifier at every level, or nothing
-// is written and FormatError says why.
+// Property, for any bytes as a damaged container: what is salvaged passes the verifier at every
+// level, or nothing is written and FormatError says why.
 #include "engine/verify/salvage.h"
 
 #include <cstdint>
@@ -14,6 +14,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const ptc::fuzz::MemoryFile file({reinterpret_cast<const std::byte*>(data), size}, "a.ptcx");
   const auto kept = ptc::fuzz::MemoryFile::directory() / "kept.ptcx";
   std::filesystem::remove(kept);
+
+  // Salvage what can be salvaged.
   ptc::Progress silent;
   try {
     static_cast<void>(salvage_container(
@@ -23,6 +25,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(!std::filesystem::exists(kept));
     return 0;
   }
+
+  // Verify it.
   const ptc::VerifyReport report = verify_container(
       kept,
       {.level = ptc::VerifyLevel::rebuild, .memory_bytes = std::uint64_t{1} << 30, .threads = 1},

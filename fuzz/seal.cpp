@@ -1,4 +1,5 @@
-// Trusts no number of the file, and none of the decoders that are to be tested (spec/container.md).
+// Finds and repairs checksums without trust in any number of the file, and without the decoders
+// that are to be tested (spec/container.md).
 #include "fuzz/seal.h"
 
 #include <algorithm>
@@ -15,18 +16,21 @@ constexpr std::size_t kBlock = 4096;
 constexpr std::size_t kPageHeader = 64;
 constexpr std::size_t kEntry = 32;
 
+// Returns the seed that eight letters spell.
 std::uint64_t seed(const char* text) {
   std::uint64_t value;
   std::memcpy(&value, text, sizeof value);
   return value;
 }
 
+// Writes the hash of `bytes` bytes from `from` on to `at`.
 void hash_to(std::span<std::byte> file, std::size_t at, std::size_t from, std::size_t bytes,
              std::uint64_t under = 0) {
   store(file.data(), at, xxh3_64(file.subspan(from, bytes), under));
 }
 
-/// Seed: uuid, page_id and type, as the header has them.
+// Writes the checksum of a page header. Its seed is made of uuid, page_id and type as the headers
+// have them.
 void seal_page_header(std::span<std::byte> file, std::size_t at) {
   std::array<std::byte, 22> salt;
   std::memcpy(salt.data(), &file[40], 16);
@@ -35,6 +39,7 @@ void seal_page_header(std::span<std::byte> file, std::size_t at) {
   hash_to(file, at + 56, at, 56, xxh3_64(salt));
 }
 
+// Returns all directory entries, concatenated.
 std::vector<std::byte> gather_entries(std::span<const std::byte> file, const Layout& layout) {
   std::vector<std::byte> all;
   for (const auto& page : layout.directory) {
@@ -44,6 +49,7 @@ std::vector<std::byte> gather_entries(std::span<const std::byte> file, const Lay
   return all;
 }
 
+// Writes the content digest of the directory's entries to the first superblock.
 void seal_digest(std::span<std::byte> file, const Layout& layout) {
   const std::vector<std::byte> entries = gather_entries(file, layout);
   std::vector<std::byte> records(entries.size() / 2);
@@ -58,6 +64,7 @@ void seal_digest(std::span<std::byte> file, const Layout& layout) {
 }  // namespace
 
 Layout find_layout(std::span<const std::byte> file) {
+  // Read where the directory starts, and clamp it to the file.
   Layout layout;
   const std::byte* const bytes = file.data();
   const std::size_t end = layout.superblock = file.size() / kBlock * kBlock - 2 * kBlock;
@@ -66,6 +73,8 @@ Layout find_layout(std::span<const std::byte> file) {
   const std::size_t per_page = ((std::size_t{1} << shift) - kPageHeader) / kEntry;
   std::size_t left = load<std::uint32_t>(bytes, end + 128);
   std::size_t at = std::min<std::size_t>(load<std::uint64_t>(bytes, end + 136), end);
+
+  // Walk the directory pages, and keep the pages that lie in the file.
   while (left > 0 && end - at >= kPageHeader + kEntry) {
     const std::size_t count = std::min({left, per_page, (end - at - kPageHeader) / kEntry});
     layout.directory.push_back({at, count * kEntry});
@@ -85,20 +94,25 @@ Layout find_layout(std::span<const std::byte> file) {
 
 void seal(std::span<std::byte> file, unsigned seals) {
   if (file.size() < kMinFile) return;
+  // Repair the file header and the pages.
   if (seals & kSealFileHeader) hash_to(file, 120, 0, 120, seed("PTCXHEAD"));
   const Layout layout = find_layout(file);
   for (const Layout::Page& page : layout.pages) {
     if (seals & kSealPayloads) {
       hash_to(file, page.header + 48, page.header + kPageHeader, page.stored_bytes);
-      std::memmove(&file[page.entry + 16], &file[page.header + 48], 8);  // forged ones overlap
+      std::memmove(&file[page.entry + 16], &file[page.header + 48], 8);  // they may overlap
     }
     if (seals & kSealPageHeaders) seal_page_header(file, page.header);
   }
+
+  // Repair the directory.
   for (const Layout::DirectoryPage& page : layout.directory) {
     if (seals & kSealDirectory)
       hash_to(file, page.header + 48, page.header + kPageHeader, page.bytes);
     if (seals & kSealPageHeaders) seal_page_header(file, page.header);
   }
+
+  // Repair the superblocks.
   const std::size_t first = layout.superblock;
   if (seals & kSealDirectory)
     store(file.data(), first + 144, xxh3_64(gather_entries(file, layout)));

@@ -1,6 +1,9 @@
-// Any well-formed values: what a writer here has written, its reader gives back; what the builder
-// has built, the verifier accepts. The first byte picks the writer: container, PLY, packed columns
-// and codecs, node page, EXR.
+// Property, for any well-formed values: what a writer here has written, its reader returns, and
+// what the builder has built, the verifier accepts.
+//
+// The first byte picks the writer: container, PLY, packed columns and codecs, node page, or EXR.
+// Each take_...() function makes well-formed values of the bytes that follow; each target writes
+// them, reads them back and compares.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,7 +31,7 @@ using fuzz::ByteSource;
 using fuzz::require;
 using Bytes = std::vector<std::byte>;
 
-constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;
+constexpr std::uint64_t kKeyMask = ~std::uint64_t{0} >> 1;  // halves of keys have 63 bits
 
 Bytes take_bytes(ByteSource& from, std::size_t count) {
   Bytes bytes(count);
@@ -36,7 +39,7 @@ Bytes take_bytes(ByteSource& from, std::size_t count) {
   return bytes;
 }
 
-/// Points that crowd in few cells, coincide, or lie at the corners of the lattice.
+// Makes points that crowd in few cells, coincide, or lie at the corners of the lattice.
 std::vector<PointRecord> take_points(ByteSource& from) {
   std::vector<PointRecord> points;
   const std::uint32_t most = from.below(600);
@@ -57,6 +60,7 @@ std::vector<PointRecord> take_points(ByteSource& from) {
       half = std::min<std::uint16_t>(from.take<std::uint16_t>() & 0x7fff, 0x7bff);
     point.normal = from.take<std::array<std::int16_t, 2>>();
     point.albedo = from.take<std::array<std::uint8_t, 3>>();
+    // Repeat one point in four, up to 16 times.
     for (std::uint8_t copies = from.take() % 64; copies >= 48; --copies)
       points.push_back(points.back());
   }
@@ -64,6 +68,7 @@ std::vector<PointRecord> take_points(ByteSource& from) {
   return points;
 }
 
+// A stream of points in memory.
 class Stream : public PointStream {
  public:
   explicit Stream(std::span<const PointRecord> points) : rest_(points) {}
@@ -78,6 +83,7 @@ class Stream : public PointStream {
   std::span<const PointRecord> rest_;
 };
 
+// Makes channels and texts; names may occur twice and groups may be too large.
 Meta take_meta(ByteSource& from) {
   constexpr char kLetters[] = "abz09_.";
   Meta meta;
@@ -96,15 +102,16 @@ Meta take_meta(ByteSource& from) {
   return meta;
 }
 
-/// A column of finite values.
+// Fills a column with finite values.
 void take_column(ByteSource& from, ChannelType type, std::span<std::byte> out) {
   for (std::byte& b : out) b = from.take<std::byte>();
   if (type != ChannelType::half && type != ChannelType::f32) return;
   const std::size_t width = channel_bytes(type);
   for (std::size_t i = width - 1; i < out.size(); i += width)
-    out[i] &= std::byte{0xbb};  // a bit of the exponent is 0
+    out[i] &= std::byte{0xbb};  // clears a bit of the exponent, so it is not that of infinity
 }
 
+// Writes the attribute pages of all channel groups and keeps their payloads in `written`.
 void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& meta,
                       std::uint64_t points, std::vector<Bytes>& written) {
   const std::uint32_t full = points_per_page(writer.header());
@@ -131,9 +138,12 @@ void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& met
   }
 }
 
+// Compares everything that a reader returns with what was written.
 void compare(const ContainerReader& reader, const std::vector<PointRecord>& points,
              const Meta& meta, const std::vector<Bytes>& attributes) {
   require(reader.meta().channels == meta.channels && reader.meta().text == meta.text);
+
+  // Compare the points.
   ContainerPoints stream(reader);
   std::vector<PointRecord> back(points.size() + 1);
   require(stream.next(back) == points.size());
@@ -142,6 +152,8 @@ void compare(const ContainerReader& reader, const std::vector<PointRecord>& poin
     require(a.key == b.key && a.radius == b.radius && a.normal == b.normal &&
             a.radiance == b.radiance && a.albedo == b.albedo);
   }
+
+  // Compare the attribute pages.
   PageDecoder decoder;
   std::size_t k = 0;
   for (std::uint16_t group = 1; group < 256; ++group) {
@@ -155,6 +167,7 @@ void compare(const ContainerReader& reader, const std::vector<PointRecord>& poin
 }
 
 void container(ByteSource& from) {
+  // Make options, channels, a frame and points.
   WriterOptions options;
   options.page_shift = static_cast<std::uint8_t>(12 + from.take() % 3);
   options.codec = static_cast<Codec>(from.take() % 3);
@@ -173,6 +186,7 @@ void container(ByteSource& from) {
   std::vector<Bytes> attributes;
   const std::vector<PointRecord> points = take_points(from);
 
+  // Build the container.
   const auto path = fuzz::MemoryFile::directory() / "a.ptcx";
   Progress silent;
   Stream stream(points);
@@ -182,6 +196,7 @@ void container(ByteSource& from) {
   write_attributes(from, writer, meta, points.size(), attributes);
   const Superblock written = writer.finish(meta, superblock);
 
+  // Verify it, and compare what it holds.
   require(verify_container(
               path,
               {.level = VerifyLevel::rebuild, .memory_bytes = std::uint64_t{1} << 30, .threads = 1},
@@ -218,6 +233,7 @@ void ply(ByteSource& from) {
 }
 
 void codec(ByteSource& from) {
+  // Make a payload of some columns.
   std::vector<Channel> channels;
   for (std::uint8_t n = 1 + from.take() % 3; n > 0; --n) {
     channels.push_back({"a", static_cast<ChannelType>(1 + from.take() % 4),
@@ -226,6 +242,8 @@ void codec(ByteSource& from) {
   const std::vector<PackedColumn> columns = packed_group_columns(channels, 1);
   const std::uint32_t count = 1 + from.below(300);
   const Bytes raw = take_bytes(from, count * group_point_bytes(channels, 1));
+
+  // Encode and decode it by each codec, then pack and unpack it alone.
   Bytes stored, back(raw.size()), packed;
   for (const Codec kind : {Codec::raw, Codec::zstd, Codec::lz4}) {
     const Coding coding = PageEncoder(kind).encode(raw, stored, {count, columns});
@@ -238,12 +256,16 @@ void codec(ByteSource& from) {
   require(back == raw);
 }
 
+// Makes a group with references and summaries of its children.
 NodeGroup take_group(ByteSource& from) {
+  // Choose a cell.
   NodeGroup group;
   group.level = from.take() % 63;
   group.cell = cell_of(
       {from.take<std::uint64_t>() & kKeyMask, from.take<std::uint64_t>() & kKeyMask}, group.level);
   const LatticePoint corner = decode_morton(group.cell);
+
+  // Choose references and summaries.
   group.children.resize(1 + from.take() % 8);
   for (NodeChild& child : group.children) {
     child.ref.interior = from.take() % 2 == 0;
@@ -268,6 +290,7 @@ NodeGroup take_group(ByteSource& from) {
 }
 
 void node_page(ByteSource& from) {
+  // Fill a page with groups.
   constexpr std::uint64_t kPoints = std::uint64_t{1} << 40;
   NodePageEncoder encoder(std::size_t{4032} << from.take() % 9);
   std::vector<NodeGroup> groups;
@@ -278,6 +301,8 @@ void node_page(ByteSource& from) {
     groups.push_back(std::move(group));
   }
   if (groups.empty()) return;
+
+  // Decode it: references are equal, and bounds are not narrower.
   const Bytes payload = encoder.take();
   const NodePage page(payload, static_cast<std::uint32_t>(groups.size()), 100, kPoints);
   for (std::uint32_t slot = 0; slot < page.size(); ++slot) {

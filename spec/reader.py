@@ -83,7 +83,7 @@ def decode_header(block):
     require(found == xxh3_64(block[:120], HEADER_SEED), 120, "spec/container.md#header-checksum",
             "file header's checksum is wrong")
     require(major == 1, 8, "spec/container.md#header-version", f"version {major} is not supported")
-    require(incompat == 0, 16, "spec/container.md#header-features", "file needs an unknown feature")
+    require(incompat == 0, 16, "spec/container.md#header-features", "file needs a feature that this program does not know")
     require((header_bytes, align_shift, checksum, byte_order) == (BLOCK, 9, 1, 0x01020304), 12,
             "spec/container.md#header-constants", "a constant has another value")
     require(12 <= page_shift <= 20, 56, "spec/container.md#header-page-shift",
@@ -132,7 +132,7 @@ def decode_page_header(header, bytes_, at):
     require(filter_ <= (PACKED if type_ in (POINT, ATTRIBUTE) and codec != RAW else 0), at + 7,
             "spec/container.md#page-filter", "unknown filter, or one that suits no such page")
     require((codec == RAW) == (stored == raw), at + 12, "spec/container.md#page-length",
-            "stored_bytes equals raw_bytes without codec raw, or the reverse")
+            "stored_bytes equals raw_bytes without codec raw, or differs with codec raw")
     require(reserved == 0 and (level <= 62 if type_ == NODE else level == 0xFFFF), at + 22,
             "spec/container.md#page-fields", "level or the reserved field is out of range")
     limit = 1 if type_ in (DIRECTORY, META) else 1 << 63
@@ -317,7 +317,7 @@ def decode_superblock(header, block, file_bytes, at):
     require(s.xxh3 == xxh3_64(block[:4088], SUPER_SEED), at + 4088,
             "spec/container.md#superblock-checksum", "superblock's checksum is wrong")
     require(s.identity == header.identity, at + 8, "spec/container.md#superblock-header",
-            "superblock belongs to another file header")
+            "superblock repeats another file header")
     require(s.file_bytes == file_bytes and file_bytes % BLOCK == 0, at + 120,
             "spec/container.md#superblock-length",
             f"file has {file_bytes} bytes, its superblock says {s.file_bytes}")
@@ -397,7 +397,7 @@ class Points:
         for i in range(1, count):
             if self.keys[i - 1] > self.keys[i]:
                 raise Broken(at + 4 * i, "spec/points.md#point-order",
-                             f"point {i} precedes the one before")
+                             f"point {i} precedes the point before it")
         require(max(column("I", 16)) < 0x7F800000, at + 16 * count,
                 "spec/points.md#point-radius", "a radius is negative or not finite")
         require(max(column("H", 24) + column("H", 26) + column("H", 28)) < 0x7C00,
@@ -536,7 +536,7 @@ def decode_group(payload, at, base, pages, points):
     here = base + at
     require(len(payload) - at >= 24, here, "spec/nodes.md#node-slots", "group is truncated")
     high, low, level, n, mask, zero, zeros = struct.unpack_from("<QQBBBBI", payload, at)
-    require(1 <= n <= 8, here + 17, "spec/nodes.md#node-children", "group has not 1 to 8 children")
+    require(1 <= n <= 8, here + 17, "spec/nodes.md#node-children", "group does not have 1 to 8 children")
     end = at + 24 + 60 * n
     size = round_up(end - at, 8)
     require(size <= len(payload) - at, here, "spec/nodes.md#node-slots", "group is truncated")
@@ -566,7 +566,7 @@ def decode_groups(payload, count, base, pages, points):
     groups = []
     for slot in range(count):
         require(8 * int.from_bytes(payload[2 * slot:2 * slot + 2], "little") == at,
-                base + 2 * slot, slots, "group does not start where the one before ends")
+                base + 2 * slot, slots, "group does not start where the group before it ends")
         group, size = decode_group(payload, at, base, pages, points)
         groups.append(group)
         at += size

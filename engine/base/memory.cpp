@@ -1,4 +1,4 @@
-// What the system says of this process, and blocks of memory straight from it.
+// The figures that the system reports of this process, and blocks of memory straight from it.
 #include "engine/base/memory.h"
 
 #include <malloc.h>
@@ -21,7 +21,7 @@ namespace {
 constexpr const char* kStatus = "/proc/self/status";
 constexpr std::size_t kHugePageBytes = std::size_t{2} << 20;
 
-// The value of a line "NAME:   1234 kB" of /proc/self/status, in bytes.
+// Returns the value of the line "NAME:   1234 kB" of /proc/self/status in bytes.
 std::uint64_t status_bytes(std::string_view name) {
   std::ifstream status(kStatus);
   for (std::string line; std::getline(status, line);) {
@@ -38,8 +38,9 @@ std::uint64_t status_bytes(std::string_view name) {
 
 }  // namespace
 
-// Not getrusage: its ru_maxrss belongs to the process, not to the program, and survives exec. A
-// small program started from a large one would report the peak of its parent's image.
+// VmHWM is read in place of getrusage(), whose ru_maxrss belongs to the process, not to the
+// program, and survives exec: a small program started from a large one would report the peak of its
+// parent's image.
 std::uint64_t peak_resident_bytes() {
   return status_bytes("VmHWM:");
 }
@@ -61,11 +62,12 @@ double cpu_seconds() {
 
 Arena::Arena(std::size_t bytes) : size_(bytes) {
   if (bytes == 0) return;
-  // Unreserved: a cap above what the machine has is no error as long as it is not used.
+  // Reserve nothing: a cap above the machine's memory is no error as long as it is not used.
   void* block = mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
                      MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (block == MAP_FAILED) throw std::bad_alloc();
-  // First touch costs a fault a page: with huge pages 512 times fewer. A refusal only costs time.
+  // The first touch of each page costs a fault; huge pages make them 512 times fewer. A refusal
+  // costs nothing but time, so it is ignored.
   if (bytes >= kHugePageBytes) madvise(block, bytes, MADV_HUGEPAGE);
   data_ = static_cast<std::byte*>(block);
 }

@@ -1,4 +1,5 @@
-// Memory of this process: what it uses, and large blocks that follow what is in use.
+// The memory and CPU time that this process uses, and large blocks of memory whose resident size
+// follows their use.
 #pragma once
 
 #include <cstddef>
@@ -6,33 +7,38 @@
 
 namespace ptc {
 
-/// Peak resident set of this process so far, bytes (VmHWM).
-/// @throws std::system_error when the system does not say
+/// Returns the peak resident set of this process so far, bytes (VmHWM).
+/// @throws std::system_error when the system does not report it
 [[nodiscard]] std::uint64_t peak_resident_bytes();
-/// Resident set now, bytes (VmRSS).
-/// @throws std::system_error when the system does not say
+/// Returns the current resident set of this process, bytes (VmRSS).
+/// @throws std::system_error when the system does not report it
 [[nodiscard]] std::uint64_t resident_bytes();
-/// Gives memory that was freed back to the system, which would else count as resident: after a
-/// stage that took much for a while.
+/// Returns freed memory from the allocator to the system, because it would otherwise still count as
+/// resident. It is called after a stage that needed much memory for a while.
 void return_freed_memory() noexcept;
-/// CPU time of this process so far, all threads, user and system, seconds.
+/// Returns the CPU time of this process so far, user and system time of all threads, seconds.
+/// @throws std::system_error when the clock cannot be read
 [[nodiscard]] double cpu_seconds();
 
-/// A large block straight from the system: zero-filled, page-aligned, given back at once when it
-/// ends, so that resident memory follows what is in use. Pages count as resident from the first
-/// touch on. Movable, not copyable; empty when moved from.
+/// A large block of memory straight from the system: zero-filled, page-aligned, and returned to the
+/// system when the Arena is destroyed, so that resident memory follows what is in use. A page
+/// counts as resident from its first touch. An Arena is movable but not copyable, and empty once
+/// moved from.
 class Arena {
  public:
   Arena() = default;
-  /// @throws std::bad_alloc
+  /// Maps a block. No memory is reserved for it, so that a block larger than the machine's memory
+  /// is no error as long as it is not used. @throws std::bad_alloc when the system refuses
   explicit Arena(std::size_t bytes);
   ~Arena();
   Arena(Arena&& other) noexcept;
   Arena& operator=(Arena&& other) noexcept;
 
-  /// Gives back the whole pages of [offset, offset + bytes); they are zero when touched again.
+  /// Returns the whole pages of [offset, offset + bytes) to the system. They are zero when they are
+  /// touched again.
   void discard(std::size_t offset, std::size_t bytes) noexcept;
 
+  /// Returns the first byte, or null when the block is empty.
   [[nodiscard]] std::byte* data() const noexcept { return data_; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
 

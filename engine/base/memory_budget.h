@@ -1,4 +1,4 @@
-// A memory cap and what is charged to it.
+// A memory cap and the parts of a job that are charged to it.
 #pragma once
 
 #include <cstdint>
@@ -8,30 +8,31 @@
 
 namespace ptc {
 
-/// A memory cap that is charged part by part, by name, before the memory is taken. When too little
-/// is left, the refusal tells what takes how much.
+/// A memory cap that is charged part by part, by name, before the memory is allocated. When too
+/// little is left, the error lists the size of every part.
 class MemoryBudget {
  public:
-  /// @param job  what the memory is for, as in "the memory cap is too small for shading"
+  /// Makes a budget to which nothing is charged yet.
+  /// @param job  the purpose of the memory, as in "the memory cap is too small for shading"
   MemoryBudget(std::uint64_t cap_bytes, std::string job);
 
-  /// Sets `bytes` apart for `part`, a noun as in "12M for open pages". The cap may be exceeded
-  /// until rest() is called.
+  /// Charges `bytes` for `part`, a noun as in "12M for open pages". The sum may exceed the cap
+  /// until rest() or require() is called.
   void charge(std::string part, std::uint64_t bytes);
 
-  /// Bytes that are left for `part` when all that was charged is taken.
-  /// @throws LimitError when they are fewer than `min_bytes`; it names the least cap that works
+  /// Returns the bytes of the cap that remain for `part` after all charges.
+  /// @throws LimitError when fewer than `min_bytes` remain; it names the smallest cap that works
   ///         and every part of it
   [[nodiscard]] std::uint64_t rest(const std::string& part, std::uint64_t min_bytes) const;
 
-  /// Checks that the cap holds what was charged. @throws LimitError as rest()
+  /// Checks that the charges do not exceed the cap. @throws LimitError as rest() does
   void require() const { static_cast<void>(rest({}, 0)); }
 
  private:
-  std::uint64_t cap_;
-  std::uint64_t charged_ = 0;
+  std::uint64_t cap_;          ///< bytes
+  std::uint64_t charged_ = 0;  ///< sum of all parts, bytes
   std::string job_;
-  std::vector<std::pair<std::string, std::uint64_t>> parts_;
+  std::vector<std::pair<std::string, std::uint64_t>> parts_;  ///< name and bytes of each charge
 };
 
 }  // namespace ptc

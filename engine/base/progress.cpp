@@ -1,4 +1,10 @@
-// Progress written to a file: a bar on a terminal, plain lines elsewhere.
+// Progress reports written to a file: a bar on a terminal, plain lines elsewhere.
+//
+//   advance() in any thread          one thread, and only when next_report_ is due
+//   done_ += count        ------->   lock, update state_, write a line, set the next report
+//
+// Counting costs one atomic addition and a look at the clock. A thread that finds a report due but
+// the lock taken goes on: whoever holds the lock writes the report.
 #include "engine/base/progress.h"
 
 #include <sys/ioctl.h>
@@ -20,7 +26,7 @@ namespace {
 constexpr double kRedrawSeconds = 0.1;  // on a terminal
 constexpr double kLineSeconds = 10;     // elsewhere
 
-// A report that cannot be written is no reason to stop the work.
+// Writes a text, or gives up silently: a report that cannot be written must not stop the work.
 void write_text(int fd, std::string_view text) noexcept {
   while (!text.empty()) {
     const ssize_t n = ::write(fd, text.data(), text.size());
@@ -44,7 +50,8 @@ class FileProgress final : public Progress {
   FileProgress(int fd, bool terminal, Clock clock)
       : fd_(fd), terminal_(terminal), clock_(std::move(clock)) {}
 
-  // A stage that was left by an exception ends its line, so that the message starts on its own.
+  // Ends the line of a stage that an exception has left, so that the error message starts on a line
+  // of its own.
   ~FileProgress() override {
     if (running_ && terminal_) write("\n");
   }
@@ -68,7 +75,7 @@ class FileProgress final : public Progress {
     write(note_line(text));
   }
 
-  // Cheap unless a report is due; then one thread writes it and the others go on.
+  // Counts; when a report is due, one thread writes it while the others go on.
   void advance(std::uint64_t count) override {
     done_.fetch_add(count, std::memory_order_relaxed);
     if (clock_() < next_report_.load(std::memory_order_relaxed)) return;
@@ -102,14 +109,14 @@ class FileProgress final : public Progress {
     return state_;
   }
 
-  // One column is left free: a line as wide as the terminal wraps on some.
+  // Leaves one column free, because a line as wide as the terminal wraps on some terminals.
   [[nodiscard]] std::size_t columns() const noexcept {
     winsize size{};
     if (ioctl(fd_, TIOCGWINSZ, &size) != 0 || size.ws_col < 2) return 79;
     return size.ws_col - 1u;
   }
 
-  // Over what the line showed before; the rest of it is erased.
+  // Replaces the line on the terminal and erases what is left of the old one.
   void redraw(const std::string& text) const {
     std::string line = "\r";
     line.append(text).append("\x1b[K");
@@ -123,7 +130,7 @@ class FileProgress final : public Progress {
   const Clock clock_;
   std::atomic<std::uint64_t> done_{0};
   std::atomic<double> next_report_{std::numeric_limits<double>::infinity()};
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   StageState state_;
   double start_ = 0;
   bool running_ = false;

@@ -1,4 +1,4 @@
-// What a long run tells the one who waits for it.
+// Progress reports of long runs for the user who waits for them.
 #pragma once
 
 #include <cstdint>
@@ -7,27 +7,35 @@
 
 namespace ptc {
 
-/// Receives progress; the base class is silent. advance() may be called from any thread, begin()
-/// and end() from one.
+/// Receives the progress of a run, which consists of stages. The base class ignores it.
+///
+/// Threads: advance() may be called from any thread; all other calls come from one thread.
 class Progress {
  public:
   virtual ~Progress() = default;
-  /// @param total  0 when it is not known
+  /// Begins a stage and ends the one before it, if that has not ended.
+  /// @param stage  a short name, e.g. "sort"
+  /// @param total  units of work in the stage; 0 when that is not known
   /// @param unit   plural noun, e.g. "points"
   virtual void begin(const std::string& /*stage*/, std::uint64_t /*total*/,
                      const std::string& /*unit*/) {}
+  /// Adds `count` finished units to the stage.
   virtual void advance(std::uint64_t /*count*/) {}
+  /// Ends the stage; without a stage it does nothing.
   virtual void end() {}
-  /// Something to know, e.g. the room that long work takes or a texture that is missing. A stage
-  /// that is under way ends.
+  /// Reports something that the user should know, such as the disk space that the run needs or a
+  /// missing texture. It ends the stage that is under way.
+  /// @param text  one line, without its line end
   virtual void note(const std::string& /*text*/) {}
 };
 
-/// On a terminal a bar with rate and time left, redrawn at most 10 times a second; otherwise one
-/// plain line at the start and end of a stage and every 10 s between.
+/// Returns a report to standard error. On a terminal it draws a bar with rate and time left, at
+/// most 10 times a second. Otherwise it writes one plain line at the start and at the end of each
+/// stage, and one every 10 s in between.
 [[nodiscard]] std::unique_ptr<Progress> make_stderr_progress();
 
-/// Nothing but notes, a line each that begins with the program's name.
+/// Returns a report to standard error that writes only notes, each as a line that begins with the
+/// name of the program.
 [[nodiscard]] std::unique_ptr<Progress> make_stderr_notes();
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// The words of a progress report.
+// The texts of a progress report: counts, durations, lines and bars.
 #include "engine/base/progress_text.h"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ double fraction(const StageState& s) {
   return std::min(1.0, static_cast<double>(s.done) / static_cast<double>(s.total));
 }
 
-// Rounded down: 100 % is said when all is done, not before.
+// Rounds down, so that 100 % is shown only when everything is done.
 int percent(const StageState& s) {
   return static_cast<int>(100 * fraction(s));
 }
@@ -47,7 +47,7 @@ std::string rate_and_time(const StageState& s) {
 std::string format_count(double count) {
   constexpr std::array<const char*, 7> kUnits{"", " K", " M", " G", " T", " P", " E"};
   std::size_t unit = 0;
-  // 999.5 would round to 1000, which has a digit too many.
+  // Go on to the next unit from 999.5, which would round to 1000 and four digits.
   while (count >= 999.5 && unit + 1 < kUnits.size()) {
     count /= 1000;
     ++unit;
@@ -84,6 +84,7 @@ std::string progress_bar(const StageState& s, std::size_t columns) {
   const std::string words = counts(s) + ", " + rate_and_time(s);
   if (s.total == 0) return (s.stage + " " + words).substr(0, columns);
 
+  // Draw the bar in the columns that the words leave, if there are enough.
   const std::string share = format(" %3d %% ", percent(s));
   const std::size_t fixed = s.stage.size() + share.size() + words.size() + 3;  // a space, [ and ]
   constexpr std::size_t kMinBar = 5, kMaxBar = 40;

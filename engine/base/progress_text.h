@@ -1,4 +1,4 @@
-// The words of a progress report: pure functions of what was counted, and a report to any file.
+// The texts of a progress report as pure functions of the counts, and a report to any file.
 #pragma once
 
 #include <cstddef>
@@ -11,39 +11,42 @@
 
 namespace ptc {
 
-/// Three significant digits with K, M, G, T, P or E behind: "950", "12.3 M".
+/// Returns a count with three significant digits and a unit of K, M, G, T, P or E: "950", "12.3 M".
 [[nodiscard]] std::string format_count(double count);
 
-/// "0:07", "12:34", "1:02:03"; "--:--" when it is not finite, negative or beyond 100 hours.
+/// Returns a duration as "0:07", "12:34" or "1:02:03", or as "--:--" when it is not finite,
+/// negative or 100 hours or more.
 [[nodiscard]] std::string format_duration(double seconds);
 
-/// How far a stage has come.
+/// The state of a stage at the moment of a report.
 struct StageState {
-  std::string stage;
-  std::string unit;         ///< plural noun
-  std::uint64_t total = 0;  ///< 0 when it is not known
-  std::uint64_t done = 0;
-  double elapsed_seconds = 0;
+  std::string stage;           ///< short name, e.g. "sort"
+  std::string unit;            ///< plural noun, e.g. "points"
+  std::uint64_t total = 0;     ///< units of work in the stage; 0 when that is not known
+  std::uint64_t done = 0;      ///< units of work that are finished
+  double elapsed_seconds = 0;  ///< since the stage began
 
-  /// Units a second so far; 0 before any time has passed.
+  /// Returns the units finished per second so far; 0 before any time has passed.
   [[nodiscard]] double rate() const noexcept;
-  /// Seconds left at that rate; infinite when nothing was done or the total is not known.
+  /// Returns the seconds left at that rate; infinite when nothing is finished or the total is not
+  /// known.
   [[nodiscard]] double seconds_left() const noexcept;
 };
 
-/// "sort: 45 %, 12.3 M of 27.1 M points, 4.10 M/s, 0:03 left"
+/// Returns a line like "sort: 45 %, 12.3 M of 27.1 M points, 4.10 M/s, 0:03 left".
 [[nodiscard]] std::string progress_line(const StageState& state);
-/// "sort [####......]  45 % 12.3 M of 27.1 M points, 4.10 M/s, 0:03 left": the bar takes what is
-/// left of `columns`; a line that is too long is cut.
+/// Returns a line like "sort [####......]  45 % 12.3 M of 27.1 M points, 4.10 M/s, 0:03 left". The
+/// bar takes the columns that the words leave; a line of more than `columns` bytes is cut.
 [[nodiscard]] std::string progress_bar(const StageState& state, std::size_t columns);
-/// "sort: 27.1 M points in 6.6 s, 4.10 M/s"
+/// Returns a line like "sort: 27.1 M points in 6.6 s, 4.10 M/s".
 [[nodiscard]] std::string progress_summary(const StageState& state);
 
-/// Seconds from some fixed moment, never falling.
+/// A clock that returns the seconds since some fixed moment and never goes back.
 using Clock = std::function<double()>;
 
-/// What make_stderr_progress() gives, to the open file `fd`, which it does not own.
-/// @param terminal  whether to draw a bar
+/// Returns a report as make_stderr_progress() does, written to the open file `fd`, which it does
+/// not own.
+/// @param terminal  whether to draw a bar in place of plain lines
 [[nodiscard]] std::unique_ptr<Progress> make_progress(int fd, bool terminal, Clock clock);
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// The box of a set of points.
+// Boxes that grow by points and by other boxes.
 #include "engine/base/surfel.h"
 
 #include <glm/common.hpp>

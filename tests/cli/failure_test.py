@@ -97,7 +97,7 @@ class SystemFailure(ProgramTest):
             time.sleep(0.01)
         second = run(*command[:1], *command[1:])
         self.assertEqual(second.returncode, 3)
-        self.assertIn("another program is at work on it", second.stderr)
+        self.assertIn("another program is using it", second.stderr)
         self.assertEqual(first.wait(60), 0)
 
     def test_points_on_the_disk_that_are_not_what_was_written_are_refused(self):
@@ -129,7 +129,7 @@ class SystemFailure(ProgramTest):
         self.succeed(*command)
         (self.here / "o.ptcx.resume").write_bytes(b"PTXSTATE and what is torn")
         message = self.fail_with(1, *command)
-        self.assertIn("o.ptcx.resume: the state is cut short; to start anew, remove ", message)
+        self.assertIn("o.ptcx.resume: the state is truncated; to start anew, remove ", message)
 
     def test_results_that_cannot_be_printed(self):
         with open("/dev/full", "w") as full:

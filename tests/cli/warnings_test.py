@@ -20,7 +20,7 @@ class Warnings(ProgramTest):
 
     def test_a_missing_texture_is_one_line(self):
         for command in self.commands():
-            said = (f"{command[0]}: {self.bare}: a texture is left out, the plain colour of its material is used: "
+            said = (f"{command[0]}: {self.bare}: a texture is left out and the plain colour of its material is used: "
                     "none.png: No such file or directory\n")
             self.assertEqual(self.succeed(*command).stderr, said)
             self.assertEqual(self.succeed(*command, "--json").stderr, said)

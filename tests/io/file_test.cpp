@@ -76,7 +76,7 @@ TEST_CASE("input file: every range inside is read, every range past the end is r
   }
   CHECK(read_text(file, 100, 0).empty());
   CHECK(refusal([&] { static_cast<void>(read_text(file, 8, 5)); }) ==
-        file.path().string() + ": offset 10: the file ends here, 3 bytes are missing");
+        file.path().string() + ": offset 10: the file ends here and 3 bytes are missing");
   CHECK(error_of([&] { static_cast<void>(read_text(file, UINT64_MAX - 1, 1)); }) == EOVERFLOW);
 }
 

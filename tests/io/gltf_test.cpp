@@ -145,7 +145,7 @@ TEST_CASE("gltf: only the nodes of the scene are read, each once", "[io][gltf]")
   json["nodes"][1]["children"] = {0};  // nobody's children are none
   CHECK_THAT(files.fault(json), Contains("no triangle"));
   json["scenes"] = Json::array({{{"nodes", {0}}}});
-  CHECK_THAT(files.fault(json), Contains("node 0 has two parents or is its own"));
+  CHECK_THAT(files.fault(json), Contains("node 0 has two parents or contains itself"));
   json["scenes"] = Json::array({{{"nodes", {0, 0}}}});
   json["nodes"] = Json::array({{{"mesh", 0}}});
   CHECK_THAT(files.fault(json), Contains("node 0 has two parents"));
@@ -179,7 +179,7 @@ TEST_CASE("gltf: strips and fans become triangles of one side, points and lines 
     CHECK_THAT(files.fault(json), Contains("no triangle"));
   }
   primitive["mode"] = 7;
-  CHECK_THAT(files.fault(json), Contains("an unknown mode"));
+  CHECK_THAT(files.fault(json), Contains("the mode of a primitive is unknown"));
 }
 
 TEST_CASE("gltf: materials have factor, texture, emission and sides", "[io][gltf]") {
@@ -306,7 +306,7 @@ TEST_CASE("gltf: a texture transform moves the coordinates", "[io][gltf]") {
   const glm::vec2 uv = file.mesh.uvs[file.mesh.triangles[0][0]];
   CHECK(uv.x == Approx(1.5F));
   CHECK(uv.y == Approx(0.75F));
-  CHECK_THAT(file.warnings.at(0), Contains("no source that is supported"));
+  CHECK_THAT(file.warnings.at(0), Contains("it has no supported source"));
 }
 
 TEST_CASE("gltf: integers are scaled when they say so", "[io][gltf]") {
@@ -348,7 +348,8 @@ TEST_CASE("gltf: ranges that reach past what they are in are refused", "[io][glt
     json[Json::json_pointer(pointer)] = value;
     return files.fault(json);
   };
-  CHECK_THAT(with("/buffers/0/byteLength", 69), Contains("buffer 0 has 68 bytes of 69"));
+  CHECK_THAT(with("/buffers/0/byteLength", 69),
+             Contains("buffer 0 has only 68 bytes of the declared 69"));
   CHECK_THAT(with("/bufferViews/0/byteOffset", 33),
              Contains("bufferView 0 reaches past its buffer"));
   CHECK_THAT(with("/bufferViews/0/byteOffset", UINT64_MAX), Contains("bufferView 0 reaches past"));
@@ -366,12 +367,12 @@ TEST_CASE("gltf: ranges that reach past what they are in are refused", "[io][glt
   CHECK_THAT(with("/accessors/0/sparse", Json::object()), Contains("is sparse"));
   CHECK_THAT(with("/accessors/1/componentType", 5121), Contains("no triangle"));
   CHECK_THAT(with("/nodes/0/mesh", 1), Contains("meshes has no entry 1"));
-  CHECK_THAT(with("/nodes/0/mesh", -1), Contains("mesh is no unsigned integer"));
-  CHECK_THAT(with("/nodes/0/scale", {1, 1}), Contains("scale has not 3 numbers"));
+  CHECK_THAT(with("/nodes/0/mesh", -1), Contains("mesh is not an unsigned integer"));
+  CHECK_THAT(with("/nodes/0/scale", {1, 1}), Contains("scale does not have 3 numbers"));
   CHECK_THAT(with("/nodes/0/scale", {1e300, 1, 1}), Contains("2e18 apart"));
   CHECK_THAT(with("/scenes/0/nodes/0", 7), Contains("nodes has no entry 7"));
   CHECK_THAT(with("/scene", 1), Contains("scenes has no entry 1"));
-  CHECK_THAT(with("/scene", "0"), Contains("scene is no unsigned integer"));
+  CHECK_THAT(with("/scene", "0"), Contains("scene is not an unsigned integer"));
   CHECK_THAT(with("/extensionsRequired", {"KHR_draco_mesh_compression"}),
              Contains("not supported"));
   CHECK_THAT(with("/buffers/0/uri", "none.bin"), Contains("none.bin"));
@@ -384,7 +385,7 @@ TEST_CASE("gltf: an index past the vertices is refused", "[io][gltf]") {
   std::string bytes = buffer_bytes();
   bytes.replace(36, 2, raw(std::uint16_t{3}));
   files.scratch.file("a b.bin", bytes);
-  CHECK_THAT(files.fault(document()), Contains("an index that leads to no vertex"));
+  CHECK_THAT(files.fault(document()), Contains("an index refers to no vertex"));
 }
 
 TEST_CASE("gltf: few bytes cannot make many vertices by repeating a mesh", "[io][gltf]") {

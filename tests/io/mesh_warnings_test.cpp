@@ -16,7 +16,7 @@ TEST_CASE("mesh warnings: each kind is a line with its number and its first four
   warnings.add(kEmissionAveraged, "'a'");
   warnings.add(kEmissionAveraged, "'b'");
   CHECK(warnings.lines() ==
-        Lines{"a skin is left out, its mesh keeps the pose in which it is stored: skin 0",
+        Lines{"a skin is left out and its mesh keeps the pose in which it is stored: skin 0",
               "2 emission textures are replaced by their means: 'a'; 'b'"});
   for (const char* more : {"'c'", "'d'"}) warnings.add(kEmissionAveraged, more);
   CHECK(warnings.lines()[1] ==
@@ -31,14 +31,14 @@ TEST_CASE("mesh warnings: a part that is shown already is not told again", "[io]
   MeshWarnings warnings;
   for (int i = 0; i < 9; ++i) warnings.add(kCameraLeftOut, "camera 0");
   CHECK(warnings.lines() ==
-        Lines{"a camera is left out, it has no direction or no field of view: camera 0"});
+        Lines{"a camera is left out because it has no direction or no field of view: camera 0"});
 }
 
 TEST_CASE("mesh warnings: a part is one line of at most some 300 printable bytes", "[io][mesh]") {
   MeshWarnings warnings;
   warnings.add(kMaterialUndefined, "a\nb\x1b[2J\xff");
   warnings.add(kMaterialUndefined, std::string(299, 'x') + "\xc3\xa9 and so on");
-  CHECK(warnings.lines() == Lines{"2 materials are not defined, plain grey is used: "
+  CHECK(warnings.lines() == Lines{"2 materials are not defined and become plain grey: "
                                   "a\\x0ab\\x1b[2J\\xff; " +
                                   std::string(299, 'x') + "..."});
 }
@@ -48,6 +48,6 @@ TEST_CASE("mesh warnings: many materials that are not defined take one line", "[
   std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   for (int i = 0; i < 1000; ++i) text += "usemtl m" + std::to_string(i) + "\nf 1 2 3\n";
   const MeshFile file = read_mesh(scratch.file("a.obj", text));
-  CHECK(file.warnings == Lines{"1000 materials are not defined, plain grey is used: 'm0'; 'm1'; "
+  CHECK(file.warnings == Lines{"1000 materials are not defined and become plain grey: 'm0'; 'm1'; "
                                "'m2'; 'm3'; and 996 more"});
 }

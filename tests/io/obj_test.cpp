@@ -95,9 +95,9 @@ TEST_CASE("obj: materials come from the library, textures from files beside it",
   CHECK_THAT(warnings, Contains("a colour that is not R G B is left out") &&
                            Contains("a b.mtl: line 10") && Contains("an emission map (map_Ke)") &&
                            Contains("a b.mtl: line 11") &&
-                           Contains("a texture is left out, the plain colour of its material is "
+                           Contains("a texture is left out and the plain colour of its material is "
                                     "used: none.png: No such file") &&
-                           Contains("a material is not defined, plain grey is used: 'missing'"));
+                           Contains("a material is not defined and becomes plain grey: 'missing'"));
 }
 
 TEST_CASE("obj: several libraries on a line, escaped blanks and missing ones", "[io][mesh]") {
@@ -177,31 +177,32 @@ TEST_CASE("textures: pixels beyond what the bytes of their files justify are lef
   CHECK(decode(poor, "image 1"));
   REQUIRE(warnings.lines().size() == 1);
   CHECK_THAT(warnings.lines()[0],
-             EndsWith("image 2: 100 x 100 pixels are more than the 5000 that are left"));
+             EndsWith("image 2: 100 x 100 pixels are more than the 5000 that may still be loaded"));
   CHECK(poor.load("a.png"));  // by its own bytes
 }
 
 TEST_CASE("obj: files that break a rule are refused by line", "[io][mesh]") {
   const Scratch scratch;
   CHECK_THAT(fault(scratch, kSquare + "f 1 2 0\n"),
-             EndsWith("line 5: an index that leads to no vertex"));
+             EndsWith("line 5: an index refers to no vertex"));
   CHECK_THAT(fault(scratch, kSquare + "f 1 2 -5\n"),
-             EndsWith("line 5: an index that leads to no vertex"));
+             EndsWith("line 5: an index refers to no vertex"));
   CHECK_THAT(fault(scratch, kSquare + "f 1 2 x\n"),
-             EndsWith("line 5: an index that leads to no vertex"));
-  CHECK_THAT(fault(scratch, kSquare + "f 1 2 4294967296\n"), EndsWith("leads to no vertex"));
+             EndsWith("line 5: an index refers to no vertex"));
+  CHECK_THAT(fault(scratch, kSquare + "f 1 2 4294967296\n"), EndsWith("refers to no vertex"));
   CHECK_THAT(fault(scratch, kSquare + "f 1 2 5\n"),
-             EndsWith("polygon 0: an index leads to no vertex"));
+             EndsWith("polygon 0: an index refers to no vertex"));
   CHECK_THAT(fault(scratch, kSquare + "f 1/1 2/1 3/1\n"),
-             EndsWith("polygon 0: an index leads to no vertex"));
+             EndsWith("polygon 0: an index refers to no vertex"));
   CHECK_THAT(fault(scratch, kSquare + "f 1//1 2//1 3//1\n"),
-             EndsWith("an index leads to no vertex"));
-  CHECK_THAT(fault(scratch, "v 1 2\n"), EndsWith("line 1: a vertex with too few values"));
-  CHECK_THAT(fault(scratch, "v 1 2 3.1+e2\n"), EndsWith("line 1: not a number"));
+             EndsWith("an index refers to no vertex"));
+  CHECK_THAT(fault(scratch, "v 1 2\n"), EndsWith("line 1: the vertex has too few values"));
+  CHECK_THAT(fault(scratch, "v 1 2 3.1+e2\n"), EndsWith("line 1: a value is not a number"));
   CHECK_THAT(fault(scratch, "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-             EndsWith("vertex 0: a position that is not finite"));
-  CHECK_THAT(fault(scratch, kSquare + "l 1 2\np 1\nf 1 2\n"), EndsWith("a.obj: no triangle"));
-  CHECK_THAT(fault(scratch, ""), EndsWith("a.obj: no triangle"));
+             EndsWith("vertex 0: the position is not finite"));
+  CHECK_THAT(fault(scratch, kSquare + "l 1 2\np 1\nf 1 2\n"),
+             EndsWith("a.obj: the mesh has no triangle"));
+  CHECK_THAT(fault(scratch, ""), EndsWith("a.obj: the mesh has no triangle"));
 }
 
 TEST_CASE("obj: every truncation gives a mesh or a refusal", "[io][mesh]") {

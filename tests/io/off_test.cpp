@@ -52,27 +52,27 @@ TEST_CASE("off: normals and texture coordinates are found around the colours", "
 TEST_CASE("off: files that break a rule are refused by line", "[io][mesh]") {
   const Scratch scratch;
   CHECK_THAT(fault(scratch, "OFF BINARY\n"), EndsWith("line 1: binary OFF is not supported"));
-  CHECK_THAT(fault(scratch, "4OFF\n"), EndsWith("line 1: an OFF of a kind that is not supported"));
+  CHECK_THAT(fault(scratch, "4OFF\n"), EndsWith("line 1: this kind of OFF is not supported"));
   CHECK_THAT(fault(scratch, "OFF\nx\n"),
-             EndsWith("line 2: OFF needs its counts of vertices and faces"));
+             EndsWith("line 2: the numbers of vertices and faces are missing"));
   CHECK_THAT(fault(scratch, "OFF\n-4 1 0\n" + kBody),
-             EndsWith("OFF needs its counts of vertices and faces"));
+             EndsWith("the numbers of vertices and faces are missing"));
   CHECK_THAT(fault(scratch, "OFF\n353535235358 6 0\n" + kBody),
-             EndsWith("line 2: more vertices or faces than the file can hold"));
+             EndsWith("line 2: the header counts more vertices or faces than the file can hold"));
   CHECK_THAT(fault(scratch, "OFF\n4 9999999999 0\n" + kBody),
-             EndsWith("line 2: more vertices or faces than the file can hold"));
+             EndsWith("line 2: the header counts more vertices or faces than the file can hold"));
   CHECK_THAT(fault(scratch, "OFF\n1 0 0\n0 0\n   \n"),
-             EndsWith("line 3: a vertex with too few values"));
-  CHECK_THAT(fault(scratch, "OFF\n1 0 0\n0 0 zero\n"), EndsWith("line 3: not a number"));
+             EndsWith("line 3: the vertex has too few values"));
+  CHECK_THAT(fault(scratch, "OFF\n1 0 0\n0 0 zero\n"), EndsWith("line 3: a value is not a number"));
   CHECK_THAT(fault(scratch, "OFF\n4 2 0\n" + kBody), EndsWith("the file ends too early"));
   CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
-             EndsWith("line 6: an index that leads to no vertex"));
+             EndsWith("line 6: an index refers to no vertex"));
   CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n"),
-             EndsWith("line 6: a face with fewer corners than it says"));
+             EndsWith("line 6: the face has fewer corners than it declares"));
   CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n"),
-             EndsWith("line 6: a face begins with its number of corners"));
+             EndsWith("line 6: a face must begin with its number of corners"));
   CHECK_THAT(fault(scratch, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 inf 0\n3 0 1 2\n"),
-             EndsWith("vertex 2: a position that is not finite"));
+             EndsWith("vertex 2: the position is not finite"));
 }
 
 TEST_CASE("off: every truncation but of the last word is refused", "[io][mesh]") {

@@ -115,16 +115,16 @@ TEST_CASE("ply mesh: wrong indices, positions and lists are refused", "[io][mesh
   };
   const std::string start = header("ascii", kVertices + kFaces);
   CHECK_THAT(fault(start + kSquare + "3 0 1 2\n3 0 1 4\n"),
-             EndsWith("line 15: an index that leads to no vertex"));
-  CHECK_THAT(fault(start + kSquare + "3 0 1 -1\n3 0 1 2\n"), EndsWith("leads to no vertex"));
+             EndsWith("line 15: an index refers to no vertex"));
+  CHECK_THAT(fault(start + kSquare + "3 0 1 -1\n3 0 1 2\n"), EndsWith("refers to no vertex"));
   CHECK_THAT(fault(start + "0 0 0\nnan 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 2\n"),
-             EndsWith("vertex 1: a position that is not finite"));
-  CHECK_THAT(fault(start + kSquare + "3 0 0 0\n0\n"), EndsWith("a.ply: no triangle"));
+             EndsWith("vertex 1: the position is not finite"));
+  CHECK_THAT(fault(start + kSquare + "3 0 0 0\n0\n"), EndsWith("a.ply: the mesh has no triangle"));
   CHECK_THAT(fault(start + "0 0 0\n1e300 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 2\n"),
-             EndsWith("positions more than 2e18 apart"));
+             EndsWith("positions are more than 2e18 apart"));
   CHECK_THAT(fault(header("ascii", kVertices + "element face 1\nproperty int vertex_index\n") +
                    kSquare + "1\n"),
-             EndsWith("without a list of integers vertex_indices"));
+             EndsWith("lacks a list of integers vertex_indices"));
   CHECK_THAT(fault(header("ascii", kVertices) + kSquare), EndsWith("no triangle"));
   CHECK_THAT(fault(start + kSquare + "3 0 1 2\n3 0 1\n"),
              EndsWith("the value of property 'vertex_indices' is missing"));

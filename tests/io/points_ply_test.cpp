@@ -218,24 +218,23 @@ TEST_CASE("ply: a point that breaks a rule is named with its place", "[io][point
       std::string(kXyz) + "property float nx\nproperty float ny\nproperty float nz\n";
   const std::string with_radius = std::string(kXyz) + "property float radius\n";
   CHECK(fault(scratch, one_point(normals, "0 0 0 0 0 0")) ==
-        "line 13: point 0: a normal of zero length");
+        "line 13: point 0: the normal has zero length");
   CHECK_THAT(fault(scratch, one_point(normals, "0 0 0 nan 0 1")),
-             EndsWith("a normal that is not finite"));
+             EndsWith("the normal is not finite"));
   CHECK_THAT(fault(scratch, one_point(normals, "0 0 0 0 inf 1")),
-             EndsWith("a normal that is not finite"));
+             EndsWith("the normal is not finite"));
   for (const char* p : {"nan 0 0", "0 inf 0", "0 0 -inf", "0 1e999 0"}) {
-    CHECK_THAT(fault(scratch, one_point(kXyz, p)),
-               EndsWith("point 0: a position that is not finite"));
+    CHECK_THAT(fault(scratch, one_point(kXyz, p)), EndsWith("point 0: the position is not finite"));
   }
   for (const char* r : {"-1", "nan", "inf", "1e39"}) {
     CHECK_THAT(fault(scratch, one_point(with_radius, std::string("0 0 0 ") + r)),
-               EndsWith("a radius that is negative, no number or beyond floats"));
+               EndsWith("the radius is negative, not a number or beyond the range of float"));
   }
   const std::string colours =
       std::string(kXyz) + "property float red\nproperty float green\nproperty float blue\n";
   for (const char* c : {"0 0 -0.1", "nan 0 0", "0 1.01 0"}) {
     CHECK_THAT(fault(scratch, one_point(colours, std::string("0 0 0 ") + c)),
-               EndsWith("a colour outside its range"));
+               EndsWith("the colour is out of range"));
   }
   std::string binary = binary_cloud(false);
   const std::size_t record = (binary.size() - binary.find("end_header\n") - 11) / 3;
@@ -243,7 +242,7 @@ TEST_CASE("ply: a point that breaks a rule is named with its place", "[io][point
   binary.replace(second + 36, 4, raw(-1.0F));  // its radius
   CHECK(fault(scratch, binary) ==
         "offset " + std::to_string(second) +
-            ": point 1: a radius that is negative, no number or beyond floats");
+            ": point 1: the radius is negative, not a number or beyond the range of float");
 }
 
 TEST_CASE("ply: headers that break a rule are refused by line", "[io][points]") {
@@ -253,30 +252,31 @@ TEST_CASE("ply: headers that break a rule are refused by line", "[io][points]") 
   CHECK(refused("") == "offset 0: not a PLY file");
   CHECK(refused("plyx\n") == "offset 0: not a PLY file");
   CHECK(refused("ply\n") == "line 1: the PLY header has no end");
-  CHECK(refused("ply\nelement vertex 1\n") == "line 2: a PLY header begins with its format");
-  CHECK(refused("ply\nformat ascii 2.0\n") == "line 2: a PLY version other than 1.0");
-  CHECK(refused("ply\nformat EBCDIC 1.0\n") == "line 2: a PLY header begins with its format");
+  CHECK(refused("ply\nelement vertex 1\n") == "line 2: a PLY header must begin with its format");
+  CHECK(refused("ply\nformat ascii 2.0\n") == "line 2: the PLY version is not 1.0");
+  CHECK(refused("ply\nformat EBCDIC 1.0\n") == "line 2: a PLY header must begin with its format");
   CHECK(refused(good) == "line 6: the PLY header has no end");
-  CHECK(refused(good + "propertie float a\n") == "line 7: no keyword of a PLY header");
-  CHECK(refused(good + "property float\n") == "line 7: a property without name");
-  CHECK(refused(good + "property half a\n") == "line 7: a property of unknown type");
-  CHECK(refused(good + "property float x\n") == "line 7: two properties of one name");
+  CHECK(refused(good + "propertie float a\n") ==
+        "line 7: the line does not begin with a keyword of a PLY header");
+  CHECK(refused(good + "property float\n") == "line 7: a property has no name");
+  CHECK(refused(good + "property half a\n") == "line 7: a property has an unknown type");
+  CHECK(refused(good + "property float x\n") == "line 7: two properties have the same name");
   CHECK(refused(good + "property list float int a\n") ==
-        "line 7: the length of a list needs an integer type");
-  CHECK(refused(good + "element vertex 1\n") == "line 7: two elements of one name");
+        "line 7: the length of a list must have an integer type");
+  CHECK(refused(good + "element vertex 1\n") == "line 7: two elements have the same name");
   CHECK(refused(good + "element face\n") == "line 7: an element needs a name and a count");
   CHECK(refused(good + "element face -1\n") == "line 7: an element needs a name and a count");
   CHECK(refused("ply\nformat ascii 1.0\nproperty float x\n") ==
-        "line 3: a property before the first element");
+        "line 3: a property precedes the first element");
   CHECK(refused(good + "property list uchar int i\nend_header\n0 0 0 0\n") ==
-        "PLY vertices with a list are not supported");
+        "PLY vertices that have a list are not supported");
   CHECK(refused(good + "property float nx\nend_header\n0 0 0 0\n") ==
-        "PLY vertices have not all of nx, ny and nz");
-  CHECK(refused("ply\nformat ascii 1.0\nend_header\n") == "a PLY file without vertices");
+        "the PLY vertices do not have all of nx, ny and nz");
+  CHECK(refused("ply\nformat ascii 1.0\nend_header\n") == "the PLY file has no vertices");
   CHECK(refused("ply\nformat ascii 1.0\nelement vertex 0\nend_header\n") ==
-        "PLY vertices without x, y and z");
+        "the PLY vertices have no x, y and z");
   CHECK(refused(good + "comment " + std::string(2'000'000, 'c') + "\nend_header\n") ==
-        "line 7: a PLY header of more than 1 MiB");
+        "line 7: the PLY header has more than 1 MiB");
 }
 
 TEST_CASE("ply: a count that the file cannot hold is refused when it is opened", "[io][points]") {
@@ -322,15 +322,15 @@ TEST_CASE("ply: a list cut anywhere is refused where it is cut", "[io][points]")
   CHECK(fault(scratch, whole).empty());
   for (std::size_t size = whole.size() - 20 + 4; size < whole.size(); ++size) {
     CHECK_THAT(fault(scratch, whole.substr(0, size)),
-               Contains("the file ends too early, " + std::to_string(whole.size() - size) +
+               Contains("the file ends too early: " + std::to_string(whole.size() - size) +
                         " bytes are missing"));
   }
   std::string negative = whole;
   negative.replace(negative.find("uint"), 4, "int ").replace(negative.size() - 20, 4, raw(-1));
-  CHECK_THAT(fault(scratch, negative), Contains("a list of negative length"));
+  CHECK_THAT(fault(scratch, negative), Contains("a list has a negative length"));
   std::string huge = whole;
   huge.replace(huge.size() - 20, 4, raw(0xffffffffU));
-  CHECK_THAT(fault(scratch, huge), Contains("a record of more than 64 MiB"));
+  CHECK_THAT(fault(scratch, huge), Contains("a record has more than 64 MiB"));
 }
 
 TEST_CASE("ply: every truncation of an ascii file but of its last word is refused",
@@ -390,16 +390,17 @@ TEST_CASE("ply: every truncation and every flipped byte of a gzip file is refuse
 TEST_CASE("ply: what follows the last element is refused", "[io][points]") {
   const Scratch scratch;
   const std::string binary = binary_cloud(false);
-  CHECK(fault(scratch, binary + "x") ==
-        "offset " + std::to_string(binary.size()) + ": more data than the header says");
+  CHECK(fault(scratch, binary + "x") == "offset " + std::to_string(binary.size()) +
+                                            ": the file has more data than its header says");
   CHECK(fault(scratch, ascii_cloud() + "\n \n").empty());
-  CHECK_THAT(fault(scratch, ascii_cloud() + "1 2 3\n"), EndsWith("more data than the header says"));
+  CHECK_THAT(fault(scratch, ascii_cloud() + "1 2 3\n"),
+             EndsWith("the file has more data than its header says"));
 }
 
 TEST_CASE("ply: lines of text have exactly the values that they should", "[io][points]") {
   const Scratch scratch;
   CHECK_THAT(fault(scratch, one_point(kXyz, "1 2 3 4")),
-             EndsWith("more values than element 'vertex' has"));
+             EndsWith("the line has more values than element 'vertex'"));
   CHECK_THAT(fault(scratch, one_point(kXyz, "10000 2000 ")),
              EndsWith("the value of property 'z' is missing"));
   CHECK_THAT(fault(scratch, one_point(kXyz, "1 2 3x")), EndsWith("property 'z' is not a number"));

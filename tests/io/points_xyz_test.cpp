@@ -61,20 +61,22 @@ TEST_CASE("xyz: a file without points gives none", "[io][points]") {
 TEST_CASE("xyz: lines at fault are named", "[io][points]") {
   const Scratch scratch;
   CHECK_THAT(fault(scratch, "1 2 3 4\n"),
-             EndsWith("line 1: 4 values; XYZ lines have 3, 6, 7 or 10"));
+             EndsWith("line 1: 4 values, but lines of XYZ have 3, 6, 7 or 10"));
   CHECK_THAT(fault(scratch, "1 2 3\n\n1 2 3 0 0 1\n"),
-             EndsWith("line 3: 6 values where the first line has 3"));
-  CHECK_THAT(fault(scratch, "1 2 3 4 5 6 7 8 9 0 1\n"), EndsWith("line 1: more than 10 values"));
-  CHECK_THAT(fault(scratch, "X Y Z\n1 2 3\n"), EndsWith("line 1: not a number"));
-  CHECK_THAT(fault(scratch, "1,2,3\n"), EndsWith("line 1: not a number"));
+             EndsWith("line 3: 6 values, but the first line has 3"));
+  CHECK_THAT(fault(scratch, "1 2 3 4 5 6 7 8 9 0 1\n"),
+             EndsWith("line 1: the line has more than 10 values"));
+  CHECK_THAT(fault(scratch, "X Y Z\n1 2 3\n"), EndsWith("line 1: a value is not a number"));
+  CHECK_THAT(fault(scratch, "1,2,3\n"), EndsWith("line 1: a value is not a number"));
   CHECK_THAT(fault(scratch, "#\n1 2 3 0 0 1\n1 2 3 0 0 0\n"),
-             EndsWith("line 3: point 1: a normal of zero length"));
-  CHECK_THAT(fault(scratch, "1 2 nan\n"),
-             EndsWith("line 1: point 0: a position that is not finite"));
-  CHECK_THAT(fault(scratch, "1 2 3 0 0 1 -4\n"),
-             EndsWith("point 0: a radius that is negative, no number or beyond floats"));
-  CHECK_THAT(fault(scratch, "1 2 3 0 0 1 4 1 1 -1\n"),
-             EndsWith("point 0: a radiance that is negative, no number or beyond floats"));
+             EndsWith("line 3: point 1: the normal has zero length"));
+  CHECK_THAT(fault(scratch, "1 2 nan\n"), EndsWith("line 1: point 0: the position is not finite"));
+  CHECK_THAT(
+      fault(scratch, "1 2 3 0 0 1 -4\n"),
+      EndsWith("point 0: the radius is negative, not a number or beyond the range of float"));
+  CHECK_THAT(
+      fault(scratch, "1 2 3 0 0 1 4 1 1 -1\n"),
+      EndsWith("point 0: the radiance is negative, not a number or beyond the range of float"));
 }
 
 TEST_CASE("xyz: every truncation gives points or a refusal that names the file", "[io][points]") {
@@ -92,5 +94,5 @@ TEST_CASE("xyz: a line longer than the buffer is read, one beyond 64 MiB is refu
   const std::string blanks(700'000, ' ');
   CHECK(read_all(scratch.file("a.xyz", "1 2" + blanks + "3\n4 5 6\n")).size() == 2);
   CHECK_THAT(fault(scratch, std::string((std::size_t{1} << 26) + 10, ' ') + "1 2 3\n"),
-             EndsWith("a line or record of more than 64 MiB"));
+             EndsWith("a line or record has more than 64 MiB"));
 }

@@ -45,13 +45,14 @@ TEST_CASE("stl: text and binary are told apart by their size", "[io][mesh]") {
 
 TEST_CASE("stl: files that break a rule are refused by line", "[io][mesh]") {
   const Scratch scratch;
-  CHECK_THAT(fault(scratch, "no\n"), EndsWith("line 1: no keyword of STL"));
+  CHECK_THAT(fault(scratch, "no\n"),
+             EndsWith("line 1: the line does not begin with a keyword of STL"));
   CHECK_THAT(fault(scratch, "solid\nvertex 1 2\n"),
-             EndsWith("line 2: a vertex without three numbers"));
+             EndsWith("line 2: the vertex does not have three numbers"));
   CHECK_THAT(fault(scratch, ""), EndsWith("no triangle"));
   std::string nan = kText;
   nan.replace(nan.find("10000000.003"), 12, "nan");
-  CHECK_THAT(fault(scratch, nan), EndsWith("vertex 1: a position that is not finite"));
+  CHECK_THAT(fault(scratch, nan), EndsWith("vertex 1: the position is not finite"));
 }
 
 TEST_CASE("stl: every truncation before the last line is refused", "[io][mesh]") {

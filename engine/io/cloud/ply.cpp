@@ -1,4 +1,11 @@
-// The records of PLY files.
+// The records of PLY files, by one of three ways:
+//
+//   read_ascii()    a line of words per record
+//   read_fixed()    binary records of equal size: one range of bytes per record
+//   read_lists()    binary records with lists: value by value, since each length says how far to go
+//
+// Lengths of lists come from the file. Nothing is allocated for a length before the bytes or words
+// that it promises have been seen.
 #include "engine/io/cloud/ply.h"
 
 #include <algorithm>
@@ -13,6 +20,7 @@
 namespace ptc {
 namespace {
 
+// Reads a number of type T, with its bytes reversed if `swap` says so.
 template <typename T>
 double load_as(const std::byte* from, bool swap) noexcept {
   std::array<std::byte, sizeof(T)> bytes;
@@ -31,7 +39,7 @@ constexpr Range range_of() {
   return {std::numeric_limits<T>::lowest(), std::numeric_limits<T>::max()};
 }
 
-// What an integer property may hold in text; any value for the others.
+// Says whether a value that is written as text fits the type of its property.
 bool fits(double value, PlyType type) noexcept {
   constexpr std::array<Range, 6> kRanges = {range_of<std::int8_t>(),  range_of<std::uint8_t>(),
                                             range_of<std::int16_t>(), range_of<std::uint16_t>(),
@@ -68,7 +76,7 @@ double PlyReader::load(const std::byte* from, PlyType type) const noexcept {
 }
 
 std::size_t PlyReader::list_length(const PlyRecord& record, double value) const {
-  if (value < 0) fail(record, "a list of negative length");
+  if (value < 0) fail(record, "a list has a negative length");
   return static_cast<std::size_t>(value);  // at most 2^32 - 1: lengths are integers
 }
 
@@ -116,14 +124,17 @@ void PlyReader::read_lists(const PlyElement& element, PlyRecord& record) {
 }
 
 void PlyReader::read_ascii(const PlyElement& element, PlyRecord& record) {
+  // Find the next line that has words.
   std::string_view line;
   do {
     if (!stream_.next_line(line)) {
-      stream_.fail_at_line("the file ends too early, records of element '" + element.name +
+      stream_.fail_at_line("the file ends too early: records of element '" + element.name +
                            "' are missing");
     }
   } while (Words(line).rest().empty());
   record.place = stream_.line();
+
+  // Read a word for each scalar; a length and that many words for each list.
   Words words(line);
   const auto value = [&](const PlyProperty& property, PlyType type) {
     const std::string_view word = words.next();
@@ -140,18 +151,19 @@ void PlyReader::read_ascii(const PlyElement& element, PlyRecord& record) {
       continue;
     }
     const std::size_t length = list_length(record, value(property, *property.length_type));
-    record.lists[i].clear();  // grows by words that are there, not by what the length says
+    record.lists[i].clear();  // it grows by words that exist, not by what the length says
     for (std::size_t k = 0; k < length; ++k) {
       record.lists[i].push_back(value(property, property.type));
     }
   }
-  if (!words.next().empty()) fail(record, "more values than element '" + element.name + "' has");
+  if (!words.next().empty())
+    fail(record, "the line has more values than element '" + element.name + "'");
 }
 
 void PlyReader::skip(const PlyElement& element) {
   if (element.properties.empty()) return;
   if (encoding_ != PlyEncoding::ascii && element.fixed_bytes > 0) {
-    // The counts were compared with the size of the file: the product cannot wrap.
+    // The counts were compared with the size of the file, so the product cannot overflow.
     stream_.skip(element.count * element.fixed_bytes);
     return;
   }
@@ -161,12 +173,14 @@ void PlyReader::skip(const PlyElement& element) {
 
 void PlyReader::require_end() {
   if (encoding_ != PlyEncoding::ascii) {
-    if (!stream_.at_end()) stream_.fail_at(stream_.offset(), "more data than the header says");
+    if (!stream_.at_end())
+      stream_.fail_at(stream_.offset(), "the file has more data than its header says");
     return;
   }
   std::string_view line;
   while (stream_.next_line(line)) {
-    if (!Words(line).rest().empty()) stream_.fail_at_line("more data than the header says");
+    if (!Words(line).rest().empty())
+      stream_.fail_at_line("the file has more data than its header says");
   }
 }
 

@@ -1,5 +1,13 @@
-// PLY files: the header, and records of any shape. Source: Turk, "The PLY Polygon File Format",
-// 1994.
+// A reader of PLY files: the header, and records of any shape. Source: Turk, "The PLY Polygon File
+// Format", 1994.
+//
+//   ply                            magic
+//   format ascii 1.0               PlyEncoding
+//   element vertex 8               PlyElement: a name and the number of its records
+//   property float x               PlyProperty of the element above: a scalar ...
+//   property list uchar int face   ... or a list: a length, then that many values
+//   end_header
+//   records of the first element, records of the second element, ...
 #pragma once
 
 #include <cstddef>
@@ -14,55 +22,66 @@
 
 namespace ptc {
 
+/// The encoding of the records of a PLY file.
 enum class PlyEncoding { ascii, little_endian, big_endian };
 
+/// The type of a number in a PLY file.
 enum class PlyType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
+/// A property of an element: a scalar or a list in each of its records.
 struct PlyProperty {
   std::string name;
-  PlyType type = PlyType::float32;
-  std::optional<PlyType> length_type;  ///< of a list
+  PlyType type = PlyType::float32;     ///< type of the scalar, or of each value of the list
+  std::optional<PlyType> length_type;  ///< type of the length of a list; nothing for a scalar
 };
 
+/// An element: a kind of record, such as "vertex" or "face".
 struct PlyElement {
   std::string name;
-  std::uint64_t count = 0;
-  std::vector<PlyProperty> properties;
-  std::size_t fixed_bytes = 0;  ///< of every binary record; 0 when there is a list
+  std::uint64_t count = 0;              ///< number of records
+  std::vector<PlyProperty> properties;  ///< in the order of a record
+  std::size_t fixed_bytes = 0;          ///< size of a binary record; 0 when it has a list
 
-  /// Index of the property of this name.
+  /// Returns the index of the property of this name, if there is one.
   [[nodiscard]] std::optional<std::size_t> find(std::string_view property) const;
-  /// Index of the first property that has one of these names.
+  /// Returns the index of the property for the first of these names that the element has.
   [[nodiscard]] std::optional<std::size_t> find_any(
       std::initializer_list<std::string_view> names) const;
+  /// Says whether a property is a list.
   [[nodiscard]] bool has_list() const;
 };
 
-/// One record; every type of PLY is exact in double.
+/// One record of an element. Every type of PLY is exact in double.
 struct PlyRecord {
   std::vector<double> scalars;             ///< by index of the property; 0 for lists
   std::vector<std::vector<double>> lists;  ///< by index of the property; empty for scalars
-  std::uint64_t place = 0;                 ///< offset (binary) or line (ascii)
+  std::uint64_t place = 0;                 ///< offset (binary) or line (ascii) of the record
 };
 
-/// Reads a PLY file front to back: the header when it is opened, then the elements in their order.
+/// Reads a PLY file from front to back: the header on construction, then the records of all
+/// elements in the order of elements().
 class PlyReader {
  public:
-  /// @throws DataError when the header breaks a rule or counts more than the file can hold;
+  /// Opens a file and reads its header.
+  /// @throws DataError when the header breaks a rule or counts more records than the file can hold;
   ///         std::system_error
   explicit PlyReader(const std::filesystem::path& path);
 
+  /// Returns the elements in the order of the file.
   [[nodiscard]] const std::vector<PlyElement>& elements() const noexcept { return elements_; }
+  /// Returns the element of this name, or null.
   [[nodiscard]] const PlyElement* find(std::string_view element) const;
 
-  /// Reads the next record of the file, which belongs to `element`.
-  /// @throws DataError when the file ends, or (ascii) a line has not the values that it should
+  /// Reads the next record of the file, which must belong to `element`.
+  /// @throws DataError when the file ends or a line (ascii) does not have the values that it should
   void read(const PlyElement& element, PlyRecord& record);
-  /// Passes over all records of an element.
+  /// Skips all records of an element, none of which was read yet.
   void skip(const PlyElement& element);
-  /// @throws DataError when there is more than the header says; binary: any byte, ascii: any word
+  /// Checks that nothing follows the records: no byte (binary) or no word (ascii).
+  /// @throws DataError when something does
   void require_end();
-  /// @throws DataError "PATH: offset N: RULE" or "PATH: line N: RULE" of a record
+  /// Refuses the file because of a record.
+  /// @throws DataError "PATH: offset N: RULE" (binary) or "PATH: line N: RULE" (ascii)
   [[noreturn]] void fail(const PlyRecord& record, const std::string& rule) const;
 
  private:

@@ -1,4 +1,7 @@
-// The header of PLY files: every rule that can be checked before data is read.
+// The header of PLY files, and every rule that can be checked before data is read.
+//
+// A header can count 2^63 records in a line. check_counts() compares the counts with the size of
+// the file, so that a caller may allocate memory for as many records as the header counts.
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -10,7 +13,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
-constexpr std::size_t kMaxNames = 1024;  // elements, and properties of one element
+constexpr std::size_t kMaxNames = 1024;  // elements of a file, properties of one element
 
 std::optional<PlyType> type_named(std::string_view name) {
   constexpr std::array<std::pair<std::string_view, PlyType>, 16> kNames = {
@@ -81,15 +84,18 @@ const PlyElement* PlyReader::find(std::string_view element) const {
 }
 
 void PlyReader::read_header() {
+  // Check the mark first; without it the file may be a single line of any length.
   std::string_view line;
-  // The mark first: without it the file may be one line of any length.
   constexpr std::string_view kMark = "ply";
   const bool marked =
       stream_.max_left() > kMark.size() && stream_.next_line(line) && Words(line).next() == kMark;
   if (!marked) stream_.fail_at(0, "not a PLY file");
+
+  // Read the format, then elements and properties up to the end of the header.
   bool has_format = false;
   while (stream_.next_line(line)) {
-    if (stream_.offset() > kMaxHeaderBytes) stream_.fail_at_line("a PLY header of more than 1 MiB");
+    if (stream_.offset() > kMaxHeaderBytes)
+      stream_.fail_at_line("the PLY header has more than 1 MiB");
     Words words(line);
     const std::string_view keyword = words.next();
     if (keyword == "comment" || keyword == "obj_info" || keyword.empty()) continue;
@@ -102,9 +108,9 @@ void PlyReader::read_header() {
       } else if (name == "binary_big_endian") {
         encoding_ = PlyEncoding::big_endian;
       } else {
-        stream_.fail_at_line("a PLY header begins with its format");
+        stream_.fail_at_line("a PLY header must begin with its format");
       }
-      if (words.next() != "1.0") stream_.fail_at_line("a PLY version other than 1.0");
+      if (words.next() != "1.0") stream_.fail_at_line("the PLY version is not 1.0");
       has_format = true;
     } else if (!read_header_line(line)) {
       return;
@@ -113,7 +119,7 @@ void PlyReader::read_header() {
   stream_.fail_at_line("the PLY header has no end");
 }
 
-// Returns false at the end of the header.
+// Reads a line of the header behind its format. Returns false at the end of the header.
 bool PlyReader::read_header_line(std::string_view line) {
   Words words(line);
   const std::string_view keyword = words.next();
@@ -124,7 +130,7 @@ bool PlyReader::read_header_line(std::string_view line) {
   } else if (keyword == "property") {
     add_property(words.rest());
   } else {
-    stream_.fail_at_line("no keyword of a PLY header");
+    stream_.fail_at_line("the line does not begin with a keyword of a PLY header");
   }
   return true;
 }
@@ -134,37 +140,38 @@ void PlyReader::add_element(std::string_view name, std::string_view count) {
   if (name.empty() || !number || *number < 0) {
     stream_.fail_at_line("an element needs a name and a count");
   }
-  if (find(name) != nullptr) stream_.fail_at_line("two elements of one name");
-  if (elements_.size() == kMaxNames) stream_.fail_at_line("more than 1024 elements");
+  if (find(name) != nullptr) stream_.fail_at_line("two elements have the same name");
+  if (elements_.size() == kMaxNames) stream_.fail_at_line("there are more than 1024 elements");
   elements_.push_back({std::string(name), static_cast<std::uint64_t>(*number), {}, 0});
 }
 
 void PlyReader::add_property(std::string_view line) {
-  if (elements_.empty()) stream_.fail_at_line("a property before the first element");
+  if (elements_.empty()) stream_.fail_at_line("a property precedes the first element");
   Words words(line);
   PlyProperty property;
   std::string_view word = words.next();
   if (word == "list") {
     property.length_type = type_named(words.next());
     if (!property.length_type || !is_integer(*property.length_type)) {
-      stream_.fail_at_line("the length of a list needs an integer type");
+      stream_.fail_at_line("the length of a list must have an integer type");
     }
     word = words.next();
   }
   const std::optional<PlyType> type = type_named(word);
-  if (!type) stream_.fail_at_line("a property of unknown type");
+  if (!type) stream_.fail_at_line("a property has an unknown type");
   property.type = *type;
   property.name = words.next();
-  if (property.name.empty()) stream_.fail_at_line("a property without name");
+  if (property.name.empty()) stream_.fail_at_line("a property has no name");
   PlyElement& element = elements_.back();
-  if (element.find(property.name)) stream_.fail_at_line("two properties of one name");
-  if (element.properties.size() == kMaxNames) stream_.fail_at_line("more than 1024 properties");
+  if (element.find(property.name)) stream_.fail_at_line("two properties have the same name");
+  if (element.properties.size() == kMaxNames)
+    stream_.fail_at_line("an element has more than 1024 properties");
   element.properties.push_back(std::move(property));
 }
 
 void PlyReader::check_counts() const {
   const bool ascii = encoding_ == PlyEncoding::ascii;
-  // The last line of a text may lack its end.
+  // Allow for the last line of a text, which may lack its end.
   std::uint64_t left = stream_.max_left() + (ascii ? 1 : 0);
   for (const PlyElement& element : elements_) {
     const std::uint64_t least = ply_least_bytes(element, ascii);

@@ -1,4 +1,4 @@
-// Inside the PLY reader: sizes of types and records.
+// Internal to the PLY reader: sizes of types and records.
 #pragma once
 
 #include <array>
@@ -9,12 +9,14 @@
 
 namespace ptc {
 
+/// Returns the bytes of a binary number of this type.
 [[nodiscard]] constexpr std::size_t ply_type_bytes(PlyType type) noexcept {
   constexpr std::array<std::size_t, 8> kBytes = {1, 1, 2, 2, 4, 4, 4, 8};
   return kBytes[static_cast<std::size_t>(type)];
 }
 
-/// Bytes of the smallest record: empty lists; in text one digit and one separator a value.
+/// Returns the bytes of the smallest possible record of an element: all lists are empty, and in
+/// text each value is one digit and one separator.
 [[nodiscard]] std::uint64_t ply_least_bytes(const PlyElement& element, bool ascii) noexcept;
 
 }  // namespace ptc

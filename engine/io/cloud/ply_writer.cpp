@@ -1,4 +1,4 @@
-// Clouds to PLY.
+// Writes clouds to PLY, and finds names for their columns.
 #include <algorithm>
 #include <cctype>
 #include <set>
@@ -11,6 +11,7 @@
 namespace ptc {
 namespace {
 
+// Returns what each component of a column appends to its name.
 std::vector<std::string> suffixes(const PointColumn& column) {
   if (column.components == 1) return {""};
   if (column.components == 3) {
@@ -35,14 +36,16 @@ bool is_property_name(const std::string& name) {
   });
 }
 
+// Returns the header, or throws when a name cannot be a property or occurs twice.
 std::string make_header(std::uint64_t count, const std::vector<PointColumn>& columns) {
   std::string text =
       "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(count) + "\n";
   std::set<std::string> seen;
   const auto add = [&](const char* type, const std::string& name) {
     if (!is_property_name(name))
-      throw std::invalid_argument("PlyWriter: no property name: " + name);
-    if (!seen.insert(name).second) throw std::invalid_argument("PlyWriter: two properties " + name);
+      throw std::invalid_argument("PlyWriter: not a property name: " + name);
+    if (!seen.insert(name).second)
+      throw std::invalid_argument("PlyWriter: two properties have the name " + name);
     text += std::string("property ") + type + " " + name + "\n";
   };
   for (const char* name : {"x", "y", "z"}) add("double", name);
@@ -100,9 +103,9 @@ struct PlyWriter::Impl {
   }
 
   std::vector<PointColumn> columns;
-  std::string header;  // made before the file: a bad column leaves none
-  std::uint64_t announced;
-  std::uint64_t came = 0;
+  std::string header;       // made before the file, so that a bad column leaves no file
+  std::uint64_t announced;  // points of the header
+  std::uint64_t came = 0;   // points of all write() calls
   std::size_t values_a_point = 0;
   BufferedOutput out;
 };
@@ -120,7 +123,7 @@ void PlyWriter::write(std::span<const Surfel> surfels, std::span<const float> va
                                 std::to_string(surfels.size()) + " points");
   }
   impl_->came += surfels.size();
-  if (impl_->came > impl_->announced) return;  // finish() says so
+  if (impl_->came > impl_->announced) return;  // finish() will refuse the file
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     impl_->put(surfels[i]);
     impl_->out.put(values.data() + i * stride, stride * sizeof(float));

@@ -1,4 +1,9 @@
-// Clouds from PLY; which files are clouds.
+// Reads clouds from PLY, checks surfels of all files, and says which files are clouds.
+//
+// A PLY header names the properties of a vertex in any order. find_layout() looks them up once;
+// then each record is gathered into a RawSurfel, which convert_surfel() checks and rounds:
+//
+//   header --find_layout()--> Layout        record --gather()--> RawSurfel --check--> Surfel
 #include "engine/io/cloud/points.h"
 
 #include <algorithm>
@@ -21,20 +26,21 @@ namespace {
 
 using Triple = std::array<std::size_t, 3>;
 
-// Where the vertex element keeps what.
+// The indices of the properties of a vertex that make a surfel.
 struct Layout {
   Triple position{};
   std::optional<Triple> normal;
   std::optional<std::size_t> radius;
   std::optional<Triple> radiance;
   std::optional<Triple> albedo;
-  std::array<double, 3> albedo_most{};  // stored value of 1; 0: linear floats
+  std::array<double, 3> albedo_most{};  // stored value that stands for 1; 0 for linear floats
 };
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& rule) {
   throw DataError(path.string() + ": " + rule);
 }
 
+// Finds three properties; it refuses a file that has only one or two of them.
 std::optional<Triple> find_triple(const PlyElement& vertex, const std::filesystem::path& path,
                                   const std::array<const char*, 3>& names) {
   Triple triple{};
@@ -47,13 +53,13 @@ std::optional<Triple> find_triple(const PlyElement& vertex, const std::filesyste
   }
   if (found == 0) return std::nullopt;
   if (found < 3) {
-    refuse(path, std::string("PLY vertices have not all of ") + names[0] + ", " + names[1] +
+    refuse(path, std::string("the PLY vertices do not have all of ") + names[0] + ", " + names[1] +
                      " and " + names[2]);
   }
   return triple;
 }
 
-// 0 for floats: they are linear already.
+// Returns the stored value that stands for 1, or 0 for floats, which are linear already.
 double stored_one(PlyType type) {
   switch (type) {
     case PlyType::float32:
@@ -79,10 +85,10 @@ Layout find_layout(const PlyElement& vertex, const std::filesystem::path& path) 
     }
     return found;
   };
-  if (vertex.has_list()) refuse(path, "PLY vertices with a list are not supported");
+  if (vertex.has_list()) refuse(path, "PLY vertices that have a list are not supported");
   Layout layout;
   const auto position = first({{"x", "y", "z"}});
-  if (!position) refuse(path, "PLY vertices without x, y and z");
+  if (!position) refuse(path, "the PLY vertices have no x, y and z");
   layout.position = *position;
   layout.normal = first({{"nx", "ny", "nz"}, {"normal_x", "normal_y", "normal_z"}});
   layout.radius = vertex.find_any({"radius", "scalar_radius"});
@@ -103,7 +109,7 @@ class PlySource : public PointSource {
  public:
   explicit PlySource(const std::filesystem::path& path) : reader_(path), path_(path) {
     vertex_ = reader_.find("vertex");
-    if (vertex_ == nullptr) refuse(path, "a PLY file without vertices");
+    if (vertex_ == nullptr) refuse(path, "the PLY file has no vertices");
     layout_ = find_layout(*vertex_, path);
     if (layout_.albedo) fill_curve();
   }
@@ -123,7 +129,7 @@ class PlySource : public PointSource {
       read_surfel(surfel);
       ++done_;
     }
-    // The rest is read along with the last points, so that no caller can stop before it is checked.
+    // Read the rest along with the last points, so that no caller can stop before it is checked.
     if (done_ == vertex_->count) finish();
     return count;
   }
@@ -140,13 +146,15 @@ class PlySource : public PointSource {
     ended_ = true;
   }
 
+  // Tabulates the sRGB curve for 8-bit values.
   void fill_curve() {
     for (std::size_t i = 0; i < curve_.size(); ++i) {
       curve_[i] = srgb_to_linear(static_cast<double>(i) / 255);
     }
   }
 
-  // Out-of-range values stay out of range for the check of the surfel.
+  // Returns the linear albedo of a stored value. A value out of range gives one that the check of
+  // the surfel refuses.
   [[nodiscard]] double albedo_of(double stored, double most) const {
     if (most == 0) return stored;
     if (!(stored >= 0 && stored <= most)) return std::numeric_limits<double>::quiet_NaN();
@@ -169,12 +177,12 @@ class PlySource : public PointSource {
 
   PlyReader reader_;
   std::filesystem::path path_;
-  const PlyElement* vertex_ = nullptr;
+  const PlyElement* vertex_ = nullptr;  // an element of reader_
   Layout layout_;
-  std::array<double, 256> curve_{};
-  PlyRecord record_;
-  std::uint64_t done_ = 0;
-  bool ended_ = false;
+  std::array<double, 256> curve_{};  // linear value of each 8-bit sRGB value
+  PlyRecord record_;                 // kept between calls
+  std::uint64_t done_ = 0;           // points that were read
+  bool ended_ = false;               // everything behind the vertices was read
 };
 
 bool is_ply(const std::filesystem::path& path) {
@@ -199,25 +207,30 @@ bool all_within(const glm::dvec3& v, double most) {
 
 std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out) {
   constexpr double kMaxFloat = std::numeric_limits<float>::max();
-  if (!all_finite(raw.position)) return "a position that is not finite";
+  // Check the numbers against the ranges that records can hold.
+  if (!all_finite(raw.position)) return "the position is not finite";
   if (glm::any(glm::greaterThan(glm::abs(raw.position), glm::dvec3(kMaxCoordinate))))
-    return "a position beyond 2^999";
+    return "the position is beyond 2^999";
   if (!(raw.radius >= 0 && raw.radius <= kMaxFloat))
-    return "a radius that is negative, no number or beyond floats";
+    return "the radius is negative, not a number or beyond the range of float";
   if (!all_within(raw.radiance, kMaxFloat))
-    return "a radiance that is negative, no number or beyond floats";
-  if (!all_within(raw.albedo, 1)) return "a colour outside its range";
+    return "the radiance is negative, not a number or beyond the range of float";
+  if (!all_within(raw.albedo, 1)) return "the colour is out of range";
+
+  // Convert them.
   out.position = raw.position;
   out.normal = glm::vec3(0);
   out.radius = static_cast<float>(raw.radius);
   out.radiance = glm::vec3(raw.radiance);
   out.albedo = glm::vec3(raw.albedo);
   if (!has_normals) return {};
-  if (!all_finite(raw.normal)) return "a normal that is not finite";
-  // Scaled first: squares of very small or large components would leave the range.
+
+  // Normalise the normal; scale it first, because squares of very small or large components would
+  // leave the range of double.
+  if (!all_finite(raw.normal)) return "the normal is not finite";
   const double most =
       std::max({std::abs(raw.normal.x), std::abs(raw.normal.y), std::abs(raw.normal.z)});
-  if (most == 0) return "a normal of zero length";
+  if (most == 0) return "the normal has zero length";
   const glm::dvec3 scaled = raw.normal / most;
   out.normal = glm::vec3(
       scaled / std::sqrt(scaled.x * scaled.x + scaled.y * scaled.y + scaled.z * scaled.z));

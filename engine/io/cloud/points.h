@@ -1,4 +1,4 @@
-// Point clouds in and out: PLY and XYZ.
+// Reading and writing of point clouds: PLY and XYZ files.
 #pragma once
 
 #include <cstddef>
@@ -16,67 +16,77 @@
 
 namespace ptc {
 
-/// What a point file says of itself before its points are read.
+/// The facts about a point file that are known before its points are read.
 struct PointFileInfo {
-  std::optional<std::uint64_t> count;  ///< XYZ does not say
-  bool has_normals = false;            ///< without, normals are 0: surfels that nothing can light
-  bool has_radius = false;             ///< without, radii are 0
-  bool has_radiance = false;           ///< without, surfels are black
-  bool has_albedo = false;             ///< colour; without, albedo is 0.5
+  std::optional<std::uint64_t> count;  ///< number of points; XYZ files do not record it
+  bool has_normals = false;            ///< otherwise normals are 0, and nothing can light a surfel
+  bool has_radius = false;             ///< otherwise radii are 0
+  bool has_radiance = false;           ///< otherwise radiance is 0
+  bool has_albedo = false;             ///< the file has colours; otherwise albedo is 0.5
 };
 
+/// An open point file.
 struct PointFile {
   PointFileInfo info;
-  std::unique_ptr<PointSource> source;
+  std::unique_ptr<PointSource> source;  ///< yields the points once, in the order of the file
 };
 
-/// Opens a cloud for one pass, in constant memory.
+/// Opens a point cloud for one pass in constant memory.
 ///
-/// PLY, ascii or binary, may be gzipped (.ply.gz). Properties of `vertex`: x y z; nx ny nz or
-/// normal_x normal_y normal_z; radius or scalar_radius; radiance_r radiance_g radiance_b; red green
-/// blue or diffuse_red diffuse_green diffuse_blue, the albedo: integers are sRGB (8 bits; 16 for
-/// short types), floats linear in [0, 1]. Others are passed over.
+/// PLY files, ascii or binary, may be compressed (.ply.gz). These properties of `vertex` are read:
+/// x y z; nx ny nz or normal_x normal_y normal_z; radius or scalar_radius; radiance_r radiance_g
+/// radiance_b; red green blue or diffuse_red diffuse_green diffuse_blue. The last six are the
+/// albedo: integers are sRGB (8 bits; 16 for short types), floats are linear in [0, 1]. All other
+/// properties are skipped.
 ///
-/// XYZ text (.xyz .xyzn .asc .txt): lines "x y z [nx ny nz [radius [r g b]]]", r g b the linear
-/// radiance, # comments; all lines have as many values as the first.
+/// XYZ text files (.xyz .xyzn .asc .txt) have lines "x y z [nx ny nz [radius [r g b]]]", where r g
+/// b is the linear radiance, and comments that begin with #. All lines have as many values as the
+/// first.
 ///
-/// Every surfel is checked: position finite and within kMaxCoordinate, normal of non-zero finite
-/// length (it is normalised), radius finite and not negative, radiance finite and not negative,
-/// albedo in [0, 1]. A PLY that ends early, counts more than it can hold, or goes on after its last
-/// element is refused.
-/// @throws DataError naming file, offset (binary) or line (text) and point; std::system_error
-/// Memory: below 1 MiB, for packed files and lines over 256 KiB more (see ByteStream).
+/// Every surfel is checked: the position is finite and within kMaxCoordinate, the normal has a
+/// non-zero finite length (it is normalised), radius and radiance are finite and not negative, and
+/// the albedo is in [0, 1]. A PLY file that ends early, counts more records than it can hold, or
+/// goes on after its last element is refused.
+/// @throws DataError that names the file, the offset (binary) or line (text) and the point;
+///         std::system_error
+/// Memory: below 1 MiB, and more for compressed files and lines over 256 KiB (see ByteStream).
 [[nodiscard]] PointFile open_points(const std::filesystem::path& path);
 
-/// True when the name ends like a cloud (.xyz .xyzn .asc .txt) or, for .ply and .ply.gz, when the
-/// file has no faces. @throws DataError, std::system_error as open_points()
+/// Says whether a file is a point cloud: its name ends in .xyz, .xyzn, .asc or .txt, or in .ply or
+/// .ply.gz and the file has no faces.
+/// @throws DataError when a PLY header breaks a rule; std::system_error
 [[nodiscard]] bool is_point_file(const std::filesystem::path& path);
 
-/// A named per-point quantity for a sink, `components` floats a point.
+/// A named quantity of every point that PlyWriter writes in addition to the surfel.
 struct PointColumn {
-  std::string name;         ///< PLY property, of letters, digits and _
-  unsigned components = 1;  ///< 1: the name as it is; 3: with _r _g _b; else with _0 _1 ...
-  bool vector = false;      ///< three components get _x _y _z instead
+  std::string name;         ///< name of the PLY property, of letters, digits and _
+  unsigned components = 1;  ///< 1 keeps the name; 3 appends _r _g _b; others append _0 _1 ...
+  bool vector = false;      ///< three components append _x _y _z instead of _r _g _b
 };
 
-/// Channels as columns of a PLY, with the names that spec/points.md#ply gives them: none is a
-/// property of the surfel, and none is there twice.
+/// Returns the columns under which a PLY file holds channels. Their names are those of
+/// spec/points.md#ply; none is a property of the surfel, and no two are equal.
 [[nodiscard]] std::vector<PointColumn> ply_columns(std::span<const Channel> channels);
 
-/// Writes binary little-endian PLY: x y z (double), nx ny nz, radius, radiance_rgb, albedo as
-/// red green blue (float), then the columns (float). Published when finish() returns.
+/// Writes a binary little-endian PLY file: x y z (double), nx ny nz, radius, radiance_rgb, albedo
+/// as red green blue (float), then the columns (float). The file replaces its target when finish()
+/// returns.
 class PlyWriter {
  public:
-  /// @param count  exact number of points that will come
-  /// @throws std::system_error; std::invalid_argument when a column's name is no property name or
-  ///         is taken
+  /// Begins a file.
+  /// @param count  exact number of points that will follow
+  /// @throws std::system_error; std::invalid_argument when the name of a column cannot name a
+  ///         property or occurs twice
   PlyWriter(const std::filesystem::path& target, std::uint64_t count,
             std::vector<PointColumn> columns);
   ~PlyWriter();
-  /// @param values  surfels.size() x sum of components, point by point
+  /// Writes the next points.
+  /// @param values  values of the columns, surfels.size() x sum of components, point by point
   /// @throws std::invalid_argument when `values` has another size; std::system_error
   void write(std::span<const Surfel> surfels, std::span<const float> values);
-  /// @throws std::invalid_argument when fewer or more points came than announced
+  /// Ends the file and puts it in the place of its target.
+  /// @throws std::invalid_argument when the number of points is not the announced one;
+  ///         std::system_error
   void finish();
 
  private:

@@ -1,3 +1,4 @@
+// Quantisation of surfels as spec/points.md#point-page asks for.
 #include "engine/io/cloud/record.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Surfels to the records of the file, and back.
+// Conversion of surfels to the records of a container, and back.
 #pragma once
 
 #include "engine/base/surfel.h"
@@ -6,9 +6,10 @@
 
 namespace ptc {
 
-/// Rounds a surfel to what the file keeps: position to the lattice, normal to 1e-4 rad, radiance to
-/// half (saturating at 65504), albedo to 8 bits.
+/// Returns the record of a surfel. Its position is rounded to the lattice of the frame, the normal
+/// to 1e-4 rad, the radiance to half (at most 65504) and the albedo to 8 bits.
 [[nodiscard]] PointRecord to_record(const Surfel& surfel, const Frame& frame) noexcept;
+/// Returns the surfel of a record. The position is exact.
 [[nodiscard]] Surfel to_surfel(const PointRecord& record, const Frame& frame) noexcept;
 
 }  // namespace ptc

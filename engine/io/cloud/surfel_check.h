@@ -1,4 +1,4 @@
-// Inside the point readers: the rules that every surfel from a file has to meet.
+// Internal to the point readers: the rules that every surfel from a file must keep.
 #pragma once
 
 #include <string>
@@ -8,7 +8,8 @@
 
 namespace ptc {
 
-/// A surfel as its file has it, before it is rounded and its normal scaled.
+/// A surfel as its file has it, before it is rounded and its normal is normalised; the members are
+/// those of Surfel.
 struct RawSurfel {
   glm::dvec3 position{0};
   glm::dvec3 normal{0};
@@ -17,10 +18,11 @@ struct RawSurfel {
   glm::dvec3 albedo{0.5};
 };
 
-/// Sets `out`. @return the rule that `raw` breaks, empty when there is none
+/// Checks a surfel and converts it to `out`.
+/// @return the rule that `raw` breaks, or an empty string when it breaks none
 [[nodiscard]] std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out);
 
-/// XYZ text.
+/// Opens an XYZ text file as open_points() describes.
 [[nodiscard]] PointFile open_xyz(const std::filesystem::path& path);
 
 }  // namespace ptc

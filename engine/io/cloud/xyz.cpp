@@ -1,4 +1,4 @@
-// Clouds from XYZ text.
+// Reads clouds from XYZ text: "x y z [nx ny nz [radius [r g b]]]" on each line.
 #include <array>
 #include <utility>
 
@@ -33,7 +33,8 @@ class XyzSource : public PointSource {
   }
 
  private:
-  // Reads the values of the next line that has some; the first one fixes how many a line has.
+  // Reads the values of the next line that has some. The first such line decides how many values
+  // every line has.
   void read_line() {
     std::string_view line;
     std::size_t count = 0;
@@ -44,12 +45,13 @@ class XyzSource : public PointSource {
     }
     if (columns_ == 0) {
       if (count != 3 && count != 6 && count != 7 && count != 10) {
-        stream_.fail_at_line(std::to_string(count) + " values; XYZ lines have 3, 6, 7 or 10");
+        stream_.fail_at_line(std::to_string(count) +
+                             " values, but lines of XYZ have 3, 6, 7 or 10");
       }
       columns_ = count;
     }
     if (count != columns_) {
-      stream_.fail_at_line(std::to_string(count) + " values where the first line has " +
+      stream_.fail_at_line(std::to_string(count) + " values, but the first line has " +
                            std::to_string(columns_));
     }
   }
@@ -59,8 +61,8 @@ class XyzSource : public PointSource {
     std::size_t count = 0;
     for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
       const std::optional<double> value = parse_number(word);
-      if (!value) stream_.fail_at_line("not a number");
-      if (count == kMaxValues) stream_.fail_at_line("more than 10 values");
+      if (!value) stream_.fail_at_line("a value is not a number");
+      if (count == kMaxValues) stream_.fail_at_line("the line has more than 10 values");
       values_[count++] = *value;
     }
     return count;
@@ -76,10 +78,10 @@ class XyzSource : public PointSource {
   }
 
   ByteStream stream_;
-  std::array<double, kMaxValues> values_{};
-  std::size_t columns_ = 0;
-  bool has_line_ = false;
-  std::uint64_t done_ = 0;
+  std::array<double, kMaxValues> values_{};  // of the line that was read last
+  std::size_t columns_ = 0;                  // values in each line; 0 before the first
+  bool has_line_ = false;                    // values_ holds a line that next() has not returned
+  std::uint64_t done_ = 0;                   // points that next() has returned
 };
 
 }  // namespace

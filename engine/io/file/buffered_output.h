@@ -1,4 +1,4 @@
-// Inside the writers: many small pieces gathered into large writes.
+// Internal to the writers of foreign formats: gathers many small pieces into large writes.
 #pragma once
 
 #include <bit>
@@ -13,25 +13,31 @@ namespace ptc {
 static_assert(std::endian::native == std::endian::little,
               "values are stored as they lie in memory");
 
-/// An OutputFile written front to back. @throws std::system_error
+/// An OutputFile that is written from front to back through a buffer. Every call throws
+/// std::system_error when the system refuses to write.
+///
+/// Memory: 1 MiB, or the longest piece if that is longer.
 class BufferedOutput {
  public:
+  /// Begins a file that will replace `target`.
   explicit BufferedOutput(const std::filesystem::path& target) : file_(target) {
     buffer_.reserve(kBytes);
   }
 
+  /// Appends bytes as they lie in memory.
   void put(const void* data, std::size_t bytes) {
     if (buffer_.size() + bytes > kBytes) flush();
     const auto* from = static_cast<const std::byte*>(data);
     buffer_.insert(buffer_.end(), from, from + bytes);
   }
+  /// Writes what is left in the buffer and puts the file in the place of the target.
   void publish() {
     flush();
     file_.publish();
   }
 
  private:
-  static constexpr std::size_t kBytes = std::size_t{1} << 20;
+  static constexpr std::size_t kBytes = std::size_t{1} << 20;  ///< size of the buffer
 
   void flush() {
     file_.append(buffer_);

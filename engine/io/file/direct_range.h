@@ -1,4 +1,9 @@
-// Blocks of direct transfers (O_DIRECT).
+// The blocks of direct transfers (O_DIRECT), which move only whole blocks.
+//
+//   file    |        |        |        |        |      blocks of 4096 bytes
+//                         [offset, + bytes)            the range that is wanted
+//                    |<--- whole --->|                 begin to begin + whole is transferred
+//                    |lead|
 #pragma once
 
 #include <cstddef>
@@ -6,22 +11,24 @@
 
 namespace ptc {
 
-/// Memory and offsets of direct transfers are multiples of this.
+/// The size of a block, to which the memory, offsets and lengths of direct transfers are aligned.
 inline constexpr std::size_t kDirectBytes = 4096;
 
-/// So many bytes up to whole blocks.
+/// Rounds a number of bytes up to whole blocks.
 [[nodiscard]] constexpr std::size_t direct_blocks(std::size_t bytes) noexcept {
   return (bytes + kDirectBytes - 1) / kDirectBytes * kDirectBytes;
 }
 
-/// Room for the blocks of any range of so many bytes.
+/// Returns the bytes that the blocks of any range of `bytes` bytes take at most, wherever the range
+/// begins.
 [[nodiscard]] constexpr std::size_t direct_room(std::size_t bytes) noexcept {
   return direct_blocks(bytes + kDirectBytes - 1);
 }
 
-/// The blocks that a range of a file lies in: direct transfers move whole ones.
+/// A range of a file and the blocks in which it lies.
 struct DirectRange {
   DirectRange() = default;
+  /// Finds the blocks of `count` bytes that start at `from`.
   DirectRange(std::uint64_t from, std::size_t count) noexcept
       : offset(from),
         bytes(count),
@@ -29,11 +36,11 @@ struct DirectRange {
         lead(static_cast<std::size_t>(from - begin)),
         whole(direct_blocks(lead + count)) {}
 
-  std::uint64_t offset = 0;
-  std::size_t bytes = 0;
-  std::uint64_t begin = 0;  ///< of the blocks
-  std::size_t lead = 0;     ///< from there to `offset`
-  std::size_t whole = 0;    ///< bytes of the blocks
+  std::uint64_t offset = 0;  ///< first byte of the range in the file
+  std::size_t bytes = 0;     ///< length of the range
+  std::uint64_t begin = 0;   ///< first byte of the blocks in the file
+  std::size_t lead = 0;      ///< bytes from `begin` to `offset`
+  std::size_t whole = 0;     ///< length of the blocks
 };
 
 }  // namespace ptc

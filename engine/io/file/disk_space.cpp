@@ -1,3 +1,4 @@
+// The free space of file systems.
 #include "engine/io/file/disk_space.h"
 
 #include <sys/stat.h>
@@ -12,6 +13,7 @@
 namespace ptc {
 namespace {
 
+// Returns the number of the file system of a path.
 dev_t disk_of(const std::filesystem::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0)
@@ -32,7 +34,7 @@ std::uint64_t free_bytes(std::span<const std::filesystem::path> directories) {
 
 const std::filesystem::path& roomiest(std::span<const std::filesystem::path> directories) {
   return *std::ranges::max_element(directories, {}, [](const std::filesystem::path& directory) {
-    std::error_code unknown;  // who opens a file there tells what is wrong
+    std::error_code unknown;  // opening a file there will report what is wrong
     const std::filesystem::space_info room = std::filesystem::space(directory, unknown);
     return unknown ? 0 : room.available;
   });
@@ -52,7 +54,7 @@ void require_room(std::span<const std::filesystem::path> directories, std::uint6
   throw std::system_error(
       ENOSPC, std::generic_category(),
       fmt::format("{} take up to {} in {}, with {} free; "
-                  "name other or more directories in `run.temp_dirs`, or fewer points",
+                  "name other or more directories in `run.temp_dirs`, or use fewer points",
                   what, amount_text(bytes), names_text(directories), amount_text(free)));
 }
 
@@ -67,6 +69,7 @@ std::string names_text(std::span<const std::filesystem::path> paths) {
 
 std::string amount_text(std::uint64_t bytes) {
   const auto count = static_cast<double>(bytes);
+  // From 999.95 MB on, one digit behind the point would round to 1000.0 MB.
   return bytes < 999'950'000 ? fmt::format("{:.1f} MB", count / 1e6)
                              : fmt::format("{:.1f} GB", count / 1e9);
 }

@@ -1,4 +1,17 @@
-// Positioned file access over POSIX calls; the registry of temporary names for signal handlers.
+// Positioned file access over POSIX calls, and the registry of temporary names for signal handlers.
+//
+// A temporary file must disappear when the process ends, whether by an exception (destructors) or
+// by a signal (a handler that walks the registry). The handler may run in any thread at any time:
+//
+//   create_temporary()            handler
+//   block fatal signals           block fatal signals
+//   take the lock                 take the lock, never release it
+//   create file, add name         unlink all names
+//   release, unblock              end the process
+//
+// Whoever changes the registry holds the lock with fatal signals blocked in its own thread. So a
+// handler that waits for the lock never waits for the thread that it interrupted. A file and its
+// name appear in one step that no signal can divide. After the handler no file can appear.
 #include "engine/io/file/file.h"
 
 #include <fcntl.h>
@@ -28,6 +41,7 @@ constexpr auto kOffsetLimit = static_cast<std::uint64_t>(std::numeric_limits<off
   throw std::system_error(error, std::generic_category(), std::string(call) + " " + path.string());
 }
 
+// Repeats a call until a signal does not interrupt it.
 template <class Call>
 int retrying(Call&& call) {
   int result = -1;
@@ -47,8 +61,9 @@ void read_whole(int fd, const std::filesystem::path& path, std::uint64_t offset,
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) fail(errno, "pread", path);
     if (count == 0) {
-      throw DataError(path.string() + ": offset " + std::to_string(at) + ": the file ends here, " +
-                      std::to_string(out.size() - done) + " bytes are missing");
+      throw DataError(path.string() + ": offset " + std::to_string(at) +
+                      ": the file ends here and " + std::to_string(out.size() - done) +
+                      " bytes are missing");
     }
     done += static_cast<std::size_t>(count);
   }
@@ -69,25 +84,24 @@ void write_whole(int fd, const std::filesystem::path& path, std::uint64_t offset
   }
 }
 
-// Absolute temporary names that a fatal signal has to remove. The handler may run in any thread at
-// any time: whoever changes the list holds the lock with these signals blocked in its own thread,
-// so a handler that waits for the lock never waits for the thread it interrupted.
 constexpr std::array kFatalSignals = {SIGINT, SIGTERM, SIGHUP};
 std::atomic_flag registry_lock = ATOMIC_FLAG_INIT;
 
+// An absolute name that a fatal signal removes.
 struct Temporary {
   const void* owner;
   std::string name;
 };
 
 std::list<Temporary>& live_temporaries() {
-  // Outlives static destructors, and needs no memory when there is none left.
+  // Construct it in static memory and never destroy it: it outlives static destructors and needs
+  // no heap.
   alignas(std::list<Temporary>) static std::byte room[sizeof(std::list<Temporary>)];
   static auto* const names = new (room) std::list<Temporary>;
   return *names;
 }
 
-// @return what was blocked before
+// Blocks fatal signals in this thread and returns the signals that were blocked before.
 sigset_t block_fatal_signals() {
   sigset_t fatal, before;
   sigemptyset(&fatal);
@@ -96,6 +110,7 @@ sigset_t block_fatal_signals() {
   return before;
 }
 
+// Holds the lock of the registry, with fatal signals blocked.
 class RegistryGuard {
  public:
   RegistryGuard() : before_(block_fatal_signals()) {
@@ -113,7 +128,8 @@ class RegistryGuard {
   sigset_t before_;
 };
 
-// Creates and registers in one step that no handled signal can divide.
+// Creates a file and registers its name in one step that no handled signal can divide. Returns the
+// descriptor, or -1 and errno.
 int create_temporary(const void* owner, const std::filesystem::path& path) {
   std::list<Temporary> entry{{owner, std::filesystem::absolute(path).string()}};
   auto& names = live_temporaries();
@@ -123,7 +139,8 @@ int create_temporary(const void* owner, const std::filesystem::path& path) {
   return fd;
 }
 
-// Allocates nothing: it is called while an exception is on its way, perhaps for want of memory.
+// Removes a name from the registry. It allocates nothing, because it is called while an exception
+// propagates, perhaps for lack of memory.
 void forget_temporary(const void* owner) noexcept {
   std::list<Temporary> removed;  // freed after the guard
   auto& names = live_temporaries();
@@ -137,11 +154,12 @@ void forget_temporary(const void* owner) noexcept {
 
 void unlink_and_reraise(int signal) {
   remove_temporaries();
-  // SA_RESETHAND: the default action follows when this handler returns.
+  // Because of SA_RESETHAND, the default action follows when this handler returns.
   static_cast<void>(::raise(signal));
 }
 
-// ".NAME.tmp-PID-N"; a long NAME is cut so that the whole stays below 255 bytes.
+// Returns ".NAME.tmp-PID-N" in the directory of the target. A long NAME is cut so that the whole
+// stays below 255 bytes.
 std::filesystem::path temporary_name(const std::filesystem::path& target) {
   static std::atomic<std::uint64_t> counter = 0;
   const std::string name = target.filename().string().substr(0, 200);
@@ -149,8 +167,8 @@ std::filesystem::path temporary_name(const std::filesystem::path& target) {
                                  std::to_string(counter.fetch_add(1)));
 }
 
-/// Permissions of a file that is to be replaced, nothing where there is none. @throws
-/// std::system_error where none can be
+// Returns the permissions of the file that will be replaced, or nothing when there is none. It
+// throws std::system_error when the target is not a regular file or cannot be one.
 std::optional<mode_t> mode_of(const std::filesystem::path& target) {
   struct stat old {};
   const bool exists = ::stat(target.c_str(), &old) == 0;
@@ -187,19 +205,19 @@ void sync_directory(const std::filesystem::path& file) {
   if (fd < 0) fail(errno, "open", directory);
   const int error = retrying([&] { return ::fsync(fd); }) == 0 ? 0 : errno;
   ::close(fd);
-  // Some file systems cannot sync a directory and say EINVAL.
+  // Ignore EINVAL, which file systems return that cannot sync a directory.
   if (error != 0 && error != EINVAL) fail(error, "fsync", directory);
 }
 
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept {
   if (bytes == 0) return;
-  // Where that cannot be the blocks stay until the file goes.
+  // If the file system cannot do this, the blocks stay until the file is removed.
   static_cast<void>(::fallocate(fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE,
                                 static_cast<off_t>(offset), static_cast<off_t>(bytes)));
 }
 
 InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
-  // O_NONBLOCK: opening a pipe must not wait for its writer.
+  // Open without blocking, because opening a pipe would wait for its writer.
   fd_ = open_retrying(path, O_RDONLY | O_NONBLOCK);
   if (fd_ < 0) fail(errno, "open", path);
   struct stat status {};
@@ -236,7 +254,7 @@ OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
   do {
     temporary_ = temporary_name(target_);
     fd_ = create_temporary(this, temporary_);
-  } while (fd_ < 0 && errno == EEXIST);  // left behind by an earlier process of the same number
+  } while (fd_ < 0 && errno == EEXIST);  // left by an earlier process of the same number
   if (fd_ < 0) fail(errno, "open", temporary_);
   if (old) static_cast<void>(::fchmod(fd_, *old));
 }
@@ -280,7 +298,7 @@ void OutputFile::sync() {
 
 void OutputFile::publish() {
   if (retrying([&] { return ::fsync(fd_); }) != 0) fail(errno, "fsync", temporary_);
-  // After EINTR the file is closed all the same, and what it holds is on the disk.
+  // Ignore EINTR: the file is closed all the same, and its content is on stable storage.
   if (::close(std::exchange(fd_, -1)) != 0 && errno != EINTR) fail(errno, "close", temporary_);
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(errno, "rename", target_);
   published_ = true;
@@ -306,7 +324,7 @@ void TemporaryName::release() noexcept {
   forget_temporary(this);
 }
 
-// Keeps the lock: no other thread may make a file in the little time that is left.
+// Keeps the lock, so that no other thread can create a file before the process ends.
 void remove_temporaries() noexcept {
   block_fatal_signals();
   while (registry_lock.test_and_set(std::memory_order_acquire)) {
@@ -315,7 +333,7 @@ void remove_temporaries() noexcept {
 }
 
 void remove_temporaries_on_signal() {
-  live_temporaries();  // made here, not in the handler
+  live_temporaries();  // construct the list here, not in the handler
   for (const int signal : kFatalSignals) {
     struct sigaction before {};
     ::sigaction(signal, nullptr, &before);
@@ -333,7 +351,8 @@ TempFile::TempFile(const std::filesystem::path& directory) : directory_(director
   fd_ = open_retrying(directory, O_TMPFILE | O_RDWR, 0600);
   if (fd_ >= 0) return;
   if (errno != EOPNOTSUPP && errno != EISDIR) fail(errno, "open", directory);
-  do {  // a file system without O_TMPFILE
+  // Without O_TMPFILE, create a file and unlink it immediately.
+  do {
     const std::filesystem::path name = temporary_name(directory / "spill");
     fd_ = open_retrying(name, O_RDWR | O_CREAT | O_EXCL, 0600);
     if (fd_ >= 0) ::unlink(name.c_str());

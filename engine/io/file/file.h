@@ -1,4 +1,16 @@
-// Files: positioned reads and writes that are whole or throw, and publication by rename.
+// Files with positioned reads and writes that transfer everything or throw, and publication by
+// rename.
+//
+//   InputFile       an existing file, read only
+//   OutputFile      a new file that replaces its target whole, or leaves the target as it was:
+//
+//                   .NAME.tmp-PID-N  --write, write, ...-->  --fsync-->  --rename-->  NAME
+//                                   an exception or a fatal signal removes the temporary file
+//
+//   TempFile        a file without a name, gone as soon as it is closed
+//   TemporaryName   removes a file that another owner wrote
+//
+// No call returns early because of a signal: EINTR and short transfers are retried everywhere.
 #pragma once
 
 #include <sys/types.h>
@@ -11,24 +23,28 @@
 
 namespace ptc {
 
-/// A file open for reading. Threads: read_at may be called concurrently.
+/// A file that is open for reading.   Threads: read_at() may be called concurrently.
 class InputFile {
  public:
-  /// @throws std::system_error with call and path; a directory is refused (EISDIR), and so is all
-  ///         else that is no regular file (ESPIPE)
+  /// Opens a regular file.
+  /// @throws std::system_error that names the call and the path; a directory is refused with
+  ///         EISDIR, and anything else that is not a regular file with ESPIPE
   explicit InputFile(const std::filesystem::path& path);
   ~InputFile();
   InputFile(InputFile&& other) noexcept;
   InputFile& operator=(InputFile&&) = delete;
 
+  /// Returns the path under which the file was opened.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  /// Bytes when the file was opened.
+  /// Returns the length of the file in bytes, as it was when the file was opened.
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
+  /// Returns the descriptor, which this object owns and closes.
   [[nodiscard]] int descriptor() const noexcept { return fd_; }
-  /// Fills `out` from `offset` on; EINTR and short reads are retried.
-  /// @throws DataError when the file ends before, std::system_error otherwise
+  /// Fills `out` with the bytes of the file from `offset` on.
+  /// @throws DataError when the file ends before `out` is full; std::system_error when a read fails
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
-  /// Tells the system to begin reading these bytes, which will be asked for soon.
+  /// Asks the system to begin reading these bytes into its page cache, because they will be read
+  /// soon.
   void read_ahead(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
  private:
@@ -37,39 +53,51 @@ class InputFile {
   std::uint64_t size_ = 0;
 };
 
-/// A file being written under a temporary name (".NAME.tmp-PID-N" beside the target) that takes the
-/// target's place whole, or is removed: the old file stays until publish() has succeeded.
+/// A file that is written under a temporary name (".NAME.tmp-PID-N" in the directory of the target)
+/// and either replaces the target as a whole or is removed. The old file stays until publish() has
+/// succeeded.
 ///
-/// A target that is a link to a file stays a link: the file it leads to is replaced. The new file
-/// gets the permissions of the old one.
+/// A target that is a symbolic link stays a link; the file to which it leads is replaced. The new
+/// file gets the permissions of the old one.
 class OutputFile {
  public:
-  /// @throws std::system_error; a directory (EISDIR) or device (EINVAL) as target is refused
+  /// Creates the temporary file.
+  /// @throws std::system_error; a target that is a directory is refused with EISDIR, any other
+  ///         target that is not a regular file with EINVAL
   explicit OutputFile(const std::filesystem::path& target);
-  /// The same under a given name instead of a temporary one: a file of that name is gone on with,
-  /// and stays unless it is published. @param partial  in the directory of the target
+  /// Opens or creates the file `partial` in place of a temporary one. What it already holds is
+  /// kept, and the file stays when this object is destroyed without publish().
+  /// @param partial  a path in the directory of the target
+  /// @throws std::system_error as the other constructor does
   OutputFile(const std::filesystem::path& target, const std::filesystem::path& partial);
-  /// Removes the temporary file unless it was published.
+  /// Closes the file. Removes it when it has a temporary name and was not published.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
+  /// Returns the path of the file that will be replaced, behind symbolic links.
   [[nodiscard]] const std::filesystem::path& target() const noexcept { return target_; }
+  /// Returns the path under which the file is written.
   [[nodiscard]] const std::filesystem::path& temporary() const noexcept { return temporary_; }
+  /// Writes all bytes from `offset` on. @throws std::system_error, see fail_write()
   /// Threads: may be called concurrently for disjoint ranges.
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
-  /// Writes at size(). Threads: not while another thread writes.
+  /// Writes all bytes from size() on. @throws std::system_error, see fail_write()
+  /// Threads: no other thread may write at the same time.
   void append(std::span<const std::byte> bytes);
-  /// End of the farthest write so far.
+  /// Returns the end of the farthest write so far, bytes; what a partial file held before does not
+  /// count.
   [[nodiscard]] std::uint64_t size() const noexcept {
     return size_.load(std::memory_order_relaxed);
   }
-  /// Cuts what lies behind.
+  /// Sets the length of the file and size() to `bytes`. @throws std::system_error
   void truncate(std::uint64_t bytes);
-  /// fdatasync: what was written so far is on the disk when it returns. Threads: while others
-  /// write, too.
+  /// Flushes everything written so far to stable storage (fdatasync). @throws std::system_error
+  /// Threads: other threads may write at the same time.
   void sync();
-  /// fsync, rename over the target, fsync of the directory. The file is closed afterwards.
+  /// Flushes the file to stable storage, renames it over the target and flushes the directory. The
+  /// file is closed afterwards.
+  /// @throws std::system_error; the target is unchanged unless only the last step failed
   void publish();
 
  private:
@@ -77,75 +105,85 @@ class OutputFile {
   std::filesystem::path temporary_;
   int fd_ = -1;
   std::atomic<std::uint64_t> size_ = 0;
-  bool stays_ = false;  ///< under the temporary name
+  bool stays_ = false;  ///< the file is not removed when it is not published
   bool published_ = false;
 };
 
-/// A name of a file that goes when this ends, or when what ends the process removes temporaries.
+/// Removes the file of a given name on destruction, or in remove_temporaries().
 class TemporaryName {
  public:
+  /// Registers the path. The file need not exist.
   explicit TemporaryName(const std::filesystem::path& path);
   ~TemporaryName();
   TemporaryName(const TemporaryName&) = delete;
   TemporaryName& operator=(const TemporaryName&) = delete;
-  /// Lets the file stay.
+  /// Gives up the removal: the file stays.
   void release() noexcept;
 
  private:
   std::filesystem::path path_;
 };
 
-/// The directory that a file is in.
+/// Returns the directory of a file: its parent path, or "." when the path has none.
 [[nodiscard]] std::filesystem::path directory_of(const std::filesystem::path& file);
 
-/// fsync of the directory that a file is in: its name is on the disk.
+/// Flushes the directory of a file to stable storage (fsync), so that a new name survives a power
+/// loss. @throws std::system_error
 void sync_directory(const std::filesystem::path& file);
 
-/// Says that a write failed. Where a limit on the size of files (RLIMIT_FSIZE) is the reason, the
-/// text names what the file needs and the limit.
+/// Throws the error of a write that failed. When the limit on the size of files (RLIMIT_FSIZE) is
+/// the reason, the message names the limit and the bytes that the file needs.
 ///
-/// A program under such a limit must ignore SIGXFSZ, which else ends it before a write can fail.
-/// @param error  errno   @param end  bytes that the file would have
-/// @throws std::system_error
+/// A program under such a limit must ignore SIGXFSZ, which would otherwise end it before a write
+/// can fail.
+/// @param error  errno of the write
+/// @param end    bytes that the file would have after the write
+/// @throws std::system_error always
 [[noreturn]] void fail_write(int error, const std::filesystem::path& path, std::uint64_t end);
 
-/// open() of a descriptor that programs begun from this one do not get, EINTR retried. @return -1
-/// and errno as open()
+/// Opens a file with O_CLOEXEC, so that programs started from this one do not inherit the
+/// descriptor. @return the descriptor, or -1 and errno as open() sets it
 [[nodiscard]] int open_retrying(const std::filesystem::path& path, int flags,
                                 mode_t mode = 0) noexcept;
 
-/// Gives back the disk's blocks under these bytes of an open file, where the file system can.
+/// Frees the disk blocks under these bytes of an open file, if the file system can; the bytes read
+/// as zero then.
 void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept;
 
-/// Removes all TemporaryNames and temporary names of OutputFiles, for a process that ends at once:
-/// who makes or drops one from now on waits for ever. Allocates nothing.
+/// Removes the files of all TemporaryNames and all unpublished OutputFiles with temporary names. It
+/// is for a process that ends immediately: any thread that later creates or destroys one of these
+/// waits forever. It allocates nothing and may be called in a signal handler.
 void remove_temporaries() noexcept;
 
-/// From now on SIGINT, SIGTERM and SIGHUP call remove_temporaries() before they end the process as
-/// they would have; a signal that was ignored stays ignored. For programs, once.
+/// Installs a handler for SIGINT, SIGTERM and SIGHUP that calls remove_temporaries() and then ends
+/// the process as the signal would have. A signal that is ignored stays ignored. A program calls it
+/// once, at its start.
 void remove_temporaries_on_signal();
 
-/// A nameless file in `directory` that vanishes when it is closed (O_TMPFILE, or unlinked at once).
-/// Threads: read_at and write_at may be called concurrently.
+/// A file without a name in `directory`, which vanishes when it is closed (O_TMPFILE, or unlinked
+/// immediately where the file system lacks that).
+///
+/// Threads: read_at() and write_at() may be called concurrently.
 class TempFile {
  public:
-  /// @throws std::system_error
+  /// Creates the file. @throws std::system_error that names the directory
   explicit TempFile(const std::filesystem::path& directory);
   ~TempFile();
   TempFile(TempFile&& other) noexcept;
   TempFile& operator=(TempFile&&) = delete;
 
-  /// @throws DataError when the file ends before, std::system_error otherwise
+  /// Fills `out` with the bytes of the file from `offset` on.
+  /// @throws DataError when the file ends before `out` is full; std::system_error when a read fails
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
+  /// Writes all bytes from `offset` on. @throws std::system_error, see fail_write()
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
-  /// Tells the system that the page cache need not keep what was written or read.
+  /// Advises the system that its page cache need not keep the bytes of this file.
   void drop_cache() const noexcept;
-  /// Gives back the disk's blocks under these bytes, where the file system can; they read as zero
-  /// then.
+  /// Frees the disk blocks under these bytes, if the file system can; the bytes read as zero then.
   void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
  private:
-  std::filesystem::path directory_;
+  std::filesystem::path directory_;  ///< stands for the file in messages
   int fd_ = -1;
 };
 

@@ -1,4 +1,6 @@
-// Files of a program's own state: magic, version, length, checksum, bytes.
+// Files of a program's own state.
+//
+//   | magic u64 | version u64 | length u64 | XXH3-64 of the state u64 | state, length bytes |
 #include "engine/io/file/state_file.h"
 
 #include <fcntl.h>
@@ -18,7 +20,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x4554'4154'5358'5450;  // "PTXSTATE"
-constexpr std::uint64_t kVersion = 3;
+constexpr std::uint64_t kVersion = 3;  // of the file; also the seed of its checksum
 constexpr std::size_t kHeadBytes = 32;
 
 }  // namespace
@@ -55,7 +57,7 @@ std::string StateReader::get_text() {
 }
 
 void StateReader::end() const {
-  if (!bytes_.empty()) fail("the state is longer than it should be");
+  if (!bytes_.empty()) fail("the state has more bytes than it should");
 }
 
 std::filesystem::path state_temporary(const std::filesystem::path& path) {
@@ -81,13 +83,13 @@ std::vector<std::byte> read_state(const std::filesystem::path& path) {
     if (!holds) throw DataError(path.string() + ": " + text);
   };
   std::array<std::byte, kHeadBytes> head{};
-  require(file.size() >= head.size(), "the state is cut short");
+  require(file.size() >= head.size(), "the state is truncated");
   file.read_at(0, head);
-  require(load<std::uint64_t>(head.data(), 0) == kMagic, "it is no state of a build");
+  require(load<std::uint64_t>(head.data(), 0) == kMagic, "the file is not the state of a build");
   require(load<std::uint64_t>(head.data(), 8) == kVersion,
-          "the state is of another version of this program");
+          "the state was written by another version of this program");
   require(load<std::uint64_t>(head.data(), 16) == file.size() - head.size(),
-          "the state is cut short");
+          "the state is truncated");
   std::vector<std::byte> state(static_cast<std::size_t>(file.size() - head.size()));
   file.read_at(head.size(), state);
   require(load<std::uint64_t>(head.data(), 24) == xxh3_64(state, kVersion),
@@ -99,7 +101,7 @@ FileLock::FileLock(const std::filesystem::path& path) {
   const auto fail = [&](const char* call) {
     const int error = errno;
     if (fd_ >= 0) ::close(fd_);
-    const char* const held = error == EWOULDBLOCK ? ": another program is at work on it" : "";
+    const char* const held = error == EWOULDBLOCK ? ": another program is using it" : "";
     throw std::system_error(error, std::generic_category(), call + (" " + path.string()) + held);
   };
   while (true) {
@@ -111,7 +113,7 @@ FileLock::FileLock(const std::filesystem::path& path) {
     struct stat held {
     }, named{};
     if (::fstat(fd_, &held) != 0) fail("fstat");
-    // Who held it before may have renamed or removed it.
+    // Try again if the process that held the lock before has renamed or removed the file.
     if (::stat(path.c_str(), &named) == 0 && held.st_dev == named.st_dev &&
         held.st_ino == named.st_ino)
       return;

@@ -1,4 +1,5 @@
-// What a program keeps for its next run: checked bytes in a file that is replaced whole.
+// The state that a program keeps for its next run: checked bytes in a file that is replaced as a
+// whole.
 #pragma once
 
 #include <cstddef>
@@ -13,42 +14,50 @@
 
 namespace ptc {
 
-/// Appends numbers and texts for a StateReader.
+/// Encodes numbers, bytes and texts one after another. A StateReader reads them in the same order.
 class StateWriter {
  public:
+  /// Appends a number or an array of three doubles.
   template <class T>
   void put(T value) {
     bytes_.resize(bytes_.size() + sizeof value);
     store(bytes_.data(), bytes_.size() - sizeof value, value);
   }
+  /// Appends bytes, preceded by their number.
   void put_bytes(std::span<const std::byte> bytes);
+  /// Appends a text as put_bytes() does.
   void put_text(std::string_view text) { put_bytes(std::as_bytes(std::span(text))); }
+  /// Returns everything that was appended; the writer is empty afterwards.
   [[nodiscard]] std::vector<std::byte> take() noexcept { return std::move(bytes_); }
 
  private:
   std::vector<std::byte> bytes_;
 };
 
-/// Reads what a StateWriter wrote, in the same order. Nothing is read beyond the end, whatever the
-/// bytes say.
+/// Decodes what a StateWriter wrote, in the same order. It never reads beyond the end, whatever the
+/// bytes say. Every get function and end() throw DataError that names the file when the bytes do
+/// not match the call.
 class StateReader {
  public:
-  /// @param bytes  must outlive this
-  /// @param name   of the file, for errors
+  /// @param bytes  the encoded state, which must outlive this reader
+  /// @param name   name of the file, for errors
   StateReader(std::span<const std::byte> bytes, std::string name)
       : bytes_(bytes), name_(std::move(name)) {}
 
-  /// @throws DataError as all of these
+  /// Returns the next number or array of three doubles.
   template <class T>
   [[nodiscard]] T get() {
     return load<T>(take(sizeof(T)).data(), 0);
   }
-  /// A number that is at most `most`.
+  /// Returns the next number, a u64 that must be at most `most`.
   [[nodiscard]] std::uint64_t get_count(std::uint64_t most);
+  /// Returns the next bytes of put_bytes(), a view into the state.
   [[nodiscard]] std::span<const std::byte> get_bytes();
+  /// Returns the next text of put_text().
   [[nodiscard]] std::string get_text();
-  /// Refuses bytes that are left.
+  /// Checks that no bytes are left.
   void end() const;
+  /// Checks a rule of the caller. @param text  what is wrong when it does not hold
   void require(bool holds, const char* text) const {
     if (!holds) fail(text);
   }
@@ -57,23 +66,26 @@ class StateReader {
   [[noreturn]] void fail(const std::string& text) const;
   [[nodiscard]] std::span<const std::byte> take(std::uint64_t count);
 
-  std::span<const std::byte> bytes_;
+  std::span<const std::byte> bytes_;  ///< not read yet
   std::string name_;
 };
 
-/// Under which write_state() writes: one that a process which was killed has left is overwritten by
-/// the next.
+/// Returns the name under which write_state() writes. A file of this name that a killed process has
+/// left is overwritten.
 [[nodiscard]] std::filesystem::path state_temporary(const std::filesystem::path& path);
-/// Writes a state under a temporary name, syncs it and renames it over the old one: at any moment
-/// the one or the other is there, whole.
+/// Writes a state under a temporary name, flushes it to stable storage and renames it over the old
+/// one. At any moment either the old or the new state exists, complete. @throws std::system_error
 void write_state(const std::filesystem::path& path, std::span<const std::byte> state);
-/// @throws DataError naming the file when it is not what write_state() wrote; std::system_error
+/// Reads a state and checks it.
+/// @throws DataError that names the file when it is not what write_state() wrote; std::system_error
 [[nodiscard]] std::vector<std::byte> read_state(const std::filesystem::path& path);
 
-/// A file that one process at a time holds, as long as this lives; made when it is not there.
+/// A file that only one process at a time can lock. The lock lasts as long as this object.
 class FileLock {
  public:
-  /// @throws std::system_error, also when another process holds it
+  /// Locks the file, which is created if it does not exist. It does not wait.
+  /// @throws std::system_error (EWOULDBLOCK) when another process holds the lock; std::system_error
+  ///         when the file cannot be opened or locked
   explicit FileLock(const std::filesystem::path& path);
   ~FileLock();
   FileLock(const FileLock&) = delete;

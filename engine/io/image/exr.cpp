@@ -1,4 +1,9 @@
-// OpenEXR pictures: any compression in, ZIP scan lines out.
+// OpenEXR pictures: reads any compression, writes ZIP scan lines.
+//
+// A header alone must not make this program allocate much. check_exr_headers() bounds what the
+// library allocates; here the picture grows by the rows that were decoded, in blocks:
+//
+//   | 256 rows | 256 rows | ... | rest |     a multiple of the rows of a chunk in every compression
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,18 +30,19 @@
 namespace ptc {
 namespace {
 
-// Rows per call of the decoder: a multiple of the rows of one chunk in every compression, so that
-// no chunk is decoded twice. The picture grows by what was decoded: a header alone cannot make it
-// large.
+// Rows per call of the decoder. They are a multiple of the rows of one chunk in every compression,
+// so that no chunk is decoded twice.
 constexpr std::uint64_t kBlockRows = 256;
+// The greatest number of pixels for which memory is reserved before anything is decoded.
 constexpr std::uint64_t kTrustedPixels = std::uint64_t{1} << 24;
 
+// Returns the names of the channels that give R, G and B: all three the same for a grey picture.
 std::array<const char*, 3> colour_channels(const Imf::Header& header) {
   const Imf::ChannelList& channels = header.channels();
   const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
   const std::array<const char*, 3> rgb = {"R", "G", "B"};
   const bool any = std::ranges::any_of(rgb, has);
-  if (!any && !has("Y")) throw DataError("no channel R, G, B or Y");
+  if (!any && !has("Y")) throw DataError("the picture has no channel R, G, B or Y");
   const std::array<const char*, 3> names = any ? rgb : std::array<const char*, 3>{"Y", "Y", "Y"};
   for (const char* name : names) {
     const Imf::Channel* channel = channels.findChannel(name);
@@ -47,13 +53,15 @@ std::array<const char*, 3> colour_channels(const Imf::Header& header) {
   return names;
 }
 
+// The data window: its first pixel and its size.
 struct Window {
   Imath::V2i low;
   std::uint64_t width = 0;
   std::uint64_t height = 0;
 };
 
-// check_exr_headers() has passed: the sides are within their limits.
+// Returns the data window, whose sides are within their limits because check_exr_headers() has
+// passed.
 Window data_window(const Imf::Header& header) {
   const Imath::Box2i box = header.dataWindow();
   const std::int64_t width = std::int64_t{box.max.x} - box.min.x + 1;
@@ -61,11 +69,12 @@ Window data_window(const Imf::Header& header) {
   return {box.min, static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height)};
 }
 
+// Decodes rows of the data window to `out`; negative and non-finite values become 0.
 void read_rows(Imf::InputPart& part, const Window& window, std::uint64_t row, std::uint64_t rows,
                const std::array<const char*, 3>& channels, glm::vec3* out) {
   const int y = window.low.y + static_cast<int>(row);
   const Imath::V2i origin(window.low.x, y);
-  // Y alone goes to the first component: a frame buffer holds one slice of each name.
+  // Decode Y alone to the first component, because a frame buffer holds one slice of each name.
   const int slices = channels[0] == channels[1] ? 1 : 3;
   Imf::FrameBuffer buffer;
   for (int i = 0; i < slices; ++i) {
@@ -77,6 +86,7 @@ void read_rows(Imf::InputPart& part, const Window& window, std::uint64_t row, st
   }
   part.setFrameBuffer(buffer);
   part.readPixels(y, y + static_cast<int>(rows) - 1);
+  // Copy Y to the other components and clean the values.
   for (glm::vec3* pixel = out; pixel != out + rows * window.width; ++pixel) {
     if (slices == 1) pixel->y = pixel->z = pixel->x;
     for (int i = 0; i < 3; ++i) {
@@ -88,7 +98,8 @@ void read_rows(Imf::InputPart& part, const Window& window, std::uint64_t row, st
 Image decode_first_part(const std::filesystem::path& path) {
   Imf::MultiPartInputFile file(path.c_str(), 0, false);
   const Imf::Header& header = file.header(0);
-  if (header.hasType() && Imf::isDeepData(header.type())) throw DataError("deep pictures");
+  if (header.hasType() && Imf::isDeepData(header.type()))
+    throw DataError("deep pictures are not supported");
   const Window window = data_window(header);
   const std::array<const char*, 3> channels = colour_channels(header);
   Imf::InputPart part(file, 0);
@@ -103,7 +114,8 @@ Image decode_first_part(const std::filesystem::path& path) {
   return image;
 }
 
-// Imf::OutputFile swallows what goes wrong in its destructor; the stream keeps it.
+// A stream that keeps the first error of a write, because the destructor of Imf::OutputFile
+// swallows errors.
 class PublishedStream : public Imf::OStream {
  public:
   explicit PublishedStream(OutputFile& file) : Imf::OStream(file.target().c_str()), file_(file) {}
@@ -145,9 +157,9 @@ std::vector<std::string> channel_names(const ExrLayer& layer) {
 void check_layers(unsigned width, unsigned height, const std::vector<ExrLayer>& layers) {
   const std::uint64_t count = std::uint64_t{width} * height;
   if (count == 0 || width > kMaxImageSide || height > kMaxImageSide || count > kMaxImagePixels) {
-    throw std::invalid_argument("write_exr: size out of range");
+    throw std::invalid_argument("write_exr: the size is out of range");
   }
-  if (layers.empty()) throw std::invalid_argument("write_exr: no layer");
+  if (layers.empty()) throw std::invalid_argument("write_exr: there is no layer");
   std::set<std::string> seen;
   for (const ExrLayer& layer : layers) {
     const std::vector<std::string> names = channel_names(layer);
@@ -162,6 +174,7 @@ void check_layers(unsigned width, unsigned height, const std::vector<ExrLayer>& 
   }
 }
 
+// Rounds values to half; finite values beyond its range become the greatest half.
 std::vector<half> as_halves(const std::vector<float>& values) {
   std::vector<half> halves(values.size());
   std::ranges::transform(values, halves.begin(), [](float value) {
@@ -177,7 +190,7 @@ Image read_exr(const std::filesystem::path& path, std::uint64_t max_pixels) {
   check_exr_headers(path, max_pixels);
   try {
     return decode_first_part(path);
-  } catch (const std::exception& error) {  // the library's own types among them
+  } catch (const std::exception& error) {  // the library throws types of its own
     const std::string what = error.what();
     const std::string name = path.string();
     throw DataError(what.find(name) == std::string::npos ? name + ": EXR: " + what : what);
@@ -187,10 +200,12 @@ Image read_exr(const std::filesystem::path& path, std::uint64_t max_pixels) {
 void write_exr(const std::filesystem::path& target, unsigned width, unsigned height,
                const std::vector<ExrLayer>& layers) {
   check_layers(width, height, layers);
+
+  // Describe the channels and where their values lie.
   Imf::Header header(static_cast<int>(width), static_cast<int>(height));
   header.compression() = Imf::ZIP_COMPRESSION;
   Imf::FrameBuffer buffer;
-  std::vector<std::vector<half>> halves;  // the library takes each channel in the type it stores
+  std::vector<std::vector<half>> halves;  // the library wants values in the type that is stored
   halves.reserve(layers.size());
   for (const ExrLayer& layer : layers) {
     if (!layer.full_float) halves.push_back(as_halves(layer.values));
@@ -206,6 +221,8 @@ void write_exr(const std::filesystem::path& target, unsigned width, unsigned hei
                                                stride, stride * width));
     }
   }
+
+  // Write the picture under a temporary name.
   OutputFile file(target);
   PublishedStream stream(file);
   {
@@ -214,7 +231,9 @@ void write_exr(const std::filesystem::path& target, unsigned width, unsigned hei
     picture.writePixels(static_cast<int>(height));
   }
   stream.rethrow_failure();
-  // Lines that found no memory to be packed in are left out by the library without a word.
+
+  // Check that all lines are there: when the library has no memory to compress a line, it leaves
+  // the line out without an error.
   const Imf::MultiPartInputFile written(file.temporary().c_str(), 0, false);
   if (!written.partComplete(0)) throw std::bad_alloc();
   file.publish();

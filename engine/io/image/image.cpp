@@ -1,4 +1,8 @@
-// 8-bit pictures through stb; the choice of the reader.
+// Pictures that stb decodes, the choice of the reader, and the writer of PNG.
+//
+// stb trusts the sizes in a file and fills in what is missing. So a file passes three gates before
+// it is decoded: raster_format() by its first bytes, check_size() by its width and height, and
+// check_raster() by its end.
 #include "engine/io/image/image.h"
 
 #include <algorithm>
@@ -20,7 +24,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kMaxFileBytes = std::uint64_t{1} << 30;  // stb counts in int
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{1} << 30;  // because stb counts in int
 
 struct StbFree {
   void operator()(void* pixels) const noexcept { stbi_image_free(pixels); }
@@ -30,6 +34,7 @@ struct StbFree {
   throw DataError(name + ": " + rule);
 }
 
+// Returns the linear value of each 16-bit sRGB value.
 const std::vector<float>& linear_of_16_bit() {
   static const std::vector<float> table = [] {
     std::vector<float> values(65536);
@@ -41,25 +46,28 @@ const std::vector<float>& linear_of_16_bit() {
   return table;
 }
 
-// The most that deflate, JPEG's end-of-band runs and run lengths make of a byte is below 8448
-// pixels (a 1-bit PNG): a small file cannot ask for a large allocation.
+// Checks the size of a picture before it is allocated. Deflate, the end-of-band runs of JPEG and
+// run lengths make fewer than 8448 pixels of a byte (in a 1-bit PNG), so a small file cannot ask
+// for a large allocation.
 void check_size(int width, int height, std::size_t file_bytes, std::uint64_t max_pixels,
                 const std::string& name) {
-  if (width < 1 || height < 1) refuse(name, "a picture without pixels");
+  if (width < 1 || height < 1) refuse(name, "the picture has no pixels");
   const auto w = static_cast<std::uint64_t>(width);
   const auto h = static_cast<std::uint64_t>(height);
   const std::string size = std::to_string(w) + " x " + std::to_string(h) + " pixels";
   if (w > kMaxImageSide || h > kMaxImageSide || w * h > kMaxImagePixels) {
-    refuse(name, size + " are more than this program takes");
+    refuse(name, size + " are more than this program accepts");
   }
   if (w * h > max_pixels) {
-    refuse(name, size + " are more than the " + std::to_string(max_pixels) + " that are left");
+    refuse(name,
+           size + " are more than the " + std::to_string(max_pixels) + " that may still be loaded");
   }
   if (w * h / 8448 > file_bytes) {
     refuse(name, size + " cannot come from " + std::to_string(file_bytes) + " bytes");
   }
 }
 
+// Replaces negative and non-finite values by 0.
 glm::vec3 sane(glm::vec3 value) {
   for (int i = 0; i < 3; ++i) {
     if (!std::isfinite(value[i]) || value[i] < 0) value[i] = 0;
@@ -100,7 +108,7 @@ Image decode_integers(const stbi_uc* data, int bytes, const std::string& name) {
   return image;
 }
 
-// stb calls back from C: what goes wrong is kept instead of thrown.
+// The bytes that stb has encoded. Its callback must not throw through C, so a failure is recorded.
 struct EncodedBytes {
   std::vector<std::byte> bytes;
   bool out_of_memory = false;
@@ -127,7 +135,7 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name,
                    std::uint64_t max_pixels) {
   const RasterFormat format = raster_format(bytes, name);
   if (format == RasterFormat::none) refuse(name, "not a PNG, JPEG, BMP, HDR, TGA or EXR picture");
-  if (bytes.size() > kMaxFileBytes) refuse(name, "a picture of more than 1 GiB");
+  if (bytes.size() > kMaxFileBytes) refuse(name, "the picture has more than 1 GiB");
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int size = static_cast<int>(bytes.size());
   int width = 0;
@@ -149,7 +157,7 @@ Image read_image(const std::filesystem::path& path, std::uint64_t max_pixels) {
   std::array<std::byte, 4> magic{};
   if (file.size() >= magic.size()) file.read_at(0, magic);
   if (magic == kExrMagic) return read_exr(path, max_pixels);
-  if (file.size() > kMaxFileBytes) refuse(path.string(), "a picture of more than 1 GiB");
+  if (file.size() > kMaxFileBytes) refuse(path.string(), "the picture has more than 1 GiB");
   std::vector<std::byte> bytes(file.size());
   file.read_at(0, bytes);
   return decode_image(bytes, path.string(), max_pixels);
@@ -159,7 +167,7 @@ void write_png(const std::filesystem::path& target, const Image& image) {
   const std::size_t count = std::size_t{image.width} * image.height;
   if (count == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide ||
       count > kMaxImagePixels || image.pixels.size() != count) {
-    throw std::invalid_argument("write_png: size and number of pixels do not fit");
+    throw std::invalid_argument("write_png: the number of pixels does not match the size");
   }
   std::vector<std::uint8_t> stored;
   stored.reserve(count * 3);

@@ -1,6 +1,12 @@
-// Which raster format bytes are, whether the end is missing, and whether they ask for more work
-// than a picture takes. stb takes a missing end for zeros, so a picture cut short would be read as
-// one with a black part.
+// Finds the raster format of a file, whether its end is missing, and whether it asks for more work
+// than a picture needs.
+//
+// stb takes a missing end for zeros, so it would read a truncated picture as one with a black part.
+// Here each format is walked without decoding it, far enough to find where its picture ends:
+//
+//   JPEG   segments up to the marker FF D9          PNG   chunks up to IEND
+//   BMP    height x rows behind the data offset     TGA   pixels or packets of run lengths
+//   HDR    lines of run lengths
 #include <algorithm>
 #include <optional>
 #include <string_view>
@@ -12,21 +18,23 @@
 namespace ptc {
 namespace {
 
-// stb decodes each scan over the whole picture, even an empty one. Encoders write some ten scans;
-// libjpeg's cjpeg reads scripts of at most 100 (rdswitch.c).
+// The greatest number of scans in a JPEG, because stb decodes each scan over the whole picture,
+// even an empty one. Encoders write about ten scans; cjpeg of libjpeg reads scripts of at most 100
+// (rdswitch.c).
 constexpr std::uint64_t kMaxScans = 100;
-// Ten scans of the largest picture fit; they take about half a minute.
+// The greatest number of pixels in all scans of a JPEG. Ten scans of the largest picture fit; they
+// take about half a minute.
 constexpr std::uint64_t kMaxScannedPixels = std::uint64_t{1} << 32;
 
 constexpr char kTooEarly[] = "the picture ends too early";
 
-// What bytes of a picture are refused for.
+// The reason why a picture is refused.
 struct Fault {
   std::size_t offset;
   const char* rule;
 };
 
-// Reads bytes front to back; past the end it gives zeros and remembers that it did.
+// Reads bytes from front to back. Past the end it returns zeros and remembers that it did.
 class Cursor {
  public:
   Cursor(std::span<const std::byte> bytes, std::size_t at) : bytes_(bytes), at_(at) {}
@@ -64,7 +72,7 @@ class Cursor {
       at_ += static_cast<std::size_t>(count);
     }
   }
-  // Up to a NUL, which ends a line for stb.
+  // Reads a line and returns it up to a NUL, which ends a line for stb.
   std::string_view line() {
     const auto* begin = reinterpret_cast<const char*>(bytes_.data());
     const std::string_view rest(begin + at_, bytes_.size() - at_);
@@ -79,8 +87,9 @@ class Cursor {
   bool past_end_ = false;
 };
 
-// Segments up to the end-of-image marker; after a start of scan, entropy-coded bytes in which FF is
-// followed by 00 or a restart marker. Source: ITU-T T.81, B.1.1.
+// Walks the segments of a JPEG up to the end-of-image marker. Behind a start of scan come
+// entropy-coded bytes, in which FF is followed by 00 or a restart marker. Source: ITU-T T.81,
+// B.1.1.
 std::optional<Fault> jpeg_fault(std::span<const std::byte> bytes, std::uint64_t pixels) {
   constexpr unsigned kStartOfScan = 0xda;
   Cursor at(bytes, 2);
@@ -97,9 +106,9 @@ std::optional<Fault> jpeg_fault(std::span<const std::byte> bytes, std::uint64_t 
     if (marker == 0xd9 && !at.past_end()) return std::nullopt;
     if (marker == 0 || (marker >= 0xd0 && marker <= 0xd7)) continue;
     in_scan = marker == kStartOfScan;
-    if (in_scan && ++scans > kMaxScans) return Fault{offset, "a JPEG of more than 100 scans"};
+    if (in_scan && ++scans > kMaxScans) return Fault{offset, "the JPEG has more than 100 scans"};
     if (in_scan && scans * pixels > kMaxScannedPixels) {
-      return Fault{offset, "a JPEG of more than 2^32 pixels in all scans"};
+      return Fault{offset, "the scans of the JPEG have more than 2^32 pixels together"};
     }
     const unsigned length = at.u16_big();
     at.skip(std::max(2U, length) - 2);
@@ -107,8 +116,8 @@ std::optional<Fault> jpeg_fault(std::span<const std::byte> bytes, std::uint64_t 
   return Fault{bytes.size(), kTooEarly};
 }
 
-// Chunks of length, type, data and checksum, up to the one that ends the picture. Source: W3C, PNG,
-// section 5.3.
+// Walks the chunks of a PNG, of length, type, data and checksum, up to the one that ends the
+// picture. Source: W3C, PNG, section 5.3.
 bool png_is_complete(std::span<const std::byte> bytes) {
   constexpr std::uint32_t kEnd = 0x49454e44;  // "IEND"
   Cursor at(bytes, 8);
@@ -121,8 +130,10 @@ bool png_is_complete(std::span<const std::byte> bytes) {
   return !at.past_end();
 }
 
-// Source: Truevision TGA File Format Specification 2.0, fields 1 to 8.
+// Walks the pixels or packets of a TGA. Source: Truevision TGA File Format Specification 2.0,
+// fields 1 to 8.
 bool tga_is_complete(std::span<const std::byte> bytes) {
+  // Read the header.
   Cursor at(bytes, 0);
   const unsigned id_bytes = at.u8();
   const bool has_palette = at.u8() == 1;
@@ -136,6 +147,8 @@ bool tga_is_complete(std::span<const std::byte> bytes) {
   const unsigned pixel_bytes = (at.u8() + 7) / 8;
   at.u8();
   at.skip(id_bytes + (has_palette ? palette_length * ((palette_bits + 7) / 8) : 0));
+
+  // Pass over the pixels, plain or in packets.
   if (type < 8) {
     at.skip(width * height * pixel_bytes);
     return !at.past_end();
@@ -149,6 +162,7 @@ bool tga_is_complete(std::span<const std::byte> bytes) {
   return !at.past_end();
 }
 
+// Checks the end of the rows of a BMP, as its header gives their place and size.
 bool bmp_is_complete(std::span<const std::byte> bytes) {
   Cursor at(bytes, 10);
   const std::uint64_t data_offset = at.u32_little();
@@ -165,8 +179,8 @@ bool bmp_is_complete(std::span<const std::byte> bytes) {
   return !at.past_end() && !data.past_end();
 }
 
-// One run-length coded line: four channels of `width` bytes. Runs of none are passed over as stb
-// does, which at the end of the file takes zeros for such runs and never ends.
+// Passes over a run-length coded line: four channels of `width` bytes. Runs of length zero are
+// skipped as in stb, which takes the zeros past the end of a file for such runs and never returns.
 void skip_hdr_line(Cursor& at, std::uint64_t width) {
   for (int channel = 0; channel < 4; ++channel) {
     for (std::uint64_t done = 0; done < width && !at.past_end();) {
@@ -178,7 +192,7 @@ void skip_hdr_line(Cursor& at, std::uint64_t width) {
   }
 }
 
-// "-Y HEIGHT +X WIDTH", the only order that stb reads.
+// Reads "-Y HEIGHT +X WIDTH", the only order that stb accepts.
 std::optional<std::array<std::uint64_t, 2>> hdr_size(std::string_view line) {
   std::array<std::uint64_t, 2> size{};
   std::size_t part = 0;
@@ -196,7 +210,8 @@ std::optional<std::array<std::uint64_t, 2>> hdr_size(std::string_view line) {
   return size;
 }
 
-// Source: Ward, "Real Pixels", Graphics Gems II, 1991; new run lengths as in Radiance's color.c.
+// Walks the lines of an HDR. Source: Ward, "Real Pixels", Graphics Gems II, 1991; new run lengths
+// as in Radiance's color.c.
 bool hdr_is_complete(std::span<const std::byte> bytes) {
   Cursor at(bytes, 0);
   while (!at.line().empty()) {
@@ -211,7 +226,7 @@ bool hdr_is_complete(std::span<const std::byte> bytes) {
   }
   for (std::uint64_t y = 0; y < height && !at.past_end(); ++y) {
     const bool coded = at.u8() == 2 && at.u8() == 2 && (at.u8() & 128) == 0;
-    if (!coded && y == 0) {  // stb looks at the first line only
+    if (!coded && y == 0) {  // stb decides by the first line only
       at.skip(width * height * 4 - 3);
       break;
     }

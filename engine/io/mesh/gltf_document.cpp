@@ -1,4 +1,15 @@
-// The container side of glTF.
+// The container of glTF: JSON, chunks, buffers and accessors.
+//
+//   .glb     | header 12 bytes | length, type | JSON | length, type | binary data |
+//
+//   bytes that an accessor reads:
+//
+//   buffer       | ... | buffer view                                             | ...
+//   buffer view        | byteOffset | element 0 | ... | element 1 | ...          |
+//                                   |<--- byteStride --->|
+//
+// Every offset and length comes from the file. They are compared so that nothing can overflow: an
+// offset with a size first, then a length with what is left behind the offset.
 #include "engine/io/mesh/gltf_document.h"
 
 #include <algorithm>
@@ -40,7 +51,7 @@ int hex_digit(char c) {
   return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
 }
 
-// Source: RFC 4648, section 4. Returns nothing for other characters.
+// Decodes base64, or returns nothing when a character is not base64. Source: RFC 4648, section 4.
 std::optional<std::vector<std::byte>> decode_base64(std::string_view text) {
   constexpr std::string_view kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -66,12 +77,13 @@ std::optional<std::vector<std::byte>> decode_base64(std::string_view text) {
   return bytes;
 }
 
+// The numbers of an accessor.
 struct Component {
   std::size_t bytes;
-  double scale;  // of normalised integers
+  double scale;  // greatest value of a normalised integer, which stands for 1
 };
 
-// componentType of accessors, section 3.6.2.2.
+// Returns the numbers of a componentType (section 3.6.2.2), or nothing when it is unknown.
 std::optional<Component> component_of(std::uint64_t type) {
   switch (type) {
     case 5120:
@@ -98,6 +110,7 @@ double load_as(const std::byte* from) {
   return static_cast<double>(value);
 }
 
+// Reads a number of a known componentType.
 double load(const std::byte* from, std::uint64_t type) {
   switch (type) {
     case 5120:
@@ -115,6 +128,7 @@ double load(const std::byte* from, std::uint64_t type) {
   }
 }
 
+// Returns the numbers in an element of a type, or 0 for matrices and unknown types.
 std::size_t components_of(const std::string& type) {
   if (type == "SCALAR") return 1;
   if (type == "VEC2") return 2;
@@ -146,49 +160,52 @@ void GltfDocument::parse(std::span<const std::byte> text) {
   } catch (const Json::exception& error) {
     fail(error.what());
   }
-  if (!root_.is_object()) fail("a glTF is a JSON object");
+  if (!root_.is_object()) fail("the JSON of a glTF must be an object");
 }
 
-// 12 bytes of header; then chunks of length, type and data: JSON, and at most one of binary data.
+// Reads a GLB: 12 bytes of header, then chunks of length, type and data. The first is the JSON; the
+// second may be the binary data.
 void GltfDocument::read_chunks(std::span<const std::byte> file) {
-  if (u32_at(file, 4) != 2) fail("a GLB version other than 2");
-  if (u32_at(file, 8) != file.size()) fail("a GLB whose length is not that of the file");
+  if (u32_at(file, 4) != 2) fail("the version of the GLB is not 2");
+  if (u32_at(file, 8) != file.size()) fail("the GLB declares another length than the file has");
   std::size_t at = 12;
   for (std::size_t chunk = 0; at < file.size(); ++chunk) {
-    if (file.size() - at < 8) fail("offset " + std::to_string(at) + ": a GLB chunk without header");
+    if (file.size() - at < 8)
+      fail("offset " + std::to_string(at) + ": the file ends in the header of a GLB chunk");
     const std::uint32_t length = u32_at(file, at);
     const std::uint32_t type = u32_at(file, at + 4);
     at += 8;
     if (length > file.size() - at) {
-      fail("offset " + std::to_string(at) + ": a GLB chunk past the end of the file");
+      fail("offset " + std::to_string(at) + ": a GLB chunk reaches past the end of the file");
     }
     const std::span<const std::byte> data = file.subspan(at, length);
-    if ((chunk == 0) != (type == kJsonChunk)) fail("the first chunk of a GLB is its JSON");
+    if ((chunk == 0) != (type == kJsonChunk))
+      fail("the first chunk of a GLB, and no other, must be JSON");
     if (chunk == 0) parse(data);
     if (chunk == 1 && type == kBinaryChunk) binary_chunk_.assign(data.begin(), data.end());
     at += length;
   }
-  if (root_.is_null()) fail("a GLB without JSON");
+  if (root_.is_null()) fail("the GLB has no JSON");
 }
 
 std::size_t GltfDocument::count(const char* array) const {
   const auto found = root_.find(array);
   if (found == root_.end()) return 0;
-  if (!found->is_array()) fail(std::string(array) + " is no array");
+  if (!found->is_array()) fail(std::string(array) + " is not an array");
   return found->size();
 }
 
 const GltfDocument::Json& GltfDocument::at(const char* array, std::uint64_t index) const {
   if (index >= count(array)) fail(std::string(array) + " has no entry " + std::to_string(index));
   const Json& entry = root_[array][index];
-  if (!entry.is_object()) fail(std::string(array) + " holds what is no object");
+  if (!entry.is_object()) fail(std::string(array) + " holds a value that is not an object");
   return entry;
 }
 
 std::optional<std::uint64_t> GltfDocument::unsigned_at(const Json& object, const char* key) const {
   const auto found = object.find(key);
   if (found == object.end()) return std::nullopt;
-  if (!found->is_number_unsigned()) fail(std::string(key) + " is no unsigned integer");
+  if (!found->is_number_unsigned()) fail(std::string(key) + " is not an unsigned integer");
   return found->get<std::uint64_t>();
 }
 
@@ -196,7 +213,7 @@ double GltfDocument::number_at(const Json& object, const char* key, double other
   const auto found = object.find(key);
   if (found == object.end()) return otherwise;
   if (!found->is_number() || !std::isfinite(found->get<double>())) {
-    fail(std::string(key) + " is no finite number");
+    fail(std::string(key) + " is not a finite number");
   }
   return found->get<double>();
 }
@@ -219,17 +236,18 @@ std::string GltfDocument::file_name(const std::string& uri) {
 std::vector<std::byte> GltfDocument::fetch(const std::string& uri) const {
   if (!uri.starts_with("data:")) return read_file(path_.parent_path() / file_name(uri));
   const std::size_t comma = uri.find(";base64,");
-  if (comma == std::string::npos) fail("a data URI that is not base64");
+  if (comma == std::string::npos) fail("a data URI is not base64");
   auto bytes = decode_base64(std::string_view(uri).substr(comma + 8));
-  if (!bytes) fail("a data URI with characters that base64 has not");
+  if (!bytes) fail("a data URI has characters that are not base64");
   return std::move(*bytes);
 }
 
 std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
+  // Find the first buffer that names the same file.
   const Json& description = at("buffers", index);
   const auto uri = description.find("uri");
   const bool has_uri = uri != description.end();
-  if (has_uri && !uri->is_string()) fail("a uri that is no string");
+  if (has_uri && !uri->is_string()) fail("a uri is not a string");
   const std::string none;
   const std::string& text = has_uri ? uri->get_ref<const std::string&>() : none;
   std::uint64_t owner = index;
@@ -237,6 +255,8 @@ std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
     const std::string name = std::filesystem::path(file_name(text)).lexically_normal().string();
     owner = buffer_of_file_.try_emplace(name, index).first->second;
   }
+
+  // Load its bytes on first use.
   auto& loaded = buffers_[owner];
   if (!loaded) {
     if (has_uri) {
@@ -246,11 +266,12 @@ std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
     }
     bytes_read_ += loaded->size();
   }
-  // Binary chunks are padded: the declared length counts.
+
+  // Return as many bytes as the buffer declares, because binary chunks are padded.
   const std::uint64_t length = unsigned_at(description, "byteLength").value_or(0);
   if (length > loaded->size()) {
-    fail("buffer " + std::to_string(index) + " has " + std::to_string(loaded->size()) +
-         " bytes of " + std::to_string(length));
+    fail("buffer " + std::to_string(index) + " has only " + std::to_string(loaded->size()) +
+         " bytes of the declared " + std::to_string(length));
   }
   return std::span(*loaded).first(length);
 }
@@ -258,7 +279,7 @@ std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
 std::span<const std::byte> GltfDocument::view(std::uint64_t index) {
   const Json& description = at("bufferViews", index);
   const auto owner = unsigned_at(description, "buffer");
-  if (!owner) fail("a bufferView without buffer");
+  if (!owner) fail("a bufferView has no buffer");
   const std::span<const std::byte> bytes = buffer(*owner);
   const std::uint64_t offset = unsigned_at(description, "byteOffset").value_or(0);
   const std::uint64_t length = unsigned_at(description, "byteLength").value_or(0);
@@ -270,6 +291,7 @@ std::span<const std::byte> GltfDocument::view(std::uint64_t index) {
 
 GltfDocument::Elements GltfDocument::read_accessor(std::uint64_t index, std::size_t components,
                                                    std::optional<std::size_t> expected) {
+  // Check the shape of the elements.
   const Json& accessor = at("accessors", index);
   const std::string name = "accessor " + std::to_string(index);
   if (accessor.contains("sparse")) fail(name + " is sparse, which is not supported");
@@ -286,19 +308,22 @@ GltfDocument::Elements GltfDocument::read_accessor(std::uint64_t index, std::siz
   const auto flag = accessor.find("normalized");
   const bool normalised = flag != accessor.end() && flag->is_boolean() && flag->get<bool>();
 
+  // Check that all elements lie in the buffer view.
   const std::span<const std::byte> bytes = view(*view_index);
   const std::uint64_t offset = unsigned_at(accessor, "byteOffset").value_or(0);
   const std::uint64_t element_bytes = component->bytes * components;
   const std::uint64_t stride =
       unsigned_at(at("bufferViews", *view_index), "byteStride").value_or(element_bytes);
   const std::uint64_t elements = unsigned_at(accessor, "count").value_or(0);
-  if (expected && elements != *expected) fail(name + " has not as many elements as POSITION");
+  if (expected && elements != *expected) fail(name + " does not have as many elements as POSITION");
   if (stride < element_bytes) fail(name + " has elements that overlap");
-  // (elements - 1) * stride + element_bytes <= bytes.size() - offset, without overflow.
+  // This is (elements - 1) * stride + element_bytes > bytes.size() - offset without overflow.
   if (elements > 0 && (offset > bytes.size() || element_bytes > bytes.size() - offset ||
                        elements - 1 > (bytes.size() - offset - element_bytes) / stride)) {
     fail(name + " reaches past its bufferView");
   }
+
+  // Read them.
   Elements read{elements, {}};
   read.values.reserve(elements * components);
   for (std::uint64_t i = 0; i < elements; ++i) {

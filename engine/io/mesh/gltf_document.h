@@ -1,5 +1,10 @@
-// Inside the glTF reader: the JSON, the buffers, and what accessors see of them. Source: Khronos,
-// "glTF 2.0 Specification", sections 3.6 (buffers), 4 (GLB).
+// Internal to the glTF reader: the JSON of a document, its buffers, and the accessors into them.
+// Source: Khronos, "glTF 2.0 Specification", sections 3.6 (buffers), 4 (GLB).
+//
+//   accessor --> buffer view --> buffer --> a file, a data URI, or the binary chunk of a .glb
+//   (numbers)    (a range)       (bytes)
+//
+// Each arrow is an index or a name that the file gives, so it is checked when it is followed.
 #pragma once
 
 #include <array>
@@ -16,49 +21,60 @@
 
 namespace ptc {
 
-/// A .gltf with its buffers, or a .glb. Every index and range is checked when it is followed.
+/// A .gltf file with its buffers, or a .glb file. Buffers are read when they are first needed.
 class GltfDocument {
  public:
   using Json = nlohmann::json;
 
-  /// @throws DataError, std::system_error
+  /// Reads and parses the file, but no other file.
+  /// @throws DataError when it is neither a JSON object nor a GLB of version 2; std::system_error
   explicit GltfDocument(const std::filesystem::path& path);
 
+  /// Returns the path of the file.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  /// Returns the JSON of the document.
   [[nodiscard]] const Json& root() const noexcept { return root_; }
 
-  /// @throws DataError "PATH: RULE"
+  /// Refuses the file. @throws DataError "PATH: RULE"
   [[noreturn]] void fail(const std::string& rule) const;
 
-  /// root()[array][index]. @throws DataError when there is none
+  /// Returns root()[array][index]. @throws DataError when it does not exist
   [[nodiscard]] const Json& at(const char* array, std::uint64_t index) const;
-  /// Number of entries of root()[array].
+  /// Returns the number of entries of root()[array]; 0 when there is no such array.
   [[nodiscard]] std::size_t count(const char* array) const;
-  /// An index or size, if `object` has it. @throws DataError when it is no unsigned integer
+  /// Returns the index or size object[key], or nothing when `object` lacks the key.
+  /// @throws DataError when it is not an unsigned integer
   [[nodiscard]] std::optional<std::uint64_t> unsigned_at(const Json& object, const char* key) const;
-  /// A number, or `otherwise`. @throws DataError when it is no finite number
+  /// Returns the number object[key], or `otherwise` when `object` lacks the key.
+  /// @throws DataError when it is not a finite number
   [[nodiscard]] double number_at(const Json& object, const char* key, double otherwise) const;
-  /// `N` numbers, if `object` has them. @throws DataError when they are others
+  /// Returns the `N` numbers of object[key], or nothing when `object` lacks the key.
+  /// @throws DataError when it is not an array of `N` numbers
   template <std::size_t N>
   [[nodiscard]] std::optional<std::array<double, N>> numbers_at(const Json& object,
                                                                 const char* key) const;
 
-  /// Bytes of bufferViews[index].
+  /// Returns the bytes of bufferViews[index], which live as long as this document.
+  /// @throws DataError when the view does not exist or lies outside its buffer; std::system_error
   [[nodiscard]] std::span<const std::byte> view(std::uint64_t index);
-  /// What a uri leads to: a data URI or a file beside this one.
+  /// Returns the bytes to which a URI leads: those of a data URI, or of a file whose path is
+  /// relative to this one. @throws DataError, std::system_error
   [[nodiscard]] std::vector<std::byte> fetch(const std::string& uri) const;
-  /// The file name that a uri stands for: %20 and the like resolved.
+  /// Returns the file name for which a URI stands; escapes such as %20 are resolved.
   [[nodiscard]] static std::string file_name(const std::string& uri);
 
-  /// Elements of accessors[index], `components` numbers each, normalised integers scaled.
-  /// @param expected  how many there must be
+  /// The elements of an accessor.
   struct Elements {
-    std::size_t count = 0;
+    std::size_t count = 0;       ///< number of elements
     std::vector<double> values;  ///< count x components
   };
+  /// Reads the elements of accessors[index]. Normalised integers are scaled to [0, 1] or [-1, 1].
+  /// @param components  numbers in each element
+  /// @param expected    number of elements that there must be, if it is known
+  /// @throws DataError when the accessor breaks a rule or has another shape; std::system_error
   [[nodiscard]] Elements read_accessor(std::uint64_t index, std::size_t components,
                                        std::optional<std::size_t> expected = std::nullopt);
-  /// Bytes of the file and of the buffers that were read so far.
+  /// Returns the size of the file and of the buffers that were read so far, bytes.
   [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
  private:
@@ -70,7 +86,7 @@ class GltfDocument {
   Json root_;
   std::vector<std::byte> binary_chunk_;
   std::vector<std::optional<std::vector<std::byte>>> buffers_;  // read when first needed
-  std::map<std::string, std::uint64_t> buffer_of_file_;         // the first one of several
+  std::map<std::string, std::uint64_t> buffer_of_file_;         // first buffer that names the file
   std::uint64_t bytes_read_ = 0;
 };
 
@@ -80,11 +96,11 @@ std::optional<std::array<double, N>> GltfDocument::numbers_at(const Json& object
   const auto found = object.find(key);
   if (found == object.end()) return std::nullopt;
   if (!found->is_array() || found->size() != N) {
-    fail(std::string(key) + " has not " + std::to_string(N) + " numbers");
+    fail(std::string(key) + " does not have " + std::to_string(N) + " numbers");
   }
   std::array<double, N> numbers{};
   for (std::size_t i = 0; i < N; ++i) {
-    if (!(*found)[i].is_number()) fail(std::string(key) + " holds what is no number");
+    if (!(*found)[i].is_number()) fail(std::string(key) + " holds a value that is not a number");
     numbers[i] = (*found)[i].template get<double>();
   }
   return numbers;

@@ -1,4 +1,4 @@
-// A set of numbers in which the next one is found fast.
+// A set of small numbers that quickly finds the next member from a given number on.
 #pragma once
 
 #include <bit>
@@ -10,16 +10,20 @@
 
 namespace ptc {
 
-/// Numbers below a fixed size; in the beginning all of them are in the set.
+/// A set of numbers below a fixed size. At first it holds all of them.
 ///
 /// A tree of 64-bit words: bit i of a level says that word i of the level below is not zero.
 ///
-///   level 1                 1 1 0 ...
-///   level 0   0..63 have some, 64..127 too, 128..191 none
+///   level 1   |  1  |  1  |  0  | ...            one bit for each word of level 0
+///                |     |     |
+///   level 0   |0..63|..127|..191| ...            one bit for each number; the third word is empty
 ///
-/// Every call takes as many steps as there are levels: 5 for 2^28 numbers.
+/// Every call takes at most one step up and one down per level: 5 levels for 2^28 numbers.
+///
+/// Memory: a little more than one bit for each number.
 class IndexSet {
  public:
+  /// Makes the set of all numbers below `size`.
   explicit IndexSet(std::size_t size) {
     for (std::size_t bits = size;; bits = levels_.back().size()) {
       std::vector<std::uint64_t> words((bits + 63) / 64, ~std::uint64_t{0});
@@ -29,6 +33,7 @@ class IndexSet {
     }
   }
 
+  /// Adds a number below the size; it may be a member already.
   void insert(std::size_t number) noexcept {
     for (auto& level : levels_) {
       level[number / 64] |= std::uint64_t{1} << number % 64;
@@ -36,6 +41,7 @@ class IndexSet {
     }
   }
 
+  /// Removes a number below the size; it need not be a member.
   void erase(std::size_t number) noexcept {
     for (auto& level : levels_) {
       level[number / 64] &= ~(std::uint64_t{1} << number % 64);
@@ -44,7 +50,7 @@ class IndexSet {
     }
   }
 
-  /// The smallest number of the set that is not below `from`, or nothing.
+  /// Returns the smallest member that is not below `from`, or nothing.
   [[nodiscard]] std::optional<std::size_t> next(std::size_t from) const noexcept {
     for (std::size_t height = 0; height < levels_.size(); ++height) {
       const std::size_t word = from / 64;
@@ -57,7 +63,7 @@ class IndexSet {
   }
 
  private:
-  /// The smallest number below a bit of a level that is set.
+  /// Returns the smallest member that is summarised by a bit of a level. @pre the bit is set
   [[nodiscard]] std::size_t lowest(std::size_t height, std::size_t bit) const noexcept {
     for (; height > 0; --height) {
       bit = bit * 64 + static_cast<std::size_t>(std::countr_zero(levels_[height - 1][bit]));
@@ -65,7 +71,7 @@ class IndexSet {
     return bit;
   }
 
-  std::vector<std::vector<std::uint64_t>> levels_;  // the numbers themselves first
+  std::vector<std::vector<std::uint64_t>> levels_;  // levels_[0] has one bit for each number
 };
 
 }  // namespace ptc

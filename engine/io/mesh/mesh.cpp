@@ -1,4 +1,10 @@
-// Meshes: the choice of the reader, joining, writing.
+// Meshes: the choice of a reader, the joining of two meshes, and a writer.
+//
+// Positions are floats relative to an origin in double, so a mesh keeps millimetres anywhere within
+// ten million metres. To join two meshes, the world positions of the second are computed in double
+// and stored relative to the origin of the first:
+//
+//   stored = float(transform * (origin_2 + position) - origin_1)
 #include "engine/io/mesh/mesh.h"
 
 #include <algorithm>
@@ -28,7 +34,7 @@ glm::vec3 flat_normal(const Mesh& mesh, const std::array<std::uint32_t, 3>& tria
   return length > 0 ? glm::vec3(cross / length) : glm::vec3(0, 0, 1);
 }
 
-// Gives each triangle vertices of its own, with the normal of its plane.
+// Gives each triangle its own three vertices, with the normal of its plane.
 void flatten(Mesh& mesh) {
   Mesh flat;
   for (auto& triangle : mesh.triangles) {
@@ -45,7 +51,7 @@ void flatten(Mesh& mesh) {
   mesh.uvs = std::move(flat.uvs);
 }
 
-// After this either both have normals or none, and texture coordinates likewise.
+// Adds normals or texture coordinates to the mesh that lacks them, if the other one has them.
 void level_attributes(Mesh& a, Mesh& b) {
   if (a.normals.empty() != b.normals.empty()) flatten(a.normals.empty() ? a : b);
   if (a.uvs.empty() != b.uvs.empty()) {
@@ -67,7 +73,7 @@ glm::dvec3 rounded_centre(const Bounds& bounds) {
   return bounds.empty() ? glm::dvec3(0) : glm::round(bounds.low / 2.0 + bounds.high / 2.0);
 }
 
-// The world positions of `mesh`, transformed, relative to `origin`.
+// Replaces the positions of a mesh by their transformed world positions, relative to `origin`.
 void transform_positions(Mesh& mesh, const glm::dmat4& transform, const glm::dvec3& origin) {
   for (glm::vec3& position : mesh.positions) {
     const glm::dvec3 world = mesh.origin + glm::dvec3(position);
@@ -76,6 +82,7 @@ void transform_positions(Mesh& mesh, const glm::dmat4& transform, const glm::dve
   mesh.origin = origin;
 }
 
+// Turns the normals, and reverses the triangles when the transform mirrors.
 void transform_directions(Mesh& mesh, const glm::dmat4& transform) {
   const glm::dmat3 turn = normal_transform(transform);
   for (glm::vec3& normal : mesh.normals) {
@@ -116,6 +123,7 @@ MeshFile read_mesh(const std::filesystem::path& path) {
 }
 
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
+  // Refuse what cannot be joined.
   const double determinant = glm::determinant(glm::dmat3(transform));
   if (!is_finite(transform) || determinant == 0 || !std::isfinite(determinant)) {
     throw std::invalid_argument("append_mesh: the transform is not finite and invertible");
@@ -123,6 +131,8 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
   if (mesh.materials.size() + other.materials.size() > kMaxMaterials) {
     throw RequestError("inputs", "the meshes have more than 65,536 materials together");
   }
+
+  // Transform a copy, and give both meshes the same attributes.
   Mesh added = other;
   if (mesh.positions.empty()) mesh.origin = rounded_centre(transformed_bounds(other, transform));
   transform_positions(added, transform, mesh.origin);
@@ -133,6 +143,8 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
     mesh.normals.clear();
     mesh.uvs.clear();
   }
+
+  // Append it, with the indices of its vertices and materials moved.
   const std::size_t base = mesh.positions.size();
   if (added.positions.size() > 0xffffffffU - base) {
     throw RequestError("inputs", "the meshes have 2^32 vertices or more together");

@@ -1,4 +1,15 @@
-// Meshes, materials and cameras from glTF 2.0.
+// Reads meshes, materials and cameras from glTF 2.0.
+//
+//   scene --> node --> node ...            transforms multiply on the way down
+//              |  `--> camera
+//              v
+//             mesh --> primitive --> accessors (positions, normals, texture coordinates, indices)
+//                          `--> material --> texture --> image
+//
+// GltfDocument follows the arrows and checks each index. GltfMesh walks the nodes of the default
+// scene and appends every primitive to one MeshSoup, in which all vertices have normals and texture
+// coordinates of the same index. Two nodes that show one mesh give it twice, so the number of
+// vertices is bounded in terms of the size of the files.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,7 +31,8 @@ namespace {
 using Corner = MeshSoup::Corner;
 using Json = GltfDocument::Json;
 
-// What changes the meaning of a file and is understood or can be left out with little harm.
+// The extensions that a file may require: each is either understood or can be left out with little
+// harm.
 constexpr std::array<std::string_view, 14> kKnownExtensions = {
     "KHR_materials_emissive_strength",
     "KHR_materials_pbrSpecularGlossiness",
@@ -37,20 +49,22 @@ constexpr std::array<std::string_view, 14> kKnownExtensions = {
     "KHR_lights_punctual",
     "EXT_texture_webp"};
 
+// Returns the object object[key], or null.
 const Json* member(const Json& object, const char* key) {
   const auto found = object.find(key);
   return found == object.end() || !found->is_object() ? nullptr : &*found;
 }
 
+// Returns an extension of an object, or null.
 const Json* extension(const Json& object, const char* name) {
   const Json* const extensions = member(object, "extensions");
   return extensions == nullptr ? nullptr : member(*extensions, name);
 }
 
-// A material of the file, and how its texture is laid on.
+// A material of the file, and how its texture is mapped.
 struct GltfMaterial {
-  std::size_t index = 0;  // in the soup
-  std::uint64_t uv_set = 0;
+  std::size_t index = 0;     // of the material in the soup
+  std::uint64_t uv_set = 0;  // N of the attribute TEXCOORD_N
   glm::dvec2 uv_offset{0};
   glm::dvec2 uv_scale{1};
   double uv_rotation = 0;
@@ -83,7 +97,7 @@ class GltfMesh {
     }
   }
 
-  // The nodes of the default scene; of a file without scenes, those that are nobody's children.
+  // Returns the nodes of the default scene or, in a file without scenes, those without a parent.
   std::vector<std::uint64_t> root_nodes() const {
     if (document_.count("scenes") > 0) {
       const std::uint64_t scene = document_.unsigned_at(document_.root(), "scene").value_or(0);
@@ -105,15 +119,17 @@ class GltfMesh {
   std::vector<std::uint64_t> node_list(const Json& object, const char* key) const {
     const auto found = object.find(key);
     if (found == object.end()) return {};
-    if (!found->is_array()) document_.fail(std::string(key) + " is no array");
+    if (!found->is_array()) document_.fail(std::string(key) + " is not an array");
     std::vector<std::uint64_t> nodes;
     for (const Json& index : *found) {
-      if (!index.is_number_unsigned()) document_.fail(std::string(key) + " holds what is no index");
+      if (!index.is_number_unsigned())
+        document_.fail(std::string(key) + " holds a value that is not an index");
       nodes.push_back(index.get<std::uint64_t>());
     }
     return nodes;
   }
 
+  // Adds the meshes and cameras of all nodes, parents before their children.
   void walk_nodes() {
     std::vector<std::pair<std::uint64_t, glm::dmat4>> open;
     const auto push = [&](std::vector<std::uint64_t> nodes, const glm::dmat4& parent) {
@@ -126,7 +142,7 @@ class GltfMesh {
       open.pop_back();
       const Json& node = document_.at("nodes", index);
       if (visited_[index]) {
-        document_.fail("node " + std::to_string(index) + " has two parents or is its own");
+        document_.fail("node " + std::to_string(index) + " has two parents or contains itself");
       }
       visited_[index] = true;
       const glm::dmat4 world = parent * local_transform(node);
@@ -156,9 +172,9 @@ class GltfMesh {
     const Json& mesh = document_.at("meshes", index);
     const auto primitives = mesh.find("primitives");
     if (primitives == mesh.end() || !primitives->is_array())
-      document_.fail("a mesh without primitives");
+      document_.fail("a mesh has no primitives");
     for (const Json& primitive : *primitives) {
-      if (!primitive.is_object()) document_.fail("a primitive that is no object");
+      if (!primitive.is_object()) document_.fail("a primitive is not an object");
       add_primitive(primitive, world);
     }
   }
@@ -166,7 +182,7 @@ class GltfMesh {
   void add_primitive(const Json& primitive, const glm::dmat4& world) {
     const std::uint64_t mode = document_.unsigned_at(primitive, "mode").value_or(4);
     if (mode < 4) return;  // points and lines
-    if (mode > 6) document_.fail("an unknown mode of a primitive");
+    if (mode > 6) document_.fail("the mode of a primitive is unknown");
     if (extension(primitive, "KHR_draco_mesh_compression") != nullptr) {
       document_.fail("Draco-compressed meshes are not supported");
     }
@@ -180,7 +196,7 @@ class GltfMesh {
     add_triangles(primitive, mode, base, count, material, mirrors(world));
   }
 
-  // Appends positions, normals and texture coordinates in step; missing ones are 0.
+  // Appends positions, normals and texture coordinates, as many of each; missing ones are 0.
   std::size_t add_vertices(const Json& attributes, std::uint64_t position,
                            const GltfMaterial& material, const glm::dmat4& world) {
     const auto positions = document_.read_accessor(position, 3);
@@ -196,12 +212,13 @@ class GltfMesh {
     return positions.count;
   }
 
-  // Many nodes may show one mesh: what they make of a small file stays within reason.
+  // Refuses more vertices or corners than the size of the files justifies, because many nodes may
+  // show one mesh.
   void check_growth(std::size_t more) const {
     const std::uint64_t most = (std::uint64_t{1} << 20) + 64 * document_.bytes_read();
     if (more > most || soup_.positions.size() > most - more ||
         more >= MeshSoup::kNone - soup_.positions.size() || soup_.corners.size() > most) {
-      document_.fail("its nodes repeat meshes to more vertices than this program takes");
+      document_.fail("its nodes repeat meshes to more vertices than this program accepts");
     }
   }
 
@@ -235,17 +252,20 @@ class GltfMesh {
 
   void add_triangles(const Json& primitive, std::uint64_t mode, std::size_t base, std::size_t count,
                      const GltfMaterial& material, bool mirrored) {
+    // Read the indices, or count up without them.
     std::vector<std::uint32_t> order;
     if (const auto accessor = document_.unsigned_at(primitive, "indices")) {
       for (const double index : document_.read_accessor(*accessor, 1).values) {
         if (!(index >= 0 && index < static_cast<double>(count))) {
-          document_.fail("an index that leads to no vertex");
+          document_.fail("an index refers to no vertex");
         }
         order.push_back(static_cast<std::uint32_t>(index));
       }
     } else {
       for (std::uint32_t i = 0; i < count; ++i) order.push_back(i);
     }
+
+    // Add the triangles of a list, strip or fan.
     const std::size_t step = mode == 4 ? 3 : 1;
     for (std::size_t i = 0; i + 2 < order.size(); i += step) {
       std::array<std::size_t, 3> at = {i, i + 1, i + 2};
@@ -261,6 +281,7 @@ class GltfMesh {
     }
   }
 
+  // Returns a material of the file, or the default one, and adds it to the soup on first use.
   const GltfMaterial& use_material(std::optional<std::uint64_t> index) {
     const std::uint64_t key = index.value_or(std::numeric_limits<std::uint64_t>::max());
     const auto known = materials_.find(key);
@@ -308,7 +329,8 @@ class GltfMesh {
       made.uv_scale = {(*s)[0], (*s)[1]};
   }
 
-  // A texture of the emission counts by its mean, so that the emitted power is right.
+  // Reads the emission. An emission texture is replaced by its mean, so that the emitted power is
+  // right.
   void read_emission(const Json& json, Material& material) {
     const auto factor = document_.numbers_at<3>(json, "emissiveFactor");
     if (!factor) return;
@@ -330,7 +352,7 @@ class GltfMesh {
     }
   }
 
-  // Many materials may emit by one texture.
+  // Returns the mean of a texture; it is kept, because many materials may share one.
   glm::dvec3 mean_of(const std::shared_ptr<const Image>& image) {
     const auto [at, is_new] = means_.try_emplace(image, 0);
     if (is_new) {
@@ -342,11 +364,11 @@ class GltfMesh {
 
   std::shared_ptr<const Image> load_texture(const Json& info) {
     const auto texture = document_.unsigned_at(info, "index");
-    if (!texture) document_.fail("a texture without index");
+    if (!texture) document_.fail("a texture has no index");
     const auto source = document_.unsigned_at(document_.at("textures", *texture), "source");
     if (!source) {
       warnings_.add(kTextureLeftOut,
-                    "texture " + std::to_string(*texture) + ": no source that is supported");
+                    "texture " + std::to_string(*texture) + ": it has no supported source");
       return nullptr;
     }
     const auto [at, is_new] = images_.try_emplace(*source);
@@ -354,7 +376,7 @@ class GltfMesh {
     return at->second;
   }
 
-  // Several images may be one file or one bufferView.
+  // Loads an image. Several images that are one file or one bufferView are loaded once.
   std::shared_ptr<const Image> load_image(std::uint64_t source) {
     const Json& image = document_.at("images", source);
     const auto uri = image.find("uri");
@@ -365,13 +387,13 @@ class GltfMesh {
       return textures_.decode(label(source), document_.fetch(text), document_.bytes_read());
     }
     const auto view = document_.unsigned_at(image, "bufferView");
-    if (!view) document_.fail("an image without uri and bufferView");
+    if (!view) document_.fail("an image has neither uri nor bufferView");
     const std::uint64_t first = image_of_view_.try_emplace(*view, source).first->second;
     const std::span<const std::byte> bytes = document_.view(*view);
     return textures_.decode(label(first), bytes, document_.bytes_read());
   }
 
-  // Cameras look along -z with y up (section 3.10).
+  // Adds a perspective camera, which looks along -z with y up (section 3.10).
   void add_camera(std::uint64_t index, const glm::dmat4& world) {
     const Json* const perspective = member(document_.at("cameras", index), "perspective");
     if (perspective == nullptr) return;
@@ -392,12 +414,12 @@ class GltfMesh {
   std::vector<MeshCamera> cameras_;
   MeshWarnings warnings_;
   TextureLoader textures_;
-  std::map<std::uint64_t, GltfMaterial> materials_;
-  std::map<std::uint64_t, std::shared_ptr<const Image>> images_;
-  std::map<std::uint64_t, std::uint64_t> image_of_view_;
+  std::map<std::uint64_t, GltfMaterial> materials_;               // by index in the file
+  std::map<std::uint64_t, std::shared_ptr<const Image>> images_;  // by index in the file
+  std::map<std::uint64_t, std::uint64_t> image_of_view_;          // first image of each bufferView
   std::map<std::shared_ptr<const Image>, glm::dvec3> means_;
-  std::vector<bool> visited_;
-  bool has_uvs_ = false;
+  std::vector<bool> visited_;  // per node
+  bool has_uvs_ = false;       // some primitive has texture coordinates
 };
 
 }  // namespace

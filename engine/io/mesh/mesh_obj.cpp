@@ -1,5 +1,13 @@
-// Meshes from Wavefront OBJ: polygons with materials. Source: Wavefront, "Object Files (.obj)",
-// Advanced Visualizer manual, appendix B1.
+// Reads meshes from Wavefront OBJ: polygons with materials. Source: Wavefront, "Object Files
+// (.obj)", Advanced Visualizer manual, appendix B1.
+//
+//   v x y z            a position              f 1/1/1 2/2/1 3/3/1   a polygon, corners
+//   vn x y z           a normal                                      POSITION[/[UV][/NORMAL]]
+//   vt u v             texture coordinates     usemtl NAME           material of what follows
+//   mtllib FILE ...    material libraries      # ...                 comment
+//
+// Statements of other kinds (groups, curves, smoothing) are skipped. Positions, normals and texture
+// coordinates are counted separately; negative indices count backwards from the last one read.
 #include <algorithm>
 #include <exception>
 #include <map>
@@ -30,7 +38,7 @@ class ObjMesh {
   }
 
  private:
-  // A backslash at its end joins a line to the next.
+  // Reads the next line; a backslash at the end of a line joins it to the next one.
   bool next_logical_line(std::string_view& line) {
     if (!stream_.next_line(line)) return false;
     if (!line.ends_with('\\')) return true;
@@ -38,7 +46,7 @@ class ObjMesh {
     do {
       joined_.append(line.substr(0, line.size() - (line.ends_with('\\') ? 1 : 0)));
       if (joined_.size() > ByteStream::kMaxBytesAtOnce) {
-        stream_.fail_at_line("a line of more than 64 MiB");
+        stream_.fail_at_line("the line has more than 64 MiB");
       }
       if (!line.ends_with('\\')) break;
     } while (stream_.next_line(line));
@@ -68,6 +76,7 @@ class ObjMesh {
     }
   }
 
+  // Reads up to N numbers, of which the first `least` must exist; the others default to 0.
   template <std::size_t N>
   std::array<double, N> read_numbers(Words& words, std::size_t least) const {
     std::array<double, N> numbers{};
@@ -76,23 +85,25 @@ class ObjMesh {
       if (word.empty() && i >= least) break;
       const auto number = parse_number(word);
       if (!number)
-        stream_.fail_at_line(word.empty() ? "a vertex with too few values" : "not a number");
+        stream_.fail_at_line(word.empty() ? "the vertex has too few values"
+                                          : "a value is not a number");
       numbers[i] = *number;
     }
     return numbers;
   }
 
-  // From 1 on, or backwards from the last one read: -1.
+  // Returns the index from 0 on for a word that counts from 1 on, or backwards from -1, the last
+  // one read.
   std::uint32_t resolve(std::string_view word, std::size_t count) const {
     const auto index = parse_integer(word);
     const auto limit = static_cast<std::int64_t>(count);
     if (!index || *index == 0 || *index < -limit || *index >= std::int64_t{MeshSoup::kNone}) {
-      stream_.fail_at_line("an index that leads to no vertex");
+      stream_.fail_at_line("an index refers to no vertex");
     }
     return static_cast<std::uint32_t>(*index < 0 ? limit + *index : *index - 1);
   }
 
-  // POSITION[/[UV][/NORMAL]]
+  // Reads a corner: POSITION[/[UV][/NORMAL]].
   Corner read_corner(std::string_view word) const {
     Corner corner;
     const std::size_t slash = word.find('/');
@@ -117,6 +128,7 @@ class ObjMesh {
     soup_.add_polygon(corners_, *material_, path_);
   }
 
+  // Returns the index of a material in the soup, to which it is added when it is first used.
   std::size_t use_material(const std::string& name) {
     const auto used = used_.find(name);
     if (used != used_.end()) return used->second;
@@ -131,7 +143,8 @@ class ObjMesh {
     return used_[name] = soup_.add_material(std::move(material), path_);
   }
 
-  // Names separated by blanks, or one name with blanks in it, which may be escaped.
+  // Reads libraries: names that are separated by blanks, or one name with blanks in it, which may
+  // be escaped by backslashes.
   void read_libraries(Words& words) {
     std::string whole(words.rest());
     std::ranges::replace(whole, '\\', '/');
@@ -153,7 +166,7 @@ class ObjMesh {
 
   void read_library(const std::string& name) {
     const std::filesystem::path path = (path_.parent_path() / name).lexically_normal();
-    if (!libraries_.insert(path.string()).second) return;  // it would define nothing new
+    if (!libraries_.insert(path.string()).second) return;  // reading again would define nothing new
     try {
       read_mtl(path, textures_, defined_, warnings_);
     } catch (const std::bad_alloc&) {
@@ -165,15 +178,15 @@ class ObjMesh {
 
   std::filesystem::path path_;
   ByteStream stream_;
-  std::string joined_;
+  std::string joined_;  // the line of next_logical_line() when it was joined
   MeshSoup soup_;
   MeshWarnings warnings_;
   TextureLoader textures_;
-  std::set<std::string> libraries_;  // that were read
-  std::map<std::string, Material> defined_;
-  std::map<std::string, std::size_t> used_;
-  std::optional<std::size_t> material_;
-  std::vector<Corner> corners_;
+  std::set<std::string> libraries_;          // paths of libraries that were read
+  std::map<std::string, Material> defined_;  // materials of the libraries by name
+  std::map<std::string, std::size_t> used_;  // index in the soup by name
+  std::optional<std::size_t> material_;      // of the next face
+  std::vector<Corner> corners_;              // of one face, kept between calls
 };
 
 }  // namespace

@@ -1,4 +1,9 @@
-// Meshes from OFF text. Source: Geomview manual, "OFF Files".
+// Reads meshes from OFF text. Source: Geomview manual, "OFF Files".
+//
+//   OFF                 or STOFF, COFF, NOFF, STCNOFF, ...: what each vertex has
+//   8 6 0               numbers of vertices, faces and edges (the last is ignored)
+//   0 0 1               a vertex for each line: x y z [nx ny nz] [colour] [s t]
+//   4 0 1 2 3           a face for each line: number of corners, indices from 0 on [colour]
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -26,7 +31,7 @@ class OffMesh {
   }
 
  private:
-  // The next line with words, without its comment. It lies in the stream's buffer.
+  // Returns the next line that has words, without its comment. It lies in the stream's buffer.
   std::string_view next_content() {
     std::string_view line;
     do {
@@ -38,11 +43,13 @@ class OffMesh {
 
   std::uint64_t count(Words& words) const {
     const auto number = parse_integer(words.next());
-    if (!number || *number < 0) stream_.fail_at_line("OFF needs its counts of vertices and faces");
+    if (!number || *number < 0)
+      stream_.fail_at_line("the numbers of vertices and faces are missing");
     return static_cast<std::uint64_t>(*number);
   }
 
-  // [ST][C][N]OFF, then the counts, on the same line or the next; the keyword may be missing.
+  // Reads the header: [ST][C][N]OFF, which may be missing, then the counts on the same line or the
+  // next.
   void read_header() {
     std::string_view line = next_content();
     const std::size_t mark = line.find("OFF");
@@ -51,7 +58,7 @@ class OffMesh {
       has_uvs_ = take_prefix(prefix, "ST");
       take_prefix(prefix, "C");
       has_normals_ = take_prefix(prefix, "N");
-      if (!prefix.empty()) stream_.fail_at_line("an OFF of a kind that is not supported");
+      if (!prefix.empty()) stream_.fail_at_line("this kind of OFF is not supported");
       line = line.substr(mark + 3);
       if (Words(line).next() == "BINARY") stream_.fail_at_line("binary OFF is not supported");
       if (Words(line).next().empty()) line = next_content();
@@ -59,20 +66,21 @@ class OffMesh {
     Words words(line);
     vertices_ = count(words);
     faces_ = count(words);
-    // "0 0 0" and the end of the line at least; "0" for a face.
+    // A vertex takes at least "0 0 0" and a line end, a face at least "0" and a line end.
     const std::uint64_t left = stream_.max_left() + 1;
     if (vertices_ > left / 6 || faces_ > (left - 6 * vertices_) / 2) {
-      stream_.fail_at_line("more vertices or faces than the file can hold");
+      stream_.fail_at_line("the header counts more vertices or faces than the file can hold");
     }
   }
 
+  // Removes a part from the front of the prefix, if it is there.
   static bool take_prefix(std::string_view& prefix, std::string_view part) {
     if (!prefix.starts_with(part)) return false;
     prefix.remove_prefix(part.size());
     return true;
   }
 
-  // x y z [nx ny nz] [colour] [s t]: the last two where there are texture coordinates, since a
+  // Reads x y z [nx ny nz] [colour] [s t]. Texture coordinates are the last two values, because a
   // colour may have three or four components.
   void read_vertex() {
     std::array<double, 16> values{};
@@ -80,12 +88,12 @@ class OffMesh {
     Words words(next_content());
     for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
       const auto value = parse_number(word);
-      if (!value) stream_.fail_at_line("not a number");
-      if (n == values.size()) stream_.fail_at_line("more values than a vertex can have");
+      if (!value) stream_.fail_at_line("a value is not a number");
+      if (n == values.size()) stream_.fail_at_line("the vertex has more values than OFF allows");
       values[n++] = *value;
     }
     const std::size_t least = 3U + (has_normals_ ? 3U : 0U) + (has_uvs_ ? 2U : 0U);
-    if (n < least) stream_.fail_at_line("a vertex with too few values");
+    if (n < least) stream_.fail_at_line("the vertex has too few values");
     soup_.positions.emplace_back(values[0], values[1], values[2]);
     if (has_normals_) soup_.normals.emplace_back(values[3], values[4], values[5]);
     if (has_uvs_) soup_.uvs.emplace_back(values[n - 2], values[n - 1]);
@@ -94,15 +102,15 @@ class OffMesh {
   void read_face() {
     Words words(next_content());
     const auto size = parse_integer(words.next());
-    if (!size || *size < 0) stream_.fail_at_line("a face begins with its number of corners");
+    if (!size || *size < 0) stream_.fail_at_line("a face must begin with its number of corners");
     corners_.clear();
     for (std::int64_t i = 0; i < *size; ++i) {
       const std::string_view word = words.next();
       const auto index = parse_integer(word);
-      if (word.empty()) stream_.fail_at_line("a face with fewer corners than it says");
+      if (word.empty()) stream_.fail_at_line("the face has fewer corners than it declares");
       if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= soup_.positions.size() ||
           *index >= MeshSoup::kNone) {
-        stream_.fail_at_line("an index that leads to no vertex");
+        stream_.fail_at_line("an index refers to no vertex");
       }
       const auto at = static_cast<std::uint32_t>(*index);
       corners_.push_back(
@@ -114,11 +122,11 @@ class OffMesh {
   std::filesystem::path path_;
   ByteStream stream_;
   MeshSoup soup_;
-  std::uint64_t vertices_ = 0;
-  std::uint64_t faces_ = 0;
+  std::uint64_t vertices_ = 0;  // as the header counts them
+  std::uint64_t faces_ = 0;     // as the header counts them
   bool has_normals_ = false;
   bool has_uvs_ = false;
-  std::vector<Corner> corners_;
+  std::vector<Corner> corners_;  // of one face, kept between calls
 };
 
 }  // namespace

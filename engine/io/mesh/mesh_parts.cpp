@@ -1,4 +1,4 @@
-// What the mesh readers share beside polygons: transforms, cameras, textures.
+// The parts that mesh readers share in addition to polygons: transforms, cameras and textures.
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -15,7 +15,8 @@
 
 namespace ptc {
 
-// The cofactor matrix is the inverse transpose times the determinant, and defined for all matrices.
+// Uses the cofactor matrix, which is the inverse transpose times the determinant and exists for
+// every matrix.
 glm::dmat3 normal_transform(const glm::dmat4& transform) {
   const glm::dmat3 m(transform);
   const glm::dmat3 cofactor(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
@@ -61,7 +62,7 @@ std::shared_ptr<const Image> TextureLoader::keep(Image image) {
 std::shared_ptr<const Image> TextureLoader::load(const std::string& name) {
   std::string relative = name;
   std::ranges::replace(relative, '\\', '/');
-  // One file has many names: a.png and ./a.png.
+  // Normalise the name, because one file has many: a.png and ./a.png.
   const std::filesystem::path path = (directory_ / relative).lexically_normal();
   const auto known = loaded_.find(path.string());
   if (known != loaded_.end()) return known->second;

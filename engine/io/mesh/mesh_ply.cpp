@@ -1,4 +1,4 @@
-// Meshes from PLY: faces or triangle strips.
+// Reads meshes from PLY: faces or triangle strips.
 #include <utility>
 
 #include "engine/base/error.h"
@@ -14,10 +14,10 @@ class PlyMesh {
  public:
   explicit PlyMesh(const std::filesystem::path& path) : path_(path), reader_(path) {
     vertex_ = reader_.find("vertex");
-    if (vertex_ == nullptr) throw DataError(path.string() + ": a PLY file without vertices");
-    // Faces may come first and need to know what vertices will have.
+    if (vertex_ == nullptr) throw DataError(path.string() + ": the PLY file has no vertices");
+    // Find the properties now, because faces may come before the vertices and need to know them.
     position_ = find_all<3>({{{"x"}, {"y"}, {"z"}}});
-    if (!position_) throw DataError(path.string() + ": PLY vertices without x, y and z");
+    if (!position_) throw DataError(path.string() + ": the PLY vertices lack x, y or z");
     normal_ = find_all<3>({{{"nx", "normal_x"}, {"ny", "normal_y"}, {"nz", "normal_z"}}});
     uv_ = find_all<2>({{{"u", "s", "texture_u"}, {"v", "t", "texture_v"}}});
   }
@@ -39,7 +39,7 @@ class PlyMesh {
   }
 
  private:
-  // The scalar properties that have one of the names each, if all are there.
+  // Returns the indices of N scalar properties, each known by one of several names, if all exist.
   template <std::size_t N>
   std::optional<std::array<std::size_t, N>> find_all(
       const std::array<std::initializer_list<std::string_view>, N>& names) const {
@@ -73,7 +73,7 @@ class PlyMesh {
     if (list == nullptr || !list->length_type || list->type == PlyType::float32 ||
         list->type == PlyType::float64) {
       throw DataError(path_.string() + ": PLY element '" + element.name +
-                      "' without a list of integers vertex_indices");
+                      "' lacks a list of integers vertex_indices");
     }
     PlyRecord record;
     for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -88,8 +88,8 @@ class PlyMesh {
     }
   }
 
-  // Each index makes a triangle with the two before it, every second one turned over; -1 begins a
-  // new strip.
+  // Adds a triangle for each index and the two before it; every second triangle is turned over. An
+  // index of -1 begins a new strip.
   void add_strip(const PlyRecord& record, const std::vector<double>& indices) {
     corners_.clear();
     for (const double index : indices) {
@@ -109,7 +109,7 @@ class PlyMesh {
 
   Corner corner(const PlyRecord& record, double index) const {
     if (!(index >= 0 && index < static_cast<double>(vertex_->count) && index < MeshSoup::kNone)) {
-      reader_.fail(record, "an index that leads to no vertex");
+      reader_.fail(record, "an index refers to no vertex");
     }
     const auto at = static_cast<std::uint32_t>(index);
     return {at, normal_ ? at : MeshSoup::kNone, uv_ ? at : MeshSoup::kNone};

@@ -1,4 +1,13 @@
-// Polygons to a mesh: checks, triangles, one index for all attributes.
+// From polygons to a mesh: checks, triangles, and one index for all attributes of a vertex.
+//
+// Files index positions, normals and texture coordinates separately; a Mesh has one index per
+// vertex. So each different combination of the three that occurs becomes a vertex:
+//
+//   corners of the triangles     1/1/1  2/1/1  3/2/1 | 3/2/1  2/1/1  4/1/1
+//   vertices                       0      1      2       2      1      3
+//
+// Vertices are numbered in the order in which the triangles first use them, so the mesh does not
+// depend on how equal corners are found.
 #include "engine/io/mesh/mesh_soup.h"
 
 #include <algorithm>
@@ -22,9 +31,11 @@ using Triangle = std::array<Corner, 3>;
 constexpr std::uint32_t kNone = MeshSoup::kNone;
 constexpr std::size_t kMaxMaterials = 65536;
 constexpr std::size_t kMaxCorners = std::size_t{1} << 28;
-// Farther from the centre, squares of float distances leave the range of float.
+// The greatest distance from the centre along an axis. Beyond it, squares of distances leave the
+// range of float.
 constexpr double kMaxExtent = 1e18;
 
+// The triangles of a soup, each with the material of its polygon.
 struct Soup {
   std::vector<Triangle> triangles;
   std::vector<std::uint16_t> material_of;
@@ -44,33 +55,34 @@ void check_corners(const MeshSoup& soup, const std::filesystem::path& path) {
       const Corner& c = soup.corners[corner];
       if (c.position >= soup.positions.size() || !within(c.normal, soup.normals.size()) ||
           !within(c.uv, soup.uvs.size())) {
-        refuse(path, "polygon " + std::to_string(i) + ": an index leads to no vertex");
+        refuse(path, "polygon " + std::to_string(i) + ": an index refers to no vertex");
       }
     }
   }
 }
 
+// Checks all positions and returns the centre of their box, rounded to integers.
 glm::dvec3 checked_origin(const MeshSoup& soup, const std::filesystem::path& path) {
   Bounds bounds;
   for (std::size_t i = 0; i < soup.positions.size(); ++i) {
     const glm::dvec3& p = soup.positions[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      refuse(path, "vertex " + std::to_string(i) + ": a position that is not finite");
+      refuse(path, "vertex " + std::to_string(i) + ": the position is not finite");
     }
     if (glm::any(glm::greaterThan(glm::abs(p), glm::dvec3(kMaxCoordinate)))) {
-      refuse(path, "vertex " + std::to_string(i) + ": a position beyond 2^999");
+      refuse(path, "vertex " + std::to_string(i) + ": the position is beyond 2^999");
     }
     bounds.add(p);
   }
   if (bounds.empty()) return glm::dvec3(0);
   const glm::dvec3 half = bounds.high / 2.0 - bounds.low / 2.0;
   if (half.x > kMaxExtent || half.y > kMaxExtent || half.z > kMaxExtent) {
-    refuse(path, "positions more than 2e18 apart");
+    refuse(path, "positions are more than 2e18 apart");
   }
   return glm::round(bounds.low / 2.0 + bounds.high / 2.0);
 }
 
-// Without those that have no area once their positions are float.
+// Triangulates all polygons and drops triangles that have no area once their positions are float.
 Soup make_triangles(const MeshSoup& soup, const std::vector<glm::vec3>& positions) {
   Soup made;
   made.triangles.reserve(soup.polygon_sizes.size());
@@ -97,7 +109,7 @@ Soup make_triangles(const MeshSoup& soup, const std::vector<glm::vec3>& position
   return made;
 }
 
-// Unit normals; those that cannot be scaled become 0, which says that they are missing.
+// Scales normals to unit length. A normal that cannot be scaled becomes 0, which means missing.
 void normalise(std::vector<glm::vec3>& normals) {
   for (glm::vec3& normal : normals) {
     const double length = glm::length(glm::dvec3(normal));
@@ -106,7 +118,8 @@ void normalise(std::vector<glm::vec3>& normals) {
   }
 }
 
-// Either all corners have a normal afterwards or there are none.
+// Gives a flat normal to every corner that has none, unless no corner has one: then all normals are
+// removed.
 void complete_normals(MeshSoup& soup, std::vector<Triangle>& triangles,
                       const std::vector<glm::vec3>& positions) {
   normalise(soup.normals);
@@ -132,7 +145,8 @@ void complete_normals(MeshSoup& soup, std::vector<Triangle>& triangles,
   if (!any) soup.normals.clear();
 }
 
-// Either all corners have texture coordinates afterwards or there are none.
+// Gives the texture coordinates (0, 0) to every corner that has none, unless no corner has any:
+// then all are removed.
 void complete_uvs(MeshSoup& soup, std::vector<Triangle>& triangles) {
   for (glm::vec2& uv : soup.uvs) {
     if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = glm::vec2(0);
@@ -153,8 +167,8 @@ void complete_uvs(MeshSoup& soup, std::vector<Triangle>& triangles) {
   }
 }
 
-// For each corner (three a triangle) the number of the first corner that equals it: by sorting, so
-// that the work does not depend on how many share a position.
+// Returns for each corner (three per triangle) the number of the first corner that equals it. It
+// sorts them, so that the work does not depend on how many corners share a position.
 std::vector<std::uint32_t> first_equals(const std::vector<Triangle>& triangles) {
   const auto corner = [&](std::uint32_t i) -> const Corner& { return triangles[i / 3][i % 3]; };
   const auto key = [&](std::uint32_t i) {
@@ -174,7 +188,7 @@ std::vector<std::uint32_t> first_equals(const std::vector<Triangle>& triangles) 
   return first;
 }
 
-// The same for meshes with one index for all attributes, without a sort.
+// Returns what first_equals() does without a sort, for meshes with one index for all attributes.
 std::vector<std::uint32_t> first_equals_by_position(const std::vector<Triangle>& triangles,
                                                     std::size_t positions) {
   std::vector<std::uint32_t> first_of(positions, kNone);
@@ -187,6 +201,7 @@ std::vector<std::uint32_t> first_equals_by_position(const std::vector<Triangle>&
   return first;
 }
 
+// Says whether every corner uses its position's index for its normal and texture coordinates, too.
 bool one_index(const std::vector<Triangle>& triangles) {
   return std::ranges::all_of(triangles, [](const Triangle& triangle) {
     return std::ranges::all_of(triangle, [](const Corner& c) {
@@ -195,7 +210,7 @@ bool one_index(const std::vector<Triangle>& triangles) {
   });
 }
 
-// One vertex for each different corner, numbered in the order of the triangles.
+// Makes one vertex for each different corner, numbered in the order of the triangles.
 void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles,
                     const std::vector<glm::vec3>& positions, Mesh& mesh) {
   const std::vector<std::uint32_t> first =
@@ -218,14 +233,15 @@ void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles
 }  // namespace
 
 std::size_t MeshSoup::add_material(Material material, const std::filesystem::path& path) {
-  if (materials.size() == kMaxMaterials) refuse(path, "more than 65,536 materials");
+  if (materials.size() == kMaxMaterials) refuse(path, "the file has more than 65,536 materials");
   materials.push_back(std::move(material));
   return materials.size() - 1;
 }
 
 void MeshSoup::add_polygon(std::span<const Corner> polygon, std::size_t material,
                            const std::filesystem::path& path) {
-  if (polygon.size() > kMaxCorners - corners.size()) refuse(path, "more than 2^28 corners");
+  if (polygon.size() > kMaxCorners - corners.size())
+    refuse(path, "the polygons have more than 2^28 corners");
   corners.insert(corners.end(), polygon.begin(), polygon.end());
   polygon_sizes.push_back(static_cast<std::uint32_t>(polygon.size()));
   material_of.push_back(static_cast<std::uint16_t>(material));
@@ -244,7 +260,7 @@ Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path) {
   positions.reserve(soup.positions.size());
   for (const glm::dvec3& position : soup.positions) positions.emplace_back(position - mesh.origin);
   Soup made = make_triangles(soup, positions);
-  if (made.triangles.empty()) refuse(path, "no triangle");
+  if (made.triangles.empty()) refuse(path, "the mesh has no triangle");
   complete_normals(soup, made.triangles, positions);
   complete_uvs(soup, made.triangles);
   share_vertices(soup, made.triangles, positions, mesh);

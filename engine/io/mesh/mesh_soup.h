@@ -1,4 +1,10 @@
-// Inside the mesh readers: polygons as files have them, and the mesh that is made of them.
+// Internal to the mesh readers: polygons as files have them, and the mesh that is built from them.
+//
+//   read_obj_mesh, read_ply_mesh, ...  -->  MeshSoup  -->  build_mesh()  -->  Mesh
+//
+// A reader only translates its format. build_mesh() does everything that all formats need: it
+// checks indices and positions, triangulates polygons, drops degenerate triangles and unused
+// vertices, and merges corners of equal position, normal and texture coordinates into vertices.
 #pragma once
 
 #include <array>
@@ -23,99 +29,125 @@
 
 namespace ptc {
 
-/// Polygons over positions, normals and texture coordinates that are indexed each on its own.
-/// Readers fill it; indices may run ahead of the vertices, build_mesh() checks them.
+/// Polygons over positions, normals and texture coordinates, each with indices of its own. Readers
+/// may add a polygon before its vertices, because only build_mesh() checks the indices.
 struct MeshSoup {
-  static constexpr std::uint32_t kNone = 0xffffffff;
+  static constexpr std::uint32_t kNone = 0xffffffff;  ///< index of a corner that lacks something
+  /// A corner of a polygon: indices into positions, normals and uvs.
   struct Corner {
     std::uint32_t position = 0;
     std::uint32_t normal = kNone;
     std::uint32_t uv = kNone;
   };
 
-  std::vector<glm::dvec3> positions;
-  std::vector<glm::vec3> normals;  ///< any length; zero and non-finite ones count as missing
-  std::vector<glm::vec2> uvs;
-  std::vector<Corner> corners;               ///< of all polygons, one after another
-  std::vector<std::uint32_t> polygon_sizes;  ///< corners of each
-  std::vector<std::uint16_t> material_of;    ///< per polygon
-  std::vector<Material> materials;           ///< empty: one of default values is used
+  std::vector<glm::dvec3> positions;  ///< world coordinates, scene units
+  std::vector<glm::vec3> normals;     ///< of any length; zero and non-finite ones count as missing
+  std::vector<glm::vec2> uvs;         ///< as Mesh::uvs
+  std::vector<Corner> corners;        ///< corners of all polygons, one polygon after another
+  std::vector<std::uint32_t> polygon_sizes;  ///< number of corners, per polygon
+  std::vector<std::uint16_t> material_of;    ///< index into materials, per polygon
+  std::vector<Material> materials;           ///< if empty, a material of default values is used
 
-  /// @throws DataError when there are 65,536 already
+  /// Adds a material and returns its index.
+  /// @param path  name of the file for the error
+  /// @throws DataError when there are 65,536 materials already
   std::size_t add_material(Material material, const std::filesystem::path& path);
-  /// @throws DataError when there are 2^28 corners already
+  /// Adds a polygon with an index of a material.
+  /// @param path  name of the file for the error
+  /// @throws DataError when all polygons together would have more than 2^28 corners
   void add_polygon(std::span<const Corner> polygon, std::size_t material,
                    const std::filesystem::path& path);
-  /// For readers that gave every corner coordinates and then found that the file has none.
+  /// Removes all texture coordinates. It is for readers that gave every corner an index before they
+  /// knew that the file has no coordinates.
   void drop_uvs();
 };
 
-/// @throws DataError when an index leads nowhere, a position is not finite or too far from the
+/// Builds the mesh of a soup: triangles over shared vertices, relative to an origin.
+/// @param path  name of the file for errors
+/// @throws DataError when an index is out of range, a position is not finite or too far from the
 ///         others, or no triangle is left
 [[nodiscard]] Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path);
 
-/// What it took to triangulate a polygon.
+/// The work that the triangulation of a polygon took.
 struct TriangulationCounts {
-  std::uint64_t looks = 0;      ///< at corners and at boxes around them
-  std::size_t fan_corners = 0;  ///< of what became a fan; 0 for a simple polygon
+  std::uint64_t looks = 0;      ///< corners, and boxes around corners, that were examined
+  std::size_t fan_corners = 0;  ///< corners of the part that became a fan; 0 for a simple polygon
 };
 
-/// Splits a simple polygon into triangles of its corners' numbers, in its winding. Concave polygons
-/// are cut by ears; what no ear can be cut from (self-intersections) becomes a fan.
+/// Splits a simple polygon into triangles that keep its winding, and appends them as indices of its
+/// corners. Ears are cut off one after another; a rest without an ear, which only polygons that
+/// intersect themselves leave, becomes a fan.
 ///
-/// The work is about n log n looks for n corners; where long triangles lie among evenly spread
-/// corners it is up to n sqrt(n).
-/// @param max_looks  after which the rest becomes a fan; usually n (1024 + 8 sqrt(n)) or 2^34
+/// For n corners the work is about n log n looks. It is up to n sqrt(n) when long triangles lie
+/// among evenly spread corners.
+/// @param max_looks  number of looks after which the rest becomes a fan; the default is the smaller
+///                   of n (1024 + 8 sqrt(n)) and 2^34
 TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
                                 std::vector<std::array<std::uint32_t, 3>>& triangles,
                                 std::optional<std::uint64_t> max_looks = {});
 
-/// Takes normals through a transform: its inverse transpose, up to a positive factor.
+/// Returns the matrix that transforms normals: the inverse transpose of a transform of positions,
+/// up to a positive factor.
 [[nodiscard]] glm::dmat3 normal_transform(const glm::dmat4& transform);
+/// Says whether a transform mirrors, that is, whether its determinant is negative.
 [[nodiscard]] bool mirrors(const glm::dmat4& transform);
 
-/// Directions of any length. @return nothing when a value is not finite or has no direction
+/// Makes a camera from directions of any length.
+/// @param horizontal_fov  radians
+/// @return nothing when a value is not finite, a direction is zero, or the field of view is not
+///         positive
 [[nodiscard]] std::optional<MeshCamera> make_camera(const glm::dvec3& position,
                                                     const glm::dvec3& forward, const glm::dvec3& up,
                                                     double horizontal_fov);
 
-/// Why a file that a mesh names could not be read, for a warning: "NAME: REASON".
-/// @param name  as the mesh has it
-/// @param path  under which it was opened; an error that begins with it says so once
+/// Returns the reason why a file that a mesh names could not be read, for a warning: "NAME:
+/// REASON".
+/// @param name  name of the file as the mesh has it
+/// @param path  path under which it was opened; it is removed from the front of the error's text
 [[nodiscard]] std::string reason_for(const std::string& name, const std::filesystem::path& path,
                                      const std::exception& error);
 
-/// Loads each texture once; a failure becomes a warning and no texture.
+/// Loads the textures of a mesh, each of them once. A texture that cannot be loaded becomes a
+/// warning and a null pointer.
 ///
-/// All textures of a mesh have at most `free_pixels` and 256 for each byte of the files that they
-/// are in, and one beyond that fails: a small file cannot ask for much memory. Photographs have
-/// less than 100 pixels a byte, only pictures of a single colour have more.
+/// All textures of a mesh together may have `free_pixels` pixels plus 256 for each byte of the
+/// files that hold them; a texture beyond that fails. So a small file cannot ask for much memory.
+/// Photographs have fewer than 100 pixels per byte; only pictures of a single colour have more.
 class TextureLoader {
  public:
+  /// Makes a loader for one mesh.
+  /// @param directory  directory of the mesh file, to which names of textures are relative
+  /// @param warnings   receives the failures; must outlive this loader
   TextureLoader(std::filesystem::path directory, MeshWarnings& warnings,
                 std::uint64_t free_pixels = kMaxImagePixels)
       : directory_(std::move(directory)), warnings_(warnings), free_pixels_(free_pixels) {}
 
-  /// @param name  path relative to the directory, / or \ between its parts
+  /// Returns the texture in a file, or null after a warning.
+  /// @param name  path relative to the directory, with / or \ between its parts
   [[nodiscard]] std::shared_ptr<const Image> load(const std::string& name);
-  /// A picture inside the mesh's own files, known as `name` from now on.
-  /// @param mesh_bytes  of these files, as far as they were read
+  /// Returns the texture in bytes of the mesh's own files, or null after a warning. A later call
+  /// with the same name returns the same texture.
+  /// @param mesh_bytes  size of these files as far as they were read, bytes
   [[nodiscard]] std::shared_ptr<const Image> decode(const std::string& name,
                                                     std::span<const std::byte> bytes,
                                                     std::uint64_t mesh_bytes);
 
  private:
+  /// Returns the number of pixels that the next texture may have.
   [[nodiscard]] std::uint64_t pixels_left() const;
+  /// Counts the pixels of a texture and puts it on the heap.
   std::shared_ptr<const Image> keep(Image image);
 
   std::filesystem::path directory_;
   MeshWarnings& warnings_;
   std::uint64_t free_pixels_;
-  std::uint64_t pixels_ = 0;
-  std::uint64_t texture_bytes_ = 0;  // of the files that load() read
-  std::uint64_t mesh_bytes_ = 0;
+  std::uint64_t pixels_ = 0;         // of all textures so far
+  std::uint64_t texture_bytes_ = 0;  // size of the files that load() read
+  std::uint64_t mesh_bytes_ = 0;     // size of the mesh's own files
   std::map<std::string, std::shared_ptr<const Image>> loaded_;
 };
+
+// The readers of each format, as read_mesh() describes them.
 
 [[nodiscard]] MeshFile read_ply_mesh(const std::filesystem::path& path);
 [[nodiscard]] MeshFile read_off_mesh(const std::filesystem::path& path);

@@ -1,4 +1,4 @@
-// Meshes from STL, text and binary. Source: 3D Systems, "StereoLithography Interface
+// Reads meshes from STL, text and binary. Source: 3D Systems, "StereoLithography Interface
 // Specification", 1988.
 #include <array>
 #include <bit>
@@ -14,8 +14,8 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary STL is little-endian");
 
-constexpr std::size_t kHeaderBytes = 84;    // free text of 80, count of triangles
-constexpr std::size_t kTriangleBytes = 50;  // normal, three positions, 16 bits that mean nothing
+constexpr std::size_t kHeaderBytes = 84;    // 80 bytes of free text, u32 number of triangles
+constexpr std::size_t kTriangleBytes = 50;  // normal, three positions, 16 bits without meaning
 
 class StlMesh {
  public:
@@ -27,7 +27,8 @@ class StlMesh {
   }
 
  private:
-  // The size tells: texts begin with "solid", but so do the headers of many binary files.
+  // Reads a binary file, or returns false when the file is text. The size of the file decides: text
+  // begins with "solid", but so do the headers of many binary files.
   bool read_binary() {
     ByteStream stream(path_);
     const std::uint64_t bytes = stream.max_left();
@@ -46,7 +47,8 @@ class StlMesh {
     return true;
   }
 
-  // "vertex x y z" between "outer loop" and "endloop"; the normals are those of the triangles.
+  // Reads text: "vertex x y z" between "outer loop" and "endloop". The normals of facets are
+  // ignored, because those of the triangles are exact.
   void read_text() {
     ByteStream stream(path_);
     std::string_view line;
@@ -62,7 +64,7 @@ class StlMesh {
         open = keyword == "solid";
       } else if (!keyword.empty() && keyword != "facet" && keyword != "outer" &&
                  keyword != "endfacet") {
-        stream.fail_at_line("no keyword of STL");
+        stream.fail_at_line("the line does not begin with a keyword of STL");
       }
     }
     if (open) stream.fail_at_line("the file ends too early");
@@ -72,7 +74,7 @@ class StlMesh {
     glm::dvec3 position;
     for (int i = 0; i < 3; ++i) {
       const auto value = parse_number(words.next());
-      if (!value) stream.fail_at_line("a vertex without three numbers");
+      if (!value) stream.fail_at_line("the vertex does not have three numbers");
       position[i] = *value;
     }
     return position;

@@ -1,3 +1,4 @@
+// The warnings of a mesh file as lines of text.
 #include "engine/io/mesh/mesh_warnings.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@ namespace {
 constexpr std::size_t kParts = 4;
 constexpr std::size_t kMaxBytes = 300;
 
-// On one line. Where UTF-8 is cut, no half character is left.
+// Returns a part as one line of printable text. A cut never splits a character of UTF-8.
 std::string shown(std::string_view part) {
   const bool cut = part.size() > kMaxBytes;
   if (cut) {

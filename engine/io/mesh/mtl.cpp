@@ -1,4 +1,4 @@
-// Materials of OBJ files.
+// The materials of OBJ files. Statements that are not understood are skipped.
 #include "engine/io/mesh/mtl.h"
 
 #include <algorithm>
@@ -56,7 +56,8 @@ class MtlReader {
     return stream_.path().filename().string() + ": line " + std::to_string(stream_.line());
   }
 
-  // One number stands for all three; what is no number is a spectral curve or an xyz colour.
+  // Reads R G B, where one number stands for all three. A first word that is not a number belongs
+  // to a spectral curve or an xyz colour, which is left out with a warning.
   void read_colour(Words& words, float most, glm::vec3& colour) {
     std::array<std::optional<double>, 3> values;
     for (auto& value : values) value = parse_number(words.next());
@@ -71,7 +72,7 @@ class MtlReader {
     }
   }
 
-  // What follows the options: -NAME and its values.
+  // Returns what follows the options, each of which is -NAME and its values.
   static std::string file_name(Words words) {
     for (;;) {
       Words ahead = words;
@@ -82,7 +83,7 @@ class MtlReader {
       for (int i = 0; i < values; ++i) {
         Words after = ahead;
         const std::string_view value = after.next();
-        // -o -s -t may have fewer than three numbers.
+        // The options -o, -s and -t may have fewer than three numbers.
         if (i > 0 && values == 3 && !parse_number(value)) break;
         ahead = after;
       }

@@ -1,4 +1,4 @@
-// Inside the OBJ reader: material libraries. Source: Wavefront, "MTL material format", 1995.
+// Internal to the OBJ reader: material libraries. Source: Wavefront, "MTL material format", 1995.
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,12 @@
 
 namespace ptc {
 
-/// Adds the materials of an MTL file: Kd, Ke and map_Kd. A material of a known name is passed over:
-/// the first library that defines it wins.
-/// @throws DataError, std::system_error
+/// Adds the materials of an MTL file, of which Kd, Ke and map_Kd are read. A material whose name is
+/// already known is skipped: the first library that defines it wins.
+/// @param materials  materials by name
+/// @param textures   loads the textures of map_Kd
+/// @param warnings   receives the parts that are left out
+/// @throws DataError when the file cannot be read as lines of text; std::system_error
 void read_mtl(const std::filesystem::path& path, TextureLoader& textures,
               std::map<std::string, Material>& materials, MeshWarnings& warnings);
 

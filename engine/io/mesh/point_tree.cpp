@@ -1,3 +1,11 @@
+// A balanced k-d tree from which points are removed.
+//
+// The tree is implicit: node i splits its range of points_ at the middle and has the children
+// 2 i + 1 and 2 i + 2; a range of at most 32 points is a leaf. Every node counts its remaining
+// points. Removing a point swaps it behind the remaining points of its leaf and lowers the counts
+// on the way down; boxes are not shrunk:
+//
+//   points_   | remaining | removed || remaining | removed || ...     two leaves
 #include "engine/io/mesh/point_tree.h"
 
 #include <algorithm>
@@ -10,11 +18,12 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kLeafPoints = 32;
-// A turn is a difference of two products of differences: four roundings of half an epsilon each,
-// twice, for a box and for a point in it, make 4. The rest is for what was left out.
+// A generous bound on the relative error of a turn. A turn is a difference of two products of
+// differences: four roundings of half an epsilon each. They count twice, for a box and for a point
+// in it, which makes 4 epsilon; the other 4 cover terms of higher order.
 constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
 
-/// A triangle that boxes of points are held against.
+// The triangle of a search, against which boxes of points are tested.
 class Target {
  public:
   Target(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c)
@@ -24,22 +33,23 @@ class Target {
         size_(high_ - low_),
         sure_area_(turn(a, b, c) - 2 * kRounding * size_.x * size_.y) {}
 
-  /// True when lies_in() is false of every point of the box, however its turns are rounded.
+  // Returns true only if lies_in() is false for every point of the box, however its turns are
+  // rounded.
   [[nodiscard]] bool misses(const glm::dvec2& low, const glm::dvec2& high) const noexcept {
-    // No coordinate of a point and of a corner differ by more than this.
+    // The coordinates of a point of the box and of a corner differ by no more than this.
     const glm::dvec2 reach = glm::max(high - low_, high_ - low);
     const double off =
         kRounding * (size_.x * reach.y + size_.y * reach.x) + std::numeric_limits<double>::min();
     for (std::size_t i = 0; i < 3; ++i) {
       const glm::dvec2& a = corners_[i];
       const glm::dvec2& b = corners_[(i + 1) % 3];
-      // The point of the box that lies most to the left of the edge.
+      // Find the point of the box that lies farthest to the left of the edge.
       const glm::dvec2 most(b.y - a.y > 0 ? low.x : high.x, b.x - a.x > 0 ? high.y : low.y);
       if (turn(a, b, most) < -off) return true;
     }
-    // Turns over the area are weights of the corners that make up the point. At most two of them
-    // are negative, none below -off / area, so the point is not farther than that from the box
-    // around the triangle.
+    // The turns of a point divided by the area are the weights of the corners whose mean it is. At
+    // most two of them are negative, and none is below -off / area. So the point lies no farther
+    // outside the box around the triangle than 2 off / area times the size of that box.
     if (!(sure_area_ > 0)) return false;
     const glm::dvec2 slack = 2 * off / sure_area_ * size_;
     return low.x > high_.x + slack.x || high.x < low_.x - slack.x || low.y > high_.y + slack.y ||
@@ -52,6 +62,7 @@ class Target {
   double sure_area_;  ///< not more than the true turn of the corners
 };
 
+// Splits a range of points the same way in all functions.
 constexpr std::size_t middle(std::size_t begin, std::size_t end) {
   return begin + (end - begin) / 2;
 }
@@ -88,6 +99,7 @@ void PointTree::build(std::size_t node, Range range) {
 std::optional<std::uint32_t> PointTree::find_in(const glm::dvec2& a, const glm::dvec2& b,
                                                 const glm::dvec2& c) {
   if (nodes_.empty()) return std::nullopt;
+  // Push a node on the stack when the triangle may reach its remaining points.
   const Target target(a, b, c);
   open_.clear();
   const auto look_at = [&](std::size_t node, Range range) {
@@ -95,6 +107,8 @@ std::optional<std::uint32_t> PointTree::find_in(const glm::dvec2& a, const glm::
     ++looks_;
     if (!target.misses(nodes_[node].low, nodes_[node].high)) open_.emplace_back(node, range);
   };
+
+  // Take nodes off the stack; a random bit decides which child is searched first.
   look_at(0, {0, points_.size()});
   while (!open_.empty()) {
     const auto [node, range] = open_.back();
@@ -135,7 +149,7 @@ void PointTree::remove(std::uint32_t point) {
   }
 }
 
-// Source: Knuth, MMIX; the top bit of a linear congruential generator.
+// Returns the top bit of a linear congruential generator. Source: Knuth, MMIX.
 bool PointTree::random_bit() noexcept {
   random_ = random_ * 6364136223846793005U + 1442695040888963407U;
   return random_ >> 63 != 0;

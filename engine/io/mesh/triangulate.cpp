@@ -1,4 +1,14 @@
-// Polygons to triangles by cutting ears. Source: Meisters, "Polygons have ears", 1975.
+// Splits polygons into triangles by cutting ears. Source: Meisters, "Polygons have ears", 1975.
+//
+//   c-----------f     An ear is a corner that bulges and whose triangle holds no other corner.
+//   |          /      Here b is one, because the triangle a b c is empty. Cutting it off leaves
+//   |     d   /       a polygon with one corner less. A simple polygon of more than three
+//   |    / \ /        corners always has an ear.
+//   b---a   e
+//
+// Only corners that turn inwards, such as d, can lie in the triangle of another corner, and cutting
+// makes no new ones. So they are kept in a k-d tree (PointTree), in which the search for a corner
+// in a triangle takes about log n looks.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -14,17 +24,19 @@ namespace {
 
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
+// Appends triangles that all share the first corner.
 void fan(std::span<const std::uint32_t> corners, Triangles& triangles) {
   for (std::size_t i = 2; i < corners.size(); ++i) {
     triangles.push_back({corners[0], corners[i - 1], corners[i]});
   }
 }
 
-// The polygon seen along the largest component of its normal, counter-clockwise.
+// Returns the polygon as seen along the largest component of its normal, counter-clockwise.
 std::vector<glm::dvec2> project(std::span<const glm::dvec3> polygon) {
-  // Newell: the sum over edges is twice the area vector, also for polygons that are not quite flat.
+  // Sum over the edges (Newell): the result is twice the area vector, even for polygons that are
+  // not quite flat.
   glm::dvec3 normal(0);
-  const glm::dvec3 base = polygon[0];  // differences keep digits far from the origin
+  const glm::dvec3 base = polygon[0];  // differences to it keep digits far from the origin
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     normal += glm::cross(polygon[i] - base, polygon[(i + 1) % polygon.size()] - base);
   }
@@ -41,20 +53,21 @@ std::vector<glm::dvec2> project(std::span<const glm::dvec3> polygon) {
 
 constexpr std::uint32_t kNone = 0xffffffff;
 
-// Looks before what is left becomes a fan. A line meets some sqrt(n) boxes of a k-d tree over n
-// evenly spread points, which is what the worst simple polygons that we know take for each corner.
-// 2^34 looks take about a minute.
+// Returns the default number of looks after which the rest of a polygon becomes a fan. A line meets
+// about sqrt(n) boxes of a k-d tree over n evenly spread points, and the worst simple polygons that
+// we know take that many looks for each corner. 2^34 looks take about a minute.
 std::uint64_t usual_most_looks(std::size_t corners) {
   const auto n = static_cast<double>(corners);
   return static_cast<std::uint64_t>(std::min(n * (1024 + 8 * std::sqrt(n)), 0x1p34));
 }
 
-// Numbers below `members` in lists, each in one at most.
+// Doubly linked lists of numbers below `members`; each number is in at most one list.
 class Lists {
  public:
   Lists(std::size_t lists, std::size_t members)
       : first_(lists, kNone), list_of_(members, kNone), before_(members), after_(members) {}
 
+  // Moves a member to the front of a list.
   void put(std::uint32_t member, std::uint32_t list) {
     take(member);
     list_of_[member] = list;
@@ -64,6 +77,7 @@ class Lists {
     first_[list] = member;
   }
 
+  // Removes a member from its list, if it is in one.
   void take(std::uint32_t member) {
     if (list_of_[member] == kNone) return;
     const std::uint32_t before = before_[member], after = after_[member];
@@ -72,22 +86,23 @@ class Lists {
     list_of_[member] = kNone;
   }
 
-  // kNone when the list is empty.
+  // Returns the first member of a list, or kNone when it is empty.
   [[nodiscard]] std::uint32_t first(std::uint32_t list) const { return first_[list]; }
 
  private:
   std::vector<std::uint32_t> first_, list_of_, before_, after_;
 };
 
-// The corners that turn inwards or go straight on, by place: many may share one.
+// The corners that turn inwards or go straight on, grouped by place, because several corners may
+// lie at one place.
 struct InwardCorners {
-  std::vector<glm::dvec2> places;
-  std::vector<std::uint32_t> corners_at;  // of each place, those that are not cut away
-  std::vector<std::uint32_t> place_of;    // of each corner of the polygon, or kNone
+  std::vector<glm::dvec2> places;         // all different
+  std::vector<std::uint32_t> corners_at;  // per place, number of corners that are not cut away
+  std::vector<std::uint32_t> place_of;    // per corner of the polygon, its place or kNone
 };
 
-// Cutting an ear never turns a bulging corner inwards: these stay the only ones that can lie in an
-// ear.
+// Finds the corners that turn inwards. Cutting an ear never turns a bulging corner inwards, so they
+// stay the only ones that can lie in an ear.
 InwardCorners inward_corners(const std::vector<glm::dvec2>& points) {
   const std::size_t n = points.size();
   InwardCorners inward{.place_of = std::vector<std::uint32_t>(n, kNone)};
@@ -108,17 +123,17 @@ InwardCorners inward_corners(const std::vector<glm::dvec2>& points) {
   return inward;
 }
 
-// A polygon being cut: a ring of the corners that are left.
+// A polygon that is being cut: a ring of the corners that are left.
 //
 //   open --> an ear: cut away, its neighbours are open again
 //    ^  \--> turns inwards: closed until a neighbour is cut away
 //    |   \-> holds an inward corner: closed until all corners there, or a neighbour, are cut away
 //    \--------/
 //
-// Open corners are asked in the order of the ring. Closed ones would give the same answer as
-// before, so that the triangles are those of asking every corner each time round. They do not
-// depend on which of the corners in a triangle is found, either. That is one at random, so that a
-// triangle is asked about log n times on the average until it is empty or gone.
+// Open corners are examined in the order of the ring. A closed corner would give the same answer as
+// before, so the triangles are the same as if every corner were examined each time round. Nor do
+// they depend on which of several corners in a triangle is found. The one that is found is random,
+// so that a triangle is examined about log n times on average before it is empty or gone.
 class EarClipper {
  public:
   EarClipper(std::vector<glm::dvec2> points, std::uint64_t max_looks)
@@ -137,6 +152,7 @@ class EarClipper {
     }
   }
 
+  // Cuts ears until three corners are left or no ear is found; the rest becomes a fan.
   TriangulationCounts clip(Triangles& triangles) {
     std::size_t left = points_.size();
     std::uint32_t at = 0;
@@ -145,7 +161,7 @@ class EarClipper {
       if (ear == kNone) break;
       triangles.push_back({previous_[ear], ear, next_[ear]});
       cut(ear);
-      at = next_[next_[ear]];  // every other corner, so that ears do not share one apex
+      at = next_[next_[ear]];  // skip a corner, so that ears do not all share one apex
     }
     std::vector<std::uint32_t> rest;
     for (std::size_t i = 0; i < left; ++i, at = next_[at]) rest.push_back(at);
@@ -154,7 +170,8 @@ class EarClipper {
   }
 
  private:
-  // The first ear of the ring from a corner on; kNone when there is none or it takes too long.
+  // Returns the first ear of the ring from a corner on, or kNone when there is none or the search
+  // takes too many looks. Corners that are no ears are closed.
   std::uint32_t find_ear(std::uint32_t from) {
     while (looks_ + tree_.looks() < max_looks_) {
       auto corner = open_.next(from);
@@ -167,7 +184,8 @@ class EarClipper {
     return kNone;
   }
 
-  // A corner that bulges, or has no area, and whose triangle holds no other corner.
+  // Says whether a corner can be cut: its triangle has no area, or it bulges and its triangle holds
+  // no other corner. A corner whose triangle holds one waits at the place of that one.
   bool is_ear(std::uint32_t i) {
     ++looks_;
     const glm::dvec2& a = points_[previous_[i]];
@@ -181,6 +199,8 @@ class EarClipper {
     return !place;
   }
 
+  // Cuts a corner away and opens the corners whose answer may change: its neighbours, and those
+  // that waited at its place if no corner is left there.
   void cut(std::uint32_t i) {
     next_[previous_[i]] = next_[i];
     previous_[next_[i]] = previous_[i];
@@ -198,17 +218,18 @@ class EarClipper {
   }
 
   std::vector<glm::dvec2> points_;
-  std::vector<std::uint32_t> next_;
-  std::vector<std::uint32_t> previous_;
-  IndexSet open_;
+  std::vector<std::uint32_t> next_;      // the ring of corners that are left
+  std::vector<std::uint32_t> previous_;  // the same ring backwards
+  IndexSet open_;                        // corners to examine
   InwardCorners inward_;
-  PointTree tree_;
-  Lists waiting_;  // of each place, the corners whose triangle holds it
+  PointTree tree_;  // places of inward corners that are left
+  Lists waiting_;   // per place, the corners whose triangle holds it
   std::uint64_t max_looks_;
   std::uint64_t looks_ = 0;
 };
 
-// What EarClipper makes of four corners, without its tables: most polygons have so many.
+// Triangulates four corners as EarClipper does, but without its tables, because most polygons that
+// are not triangles have four corners.
 TriangulationCounts cut_quad(const std::vector<glm::dvec2>& points, Triangles& triangles) {
   for (std::uint32_t i = 0; i < 4; ++i) {
     const std::uint32_t next = (i + 1) % 4, far = (i + 2) % 4, previous = (i + 3) % 4;

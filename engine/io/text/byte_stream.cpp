@@ -1,4 +1,9 @@
-// Buffering, lines and gunzip.
+// Buffered reading of lines and records, and the decompression of gzip files.
+//
+//   buffer_    | consumed | unread | free |          refill() moves the unread bytes to the front,
+//              0        begin_   end_               doubles a full buffer, and reads behind them
+//
+// A view that next_line() or take() has returned is valid until the next call, which may refill.
 #include "engine/io/text/byte_stream.h"
 
 #include <algorithm>
@@ -15,8 +20,9 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
-// Deflate makes up to 1032 bytes of one, of a file of nothing but repetition: 600 KB of gzip were
-// minutes of reading and gigabytes of vertices. Meshes and clouds shrink to a twentieth at best.
+// The greatest accepted ratio of decompressed to compressed bytes. Deflate makes up to 1032 bytes
+// of one when a file is nothing but repetition: 600 KB of gzip took minutes to read and gave
+// gigabytes of vertices. Meshes and clouds shrink to a twentieth at best.
 constexpr std::uint64_t kMaxUnpackRatio = 256;
 constexpr std::uint64_t kFreeUnpackedBytes = std::uint64_t{1} << 26;
 
@@ -26,7 +32,8 @@ std::uint64_t max_unpacked(std::uint64_t packed) {
 
 }  // namespace
 
-// Packed bytes come through InputFile, as all others do; zlib reads no file itself.
+// Decompresses a gzip file. Compressed bytes come through InputFile, because zlib must not read the
+// file itself.
 struct ByteStream::Gunzip {
   explicit Gunzip(const InputFile& from) : file(from), input(kBufferBytes) {
     constexpr int kGzipOnly = 15 + 16;
@@ -36,7 +43,7 @@ struct ByteStream::Gunzip {
   Gunzip(const Gunzip&) = delete;
   Gunzip& operator=(const Gunzip&) = delete;
 
-  /// False at the end of the file.
+  // Reads more compressed bytes. Returns false at the end of the file.
   bool refill() {
     const auto count =
         static_cast<std::size_t>(std::min<std::uint64_t>(input.size(), file.size() - at));
@@ -47,12 +54,12 @@ struct ByteStream::Gunzip {
     return count > 0;
   }
 
-  /// Behind a member comes another one, or what is not meant for us: padding (RFC 1952 says
-  /// nothing).
+  // Says whether the position is behind a member. What follows is another member or padding, of
+  // which RFC 1952 says nothing and which is ignored.
   [[nodiscard]] bool between() const { return members > 0 && stream.total_in <= 2; }
 
-  /// @return bytes unpacked, fewer than there is room for at the end only; or a negative error of
-  /// zlib
+  // Decompresses into `out`. Returns the number of bytes, which is below out.size() only at the
+  // end of the file, or a negative error of zlib.
   int read(std::span<std::byte> out) {
     stream.next_out = reinterpret_cast<Bytef*>(out.data());
     stream.avail_out = static_cast<uInt>(out.size());
@@ -77,9 +84,9 @@ struct ByteStream::Gunzip {
 
   const InputFile& file;
   std::vector<std::byte> input;
-  std::uint64_t at = 0;  // of the next packed byte to be read
+  std::uint64_t at = 0;  // offset of the next compressed byte to read
   z_stream stream{};
-  std::uint64_t members = 0;  // unpacked so far
+  std::uint64_t members = 0;  // members that were decompressed completely
 };
 
 ByteStream::ByteStream(const std::filesystem::path& path) : file_(path), buffer_(kBufferBytes) {
@@ -87,7 +94,7 @@ ByteStream::ByteStream(const std::filesystem::path& path) : file_(path), buffer_
   constexpr std::array kMagic = {std::byte{0x1f}, std::byte{0x8b}};
   std::array<std::byte, 2> begin{};
   if (file_.size() >= begin.size()) file_.read_at(0, begin);
-  if (begin != kMagic) throw DataError(path.string() + ": not a gzip file");
+  if (begin != kMagic) throw DataError(path.string() + ": the file is not a gzip file");
   gunzip_ = std::make_unique<Gunzip>(file_);
 }
 
@@ -114,7 +121,7 @@ std::size_t ByteStream::read_some(std::span<std::byte> out) {
     }
     const std::uint64_t unpacked = base_ + end_ + static_cast<std::uint64_t>(count);
     if (unpacked > max_unpacked(file_.size())) {
-      fail_at(base_ + end_, "gzip data that unpack to more than 256 times their size");
+      fail_at(base_ + end_, "the gzip data unpack to more than 256 times their size");
     }
     return static_cast<std::size_t>(count);
   }
@@ -125,7 +132,7 @@ std::size_t ByteStream::read_some(std::span<std::byte> out) {
   return count;
 }
 
-// More bytes behind the unread ones, which move to the front.
+// Moves the unread bytes to the front of the buffer and reads more behind them.
 bool ByteStream::refill() {
   if (begin_ > 0) {
     std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
@@ -134,7 +141,7 @@ bool ByteStream::refill() {
     begin_ = 0;
   }
   if (end_ == buffer_.size()) {
-    if (end_ >= kMaxBytesAtOnce) fail_at(base_, "a line or record of more than 64 MiB");
+    if (end_ >= kMaxBytesAtOnce) fail_at(base_, "a line or record has more than 64 MiB");
     buffer_.resize(2 * buffer_.size());
   }
   const std::size_t count = read_some(std::span(buffer_).subspan(end_));
@@ -143,7 +150,7 @@ bool ByteStream::refill() {
 }
 
 bool ByteStream::next_line(std::string_view& line) {
-  std::size_t seen = 0;
+  std::size_t seen = 0;  // unread bytes that hold no line end
   for (;;) {
     const std::byte* const from = buffer_.data() + begin_;
     const std::size_t count = end_ - begin_;
@@ -166,12 +173,12 @@ bool ByteStream::next_line(std::string_view& line) {
 }
 
 std::span<const std::byte> ByteStream::take(std::size_t count) {
-  if (count > kMaxBytesAtOnce) fail_at(offset(), "a record of more than 64 MiB");
+  if (count > kMaxBytesAtOnce) fail_at(offset(), "a record has more than 64 MiB");
   while (end_ - begin_ < count) {
     const std::size_t missing = count - (end_ - begin_);
     if (!refill()) {
       fail_at(offset(),
-              "the file ends too early, " + std::to_string(missing) + " bytes are missing");
+              "the file ends too early: " + std::to_string(missing) + " bytes are missing");
     }
   }
   const std::span<const std::byte> bytes(buffer_.data() + begin_, count);

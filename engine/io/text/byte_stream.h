@@ -1,4 +1,4 @@
-// A file read once from front to back, as lines or as records of bytes.
+// A file that is read once from front to back, as lines or as records of bytes.
 #pragma once
 
 #include <cstddef>
@@ -14,52 +14,63 @@
 
 namespace ptc {
 
-/// Buffered sequential reading; a name that ends in ".gz" is unpacked on the way. Offsets count
-/// unpacked bytes.
-/// Memory: a buffer of 256 KiB, up to kMaxBytesAtOnce while a line or record is longer.
+/// Reads a file sequentially through a buffer. A file whose name ends in ".gz" is decompressed on
+/// the way, and all offsets count decompressed bytes.
+///
+/// Every read throws DataError when compressed data are damaged or decompress to more than 64 MiB
+/// plus 256 times their size, and std::system_error when the system refuses to read.
+///
+/// Memory: a buffer of 256 KiB, which grows up to kMaxBytesAtOnce for longer lines and records;
+/// compressed files take another 256 KiB.
 class ByteStream {
  public:
-  /// The longest line and the largest record.
+  /// The greatest length of a line or record, bytes.
   static constexpr std::size_t kMaxBytesAtOnce = std::size_t{1} << 26;
 
-  /// @throws std::system_error, DataError when a .gz is no gzip file
+  /// Opens a file. @throws std::system_error; DataError when a .gz is not a gzip file
   explicit ByteStream(const std::filesystem::path& path);
   ~ByteStream();
   ByteStream(const ByteStream&) = delete;
   ByteStream& operator=(const ByteStream&) = delete;
 
+  /// Returns the path of the file.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return file_.path(); }
-  /// Offset of the next byte.
+  /// Returns the offset of the next byte.
   [[nodiscard]] std::uint64_t offset() const noexcept { return base_ + begin_; }
-  /// Number of the line that next_line() gave last, from 1 on.
+  /// Returns the number of the line that next_line() read last, counted from 1.
   [[nodiscard]] std::uint64_t line() const noexcept { return line_; }
-  /// No more bytes than this are to come; exact where the file is not packed.
+  /// Returns an upper bound on the bytes that are left; it is exact for uncompressed files.
   [[nodiscard]] std::uint64_t max_left() const noexcept;
 
-  /// Sets `line` to the next line without its end ("\n" or "\r\n"), valid until the next call.
-  /// @return false at the end of the file
+  /// Sets `line` to the next line without its end ("\n" or "\r\n"). The view is valid until the
+  /// next call. @return false at the end of the file
+  /// @throws DataError when the line has more than kMaxBytesAtOnce bytes
   [[nodiscard]] bool next_line(std::string_view& line);
-  /// The next `count` bytes, valid until the next call. @throws DataError when the file ends before
+  /// Returns the next `count` bytes, a view that is valid until the next call.
+  /// @throws DataError when fewer are left or `count` is above kMaxBytesAtOnce
   [[nodiscard]] std::span<const std::byte> take(std::size_t count);
-  /// Passes over `count` bytes. @throws DataError when the file ends before
+  /// Skips `count` bytes. @throws DataError when fewer are left
   void skip(std::uint64_t count);
+  /// Says whether no byte is left; it may have to read to find out.
   [[nodiscard]] bool at_end();
 
-  /// @throws DataError "PATH: offset N: RULE"
+  /// Refuses the file because of the bytes at an offset. @throws DataError "PATH: offset N: RULE"
   [[noreturn]] void fail_at(std::uint64_t offset, const std::string& rule) const;
-  /// @throws DataError "PATH: line N: RULE" of the last line
+  /// Refuses the file because of the line read last. @throws DataError "PATH: line N: RULE"
   [[noreturn]] void fail_at_line(const std::string& rule) const;
 
  private:
   struct Gunzip;
 
+  /// Reads more bytes behind the unread ones. @return false at the end of the file
   bool refill();
+  /// Reads up to out.size() bytes. @return their number; 0 at the end of the file
   std::size_t read_some(std::span<std::byte> out);
 
   InputFile file_;
-  std::unique_ptr<Gunzip> gunzip_;
+  std::unique_ptr<Gunzip> gunzip_;  // null when the file is not compressed
   std::vector<std::byte> buffer_;
-  std::uint64_t base_ = 0;  // offset of buffer_[0]
+  std::uint64_t base_ = 0;  // offset of buffer_[0] in the stream
   std::size_t begin_ = 0;   // unread bytes are [begin_, end_)
   std::size_t end_ = 0;
   std::uint64_t line_ = 0;

@@ -1,4 +1,4 @@
-// Words, numbers without locale, printable text.
+// Words of a line, numbers that do not depend on the locale, and printable text.
 #include "engine/io/text/text.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r\v\f";
 
-// std::from_chars takes no plus sign.
+// Removes a plus sign from the front of a number, because std::from_chars does not accept one.
 std::string_view without_plus(std::string_view word) noexcept {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-' && word[1] != '+') word.remove_prefix(1);
   return word;
@@ -47,7 +47,7 @@ std::optional<double> parse_number(std::string_view word) noexcept {
   const char* const end = word.data() + word.size();
   const auto [stop, error] = std::from_chars(word.data(), end, value);
   if (stop != end || error == std::errc::invalid_argument) return std::nullopt;
-  if (error == std::errc::result_out_of_range) {
+  if (error == std::errc::result_out_of_range) {  // std::from_chars leaves `value` as it was
     const bool tiny =
         word.find("e-") != std::string_view::npos || word.find("E-") != std::string_view::npos;
     value = tiny ? 0 : std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// Words and numbers in lines of text; file name endings; text that is shown.
+// Words and numbers in lines of text, endings of file names, and text that is fit for a terminal.
 #pragma once
 
 #include <cstdint>
@@ -9,29 +9,33 @@
 
 namespace ptc {
 
-/// The words of a line, separated by blanks and tabs.
+/// Splits a line into words, which are separated by white space. All views refer to the line.
 class Words {
  public:
   explicit Words(std::string_view line) noexcept : rest_(line) {}
 
-  /// The next word, empty at the end.
+  /// Returns the next word, or an empty view at the end of the line.
   [[nodiscard]] std::string_view next() noexcept;
-  /// What follows the words taken so far, without blanks at its ends.
+  /// Returns the part of the line behind the words that next() returned, without white space at its
+  /// ends.
   [[nodiscard]] std::string_view rest() const noexcept;
 
  private:
   std::string_view rest_;
 };
 
-/// A decimal number, "nan" or "inf"; too large a number is an infinity, too small a one zero.
+/// Parses a decimal number, "nan" or "inf", in any case and without regard to the locale. A number
+/// that is too large gives infinity, one that is too small gives zero.
+/// @return nothing when the word is not exactly one number
 [[nodiscard]] std::optional<double> parse_number(std::string_view word) noexcept;
+/// Parses a decimal integer. @return nothing when the word is not exactly one integer of 64 bits
 [[nodiscard]] std::optional<std::int64_t> parse_integer(std::string_view word) noexcept;
 
-/// The ending of a file name in lower case, with its dot.
+/// Returns the extension of a file name in lower case with its dot, or an empty string.
 [[nodiscard]] std::string lower_extension(const std::filesystem::path& path);
 
-/// Text that may hold bytes of a file, fit for a terminal: control characters but '\n' become \xNN,
-/// and so do all bytes beyond ASCII when they are not UTF-8.
+/// Returns a text that may hold bytes of a file in a form that is fit for a terminal. Control
+/// characters other than '\n' become \xNN; so do all bytes beyond ASCII when the text is not UTF-8.
 [[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace ptc
