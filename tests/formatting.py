@@ -1,4 +1,4 @@
-"""Holds every C++ file to .clang-format, with the release of clang-format that Debian 12 has.
+"""Checks every C++ file against .clang-format, with the release of clang-format that Debian 12 has.
 
 Another release may break lines elsewhere, so the test is skipped (exit code 77) where that one is
 not installed. With --fix the files are rewritten instead.
@@ -19,7 +19,7 @@ SKIPPED = 77
 
 
 def find_clang_format():
-    """The path of clang-format in the release that counts, or None."""
+    """Returns the path of clang-format in the required release, or None."""
     for name in (f"clang-format-{RELEASE}", "clang-format"):
         path = shutil.which(name)
         if not path:
@@ -31,13 +31,13 @@ def find_clang_format():
 
 
 def sources():
-    """All C++ files of the tree."""
+    """Returns all C++ files of the tree."""
     return [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*"))
             if path.suffix in (".h", ".cpp")]
 
 
 def faults_of(program, paths):
-    """What clang-format would change, one line for each place; empty when all is as it should be."""
+    """Returns what clang-format would change, one line for each place; empty when a file is formatted."""
     done = subprocess.run([program, "--dry-run", "--Werror", "--style=file", *map(str, paths)],
                           capture_output=True, text=True, check=False)
     places = [line for line in done.stderr.splitlines() if "error:" in line]

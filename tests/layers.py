@@ -16,7 +16,7 @@ FOLDERS = ["format", "engine", "tools"]
 
 
 def read_table(text):
-    """Layers that each layer may include, from set(PTC_LAYERS_x "a;b") lines."""
+    """Returns the layers that each layer may include, from set(PTC_LAYERS_x "a;b") lines."""
     table = {}
     for layer, value in re.findall(r'^set\(PTC_LAYERS_(\S+)\s+"([^"]*)"\)', text, re.MULTILINE):
         value = re.sub(r"\$\{PTC_LAYERS_([^}]+)\}", lambda m: ";".join(table[m[1]]), value)
@@ -25,7 +25,7 @@ def read_table(text):
 
 
 def layer_of(path, table):
-    """The layer whose folder holds a path from the root; None for what is in no layer."""
+    """Returns the layer whose folder holds a path from the root; None for a file in no layer."""
     folder = Path(path).parent
     while str(folder) != "." and str(folder) not in table:
         folder = folder.parent
@@ -33,7 +33,7 @@ def layer_of(path, table):
 
 
 def faults_of(path, text, table, exists):
-    """What is wrong with the includes of one file, "PATH:LINE: ..." each."""
+    """Returns what is wrong with the includes of one file, "PATH:LINE: ..." each."""
     own = layer_of(path, table)
     faults = []
     for number, line in enumerate(text.splitlines(), 1):
@@ -56,7 +56,7 @@ def faults_of(path, text, table, exists):
 
 
 def packages_not_linked(root_list, other_lists):
-    """Packages that the list at the root requires and that no other list links a target of."""
+    """Returns packages that the CMakeLists.txt at the root requires and that no target links."""
     required = re.findall(r"^\s*find_package\((\w+) [^)]*\bCONFIG\b", root_list, re.MULTILINE)
     required += re.findall(r"^\s*pkg_check_modules\((\w+)", root_list, re.MULTILINE)
     words = set(re.split(r"[\s():]+", " ".join(other_lists)))
@@ -68,7 +68,7 @@ TOKEN = re.compile(r'''//[^\n]*|/\*.*?\*/|R"(?P<mark>[^(\s]*)\((?P<raw>.*?)\)(?P
 
 
 def literals_of(text):
-    """String literals of a source with their lines; adjacent ones are one, as the compiler has it."""
+    """Returns the string literals of a source with their lines; adjacent ones are joined, as by the compiler."""
     found, joined = [], False
     for token in TOKEN.finditer(text):
         if token["code"]:
@@ -84,7 +84,7 @@ def literals_of(text):
 
 
 def word_faults_of(path, text, fields):
-    """Literals that name an option of a command line, or a field in backquotes that no program has an option for."""
+    """Returns literals that name a command-line option, or a field in backquotes for which no program has an option."""
     faults = []
     for line, literal in literals_of(text):
         if re.search(r"--[a-z]", literal):

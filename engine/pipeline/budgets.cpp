@@ -6,10 +6,11 @@
 namespace ptc {
 namespace {
 
+/// Minimum of bytes for a page cache, even where a cache for fewer pages would be possible.
 constexpr std::uint64_t kMinCacheBytes = std::uint64_t{16} << 20;
 
-/// Direction buffers and lists of the receiver cells of one thread. At most 14 MiB were measured,
-/// with receivers 80 surfels apart in a city of 20 million.
+/// Bytes of the direction buffers and receiver cells' lists of one thread. At most 14 MiB were
+/// measured, with receivers 80 surfels apart in a city of 20 million.
 constexpr std::uint64_t kGatherBytes = std::uint64_t{16} << 20;
 
 }  // namespace

@@ -1,4 +1,8 @@
-// What the stages of the pipeline charge to a memory budget.
+// How the pipeline divides a memory cap: what each of its stages charges to a MemoryBudget.
+//
+//   |<----------------------------- RunOptions::memory_bytes ----------------------------->|
+//   | buffers | directory | mesh and rays | output's directory | ... | sort, or page cache |
+//     fixed     by pages    by triangles    by pages                   whatever is left
 #pragma once
 
 #include <cstdint>
@@ -11,25 +15,27 @@
 
 namespace ptc {
 
-/// Open pages, blocks of points and receivers, and the program itself.
+/// Bytes that are set apart for open pages, blocks of points and receivers, and the program itself.
 inline constexpr std::uint64_t kBufferBytes = std::uint64_t{32} << 20;
 
-/// Least memory that the sort of a build is given.
+/// Minimum of bytes that the sort of a build is given.
 inline constexpr std::uint64_t kMinSortBytes = std::uint64_t{48} << 20;
 
-/// A budget that kBufferBytes are charged to.
+/// Returns a budget to which kBufferBytes are already charged.
+/// @param job  what the memory is for, as in "the memory cap is too small for shading"
 [[nodiscard]] MemoryBudget budget_of(std::uint64_t cap_bytes, std::string job);
 
-/// Charges the directory of an open container.
+/// Charges the directory that an open container keeps in memory.
 void charge_directory(MemoryBudget& budget, const ContainerReader& container);
 
 /// Charges a mesh and what Embree keeps of it.
-/// @param rays  of the mesh, or null
+/// @param rays  the ray scene of the mesh; null when the mesh is not traced
 void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays);
 
 /// Charges a gather from `scene` on `threads` threads.
-/// @return bytes that are left for its page cache
-/// @throws LimitError when they are too few
+/// @param budget  a copy: the caller's budget stays as it is
+/// @return        bytes that are left for the page cache of the gather
+/// @throws LimitError when these are too few for a cache; the text names the least cap that works
 [[nodiscard]] std::uint64_t cache_bytes_left(MemoryBudget budget, const ContainerReader& scene,
                                              unsigned threads, BackEnd back_end);
 

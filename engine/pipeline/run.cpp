@@ -14,8 +14,8 @@ Stage::Stage(StageSeconds& seconds, Progress& progress, std::string name, std::u
   progress_.begin(name_, total, unit);
 }
 
-// The destructor may run because memory is exhausted: a progress report that cannot be made is
-// left out.
+// The destructor may run while std::bad_alloc unwinds the stack: a progress report that needs
+// memory is left out then, because a second exception would end the program.
 Stage::~Stage() {
   try {
     progress_.end();

@@ -1,4 +1,4 @@
-// What every long run is given, and the clock of its stages.
+// The resources that every long run is given, and the clock of its stages.
 #pragma once
 
 #include <chrono>
@@ -12,25 +12,30 @@
 
 namespace ptc {
 
-/// Resources of a run. None of them changes a result.
+/// The resources of a run. They decide how long it takes, never what it gives: the output is the
+/// same, byte for byte, for every cap, number of threads and choice of directories.
 struct RunOptions {
-  /// Cap on resident bytes, caches included.
+  /// Maximum of resident bytes, caches included. A run that cannot keep to it throws LimitError,
+  /// whose text names the least cap that works.
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
   /// Number of threads; 0 means as many as the machine has cores.
   unsigned threads = 0;
-  /// Temporary files are spread over these directories; the output's directory when there are none.
+  /// Directories over which temporary files are spread; when empty, the output's directory.
   std::vector<std::filesystem::path> temp_dirs;
 };
 
-/// Seconds of wall time by stage, in the order in which the stages ran.
+/// Wall time of each stage: name and seconds, in the order in which the stages ended.
 using StageSeconds = std::vector<std::pair<std::string, double>>;
 
 /// Times one stage and reports its progress, from construction to destruction.
 class Stage {
  public:
-  /// @param seconds  gets a row when the stage ends; must outlive it
-  /// @param total    number of units of work, 0 when it is not known
-  /// @param unit     plural noun, e.g. "points"
+  /// Starts the clock and announces the stage.
+  /// @param seconds   gets a row when the stage ends; must outlive it
+  /// @param progress  gets the beginning and the end of the stage; must outlive it
+  /// @param name      what is done, e.g. "sort and build"; reports use it as a key
+  /// @param total     number of units of work, 0 when it is not known
+  /// @param unit      plural noun, e.g. "points"
   Stage(StageSeconds& seconds, Progress& progress, std::string name, std::uint64_t total,
         const char* unit);
   ~Stage();
@@ -44,11 +49,13 @@ class Stage {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Directories for temporary files: those of the run, else the target's own.
+/// Returns the directories for temporary files: RunOptions::temp_dirs or, when there are none, the
+/// directory of the target.
 [[nodiscard]] std::vector<std::filesystem::path> temp_dirs(const RunOptions& run,
                                                            const std::filesystem::path& target);
 
-/// The directory among temp_dirs() with the most free bytes, for a file that lies in one piece.
+/// Returns the directory among temp_dirs() that has the most free bytes, for a temporary file that
+/// cannot be spread over several of them.
 [[nodiscard]] std::filesystem::path roomiest_temp_dir(const RunOptions& run,
                                                       const std::filesystem::path& target);
 

@@ -31,7 +31,7 @@ LightRig recorded_lights(const ContainerReader& container, Progress& progress) {
 std::string lights_record(LightRig rig) {
   if (rig.sky.map && rig.sky.map_path.empty()) {
     throw RequestError("lights",
-                       "a sky with a picture needs its path, by which containers record it");
+                       "a sky with a picture needs its path, which the container records");
   }
   if (!rig.sky.map_path.empty()) {
     rig.sky.map_path = std::filesystem::absolute(rig.sky.map_path).lexically_normal().string();
@@ -44,9 +44,8 @@ void check_meta(const Meta& meta, std::uint8_t page_shift) {
   const std::size_t most = (std::size_t{1} << page_shift) - kPageHeaderBytes;
   if (bytes <= most) return;
   throw RequestError("page_shift",
-                     fmt::format("the record of lights, inputs and channels takes {} bytes, and a "
-                                 "page holds {}: make the container with larger pages, by "
-                                 "`page_shift`",
+                     fmt::format("the record of lights, inputs and channels takes {} bytes, but a "
+                                 "page holds {}: choose larger pages with `page_shift`",
                                  bytes, most));
 }
 

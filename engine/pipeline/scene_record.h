@@ -1,4 +1,5 @@
-// What a container's meta page records of the scene, by key, and its typed values.
+// The record of a scene on the meta page of its container: its keys, and typed access to its
+// values.
 #pragma once
 
 #include <string>
@@ -16,26 +17,28 @@ inline constexpr const char* kSpacingKey = "spacing";    ///< between surfels on
 inline constexpr const char* kInputsKey = "inputs";      ///< file names, separated by spaces
 inline constexpr const char* kRoundingKey = "rounding";  ///< kRounding when points were rounded
 
-/// The lights that a container was built with, the picture of their sky included; no lights when
-/// the container records none.
+/// Returns the lights that a container was built with, and loads the picture of their sky; no
+/// lights when the container records none.
 /// @param progress  gets a note when the picture is no longer the one that was recorded
 /// @throws DataError when the record is no light rig, or names a picture that does not exist or is
 ///         damaged; std::system_error
 [[nodiscard]] LightRig recorded_lights(const ContainerReader& container, Progress& progress);
 
-/// The rig as it is recorded: the path of its sky picture is made absolute.
+/// Returns the text that records a rig. The path of its sky picture is made absolute.
 /// @throws RequestError when the sky has a picture and no path
 [[nodiscard]] std::string lights_record(LightRig rig);
 
-/// @throws RequestError when the texts and channels of a meta page take more than a page
+/// Checks that a meta page has room for the texts and channels of a record.
+/// @param page_shift  logarithm to the base 2 of the bytes of a page
+/// @throws RequestError when they take more than a page
 void check_meta(const Meta& meta, std::uint8_t page_shift);
 
-/// True when emissive triangles lit the surfels, so that the radiance of the surfels around an
-/// emitter includes the light that it gave them.
+/// Returns true when emissive triangles lit the surfels, so that the radiance of the surfels around
+/// an emitter includes the light that it gave them.
 [[nodiscard]] bool lit_by_emitters(const ContainerReader& container);
 
-/// Distance between neighbouring surfels in scene units: the recorded one, else the square root of
-/// area over points; 0 for a container without points.
+/// Returns the distance between neighbouring surfels in scene units: the recorded one or, without a
+/// record, the square root of area over points; 0 for a container without points.
 [[nodiscard]] double surfel_spacing(const ContainerReader& container);
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// A container that lives as long as one run.
+// A container that exists for the length of one run.
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,12 @@
 
 namespace ptc {
 
-/// Writes a container, opens it and removes its name at once: however the run ends from then on,
-/// nothing is left on the disk.
-/// @param write  writes the container to the path that it is given, or throws and leaves nothing
+/// Writes a container, opens it and removes its name. Its space is freed when the reader is
+/// destroyed, or when the process ends, however it ends.
+/// @param directory  where the file lies
+/// @param write      writes the container to the path that it is given, or throws and leaves
+///                   nothing there
+/// @throws FormatError, std::system_error, and whatever `write` throws
 [[nodiscard]] std::unique_ptr<ContainerReader> make_temporary_container(
     const std::filesystem::path& directory,
     const std::function<void(const std::filesystem::path&)>& write);

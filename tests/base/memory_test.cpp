@@ -1,4 +1,4 @@
-// What the system says of this process, and arenas.
+// Memory figures that the system reports for this process, and arenas.
 #include "engine/base/memory.h"
 
 #include <sys/wait.h>
@@ -25,7 +25,7 @@ bool near(std::uint64_t actual, std::uint64_t expected) {
   return kSanitized || (actual + 4 * kMiB > expected && actual < expected + 4 * kMiB);
 }
 
-// Whether `holds` is true in a child process, whose peak is its own.
+// Returns true when `holds` is true in a child process, which has a peak of its own.
 bool in_child(const std::function<bool()>& holds) {
   const pid_t child = fork();
   REQUIRE(child >= 0);
@@ -44,7 +44,7 @@ bool in_child(const std::function<bool()>& holds) {
 
 }  // namespace
 
-TEST_CASE("memory: an arena counts as resident once touched and no longer than it lives",
+TEST_CASE("memory: an arena is resident from the first touch until it is destroyed",
           "[base][memory]") {
   CHECK(in_child([] {
     const std::uint64_t before = resident_bytes();
@@ -58,7 +58,7 @@ TEST_CASE("memory: an arena counts as resident once touched and no longer than i
   }));
 }
 
-TEST_CASE("memory: what an arena discards is given back, zero when touched again",
+TEST_CASE("memory: discarded pages of an arena are freed, and zero when touched again",
           "[base][memory]") {
   CHECK(in_child([] {
     const std::uint64_t before = resident_bytes();
@@ -86,7 +86,7 @@ TEST_CASE("memory: what an arena discards is given back, zero when touched again
   }
 }
 
-TEST_CASE("memory: the peak stays when memory is given back", "[base][memory]") {
+TEST_CASE("memory: the peak stays when memory is freed", "[base][memory]") {
   CHECK(in_child([] {
     const std::uint64_t before = resident_bytes();
     {
@@ -112,7 +112,7 @@ TEST_CASE("memory: an arena is zero-filled, aligned to pages and writable to its
   }
 }
 
-TEST_CASE("memory: an arena moves and leaves nothing behind", "[base][memory]") {
+TEST_CASE("memory: an arena can be moved and leaves nothing behind", "[base][memory]") {
   Arena empty(0);
   CHECK(empty.data() == nullptr);
   CHECK(empty.size() == 0);
@@ -135,11 +135,11 @@ TEST_CASE("memory: an arena moves and leaves nothing behind", "[base][memory]") 
   CHECK(c.size() == 8192);
 }
 
-TEST_CASE("memory: an arena beyond the address space is bad_alloc", "[base][memory]") {
+TEST_CASE("memory: an arena larger than the address space throws bad_alloc", "[base][memory]") {
   CHECK_THROWS_AS(Arena(std::numeric_limits<std::size_t>::max() / 2), std::bad_alloc);
 }
 
-TEST_CASE("memory: CPU time grows with work and not with waiting", "[base][memory]") {
+TEST_CASE("memory: CPU time grows while a thread works, not while it waits", "[base][memory]") {
   const double start = cpu_seconds();
   usleep(50000);
   const double waited = cpu_seconds();

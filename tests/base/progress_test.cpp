@@ -1,4 +1,4 @@
-// What a report says, and when.
+// The lines of a progress report, and when they appear.
 #include "engine/base/progress.h"
 
 #include <unistd.h>
@@ -20,7 +20,7 @@ using namespace ptc;
 
 namespace {
 
-// A file that a report is written to, and the clock it looks at.
+// The file that a report is written to, and the clock that it reads.
 struct Desk {
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file{std::tmpfile(), std::fclose};
   double now = 1000;
@@ -30,7 +30,7 @@ struct Desk {
     return make_progress(fileno(file.get()), terminal, [this] { return now; });
   }
 
-  // What was written since the last call.
+  // Returns what was written since the last call.
   std::string take() {
     std::string text(1 << 16, '\0');
     const ssize_t n = pread(fileno(file.get()), text.data(), text.size(), read_);
@@ -46,7 +46,7 @@ struct Desk {
 
 }  // namespace
 
-TEST_CASE("progress: a note is a line of its own, on a terminal too", "[base][progress]") {
+TEST_CASE("progress: a note is a line of its own, even on a terminal", "[base][progress]") {
   for (const bool terminal : {false, true}) {
     Desk desk;
     const auto progress = desk.progress(terminal);
@@ -55,7 +55,7 @@ TEST_CASE("progress: a note is a line of its own, on a terminal too", "[base][pr
           std::string(program_invocation_short_name) + ": 12.0 GB of temporary files\n");
     progress->begin("sort", 10, "points");
     desk.take();
-    progress->note("more");  // after what the stage has to say
+    progress->note("more");  // after the line of the stage
     const std::string told = desk.take();
     CHECK(told.ends_with(std::string("\n") + program_invocation_short_name + ": more\n"));
   }
@@ -79,7 +79,7 @@ TEST_CASE("progress: a count has three digits and a unit", "[base][progress]") {
   CHECK(format_count(1.8446744073709552e19) == "18.4 E");
 }
 
-TEST_CASE("progress: a duration is minutes and seconds, hours where there are some",
+TEST_CASE("progress: a duration is minutes and seconds, and hours where needed",
           "[base][progress]") {
   CHECK(format_duration(0) == "0:00");
   CHECK(format_duration(7.4) == "0:07");
@@ -93,7 +93,7 @@ TEST_CASE("progress: a duration is minutes and seconds, hours where there are so
     CHECK(format_duration(odd) == "--:--");
 }
 
-TEST_CASE("progress: rate and time left follow what was done", "[base][progress]") {
+TEST_CASE("progress: rate and time left follow from the work done", "[base][progress]") {
   StageState s{"sort", "points", 100, 25, 5};
   CHECK(s.rate() == 5);
   CHECK(s.seconds_left() == 15);
@@ -117,7 +117,7 @@ TEST_CASE("progress: the lines say share, counts, rate and time", "[base][progre
   CHECK(progress_line(unknown) == "read: 5.00 K points, 82/s, 1:01");
   CHECK(progress_summary(known) == "sort: 12.3 M points in 3.0 s, 4.10 M/s");
   CHECK(progress_summary({"sort", "points", 0, 1000, 100}) == "sort: 1.00 K points in 1:40, 10/s");
-  // Not 100 % before the end, and never above.
+  // The share is below 100 % before the end, and never above.
   CHECK(progress_line({"s", "p", 1000, 999, 1}).starts_with("s: 99 %"));
   CHECK(progress_line({"s", "p", 1000, 2000, 1}).starts_with("s: 100 %"));
 }
@@ -136,7 +136,7 @@ TEST_CASE("progress: a bar fits the columns it is given", "[base][progress]") {
       }
 }
 
-TEST_CASE("progress: off a terminal a stage is a line at its start and end and every 10 s",
+TEST_CASE("progress: without a terminal a stage prints its start, its end and a line every 10 s",
           "[base][progress]") {
   Desk desk;
   const auto progress = desk.progress(false);
@@ -165,11 +165,12 @@ TEST_CASE("progress: off a terminal a stage is a line at its start and end and e
   CHECK(desk.take() == "read: points\n");
   desk.now += 2;
   progress->advance(4);
-  progress->begin("build", 0, "nodes");  // ends the stage before
+  progress->begin("build", 0, "nodes");  // ends the previous stage
   CHECK(desk.take() == "read: 4 points in 2.0 s, 2/s\nbuild: nodes\n");
 }
 
-TEST_CASE("progress: a terminal's bar is redrawn 10 times a second at most", "[base][progress]") {
+TEST_CASE("progress: the bar on a terminal is redrawn at most 10 times a second",
+          "[base][progress]") {
   Desk desk;
   {
     const auto progress = desk.progress(true);
@@ -198,7 +199,7 @@ TEST_CASE("progress: a terminal's bar is redrawn 10 times a second at most", "[b
   CHECK(desk.take() == "\n");  // left in the middle of a stage
 }
 
-TEST_CASE("progress: advances of many threads add up", "[base][progress]") {
+TEST_CASE("progress: advances from many threads add up", "[base][progress]") {
   Desk desk;
   const auto progress = desk.progress(true);
   progress->begin("sort", 0, "points");

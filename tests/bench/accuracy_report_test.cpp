@@ -1,4 +1,4 @@
-// JSON, CSV, words and charts of rows made by hand.
+// JSON, CSV, text and charts of rows made by hand.
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -39,7 +39,7 @@ AccuracyRow row(const std::string& set, const std::string& method, Quantity job,
           .speedup_mesh = kNone};
 }
 
-/// Two sets, two methods, both jobs; no mesh.
+/// Rows of two sets, two methods and both jobs, without a mesh.
 SceneAccuracy accuracy() {
   SceneAccuracy scene{.surfels = 1000};
   for (const char* set : {"camera", "points"}) {
@@ -67,7 +67,7 @@ std::string text_of(const std::filesystem::path& path) {
   return text.str();
 }
 
-/// Cells of each line of a CSV file (RFC 4180).
+/// Returns the cells of each line of a CSV file (RFC 4180).
 std::vector<std::vector<std::string>> csv_cells(const std::string& text) {
   std::vector<std::vector<std::string>> lines;
   bool quoted = false, begun = false;
@@ -93,7 +93,7 @@ std::vector<std::vector<std::string>> csv_cells(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("facts: a row says where, what, how long and how wrong", "[bench][report]") {
+TEST_CASE("facts: a row has the set, the method, the times and the errors", "[bench][report]") {
   const nlohmann::ordered_json facts = facts_of(report_of({accuracy()}, 5));
   REQUIRE(facts.at("rows").size() == 8);
   for (const auto& found : facts.at("rows")) {
@@ -136,7 +136,7 @@ TEST_CASE("facts: a row says where, what, how long and how wrong", "[bench][repo
   CHECK(first.at("groups") == 2.5);
 }
 
-TEST_CASE("facts: what was not measured is null", "[bench][report]") {
+TEST_CASE("facts: values that were not measured are null", "[bench][report]") {
   const nlohmann::ordered_json facts = facts_of(report_of({accuracy()}, 5));
   const auto& occlusion = facts.at("rows")[0];
   CHECK(occlusion.at("e_rms").is_null());
@@ -149,9 +149,8 @@ TEST_CASE("facts: what was not measured is null", "[bench][report]") {
   CHECK(facts.dump().find("nan") == std::string::npos);
 }
 
-TEST_CASE(
-    "reports: the files hold the facts, and each line of the table has a cell for each column",
-    "[bench][report]") {
+TEST_CASE("reports: the files hold the facts, and each line of the table has every column",
+          "[bench][report]") {
   const test::TemporaryDirectory dir;
   SceneAccuracy plain = accuracy();
   for (AccuracyRow& r : plain.rows) r.scene = "rooms";
@@ -177,8 +176,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("words: a line for each row and for each reference, nothing that is no number",
-          "[bench][report]") {
+TEST_CASE("words: there is a line for each row and each reference, and no NaN", "[bench][report]") {
   const std::string text = text_of(report_of({accuracy()}, 5));
   CHECK(std::ranges::count(text, '\n') == (2 + 8) + 1 + (2 + 2));  // titles and headings, too
   CHECK(text.find("nan") == std::string::npos);
@@ -208,7 +206,7 @@ TEST_CASE("chart: each set has a row of panels, each method a curve", "[bench][r
   CHECK((panel.log_x && panel.log_y));
 }
 
-TEST_CASE("chart: what nobody measured has no panel", "[bench][report]") {
+TEST_CASE("chart: a quantity that was not measured has no panel", "[bench][report]") {
   SceneAccuracy dark = accuracy();
   std::erase_if(dark.rows, [](const AccuracyRow& r) { return r.job == Quantity::bleeding; });
   CHECK(chart_of(dark).panels.size() == 2);

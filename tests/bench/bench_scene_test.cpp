@@ -1,4 +1,4 @@
-// Which scene a word means, and what it is made of.
+// The scene that a word means, and what it is made of.
 #include "tools/bench/scenes/bench_scene.h"
 
 #include <set>
@@ -24,7 +24,7 @@ constexpr SceneOptions kSmall{.points = 3000,
 
 }  // namespace
 
-TEST_CASE("scene: three words are scenes, everything else is a file", "[bench][scene]") {
+TEST_CASE("scene: three words name scenes, everything else names a file", "[bench][scene]") {
   for (const char* word : {"fractal", "window", "city"}) {
     const SceneChoice choice = parse_scene(word);
     CHECK(choice.name == word);
@@ -43,13 +43,13 @@ TEST_CASE("scene: a file's name ends before its first dot", "[bench][scene]") {
   CHECK(parse_scene(".obj").name == ".obj");
 }
 
-TEST_CASE("scene: names hold nothing that a chart cannot show", "[bench][scene]") {
+TEST_CASE("scene: names contain nothing that a chart cannot show", "[bench][scene]") {
   CHECK(parse_scene("d\xc3\xa9j\xc3\xa0 vu.ply").name == "d\xc3\xa9j\xc3\xa0 vu");
   CHECK(parse_scene("a\xff\xe9z.ply").name == "a__z");
   CHECK(parse_scene("a\n\x7f.ply").name == "a__");
 }
 
-TEST_CASE("scene: a backdrop is taken off a file's name and refused behind a word",
+TEST_CASE("scene: the suffix +backdrop is cut off a file's name and refused after a word",
           "[bench][scene]") {
   const SceneChoice choice = parse_scene("meshes/dragon.ply+backdrop");
   CHECK(choice.file == "meshes/dragon.ply");
@@ -61,12 +61,12 @@ TEST_CASE("scene: a backdrop is taken off a file's name and refused behind a wor
   }
 }
 
-TEST_CASE("scene: nothing is no scene", "[bench][scene]") {
+TEST_CASE("scene: an empty name is refused", "[bench][scene]") {
   CHECK_THROWS_AS(parse_scene(""), RequestError);
   CHECK_THROWS_AS(parse_scene("+backdrop"), RequestError);
 }
 
-TEST_CASE("scene: no two have one name", "[bench][scene]") {
+TEST_CASE("scene: no two scenes have the same name", "[bench][scene]") {
   const std::vector<SceneChoice> choices =
       parse_scenes({"a/room.obj", "b/room.ply", "room-2.obj", "city", "room.obj", "x/city.obj",
                     "room.obj+backdrop"});
@@ -77,7 +77,8 @@ TEST_CASE("scene: no two have one name", "[bench][scene]") {
   CHECK(choices[1].file == "b/room.ply");
 }
 
-TEST_CASE("scene: it leaves nothing in its directory, not even while it lives", "[bench][scene]") {
+TEST_CASE("scene: a scene leaves nothing in its directory, not even while it is open",
+          "[bench][scene]") {
   const test::TemporaryDirectory dir;
   Progress silent;
   const BenchScene scene(parse_scene("fractal"), kSmall, dir.path(), {.threads = 1}, silent);
@@ -85,7 +86,7 @@ TEST_CASE("scene: it leaves nothing in its directory, not even while it lives", 
   CHECK(scene.surfels().size() == scene.container().superblock().points);
 }
 
-TEST_CASE("scene: pixels of the middle of the picture are receivers, and points of the scene",
+TEST_CASE("scene: receivers are pixels from the middle of the picture, and points of the scene",
           "[bench][scene]") {
   const test::TemporaryDirectory dir;
   Progress silent;

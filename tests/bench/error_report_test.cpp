@@ -1,4 +1,4 @@
-// JSON, CSV, words and the chart of errors made by hand.
+// JSON, CSV, text and the chart of errors made by hand.
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -21,7 +21,7 @@ CheckError error_of(double share) {
           .irradiance_mean = 2};
 }
 
-/// Errors that fall as one over the square of time.
+/// Rows whose errors fall with the square of the time.
 SceneErrors errors(bool mesh) {
   SceneErrors scene{.name = "room", .surfels = 1000};
   for (const double asked : {0.1, 0.02}) {
@@ -51,16 +51,16 @@ std::string text_of(const std::filesystem::path& path) {
 
 }  // namespace
 
-TEST_CASE("error report: the slope is the exponent of error over time", "[bench][error]") {
+TEST_CASE("error report: the slope is the exponent of the error as a power of time",
+          "[bench][error]") {
   CHECK(errors(false).slope() == Approx(-2));
   SceneErrors gap = errors(false);
-  gap.rungs[2].error = {};  // nothing to take a logarithm of
+  gap.rungs[2].error = {};  // has no logarithm
   CHECK(gap.slope() == Approx(-2));
 }
 
-TEST_CASE(
-    "error report: rows say what was asked, what was measured, and null where there is no mesh",
-    "[bench][error]") {
+TEST_CASE("error report: rows have the requested and the measured error, and null without a mesh",
+          "[bench][error]") {
   const nlohmann::ordered_json facts = facts_of(report_of({errors(false)}));
   REQUIRE(facts.at("rows").size() == 2);
   const auto& row = facts.at("rows").at(1);
@@ -75,7 +75,8 @@ TEST_CASE(
   CHECK(facts.at("slopes").at(0).at("slope") == Approx(-2));
 }
 
-TEST_CASE("error report: a floor is not met, and every file is written", "[bench][error]") {
+TEST_CASE("error report: an unreachable error counts as not met, and every file is written",
+          "[bench][error]") {
   const std::vector<SceneErrors> scenes{errors(true)};
   const std::string text = text_of(report_of(scenes));
   CHECK_THAT(text, Catch::Contains("10  yes") && Catch::Contains(" 2   no "));

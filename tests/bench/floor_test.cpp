@@ -1,4 +1,4 @@
-// How far the discs of a mesh are from the mesh: what no gather can be better than.
+// How far the discs of a mesh are from the mesh: the error that no gather can fall below.
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -16,12 +16,12 @@ using namespace ptc;
 
 namespace {
 
-/// RMS of the difference between rays at discs and at the mesh, over the mean.
+/// The RMS difference between rays at discs and rays at the mesh, over the mean.
 struct Floor {
   double occlusion = 0, irradiance = 0;
 };
 
-/// Receivers are hits of camera rays.
+/// Returns the places of a mesh that camera rays hit; they serve as receivers.
 std::vector<SurfaceHit> seen(const RayScene& rays, Camera camera, unsigned side) {
   camera.width = camera.height = side;
   std::vector<SurfaceHit> hits;
@@ -64,7 +64,7 @@ Floor measure(const bench::LitScene& scene, std::uint64_t count, unsigned side) 
   return {std::sqrt(floor.occlusion * n) / occlusion, std::sqrt(floor.irradiance * n) / irradiance};
 }
 
-/// Planks, 3 surfels wide, on posts over a ground: all edges.
+/// Planks, 3 surfels wide, on posts above a ground: a scene that is all edges.
 bench::LitScene planks() {
   bench::LitScene scene;
   Mesh& mesh = scene.mesh;
@@ -89,22 +89,24 @@ bench::LitScene planks() {
 
 }  // namespace
 
-TEST_CASE("floor: planks of discs let through what planks do", "[bench][floor]") {
-  const Floor floor = measure(planks(), 24000, 12);  // whose light meets no plank's underside
+TEST_CASE("floor: planks made of discs let through as much as the planks themselves",
+          "[bench][floor]") {
+  const Floor floor = measure(planks(), 24000, 12);  // the light meets no plank's underside
   INFO(floor.occlusion);
   CHECK(floor.occlusion < 0.03);  // 0.148 with discs about the middles of their patches
 }
 
-TEST_CASE("floor: a terrain finer than its surfels occludes and is lit as its mesh is",
+TEST_CASE("floor: a terrain finer than its surfels has the occlusion and light of its mesh",
           "[bench][floor]") {
   const Floor floor = measure(bench::make_fractal(80000), 20000, 16);
   INFO(floor.occlusion << " " << floor.irradiance);
   CHECK(floor.occlusion <
-        0.075);  // 0.097 and 0.169 with a place and a normal of the mesh for each disc
+        0.075);  // 0.097 and 0.169 when each disc takes a place and a normal of the mesh
   CHECK(floor.irradiance < 0.13);
 }
 
-TEST_CASE("floor: the window of a room of discs is as wide as its mesh's", "[bench][floor]") {
+TEST_CASE("floor: the window of a room made of discs is as wide as that of its mesh",
+          "[bench][floor]") {
   const Floor floor = measure(bench::make_window_room(), 30000, 12);
   INFO(floor.occlusion);
   CHECK(floor.occlusion < 0.0012);

@@ -1,4 +1,4 @@
-// Growth: what is measured, what a row says, and what becomes of rows made by hand.
+// The growth experiment: its measurements, its rows, and reports of rows made by hand.
 #include "tools/bench/experiments/growth.h"
 
 #include <cmath>
@@ -69,7 +69,7 @@ std::vector<GrowthRow> all_rows() {
 
 }  // namespace
 
-TEST_CASE("growth: a row for each number of surfels, checked and beside Embree",
+TEST_CASE("growth: there is a checked row for each number of surfels, next to one of Embree",
           "[bench][growth]") {
   const std::vector<GrowthRow> rows = measure(small(), "surfels");
   REQUIRE(rows.size() == 2);
@@ -86,7 +86,7 @@ TEST_CASE("growth: a row for each number of surfels, checked and beside Embree",
   }
 }
 
-TEST_CASE("growth: beyond the reach of rays there is time, and no error", "[bench][growth]") {
+TEST_CASE("growth: where rays are too slow there is a time and no error", "[bench][growth]") {
   GrowthOptions options = small();
   options.ray_reach = 20'000;
   const std::vector<GrowthRow> rows = measure(options, "surfels");
@@ -99,7 +99,7 @@ TEST_CASE("growth: beyond the reach of rays there is time, and no error", "[benc
   for (const GrowthRow& r : measure(options, "cap")) CHECK(std::isnan(r.irradiance_rms));
 }
 
-TEST_CASE("growth: a smaller solid angle is closer to the truth", "[bench][growth]") {
+TEST_CASE("growth: a smaller solid angle has a smaller error", "[bench][growth]") {
   const std::vector<GrowthRow> rows = measure(small(), "solid-angle");
   REQUIRE(rows.size() == 2);
   CHECK(rows[0].x == Approx(0.3));
@@ -115,7 +115,7 @@ TEST_CASE("growth: sheets lie behind each other", "[bench][growth]") {
   CHECK(rows[0].surfels == Approx(rows[1].surfels).epsilon(0.05));
 }
 
-TEST_CASE("growth: a cap changes what is read and no result", "[bench][growth]") {
+TEST_CASE("growth: a cap changes how much is read and no result", "[bench][growth]") {
   GrowthOptions options = small();
   options.points = {100'000};
   options.own_points = 16'384;
@@ -134,7 +134,8 @@ TEST_CASE("growth: a cap changes what is read and no result", "[bench][growth]")
   CHECK(rows[1].bytes > rows[0].bytes);
 }
 
-TEST_CASE("growth: a disk without room is told before anything is built", "[bench][growth]") {
+TEST_CASE("growth: a disk with too little room is refused before anything is built",
+          "[bench][growth]") {
   GrowthOptions options = small();
   options.points = {std::uint64_t{1} << 46};
   const test::TemporaryDirectory dir;
@@ -146,7 +147,7 @@ TEST_CASE("growth: a disk without room is told before anything is built", "[benc
                         Catch::Contains("`run.temp_dirs`"));
 }
 
-TEST_CASE("growth: a build stays below the bytes that it was said to take", "[bench][growth]") {
+TEST_CASE("growth: a build takes no more bytes than estimated", "[bench][growth]") {
   const test::TemporaryDirectory dir;
   Progress silent;
   BuildRequest request;
@@ -156,7 +157,7 @@ TEST_CASE("growth: a build stays below the bytes that it was said to take", "[be
         build_disk_bytes(50'000));
 }
 
-TEST_CASE("growth report: a panel for each thing that varied, and three for caps",
+TEST_CASE("growth report: there is a panel for each varied quantity, and three for caps",
           "[bench][report]") {
   const Chart chart = report_of(all_rows(), 3).figures.front().chart;
   std::vector<std::string> titles;
@@ -185,7 +186,7 @@ TEST_CASE("growth report: a panel for each thing that varied, and three for caps
   CHECK(report_of({row("depth", 4, 2, 70)}, 3).figures.front().chart.panels.size() == 1);
 }
 
-TEST_CASE("growth report: rows have the same members, and null for what was not measured",
+TEST_CASE("growth report: rows have the same members, null where nothing was measured",
           "[bench][report]") {
   const nlohmann::ordered_json facts = facts_of(report_of(all_rows(), 3));
   REQUIRE(facts.at("rows").size() == 8);

@@ -1,4 +1,4 @@
-// Radiance of surfels, found again at places of triangles.
+// The radiance of surfels, looked up at places on triangles.
 #include "tools/bench/references/lightmap.h"
 
 #include <cmath>
@@ -14,7 +14,7 @@ using test::add_rectangle;
 namespace {
 
 const glm::vec3 kRed(0.75F, 0.125F, 0),
-    kBlue(0, 0.25F, 0.5F);  // as rgbe has them, without rounding
+    kBlue(0, 0.25F, 0.5F);  // values that rgbe stores without rounding
 
 void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
@@ -23,7 +23,7 @@ void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm
   mesh.triangles.push_back({first, first + 2, first + 3});
 }
 
-/// Radiance is the place, so that what is looked up says from where it is.
+/// Sets the radiance of surfels to their place, so that each lookup says where its value is from.
 std::vector<Surfel> marked(std::vector<Surfel> surfels) {
   for (Surfel& s : surfels) s.radiance = glm::vec3(s.position) + 1.0F;
   return surfels;
@@ -67,7 +67,8 @@ TEST_CASE("lightmap: u is the weight of the second corner, v that of the third",
   }
 }
 
-TEST_CASE("lightmap: no place on the far edge is black, whatever the texels", "[bench][lightmap]") {
+TEST_CASE("lightmap: no place on the far edge is black, whatever the number of texels",
+          "[bench][lightmap]") {
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.25, kRed);
   for (int size = 1; size < 60; ++size) {
@@ -86,7 +87,7 @@ TEST_CASE("lightmap: no place on the far edge is black, whatever the texels", "[
   }
 }
 
-TEST_CASE("lightmap: each of two faces in one place takes the surfels that face its way",
+TEST_CASE("lightmap: each of two coincident faces takes the surfels that face its way",
           "[bench][lightmap]") {
   Mesh mesh;
   add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
@@ -102,7 +103,8 @@ TEST_CASE("lightmap: each of two faces in one place takes the surfels that face 
   }
 }
 
-TEST_CASE("lightmap: where nothing faces its way a face takes the nearest", "[bench][lightmap]") {
+TEST_CASE("lightmap: a face takes the nearest surfels where none face its way",
+          "[bench][lightmap]") {
   Mesh mesh;
   add_quad(mesh, {0, 0, 0}, {0, 1, 0}, {1, 0, 0});
   std::vector<Surfel> surfels;

@@ -1,4 +1,4 @@
-// The study of the model: what is measured, what bounds it keeps, and what becomes of its rows.
+// The study of the model: its measurements, their bounds, and the report of its rows.
 #include "tools/bench/experiments/model.h"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ ModelOptions small() {
   return options;
 }
 
-/// Of the fractal, once for all tests.
+/// Returns the study of the fractal, which is made once for all tests.
 const SceneModel& measured() {
   static const SceneModel model = [] {
     const test::TemporaryDirectory dir;
@@ -61,7 +61,7 @@ const ModelRow& row_of(const SceneModel& model, const std::string& axis, const s
 
 }  // namespace
 
-TEST_CASE("model: every axis has its rows, and each says what it costs", "[bench][model]") {
+TEST_CASE("model: every axis has its rows, and each row has its cost", "[bench][model]") {
   std::map<std::string, int> rows;
   for (const ModelRow& row : measured().rows) {
     CAPTURE(row.axis, row.variant, row.form);
@@ -81,7 +81,7 @@ TEST_CASE("model: every axis has its rows, and each says what it costs", "[bench
                     {"payload", 34}, {"node", 4}, {"leaf", 2}, {"directions", 2}, {"pages", 14}});
 }
 
-TEST_CASE("model: a payload that tells more shades no worse, within a tenth", "[bench][model]") {
+TEST_CASE("model: a larger payload has at most a tenth more error", "[bench][model]") {
   for (const double angle : {0.1, 0.02}) {
     const auto error = [&](const char* name) {
       return row_of(measured(), "payload", name, "stored", angle).irradiance.rms;
@@ -110,7 +110,7 @@ TEST_CASE("model: rounding changes no error by more than a twentieth", "[bench][
   }
 }
 
-TEST_CASE("model: leaves, directions and pages cost what they should", "[bench][model]") {
+TEST_CASE("model: leaves, directions and pages have the expected costs", "[bench][model]") {
   const SceneModel& model = measured();
   CHECK(row_of(model, "leaf", "32", "").bytes < 0.8 * row_of(model, "leaf", "4", "").bytes);
   CHECK(row_of(model, "directions", "48", "").irradiance.rms <
@@ -133,7 +133,7 @@ TEST_CASE("model: leaves, directions and pages cost what they should", "[bench][
   }
 }
 
-TEST_CASE("model: nodes as they are stored shade as the plain gather does", "[bench][model]") {
+TEST_CASE("model: stored nodes give the shading of the plain gather", "[bench][model]") {
   const test::TemporaryDirectory dir;
   Progress silent;
   const ThreadPool executor(1);
@@ -162,7 +162,7 @@ TEST_CASE("model: nodes as they are stored shade as the plain gather does", "[be
   CHECK(ours->occlusion.rms == Approx(theirs.occlusion.rms).epsilon(0.01));
 }
 
-TEST_CASE("model: a camera that sees nothing is told", "[bench][model]") {
+TEST_CASE("model: a camera that sees nothing is refused", "[bench][model]") {
   const test::TemporaryDirectory dir;
   Progress silent;
   ModelOptions options = small();
@@ -172,7 +172,8 @@ TEST_CASE("model: a camera that sees nothing is told", "[bench][model]") {
   CHECK_THROWS_AS(measure_model(scene, options, dir.path(), ThreadPool(1), silent), DataError);
 }
 
-TEST_CASE("model report: rows have the same members, panels what was measured", "[bench][report]") {
+TEST_CASE("model report: rows have the same members, and panels show what was measured",
+          "[bench][report]") {
   const std::vector<SceneModel> scenes{measured()};
   const nlohmann::ordered_json facts = facts_of(report_of(scenes, 1));
   REQUIRE(facts.at("rows").size() == measured().rows.size());

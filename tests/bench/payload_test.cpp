@@ -1,4 +1,4 @@
-// Payloads: what each of them tells of surfels, against the surfels themselves.
+// Payloads: how each of them describes surfels, compared with the surfels themselves.
 #include "tools/bench/experiments/payload.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ std::vector<glm::vec3> directions() {
   return all;
 }
 
-/// Numbers of a cluster, after what a container keeps of it.
+/// A cluster of surfels as a container stores them; fit() gives the numbers of a payload for it.
 struct Cluster {
   explicit Cluster(const std::vector<Surfel>& from) {
     const test::SortedScene sorted = test::sort_scene(from);
@@ -44,7 +44,7 @@ struct Cluster {
   std::vector<Surfel> surfels;
 };
 
-/// RMS over directions of what is off, over the mean: area that faces, and its light.
+/// Returns the RMS errors over directions, over the mean: of the facing area, and of its light.
 std::array<double, 2> errors_of(const Payload& payload, const std::vector<float>& numbers,
                                 const Cluster& cluster) {
   double area = 0, light = 0, area_off = 0, light_off = 0;
@@ -60,7 +60,7 @@ std::array<double, 2> errors_of(const Payload& payload, const std::vector<float>
   return {std::sqrt(area_off / n) / (area / n), std::sqrt(light_off / n) / (light / n)};
 }
 
-/// Three walls of a corner, each of a size and a colour of its own.
+/// The three walls of a corner, each with its own size and colour.
 Cluster corner() {
   std::vector<Surfel> surfels;
   test::add_rectangle(surfels, {0, 0, 0}, {1, 0, 0}, {0, 3, 0}, 0.25, {1, 0.2F, 0.1F});
@@ -88,7 +88,7 @@ TEST_CASE("payload: products of harmonics add up to Legendre polynomials", "[ben
   }
 }
 
-TEST_CASE("payload: a wall of one colour is told exactly by all but the harmonics",
+TEST_CASE("payload: every payload except the harmonics is exact for a wall of one colour",
           "[bench][payload]") {
   std::vector<Surfel> surfels;
   test::add_rectangle(surfels, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.25, {1, 0.5F, 0.25F});
@@ -102,7 +102,8 @@ TEST_CASE("payload: a wall of one colour is told exactly by all but the harmonic
   }
 }
 
-TEST_CASE("payload: more of it tells more of a corner of three colours", "[bench][payload]") {
+TEST_CASE("payload: larger payloads are more exact for a corner of three colours",
+          "[bench][payload]") {
   const Cluster cluster = corner();
   std::map<std::string, std::array<double, 2>> found;
   for (const Payload& payload : payloads())
@@ -118,7 +119,7 @@ TEST_CASE("payload: more of it tells more of a corner of three colours", "[bench
   }
 }
 
-TEST_CASE("payload: the cube with 22 bytes of bounds is a child of spec/nodes.md",
+TEST_CASE("payload: the cube and 22 bytes of bounds are as large as a child of spec/nodes.md",
           "[bench][payload]") {
   const auto cube = std::ranges::find(payloads(), std::string("cube"), &Payload::name);
   REQUIRE(cube != payloads().end());

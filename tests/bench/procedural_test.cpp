@@ -1,4 +1,4 @@
-// Scenes made in code: their size, and where they are open.
+// Scenes made in code: their size and their openings.
 #include "tools/bench/scenes/procedural.h"
 
 #include <cmath>
@@ -33,13 +33,13 @@ void check_sound(const Mesh& mesh) {
   for (const std::uint16_t material : mesh.material_of) REQUIRE(material < mesh.materials.size());
 }
 
-/// Where a ray crosses the plane of x: (y, z).
+/// Returns the place (y, z) where a ray crosses the plane of an x.
 glm::vec2 at_plane(const glm::vec3& from, const glm::vec3& along, float x) {
   const glm::vec3 p = from + along * ((x - from.x) / along.x);
   return {p.y, p.z};
 }
 
-/// How far a place is inside the window's frame, metres; below 0 outside.
+/// Returns how far a place is inside the window's frame, metres; below 0 outside.
 float inside_window(const glm::vec2& p) {
   return std::min({p.x - 0.9F, 2.3F - p.x, p.y - 1.2F, 2.8F - p.y});
 }
@@ -48,7 +48,7 @@ constexpr double kFar = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-TEST_CASE("fractal: as many triangles as asked for, none degenerate, each vertex in use",
+TEST_CASE("fractal: it has the requested number of triangles, none degenerate, each vertex used",
           "[bench][procedural]") {
   for (const std::uint64_t wanted : {1'000U, 5'000U, 10'000U, 20'000U, 77'777U, 300'000U}) {
     const LitScene scene = make_fractal(wanted);
@@ -59,7 +59,7 @@ TEST_CASE("fractal: as many triangles as asked for, none degenerate, each vertex
   }
 }
 
-TEST_CASE("fractal: twice the same", "[bench][procedural]") {
+TEST_CASE("fractal: it is the same every time", "[bench][procedural]") {
   const LitScene a = make_fractal(20'000), b = make_fractal(20'000);
   CHECK(a.mesh.positions == b.mesh.positions);
   CHECK(a.mesh.triangles == b.mesh.triangles);
@@ -75,7 +75,7 @@ TEST_CASE("fractal: the camera is above the ground and sees it", "[bench][proced
   CHECK(rays.occluded(from, glm::vec3(glm::normalize(scene.camera.look_at - from)), 0, kFar));
 }
 
-TEST_CASE("window room: sound, and lit by a sun that shines in", "[bench][procedural]") {
+TEST_CASE("window room: its mesh is valid, and the sun shines in", "[bench][procedural]") {
   const LitScene scene = make_window_room();
   check_sound(scene.mesh);
   REQUIRE(scene.lights.suns.size() == 1);
@@ -102,7 +102,7 @@ TEST_CASE("window room: light leaves it through the window alone", "[bench][proc
       if (std::abs(margin) < 1e-4F) continue;  // the frame's edge
       const bool open = !rays.occluded(glm::dvec3(from), along, 0, kFar);
       if (margin < 0) REQUIRE(!open);
-      // Downwards it meets the ground outside; nothing inside is between these places and the
+      // A ray downwards meets the ground outside; nothing inside is between these places and the
       // window.
       if (margin > 0 && along.y > 0) REQUIRE(open);
       escaped += open ? 1 : 0;

@@ -1,4 +1,4 @@
-// The ray tracer that PTCX is measured against, beside the oracle of engine/shade.
+// The ray tracer that PTCX is measured against, compared with the oracle of engine/shade.
 #include "tools/bench/references/ray_baseline.h"
 
 #include <cmath>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kSpacing = 0.05;
 
-/// A floor before a red wall, with balls on it.
+/// A floor in front of a red wall, with balls on it.
 std::vector<Surfel> balls_before_a_wall() {
   std::vector<Surfel> surfels;
   test::add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, kSpacing, glm::vec3(0.5F));
@@ -32,7 +32,7 @@ std::vector<Surfel> balls_before_a_wall() {
   return surfels;
 }
 
-/// Places on the floor.
+/// Returns receivers on the floor.
 std::vector<Receiver> floor_receivers() {
   std::vector<Receiver> receivers;
   for (int j = 0; j < 8; ++j) {
@@ -43,10 +43,10 @@ std::vector<Receiver> floor_receivers() {
 }
 
 struct Compared {
-  ErrorStatistics occlusion, irradiance;  // over their means
+  ErrorStatistics occlusion, irradiance;  // relative to their means
 };
 
-/// @param ours, theirs  of a receiver and its index
+/// @param ours, theirs  return the result of a receiver, given the receiver and its index
 template <class Ours, class Theirs>
 Compared compare(const std::vector<Receiver>& receivers, const Ours& ours, const Theirs& theirs) {
   std::vector<float> a, b, light_a, light_b;
@@ -69,7 +69,7 @@ auto trace_with(const RayBaseline& rays, Job job, Packets packets, unsigned coun
 
 }  // namespace
 
-TEST_CASE("ray baseline: discs give what the oracle's discs give, both sides and fronts alone",
+TEST_CASE("ray baseline: discs give the results of the oracle, with both sides and fronts alone",
           "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   for (const Sides sides : {Sides::both, Sides::front}) {
@@ -89,8 +89,8 @@ TEST_CASE("ray baseline: discs give what the oracle's discs give, both sides and
   }
 }
 
-TEST_CASE("ray baseline: a mesh gives what its surfels give as discs", "[bench][rays]") {
-  // A wall over a floor: discs cover both but for their rims.
+TEST_CASE("ray baseline: a mesh gives the results of its surfels as discs", "[bench][rays]") {
+  // A wall above a floor: discs cover both except for their rims.
   Mesh mesh{.origin = {50, 60, 70}};
   mesh.positions = {{-2, -2, 0},   {2, -2, 0},   {2, 2, 0},    {-2, 2, 0},
                     {-2, 1.5F, 0}, {2, 1.5F, 0}, {2, 1.5F, 2}, {-2, 1.5F, 2}};
@@ -113,7 +113,7 @@ TEST_CASE("ray baseline: a mesh gives what its surfels give as discs", "[bench][
   CHECK(errors.irradiance.rms < 0.015);
 }
 
-TEST_CASE("ray baseline: a back covers and is black", "[bench][rays]") {
+TEST_CASE("ray baseline: the back of a disc covers and is black", "[bench][rays]") {
   Mesh mesh;
   mesh.positions = {{-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
@@ -131,7 +131,7 @@ TEST_CASE("ray baseline: a back covers and is black", "[bench][rays]") {
   }
 }
 
-TEST_CASE("ray baseline: single rays and packets of one seed differ in ties alone",
+TEST_CASE("ray baseline: single rays and packets with one seed differ only in ties",
           "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
@@ -143,7 +143,7 @@ TEST_CASE("ray baseline: single rays and packets of one seed differ in ties alon
   }
 }
 
-TEST_CASE("ray baseline: any hit covers what the closest hit covers", "[bench][rays]") {
+TEST_CASE("ray baseline: any-hit rays find the occlusion of closest-hit rays", "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   for (const Packets packets : {Packets::single, Packets::sixteen}) {
@@ -156,7 +156,7 @@ TEST_CASE("ray baseline: any hit covers what the closest hit covers", "[bench][r
   }
 }
 
-TEST_CASE("ray baseline: errors fall faster than the root of the rays", "[bench][rays]") {
+TEST_CASE("ray baseline: errors fall faster than one over the root of the rays", "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   const auto truth = trace_with(rays, Job::bleeding, Packets::sixteen, 65536, 1'000'000);
@@ -169,7 +169,8 @@ TEST_CASE("ray baseline: errors fall faster than the root of the rays", "[bench]
   CHECK(few.irradiance.rms > 1.2 * root * many.irradiance.rms);
 }
 
-TEST_CASE("ray baseline: the same seed gives the same, another one another", "[bench][rays]") {
+TEST_CASE("ray baseline: the same seed gives the same result, another seed another",
+          "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   const Receiver receiver = floor_receivers()[27];
@@ -180,7 +181,7 @@ TEST_CASE("ray baseline: the same seed gives the same, another one another", "[b
   CHECK(trace(1) != trace(2));
 }
 
-TEST_CASE("ray baseline: numbers of rays that are no power of two from 16 to 65536 are refused",
+TEST_CASE("ray baseline: numbers of rays other than powers of two from 16 to 65536 are refused",
           "[bench][rays]") {
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
@@ -194,7 +195,7 @@ TEST_CASE("ray baseline: numbers of rays that are no power of two from 16 to 655
   }
 }
 
-TEST_CASE("ray baseline: nothing is around no discs", "[bench][rays]") {
+TEST_CASE("ray baseline: without discs nothing is covered", "[bench][rays]") {
   const RayBaseline rays(std::span<const Surfel>(), Sides::both);
   const Shading shading =
       rays.trace({{0, 0, 0}, {0, 0, 1}}, Job::bleeding, Packets::sixteen, 64, 0);

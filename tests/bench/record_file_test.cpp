@@ -1,4 +1,4 @@
-// Files of records by which benches move bytes: how many there are, and that they are the same.
+// Files of records that benches copy: their number of records and their content.
 #include "tools/bench/scenes/record_file.h"
 
 #include <cstring>
@@ -23,7 +23,7 @@ std::vector<PointRecord> records_of(const RecordFile& file) {
   return all;
 }
 
-/// Bytes that this process has asked the system to write so far.
+/// Returns the bytes that this process has written so far.
 std::uint64_t written_bytes() {
   std::ifstream facts("/proc/self/io");
   std::string key;
@@ -56,7 +56,7 @@ TEST_CASE("record file: noise fills it to its last record", "[bench][records]") 
   }
 }
 
-TEST_CASE("record file: a copy holds the whole records of the bytes asked for, and can be read",
+TEST_CASE("record file: a copy holds the whole records within the requested bytes",
           "[bench][records]") {
   const test::TemporaryDirectory dir;
   RecordFile file(dir.path());
@@ -79,7 +79,7 @@ TEST_CASE("record file: a copy holds the whole records of the bytes asked for, a
   CHECK(records_of(file).size() == all.size());
 }
 
-TEST_CASE("record file: copied to its own place a file keeps what it held", "[bench][records]") {
+TEST_CASE("record file: a file copied to its own place keeps its content", "[bench][records]") {
   const test::TemporaryDirectory dir;
   RecordFile file(dir.path());
   file.fill(6 * RecordFile::kBlock);

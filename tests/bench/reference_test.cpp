@@ -1,4 +1,4 @@
-// References that tell their own error, and pictures that are compared.
+// References that report their own error, and pictures that are compared.
 #include "tools/bench/references/reference.h"
 
 #include <cmath>
@@ -14,12 +14,12 @@ using namespace ptc::bench;
 
 namespace {
 
-/// Evenly spread in [-1, 1).
+/// Returns a number that is evenly spread in [-1, 1).
 float noise(std::uint64_t seed) {
   return 2 * to_unit(static_cast<std::uint32_t>(splitmix64(seed) >> 32)) - 1;
 }
 
-/// A window of 16 x 16 pixels in which every fourth sees nothing.
+/// A window of 16 x 16 pixels in which every fourth pixel sees nothing.
 ReceiverSet windowed_set() {
   ReceiverSet set{.name = "camera", .window_width = 16, .window_height = 16};
   for (std::size_t i = 0; i < 256; ++i) {
@@ -33,7 +33,7 @@ ReceiverSet windowed_set() {
 
 }  // namespace
 
-TEST_CASE("reference: what it says of its own error is true", "[bench][reference]") {
+TEST_CASE("reference: the error that it reports of itself is right", "[bench][reference]") {
   constexpr std::size_t kCount = 20'000;
   ReceiverSet set{.receivers = std::vector<Receiver>(kCount)};
   Checked checked;
@@ -56,7 +56,7 @@ TEST_CASE("reference: what it says of its own error is true", "[bench][reference
   CHECK(reference.occlusion_noise == Approx(0.2 / std::sqrt(6.0)).epsilon(0.03));
 }
 
-TEST_CASE("reference: the window has rays of its own", "[bench][reference]") {
+TEST_CASE("reference: the window has its own rays", "[bench][reference]") {
   ReceiverSet set{.receivers = std::vector<Receiver>(5)};
   const Checked checked{.receivers = {1, 3}, .window = {0, 2, 4}};
   const auto trace = [](const Receiver&, unsigned rays, std::uint64_t) {
@@ -68,7 +68,7 @@ TEST_CASE("reference: the window has rays of its own", "[bench][reference]") {
   CHECK(occlusion_of(reference.window) == std::vector<float>{16, 16, 16});
 }
 
-TEST_CASE("window: a picture differs from others and not from itself", "[bench][window]") {
+TEST_CASE("window: a picture differs from others, but not from itself", "[bench][window]") {
   const ReceiverSet set = windowed_set();
   const std::vector<Shading> dark(set.receivers.size(),
                                   {.occlusion = 0.9F, .irradiance = glm::vec3(0.1F)});
@@ -96,7 +96,7 @@ TEST_CASE("window: exposure makes dark pictures as bright as others", "[bench][w
   CHECK(flip_at(1e4F) == Approx(flip_at(1)).epsilon(1e-3));
 }
 
-TEST_CASE("window: a set without one has no difference, a black one none that is no number",
+TEST_CASE("window: without a window the difference is NaN, for a black one it is 0",
           "[bench][window]") {
   CHECK(std::isnan(window_flip({}, {}, {}, Quantity::occlusion, glm::vec3(1))));
   ReceiverSet nothing{.window_width = 4, .window_height = 4};

@@ -1,4 +1,4 @@
-// Files of results: what they say of the measurement, and how they are written.
+// Files of results: what they say about the measurement, and how they are written.
 #include "tools/bench/report/results.h"
 
 #include <fstream>
@@ -57,7 +57,7 @@ std::string command_of(std::vector<std::string> words) {
 
 }  // namespace
 
-TEST_CASE("results: the head tells machine, commit, date, command and runs", "[bench][results]") {
+TEST_CASE("results: the head has machine, commit, date, command and runs", "[bench][results]") {
   const std::string text = results_text(report(5), circumstances(false));
   CHECK(text.starts_with("# A sample\n\nOne thing against another.\n\n| | |\n|---|---|\n"));
   for (const char* line :
@@ -72,8 +72,7 @@ TEST_CASE("results: the head tells machine, commit, date, command and runs", "[b
   CHECK_THAT(text, Catch::Contains("[![A chart](sample-city.svg)](sample-city.png)"));
 }
 
-TEST_CASE("results: few runs and a changed tree are stated, and nothing else is",
-          "[bench][results]") {
+TEST_CASE("results: few runs and a changed tree are stated, and only these", "[bench][results]") {
   const std::string sound = results_text(report(5), circumstances(false));
   CHECK(sound.find("**") == std::string::npos);
   const std::string few = results_text(report(4), circumstances(false));
@@ -88,8 +87,7 @@ TEST_CASE("results: few runs and a changed tree are stated, and nothing else is"
   CHECK(changed.find("Fewer") == std::string::npos);
 }
 
-TEST_CASE("results: a command keeps the names of files and no other part of their paths",
-          "[bench][results]") {
+TEST_CASE("results: a command keeps only the file names of paths", "[bench][results]") {
   CHECK(command_of({"/usr/bin/ptcbench", "error", "/home/me/dragon.ply.gz+backdrop", "--points",
                     "200k", "-o", "/tmp/charts/", "--temp=/scratch/mine", "-o/tmp/charts"}) ==
         "ptcbench error dragon.ply.gz+backdrop --points 200k -o charts --temp=mine -ocharts");
@@ -97,7 +95,7 @@ TEST_CASE("results: a command keeps the names of files and no other part of thei
         "ptcbench error 'my scan.ply'");
 }
 
-TEST_CASE("results: circumstances name the machine but not the host", "[bench][results]") {
+TEST_CASE("results: the circumstances name the machine, but not the host", "[bench][results]") {
   std::string program = "ptcbench";
   char* const command[] = {program.data()};
   const Circumstances found = circumstances_of(command, "given");
@@ -112,7 +110,7 @@ TEST_CASE("results: circumstances name the machine but not the host", "[bench][r
   CHECK_THAT(found.system, Catch::StartsWith("Linux "));
 }
 
-TEST_CASE("results: the file and its charts are written whole, over an older one too",
+TEST_CASE("results: the file and its charts are written whole, even over an older one",
           "[bench][results]") {
   const test::TemporaryDirectory dir;
   std::ofstream(dir / "sample.md") << "older";

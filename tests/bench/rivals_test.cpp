@@ -20,7 +20,7 @@ AccuracyRow row(const std::string& method, const std::string& setting, Quantity 
 
 }  // namespace
 
-TEST_CASE("time at an error: a power law is met between and at its points", "[bench][rivals]") {
+TEST_CASE("time at an error: a power law is interpolated exactly", "[bench][rivals]") {
   // Four times the time halves the error.
   const auto law = [](double error) { return 3 / (error * error); };
   std::vector<TimedError> measured;
@@ -30,13 +30,13 @@ TEST_CASE("time at an error: a power law is met between and at its points", "[be
   }
 }
 
-TEST_CASE("time at an error: at a measured one it is the measured time", "[bench][rivals]") {
+TEST_CASE("time at an error: at a measured error it is the measured time", "[bench][rivals]") {
   const std::vector<TimedError> measured{{0.1, 7}, {0.03, 31}, {0.01, 90}};
   for (const TimedError& m : measured) CHECK(time_at(measured, m.error) == m.us);
   CHECK(time_at({{0.1, 7}}, 0.1) == 7);
 }
 
-TEST_CASE("time at an error: there is none outside of those measured", "[bench][rivals]") {
+TEST_CASE("time at an error: there is none outside the measured errors", "[bench][rivals]") {
   const std::vector<TimedError> measured{{0.1, 7}, {0.01, 90}};
   for (const double error :
        {0.1001, 0.00999, 0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
@@ -46,14 +46,15 @@ TEST_CASE("time at an error: there is none outside of those measured", "[bench][
   CHECK(std::isnan(time_at({{std::numeric_limits<double>::quiet_NaN(), 7}}, 0.1)));
 }
 
-TEST_CASE("time at an error: the nearest on both sides count where errors do not fall with time",
+TEST_CASE("time at an error: the nearest errors count where errors do not fall with time",
           "[bench][rivals]") {
   const std::vector<TimedError> measured{{0.1, 1}, {0.02, 10}, {0.04, 20}, {0.01, 40}};
   CHECK(time_at(measured, 0.04) == 20);
   CHECK(time_at(measured, std::sqrt(0.02 * 0.04)) == Approx(std::sqrt(10.0 * 20)));
 }
 
-TEST_CASE("packets: of each pair of a job the faster stays, in its place", "[bench][rivals]") {
+TEST_CASE("packets: the faster of single rays and packets is kept, in its place",
+          "[bench][rivals]") {
   std::vector<AccuracyRow> rows{
       row("ptcx", "0.01 sr, 0.1 rad, R 32", Quantity::occlusion, 50, 0.01),
       row("ptcx", "0.01 sr, 0.1 rad, R 32", Quantity::bleeding, 50, 0.02),
@@ -76,7 +77,7 @@ TEST_CASE("packets: of each pair of a job the faster stays, in its place", "[ben
                                          "embree-mesh: 64 rays, single: occlusion"});
 }
 
-TEST_CASE("speedups: the rival's time at a row's error over the row's time, job by job",
+TEST_CASE("speedups: a speedup is the rival's time at a row's error over the row's time",
           "[bench][rivals]") {
   std::vector<AccuracyRow> rows{row("ptcx", "a", Quantity::occlusion, 10, 0.02),
                                 row("ptcx", "a", Quantity::bleeding, 10, 0.04),

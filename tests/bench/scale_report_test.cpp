@@ -1,4 +1,4 @@
-// Scale: the law of growth and the reports, of rows made by hand.
+// The scale experiment: laws of growth and reports for rows made by hand.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -34,7 +34,8 @@ ScaleRow row(const std::string& stage, std::uint64_t points, double seconds,
   return made;
 }
 
-/// Build takes a time that grows with points, verify with their square root, shade one that stays.
+/// Rows in which the time of build grows with the points, of verify with their root, of shade not
+/// at all.
 std::vector<ScaleRow> rows_of(const std::vector<std::uint64_t>& sizes) {
   std::vector<ScaleRow> rows;
   for (const std::uint64_t points : sizes) {
@@ -51,7 +52,7 @@ std::vector<ScaleRow> rows_of(const std::vector<std::uint64_t>& sizes) {
 
 }  // namespace
 
-TEST_CASE("scale report: each stage has its law, and time at 1.7 billion points",
+TEST_CASE("scale report: each stage has its law and its time at 1.7 billion points",
           "[bench][report]") {
   const std::vector<ScaleLaw> laws = laws_of(rows_of({1'000'000, 5'000'000}));
   REQUIRE(laws.size() == 3);
@@ -63,10 +64,10 @@ TEST_CASE("scale report: each stage has its law, and time at 1.7 billion points"
   CHECK(laws[1].predicted_seconds == Approx(1e-5 * std::sqrt(1.7e9)));
   CHECK(laws[2].time_exponent == Approx(0).margin(1e-9));
   CHECK(laws[2].resident_exponent == Approx(0).margin(1e-9));
-  for (const ScaleLaw& law : laws) CHECK(std::isnan(law.time_ratio));  // none of 20 million
+  for (const ScaleLaw& law : laws) CHECK(std::isnan(law.time_ratio));  // no size reaches 20 million
 }
 
-TEST_CASE("scale report: the greatest size is held against the least of 20 million or more",
+TEST_CASE("scale report: the largest size is compared with the smallest from 20 million on",
           "[bench][report]") {
   const std::vector<ScaleLaw> laws =
       laws_of(rows_of({1'000'000, 20'000'000, 50'000'000, 200'000'000}));
@@ -76,14 +77,14 @@ TEST_CASE("scale report: the greatest size is held against the least of 20 milli
   CHECK(laws[2].time_ratio == Approx(1));  // of a receiver
   CHECK(laws[2].resident_ratio == 1);
   CHECK(std::isnan(
-      laws_of(rows_of({1'000'000, 20'000'000}))[0].time_ratio));  // the greatest is the least
+      laws_of(rows_of({1'000'000, 20'000'000}))[0].time_ratio));  // the largest is the smallest
   CHECK(std::isnan(laws_of(rows_of({19'999'999, 20'000'000}))[0].resident_ratio));
   CHECK(std::isfinite(laws[0].predicted_seconds));
   CHECK(
       std::isnan(laws_of(rows_of({20'000'000, 1'700'000'000}))[0].predicted_seconds));  // measured
 }
 
-TEST_CASE("scale report: rows have the same members, and null for what a stage has not",
+TEST_CASE("scale report: rows have the same members, null where a stage has no value",
           "[bench][report]") {
   const nlohmann::ordered_json facts = facts_of(report_of(rows_of({1'000'000, 20'000'000}), 5));
   const auto& rows = facts.at("rows");
@@ -104,7 +105,7 @@ TEST_CASE("scale report: rows have the same members, and null for what a stage h
   CHECK(facts["laws"][0]["time_ratio"].is_null());
 }
 
-TEST_CASE("scale report: panels of time, receivers, memory and bytes; limits are dashed",
+TEST_CASE("scale report: panels show time, receivers, memory and bytes, with dashed limits",
           "[bench][report]") {
   const Chart chart = report_of(rows_of({1'000'000, 20'000'000}), 5).figures.front().chart;
   std::vector<std::string> titles;
@@ -133,7 +134,8 @@ TEST_CASE("scale report: panels of time, receivers, memory and bytes; limits are
   CHECK(chart.panels[3].series[1].points[0].y == 10);
 }
 
-TEST_CASE("scale report: files and text of one size and of several", "[bench][report]") {
+TEST_CASE("scale report: files and text are written for one size and for several",
+          "[bench][report]") {
   const test::TemporaryDirectory dir;
   for (const std::vector<std::uint64_t>& sizes :
        {std::vector<std::uint64_t>{1'000'000}, {1'000'000, 20'000'000, 200'000'000}}) {

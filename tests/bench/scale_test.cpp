@@ -1,4 +1,4 @@
-// Scale: what is measured, and that wrong answers are found.
+// The scale experiment: its measurements, and that wrong answers are found.
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -25,7 +25,7 @@ ScaleOptions small() {
   return {.points = {20'000, 60'000}, .receivers = 500, .repeats = 2};
 }
 
-/// Does something to the files of a bench after one of its stages, and hears what it is told.
+/// Changes the files of a bench after one of its stages, and collects its notes.
 class Meddler : public Progress {
  public:
   explicit Meddler(std::uint64_t stage = 0, std::function<void()> meddle = {})
@@ -58,8 +58,8 @@ std::filesystem::path file_in(const std::filesystem::path& directory, const char
   throw std::logic_error("no such file");
 }
 
-/// A bench with whose files somebody meddles must say what is wrong and leave nothing.
-/// @param stage  after which; there are six in a run
+/// Checks that a bench whose files are changed says what is wrong and leaves nothing.
+/// @param stage  stage after which they are changed; a run has six
 void require_found(std::uint64_t stage,
                    const std::function<void(const std::filesystem::path& file)>& meddle,
                    const std::string& what, const char* ending = ".ptcx") {
@@ -87,7 +87,7 @@ void damage(const std::filesystem::path& container) {
   stream.put(other);
 }
 
-/// Makes the last value of a binary PLY no number.
+/// Makes the last value of a binary PLY a NaN.
 void spoil(const std::filesystem::path& ply) {
   std::fstream stream(ply, std::ios::in | std::ios::out | std::ios::binary);
   const float none = std::numeric_limits<float>::quiet_NaN();
@@ -95,7 +95,7 @@ void spoil(const std::filesystem::path& ply) {
   stream.write(reinterpret_cast<const char*>(&none), sizeof none);
 }
 
-/// A PLY of two points with a column of its own.
+/// Writes a PLY of two points with a column of values.
 std::filesystem::path write_values(const std::filesystem::path& target, float second) {
   PlyWriter writer(target, 2, {{.name = "light"}});
   const std::vector<Surfel> surfels(
@@ -114,7 +114,7 @@ VerifyReport report_of(std::uint64_t points) {
 
 }  // namespace
 
-TEST_CASE("scale: a row for every stage and limit of every size", "[bench][scale]") {
+TEST_CASE("scale: there is a row for every stage and limit of every size", "[bench][scale]") {
   const test::TemporaryDirectory dir;
   Meddler progress;
   std::size_t reported = 0;
@@ -157,13 +157,13 @@ TEST_CASE("scale: a row for every stage and limit of every size", "[bench][scale
     CHECK(rows[size + 3].moved_bytes == build.moved_bytes);
     CHECK(rows[size + 4].moved_bytes == build.file_bytes);
     CHECK(rows[size + 5].moved_bytes == 80 * build.points);
-    if (rows[size + 4].disk_bytes == 0) continue;  // no disk that the system counts
+    if (rows[size + 4].disk_bytes == 0) continue;  // the system does not count this disk
     CHECK(verify.disk_bytes > build.file_bytes / 2);
     CHECK(shade.disk_bytes > shade.moved_bytes / 2);
   }
 }
 
-TEST_CASE("scale: what the cap does not hold is spilled, and every stage keeps below it",
+TEST_CASE("scale: points beyond the cap are spilled, and every stage stays below it",
           "[bench][scale]") {
   const test::TemporaryDirectory dir;
   Progress silent;
@@ -172,7 +172,7 @@ TEST_CASE("scale: what the cap does not hold is spilled, and every stage keeps b
   const std::vector<ScaleRow> rows = measure_scale(options, dir.path(), run, silent);
   REQUIRE(rows.size() == 6);
   CHECK(rows[0].spilled_bytes >=
-        kSpilledBytes * rows[0].points);  // and what fills the last blocks of the disk
+        kSpilledBytes * rows[0].points);  // and the padding of the last blocks on the disk
   CHECK(rows[0].spilled_bytes == Approx(kSpilledBytes * rows[0].points).epsilon(0.001));
   CHECK(rows[0].moved_bytes == 2 * rows[0].spilled_bytes + rows[0].file_bytes);
   CHECK(rows[3].moved_bytes == rows[0].moved_bytes);
@@ -183,7 +183,7 @@ TEST_CASE("scale: what the cap does not hold is spilled, and every stage keeps b
   for (std::size_t i = 0; i < 3; ++i) CHECK(rows[i].resident_bytes < run.memory_bytes);
 }
 
-TEST_CASE("scale: a disk without room for the largest is told before anything is built",
+TEST_CASE("scale: a disk too small for the largest size is refused before anything is built",
           "[bench][scale]") {
   const test::TemporaryDirectory dir;
   Meddler progress;
@@ -197,7 +197,7 @@ TEST_CASE("scale: a disk without room for the largest is told before anything is
   CHECK(std::filesystem::is_empty(dir.path()));
 }
 
-TEST_CASE("scale: files that are damaged or others are found, and none stays", "[bench][scale]") {
+TEST_CASE("scale: damaged or exchanged files are found, and none is left", "[bench][scale]") {
   require_found(1, damage, "not sound");
   require_found(2, damage, "not sound");  // by the verification at level 4
   require_found(7, damage, "not sound");  // in the second run
@@ -210,7 +210,7 @@ TEST_CASE("scale: files that are damaged or others are found, and none stays", "
       8, [](const auto& file) { build_city(file, 22'000); }, "other values");
 }
 
-TEST_CASE("scale: answers that differ are told apart", "[bench][scale]") {
+TEST_CASE("scale: answers that differ are found", "[bench][scale]") {
   const ScaleAnswers first{.points = 1, .content = {2, 3}, .values = 4};
   CHECK_NOTHROW(require_same(first, first));
   CHECK_THROWS_WITH(require_same(first, {2, {2, 3}, 4}),
@@ -219,7 +219,7 @@ TEST_CASE("scale: answers that differ are told apart", "[bench][scale]") {
   CHECK_THROWS_WITH(require_same(first, {1, {2, 3}, 5}), Catch::Contains("other values"));
 }
 
-TEST_CASE("scale: a city has the points asked for within 5 %", "[bench][scale]") {
+TEST_CASE("scale: a city has the requested number of points within 5 %", "[bench][scale]") {
   for (const std::uint64_t points :
        {std::uint64_t{9'500}, std::uint64_t{10'000}, std::uint64_t{10'500}}) {
     CHECK_NOTHROW(require_whole(report_of(points), 10'000, points));
@@ -235,7 +235,7 @@ TEST_CASE("scale: a city has the points asked for within 5 %", "[bench][scale]")
   CHECK_THROWS_WITH(require_whole(damaged, 10'000, 10'000), Catch::Contains("not sound"));
 }
 
-TEST_CASE("scale: values must be finite, all there, and have a digest of their own",
+TEST_CASE("scale: values must be finite and complete, and different values have different digests",
           "[bench][scale]") {
   const test::TemporaryDirectory dir;
   const std::filesystem::path file = dir / "values.ply";

@@ -1,4 +1,4 @@
-// Columns: one list gives JSON, CSV, text and Markdown, which tell the same.
+// Columns: one list gives JSON, CSV, text and Markdown with the same content.
 #include "tools/bench/report/table.h"
 
 #include <set>
@@ -32,7 +32,7 @@ const Columns<Run>& columns() {
   return list;
 }
 
-/// Two whole rows, and one of which nothing but the name is known.
+/// Two complete rows, and one row with nothing but a name.
 std::vector<Run> runs() {
   return {{"city", 1'234'567, {0.25, 0.2, 0.5}, 0.0125},
           {"a | b, \"c\"", 999, {2, 2, 2}, 1, false},
@@ -50,7 +50,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// Cells of a line of Markdown.
+/// Returns the cells of a line of Markdown.
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells(1);
   for (std::size_t i = 2; i + 2 < line.size(); ++i) {
@@ -66,7 +66,7 @@ std::vector<std::string> cells_of(const std::string& line) {
 
 }  // namespace
 
-TEST_CASE("table: JSON has every column, and several runs as three members", "[bench][table]") {
+TEST_CASE("table: JSON has every column, and repeated runs as three members", "[bench][table]") {
   const nlohmann::ordered_json rows = json_of(table_of(runs()));
   REQUIRE(rows.size() == 3);
   CHECK(rows[0].dump() ==
@@ -112,7 +112,7 @@ TEST_CASE("table: Markdown shows units, the median with its range, and no hidden
   CHECK(lines[5] == "| a \\| b, \"c\" | 999 | 2000.0 | 100.00 | no |");
 }
 
-TEST_CASE("table: text has the cells of Markdown, words to the left and numbers to the right",
+TEST_CASE("table: text has the cells of Markdown, with words flush left and numbers flush right",
           "[bench][table]") {
   const Table table = table_of({runs()[0], runs()[2]});
   const std::vector<std::string> text = lines_of(text_of(table)),
@@ -130,7 +130,7 @@ TEST_CASE("table: text has the cells of Markdown, words to the left and numbers 
   CHECK(text[1].size() == text[2].size());
 }
 
-TEST_CASE("table: people get a table for each value that groups, without columns that say nothing",
+TEST_CASE("table: readers get one table for each group, without columns that say nothing",
           "[bench][table]") {
   std::vector<Run> rows = runs();
   rows.push_back(rows[0]);

@@ -1,4 +1,4 @@
-// The bookkeeping of the cache against textbook replacement.
+// The bookkeeping of the cache, compared with textbook replacement.
 #include "engine/cache/frame_table.h"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ constexpr std::uint32_t kReaders = 3;
 constexpr std::uint32_t kSlots = 2;
 constexpr std::uint32_t kPages = 40;
 
-/// Frames in the order in which their pages were asked for.
+/// The textbook LRU: frames in the order in which their pages were last requested.
 class TextbookLru {
  public:
   explicit TextbookLru(std::uint32_t /*frames*/) {}
@@ -31,7 +31,7 @@ class TextbookLru {
     std::erase(order_, frame);
     order_.push_back(frame);
   }
-  /// The frame that leaves; those that are held on the way count as asked for.
+  /// Returns the frame to evict. Pinned frames on the way to it count as requested.
   template <class Held>
   std::uint32_t evict(const Held& held) {
     while (held(order_.front())) touch(order_.front());
@@ -44,7 +44,7 @@ class TextbookLru {
   std::deque<std::uint32_t> order_;
 };
 
-/// Frames around a hand that gives those asked for a second chance.
+/// The textbook clock: frames around a hand that gives requested ones a second chance.
 class TextbookClock {
  public:
   explicit TextbookClock(std::uint32_t frames) : asked_for_(frames) {}
@@ -66,11 +66,11 @@ class TextbookClock {
   }
 
  private:
-  std::vector<std::optional<bool>> asked_for_;  // none: takes no part
+  std::vector<std::optional<bool>> asked_for_;  // empty: the frame takes no part
   std::size_t hand_ = 0;
 };
 
-/// Some readers that ask for pages, and what must come of it.
+/// A session of readers that request pages, with the outcome that each request must have.
 template <class Order>
 class Session {
  public:
@@ -160,7 +160,7 @@ class Session {
   }
 
   FrameTable table_;
-  std::vector<std::uint32_t> page_in_;  // by frame; kPages: none
+  std::vector<std::uint32_t> page_in_;  // by frame; kPages: no page
   Order order_;
   std::array<std::array<std::optional<std::uint32_t>, kSlots>, kReaders> holds_;
   std::array<std::optional<std::uint32_t>, kReaders> waits_;
@@ -187,7 +187,7 @@ TEST_CASE("frame table: pages leave in the order of a textbook clock", "[cache][
   check_order<TextbookClock>(Replacement::clock);
 }
 
-TEST_CASE("frame table: what a reader let go of leaves, what it holds stays", "[cache][frames]") {
+TEST_CASE("frame table: a released page can be evicted, a pinned one stays", "[cache][frames]") {
   FrameTable table({.pages = 8, .frames = 2, .readers = 1, .slots = 2}, Replacement::clock);
   for (const std::uint32_t page : {0U, 1U}) table.ready(table.claim(0, page), 1, 1);
   CHECK(table.hold(0, 2) == kNoFrame);  // lets go of page 0, whose slot it has
@@ -201,7 +201,7 @@ TEST_CASE("frame table: what a reader let go of leaves, what it holds stays", "[
   CHECK(table.evictions() == 2);
 }
 
-TEST_CASE("frame table: a failed page keeps its error until the last who waited has read it",
+TEST_CASE("frame table: a failed page keeps its error until the last waiting reader has read it",
           "[cache][frames]") {
   FrameTable table({.pages = 4, .frames = 2, .readers = 2, .slots = 1}, Replacement::clock);
   const std::uint32_t frame = table.claim(0, 3);
@@ -211,7 +211,7 @@ TEST_CASE("frame table: a failed page keeps its error until the last who waited 
   table.leave(0, frame);
   CHECK(table.state(frame) == FrameTable::State::failed);
   CHECK_THROWS_AS(std::rethrow_exception(table.error(frame)), std::runtime_error);
-  const std::uint32_t again = table.claim(0, 3);  // a new try does not disturb who still waits
+  const std::uint32_t again = table.claim(0, 3);  // a new attempt does not disturb waiting readers
   CHECK(again != frame);
   table.leave(1, frame);
   CHECK(table.state(frame) == FrameTable::State::empty);

@@ -1,4 +1,4 @@
-// One thread: what the cache answers, counts, evicts and takes.
+// The cache on one thread: what it returns, counts, evicts and allocates.
 #include "engine/cache/page_cache.h"
 
 #include <fcntl.h>
@@ -27,7 +27,7 @@ namespace {
 
 using Trace = std::vector<std::uint32_t>;
 
-/// Misses of a textbook LRU with so many frames.
+/// Returns the number of misses of a textbook LRU with this many frames.
 std::uint64_t lru_misses(const Trace& trace, std::size_t frames) {
   std::list<std::uint32_t> recent;
   std::uint64_t misses = 0;
@@ -47,7 +47,7 @@ std::uint64_t lru_misses(const Trace& trace, std::size_t frames) {
 Trace random_trace(std::uint32_t pages, std::size_t length) {
   std::mt19937 random(pages);
   Trace trace(length);
-  // Squared: some pages are much more wanted than others.
+  // Square the number, so that some pages are requested much more often than others.
   for (std::uint32_t& page : trace) {
     const double u = static_cast<double>(random()) / 4294967296.0;
     page = static_cast<std::uint32_t>(u * u * pages);
@@ -88,7 +88,7 @@ void check_sums(const CacheStatistics& s, std::uint64_t lookups) {
   CHECK(s.evictions == s.misses - std::min(s.misses, s.frames));
 }
 
-/// Flips a bit of the file when it is made and again when it ends.
+/// Flips a bit of the file on construction and flips it back on destruction.
 class Flip {
  public:
   Flip(const std::filesystem::path& path, std::uint64_t at) : path_(path), at_(at) { flip(); }
@@ -130,7 +130,8 @@ TEST_CASE("cache: the shared level misses as often as a textbook LRU", "[cache][
   }
 }
 
-TEST_CASE("cache: a reader's own level changes who answers, not what", "[cache][local]") {
+TEST_CASE("cache: the reader's own level changes which level answers, not the answer",
+          "[cache][local]") {
   const Pages pages;
   const Trace trace = random_trace(pages.count(), 5000);
   std::uint64_t local_hits = 0;
@@ -144,7 +145,7 @@ TEST_CASE("cache: a reader's own level changes who answers, not what", "[cache][
   }
 }
 
-TEST_CASE("cache: every page in its own frame is read once", "[cache]") {
+TEST_CASE("cache: with a frame for every page, each page is read once", "[cache]") {
   const Pages pages;
   for (const BackEnd back_end : available_back_ends(pages.container.file())) {
     const CacheOptions options = pages.options(1, pages.count(), 0, back_end);
@@ -162,7 +163,8 @@ TEST_CASE("cache: every page in its own frame is read once", "[cache]") {
   }
 }
 
-TEST_CASE("cache: 64 bytes past a payload can be read, which starts on a cache line", "[cache]") {
+TEST_CASE("cache: a payload starts on a cache line, and 64 bytes past its end can be read",
+          "[cache]") {
   const Pages pages;
   PageCache cache(pages.container, pages.options(1, 2));
   PageReader reader(cache);
@@ -193,7 +195,8 @@ TEST_CASE("cache: local slots are a power of two that leaves frames to share", "
   }
 }
 
-TEST_CASE("cache: the least cap works and one byte less is refused by its number", "[cache][cap]") {
+TEST_CASE("cache: the minimum cap works, and one byte less is refused with that minimum",
+          "[cache][cap]") {
   const Pages pages;
   for (const unsigned threads : {1u, 2u, 5u, 64u}) {
     CacheOptions options;
@@ -209,7 +212,7 @@ TEST_CASE("cache: the least cap works and one byte less is refused by its number
   }
 }
 
-TEST_CASE("cache: no more frames are made than the file can use", "[cache][cap]") {
+TEST_CASE("cache: there are no more frames than the file can use", "[cache][cap]") {
   const Pages pages;
   CacheOptions options;
   options.memory_bytes = std::uint64_t{1} << 40;
@@ -231,7 +234,8 @@ TEST_CASE("cache: options that cannot work are refused", "[cache]") {
   CHECK_NOTHROW(PageCache(pages.container, pages.options(2, 16, 8)));
 }
 
-TEST_CASE("cache: more readers than threads are refused, ended ones make room", "[cache]") {
+TEST_CASE("cache: more readers than threads are refused, and a destroyed one makes room",
+          "[cache]") {
   const Pages pages;
   PageCache cache(pages.container, pages.options(2, 8));
   PageReader first(cache);
@@ -242,7 +246,7 @@ TEST_CASE("cache: more readers than threads are refused, ended ones make room", 
   CHECK_NOTHROW(PageReader(cache));
 }
 
-TEST_CASE("cache: a reader that ends gives back what it had pinned", "[cache]") {
+TEST_CASE("cache: a destroyed reader unpins its pages", "[cache]") {
   const Pages pages;
   PageCache cache(pages.container, pages.options(1, 16, 16));
   for (int round = 0; round < 5; ++round) {
@@ -274,7 +278,7 @@ TEST_CASE("cache: a reader gives up no page that is pinned, whatever the others 
   CHECK(cache.statistics().evictions > 0);
 }
 
-TEST_CASE("cache: a page that there is not is refused and not counted", "[cache]") {
+TEST_CASE("cache: a nonexistent page is refused and not counted", "[cache]") {
   const Pages pages;
   PageCache cache(pages.container, pages.options(1, 4));
   {
@@ -288,7 +292,7 @@ TEST_CASE("cache: a page that there is not is refused and not counted", "[cache]
   CHECK(cache.statistics().hit_rate() == Approx(0.5));
 }
 
-TEST_CASE("cache: a damaged page is an error each time, and a page again once it is mended",
+TEST_CASE("cache: a damaged page is an error each time, and readable once it is mended",
           "[cache][failure]") {
   const Pages pages;
   for (const std::uint32_t slots : {1u, 2u}) {
@@ -314,7 +318,8 @@ TEST_CASE("cache: a damaged page is an error each time, and a page again once it
   }
 }
 
-TEST_CASE("cache: statistics do not count a living reader's hits before they are told", "[cache]") {
+TEST_CASE("cache: statistics lack a living reader's hits until the reader reports them",
+          "[cache]") {
   const Pages pages;
   PageCache cache(pages.container, pages.options(1, 8));
   CHECK(cache.statistics().hit_rate() == 1);
@@ -341,7 +346,7 @@ TEST_CASE("cache: resident memory stays within the cap", "[cache][cap]") {
   const SceneFile file(options);
   const ContainerReader container(file.path());
   constexpr std::uint64_t kCap = std::uint64_t{4} << 20;
-  constexpr std::uint64_t kNoise = std::uint64_t{256} << 10;  // of the test itself
+  constexpr std::uint64_t kNoise = std::uint64_t{256} << 10;  // memory that the test itself takes
   REQUIRE(std::filesystem::file_size(file.path()) > 3 * kCap);
   for (const BackEnd back_end : available_back_ends(container.file())) {
     const std::uint64_t before = resident_bytes();

@@ -1,4 +1,4 @@
-// What the back ends read is what is in the file.
+// The back ends read the bytes that are in the file.
 #include "engine/cache/page_source.h"
 
 #include <unistd.h>
@@ -43,7 +43,7 @@ class NoiseFile {
 
 }  // namespace
 
-TEST_CASE("page source: any range is what the file holds, expected or not", "[cache][source]") {
+TEST_CASE("page source: any range has the bytes of the file, expected or not", "[cache][source]") {
   const NoiseFile noise;
   const InputFile file(noise.path());
   for (const BackEnd back_end : available_back_ends(file)) {
@@ -52,7 +52,7 @@ TEST_CASE("page source: any range is what the file holds, expected or not", "[ca
     const auto source = make_page_source(back_end, file, kMaxBytes);
     std::size_t wrong = 0;
     for (int i = 0; i < 2000; ++i) {
-      // Up to more than any back end keeps; some of them are read afterwards, in any order.
+      // Expect more ranges than any back end keeps; some are read afterwards, in any order.
       const std::uint32_t expected = below(i % 50 == 0 ? 100 : 4, random);
       std::vector<std::pair<std::uint64_t, std::size_t>> ranges;
       for (std::uint32_t k = 0; k <= expected; ++k) {
@@ -85,12 +85,12 @@ TEST_CASE("page source: the last bytes of a file are read, and none beyond them"
   }
 }
 
-TEST_CASE("page source: a file that became shorter is an error that names it",
+TEST_CASE("page source: a file that became shorter is an error that names the file",
           "[cache][source][failure]") {
   const NoiseFile noise;
   const InputFile file(noise.path());
   for (const BackEnd back_end : available_back_ends(file)) {
-    if (back_end == BackEnd::mmap) continue;  // SIGBUS, as its comment says
+    if (back_end == BackEnd::mmap) continue;  // SIGBUS, as BackEnd documents
     INFO("back end " << static_cast<int>(back_end));
     const auto source = make_page_source(back_end, file, kMaxBytes);
     write_file(noise.path(), noise.bytes);
@@ -103,7 +103,7 @@ TEST_CASE("page source: a file that became shorter is an error that names it",
   }
 }
 
-TEST_CASE("page source: one that ends leaves nothing on its way", "[cache][source]") {
+TEST_CASE("page source: a destroyed source leaves no read in flight", "[cache][source]") {
   const NoiseFile noise;
   const InputFile file(noise.path());
   for (const BackEnd back_end : available_back_ends(file)) {

@@ -1,4 +1,4 @@
-// A container for the tests of the cache, with what its pages hold.
+// A container for the tests of the cache, together with the contents of its pages.
 #pragma once
 
 #include <algorithm>
@@ -28,12 +28,12 @@ class SceneFile {
   ScratchDirectory scratch_;
 };
 
-/// A number from 0 to n - 1, the same for the same seed on every system.
+/// Returns a number from 0 to n - 1, the same for the same seed on every system.
 inline std::uint32_t below(std::uint32_t n, std::mt19937& random) {
   return static_cast<std::uint32_t>(random() % n);
 }
 
-/// The back ends that this system has for a file; that some are missing is told.
+/// Returns the back ends that this system has for a file, and warns about missing ones.
 inline std::vector<BackEnd> available_back_ends(const InputFile& file) {
   std::vector<BackEnd> found{BackEnd::pread, BackEnd::mmap};
   for (const BackEnd back_end : {BackEnd::direct, BackEnd::io_uring}) {
@@ -53,7 +53,7 @@ inline SampleOptions many_pages() {
   return options;
 }
 
-/// A container and its payloads, as the reader gives them.
+/// A container and its payloads, as ContainerReader returns them.
 class Pages {
  public:
   explicit Pages(const SampleOptions& options = many_pages())
@@ -71,7 +71,7 @@ class Pages {
     return found.record_count() == container.entry(page).record_count &&
            std::ranges::equal(payloads[page], std::span(found.payload(), found.bytes()));
   }
-  /// Options that give exactly so many frames.
+  /// Returns options that give exactly this many frames.
   [[nodiscard]] CacheOptions options(unsigned threads, std::uint64_t frames,
                                      std::uint32_t local_slots = 0,
                                      BackEnd back_end = BackEnd::pread) const {

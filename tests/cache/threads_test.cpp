@@ -1,4 +1,4 @@
-// Many threads on one cache: contents, single flight, failure, and no deadlock at the least cap.
+// Many threads on one cache: contents, single flight, failure, and no deadlock at the minimum cap.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -25,7 +25,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// Calls body(thread) on so many threads at once.
+/// Calls body(thread) on this many threads at once.
 void on_threads(unsigned threads, const std::function<void(unsigned)>& body) {
   std::barrier start(static_cast<std::ptrdiff_t>(threads));
   std::vector<std::jthread> running;
@@ -37,7 +37,7 @@ void on_threads(unsigned threads, const std::function<void(unsigned)>& body) {
   }
 }
 
-/// Few pages of a mebibyte, whose reads last long enough for threads to meet in them.
+/// A few pages of 1 MiB, whose reads last long enough for threads to meet in them.
 SampleOptions slow_pages() {
   SampleOptions options;
   options.writer.page_shift = 20;
@@ -47,7 +47,7 @@ SampleOptions slow_pages() {
   return options;
 }
 
-/// Changes a byte of the page's payload in the file.
+/// Changes one byte of a page's payload in the file.
 void damage(const Pages& pages, std::uint32_t page) {
   const std::uint64_t at = pages.container.entry(page).offset + kPageHeaderBytes + 6;
   std::fstream file(pages.file.path(), std::ios::in | std::ios::out | std::ios::binary);
@@ -66,7 +66,7 @@ void check_sums(const CacheStatistics& s, std::uint64_t lookups) {
 
 }  // namespace
 
-TEST_CASE("frame table: a frame that a reader holds keeps its page while others claim",
+TEST_CASE("frame table: a pinned frame keeps its page while other readers claim frames",
           "[cache][frames][threads]") {
   constexpr std::uint32_t kReaders = 4, kPages = 6;
   for (const Replacement replacement : {Replacement::clock, Replacement::lru}) {
@@ -99,7 +99,7 @@ TEST_CASE("frame table: a frame that a reader holds keeps its page while others 
   }
 }
 
-TEST_CASE("cache: threads that fight for frames get the right pages", "[cache][threads]") {
+TEST_CASE("cache: threads that compete for frames get the right pages", "[cache][threads]") {
   const Pages pages;
   constexpr std::uint64_t kGets = 3000;
   for (const unsigned threads : {2u, 4u, 8u}) {
@@ -113,7 +113,7 @@ TEST_CASE("cache: threads that fight for frames get the right pages", "[cache][t
           PageReader reader(cache);
           std::mt19937 random(thread);
           for (std::uint64_t i = 0; i < kGets; ++i) {
-            // Half of the gets go to a few pages that all threads want.
+            // Half of the requests go to a few pages that all threads want.
             const std::uint32_t page = below(i % 2 == 0 ? 8 : pages.count(), random);
             if (!pages.same(page, reader.pin(page))) ++wrong;
           }
@@ -125,7 +125,7 @@ TEST_CASE("cache: threads that fight for frames get the right pages", "[cache][t
   }
 }
 
-TEST_CASE("cache: a page that all ask for at once is read once", "[cache][threads]") {
+TEST_CASE("cache: a page that all threads request at once is read once", "[cache][threads]") {
   const Pages pages(slow_pages());
   constexpr unsigned kThreads = 8;
   for (int round = 0; round < 20; ++round) {
@@ -145,14 +145,15 @@ TEST_CASE("cache: a page that all ask for at once is read once", "[cache][thread
   }
 }
 
-TEST_CASE("cache: who waits for a read that fails gets its error", "[cache][threads][failure]") {
+TEST_CASE("cache: a thread that waits for a failing read gets its error",
+          "[cache][threads][failure]") {
   const Pages pages(slow_pages());
   damage(pages, 0);
   constexpr unsigned kThreads = 4;
   PageCache cache(pages.container, pages.options(kThreads, 2 * kThreads));
   std::atomic<std::uint64_t> errors = 0;
   std::uint64_t asked = 0;
-  // Whether two threads meet in one read is up to the system: it is tried until they have.
+  // Whether two threads meet in one read is up to the system: try until they do.
   while (asked < 4000 && cache.statistics().shared_hits == 0) {
     asked += kThreads;
     on_threads(kThreads, [&](unsigned) {
@@ -170,11 +171,12 @@ TEST_CASE("cache: who waits for a read that fails gets its error", "[cache][thre
   CHECK(pages.same(1, reader.pin(1)));
 }
 
-TEST_CASE("cache: readers that pin all they may do not lock each other out", "[cache][threads]") {
+TEST_CASE("cache: readers that pin as much as allowed do not block each other",
+          "[cache][threads]") {
   const Pages pages;
   constexpr unsigned kThreads = 4;
   constexpr std::uint32_t kSlots = 4;
-  // Every frame can be pinned: T * S of them.
+  // Every frame can be pinned: there are threads * slots of them.
   PageCache cache(pages.container, pages.options(kThreads, kThreads * kSlots, kSlots));
   REQUIRE(cache.statistics().frames == kThreads * kSlots);
   std::atomic<std::size_t> wrong = 0;
@@ -188,7 +190,7 @@ TEST_CASE("cache: readers that pin all they may do not lock each other out", "[c
   CHECK(wrong == 0);
 }
 
-TEST_CASE("cache: all who ask for a damaged page get its error, the others their pages",
+TEST_CASE("cache: threads that request a damaged page get its error, the others their pages",
           "[cache][threads][failure]") {
   const Pages pages;
   damage(pages, 0);
@@ -214,8 +216,9 @@ TEST_CASE("cache: all who ask for a damaged page get its error, the others their
           caught = std::current_exception();
         }
         if (!caught) continue;
-        // Threads share the error. It is counted in a library that the thread sanitizer does not
-        // see: under a lock it sees that who frees it comes after all who read it.
+        // Threads share the error. Its references are counted in a library that the thread
+        // sanitizer does not see: the lock shows it that the error is freed after everyone has read
+        // it.
         const std::lock_guard lock(reading);
         try {
           std::rethrow_exception(std::exchange(caught, nullptr));

@@ -1,4 +1,4 @@
-"""ptcbuild --append: points added to a container."""
+"""ptcbuild --append: appending points to a container."""
 
 import json
 import math
@@ -22,7 +22,7 @@ class Append(ProgramTest):
         self.succeed("ptcbuild", self.other, "--append", self.scene, "-o", target, *options)
 
     def columns(self, scene):
-        """Positions and occlusion of all points, by radius and normal, which tell them apart."""
+        """Returns positions and occlusion of all points by radius and normal, which identify them."""
         lit = self.here / "lit.ply"
         self.succeed("ptcshade", scene, "-o", lit)
         names, points = read_ply(lit)
@@ -64,7 +64,7 @@ class Append(ProgramTest):
         for at in (len(whole) - 4096, 5000, 100):
             target.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1:])
             before = target.read_bytes()
-            if at == len(whole) - 4096:  # one of the two superblocks: whole enough
+            if at == len(whole) - 4096:  # one of the two superblocks: the other is enough
                 self.succeed("ptcbuild", self.other, "--append", target, "-o", self.here / "t.ptcx")
                 (self.here / "t.ptcx").unlink()
             else:

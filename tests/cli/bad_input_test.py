@@ -13,7 +13,7 @@ class BadInput(ProgramTest):
     """Every kind of bad file, everywhere a program reads one: exit 1, the path, nothing left."""
 
     def consumers(self, kind):
-        """Commands that read a file of a kind, with a place for its name."""
+        """Returns the commands that read a file of a kind, with a placeholder for its name."""
         out = {"ptcx": self.here / "out.ptcx", "ply": self.here / "out.ply",
                "png": self.here / "out.png", "exr": self.here / "out.exr"}
         commands = {
@@ -41,7 +41,8 @@ class BadInput(ProgramTest):
         return commands[kind]
 
     def refuse(self, kind, path, *places, verdict=1):
-        """Expects every consumer of a kind to refuse a file, naming it and one of `places`; ptcverify with its verdict."""
+        """Expects every program that reads a kind of file to refuse this one, naming it and one of `places`; ptcverify
+        ends with its verdict."""
         for command in self.consumers(kind):
             arguments = [path if word == "{}" else word for word in command]
             message = self.fail_with(verdict if arguments[0] == "ptcverify" else 1, *arguments)

@@ -1,4 +1,4 @@
-"""ptcbench: what it measures, writes and refuses. Nothing here depends on how fast the machine is."""
+"""ptcbench: what it measures, writes and refuses. Nothing here depends on the speed of the machine."""
 
 import csv
 import json
@@ -12,7 +12,7 @@ METHODS = ["ptcx", "plain", "embree-discs", "embree-mesh"]
 
 class Bench(ProgramTest):
     def measure(self, *arguments):
-        """Rows and references of a small run."""
+        """Returns the rows and references of a small run."""
         charts = self.here / "charts"
         self.succeed("ptcbench", "accuracy", *arguments, "-o", charts, "--quick", "--quiet", "--checked", "20",
                      "--repeats", "1", "--reference-rays", "256")
@@ -23,7 +23,7 @@ class Bench(ProgramTest):
         return sorted({row[key] for row in facts["rows"]})
 
     def test_finer_settings_are_closer_to_the_truth(self):
-        # Two settings of PTCX; what rays and the plain gather do is timed as always.
+        # Two settings of PTCX; rays and the plain gather are timed as always.
         charts = self.here / "charts"
         settings = ["--setting", "0.06,0.3,32", "--setting", "0.005,0.07,32"]
         printed = self.succeed("ptcbench", "accuracy", "fractal", "--quick", "--points", "20k", "--checked", "60",
@@ -44,7 +44,7 @@ class Bench(ProgramTest):
                 self.assertEqual([r["setting"].split()[0] for r in rays], ["64", "256", "1024", "4096"])
                 self.assertLess(rays[3]["ao_rms"], 0.25 * rays[0]["ao_rms"])
                 self.assertTrue(all(r["us_per_receiver"] > 0 for r in rows))
-        for note in facts["references"]:  # well below what is measured
+        for note in facts["references"]:  # well below the measured errors
             self.assertLess(note["ao_noise"], 0.005)
             self.assertLess(note["e_noise"], 0.01)
         for name in ("accuracy", "accuracy-fractal"):
@@ -146,7 +146,7 @@ class Bench(ProgramTest):
                          | {("disk", o, m) for o in orders for m in ("ptcx", "floor")})
         for row in rows:
             self.assertGreater(row["wall_seconds"], 0)
-            if row["panel"] == "disk":  # in, spilled and read again, out
+            if row["panel"] == "disk":  # read, spilled and read again, written
                 self.assertGreaterEqual(row["moved_bytes"], 2 * (40 + 34) * row["points"])
                 self.assertEqual(row["floor_share"] is None, row["method"] == "floor")
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["sort.csv", "sort.json", "sort.png", "sort.svg"])

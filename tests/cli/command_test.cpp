@@ -1,4 +1,4 @@
-// What every program makes of an error: exit code and message (tools/common.h).
+// What every program does with an error: exit code and message (tools/common.h).
 #include <unistd.h>
 
 #include <array>
@@ -21,10 +21,10 @@ namespace {
 
 struct Ended {
   int code = 0;
-  std::string errors;  ///< what stands on standard error
+  std::string errors;  ///< text on standard error
 };
 
-/// Runs a program whose body does this.
+/// Runs a program with this body.
 Ended run_program(const std::function<Outcome(Progress&)>& body) {
   std::FILE* const caught = std::tmpfile();
   REQUIRE(caught != nullptr);
@@ -77,7 +77,7 @@ TEST_CASE("command: a broken precondition ends as an internal error, not as a us
   CHECK(run_throwing(std::length_error("length")).code == kInternal);
 }
 
-TEST_CASE("command: messages of the engine name options where they name fields", "[cli]") {
+TEST_CASE("command: messages name options in place of the fields of a request", "[cli]") {
   CHECK(run_throwing(RequestError("count", "`count` goes with a .ply")).errors ==
         "ptctest: --count goes with a .ply\n");
   CHECK(with_options("`estimate` needs `error` or `check`, too") ==
@@ -90,7 +90,7 @@ TEST_CASE("command: messages of the engine name options where they name fields",
   CHECK(option_of("temp_dirs").empty());
 }
 
-TEST_CASE("command: an error of a request tells which field is wrong", "[cli]") {
+TEST_CASE("command: an error of a request says which field is wrong", "[cli]") {
   const RequestError error("sampling.spacing", "`sampling.spacing` is negative");
   CHECK(error.field() == "sampling.spacing");
   CHECK(std::string(error.what()) == "`sampling.spacing` is negative");

@@ -1,4 +1,4 @@
-"""What the programs tell, and that it does not depend on threads or memory."""
+"""The facts that the programs report, which do not depend on threads or memory."""
 
 import json
 import math
@@ -81,7 +81,7 @@ class Facts(ProgramTest):
         self.assertEqual(space["temp_bytes"], 700_000 * 34)
         for key in ("temp_free_bytes", "output_bytes", "output_free_bytes"):
             self.assertGreater(space[key], 1 << 20)
-        # On one disk, whose room is counted once.
+        # Both directories are on one disk, whose room is counted once.
         self.assertLess(abs(space["temp_free_bytes"] - space["output_free_bytes"]), 0.5 * space["output_free_bytes"])
         told = self.succeed(*command, "--progress").stderr
         for text in (f"ptcbuild: 23.8 MB of temporary files in {first} and {second}, ", " GB free; about 9.1 MB for "):
@@ -156,7 +156,7 @@ class Facts(ProgramTest):
     def test_radii_that_no_scene_has_are_shaded_as_rays_see_them(self):
         cloud, scene, out = self.here / "c.ply", self.here / "c.ptcx", self.here / "o.ply"
         for radius in (1e19, 1e20, 1e30, 3e38):
-            for which in (range(90, 91), range(180)):  # one disc, all of them
+            for which in (range(90, 91), range(180)):  # one disc, all discs
                 points = [list(point) for point in ball(180)]
                 for i in which:
                     points[i][CORE.index("radius")] = radius
@@ -239,12 +239,12 @@ class Verify(ProgramTest):
                 self.assertEqual(facts[name], value if level > 2 else None, (level, name))
         path = self.here / "wrong.ptcx"
         content = bytearray(self.scene.read_bytes())
-        content[4096 + 100] ^= 1  # the first page
+        content[4096 + 100] ^= 1  # a byte of the first page
         path.write_bytes(content)
         for level in (2, 3, 4):
             told = run("ptcverify", path, "--level", level).stderr
             self.assertIn(f"damaged: 1 fault in 1 of {pages} pages at level {level}: test memory and disk", told)
-        content[-2000] ^= 1  # a superblock
+        content[-2000] ^= 1  # a byte of a superblock
         path.write_bytes(content)
         self.assertRegex(run("ptcverify", path, "--level", "0").stderr, r"damaged: 1 fault at level 0: ")
         self.assertRegex(run("ptcverify", path, "--level", "3").stderr, rf"damaged: 2 faults in 1 of {pages} pages at level 3: ")
@@ -314,7 +314,7 @@ class Verify(ProgramTest):
         scene, broken, out = self.here / "many.ptcx", self.here / "broken.ptcx", self.here / "o.ply"
         self.succeed("ptcbuild", self.mesh, "--points", "3k", "--page-size", "4K", "-o", scene)
         whole = bytearray(scene.read_bytes())
-        for byte in (64, 65):  # of the first page, which holds points
+        for byte in (64, 65):  # bytes of the first page, which holds points
             whole[4096 + byte] ^= 0xff
         broken.write_bytes(whole)
         number, count = struct.unpack_from("<I", whole, 4096 + 8)[0], struct.unpack_from("<I", whole, 4096 + 24)[0]

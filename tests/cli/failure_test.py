@@ -24,7 +24,7 @@ class SystemFailure(ProgramTest):
             path.rmdir()
 
     def test_a_limit_on_the_size_of_files_leaves_nothing(self):
-        """The system sends SIGXFSZ, by which a program ends that does not ignore it."""
+        """The system sends SIGXFSZ, which ends a program unless it ignores the signal."""
         picture = ["--size", "200x200", "--camera", "0,0,3,0,0,0", "--samples", "1"]
         spilling = ["--city", "700k", "--page-size", "1M", "--profile", "raw", "-o", self.here / "o.ptcx"]
         for program, operands, kib in (("ptcbuild", [self.cloud, "-o", self.here / "o.ptcx"], 8),
@@ -54,7 +54,7 @@ class SystemFailure(ProgramTest):
         self.succeed(*command)
         whole = (self.here / "o.ptcx").read_bytes()
         (self.here / "o.ptcx").unlink()
-        for temp in temps:  # half of the points has room in each, the container has not
+        for temp in temps:  # each has room for half of the points; the container does not fit
             temp.mkdir()
             command += ["--temp", temp]
         command += ["--resume", "--checkpoint", "50k"]
@@ -62,7 +62,7 @@ class SystemFailure(ProgramTest):
         self.assertEqual(limited.returncode, 3, limited.stderr)
         self.assertRegex(limited.stderr, r"o\.ptcx\.resume-pages: it needs \d+ bytes or more")
         self.assertFalse((self.here / "o.ptcx").exists())
-        self.assertIn("going on with", self.succeed(*command).stderr)
+        self.assertIn("continuing with", self.succeed(*command).stderr)
         self.assertEqual((self.here / "o.ptcx").read_bytes(), whole)
         self.assertEqual(sorted(path.name for path in self.here.rglob("*")), ["o.ptcx", "t1", "t2"])
 
@@ -77,13 +77,13 @@ class SystemFailure(ProgramTest):
         for turn, number in enumerate((signal.SIGKILL, signal.SIGTERM, signal.SIGINT) * 4):
             process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
                                        stderr=subprocess.PIPE, text=True)
-            time.sleep(0.05 + 0.03 * died)  # at any moment, every other time behind a checkpoint
+            time.sleep(0.05 + 0.03 * died)  # any moment, every other time after a checkpoint
             while turn % 2 and process.poll() is None and not checkpoint.exists():
                 time.sleep(0.001)
             process.send_signal(number)
             told = process.communicate(timeout=60)[1]
             died += process.returncode == -number
-            gone_on += "going on with" in told
+            gone_on += "continuing with" in told
         self.assertGreater(died, 4)
         self.assertGreater(gone_on, 0)
         self.succeed(*command)
@@ -117,7 +117,7 @@ class SystemFailure(ProgramTest):
         for _ in range(2):
             message = self.fail_with(1, *command)
             self.assertRegex(message, r"ptcbuild: .*/o\.ptcx\.resume-spill-\w+-0: offset \d+: the \d+ points there are not "
-                                      r"what was written; to start anew, remove .*/o\.ptcx\.resume, .*" + spill.name)
+                                      r"what was written; to start again, remove .*/o\.ptcx\.resume, .*" + spill.name)
         for path in self.here.iterdir():
             self.assertIn(str(path), message)
             path.unlink()
@@ -129,7 +129,7 @@ class SystemFailure(ProgramTest):
         self.succeed(*command)
         (self.here / "o.ptcx.resume").write_bytes(b"PTXSTATE and what is torn")
         message = self.fail_with(1, *command)
-        self.assertIn("o.ptcx.resume: the state is truncated; to start anew, remove ", message)
+        self.assertIn("o.ptcx.resume: the state is truncated; to start again, remove ", message)
 
     def test_results_that_cannot_be_printed(self):
         with open("/dev/full", "w") as full:

@@ -13,7 +13,7 @@ SCRIPT = ROOT / "tools/measure.sh"
 
 
 def listed():
-    """Names of results and their commands, as the script has them."""
+    """Returns the names of results and their commands, as the script lists them."""
     done = subprocess.run([SCRIPT, "--list"], capture_output=True, text=True, check=True, timeout=60)
     return dict(line.split(": ", 1) for line in done.stdout.splitlines())
 

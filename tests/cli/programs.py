@@ -1,4 +1,4 @@
-"""What the tests of the programs share: small inputs, running a program, what must hold after.
+"""Shared by the tests of the programs: small inputs, running a program, and what must hold afterwards.
 
 Tests run with PTC_BIN, the directory of the programs, and PTC_PROGRAMS, their names with blanks
 between them; they need the standard library only.
@@ -21,13 +21,13 @@ SMALL_PICTURE = ["--camera", "0.5,0.5,3,0.5,0.5,0.5", "--size", "24x16", "--samp
 
 
 def run(program, *arguments, **options):
-    """Runs a program to its end; its exit code, standard output and standard error."""
+    """Runs a program to its end. Returns its exit code, standard output and standard error."""
     command = [str(BIN / program), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=250, **options)
 
 
 def write_ply(path, points, names=CORE):
-    """Binary PLY of floats, positions in double."""
+    """Writes a binary PLY of floats, with positions in double."""
     kinds = ["double" if name in "xyz" else "float" for name in names]
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
     header += [f"property {kind} {name}" for kind, name in zip(kinds, names)] + ["end_header", ""]
@@ -36,7 +36,7 @@ def write_ply(path, points, names=CORE):
 
 
 def read_ply(path):
-    """The points of a PLY written by the programs: property names, list of tuples."""
+    """Reads a PLY that a program wrote. Returns the property names and a list of tuples."""
     data = path.read_bytes()
     end = data.index(b"end_header\n") + len(b"end_header\n")
     names, code = [], "<"
@@ -53,7 +53,7 @@ def read_ply(path):
 
 
 def ball(count, seed=1):
-    """Lit surfels spread over a ball."""
+    """Returns lit surfels spread over a ball."""
     draw = random.Random(seed)
     points = []
     for i in range(count):
@@ -77,7 +77,7 @@ f 1 2 6 5
 
 
 class ProgramTest(unittest.TestCase):
-    """A directory of its own for every test, with a small mesh, cloud and container."""
+    """Gives every test its own directory with a small mesh, cloud and container."""
 
     @classmethod
     def setUpClass(cls):

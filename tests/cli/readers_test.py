@@ -1,4 +1,4 @@
-"""Two readers that share no code, over files with one number changed and all checksums right.
+"""Two readers that share no code, on files with one changed number and correct checksums.
 
 They agree on whether a file is valid, and the rule by which one refuses it is among those that the other finds broken.
 The changes are the same each time.
@@ -40,7 +40,7 @@ SUMS = {"nodes-node-mean", "nodes-node-sphere", "nodes-node-slab", "nodes-node-s
 
 
 def draw(choice, bits):
-    """An integer, often at an end of its range."""
+    """Returns a random integer, often at an end of its range."""
     top = 1 << bits - 1
     return choice.choice((0, 1, 2, choice.randrange(9), top - 1, top, 2 * top - 2, 2 * top - 1,
                           choice.getrandbits(bits), choice.randrange(200)))
@@ -52,7 +52,7 @@ def draw_double(choice):
 
 
 def change(choice, draft):
-    """One number of a page's payload, a header, an entry, both, the superblock or the directory."""
+    """Changes one number of a page's payload, a header, an entry, both, the superblock or the directory."""
     page = choice.choice(draft.pages)
     what = choice.randrange(8)
     if what < 3:
@@ -79,7 +79,7 @@ def change(choice, draft):
 
 
 def write_far(path):
-    """A point whose attributes, nodes and directory lie behind a hole of 4 GiB."""
+    """Makes a container of one point whose attributes, nodes and directory lie after a hole of 4 GiB."""
     draft = Draft([Surfel((1, 2, 3), radius=0.5)], channels=good.CHANNELS)
     hole = draft.offset(1)
     for i, page in enumerate(draft.pages[1:], 1):

@@ -1,4 +1,4 @@
-"""What went into a container comes out of it."""
+"""Whatever is written to a container is read back from it."""
 
 import json
 import unittest
@@ -80,7 +80,7 @@ class RoundTrip(ProgramTest):
 
     def test_profiles_round_as_they_say(self):
         exact = self.here / "exact.ptcx"
-        self.succeed("ptcconvert", self.cloud, exact)  # keeps what it is given
+        self.succeed("ptcconvert", self.cloud, exact)  # keeps the exact values
         self.succeed("ptcconvert", exact, self.here / "exact.ply")
         names, was = read_ply(self.here / "exact.ply")
         at = {name: i for i, name in enumerate(names)}

@@ -22,8 +22,7 @@ class Usage(ProgramTest):
                 self.assertIn(option, text, program)
 
     def test_examples_in_the_help_parse(self):
-        # Their files are not there: they must fail for that and for nothing else. Those without files
-        # would run for long.
+        # Their files do not exist, which must be the only error. Examples without files would run for long.
         for program in PROGRAMS:
             for line in self.succeed(program, "--help").stdout.split("Examples:\n")[1].splitlines():
                 long = any(word in line for word in ("--city", "--quick", " build ", " growth ", " scale ", " sort "))
@@ -104,12 +103,12 @@ class Usage(ProgramTest):
     def test_requests_that_the_library_refuses_are_told_in_options(self):
         shade = ["ptcshade", self.scene, "-o", self.here / "o.ply"]
         for options, text in ((["--tolerate-damage", "--bounces", "2"], "--tolerate-damage allows at most one bounce: "),
-                              (["--tolerate-damage", "--check", "9"], "--tolerate-damage goes without --error and --check: "),
-                              (["--estimate"], "--estimate needs rays to go by: ask for --error or --check, too")):
+                              (["--tolerate-damage", "--check", "9"], "--tolerate-damage excludes --error and --check: "),
+                              (["--estimate"], "--estimate needs rays to compare with: ask for --error or --check as well")):
             self.assertIn("ptcshade: " + text, self.fail_with(2, *shade, *options))
         to_container = ["ptcshade", self.scene, "-o", self.here / "o.ptcx"]
-        self.assertIn("--count goes with a .ply as output", self.fail_with(2, *to_container, "--count", "9"))
-        self.assertIn("--tolerate-damage goes with a .ply as output", self.fail_with(2, *to_container, "--tolerate-damage"))
+        self.assertIn("--count needs a .ply as output", self.fail_with(2, *to_container, "--count", "9"))
+        self.assertIn("--tolerate-damage needs a .ply as output", self.fail_with(2, *to_container, "--tolerate-damage"))
         build = ["ptcbuild", self.mesh, "-o", self.here / "o.ptcx"]
         self.assertIn("--spacing is too small", self.fail_with(2, *build, "--spacing", "1e-30"))
         self.assertIn("a sun is negative or not finite", self.fail_with(2, *build, "--sun=1,2,1e30", "--sun-colour=1e30"))
@@ -117,7 +116,7 @@ class Usage(ProgramTest):
         scene = self.here / "s.ptcx"
         shutil.copy(self.scene, scene)
         message = self.fail_with(2, "ptcbuild", self.cloud, "--append", scene, "--resume", "-o", scene)
-        self.assertIn("--resume with --append goes into another file", message)
+        self.assertIn("--resume with --append needs a target other than the scene", message)
 
     def test_options_that_messages_name_exist(self):
         helps = "".join(self.succeed(program, "--help").stdout for program in PROGRAMS)

@@ -1,4 +1,4 @@
-"""What mesh readers leave out is one line on stderr of every program that reads a mesh."""
+"""Whatever mesh readers leave out is one line on stderr of every program that reads a mesh."""
 
 import unittest
 

@@ -1,15 +1,17 @@
-// Preloaded into a program under test: meddles with its calls on files below one directory, or with
-// its allocations, and tells what it did. Asked by environment variables, set by harness.py:
+// A library that is preloaded into a program under test: it interferes with the program's calls on
+// files below one directory, or with its allocations, and reports what it did. Environment
+// variables, set by harness.py, say what to do:
 //
 //   PTC_FAULTS_DIR     the directory
 //   PTC_FAULTS_HOW     what happens: see kHows
-//   PTC_FAULTS_AT      to the how-manieth call that it can happen to, from 1 on; 0: to none, and
-//                      the report gets a line "call CALL" for each of them
-//   PTC_FAULTS_ON      when set, to all further ones too
+//   PTC_FAULTS_AT      number of the call that it happens to, from 1 on, among the calls that it
+//   can
+//                      happen to; 0: none, and the report gets a line "call CALL" for each
+//   PTC_FAULTS_ON      when set, it happens to all further calls, too
 //   PTC_FAULTS_REPORT  file that gets a line "hit CALL PATH" and, at the end, "of N" such calls
-//   PTC_FAULTS_TRACE   file that gets every call that changes files: see record()
+//   PTC_FAULTS_TRACE   file that gets every call that changes files, as record() writes it
 //
-// Calls that the C library makes for itself (stdio) pass by; streams of the C++ library do not.
+// Calls that the C library makes for itself (stdio) are not seen; streams of the C++ library are.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -25,7 +27,7 @@
 #include <cstdlib>
 #include <cstring>
 
-// Where the C library's own allocator is, without a search that would allocate.
+// The C library's own allocator, found without a search that would allocate.
 extern "C" void* __libc_malloc(std::size_t);
 extern "C" void* __libc_calloc(std::size_t, std::size_t);
 extern "C" void* __libc_realloc(void*, std::size_t);
@@ -41,15 +43,15 @@ struct Known {
   int error;
 };
 constexpr Known kHows[] = {
-    {"eio", How::error, EIO},        // any call fails so
-    {"enospc", How::error, ENOSPC},  // calls that need room
-    {"emfile", How::error, EMFILE},  // opening
+    {"eio", How::error, EIO},        // any call fails
+    {"enospc", How::error, ENOSPC},  // a call that needs disk space fails
+    {"emfile", How::error, EMFILE},  // opening a file fails
     {"eintr", How::interrupt, EINTR},
     {"short", How::cut, 0},      // half of what was asked for is read or written
     {"none", How::none, 0},      // 0 bytes are written
     {"stop", How::stop, 0},      // SIGSTOP before the call
     {"kill", How::kill, 0},      // SIGKILL before the call
-    {"memory", How::memory, 0},  // an allocation fails, from main() on; mapped memory is one too
+    {"memory", How::memory, 0},  // an allocation or a mapping of memory fails, from main() on
 };
 
 enum class Kind { open, create, read, write, sync, close, name, other };
@@ -65,7 +67,7 @@ std::atomic<bool> in_main{false};
 int trace = -1;
 
 constexpr int kMaxFiles = 1024;
-char paths[kMaxFiles][PATH_MAX];  // of open files below the directory; "": another file
+char paths[kMaxFiles][PATH_MAX];  // paths of open files below the directory; "": another file
 std::atomic_flag trace_lock = ATOMIC_FLAG_INIT;
 
 template <class Function>
@@ -118,7 +120,7 @@ const char* path_of(int fd) {
   return fd >= 0 && fd < kMaxFiles ? paths[fd] : "";
 }
 
-// Where `path` is, when that is in the directory; else "".
+// Returns the absolute path when it is in the directory, otherwise "".
 const char* watched(const char* path, char (&whole)[PATH_MAX]) {
   if (directory == nullptr || path == nullptr) return "";
   whole[0] = '\0';
@@ -156,7 +158,7 @@ bool counted_in() {
   return at > 0 && (number == at || (on && number > at));
 }
 
-// True when the caller has to meddle with this call itself: to fail or to shorten it.
+// Returns true when the caller has to interfere with this call itself: to fail or to shorten it.
 bool strikes(const char* call, Kind kind, const char* path) {
   if (path[0] == '\0' || !can_happen(kind)) return false;
   const bool hit = counted_in();
@@ -187,7 +189,7 @@ class TraceGuard {
   TraceGuard& operator=(const TraceGuard&) = delete;
 };
 
-// A line "CALL OFFSET BYTES PATH", tab, second path; then the bytes that were written.
+// Appends to the trace: a line "CALL OFFSET BYTES PATH", tab, second path; then the written bytes.
 void record(const char* call, const char* path, const char* to = "", long long offset = 0,
             const void* data = nullptr, std::size_t bytes = 0) {
   if (trace < 0 || path[0] == '\0') return;
@@ -320,7 +322,7 @@ int ftruncate(int fd, off_t bytes) noexcept {
 
 int ftruncate64(int fd, off64_t bytes) noexcept __attribute__((alias("ftruncate")));
 
-// Of holes.
+// Watched because it punches holes into files.
 int fallocate(int fd, int mode, off_t offset, off_t bytes) {
   static const auto real = next_of(&::fallocate, "fallocate");
   if (strikes("fallocate", Kind::other, path_of(fd))) return -1;
@@ -345,7 +347,7 @@ int fdatasync(int fd) {
   return sync_watched("fdatasync", fd, real);
 }
 
-// As Linux does: whatever close() says, the descriptor is gone.
+// Closes the descriptor even when it reports failure, as Linux does.
 int close(int fd) {
   static const auto real = next_of(&::close, "close");
   const bool fails = strikes("close", Kind::close, path_of(fd));

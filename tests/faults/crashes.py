@@ -1,8 +1,8 @@
-"""What a crash may leave: kill -9 at any moment, and power loss replayed from a trace of calls.
+"""The files that a crash may leave: kill -9 at any moment, and power loss replayed from a trace of calls.
 
-The replay knows a file system that keeps no more than it promised: what was written to a file since
-its last sync is on the disk whole, in part, in any order or not at all, and so are names since the
-last sync of their directory.
+The replay models a file system that keeps no more than it promises: whatever was written to a file since
+its last sync is on the disk in whole, in part, in any order or not at all, and so are changes of names
+since the last sync of their directory.
 """
 
 import os
@@ -18,7 +18,7 @@ SUPERBLOCKS = 2 * 4096  # at the end of a container
 
 
 def read_trace(path):
-    """Tuples of call, path, second path, offset, data, in the order of the calls."""
+    """Returns tuples of call, path, second path, offset and data, in the order of the calls."""
     data, at, calls = path.read_bytes(), 0, []
     while at < len(data):
         end = data.index(b"\n", at)
@@ -48,7 +48,7 @@ class File:
         pieces = list(self.pending)
         draw.shuffle(pieces)
         for offset, data in pieces:
-            if data is None:  # cut there
+            if data is None:  # the file was cut there
                 del content[offset if fate != "none" else len(content):]
                 continue
             kept = {"all": "whole", "none": "lost"}.get(fate) or draw.choice(["whole", "lost", "torn", "zeros"])
@@ -72,8 +72,8 @@ def put(content, offset, data):
 class Disk:
     def __init__(self, target):
         self.synced = {target: File(OLD)}  # names whose directory was synced
-        self.names = dict(self.synced)     # as the running program sees them
-        self.pending = []                  # changes of names since: directory, function of a dictionary
+        self.names = dict(self.synced)     # names as the running program sees them
+        self.pending = []                  # changes of names since then: directory, function of a dictionary
 
     def change(self, path, names):
         self.pending.append((os.path.dirname(path), names))
@@ -94,7 +94,7 @@ class Disk:
                 file.sync()
             else:
                 file.pending.append((offset, {"cut": None, "hole": bytes(int(second or 0))}.get(call, data)))
-        elif call == "sync":  # of a directory: changes of names in it
+        elif call == "sync":  # the sync of a directory makes changes of names in it permanent
             for where, names in self.pending:
                 if where == path:
                     names(self.synced)
@@ -110,14 +110,14 @@ class Disk:
 
 
 def broken_promise(content, new):
-    """True when a superblock is whole and what it commits is not."""
+    """Returns true when a superblock is whole and the pages that it commits are not."""
     body = len(new) - SUPERBLOCKS
     whole = any(content[at:at + 4096] == new[at:at + 4096] for at in (body, body + 4096))
     return whole and content[:body] != new[:body]
 
 
 def replay(place, arguments, tally):
-    """Every point of a run at which the power may fail, each with several fates of what was not synced."""
+    """Replays a power failure after every call of a run, each with several fates of unsynced data."""
     if not place.target:
         return
     trace = place.home / "trace"
@@ -151,7 +151,7 @@ def replay(place, arguments, tally):
 
 
 def go_on(place, left, where, tally):
-    """A run among what a crash left comes to the new file."""
+    """Checks that a run among the files that a crash left completes the new file."""
     place.reset()
     place.target.unlink()
     for name, content in left.items():
@@ -173,7 +173,7 @@ def judge_killed(place, run, where, tally):
 
 
 def kill(place, arguments, tally):
-    """kill -9 before calls on files and at random moments; then a run among what that left."""
+    """Kills runs with kill -9 before calls on files and at random moments, then runs again among their files."""
     draw = random.Random(str(place.scenario))
     died = points = 0
     if place.preloaded:

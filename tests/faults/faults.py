@@ -14,12 +14,12 @@ from harness import CALLS, OLD, Tally, each_scenario
 
 KINDS = {"eio": "Input/output error", "enospc": "No space left on device", "emfile": "Too many open files",
          "eintr": "", "short": "", "none": "Input/output error"}
-# What these say changes nothing of what was done.
+# Failures of these calls do not affect the result.
 HARMLESS = {"close", "unlink", "fallocate"}
 
 
 def steps(count, most):
-    """1 to count, or `most` of them evenly spread, first and last among them."""
+    """Returns 1 to count, or `most` of these numbers evenly spread, the first and the last included."""
     if count <= most:
         return range(1, count + 1)
     if most == 1:
@@ -28,31 +28,31 @@ def steps(count, most):
 
 
 def one_of_each(names, draw):
-    """Numbers of calls, from 1 on: for each name one of those that have it."""
+    """Returns numbers of calls, from 1 on: one call for each name."""
     return sorted(draw.choice([i + 1 for i, n in enumerate(names) if n == name]) for name in sorted(set(names)))
 
 
 def judge_call(place, run, how, on):
-    """Complaints about a run one of whose calls met `how`."""
+    """Returns the complaints about a run in which the fault `how` hit a call."""
     may_leave = run.call == "unlink" or (on and how == "eio")  # when nothing can be removed
     wrong = place.complaints(run, may_leave)
     if run.code is None or run.code < 0:
         return wrong
-    # What cannot be opened for direct transfers is tried without.
+    # A file that cannot be opened for direct transfers is opened without them.
     without_o_direct = run.call == "open" and run.path.endswith("/temp") and not on
     if not run.call or not KINDS[how]:
         return wrong + ["not survived"] * (run.code != 0)
     if run.code == 0:
         return wrong + ["the error is swallowed"] * (run.call not in HARMLESS and not without_o_direct)
     if run.code == 2 and "--temp: Directory does not exist" in run.errors:
-        return wrong  # whatever keeps CLI11 from seeing the directory
+        return wrong  # CLI11 could not look at the directory
     if run.code != 3 or KINDS[how] not in run.errors or str(place.home) not in run.errors:
         wrong.append("not exit 3 with error and file")
     return wrong
 
 
 def fail_calls(place, arguments, tally):
-    """Every call on files fails in every way that it can; errors also from then on."""
+    """Lets every call on files fail in every way that it can; errors also continue from then on."""
     told, runs = [], 0
     for how in KINDS:
         clean = place.run(how=how)
@@ -73,7 +73,7 @@ def fail_calls(place, arguments, tally):
 
 
 def fail_allocations(place, arguments, tally):
-    """Every allocation fails, once and from then on."""
+    """Lets every allocation fail, once and from then on."""
     count = place.run(how="memory").calls
     codes = Counter()
     for on in (False, True):

@@ -1,4 +1,4 @@
-"""What the fault tests share: programs on tiny inputs, runs with a fault, what must hold after each.
+"""Shared by the fault tests: programs on tiny inputs, runs with a fault, and what must hold after each.
 
 PTC_BIN is the directory of the programs, PTC_CALLS the library to preload (calls.cpp), empty when
 the programs run under a sanitizer, which has an allocator and calls of its own.
@@ -23,7 +23,7 @@ SECONDS = 120  # a run that takes longer hangs
 
 
 def ball(count):
-    """Points, normals, radius and colours of lit surfels spread over a ball."""
+    """Writes points, normals, radii and colours of lit surfels spread over a ball."""
     draw = random.Random(1)
     points = []
     for i in range(count):
@@ -43,8 +43,8 @@ def write_ply(path, points):
 
 
 class Scenario:
-    """One command. `{in}` in an argument is the directory of inputs, `{out}` that of the target. What `keeps` leaves
-    files from which the same command goes on."""
+    """One command. `{in}` in an argument is the directory of inputs, `{out}` that of the target. A command that `keeps`
+    leaves files from which the same command continues."""
 
     def __init__(self, name, command, target="", slow=False, keeps=False):
         self.name, self.command, self.target, self.slow, self.keeps = name, command.split(), target, slow, keeps
@@ -81,8 +81,8 @@ SCENARIOS = [
 
 
 class Run:
-    """A finished run: exit code (None: it hung), stderr, call and path that the fault hit, how many
-    such calls there were, and when it hit none, their names."""
+    """A finished run: exit code (None: it hung), stderr, the call and the path that the fault hit, the number of calls
+    that it could hit and, when it hit none, their names."""
 
     def __init__(self, code, errors, report):
         self.code, self.errors = code, errors
@@ -94,7 +94,7 @@ class Run:
 
 
 class Place:
-    """Directories for the runs of one scenario, one run at a time."""
+    """The directories for the runs of one scenario, one run at a time."""
 
     def __init__(self, scenario, home):
         self.scenario = scenario
@@ -107,7 +107,7 @@ class Place:
         make_inputs(self.home)
         self.target = self.out / scenario.target if scenario.target else None
         self.report = Path(f"{home}.report")
-        self.old, self.new = OLD, b""  # what the target holds before and after
+        self.old, self.new = OLD, b""  # content of the target before and after
         clean = self.run()
         assert clean.code == 0, (scenario.name, clean.errors)
         if self.target:
@@ -142,7 +142,7 @@ class Place:
         return bool(CALLS)
 
     def most(self, arguments, quick, slow):
-        """How many runs of a kind; a scenario that takes long is never run for all of its calls."""
+        """Returns the number of runs of a kind; a slow scenario is never run for all of its calls."""
         if arguments.all:
             return 100 if self.scenario.slow else 10 ** 9
         return slow if self.scenario.slow else quick
@@ -170,7 +170,8 @@ class Place:
         return sorted(path.name for path in self.files() if path != self.target)
 
     def complaints(self, run, may_leave=False):
-        """What is wrong after any fault: a hang, a death, a half file, a temporary file. What was kept is gone on with."""
+        """Returns what is wrong after a fault: a hang, a signal, a half file, a temporary file. A run that keeps files is
+        continued."""
         wrong = self.complaints_alone(run, may_leave)
         if self.scenario.keeps and run.code is not None:
             again = self.run(reset=False)
@@ -205,7 +206,7 @@ INPUTS = {}
 
 
 def make_inputs(home):
-    """Inputs, made once and copied."""
+    """Makes the inputs, once, and copies them."""
     if not INPUTS:
         with tempfile.TemporaryDirectory(prefix="ptc-faults-") as scratch:
             here = Path(scratch)
@@ -224,7 +225,7 @@ def make_inputs(home):
 
 
 class Tally:
-    """Counts runs and keeps what went wrong."""
+    """Counts runs and collects complaints."""
 
     def __init__(self):
         self.failures = 0
@@ -240,7 +241,7 @@ class Tally:
 
 
 def each_scenario(names, work, workers=2):
-    """Calls work(place) for the scenarios, a few at a time, each in directories of its own."""
+    """Calls work(place) for the scenarios, a few at a time, each in its own directories."""
     home = Path(tempfile.mkdtemp(prefix="ptc-faults-"))
 
     def one(index_and_scenario):

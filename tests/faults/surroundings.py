@@ -12,7 +12,7 @@ INSIDE = "PTC_FAULTS_INSIDE"  # set in a name space where file systems may be mo
 
 
 def enter_name_space():
-    """The unshare command that lets this user mount a tmpfs, or None."""
+    """Returns the unshare command that lets this user mount a tmpfs, or None."""
     for options in (["-m"], ["-rm"]):
         probe = ["unshare", *options, "mount", "-t", "tmpfs", "none", "/mnt"]
         if subprocess.run(probe, stderr=subprocess.DEVNULL, check=False).returncode == 0:
@@ -34,7 +34,7 @@ def pages(data):
 
 
 def fill(place, arguments, tally):
-    """The disk of the target, then that of temporary files, is too small by more or less."""
+    """Makes the disk of the target, then that of temporary files, too small by various amounts."""
     if not place.target:
         return
     temp = place.home / "temp"
@@ -108,7 +108,7 @@ def run_changed(place, at, path, change):
 
 
 def disturb(place, arguments, tally):
-    """The input is cut, overwritten, replaced or removed before each call."""
+    """Cuts, overwrites, replaces or removes the input before each call."""
     names = [Path(word).name for word in place.scenario.command if word.startswith("{in}/") and "." in word]
     if not names or not place.preloaded:
         return
@@ -117,7 +117,7 @@ def disturb(place, arguments, tally):
     told = []
     for change in CHANGES:
         if change == overwrite and path.suffix != ".ptcx":
-            continue  # no checksums: other values are as good
+            continue  # without checksums other values are as good
         if change in (truncate_half, truncate_all) and "mapped" in place.scenario.name:
             continue  # SIGBUS, as the option says
         codes = []
@@ -137,7 +137,7 @@ def disturb(place, arguments, tally):
 
 
 def inside_name_space(arguments):
-    """True inside; else runs this again inside, or says why not."""
+    """Returns true inside the name space. Outside, runs this program again inside, or says why it cannot."""
     if os.environ.get(INSIDE):
         return True
     command = enter_name_space()

@@ -1,4 +1,4 @@
-"""Every clause that the sources cite exists in the spec; every rule is listed in errors.md and has a
+"""Checks that every clause that the sources cite exists in the spec; every rule is listed in errors.md and has a
 vector; released versions are frozen; what security.md names exists; exit codes are told alike.
 
 anchors.py SOURCE_DIR: collects "spec/FILE.md#anchor" and "spec/FILE.md" in sources and documents.
@@ -20,14 +20,14 @@ def slug(heading):
 
 
 def anchors_of(text):
-    """Headings, explicit anchors, and rules in bold at the start of a list item."""
+    """Returns headings, explicit anchors, and rules in bold at the start of a list item."""
     found = {slug(m) for m in re.findall(r"^#+ (.*)$", text, re.M)}
     found.update(re.findall(r'<a id="([^"]+)">', text))
     return found
 
 
 def rules_of(text):
-    """Names in bold with which a list item begins."""
+    """Returns the names in bold at the start of list items."""
     return set(re.findall(r"^- (?:<a id=\"[^\"]+\"></a>)?\*\*([a-z0-9-]+)\*\*:", text, re.M))
 
 
@@ -40,7 +40,7 @@ def sources(root, folders=FOLDERS):
 
 
 def check_vectors(spec, errors):
-    """Faults: rules without a vector in the folder of their kind, and vectors of no such rule."""
+    """Yields faults: rules without a vector in the folder of their kind, and vectors without a rule."""
     rules = {"bad": set(), "verify": set()}
     without = set()
     for rule, document, when, rest in re.findall(
@@ -59,7 +59,7 @@ def check_vectors(spec, errors):
 
 
 def check_versions(spec, text):
-    """Faults: versions that were released and of which there are no frozen vectors, or the reverse."""
+    """Yields faults: released versions without frozen vectors, and frozen vectors without a released version."""
     history = text.split("## How the format may change")[0]
     released = {version for version, body in re.findall(r"^## ([0-9.]+)\n(.*?)(?=^## |\Z)", history, re.M | re.S)
                 if "Not released yet" not in body}
@@ -70,7 +70,7 @@ def check_versions(spec, text):
 
 
 def check_security(root, text):
-    """Faults: classes that are missing or that nothing covers; vectors, tests and files that are not there."""
+    """Yields faults: classes that are missing or that nothing covers; vectors, tests and files that do not exist."""
     tests = ""
     for path in sources(os.path.join(root, "tests"), ("",)):
         with open(path, encoding="utf-8") as file:
@@ -92,13 +92,13 @@ def check_security(root, text):
 
 
 def exit_codes(errors):
-    """Names of the exit codes in the table of errors.md, by code."""
+    """Returns the names of the exit codes in the table of errors.md, by code."""
     section = errors.split("## Exit codes")[1].split("## ")[0]
     return {int(code): name for code, name in re.findall(r"^\| (\d+) \| ([a-z ]+) \|", section, re.M)}
 
 
 def check_exit_codes(root, documents):
-    """Faults: codes of the programs, their help, the README or a document that are not those of errors.md."""
+    """Yields faults: exit codes in programs, help, README or documents that differ from those of errors.md."""
     names = exit_codes(documents["errors.md"])
     if len(names) < 6:
         yield "spec/errors.md: hardly any exit codes found: the search is broken"
@@ -119,7 +119,7 @@ def check_exit_codes(root, documents):
         told = {int(code): name for code, name in re.findall(r"\b(\d),? ([a-z ]+)", " ".join(text.split()))}
         for code in sorted((set(names) - {6}) ^ (set(told) - {6})):
             yield f"{where} and spec/errors.md do not agree on exit code {code}"
-        for code, name in told.items():  # a verifier has names of its own for 0 and 1
+        for code, name in told.items():  # a verifier has its own names for 0 and 1
             if code > 1 and names.get(code, name) != name:
                 yield f"{where}: exit code {code} is '{name}', in spec/errors.md '{names[code]}'"
     for document, text in documents.items():
@@ -141,7 +141,7 @@ def main(root):
     def check(where, document, anchor):
         if document not in anchors:
             faults.append(f"{where}: spec/{document} does not exist")
-        elif anchor.endswith("-"):  # a prefix, to compare with
+        elif anchor.endswith("-"):  # a prefix of anchors
             if not any(a.startswith(anchor) for a in anchors[document]):
                 faults.append(f"{where}: spec/{document} has no #{anchor}...")
         elif anchor and anchor not in anchors[document]:

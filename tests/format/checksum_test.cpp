@@ -1,4 +1,4 @@
-// XXH3 against published values and against the table that the second reader is tested with too.
+// XXH3 against published values, and against the table that the second reader is tested with.
 #include "format/checksum.h"
 
 #include <fstream>
@@ -32,7 +32,8 @@ std::vector<std::byte> sequence(std::size_t size) {
 
 }  // namespace
 
-TEST_CASE("checksum: XXH3 of known texts is what xxHash publishes", "[format][checksum]") {
+TEST_CASE("checksum: XXH3 of known texts equals the values that xxHash publishes",
+          "[format][checksum]") {
   CHECK(xxh3_64(bytes_of("")) == 0x2d06800538d394c2);
   CHECK(xxh3_64(bytes_of("a")) == 0xe6c632b61e964e1f);
   CHECK(xxh3_64(bytes_of("abc")) == 0x78af5f94892f3950);
@@ -68,7 +69,7 @@ TEST_CASE("checksum: every length class agrees with the table of the spec", "[fo
   CHECK(rows >= 100);
 }
 
-TEST_CASE("checksum: sums over records are those of their hashes", "[format][checksum]") {
+TEST_CASE("checksum: the sum over records equals the sum of their hashes", "[format][checksum]") {
   for (const std::size_t size : {1u, 16u, 40u, 200u, 1000u}) {
     const std::vector<std::byte> bytes = sequence(7 * size);
     std::array<std::uint64_t, 2> wide{};
@@ -81,7 +82,7 @@ TEST_CASE("checksum: sums over records are those of their hashes", "[format][che
     }
     CHECK(xxh3_128_sum(bytes, size) == wide);
     CHECK(xxh3_64_sum(bytes, size, size, 3) == seeded);
-    std::vector<std::byte> apart;  // with a byte behind each that does not count
+    std::vector<std::byte> apart;  // each followed by a byte that does not count
     for (std::size_t i = 0; i < 7; ++i) {
       const auto record = std::span(bytes).subspan(i * size, size);
       apart.insert(apart.end(), record.begin(), record.end());
@@ -92,7 +93,7 @@ TEST_CASE("checksum: sums over records are those of their hashes", "[format][che
   CHECK(xxh3_128_sum({}, 40) == std::array<std::uint64_t, 2>{});
 }
 
-TEST_CASE("digest: it is XXH3-128 over 16 bytes a page, in page order", "[format][checksum]") {
+TEST_CASE("digest: it is XXH3-128 over 16 bytes per page, in page order", "[format][checksum]") {
   ContentDigest digest;
   std::vector<std::byte> all;
   CHECK(digest.value() == xxh3_128(all));

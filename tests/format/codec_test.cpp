@@ -49,7 +49,7 @@ std::string decode_clause(const Bytes& stored, std::size_t raw_bytes) {
 
 }  // namespace
 
-TEST_CASE("codec: pages of every size come back", "[format][codec]") {
+TEST_CASE("codec: pages of every size survive encoding and decoding", "[format][codec]") {
   const Codec kind = GENERATE(Codec::zstd, Codec::lz4);
   PageEncoder encoder(kind);
   PageDecoder decoder;
@@ -64,7 +64,8 @@ TEST_CASE("codec: pages of every size come back", "[format][codec]") {
   }
 }
 
-TEST_CASE("codec: what does not save a sixteenth is stored raw", "[format][codec]") {
+TEST_CASE("codec: a page that compression does not shrink by a sixteenth is stored raw",
+          "[format][codec]") {
   PageEncoder encoder(Codec::zstd);
   Bytes stored;
   const Bytes raw = noise(4096);
@@ -113,7 +114,7 @@ TEST_CASE("codec: every truncation and every flipped bit is refused or harmless"
   CHECK(wrong == 0);
 }
 
-TEST_CASE("codec: frames of another size, shape or number are refused", "[format][codec]") {
+TEST_CASE("codec: frames of the wrong size, shape or number are refused", "[format][codec]") {
   const Bytes raw = compressible(2000, 2);
   const Bytes frame = zstd_frame(raw, true, 20);
   CHECK(decode_clause(frame, 2000) == "none");
@@ -134,7 +135,7 @@ TEST_CASE("codec: frames of another size, shape or number are refused", "[format
   CHECK(decode_clause(skippable, 2000) == kFrame);
 }
 
-TEST_CASE("codec: what zstd passes over is refused", "[format][codec]") {
+TEST_CASE("codec: frames that zstd itself would skip are refused", "[format][codec]") {
   // 34 zeros as one block that repeats a byte: magic, descriptor, content size, block.
   const auto bytes = [](std::initializer_list<int> values) {
     Bytes out;
@@ -142,7 +143,7 @@ TEST_CASE("codec: what zstd passes over is refused", "[format][codec]") {
     return out;
   };
   CHECK(decode_clause(bytes({0x28, 0xb5, 0x2f, 0xfd, 0x20, 34, 0x13, 1, 0, 0}), 34) == "none");
-  // A dictionary id of 0, which zstd takes for none.
+  // A dictionary id of 0, which zstd treats as no dictionary.
   CHECK(decode_clause(bytes({0x28, 0xb5, 0x2f, 0xfd, 0x21, 0, 34, 0x13, 1, 0, 0}), 34) == kFrame);
   // A skippable frame after the frame.
   CHECK(decode_clause(bytes({0x28, 0xb5, 0x2f, 0xfd, 0x20, 34, 0x13, 1, 0, 0, 0x50, 0x2a, 0x4d,

@@ -1,5 +1,5 @@
-// File header, page header and directory entry: damage is found by the checksum, and a rule that is
-// broken under a right checksum is named.
+// File header, page header and directory entry: the checksum finds damage, and a rule that is
+// broken under a correct checksum is named.
 #include "format/container.h"
 
 #include <limits>
@@ -58,7 +58,7 @@ std::string header_clause(const Block& block) {
   return clause_of([&] { (void)decode_file_header(block); });
 }
 
-// The clause of a header block whose bytes changed and whose checksum is right again.
+// Returns the clause that a header block breaks when its bytes changed and its checksum is correct.
 template <class T>
 std::string resealed_header(std::size_t at, T value) {
   Block block = encode_file_header(example_file());
@@ -101,7 +101,7 @@ std::string changed_entry(const Change& change) {
 
 }  // namespace
 
-TEST_CASE("file header: it comes back", "[format][container]") {
+TEST_CASE("file header: decoding an encoded header gives it back", "[format][container]") {
   const FileHeader header = example_file();
   const FileHeader back = decode_file_header(encode_file_header(header));
   CHECK(back.major == 1);
@@ -153,7 +153,8 @@ TEST_CASE("file header: every truncation and every flipped bit is refused", "[fo
   CHECK(accepted == 0);
 }
 
-TEST_CASE("file header: a broken rule is named, checksum right or not", "[format][container]") {
+TEST_CASE("file header: a broken rule is named, whether the checksum is correct or not",
+          "[format][container]") {
   Block block = encode_file_header(example_file());
   block[8] ^= std::byte{1};
   CHECK(header_clause(block) == "spec/container.md#header-checksum");
@@ -204,7 +205,7 @@ TEST_CASE("file header: a frame is exact in doubles", "[format][container]") {
   CHECK(origin(-kInfinity, 1) == kFrame);
 }
 
-TEST_CASE("page header: it comes back", "[format][container]") {
+TEST_CASE("page header: decoding an encoded header gives it back", "[format][container]") {
   const PageHeader header = example_page();
   const PageHeader back = decode_page_header(encode_page(header), example_file());
   CHECK(back.type == header.type);
@@ -233,7 +234,8 @@ TEST_CASE("page header: every truncation and every flipped bit is refused", "[fo
   }
 }
 
-TEST_CASE("page header: the checksum holds for one file, number and type", "[format][container]") {
+TEST_CASE("page header: the checksum is valid for one file, page number and type only",
+          "[format][container]") {
   const PageBytes bytes = encode_page(example_page());
   FileHeader other = example_file();
   other.uuid[15] ^= std::byte{1};
@@ -316,7 +318,7 @@ TEST_CASE("page header: each type has its own fields", "[format][container]") {
   CHECK(of_type(PageType::attribute, [](PageHeader& h) { h.group = 256; }) == kFields);
 }
 
-TEST_CASE("directory: an entry comes back", "[format][directory]") {
+TEST_CASE("directory: decoding an encoded entry gives it back", "[format][directory]") {
   const DirectoryEntry entry = example_entry();
   CHECK(decode_directory_entry(encode_entry(entry), example_file(), 65536) == entry);
 }
@@ -329,7 +331,7 @@ TEST_CASE("directory: every proper prefix of an entry is truncated", "[format][d
   }
 }
 
-TEST_CASE("directory: a page outside the file is refused, however the numbers wrap",
+TEST_CASE("directory: a page outside the file is refused, whatever overflow its numbers cause",
           "[format][directory]") {
   constexpr char kExtent[] = "spec/container.md#directory-extent";
   const auto at = [](std::uint64_t offset) {
@@ -352,7 +354,7 @@ TEST_CASE("directory: a page outside the file is refused, however the numbers wr
   CHECK_NOTHROW((void)decode_directory_entry(bytes, example_file(), 17920));
 }
 
-TEST_CASE("directory: an entry keeps the rules of its page's header", "[format][directory]") {
+TEST_CASE("directory: an entry obeys the rules of its page's header", "[format][directory]") {
   const auto entry = [](auto change) { return changed_entry(change); };
   CHECK(entry([](DirectoryEntry& e) { e.type = PageType{0}; }) == "spec/container.md#page-type");
   CHECK(entry([](DirectoryEntry& e) { e.type = PageType{0xffff}; }) ==
@@ -383,7 +385,7 @@ TEST_CASE("directory: its size follows from the number of pages", "[format][dire
   CHECK(directory_bytes(file, 0xfffffffe) == 0xfffffffe / 2046 * 65536ull + 4096);
 }
 
-TEST_CASE("container: points a page are a multiple of 8 that fits", "[format][container]") {
+TEST_CASE("container: the points of a page are a multiple of 8 that fits", "[format][container]") {
   FileHeader file = example_file();
   for (std::uint8_t shift = 12; shift <= 20; ++shift) {
     file.page_shift = shift;

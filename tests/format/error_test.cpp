@@ -1,11 +1,11 @@
-// The words of a FormatError.
+// The text of a FormatError.
 #include "format/error.h"
 
 #include <catch2/catch.hpp>
 
 using namespace ptc;
 
-TEST_CASE("error: what() says where, what and which clause", "[format][error]") {
+TEST_CASE("error: what() names the place, the fault and the clause", "[format][error]") {
   const FormatError error(16, "spec/container.md#directory", "pages overlap");
   CHECK(std::string(error.what()) == "offset 16: pages overlap (spec/container.md#directory)");
   const FormatError moved = error.rebased(4096, "scene.ptcx");
@@ -16,7 +16,7 @@ TEST_CASE("error: what() says where, what and which clause", "[format][error]") 
   CHECK(moved.text() == "pages overlap");
 }
 
-TEST_CASE("error: what() names the page where one is known, in whatever order it is told",
+TEST_CASE("error: what() names the page when it is known, in whatever order it was set",
           "[format][error]") {
   const FormatError error(64, "spec/container.md#page-payload", "payload's checksum is wrong");
   CHECK_FALSE(error.page());

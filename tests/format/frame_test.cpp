@@ -1,4 +1,4 @@
-// The lattice laid over a scene: what it holds, and what it keeps exactly.
+// The lattice over a scene: which points it holds, and which values it keeps exactly.
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -19,7 +19,7 @@ bool power_of_two(double x) {
   return std::frexp(x, &exponent) == 0.5;
 }
 
-// Every rule of spec/morton.md#frame.
+// Checks every rule of spec/morton.md#frame.
 void check_frame(const Box& low, const Box& high) {
   const Frame frame = frame_around(low, high);
   INFO("edge " << frame.edge << " origin " << frame.origin[0] << " " << frame.origin[1]);
@@ -40,7 +40,7 @@ void check_frame(const Box& low, const Box& high) {
 
 }  // namespace
 
-TEST_CASE("frame: boxes of any size and place are held within half a unit", "[format][frame]") {
+TEST_CASE("frame: boxes of any size and place are kept to within half a unit", "[format][frame]") {
   Random random(1);
   for (int i = 0; i < 20000; ++i) {
     Box low;
@@ -55,7 +55,7 @@ TEST_CASE("frame: boxes of any size and place are held within half a unit", "[fo
   }
 }
 
-TEST_CASE("frame: every lattice point is a double and comes back", "[format][frame]") {
+TEST_CASE("frame: every lattice point maps to a double and back", "[format][frame]") {
   Random random(2);
   unsigned wrong = 0;
   for (int i = 0; i < 3000; ++i) {
@@ -81,7 +81,7 @@ TEST_CASE("frame: every lattice point is a double and comes back", "[format][fra
   CHECK(wrong == 0);
 }
 
-TEST_CASE("frame: floats above edge / 2^18 come back exactly", "[format][frame]") {
+TEST_CASE("frame: floats above edge / 2^18 are kept exactly", "[format][frame]") {
   Random random(3);
   const Frame frame = frame_around({-3, 0, -1}, {2.5, 1, 4});
   CHECK(frame.edge == 8);
@@ -105,7 +105,7 @@ TEST_CASE("frame: the edge is the smallest that fits", "[format][frame]") {
   CHECK(frame_around({0, 0, 0}, {0, 0, 0}).edge == 1);
 }
 
-TEST_CASE("frame: a lone point far out keeps much less than a millimetre", "[format][frame]") {
+TEST_CASE("frame: a lone point far out is kept to much less than a millimetre", "[format][frame]") {
   const Box p{1e7 + 0.1234567, -1e7 - 0.7654321, 12.5};
   const Frame frame = frame_around(p, p);
   const Box back = frame.to_position(frame.to_lattice(p));
@@ -139,7 +139,7 @@ TEST_CASE("frame: to_lattice keeps the order of coordinates", "[format][frame]")
   CHECK(wrong == 0);
 }
 
-TEST_CASE("frame: bounds that are no box are refused", "[format][frame]") {
+TEST_CASE("frame: bounds that are not a box are refused", "[format][frame]") {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   CHECK_THROWS_AS(frame_around({1, 0, 0}, {0, 0, 0}), std::invalid_argument);

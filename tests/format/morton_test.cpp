@@ -1,4 +1,4 @@
-// The Z-curve against interleaving bit by bit.
+// The Z-curve, compared with interleaving bit by bit.
 #include "format/morton.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ using ptc::test::Random;
 
 namespace {
 
-// Digit by digit, as the spec says it.
+// Encodes digit by digit, as the specification says it.
 MortonKey interleave(const LatticePoint& p) {
   MortonKey key;
   for (int level = 1; level <= kLatticeBits; ++level) {
@@ -34,7 +34,7 @@ LatticePoint random_point(Random& random) {
 
 }  // namespace
 
-TEST_CASE("morton: keys interleave z y x and come back", "[format][morton]") {
+TEST_CASE("morton: keys interleave z y x and decode to the same point", "[format][morton]") {
   Random random(1);
   unsigned wrong = 0;
   for (int i = 0; i < 100000; ++i) {
@@ -72,7 +72,8 @@ TEST_CASE("morton: blocks of keys are decoded the same by every instruction set"
   }
 }
 
-TEST_CASE("morton: levels, digits and cells agree with the digits one by one", "[format][morton]") {
+TEST_CASE("morton: levels, digits and cells agree with a digit-by-digit computation",
+          "[format][morton]") {
   Random random(2);
   unsigned wrong = 0;
   for (int i = 0; i < 20000; ++i) {

@@ -105,7 +105,7 @@ bool reference_in_bounds(const ChildRef& ref) {
 
 }  // namespace
 
-TEST_CASE("node page: structure and references come back", "[format][nodes]") {
+TEST_CASE("node page: structure and references survive encoding and decoding", "[format][nodes]") {
   Random random(1);
   std::vector<NodeGroup> groups;
   for (int level = 0; level <= kMaxLevel; ++level) {
@@ -125,7 +125,7 @@ TEST_CASE("node page: structure and references come back", "[format][nodes]") {
   }
 }
 
-TEST_CASE("node page: the stored sphere holds the given one", "[format][nodes]") {
+TEST_CASE("node page: the stored sphere contains the given one", "[format][nodes]") {
   Random random(2);
   unsigned wrong = 0;
   for (int i = 0; i < 20000; ++i) {
@@ -143,17 +143,17 @@ TEST_CASE("node page: the stored sphere holds the given one", "[format][nodes]")
     }
     const long double moved = std::sqrt(square);
     wrong += stored.radius < given.radius + moved;
-    // Not wider than needed: one step of ufloat16.
+    // The sphere is not wider than needed: one step of ufloat16.
     wrong += stored.radius > (given.radius + moved) * (1.0L + 0x1p-8L) * (1 + 1e-6L);
     if (i % 7 != 0) {
       wrong +=
-          moved > std::sqrt(3.0) / 2 * 1.001 * cell_edge(level) / 65536;  // half a step an axis
+          moved > std::sqrt(3.0) / 2 * 1.001 * cell_edge(level) / 65536;  // half a step per axis
     }
   }
   CHECK(wrong == 0);
 }
 
-TEST_CASE("node page: the stored slab holds the given one", "[format][nodes]") {
+TEST_CASE("node page: the stored slab contains the given one", "[format][nodes]") {
   using Vec = std::array<double, 3>;
   const auto normal = [](const NodeSummary& node) {
     Vec v{node.facing[0] - node.facing[1], node.facing[2] - node.facing[3],
@@ -172,7 +172,7 @@ TEST_CASE("node page: the stored slab holds the given one", "[format][nodes]") {
     given.thickness = given.radius * std::exp2(random.between(-20, 0));
     const NodeSummary stored =
         NodePage(page_of({group}), 1, kPages, kPoints).decode(0).children[0].node;
-    // The highest point over the plane, at the rim of the slab, turned any way.
+    // Find the highest point over the plane, at the rim of the slab, turned any way.
     const Vec n = normal(given), s = normal(stored);
     const std::array<float, 3> other = random_axis(random);
     double along = 0;
@@ -206,7 +206,7 @@ TEST_CASE("node page: an exact mean keeps its radius", "[format][nodes]") {
   CHECK(stored.radius == 3);
 }
 
-TEST_CASE("node page: the stored cone holds the given one", "[format][nodes]") {
+TEST_CASE("node page: the stored cone contains the given one", "[format][nodes]") {
   Random random(3);
   unsigned wrong = 0;
   unsigned useful = 0;
@@ -216,7 +216,7 @@ TEST_CASE("node page: the stored cone holds the given one", "[format][nodes]") {
     const NodeSummary stored =
         NodePage(page_of({group}), 1, kPages, kPoints).decode(0).children[0].node;
     const double half_angle = std::acos(double{given.cone_cos});
-    // A normal on the given cone's edge, turned any way about the axis.
+    // Take a normal on the edge of the given cone, turned any way about the axis.
     const std::array<float, 3> other = random_axis(random);
     std::array<double, 3> side;
     double along = 0;
@@ -263,7 +263,7 @@ TEST_CASE("node page: area, facing and flux keep their precision", "[format][nod
   CHECK(wrong == 0);
 }
 
-TEST_CASE("node page: a cluster without area has no light", "[format][nodes]") {
+TEST_CASE("node page: a cluster without area emits no light", "[format][nodes]") {
   NodeGroup group;
   group.children.resize(1);
   group.children[0].ref.point_count = 1;
@@ -304,7 +304,7 @@ TEST_CASE("node page: groups fill a page up to its limit", "[format][nodes]") {
   }
 }
 
-TEST_CASE("node page: slots reach the end of the greatest page", "[format][nodes]") {
+TEST_CASE("node page: slots reach the end of the largest page", "[format][nodes]") {
   Random random(6);
   const NodeGroup group = random_group(random, 8, 9);
   NodePageEncoder encoder((1u << 20) - 64);

@@ -1,5 +1,5 @@
-// Packed columns: every payload comes back, the bytes are those of the specification, nonsense is
-// refused.
+// Packed columns: every payload survives packing, the bytes are those of the specification, and
+// nonsense is refused.
 #include "format/packed_columns.h"
 
 #include <catch2/catch.hpp>
@@ -59,7 +59,8 @@ Bytes bytes_of(std::initializer_list<int> values) {
 
 }  // namespace
 
-TEST_CASE("packed columns: points of every kind come back", "[format][packed]") {
+TEST_CASE("packed columns: points of every kind survive packing and unpacking",
+          "[format][packed]") {
   for (const std::uint32_t count : {1u, 2u, 7u, 120u, 1920u}) {
     for (const unsigned zeros : {0u, 1u, 13u, 30u, 31u, 32u, 41u}) {
       for (const unsigned spread : {0u, 4u, 16u}) {
@@ -73,7 +74,8 @@ TEST_CASE("packed columns: points of every kind come back", "[format][packed]") 
   }
 }
 
-TEST_CASE("packed columns: channels of every type come back", "[format][packed]") {
+TEST_CASE("packed columns: channels of every type survive packing and unpacking",
+          "[format][packed]") {
   const std::vector<Channel> channels{{"a", ChannelType::u8, 3, 1},
                                       {"b", ChannelType::f32, 2, 1},
                                       {"c", ChannelType::u16, 1, 2},
@@ -92,7 +94,7 @@ TEST_CASE("packed columns: channels of every type come back", "[format][packed]"
   CHECK(packed_group_columns(channels, 4).empty());
 }
 
-TEST_CASE("packed columns: bytes are those of the specification", "[format][packed]") {
+TEST_CASE("packed columns: the bytes are those of the specification", "[format][packed]") {
   const std::vector<PackedColumn> u16{{.before = 0, .bits = 16}};
   // 8, 24, 16, 16: all end in three zero bits; differences 0, 2, -1, 0 of eight; zigzag 0, 4, 1, 0.
   CHECK(pack(bytes_of({8, 0, 24, 0, 16, 0, 16, 0}), 4, u16) ==
@@ -100,16 +102,16 @@ TEST_CASE("packed columns: bytes are those of the specification", "[format][pack
   // A column of one value takes no plane; zero has no bits to shift away.
   CHECK(pack(bytes_of({0, 1, 0, 1}), 2, u16) == bytes_of({8, 0, 0, 1, 0, 0, 0, 0, 0, 0}));
   CHECK(pack(bytes_of({0, 0, 0, 0}), 2, u16) == bytes_of({0, 0, 0, 0, 0, 0, 0, 0, 0, 0}));
-  // 1, 65535: the way round the end is the shorter one, -2, zigzag 3.
+  // 1, 65535: the difference that wraps around is the shorter one, -2, zigzag 3.
   CHECK(pack(bytes_of({1, 0, 255, 255}), 2, u16) == bytes_of({0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 3}));
-  // The second column is kept as what it is above the first: -1, -1.
+  // The second column is stored as its difference to the first: -1, -1.
   const std::vector<PackedColumn> pair{{.before = 0, .bits = 8},
                                        {.before = 1, .bits = 8, .minus = 0}};
   CHECK(pack(bytes_of({10, 20, 9, 19}), 2, pair) ==
         bytes_of({1, 1, 10, 0, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 255, 0, 0, 0, 0, 0, 0, 0}));
 }
 
-TEST_CASE("packed columns: what they are not is refused", "[format][packed]") {
+TEST_CASE("packed columns: bytes that are no packed columns are refused", "[format][packed]") {
   const std::uint32_t count = 50;
   const Bytes payload = point_payload(count, 3, 8, 1);
   const Bytes packed = pack(payload, count, packed_point_columns());
@@ -134,10 +136,11 @@ TEST_CASE("packed columns: what they are not is refused", "[format][packed]") {
   CHECK(changed(1, std::uint8_t{7}) == kPacked);   // planes of 42 bits
   CHECK(changed(2, std::uint64_t{1} << 42) == kPacked);
   CHECK(changed(2, get<std::uint64_t>(packed, 2) ^ 8) ==
-        "none");  // another place, as far as this tells
+        "none");  // another offset, which this function ignores
 }
 
-TEST_CASE("packed columns: payloads of another size are the caller's mistake", "[format][packed]") {
+TEST_CASE("packed columns: a payload of the wrong size is the caller's mistake",
+          "[format][packed]") {
   Bytes payload = point_payload(9, 0, 8, 1), packed = pack(payload, 9, packed_point_columns());
   for (const std::uint32_t count : {0u, 8u, 10u}) {
     CHECK_THROWS_AS(pack_columns(payload, count, packed_point_columns(), packed),
@@ -147,7 +150,7 @@ TEST_CASE("packed columns: payloads of another size are the caller's mistake", "
   }
 }
 
-TEST_CASE("codec: columns are packed where that is shorter, and come back",
+TEST_CASE("codec: columns are packed where that is shorter, and unpack to the same bytes",
           "[format][codec][packed]") {
   for (const Codec codec : {Codec::zstd, Codec::lz4}) {
     PageEncoder encoder(codec);
@@ -170,7 +173,7 @@ TEST_CASE("codec: columns are packed where that is shorter, and come back",
             .encode(point_payload(60, 20, 4, 1), stored, {60, packed_point_columns()}) == Coding{});
 }
 
-TEST_CASE("codec: LZ4 blocks of another size or shape are refused", "[format][codec]") {
+TEST_CASE("codec: LZ4 blocks of the wrong size or shape are refused", "[format][codec]") {
   constexpr char kBlock[] = "spec/container.md#codec-block";
   const Bytes raw(600, std::byte{7});
   Bytes stored;
@@ -190,7 +193,7 @@ TEST_CASE("codec: LZ4 blocks of another size or shape are refused", "[format][co
   Bytes longer = stored;
   longer.push_back(std::byte{0});
   CHECK(decode(longer, 600) == kBlock);
-  Bytes less = stored;  // declares what the page wants, holds less
+  Bytes less = stored;  // declares the size that the page needs, holds less
   put(less, 0, std::uint32_t{601});
   CHECK(decode(less, 601) == kBlock);
   unsigned wrong = 0;

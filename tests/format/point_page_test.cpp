@@ -1,4 +1,5 @@
-// Point pages: columns come back, and verify() sees what a plain loop over the points sees.
+// Point pages: columns survive encoding, and verify() finds what a plain loop over the points
+// finds.
 #include "format/point_page.h"
 
 #include <algorithm>
@@ -47,7 +48,7 @@ std::string verify_clause(const Bytes& payload, std::uint32_t count) {
   return clause_of([&] { PointPage(payload, count).verify(); });
 }
 
-// The rules one point at a time, on decoded values.
+// Checks the rules one point at a time, on decoded values.
 bool valid(const Bytes& payload, std::uint32_t count) {
   for (std::uint32_t i = 0; i < count; ++i) {
     if (test::get<std::uint32_t>(payload, 12 * count + 4 * i) >> 30 != 0) return false;
@@ -66,7 +67,8 @@ bool valid(const Bytes& payload, std::uint32_t count) {
 
 }  // namespace
 
-TEST_CASE("point page: points come back, whatever their spread", "[format][points]") {
+TEST_CASE("point page: points survive encoding and decoding, whatever their spread",
+          "[format][points]") {
   for (int bits = 0; bits <= kLatticeBits; ++bits) {
     const auto points = random_points(112, (1ull << bits) - 1, static_cast<std::uint64_t>(bits));
     const Bytes payload = encode_point_page(points);
@@ -127,7 +129,8 @@ TEST_CASE("point page: any other size is refused", "[format][points]") {
   CHECK_THROWS_AS(encode_point_page({}), std::invalid_argument);
 }
 
-TEST_CASE("point page: any value of any byte is judged as point by point", "[format][points]") {
+TEST_CASE("point page: any value of any byte is judged as by a loop over the points",
+          "[format][points]") {
   unsigned wrong = 0;
   unsigned refused = 0;
   for (const std::uint64_t spread : {std::uint64_t{3}, std::uint64_t{5000}, kLatticeMax}) {

@@ -1,4 +1,4 @@
-// Small number types against the rules that define them.
+// Small number types, compared with the rules that define them.
 #include "format/scalar.h"
 
 #include <cmath>
@@ -13,7 +13,7 @@ using ptc::test::Random;
 
 namespace {
 
-// The value of a binary16 pattern by its definition.
+// Returns the value of a binary16 pattern by its definition.
 double half_value(unsigned bits) {
   const int exponent = static_cast<int>(bits >> 10 & 31);
   const double fraction = bits & 1023;
@@ -55,7 +55,7 @@ TEST_CASE("half: every finite pattern decodes to its value and encodes back", "[
   CHECK(wrong == 0);
 }
 
-TEST_CASE("half: infinities and NaN decode as such, and encode saturates", "[format][scalar]") {
+TEST_CASE("half: infinities and NaN decode as such, and encoding saturates", "[format][scalar]") {
   unsigned wrong = 0;
   for (unsigned fraction = 1; fraction < 1024; ++fraction) {
     wrong += !std::isnan(decode_half(static_cast<std::uint16_t>(0x7c00 | fraction)));
@@ -90,7 +90,7 @@ TEST_CASE("half: between neighbours the nearest wins, ties go to even", "[format
   CHECK(wrong == 0);
 }
 
-TEST_CASE("ufloat16: rounded up it is an upper bound within 2^-8", "[format][scalar]") {
+TEST_CASE("ufloat16: a value rounded up is an upper bound within 2^-8", "[format][scalar]") {
   Random random(1);
   unsigned wrong = 0;
   const auto check = [&](float x) {
@@ -124,7 +124,7 @@ TEST_CASE("ufloat16: the nearest wins, ties go to even", "[format][scalar]") {
   CHECK(wrong == 0);
 }
 
-TEST_CASE("ufloat16: small numbers stay bounded, great ones stay finite", "[format][scalar]") {
+TEST_CASE("ufloat16: small numbers stay bounded, large ones stay finite", "[format][scalar]") {
   CHECK(encode_ufloat16_up(0) == 0);
   CHECK(encode_ufloat16(0) == 0);
   CHECK(encode_ufloat16_up(-1) == 0);
@@ -135,7 +135,7 @@ TEST_CASE("ufloat16: small numbers stay bounded, great ones stay finite", "[form
   CHECK(std::isfinite(decode_ufloat16(0xfeff)));
 }
 
-TEST_CASE("rgbe: the error is at most the greatest component / 256", "[format][scalar]") {
+TEST_CASE("rgbe: the error is at most the largest component / 256", "[format][scalar]") {
   Random random(2);
   unsigned wrong = 0;
   for (int i = 0; i < 300000; ++i) {
@@ -153,7 +153,7 @@ TEST_CASE("rgbe: the error is at most the greatest component / 256", "[format][s
   CHECK(wrong == 0);
 }
 
-TEST_CASE("rgbe: every exponent and mantissa decodes to a finite number and back",
+TEST_CASE("rgbe: every exponent and mantissa decodes to a finite number that encodes back",
           "[format][scalar]") {
   unsigned wrong = 0;
   for (unsigned exponent = 0; exponent < 256; ++exponent) {
@@ -194,7 +194,8 @@ TEST_CASE("octahedral: 8 bits keep a direction to 0.017 rad", "[format][scalar]"
   CHECK(worst <= 0.017);
 }
 
-TEST_CASE("octahedral: every pattern is a unit vector; axes are exact", "[format][scalar]") {
+TEST_CASE("octahedral: every pattern decodes to a unit vector, and axes are exact",
+          "[format][scalar]") {
   unsigned wrong = 0;
   for (unsigned bits = 0; bits < 0x10000; ++bits) {
     const auto n = decode_octahedral8(static_cast<std::uint16_t>(bits));

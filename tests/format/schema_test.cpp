@@ -1,4 +1,4 @@
-// The meta page: what is written comes back, and nothing else is let in.
+// The meta page: what is written is read back, and nothing else is accepted.
 #include "format/schema.h"
 
 #include <limits>
@@ -36,7 +36,7 @@ void check_refused(const Meta& meta) {
 
 }  // namespace
 
-TEST_CASE("meta: channels and text come back", "[format][meta]") {
+TEST_CASE("meta: channels and text survive encoding and decoding", "[format][meta]") {
   const Meta meta = example();
   const Meta back = decode_meta(encode_meta(meta));
   CHECK(back.channels == meta.channels);
@@ -59,7 +59,7 @@ TEST_CASE("meta: every proper prefix is truncated, every longer payload too long
   CHECK(clause(longer) == "spec/points.md#meta-size");
 }
 
-TEST_CASE("meta: any value of any byte is refused or comes back as it was", "[format][meta]") {
+TEST_CASE("meta: any value of any byte is refused or encodes to the same bytes", "[format][meta]") {
   const Bytes whole = encode_meta(example());
   unsigned wrong = 0;
   for (std::size_t at = 0; at < whole.size(); ++at) {
@@ -92,7 +92,7 @@ TEST_CASE("meta: counts beyond the payload are refused before anything is alloca
   }
 }
 
-TEST_CASE("meta: as many channels as groups hold come back, one more is of no group",
+TEST_CASE("meta: as many channels as groups hold are decoded, and one more is refused",
           "[format][meta]") {
   Meta meta;
   for (unsigned i = 0; i < 255 * 34; ++i) {
@@ -143,7 +143,7 @@ TEST_CASE("meta: channels that break a rule are refused on both sides", "[format
   CHECK(clause(payload) == "spec/points.md#meta-text");
 }
 
-TEST_CASE("meta: a group's bytes a point are those of its channels", "[format][meta]") {
+TEST_CASE("meta: the bytes of a group per point are those of its channels", "[format][meta]") {
   const Meta meta = example();
   CHECK(group_point_bytes(meta.channels, 1) == 7);
   CHECK(group_point_bytes(meta.channels, 7) == 8);
@@ -151,7 +151,7 @@ TEST_CASE("meta: a group's bytes a point are those of its channels", "[format][m
   CHECK(channel_bytes(ChannelType::u16) == 2);
 }
 
-TEST_CASE("text: UTF-8 is well-formed as RFC 3629 has it", "[format][meta]") {
+TEST_CASE("text: UTF-8 is well-formed as RFC 3629 defines it", "[format][meta]") {
   CHECK(is_utf8(""));
   CHECK(is_utf8("\x7f \xc2\x80 \xdf\xbf \xe0\xa0\x80 \xed\x9f\xbf \xee\x80\x80 \xef\xbf\xbf"));
   CHECK(is_utf8("\xf0\x90\x80\x80 \xf4\x8f\xbf\xbf"));

@@ -1,4 +1,4 @@
-// The commit record: what it repeats, counts and bounds.
+// The superblock: what it repeats, counts and bounds.
 #include <limits>
 #include <stdexcept>
 
@@ -50,7 +50,7 @@ std::string clause(const Block& block, const Superblock& s) {
   return clause_of([&] { (void)decode_superblock(block, s.header, s.file_bytes); });
 }
 
-// The clause of a superblock that breaks a rule under a right checksum.
+// Returns the clause that a superblock breaks under a correct checksum.
 template <class Change>
 std::string changed(const Change& change) {
   Superblock s = example();
@@ -69,7 +69,7 @@ std::string resealed(std::size_t at, T value) {
 
 }  // namespace
 
-TEST_CASE("superblock: it comes back", "[format][superblock]") {
+TEST_CASE("superblock: decoding an encoded superblock gives it back", "[format][superblock]") {
   const Superblock s = example();
   const Superblock back = decode_superblock(encode_superblock(s), s.header, s.file_bytes);
   CHECK(encode_superblock(back) == encode_superblock(s));
@@ -102,11 +102,12 @@ TEST_CASE("superblock: every truncation and every flipped bit is refused", "[for
   CHECK(accepted == 0);
 }
 
-TEST_CASE("superblock: a file without one is unfinished", "[format][superblock]") {
+TEST_CASE("superblock: a file without a superblock is unfinished", "[format][superblock]") {
   CHECK(clause(Block{}, example()) == "spec/container.md#superblock-magic");
 }
 
-TEST_CASE("superblock: it belongs to one header and one length", "[format][superblock]") {
+TEST_CASE("superblock: it is valid for one file header and one file length only",
+          "[format][superblock]") {
   const Superblock s = example();
   const Block block = encode_superblock(s);
   const auto under = [&](auto change) {

@@ -1,5 +1,5 @@
-// What the tests of format/ share: random numbers that are the same everywhere, and which clause an
-// error names.
+// Shared by the tests of format/: random numbers that are the same on every machine, and the clause
+// that an error names.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ class Random {
     return value;
   }
   std::uint64_t below(std::uint64_t limit) { return bits() % limit; }
-  /// In [0, 1).
+  /// Returns a number in [0, 1).
   double unit() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
   double between(double low, double high) { return low + (high - low) * unit(); }
 
@@ -32,7 +32,7 @@ class Random {
   std::uint64_t state_;
 };
 
-/// The clause of the FormatError that `action` throws; "none" when it throws nothing.
+/// Returns the clause of the FormatError that `action` throws; "none" when it throws nothing.
 template <class Action>
 std::string clause_of(const Action& action) {
   try {

@@ -1,5 +1,5 @@
-// The vectors of the spec through the decoders of format/: good ones decode, and of bad ones each
-// rule that a decoder can see alone is named. The file names say which rule.
+// The vectors of the specification, decoded by format/: good ones decode, and bad ones are refused
+// by each rule that a decoder can check alone. The file names say which rule.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -48,7 +48,7 @@ std::string rule_of(const Path& path) {
   return "spec/" + name.substr(0, dash) + ".md#" + name.substr(dash + 1);
 }
 
-// What decoders see without comparing structures with one another.
+// Decodes everything, without comparing structures with one another.
 struct Walk {
   std::uint64_t points = 0;
   std::uint64_t groups = 0;
@@ -59,7 +59,7 @@ struct Walk {
 void walk_page(std::span<const std::byte> page, const FileHeader& file, Walk& walk) {
   const PageHeader header = decode_page_header(page.first(kPageHeaderBytes), file);
   const auto stored = page.subspan(kPageHeaderBytes, header.stored_bytes);
-  if (xxh3_64(stored) != header.payload_xxh3) return;  // a reader's business
+  if (xxh3_64(stored) != header.payload_xxh3) return;  // a matter for readers
   Bytes payload(header.raw_bytes);
   const bool filtered = header.coding.filter != Filter::none;
   if (filtered && header.type == PageType::attribute) return;  // its columns are in the meta page
@@ -112,7 +112,7 @@ Walk walk(const Bytes& file) {
   return walk;
 }
 
-// Rules about two structures at once: engine/store holds files to them.
+// Rules about two structures at once, which engine/store checks.
 bool needs_a_reader(const std::string& rule) {
   static const std::set<std::string> kRules{
       "spec/container.md#page-agreement",    "spec/container.md#page-payload",
@@ -125,7 +125,8 @@ bool needs_a_reader(const std::string& rule) {
 
 }  // namespace
 
-TEST_CASE("vectors: good ones decode, and hold what their superblock counts", "[format][vectors]") {
+TEST_CASE("vectors: good ones decode, and contain what their superblock counts",
+          "[format][vectors]") {
   const auto paths = vectors("good");
   CHECK(paths.size() >= 10);
   for (const Path& path : paths) {
@@ -143,7 +144,8 @@ TEST_CASE("vectors: bad ones are refused by the rule that names them", "[format]
   for (const Path& path : vectors("bad")) {
     const std::string rule = rule_of(path);
     INFO(path.filename());
-    // Of the root and the counts a decoder sees ranges only, and it looks for no superblock.
+    // A decoder checks only the ranges of the root and the counts, and does not look for
+    // superblocks.
     const std::string variant = path.stem().extension().string();
     const bool beyond = (rule == "spec/container.md#superblock-length" &&
                          (variant == ".three-bytes" || variant == ".half")) ||
@@ -158,7 +160,7 @@ TEST_CASE("vectors: bad ones are refused by the rule that names them", "[format]
   CHECK(checked >= 80);
 }
 
-TEST_CASE("vectors: those for verifiers decode", "[format][vectors]") {
+TEST_CASE("vectors: vectors for verifiers decode", "[format][vectors]") {
   const auto paths = vectors("verify");
   CHECK(paths.size() >= 20);
   for (const Path& path : paths) {
@@ -168,7 +170,7 @@ TEST_CASE("vectors: those for verifiers decode", "[format][vectors]") {
   }
 }
 
-TEST_CASE("vectors: a good file comes back from the values that it decodes to",
+TEST_CASE("vectors: the decoded values of a good file encode to the same bytes",
           "[format][vectors]") {
   for (const Path& path : vectors("good")) {
     INFO(path.filename());

@@ -1,4 +1,4 @@
-"""The second reader against the vectors and against damage.
+"""The second reader on the vectors and on damaged files.
 
 vectors_test.py SOURCE_DIR TEMP_DIR: good files are valid and hold what good.txt says, every other one
 is refused by the rule in its name, the vectors are what spec/vectors.py writes, and no flipped bit of two small files goes
@@ -37,7 +37,7 @@ def files(folder):
 
 
 def found_in(folder, name):
-    """The line of good.txt, from what the reader finds."""
+    """Returns the line of good.txt for what the reader finds."""
     path = os.path.join(folder, name)
     facts = verifier.verify(path)
     container = reader.open_container(path)
@@ -49,7 +49,7 @@ def found_in(folder, name):
 
 
 def check_content():
-    """Of today's vectors, and of those of each version that was released."""
+    """Compares what the reader finds with good.txt, for the current vectors and those of each released version."""
     root = os.path.join(SPEC, "vectors")
     frozen = os.path.join(root, "frozen")
     for folder in [root, *(e.path for e in os.scandir(frozen))] if os.path.exists(frozen) else [root]:
@@ -75,7 +75,7 @@ def check_verdicts():
 
 
 def check_written_again():
-    """Compressed pages depend on the version of zstd: there only the content is compared."""
+    """Writes the vectors again. Compressed pages depend on the version of zstd, so zstd.ptcx is not compared here."""
     shutil.rmtree(TEMP, ignore_errors=True)
     vectors.write_all(TEMP)
     for kind in ("good", "bad", "verify"):
@@ -90,7 +90,7 @@ def check_written_again():
 
 
 def check_flipped_bits(name):
-    """One bit of every byte that is not padding, and one byte in each 64 of padding."""
+    """Flips one bit of every byte that is not zero, and of one byte in each 64 that are."""
     with open(os.path.join(SPEC, "vectors", "good", name), "rb") as file:
         whole = file.read()
     path = os.path.join(TEMP, "flipped.ptcx")
@@ -114,7 +114,7 @@ def check_flipped_bits(name):
 
 
 def check_without_zstd():
-    """Checksums only, and the verdict says so."""
+    """Without zstd only the checksums of compressed pages are verified, and the verdict says so."""
     which, reader.shutil.which = reader.shutil.which, lambda name: None
     try:
         facts = verifier.verify(os.path.join(SPEC, "vectors", "good", "zstd.ptcx"))

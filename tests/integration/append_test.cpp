@@ -1,4 +1,4 @@
-// Points added to a container.
+// Appending points to a container.
 #include "engine/pipeline/build/append.h"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// Numbers that a float and the lattice hold exactly.
+/// Writes surfels as XYZ, with positions that a float holds exactly.
 void write_cloud(const std::filesystem::path& path, const std::vector<Surfel>& surfels,
                  const glm::dvec3& moved = glm::dvec3(0)) {
   std::ofstream out(path);
@@ -49,14 +49,14 @@ std::vector<Surfel> points_of(const std::filesystem::path& path) {
   return surfels;
 }
 
-/// Order in space, so that two ways to the same points can be compared one by one.
+/// Sorts surfels by radius and normal, so that equal sets can be compared one by one.
 void arrange(std::vector<Surfel>& surfels) {
   std::ranges::sort(surfels, {}, [](const Surfel& s) {
     return std::array{s.radius, s.normal.x, s.normal.y, s.normal.z};
   });
 }
 
-/// The same points but for so much of a radius.
+/// Checks that two sets have the same points, with positions within `tolerance` radii.
 void check_same(std::vector<Surfel> a, std::vector<Surfel> b, double tolerance) {
   REQUIRE(a.size() == b.size());
   arrange(a);
@@ -90,7 +90,7 @@ struct Place {
 
 }  // namespace
 
-TEST_CASE("append: a scene and more have the points of both built at once",
+TEST_CASE("append: a scene with appended points has the points of one build of both",
           "[integration][append]") {
   for (const Profile profile : {Profile::exact, Profile::compact}) {
     for (const glm::dvec3& moved : {glm::dvec3(0), glm::dvec3(0.25, 5, -40)}) {
@@ -112,8 +112,9 @@ TEST_CASE("append: a scene and more have the points of both built at once",
   }
 }
 
-TEST_CASE("append: with all in the cube old points keep their bytes, and nothing new changes none",
-          "[integration][append]") {
+TEST_CASE(
+    "append: old points keep their bytes when the cube stays, and nothing new changes no byte",
+    "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
   std::ofstream none(place.dir / "none.ply");
@@ -125,7 +126,7 @@ TEST_CASE("append: with all in the cube old points keep their bytes, and nothing
   place.build("a.ptcx", {place.dir / "a.xyz"}, Profile::compact);
   place.build("same.ptcx", {place.dir / "none.ply"}, Profile::compact, "a.ptcx");
   CHECK(ContainerReader(place.dir / "same.ptcx").superblock().points == 9000);
-  // All pages but the meta page.
+  // Compare all pages but the meta page.
   const ContainerReader a(place.dir / "a.ptcx"), same(place.dir / "same.ptcx");
   REQUIRE(a.page_count() == same.page_count());
   for (std::uint32_t page = 0; page < a.page_count(); ++page) {
@@ -134,7 +135,7 @@ TEST_CASE("append: with all in the cube old points keep their bytes, and nothing
   }
 }
 
-TEST_CASE("append: twice, in place, under other caps and interrupted gives the same points",
+TEST_CASE("append: twice, in place, under other caps or interrupted, the points are the same",
           "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
@@ -159,7 +160,7 @@ TEST_CASE("append: twice, in place, under other caps and interrupted gives the s
   CHECK_THROWS_AS(build_container(request, place.dir / "two.ptcx", place.silent), RequestError);
 }
 
-TEST_CASE("append: what is damaged, shaded or too far away is refused, and the old file stays",
+TEST_CASE("append: a damaged, shaded or distant input is refused, and the old file stays",
           "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
@@ -185,7 +186,7 @@ TEST_CASE("append: what is damaged, shaded or too far away is refused, and the o
                   place.silent);
   request.append = place.dir / "lit.ptcx";
   CHECK_THROWS_WITH(build_container(request, place.dir / "b.ptcx", place.silent),
-                    Catch::Contains("lit.ptcx: new points would have no occlusion"));
+                    Catch::Contains("lit.ptcx: the appended points would have no occlusion"));
   CHECK(std::distance(std::filesystem::directory_iterator(place.dir.path()), {}) == 4);
 }
 
@@ -223,7 +224,8 @@ TEST_CASE("append: a scene whose points descend from page to page is refused",
   }
 }
 
-TEST_CASE("append: what is not asked for is kept", "[integration][append]") {
+TEST_CASE("append: profile, page size and leaves are taken from the scene",
+          "[integration][append]") {
   Place place;
   write_cloud(place.dir / "a.xyz", place.first);
   for (const Profile profile : {Profile::raw, Profile::exact, Profile::fast, Profile::compact}) {
@@ -241,7 +243,7 @@ TEST_CASE("append: what is not asked for is kept", "[integration][append]") {
   }
 }
 
-TEST_CASE("append: a cube grows by doublings that keep positions and the order of keys",
+TEST_CASE("append: the cube grows by doublings that keep positions and the order of keys",
           "[build][append]") {
   const std::array<double, 3> low{0.3, -7, 1000}, high{5, -6.5, 1001};
   const Frame old = frame_around(low, high);

@@ -1,4 +1,4 @@
-// Light of several bounces, against a furnace and path tracing.
+// Light of several bounces, compared with a furnace and with path tracing.
 #include "engine/pipeline/light/bounces.h"
 
 #include <cmath>
@@ -30,7 +30,7 @@ std::size_t entries_in(const TemporaryDirectory& dir) {
   return static_cast<std::size_t>(std::distance(begin(entries), end(entries)));
 }
 
-/// The inside of a closed box or sphere of one albedo, every point of which has radiance 1.
+/// The inside of a closed box or sphere with one albedo, in which every point has radiance 1.
 std::vector<Surfel> furnace(bool round, float albedo) {
   std::vector<Surfel> surfels;
   if (round) {
@@ -91,8 +91,8 @@ void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm
   mesh.material_of.insert(mesh.material_of.end(), {material, material});
 }
 
-/// Two rooms of 2 x 2 x 2 with a doorway between them, red, green and white. The first has a
-/// ceiling that shines; most of the light in the second has met several surfaces.
+/// Two rooms of 2 x 2 x 2 with a doorway between them, red, green and white. The ceiling of the
+/// first emits light; most of the light in the second has met several surfaces.
 Mesh two_rooms() {
   Mesh mesh;
   mesh.materials = {{.name = "white", .albedo = glm::vec3(0.8F)},
@@ -124,10 +124,10 @@ BuildRequest rooms_request() {
 }
 
 struct Means {
-  double ours = 0, traced = 0, rms = 0;  ///< irradiance over RGB; error over the mean of rays
+  double ours = 0, traced = 0, rms = 0;  ///< irradiance over RGB; error over the mean by rays
 };
 
-/// Points of one of the rooms against paths on the mesh.
+/// Compares points of one of the rooms with paths on the mesh.
 Means compare_with_paths(const ContainerReader& lit, const DirectLight& light, const RayScene& rays,
                          unsigned bounces, bool second_room) {
   std::vector<Receiver> receivers;
@@ -174,7 +174,8 @@ TEST_CASE("bounces: a furnace glows by the geometric series of its albedo",
   }
 }
 
-TEST_CASE("bounces: two rooms are lit as paths on the mesh light them", "[integration][bounces]") {
+TEST_CASE("bounces: the light in two rooms agrees with path tracing on the mesh",
+          "[integration][bounces]") {
   const TemporaryDirectory dir;
   const BuildRequest request = rooms_request();
   Progress silent;
@@ -199,7 +200,7 @@ TEST_CASE("bounces: two rooms are lit as paths on the mesh light them", "[integr
   }
 }
 
-TEST_CASE("bounces: sky is in the light of the points once", "[integration][bounces]") {
+TEST_CASE("bounces: the light of the points includes the sky once", "[integration][bounces]") {
   const TemporaryDirectory dir;
   Mesh mesh;
   mesh.materials = {{.name = "white", .albedo = glm::vec3(0.8F)}};
@@ -223,7 +224,7 @@ TEST_CASE("bounces: sky is in the light of the points once", "[integration][boun
   }
 }
 
-TEST_CASE("bounces: no bounce brings more light than the one before, white walls or not",
+TEST_CASE("bounces: no bounce adds more light than the one before, even between white walls",
           "[integration][bounces]") {
   for (const float albedo : {1.0F, 0.5F, 0.0F}) {
     const TemporaryDirectory dir;
@@ -235,7 +236,7 @@ TEST_CASE("bounces: no bounce brings more light than the one before, white walls
       const double flux = lit.bounced->superblock().flux[0];
       INFO("albedo " << albedo << ", bounce " << n << ": " << (flux - before) / added);
       CHECK(flux - before >= 0);
-      // Radiance is rounded to half: up to 0.4 % of what a bounce adds here.
+      // Radiance is rounded to half, which is up to 0.4 % of what a bounce adds here.
       CHECK(flux - before <= added * 1.01 * static_cast<double>(albedo));
       added = flux - before;
       before = flux;
@@ -270,7 +271,7 @@ TEST_CASE("bounces: points, tree and albedo stay, and one bounce is the scene it
   CHECK(lit.report.bounce_cpu_seconds > 0);
 }
 
-TEST_CASE("bounces: threads and cap change no byte, and nothing is left behind",
+TEST_CASE("bounces: threads and cap change no byte, and no temporary file is left",
           "[integration][bounces]") {
   const TemporaryDirectory dir;
   write_scene(dir / "box.ptcx", furnace(false, 0.7F));
@@ -292,7 +293,8 @@ TEST_CASE("bounces: threads and cap change no byte, and nothing is left behind",
         std::string::npos);
 }
 
-TEST_CASE("bounces: another cloud's points and a picture see them", "[integration][bounces]") {
+TEST_CASE("bounces: the points of another cloud and pictures receive their light",
+          "[integration][bounces]") {
   const TemporaryDirectory dir;
   write_scene(dir / "box.ptcx", furnace(false, 0.5F));
   std::ofstream(dir / "probe.xyz") << "0 0 0 0 1 0\n0.1 0 0 0 1 0\n";
@@ -315,7 +317,8 @@ TEST_CASE("bounces: another cloud's points and a picture see them", "[integratio
   CHECK(entries_in(dir) == 4);
 }
 
-TEST_CASE("bounces: an emitter lights a picture once", "[integration][bounces][render]") {
+TEST_CASE("bounces: the light of an emitter counts once in a picture",
+          "[integration][bounces][render]") {
   const TemporaryDirectory dir;
   Mesh mesh;
   mesh.materials = {{.name = "furnace", .albedo = glm::vec3(0.5F), .emission = glm::vec3(1)}};
@@ -351,7 +354,7 @@ TEST_CASE("bounces: an emitter lights a picture once", "[integration][bounces][r
   }
 }
 
-TEST_CASE("bounces: a run that fails leaves nothing", "[integration][bounces]") {
+TEST_CASE("bounces: a run that fails leaves no file", "[integration][bounces]") {
   const TemporaryDirectory dir;
   Progress silent;
   write_scene(dir / "box.ptcx", furnace(false, 0.5F));
@@ -364,8 +367,7 @@ TEST_CASE("bounces: a run that fails leaves nothing", "[integration][bounces]") 
   CHECK(entries_in(dir) == 1);
 }
 
-TEST_CASE("bounces: emitters that lit the surfels are refused, those that did not are not",
-          "[integration][bounces]") {
+TEST_CASE("bounces: only emitters that lit the surfels are refused", "[integration][bounces]") {
   const TemporaryDirectory dir;
   Progress silent;
   BuildRequest request = rooms_request();

@@ -1,4 +1,4 @@
-// What receivers are off, as estimated, against what they are.
+// Estimated errors of receivers, compared with their errors against rays.
 #include "engine/pipeline/quality/estimate.h"
 
 #include <algorithm>
@@ -49,7 +49,7 @@ void check_worth(const EstimateWorth& worth) {
 
 }  // namespace
 
-TEST_CASE("estimate: a line is fitted with the mean of the errors and nothing negative",
+TEST_CASE("estimate: a fitted line has the mean of the errors and no negative coefficient",
           "[integration][estimate]") {
   const ErrorLine exact = fit_errors(std::vector<ErrorSample>{{0, 1}, {1, 3}, {2, 5}, {4, 9}});
   CHECK(exact.constant == Approx(1));
@@ -69,10 +69,8 @@ TEST_CASE("estimate: a line is fitted with the mean of the errors and nothing ne
   }
 }
 
-TEST_CASE(
-    "estimate: errors at receivers that had no part in it are as large as said, and larger where "
-    "said",
-    "[integration][estimate]") {
+TEST_CASE("estimate: errors at other receivers are as large as estimated and ordered as estimated",
+          "[integration][estimate]") {
   const Scene scene(small_scene(0.02));
   for (const bool tuned : {true, false}) {
     ShadeRequest request = request_of(scene, true);
@@ -90,7 +88,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("estimate: channels are there when asked for and change no other",
+TEST_CASE("estimate: its channels exist when requested and change no other channel",
           "[integration][estimate]") {
   const Scene scene(small_scene(0.04));
   const LightingReport without = shade(scene, request_of(scene, false), "without.ptcx");
@@ -120,14 +118,14 @@ TEST_CASE("estimate: channels are there when asked for and change no other",
     CHECK(names(scene.dir / "a.exr", "irradiance_error.V") == estimate);
   }
 
-  // Shading once more without estimates leaves out those of before.
+  // Shading again without estimates removes the earlier ones.
   ShadeRequest again = request_of(scene, false);
   again.scene = scene.dir / "with.ptcx";
   shade(scene, again, "again.ptcx");
   CHECK(channels_of(scene.dir / "again.ptcx") == channels_of(scene.dir / "without.ptcx"));
 }
 
-TEST_CASE("estimate: neither threads nor the cap change a byte", "[integration][estimate]") {
+TEST_CASE("estimate: neither threads nor the cap change any byte", "[integration][estimate]") {
   const Scene scene(small_scene(0.03));
   ShadeRequest request = request_of(scene, true);
   RenderRequest picture{{.scene = request.scene, .error = 0.05, .estimate = true}};
@@ -146,7 +144,7 @@ TEST_CASE("estimate: neither threads nor the cap change a byte", "[integration][
   CHECK(bytes_of(scene.dir / "one.exr") == bytes_of(scene.dir / "two.exr"));
 }
 
-TEST_CASE("estimate: runs that compare nothing with rays are refused, empty ones are not",
+TEST_CASE("estimate: a run without rays is refused, a run without receivers is not",
           "[integration][estimate]") {
   const Scene scene(small_scene(0.1));
   ShadeRequest request = request_of(scene, true);

@@ -1,4 +1,4 @@
-// What a memory cap must hold.
+// The parts of a run that a memory cap must hold.
 #include <array>
 #include <functional>
 #include <system_error>
@@ -17,7 +17,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// Least number of bytes under which a run is not refused.
+/// Returns the minimum number of bytes with which a run is not refused.
 std::uint64_t min_cap(const std::function<void(std::uint64_t)>& run) {
   const auto refused = [&](std::uint64_t bytes) {
     try {
@@ -35,7 +35,7 @@ std::uint64_t min_cap(const std::function<void(std::uint64_t)>& run) {
   return enough;
 }
 
-/// Ends a build when it has begun.
+/// Ends a build when its partition begins.
 class EndAtPartition final : public Progress {
  public:
   struct Begun {};
@@ -48,8 +48,8 @@ class EndAtPartition final : public Progress {
 }  // namespace
 
 TEST_CASE(
-    "memory: a cap for a build holds an encoder for each thread, and the directory when the sort "
-    "is done",
+    "memory: the cap of a build covers an encoder for each thread, and the directory after the "
+    "sort",
     "[integration][memory]") {
   const TemporaryDirectory dir;
   const auto building = [&](std::uint64_t points, std::uint8_t page_shift, unsigned threads) {
@@ -63,7 +63,7 @@ TEST_CASE(
         build_container(request, dir / "o.ptcx", until_begun);
       } catch (const EndAtPartition::Begun&) {
       } catch (const std::system_error&
-                   error) {  // the points' way through the sort is longer than this disk
+                   error) {  // the points need more temporary space than this disk has
         CHECK(error.code() == std::errc::no_space_on_device);
       }
     });
@@ -71,7 +71,7 @@ TEST_CASE(
   const std::uint64_t least = building(100, 12, 1);
   CHECK(building(100, 16, 9) - least == 9 * ((768 << 10) + (2 << 16)) - ((768 << 10) + (2 << 12)));
   CHECK(building(100'000, 12, 1) == least);
-  // Whose directories are longer than the least that the sort holds before.
+  // Their directories take more than the minimum that the sort is given before.
   const std::uint64_t per_page = points_per_page({.page_shift = 12}), some = 60'000'000,
                       more = 120'000'000;
   const auto directory = [&](std::uint64_t points) { return 80 * (points / per_page * 3 / 2); };
@@ -79,7 +79,7 @@ TEST_CASE(
   CHECK(building(some, 12, 1) - least == directory(some) - kMinSortBytes);
 }
 
-TEST_CASE("memory: a cap for shading holds the directory of each container that is open",
+TEST_CASE("memory: the cap for shading covers the directory of every open container",
           "[integration][memory]") {
   const TemporaryDirectory dir;
   write_scene(dir / "few.ptcx", random_surfels(100, 1));
@@ -109,9 +109,9 @@ TEST_CASE("memory: a cap for shading holds the directory of each container that 
     });
   };
   CHECK(lit("many.ptcx", 1, 1) - lit("few.ptcx", 1, 1) ==
-        (36 + 2 * 80) * (many - few));  // with that of what is written
+        (36 + 2 * 80) * (many - few));  // with the directory of the output
   CHECK(lit("few.ptcx", 2, 1) - lit("few.ptcx", 1, 1) >
-        (512 << 10) + (36 + 80) * few);  // and an encoder
+        (512 << 10) + (36 + 80) * few);  // with an encoder, too
   const auto picture = [&](const char* scene) {
     return min_cap([&](std::uint64_t bytes) {
       RenderRequest request{{.scene = dir / scene, .run = {.memory_bytes = bytes, .threads = 1}}};

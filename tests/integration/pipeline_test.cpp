@@ -1,4 +1,4 @@
-// The road end to end: mesh or cloud to container to shaded points and pictures.
+// The whole pipeline: mesh or cloud to container to shaded points and pictures.
 #include <fstream>
 #include <limits>
 
@@ -19,7 +19,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// Checksums of all pages but the one with the record, which names the inputs.
+/// Returns the checksums of all pages except the one with the record, which names the inputs.
 std::vector<std::uint64_t> pages_of(const std::filesystem::path& path) {
   const ContainerReader container(path);
   std::vector<std::uint64_t> pages;
@@ -30,7 +30,7 @@ std::vector<std::uint64_t> pages_of(const std::filesystem::path& path) {
   return pages;
 }
 
-/// A unit cube as OBJ, faces outwards.
+/// A unit cube as OBJ, whose faces front the outside.
 void write_cube(const std::filesystem::path& path) {
   std::ofstream(path) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
                          "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
@@ -50,7 +50,8 @@ BuildRequest cube_request(const std::filesystem::path& mesh) {
 
 }  // namespace
 
-TEST_CASE("pipeline: threads and cap change no byte of a container", "[integration][build]") {
+TEST_CASE("pipeline: neither threads nor the cap change any byte of a container",
+          "[integration][build]") {
   const TemporaryDirectory dir;
   write_cube(dir / "cube.obj");
   Progress silent;
@@ -65,7 +66,8 @@ TEST_CASE("pipeline: threads and cap change no byte of a container", "[integrati
   CHECK(bytes_of(dir / "one.ptcx") != bytes_of(dir / "other.ptcx"));
 }
 
-TEST_CASE("pipeline: only meshes without any light get a sun and a sky", "[integration][build]") {
+TEST_CASE("pipeline: only meshes without any light get the default sun and sky",
+          "[integration][build]") {
   const TemporaryDirectory dir;
   const auto lights_of = [&](const std::filesystem::path& input,
                              const std::optional<LightRig>& lights) {
@@ -86,7 +88,8 @@ TEST_CASE("pipeline: only meshes without any light get a sun and a sky", "[integ
   CHECK(lights_of(dir / "cloud.xyz", {}) == to_json(LightRig{}));
 }
 
-TEST_CASE("pipeline: a mesh in memory is built as its file is", "[integration][build]") {
+TEST_CASE("pipeline: a mesh in memory gives the same container as its file",
+          "[integration][build]") {
   const TemporaryDirectory dir;
   write_cube(dir / "cube.obj");
   std::ofstream(dir / "tile.obj") << "v 2 0 0\nv 2 0 1\nv 3 0 0\nf 1 2 3\n";
@@ -118,7 +121,7 @@ TEST_CASE("pipeline: a mesh in memory is built as its file is", "[integration][b
   CHECK_FALSE(std::filesystem::exists(dir / "broken.ptcx"));
 }
 
-TEST_CASE("pipeline: an output that its disk has no room for is refused before work begins",
+TEST_CASE("pipeline: an output that does not fit on its disk is refused before work begins",
           "[integration][build]") {
   const TemporaryDirectory dir;
   const std::vector<std::filesystem::path> temps{dir.path(), dir.path()};
@@ -134,7 +137,8 @@ TEST_CASE("pipeline: an output that its disk has no room for is refused before w
         0);  // not known
 }
 
-TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integration][build]") {
+TEST_CASE("pipeline: a build through temporary files gives the bytes of a build in memory",
+          "[integration][build]") {
   const TemporaryDirectory dir;
   Progress silent;
   BuildRequest request;
@@ -150,7 +154,7 @@ TEST_CASE("pipeline: a spilled build gives the bytes of one in memory", "[integr
   CHECK(verify_container(dir / "tight.ptcx", {}, silent).sound());
 }
 
-TEST_CASE("pipeline: shading adds channels, keeps the points and verifies",
+TEST_CASE("pipeline: shading adds channels, keeps the points and gives a valid container",
           "[integration][shade]") {
   const TemporaryDirectory dir;
   write_cube(dir / "cube.obj");
@@ -167,7 +171,7 @@ TEST_CASE("pipeline: shading adds channels, keeps the points and verifies",
   REQUIRE(shaded.meta().channels.size() == 5);
   CHECK(shaded.meta().channels[0].name == "occlusion");
 
-  // Shading a shaded container replaces the channels: the same bytes again.
+  // Shading a shaded container replaces the channels, which gives the same bytes again.
   request.scene = dir / "shaded.ptcx";
   shade_container(request, dir / "again.ptcx", silent);
   CHECK(ContainerReader(dir / "again.ptcx").superblock().content_xxh3 ==
@@ -184,7 +188,7 @@ TEST_CASE("pipeline: shading adds channels, keeps the points and verifies",
   CHECK_FALSE(std::filesystem::exists(dir / "some.ptcx"));
 }
 
-TEST_CASE("pipeline: another cloud's points can be shaded by a scene", "[integration][shade]") {
+TEST_CASE("pipeline: a scene can shade the points of another cloud", "[integration][shade]") {
   const TemporaryDirectory dir;
   write_cube(dir / "cube.obj");
   Progress silent;
@@ -221,7 +225,7 @@ TEST_CASE("pipeline: a picture has the layers it promises, with and without a me
   const std::vector<PictureTarget> splatted{{dir / "b.exr", ""}};
   render_picture(request, splatted, silent);
   const Image with_surfels = read_image(dir / "b.exr");
-  // The same view of the same scene: most pixels agree closely.
+  // Both show the same view of the same scene: most pixels agree closely.
   std::size_t close = 0;
   for (std::size_t i = 0; i < with_mesh.pixels.size(); ++i) {
     close += std::abs(with_mesh.pixels[i].g - with_surfels.pixels[i].g) < 0.1F;
@@ -229,7 +233,7 @@ TEST_CASE("pipeline: a picture has the layers it promises, with and without a me
   CHECK(close > with_mesh.pixels.size() * 80 / 100);
 }
 
-TEST_CASE("pipeline: a cap that is too small is refused with the least that works",
+TEST_CASE("pipeline: a cap that is too small is refused with the minimum that works",
           "[integration]") {
   const TemporaryDirectory dir;
   Progress silent;
@@ -256,7 +260,8 @@ TEST_CASE("pipeline: clouds without normals and inputs without points are refuse
   CHECK_FALSE(std::filesystem::exists(dir / "a.ptcx"));
 }
 
-TEST_CASE("pipeline: a request that is out of range names its field", "[integration][request]") {
+TEST_CASE("pipeline: a request that is out of range is refused with the name of its field",
+          "[integration][request]") {
   const TemporaryDirectory dir;
   const auto scene = dir / "scene.ptcx";
   write_scene(scene, small_scene(0.1), {}, 12, Codec::zstd);

@@ -1,4 +1,4 @@
-// Builds that are interrupted and go on.
+// Builds that are interrupted and continued.
 #include <chrono>
 #include <fstream>
 #include <utility>
@@ -17,7 +17,7 @@ namespace {
 
 struct Interrupted {};
 
-/// Ends the build when so many points were reported in all stages.
+/// Ends the build when this many points were reported in all stages together.
 class Interrupt : public Progress {
  public:
   explicit Interrupt(std::uint64_t after) : left_(static_cast<std::int64_t>(after)) {}
@@ -42,8 +42,8 @@ void write_cloud(const std::filesystem::path& path, std::size_t count) {
   }
 }
 
-/// Pairs of a point that is not rounded and one that rounding may not move in front of it; blocks
-/// of a build begin with the second of a pair.
+/// Writes pairs of a point that is not rounded and one that rounding must not move in front of it;
+/// blocks of a build begin with the second of a pair.
 void write_pairs(const std::filesystem::path& path, std::size_t count) {
   std::ofstream out(path);
   out.precision(17);
@@ -66,7 +66,7 @@ struct Place {
   std::filesystem::path out = dir / "o.ptcx";
   std::vector<char> whole;
   std::uint64_t points = 0;
-  std::size_t before = 0;  // files
+  std::size_t before = 0;  // number of files before the build
 
   explicit Place(Kind kind) {
     std::filesystem::create_directory(dir / "t1");
@@ -99,7 +99,7 @@ struct Place {
 
 }  // namespace
 
-TEST_CASE("resume: a build that is interrupted anywhere comes to the same bytes",
+TEST_CASE("resume: a build that is interrupted anywhere continues to the same bytes",
           "[integration][resume]") {
   for (const Kind kind : {Kind::city, Kind::cloud, Kind::pairs}) {
     Place place(kind);
@@ -107,7 +107,7 @@ TEST_CASE("resume: a build that is interrupted anywhere comes to the same bytes"
         (kind == Kind::city ? 1 : 2) * place.points;  // points reported before the sorted ones
     Progress silent;
     for (const std::uint64_t after :
-         {100'000u, 299'000u}) {  // nothing is kept of a sort that did not end
+         {100'000u, 299'000u}) {  // nothing is kept of an interrupted sort
       place.interrupt(after);
       CHECK(place.clean());
     }
@@ -125,13 +125,13 @@ TEST_CASE("resume: a build that is interrupted anywhere comes to the same bytes"
     }
     place.interrupt(passes + 101'000);
     for (unsigned k = 0; k < 3; ++k)
-      place.interrupt(65'280 * (k + 2) + 10'000);  // what was built before counts, too
+      place.interrupt(65'280 * (k + 2) + 10'000);  // points that were built before count, too
     CHECK(build_container(place.request, place.out, silent).resumed_points == 4 * 65'280);
     CHECK(place.made_whole());
   }
 }
 
-TEST_CASE("resume: what is left of another request or of changed inputs is refused by name",
+TEST_CASE("resume: files of another request or of changed inputs are refused by name",
           "[integration][resume]") {
   Place place(Kind::cloud);
   place.interrupt(2 * place.points + 200'000);
@@ -140,7 +140,7 @@ TEST_CASE("resume: what is left of another request or of changed inputs is refus
   other.tree.leaf_points = 9;
   CHECK_THROWS_WITH(build_container(other, place.out, silent),
                     Catch::Contains("`tree.leaf_points` was '16', not '9'") &&
-                        Catch::Contains("to start anew, remove"));
+                        Catch::Contains("to start again, remove"));
   other = place.request;
   other.profile = Profile::raw;
   CHECK_THROWS_WITH(build_container(other, place.out, silent),
@@ -162,7 +162,7 @@ TEST_CASE("resume: what is left of another request or of changed inputs is refus
   CHECK(place.clean());
 }
 
-TEST_CASE("resume: torn states are refused with what to remove", "[integration][resume]") {
+TEST_CASE("resume: damaged states are refused with the files to remove", "[integration][resume]") {
   Place place(Kind::city);
   place.interrupt(place.points + 200'000);
   Progress silent;
@@ -180,9 +180,8 @@ TEST_CASE("resume: torn states are refused with what to remove", "[integration][
   CHECK(place.made_whole());
 }
 
-TEST_CASE(
-    "resume: points on the disk that are not what was written are refused with what to remove",
-    "[integration][resume]") {
+TEST_CASE("resume: spilled points that changed on the disk are refused with the files to remove",
+          "[integration][resume]") {
   for (const Kind kind : {Kind::city, Kind::cloud}) {
     Place place(kind);
     place.interrupt((kind == Kind::city ? 1 : 2) * place.points + 200'000);
@@ -201,13 +200,14 @@ TEST_CASE(
     };
     const std::size_t record =
         (whole.size() - 50'000) / kSpilledBytes * kSpilledBytes;  // not yet read
-    for (const std::size_t offset : {record + 3, record + 20}) {  // of a key, of what is behind it
+    for (const std::size_t offset :
+         {record + 3, record + 20}) {  // a byte of the key, and one after it
       flip(offset, 0x40);
       for (int again = 0; again < 2; ++again) {
         CHECK_THROWS_WITH(
             build_container(place.request, place.out, silent),
             Catch::StartsWith(spill.string() + ": offset ") &&
-                Catch::Contains("points there are not what was written; to start anew, remove ") &&
+                Catch::Contains("points there are not what was written; to start again, remove ") &&
                 Catch::Contains("o.ptcx.resume-pages"));
       }
       CHECK_FALSE(std::filesystem::exists(place.out));
@@ -216,12 +216,12 @@ TEST_CASE(
     }
     std::filesystem::resize_file(spill, whole.size() - 4096);
     CHECK_THROWS_WITH(build_container(place.request, place.out, silent),
-                      Catch::Contains("another length; to start anew, remove"));
+                      Catch::Contains("another length; to start again, remove"));
     CHECK_FALSE(std::filesystem::exists(place.out));
   }
 }
 
-TEST_CASE("resume: before its first page a build goes on beside an old file of any kind",
+TEST_CASE("resume: a build without pages yet continues, whatever file has the target's name",
           "[integration][resume]") {
   Place place(Kind::city);
   place.interrupt(place.points + 100);
@@ -234,7 +234,7 @@ TEST_CASE("resume: before its first page a build goes on beside an old file of a
   CHECK(place.clean());
 }
 
-TEST_CASE("resume: a build that was published before what it had kept was removed is done",
+TEST_CASE("resume: a build that was killed after publication is complete and cleans up",
           "[integration][resume]") {
   Place place(Kind::city);
   place.interrupt(place.points + 200'000);

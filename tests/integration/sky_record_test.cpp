@@ -1,4 +1,4 @@
-// A sky picture travels from the build of a scene to every later program.
+// The sky picture of a build is used by every later program.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -21,14 +21,14 @@ using namespace ptc::test;
 
 namespace {
 
-/// Notes that a run gives.
+/// Collects the notes of a run.
 class Notes : public Progress {
  public:
   void note(const std::string& text) override { texts.push_back(text); }
   std::vector<std::string> texts;
 };
 
-/// A sky that is dark but for a bright band.
+/// A sky that is dark except for a bright band.
 void write_sky(const std::filesystem::path& path, float brightness) {
   constexpr unsigned kWidth = 32, kHeight = 16;
   std::vector<float> values;
@@ -41,7 +41,7 @@ void write_sky(const std::filesystem::path& path, float brightness) {
   write_exr(path, kWidth, kHeight, {{"", ExrLayer::Kind::colour, true, values}});
 }
 
-/// A container of a mesh under a sky picture, and the picture beside it.
+/// A container of a mesh under a sky picture, next to the picture.
 struct Lit {
   Lit() {
     write_sky(picture(), 4);
@@ -70,7 +70,7 @@ struct Lit {
   Notes notes;
 };
 
-/// Red radiance times area, summed over the surfels of a container.
+/// Returns red radiance times area, summed over the surfels of a container.
 double power_of(const std::filesystem::path& file) {
   const ContainerReader container(file);
   ContainerPoints points(container);
@@ -109,8 +109,7 @@ TEST_CASE("sky record: a picture is rendered under the sky that the scene was bu
   CHECK(bytes_of(recorded.path) == bytes_of(given.path));
 }
 
-TEST_CASE("sky record: a mesh that is appended is lit by the sky of the scene",
-          "[integration][sky]") {
+TEST_CASE("sky record: an appended mesh is lit by the sky of the scene", "[integration][sky]") {
   Lit lit;
   std::ofstream(lit.dir / "more.obj") << "v 2 0 0\nv 3 0 0\nv 3 0 1\nf 3 2 1\n";
   BuildRequest request{.inputs = {lit.dir / "more.obj"}, .append = lit.scene()};
@@ -124,7 +123,8 @@ TEST_CASE("sky record: a mesh that is appended is lit by the sky of the scene",
   CHECK(power_of(lit.dir / "both.ptcx") == Approx(power_of(lit.scene()) + more).epsilon(0.01));
 }
 
-TEST_CASE("sky record: a picture that moved beside the container is found", "[integration][sky]") {
+TEST_CASE("sky record: a picture that was moved next to the container is found",
+          "[integration][sky]") {
   Lit lit;
   const std::vector<char> before = lit.shaded({});
   std::filesystem::create_directory(lit.dir / "elsewhere");
@@ -135,7 +135,7 @@ TEST_CASE("sky record: a picture that moved beside the container is found", "[in
   CHECK(bytes_of(lit.dir / "after.ply") == before);
 }
 
-TEST_CASE("sky record: a picture that is gone is an error that names it, and no output is left",
+TEST_CASE("sky record: a missing picture is an error that names it, and no output is left",
           "[integration][sky]") {
   Lit lit;
   std::filesystem::remove(lit.picture());

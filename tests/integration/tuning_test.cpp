@@ -1,4 +1,4 @@
-// The error that was asked for, against the error that is measured.
+// The requested error, compared with the measured one.
 #include "engine/pipeline/quality/tuning.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// A floor, a wall, balls: all lit alike.
+/// A floor, a wall and balls, all of the same radiance.
 std::vector<Surfel> lit_balls() {
   return small_scene(0.02);
 }
@@ -35,14 +35,14 @@ std::vector<Surfel> crossed_sheets() {
   return surfels;
 }
 
-/// Surfels over a floor in the dark.
+/// Surfels over a floor, all without light.
 std::vector<Surfel> dark_balls() {
   std::vector<Surfel> surfels = small_scene(0.03);
   for (Surfel& s : surfels) s.radiance = glm::vec3(0);
   return surfels;
 }
 
-/// Error of each setting of the ladder at a scene's receivers.
+/// Returns the error of each setting of the ladder at the receivers of a scene.
 std::vector<double> errors_along_ladder(const Scene& scene) {
   std::vector<Pilot> pilots;
   for (std::size_t i = 0; i < scene.receivers.size(); i += 64) {
@@ -69,7 +69,7 @@ LightingReport shade_with(const Scene& scene, double error, const RunOptions& ru
 
 }  // namespace
 
-TEST_CASE("error sums: what rays are off is told apart from what we are off",
+TEST_CASE("error sums: the noise of the rays is separated from the error of the gather",
           "[integration][error]") {
   std::mt19937 bits;
   std::normal_distribution<float> normal;
@@ -94,7 +94,8 @@ TEST_CASE("error sums: what rays are off is told apart from what we are off",
   CHECK(ErrorSums().error().relative() == 0);
 }
 
-TEST_CASE("tuning: pilots fit into every run and are few of a long one", "[integration][error]") {
+TEST_CASE("tuning: pilots fit into every run and are a small part of a long one",
+          "[integration][error]") {
   CHECK(plan_pilots(0).count == 0);
   for (std::uint64_t n = 1; n < 100'000'000; n += 1 + n / 7) {
     const PilotPlan plan = plan_pilots(n);
@@ -126,7 +127,7 @@ TEST_CASE("tuning: the error falls along the ladder", "[integration][error]") {
     CHECK(ladder()[i].usual_error < ladder()[i - 1].usual_error);
 }
 
-TEST_CASE("tuning: an error that was asked for is met at receivers that had no part in it",
+TEST_CASE("tuning: a requested error is met at receivers that did not choose the setting",
           "[integration][error]") {
   for (const auto& surfels : {lit_balls(), crossed_sheets(), dark_balls()}) {
     const Scene scene(surfels);
@@ -144,7 +145,7 @@ TEST_CASE("tuning: an error that was asked for is met at receivers that had no p
   }
 }
 
-TEST_CASE("tuning: below the floor the finest setting is taken and the floor told",
+TEST_CASE("tuning: an error that no setting meets takes the finest setting and reports its error",
           "[integration][error]") {
   const Scene scene(lit_balls());
   const LightingReport report = shade_with(scene, 1e-4);
@@ -154,7 +155,7 @@ TEST_CASE("tuning: below the floor the finest setting is taken and the floor tol
   CHECK(report.check->discs.relative() == Approx(report.tuning->measured.relative()).epsilon(0.5));
 }
 
-TEST_CASE("tuning: neither threads nor the cap change the choice or a byte",
+TEST_CASE("tuning: neither threads nor the cap change the choice or any byte",
           "[integration][error]") {
   const Scene scene(lit_balls());
   const auto bytes = [&](const char* name) { return bytes_of(scene.dir / name); };
@@ -170,7 +171,7 @@ TEST_CASE("tuning: neither threads nor the cap change the choice or a byte",
   CHECK(bytes("other.ptcx") != bytes("one.ptcx"));
 }
 
-TEST_CASE("tuning: runs of few receivers and scenes of few surfels have pilots too",
+TEST_CASE("tuning: runs with few receivers and scenes with few surfels have pilots, too",
           "[integration][error]") {
   const Scene scene(lit_balls());
   for (const std::uint64_t count : {1U, 2U, 5U, 40U}) {

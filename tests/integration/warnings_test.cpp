@@ -1,4 +1,4 @@
-// What mesh readers leave out or replace is told to whoever waits for the run.
+// Whatever mesh readers leave out or replace is reported to the progress of the run.
 #include <algorithm>
 #include <fstream>
 
@@ -35,8 +35,7 @@ void check_note(const Notes& notes, const std::filesystem::path& mesh) {
 
 }  // namespace
 
-TEST_CASE("warnings: build, append and render note once what each mesh file lacks",
-          "[integration]") {
+TEST_CASE("warnings: build, append and render note once what a mesh file lacks", "[integration]") {
   const TemporaryDirectory dir;
   write_bare(dir.path(), "a");
   write_bare(dir.path(), "b");
@@ -69,7 +68,7 @@ TEST_CASE("warnings: build, append and render note once what each mesh file lack
   check_note(render, dir / "b.obj");
 }
 
-TEST_CASE("warnings: points whose radius cannot be estimated are noted with their number",
+TEST_CASE("warnings: points whose radius cannot be estimated are counted in a note",
           "[integration]") {
   const TemporaryDirectory dir;
   const auto notes_of = [&](const char* text) {
@@ -82,6 +81,6 @@ TEST_CASE("warnings: points whose radius cannot be estimated are noted with thei
   };
   const std::vector<std::string> lone = notes_of("1 2 3 0 0 1\n1 2 3 0 0 1\n");
   REQUIRE(lone.size() == 1);
-  CHECK_THAT(lone[0], Contains("for 2 points they cannot be estimated"));
+  CHECK_THAT(lone[0], Contains("those of 2 points cannot be estimated"));
   CHECK(notes_of("1 2 3 0 0 1\n1 2 4 0 0 1\n").empty());
 }

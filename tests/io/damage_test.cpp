@@ -1,4 +1,4 @@
-// Flipped bytes in every text and binary format that is read: a value or a refusal, nothing else.
+// Flipped bytes in every text and binary format that is read: they give a value or a refusal.
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -37,7 +37,7 @@ std::string binary_ply() {
 
 }  // namespace
 
-TEST_CASE("damage: no flipped byte of any format does more than change the data or refuse it",
+TEST_CASE("damage: a flipped byte of any format changes the data or has it refused, no more",
           "[io][damage]") {
   const Scratch scratch;
   const std::vector<std::pair<std::string, std::string>> wholes = {

@@ -1,4 +1,4 @@
-// OpenEXR pictures out and in.
+// Writing and reading OpenEXR pictures.
 #include <array>
 #include <cmath>
 #include <stdexcept>
@@ -28,14 +28,14 @@ std::vector<float> ramp(std::size_t count) {
 }
 
 struct Picture {
-  std::string channels;  // a letter each
+  std::string channels;  // one letter for each
   Imf::Compression compression = Imf::NO_COMPRESSION;
   Imf::PixelType type = Imf::FLOAT;
   Imath::Box2i window = {{-2, 3}, {4, 12}};  // 7 x 10
   unsigned tile = 0;
 };
 
-// Channel c of pixel i holds 100 c + i.
+// Returns a picture in which channel c of pixel i has the value 100 c + i.
 void write_with_library(const std::filesystem::path& path, const Picture& picture) {
   const auto size = picture.window.size() + Imath::V2i(1);
   const auto count = static_cast<std::size_t>(size.x * size.y);
@@ -83,7 +83,7 @@ void check_picture(const Image& image, const std::array<float, 3>& base) {
 
 }  // namespace
 
-TEST_CASE("exr: a picture of more pixels than the caller allows is refused", "[io][exr]") {
+TEST_CASE("exr: a picture with more pixels than the caller allows is refused", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";
   write_exr(path, 10, 20, {{.values = std::vector<float>(600, 1.0F)}});
@@ -93,7 +93,7 @@ TEST_CASE("exr: a picture of more pixels than the caller allows is refused", "[i
       Catch::EndsWith("EXR: the picture has more pixels than the 199 that may still be loaded"));
 }
 
-TEST_CASE("exr: a float colour layer comes back bit for bit", "[io][exr]") {
+TEST_CASE("exr: a float colour layer is read back bit for bit", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";
   const std::vector<float> values = ramp(5 * 3 * 3);
@@ -138,7 +138,7 @@ TEST_CASE("exr: halves saturate instead of becoming infinite", "[io][exr]") {
   CHECK(read_image(path).at(0, 0) == glm::vec3(65504));
 }
 
-TEST_CASE("exr: what does not fit is refused and leaves no file", "[io][exr]") {
+TEST_CASE("exr: layers that do not fit are refused and leave no file", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";
   const ExrLayer good{"", ExrLayer::Kind::colour, false, ramp(12)};
@@ -165,7 +165,7 @@ TEST_CASE("exr: every compression, type and tiling of the library is read", "[io
   }
 }
 
-TEST_CASE("exr: pictures of more rows than one block are read whole", "[io][exr]") {
+TEST_CASE("exr: pictures with more rows than one block are read whole", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";
   for (const unsigned tile : {0U, 100U}) {
@@ -178,8 +178,7 @@ TEST_CASE("exr: pictures of more rows than one block are read whole", "[io][exr]
   }
 }
 
-TEST_CASE("exr: Y alone is grey, a missing colour is 0, other channels are passed over",
-          "[io][exr]") {
+TEST_CASE("exr: Y alone is grey, a missing colour is 0, other channels are skipped", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";
   write_with_library(path, {"Y"});
@@ -215,7 +214,7 @@ TEST_CASE("exr: every truncation is refused", "[io][exr]") {
   }
 }
 
-TEST_CASE("exr: no flipped byte does more than change the picture or refuse it", "[io][exr]") {
+TEST_CASE("exr: a flipped byte changes the picture or has it refused, no more", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";
   for (const unsigned tile : {0U, 4U}) {
@@ -244,7 +243,7 @@ TEST_CASE("exr: a header that claims a huge picture is refused", "[io][exr]") {
   }
 }
 
-TEST_CASE("exr: an attribute that is not as long as its type is refused", "[io][exr]") {
+TEST_CASE("exr: an attribute whose length does not match its type is refused", "[io][exr]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.exr";
   write_with_library(path, {"RGB", Imf::ZIP_COMPRESSION, Imf::HALF, {{0, 0}, {6, 9}}});

@@ -41,7 +41,7 @@ int error_of(const std::function<void()>& call) {
   return 0;
 }
 
-// Writes beyond so many bytes of a file fail while this lives, as on a full disk.
+// Makes writes beyond this many bytes of a file fail while it lives, as on a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {
@@ -60,7 +60,7 @@ class FileSizeLimit {
 
 }  // namespace
 
-TEST_CASE("input file: every range inside is read, every range past the end is refused",
+TEST_CASE("input file: ranges inside the file are read, ranges past its end are refused",
           "[io][file]") {
   const Scratch scratch;
   const InputFile file(scratch.file("f", "0123456789"));
@@ -80,7 +80,7 @@ TEST_CASE("input file: every range inside is read, every range past the end is r
   CHECK(error_of([&] { static_cast<void>(read_text(file, UINT64_MAX - 1, 1)); }) == EOVERFLOW);
 }
 
-TEST_CASE("input file: what is no regular file is refused by name", "[io][file]") {
+TEST_CASE("input file: anything but a regular file is refused by name", "[io][file]") {
   const Scratch scratch;
   CHECK(error_of([&] { const InputFile file(scratch.path()); }) == EISDIR);
   CHECK(error_of([&] { const InputFile file(scratch.path() / "none"); }) == ENOENT);
@@ -117,7 +117,7 @@ TEST_CASE("output file: the old file stays until the new one is published", "[io
   CHECK(scratch.listing() == "out");
 }
 
-TEST_CASE("output file: without publish nothing is left", "[io][file]") {
+TEST_CASE("output file: without publish() nothing is left", "[io][file]") {
   const Scratch scratch;
   {
     OutputFile file(scratch.path() / "out");
@@ -143,7 +143,7 @@ TEST_CASE("output file: a write that fails leaves the old file, whichever write 
   }
 }
 
-TEST_CASE("output file: directories and devices are no targets", "[io][file]") {
+TEST_CASE("output file: directories and devices are refused as targets", "[io][file]") {
   const Scratch scratch;
   CHECK(error_of([&] { OutputFile file(scratch.path()); }) == EISDIR);
   CHECK(error_of([&] { OutputFile file(scratch.path() / "name" / ""); }) == EISDIR);
@@ -168,7 +168,7 @@ TEST_CASE("output file: a link stays a link and permissions stay", "[io][file]")
   CHECK((status.st_mode & 0777) == 0640);
 }
 
-TEST_CASE("output file: a name of the greatest length is published", "[io][file]") {
+TEST_CASE("output file: a name of the maximum length is published", "[io][file]") {
   const Scratch scratch;
   OutputFile file(scratch.path() / std::string(255, 'n'));
   file.publish();
@@ -195,7 +195,7 @@ TEST_CASE("output file: threads write disjoint ranges", "[io][file]") {
   }
 }
 
-TEST_CASE("temp file: has no name and keeps what is written", "[io][file]") {
+TEST_CASE("temp file: it has no name and keeps what is written", "[io][file]") {
   const Scratch scratch;
   TempFile first(scratch.path());
   CHECK(scratch.listing().empty());

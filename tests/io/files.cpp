@@ -29,7 +29,7 @@ Scratch::~Scratch() {
 
 std::filesystem::path Scratch::file(const std::string& name, std::string_view bytes) const {
   const std::filesystem::path path = path_ / name;
-  std::filesystem::remove(path);  // some systems sync a file that is written over
+  std::filesystem::remove(path);  // some systems sync a file that is overwritten
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();

@@ -12,7 +12,7 @@
 
 namespace ptc {
 
-/// A directory that is removed with all it holds.
+/// A directory that is removed together with its contents.
 class Scratch {
  public:
   Scratch();
@@ -23,7 +23,7 @@ class Scratch {
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// Writes a file of these bytes and returns its path.
   std::filesystem::path file(const std::string& name, std::string_view bytes) const;
-  /// Names of all entries, sorted, separated by blanks.
+  /// Returns the names of all entries, sorted and separated by blanks.
   [[nodiscard]] std::string listing() const;
 
  private:
@@ -32,7 +32,7 @@ class Scratch {
 
 [[nodiscard]] std::string slurp(const std::filesystem::path& path);
 
-/// The bytes of a value as they lie in memory, for binary files.
+/// Returns the bytes of a value as they lie in memory, for binary files.
 template <typename T>
 std::string raw(T value) {
   std::string bytes(sizeof value, '\0');
@@ -40,12 +40,12 @@ std::string raw(T value) {
   return bytes;
 }
 
-/// The message of the DataError, FormatError or std::system_error that `call` throws; empty when it
-/// throws nothing. Any other exception passes.
+/// Returns the message of the DataError, FormatError or std::system_error that `call` throws; empty
+/// when it throws nothing. Any other exception passes.
 [[nodiscard]] std::string refusal(const std::function<void()>& call);
 
-/// A folder of real files that is no part of the project, if this machine has it: PTC_SHARED, else
-/// "../shared" beside the sources.
+/// Returns a folder of real files that is not part of the project, if this machine has it:
+/// PTC_SHARED or, without that variable, "../shared" next to the sources.
 [[nodiscard]] std::optional<std::filesystem::path> shared_data();
 
 }  // namespace ptc

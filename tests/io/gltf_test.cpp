@@ -83,7 +83,7 @@ glm::dvec3 corner(const Mesh& mesh, std::size_t triangle, std::size_t k) {
 
 }  // namespace
 
-TEST_CASE("gltf: buffers beside the file, in it and in a GLB give the same triangle",
+TEST_CASE("gltf: buffers next to the file, in it and in a GLB give the same triangle",
           "[io][gltf]") {
   const Files files;
   Json inside = document();
@@ -132,7 +132,7 @@ TEST_CASE("gltf: a mirroring node keeps the front in front", "[io][gltf]") {
   CHECK(normal.z > 0);
 }
 
-TEST_CASE("gltf: only the nodes of the scene are read, each once", "[io][gltf]") {
+TEST_CASE("gltf: only the nodes of the scene are read, and each of them once", "[io][gltf]") {
   const Files files;
   Json json = document();
   json["nodes"].push_back({{"mesh", 0}});
@@ -142,7 +142,7 @@ TEST_CASE("gltf: only the nodes of the scene are read, each once", "[io][gltf]")
   CHECK(files.read(json).mesh.triangles.size() == 2);
   json["nodes"][0]["children"] = {1};
   CHECK(files.read(json).mesh.triangles.size() == 2);
-  json["nodes"][1]["children"] = {0};  // nobody's children are none
+  json["nodes"][1]["children"] = {0};  // a cycle: no node is a root
   CHECK_THAT(files.fault(json), Contains("no triangle"));
   json["scenes"] = Json::array({{{"nodes", {0}}}});
   CHECK_THAT(files.fault(json), Contains("node 0 has two parents or contains itself"));
@@ -151,7 +151,7 @@ TEST_CASE("gltf: only the nodes of the scene are read, each once", "[io][gltf]")
   CHECK_THAT(files.fault(json), Contains("node 0 has two parents"));
 }
 
-TEST_CASE("gltf: strips and fans become triangles of one side, points and lines nothing",
+TEST_CASE("gltf: strips and fans become triangles that face one side, points and lines nothing",
           "[io][gltf]") {
   const Files files;
   Json json = document();
@@ -210,7 +210,7 @@ TEST_CASE("gltf: materials have factor, texture, emission and sides", "[io][gltf
   CHECK(file.mesh.uvs[file.mesh.triangles[0][1]] == glm::vec2(1, 1));
   CHECK(file.warnings.empty());
 
-  // The mean of an emission texture, in a bufferView and by a data URI alike.
+  // An emission texture is replaced by its mean, in a bufferView and in a data URI alike.
   const std::string png = slurp(files.scratch.path() / "t.png");
   json["images"] = Json::array({{{"uri", "data:image/png;base64," + base64(png)}}});
   json["materials"][0]["emissiveTexture"] = {{"index", 0}};
@@ -227,7 +227,7 @@ TEST_CASE("gltf: materials have factor, texture, emission and sides", "[io][gltf
   CHECK_THAT(plain.warnings[0], Contains("none.png"));
 }
 
-TEST_CASE("gltf: images of one file or one bufferView are one picture", "[io][gltf]") {
+TEST_CASE("gltf: images that share a file or a bufferView are one picture", "[io][gltf]") {
   const Files files;
   write_png(files.scratch.path() / "t.png", {1, 1, {glm::vec3(1, 0, 0)}});
   const std::string png = slurp(files.scratch.path() / "t.png");
@@ -253,8 +253,8 @@ TEST_CASE("gltf: images of one file or one bufferView are one picture", "[io][gl
   CHECK(materials[2].texture == materials[3].texture);
 }
 
-// Five minutes, were the mean taken for each material.
-TEST_CASE("gltf: 30,000 materials that emit by one texture need its mean once", "[io][gltf]") {
+// This would take five minutes if the mean were computed for each material.
+TEST_CASE("gltf: 30,000 materials that emit by one texture compute its mean once", "[io][gltf]") {
   const Files files;
   constexpr unsigned kSide = 2048;
   write_png(files.scratch.path() / "t.png",
@@ -276,7 +276,7 @@ TEST_CASE("gltf: 30,000 materials that emit by one texture need its mean once", 
   CHECK(file.warnings.size() == 1);
 }
 
-TEST_CASE("gltf: buffers of one file are read once", "[io][gltf]") {
+TEST_CASE("gltf: a file that several buffers name is read once", "[io][gltf]") {
   const Files files;
   Json json = document();
   for (const char* name : {"./a%20b.bin", "x/../a%20b.bin"}) {
@@ -302,14 +302,15 @@ TEST_CASE("gltf: a texture transform moves the coordinates", "[io][gltf]") {
   primitive["material"] = 0;
   primitive["attributes"]["TEXCOORD_0"] = 2;
   const MeshFile file = files.read(json);
-  // (0, 0.25) scaled is (0, 1), turned (1, 0), moved (1.5, 0.25); v upwards 0.75.
+  // (0, 0.25) becomes (0, 1) when scaled, (1, 0) when turned, (1.5, 0.25) when moved; v upwards is
+  // 0.75.
   const glm::vec2 uv = file.mesh.uvs[file.mesh.triangles[0][0]];
   CHECK(uv.x == Approx(1.5F));
   CHECK(uv.y == Approx(0.75F));
   CHECK_THAT(file.warnings.at(0), Contains("it has no supported source"));
 }
 
-TEST_CASE("gltf: integers are scaled when they say so", "[io][gltf]") {
+TEST_CASE("gltf: integers are scaled when they are marked as normalized", "[io][gltf]") {
   const Files files;
   Json json = document();
   const std::string bytes = std::string("\0\0\0\xff\0\0\0\xff\0", 9);
@@ -341,7 +342,7 @@ TEST_CASE("gltf: cameras look along -z of their node", "[io][gltf]") {
   CHECK(static_cast<double>(camera.horizontal_fov) == Approx(2 * std::atan(2 * std::tan(0.4))));
 }
 
-TEST_CASE("gltf: ranges that reach past what they are in are refused", "[io][gltf]") {
+TEST_CASE("gltf: ranges that reach past their buffer are refused", "[io][gltf]") {
   const Files files;
   const auto with = [&](const char* pointer, const Json& value) {
     Json json = document();
@@ -388,7 +389,7 @@ TEST_CASE("gltf: an index past the vertices is refused", "[io][gltf]") {
   CHECK_THAT(files.fault(document()), Contains("an index refers to no vertex"));
 }
 
-TEST_CASE("gltf: few bytes cannot make many vertices by repeating a mesh", "[io][gltf]") {
+TEST_CASE("gltf: a small file cannot make many vertices by repeating a mesh", "[io][gltf]") {
   const Files files;
   Json json = document();
   std::string bytes(12 * 1000, '\0');

@@ -16,7 +16,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-// Linear value of an 8-bit one, written down apart from the library's own curve.
+// Returns the linear value of an 8-bit one, independently of the library's own curve.
 double linear(int stored) {
   const double s = stored / 255.0;
   return s < 0.04045 ? s / 12.92 : std::exp(2.4 * std::log((s + 0.055) / 1.055));
@@ -26,7 +26,7 @@ Image decode(std::string_view bytes, const std::string& name) {
   return decode_image(std::as_bytes(std::span(bytes.data(), bytes.size())), name);
 }
 
-// 2 x 2: red, green / blue, white, as the rows of a picture from the top.
+// A picture of 2 x 2 pixels, rows from the top: red, green / blue, white.
 void check_four_colours(const Image& image, double tolerance = 1e-6) {
   REQUIRE(image.width == 2);
   REQUIRE(image.height == 2);
@@ -59,7 +59,7 @@ std::string four_colours_tga() {
 }
 
 std::string four_colours_tga_rle() {
-  // One packet of three different pixels, one of a single repeated one.
+  // One packet of three different pixels, and one packet that repeats a pixel.
   return tga_header(10, 2, 2) + std::string("\x02") + kBgr.substr(0, 9) + std::string("\x80") +
          kBgr.substr(9);
 }
@@ -72,13 +72,13 @@ std::string four_colours_bmp() {
          raw<std::uint16_t>(1) + raw<std::uint16_t>(24) + std::string(24, '\0') + rows;
 }
 
-// Radiance: mantissas and a common exponent; 2^(129 - 136) * 128 = 1.
+// The Radiance format: mantissas and a common exponent; 2^(129 - 136) * 128 = 1.
 std::string four_colours_hdr() {
   return "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n" +
          std::string("\x80\0\0\x81\0\x80\0\x81\0\0\x80\x81\x80\x80\x80\x81", 16);
 }
 
-// Eight equal pixels a row, run-length coded.
+// Eight equal pixels in each row, run-length coded.
 std::string coded_hdr() {
   std::string row("\x02\x02\x00\x08", 4);
   for (const char* run : {"\x88\x80", "\x88\x80", "\x88\x80", "\x88\x81"}) row.append(run, 2);
@@ -92,14 +92,14 @@ struct GreyJpeg {
   bool progressive = true;
 };
 
-// A marker and its segment.
+// Appends a marker and its segment.
 std::string segment(char marker, const std::string& bytes) {
   const std::size_t length = bytes.size() + 2;
   return std::string{'\xff', marker, static_cast<char>(length >> 8), static_cast<char>(length)} +
          bytes;
 }
 
-// Every scan is empty: what is missing is read as zeros, each the code of "no change".
+// A JPEG whose scans are all empty: missing bits are read as zeros, each the code of "no change".
 std::string grey_jpeg(const GreyJpeg& jpeg) {
   const std::string code = std::string("\1") + std::string(16, '\0');
   const std::string side{static_cast<char>(jpeg.side >> 8), static_cast<char>(jpeg.side)};
@@ -127,7 +127,7 @@ Image gradient() {
 
 }  // namespace
 
-TEST_CASE("png: all 256 stored values come back as written", "[io][image]") {
+TEST_CASE("png: all 256 values are read back as written", "[io][image]") {
   const Scratch scratch;
   const Image image = gradient();
   write_png(scratch.path() / "a.png", image);
@@ -143,7 +143,7 @@ TEST_CASE("png: all 256 stored values come back as written", "[io][image]") {
   }
 }
 
-TEST_CASE("png: values outside [0, 1] are clamped and no number is black", "[io][image]") {
+TEST_CASE("png: values outside [0, 1] are clamped, and NaN is black", "[io][image]") {
   const Scratch scratch;
   write_png(scratch.path() / "a.png", {2, 1, {{-1, 2, NAN}, {INFINITY, -INFINITY, 0.5F}}});
   const Image back = read_image(scratch.path() / "a.png");
@@ -153,7 +153,7 @@ TEST_CASE("png: values outside [0, 1] are clamped and no number is black", "[io]
   CHECK(static_cast<double>(back.at(1, 0).z) == Approx(linear(188)));
 }
 
-TEST_CASE("png: sizes that do not fit the pixels are refused", "[io][image]") {
+TEST_CASE("png: sizes that do not match the pixels are refused", "[io][image]") {
   const Scratch scratch;
   CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {2, 2, {glm::vec3(0)}}),
                   std::invalid_argument);
@@ -186,7 +186,7 @@ TEST_CASE("image: every truncation of every format is refused", "[io][image]") {
   }
 }
 
-TEST_CASE("image: no flipped byte does more than change the picture or refuse it", "[io][image]") {
+TEST_CASE("image: a flipped byte changes the picture or has it refused, no more", "[io][image]") {
   const Scratch scratch;
   write_png(scratch.path() / "a.png", {3, 2, std::vector<glm::vec3>(6, glm::vec3(0.5F))});
   for (const std::string& whole :
@@ -207,7 +207,7 @@ TEST_CASE("image: no flipped byte does more than change the picture or refuse it
   }
 }
 
-TEST_CASE("image: an HDR of empty runs, or of a size that is told two ways, is refused and ends",
+TEST_CASE("image: an HDR with empty runs or with two different sizes is refused, and reading ends",
           "[io][image]") {
   const std::string whole = coded_hdr();
   const std::size_t pixels = whole.find("+X 8\n") + 5;
@@ -218,7 +218,7 @@ TEST_CASE("image: an HDR of empty runs, or of a size that is told two ways, is r
   CHECK_THROWS_AS(decode(ended.insert(ended.find("\n\n") + 1, "\0x", 2), "a"), DataError);
 }
 
-TEST_CASE("jpeg: as many scans as encoders write are read, more are refused by offset",
+TEST_CASE("jpeg: as many scans as encoders write are read, and more are refused by offset",
           "[io][image]") {
   for (const bool progressive : {true, false}) {
     CHECK(decode(grey_jpeg({.scans = 10, .progressive = progressive}), "a").width == 8);
@@ -234,7 +234,7 @@ TEST_CASE("jpeg: as many scans as encoders write are read, more are refused by o
 
 TEST_CASE("jpeg: scans of a large picture are refused when they add up to 2^32 pixels",
           "[io][image]") {
-  // The comments are what a picture of this size needs at least.
+  // The comments make the file as large as a picture of this size must be.
   const std::string whole =
       grey_jpeg({.side = 16'384, .scans = 17, .comments = 40'000, .progressive = true});
   CHECK_THROWS_WITH(decode(whole, "a.jpg"),
@@ -242,7 +242,7 @@ TEST_CASE("jpeg: scans of a large picture are refused when they add up to 2^32 p
                         ": the scans of the JPEG have more than 2^32 pixels together");
 }
 
-TEST_CASE("image: a small file cannot ask for many pixels", "[io][image]") {
+TEST_CASE("image: a small file cannot claim many pixels", "[io][image]") {
   std::string bmp = four_colours_bmp();
   bmp.replace(18, 8, raw<std::int32_t>(60000) + raw<std::int32_t>(4000));
   CHECK_THROWS_WITH(decode(bmp, "a.bmp"), Contains("a.bmp: 60000 x 4000 pixels"));
@@ -250,7 +250,7 @@ TEST_CASE("image: a small file cannot ask for many pixels", "[io][image]") {
   CHECK_THROWS_WITH(decode(bmp, "a.bmp"), Contains("more than this program accepts"));
 }
 
-TEST_CASE("image: what is no picture is refused by name", "[io][image]") {
+TEST_CASE("image: a file that is not a picture is refused by name", "[io][image]") {
   const Scratch scratch;
   for (const std::string text : {"", "GIF89a......", "hello"}) {
     const auto path = scratch.file("a.png", text);

@@ -1,4 +1,4 @@
-// Boxes, and joining meshes.
+// Bounding boxes, and joining meshes.
 #include "engine/io/mesh/mesh.h"
 
 #include <stdexcept>
@@ -39,7 +39,7 @@ glm::vec3 geometric_normal(const Mesh& mesh, std::size_t index) {
 
 }  // namespace
 
-TEST_CASE("bounds: a box holds what was added and nothing before", "[io][bounds]") {
+TEST_CASE("bounds: a box contains what was added, and nothing before that", "[io][bounds]") {
   Bounds box;
   CHECK(box.empty());
   box.add(Bounds{});
@@ -63,7 +63,7 @@ TEST_CASE("mesh: the box of an empty mesh is empty", "[io][mesh]") {
   CHECK(triangle({1e7, 0, 0}).bounds().high == glm::dvec3(1e7 + 1, 1, 0));
 }
 
-TEST_CASE("append: an empty mesh takes its origin from what is appended", "[io][mesh]") {
+TEST_CASE("append: an empty mesh takes the origin of the appended mesh", "[io][mesh]") {
   Mesh mesh;
   append_mesh(mesh, triangle({1e7, 0, 0}), glm::translate(glm::dmat4(1), {0.25, 0, 5e6}));
   CHECK(mesh.origin == glm::dvec3(1e7 + 1, 1, 5e6));
@@ -71,7 +71,7 @@ TEST_CASE("append: an empty mesh takes its origin from what is appended", "[io][
   CHECK(mesh.materials.size() == 1);
 }
 
-TEST_CASE("append: indices and materials move behind those that are there", "[io][mesh]") {
+TEST_CASE("append: indices and materials are shifted past the existing ones", "[io][mesh]") {
   Mesh mesh = triangle({0, 0, 0});
   append_mesh(mesh, triangle({3, 0, 0}), glm::dmat4(1));
   append_mesh(mesh, mesh, glm::translate(glm::dmat4(1), {0, 0, 1}));
@@ -81,18 +81,18 @@ TEST_CASE("append: indices and materials move behind those that are there", "[io
   CHECK(mesh.normals.empty());
 }
 
-TEST_CASE("append: a mirror turns triangles and normals alike", "[io][mesh]") {
+TEST_CASE("append: a mirroring transform turns triangles and normals alike", "[io][mesh]") {
   Mesh other = triangle({0, 0, 0});
   other.normals.assign(3, {0, 0.6F, 0.8F});
   Mesh mesh;
   append_mesh(mesh, other, glm::scale(glm::dmat4(1), {2, 1, -0.5}));
   CHECK(geometric_normal(mesh, 0) == glm::vec3(0, 0, -1));
-  // The inverse transpose: y by 1, z by -2.
+  // The inverse transpose scales y by 1 and z by -2.
   const glm::vec3 expected = glm::normalize(glm::vec3(0, 0.6F, -1.6F));
   CHECK(glm::length(mesh.normals[0] - expected) < 1e-6F);
 }
 
-TEST_CASE("append: the mesh without normals gets flat ones, without coordinates (0, 0)",
+TEST_CASE("append: a mesh without normals gets flat ones, one without coordinates (0, 0)",
           "[io][mesh]") {
   for (const bool first : {false, true}) {
     Mesh with = triangle({0, 0, 0});
@@ -126,7 +126,7 @@ TEST_CASE("append: transforms without an inverse and too many materials are refu
   CHECK(mesh.triangles.size() == 1);
 }
 
-TEST_CASE("mesh: names that no reader knows are refused", "[io][mesh]") {
+TEST_CASE("mesh: file names with an unknown ending are refused", "[io][mesh]") {
   const Scratch scratch;
   for (const char* name : {"a.blend", "a.dae", "a", "a.gltf.gz"}) {
     CHECK_THAT(refusal([&] { static_cast<void>(read_mesh(scratch.file(name, "x"))); }),

@@ -8,7 +8,7 @@
 using namespace ptc;
 using Lines = std::vector<std::string>;
 
-TEST_CASE("mesh warnings: each kind is a line with its number and its first four parts",
+TEST_CASE("mesh warnings: each kind is one line with a count and its first four parts",
           "[io][mesh]") {
   MeshWarnings warnings;
   CHECK(warnings.lines().empty());
@@ -27,14 +27,15 @@ TEST_CASE("mesh warnings: each kind is a line with its number and its first four
         "more");
 }
 
-TEST_CASE("mesh warnings: a part that is shown already is not told again", "[io][mesh]") {
+TEST_CASE("mesh warnings: a part that is already listed is not listed again", "[io][mesh]") {
   MeshWarnings warnings;
   for (int i = 0; i < 9; ++i) warnings.add(kCameraLeftOut, "camera 0");
   CHECK(warnings.lines() ==
         Lines{"a camera is left out because it has no direction or no field of view: camera 0"});
 }
 
-TEST_CASE("mesh warnings: a part is one line of at most some 300 printable bytes", "[io][mesh]") {
+TEST_CASE("mesh warnings: a part is printed as one line of at most some 300 printable bytes",
+          "[io][mesh]") {
   MeshWarnings warnings;
   warnings.add(kMaterialUndefined, "a\nb\x1b[2J\xff");
   warnings.add(kMaterialUndefined, std::string(299, 'x') + "\xc3\xa9 and so on");
@@ -43,7 +44,7 @@ TEST_CASE("mesh warnings: a part is one line of at most some 300 printable bytes
                                   std::string(299, 'x') + "..."});
 }
 
-TEST_CASE("mesh warnings: many materials that are not defined take one line", "[io][mesh]") {
+TEST_CASE("mesh warnings: many undefined materials take one line", "[io][mesh]") {
   const Scratch scratch;
   std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   for (int i = 0; i < 1000; ++i) text += "usemtl m" + std::to_string(i) + "\nf 1 2 3\n";

@@ -23,7 +23,7 @@ std::string fault(const Scratch& scratch, const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("obj: indices count from one, from the end, and with any of their parts", "[io][mesh]") {
+TEST_CASE("obj: indices count from one or from the end, and may leave out any part", "[io][mesh]") {
   const Scratch scratch;
   const std::string start = kSquare + "vt 0.5\nvt 0 1 7\nvn 0 0 1\n";
   for (const char* face : {"f 1 2 3", "f -4 -3 -2", "f 1/1 2/1 3/2", "f 1//1 2//1 3//1",
@@ -35,7 +35,7 @@ TEST_CASE("obj: indices count from one, from the end, and with any of their part
   }
 }
 
-TEST_CASE("obj: corners that differ in any index are vertices of their own", "[io][mesh]") {
+TEST_CASE("obj: corners that differ in any index become separate vertices", "[io][mesh]") {
   const Scratch scratch;
   const std::string start = kSquare + "vt 0 0\nvt 1 1\nvn 0 0 1\nvn 0 1 0\n";
   const Mesh shared = read(scratch, start + "f 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/1/1 4/1/1\n").mesh;
@@ -57,7 +57,7 @@ TEST_CASE("obj: faces without normals among others get flat ones", "[io][mesh]")
   CHECK(mesh.normals[mesh.triangles[2][2]] == glm::vec3(0, -1, 0));
 }
 
-TEST_CASE("obj: ten million metres from the origin millimetres are kept", "[io][mesh]") {
+TEST_CASE("obj: millimetres are kept ten million metres from the origin", "[io][mesh]") {
   const Scratch scratch;
   const Mesh mesh =
       read(scratch, "v 10000000.001 0 0\nv 10000000.003 0 0\nv 10000000.001 0.002 0\nf 1 2 3\n")
@@ -66,7 +66,7 @@ TEST_CASE("obj: ten million metres from the origin millimetres are kept", "[io][
   CHECK(static_cast<double>(mesh.positions[1].x) == Approx(0.003).epsilon(1e-6));
 }
 
-TEST_CASE("obj: materials come from the library, textures from files beside it", "[io][mesh]") {
+TEST_CASE("obj: materials come from the library, textures from files next to it", "[io][mesh]") {
   const Scratch scratch;
   write_png(scratch.path() / "my red.png", {1, 1, {glm::vec3(1, 0, 0)}});
   scratch.file("a b.mtl",
@@ -100,7 +100,8 @@ TEST_CASE("obj: materials come from the library, textures from files beside it",
                            Contains("a material is not defined and becomes plain grey: 'missing'"));
 }
 
-TEST_CASE("obj: several libraries on a line, escaped blanks and missing ones", "[io][mesh]") {
+TEST_CASE("obj: a line may name several libraries, with escaped blanks and missing ones",
+          "[io][mesh]") {
   const Scratch scratch;
   scratch.file("one.mtl", "newmtl a\nKd 1 0 0\n");
   scratch.file("two three.mtl", "newmtl b\nKd 0 1 0\n");
@@ -115,7 +116,7 @@ TEST_CASE("obj: several libraries on a line, escaped blanks and missing ones", "
              Contains("a material library is left out") && Contains("grey: none.mtl: No such"));
 }
 
-TEST_CASE("obj: a texture that is no picture is named once, with the reason", "[io][mesh]") {
+TEST_CASE("obj: a texture that is not a picture is reported once, with the reason", "[io][mesh]") {
   const Scratch scratch;
   scratch.file("a.png", "no picture");
   scratch.file("a.mtl", "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd a.png\n");
@@ -126,7 +127,7 @@ TEST_CASE("obj: a texture that is no picture is named once, with the reason", "[
                                         "picture"));
 }
 
-TEST_CASE("obj: a texture that is named in several ways is one picture", "[io][mesh]") {
+TEST_CASE("obj: a texture that is named in several ways is loaded as one picture", "[io][mesh]") {
   const Scratch scratch;
   write_png(scratch.path() / "a.png", {1, 1, {glm::vec3(1, 0, 0)}});
   scratch.file("a.mtl", "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd .\\././x/..//a.png\n");
@@ -137,7 +138,7 @@ TEST_CASE("obj: a texture that is named in several ways is one picture", "[io][m
   CHECK(mesh.materials[0].texture == mesh.materials[1].texture);
 }
 
-// Ten minutes, were the library read for each of the lines.
+// This would take ten minutes if the library were read for each of the lines.
 TEST_CASE("obj: a library that is named on 30,000 lines is read once", "[io][mesh]") {
   const Scratch scratch;
   std::string library = "newmtl a\nKd 1 0 0\n";
@@ -151,7 +152,7 @@ TEST_CASE("obj: a library that is named on 30,000 lines is read once", "[io][mes
   CHECK_THAT(file.warnings[0], Contains("a material library is left out"));
 }
 
-TEST_CASE("textures: pixels beyond what the bytes of their files justify are left out",
+TEST_CASE("textures: pictures with more pixels than their files justify are left out",
           "[io][mesh]") {
   const Scratch scratch;
   const Image white{100, 100, std::vector<glm::vec3>(10'000, glm::vec3(1))};
@@ -161,7 +162,7 @@ TEST_CASE("textures: pixels beyond what the bytes of their files justify are lef
     pictures.push_back(slurp(scratch.path() / name));
   }
   const std::uint64_t bytes = pictures[0].size();
-  REQUIRE(256 * bytes > 10'000);  // so that one more is justified by its own bytes, as in a file
+  REQUIRE(256 * bytes > 10'000);  // so that the bytes of one more justify its pixels, as in a file
   MeshWarnings warnings;
   TextureLoader loader(scratch.path(), warnings, 0);
   for (const char* name : {"a.png", "./a.png", "b.png", "c.png"}) CHECK(loader.load(name));

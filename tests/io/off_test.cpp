@@ -22,7 +22,7 @@ std::string fault(const Scratch& scratch, const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("off: headers in all their forms give the same square", "[io][mesh]") {
+TEST_CASE("off: all forms of the header give the same square", "[io][mesh]") {
   const Scratch scratch;
   for (const char* header :
        {"OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\n", "4 1 0\n", "OFF # comment\n\n4 1\n",
@@ -35,7 +35,8 @@ TEST_CASE("off: headers in all their forms give the same square", "[io][mesh]") 
   }
 }
 
-TEST_CASE("off: normals and texture coordinates are found around the colours", "[io][mesh]") {
+TEST_CASE("off: normals and texture coordinates are found before and after the colours",
+          "[io][mesh]") {
   const Scratch scratch;
   const Mesh mesh =
       read(scratch,
@@ -75,7 +76,7 @@ TEST_CASE("off: files that break a rule are refused by line", "[io][mesh]") {
              EndsWith("vertex 2: the position is not finite"));
 }
 
-TEST_CASE("off: every truncation but of the last word is refused", "[io][mesh]") {
+TEST_CASE("off: every truncation is refused, except inside the last word", "[io][mesh]") {
   const Scratch scratch;
   const std::string whole = "OFF\n4 1 0\n" + kBody;
   for (std::size_t size = 0; size < whole.size() - 1; ++size) {

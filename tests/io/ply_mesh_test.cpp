@@ -29,7 +29,7 @@ MeshFile read(const Scratch& scratch, const std::string& bytes) {
 
 }  // namespace
 
-TEST_CASE("ply mesh: triangles and vertices come as the file has them", "[io][mesh]") {
+TEST_CASE("ply mesh: triangles and vertices are read as they are in the file", "[io][mesh]") {
   const Scratch scratch;
   const Mesh mesh =
       read(scratch, header("ascii", kVertices + kFaces) + kSquare + "3 0 1 2\n3 0 2 3\n").mesh;
@@ -50,7 +50,7 @@ TEST_CASE("ply mesh: faces may come before the vertices", "[io][mesh]") {
   CHECK(mesh.triangles == Triangles{{0, 1, 2}, {0, 2, 3}});
 }
 
-TEST_CASE("ply mesh: strips are cut, every second triangle turned over", "[io][mesh]") {
+TEST_CASE("ply mesh: strips are cut into triangles, every second one turned over", "[io][mesh]") {
   const Scratch scratch;
   const std::string strips =
       "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
@@ -68,7 +68,7 @@ TEST_CASE("ply mesh: strips are cut, every second triangle turned over", "[io][m
   }
 }
 
-TEST_CASE("ply mesh: ten million metres from the origin millimetres are kept", "[io][mesh]") {
+TEST_CASE("ply mesh: millimetres are kept ten million metres from the origin", "[io][mesh]") {
   const Scratch scratch;
   const Mesh mesh = read(scratch, header("ascii", kVertices + kFaces) +
                                       "10000000.001 5000000.001 0\n10000000.004 5000000.001 0\n"
@@ -80,7 +80,8 @@ TEST_CASE("ply mesh: ten million metres from the origin millimetres are kept", "
   CHECK(static_cast<double>(mesh.positions[2].y) == Approx(0.009).epsilon(1e-6));
 }
 
-TEST_CASE("ply mesh: normals are unit, broken ones flat, texture coordinates kept", "[io][mesh]") {
+TEST_CASE("ply mesh: normals become unit, broken ones flat, texture coordinates stay",
+          "[io][mesh]") {
   const Scratch scratch;
   const std::string vertices =
       kVertices +
@@ -144,7 +145,7 @@ TEST_CASE("ply mesh: every truncation of a binary mesh is refused", "[io][mesh]"
   CHECK_THROWS_AS(read(scratch, whole + "x"), DataError);
 }
 
-TEST_CASE("mesh: what is written is read back, also from a gzip file", "[io][mesh]") {
+TEST_CASE("mesh: a written mesh is read back, also from a gzip file", "[io][mesh]") {
   const Scratch scratch;
   Mesh mesh;
   mesh.origin = {1e7, -3, 0};

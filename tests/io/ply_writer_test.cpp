@@ -1,4 +1,4 @@
-// Clouds to PLY and back.
+// Writing clouds as PLY and reading them back.
 #include <random>
 #include <stdexcept>
 #include <vector>
@@ -30,7 +30,7 @@ std::vector<Surfel> make_surfels(std::size_t count) {
 
 }  // namespace
 
-TEST_CASE("ply writer: every value of every surfel comes back bit for bit", "[io][writer]") {
+TEST_CASE("ply writer: every value of every surfel is read back bit for bit", "[io][writer]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.ply";
   for (const std::size_t count : {0U, 1U, 20'000U}) {  // none, one, more than one buffer
@@ -55,7 +55,7 @@ TEST_CASE("ply writer: every value of every surfel comes back bit for bit", "[io
   }
 }
 
-TEST_CASE("ply writer: columns follow the surfel under their names", "[io][writer]") {
+TEST_CASE("ply writer: named columns follow the values of the surfel", "[io][writer]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.ply";
   const std::vector<Surfel> surfels = make_surfels(2);
@@ -96,7 +96,7 @@ TEST_CASE("ply writer: wrong numbers of points or values leave no file", "[io][w
   CHECK(scratch.listing().empty());
 }
 
-TEST_CASE("ply writer: names that are none or are taken are refused", "[io][writer]") {
+TEST_CASE("ply writer: column names that are invalid or taken are refused", "[io][writer]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.ply";
   const auto make = [&](std::vector<PointColumn> columns) { PlyWriter writer(path, 0, columns); };
@@ -109,7 +109,7 @@ TEST_CASE("ply writer: names that are none or are taken are refused", "[io][writ
   CHECK(scratch.listing().empty());
 }
 
-TEST_CASE("ply writer: channels get names that are free, vectors with x, y and z", "[io][writer]") {
+TEST_CASE("ply writer: channels get free names, vectors with x, y and z", "[io][writer]") {
   const auto channel = [](const char* name, std::uint8_t components) {
     return Channel{name, ChannelType::half, components, 1};
   };

@@ -1,4 +1,4 @@
-// Points in triangles, and the set of corners that are still to be asked.
+// Points in triangles, and the set of corners that are still to be tested.
 #include "engine/io/mesh/point_tree.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 using namespace ptc;
 
-TEST_CASE("index set: the next number is that of an ordered set after any insertions and erasures",
+TEST_CASE("index set: the next number equals that of an ordered set after any changes",
           "[io][triangulate]") {
   std::mt19937 random(3);
   for (const std::size_t size : {1u, 63u, 64u, 65u, 4096u, 4097u, 20'000u}) {
@@ -22,7 +22,7 @@ TEST_CASE("index set: the next number is that of an ordered set after any insert
     bool same = true;
     for (int step = 0; step < 60'000; ++step) {
       const std::size_t number = random() % size;
-      // First mostly erasures, then mostly insertions: all numbers of many words come and go.
+      // Mostly erase first, then mostly insert: all numbers of many words come and go.
       const bool erase = random() % 8 < (step < 40'000 ? 7u : 1u);
       erase ? set.erase(number) : set.insert(number);
       erase ? void(expected.erase(number)) : void(expected.insert(number));
@@ -35,13 +35,13 @@ TEST_CASE("index set: the next number is that of an ordered set after any insert
   }
 }
 
-TEST_CASE("point tree: a point is found whenever one lies in the triangle, until all are removed",
+TEST_CASE("point tree: a point is found exactly when a remaining one lies in the triangle",
           "[io][triangulate]") {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> unit(-1, 1);
   bool same = true;
   for (int round = 0; round < 60; ++round) {
-    // A third of the clouds lies on a slanted line but for the rounding of its coordinates.
+    // A third of the clouds lies on a slanted line, except for the rounding of its coordinates.
     const bool line = round % 3 == 0;
     std::vector<glm::dvec2> points;
     for (int i = 0; i < 500; ++i) {
@@ -74,7 +74,7 @@ TEST_CASE("point tree: a point is found whenever one lies in the triangle, until
   CHECK_FALSE(PointTree({}).find_in({0, 0}, {1, 0}, {0, 1}));
 }
 
-TEST_CASE("point tree: of many points that are removed in order few are found one after another",
+TEST_CASE("point tree: few points are visited when many are removed in order",
           "[io][triangulate]") {
   constexpr std::uint32_t kPoints = 4096;
   for (const bool backwards : {false, true}) {

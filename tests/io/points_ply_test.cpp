@@ -26,7 +26,7 @@ std::vector<Surfel> read_all(const std::filesystem::path& path, std::size_t bloc
   return all;
 }
 
-// A cloud of three points with all that a point can have; the same values in each encoding.
+// A cloud of three points with every property of a point; the same values in each encoding.
 constexpr std::string_view kProperties =
     "property double x\nproperty double y\nproperty double z\n"
     "property float nx\nproperty float ny\nproperty float nz\nproperty float radius\n"
@@ -89,7 +89,7 @@ std::string gzipped(const std::filesystem::path& path, const std::string& bytes)
   return slurp(path);
 }
 
-// The refusal of a cloud of these lines, without the path.
+// Returns the error for a cloud of these lines, without the path.
 std::string fault(const Scratch& scratch, const std::string& bytes) {
   const auto path = scratch.file("fault.ply", bytes);
   std::string text = refusal([&] { static_cast<void>(read_all(path)); });
@@ -129,7 +129,7 @@ TEST_CASE("ply: ascii, both binary orders, CRLF headers and gzip give the same p
   check_cloud(read_all(scratch.path() / "f.ply.gz"));
 }
 
-TEST_CASE("ply: the size of the blocks that are asked for does not matter", "[io][points]") {
+TEST_CASE("ply: the points do not depend on the size of the requested blocks", "[io][points]") {
   const Scratch scratch;
   const auto path = scratch.file("a.ply", binary_cloud(false));
   for (std::size_t block = 1; block <= 4; ++block) check_cloud(read_all(path, block));
@@ -142,7 +142,7 @@ TEST_CASE("ply: the size of the blocks that are asked for does not matter", "[io
   CHECK(file.source->next(all) == 0);
 }
 
-TEST_CASE("ply: what a file says of itself is known before its points", "[io][points]") {
+TEST_CASE("ply: the header is known before the points are read", "[io][points]") {
   const Scratch scratch;
   const PointFileInfo full = open_points(scratch.file("a.ply", binary_cloud(false))).info;
   CHECK(full.count == 3);
@@ -183,7 +183,7 @@ TEST_CASE("ply: colours are sRGB as integers and linear as floats", "[io][points
   CHECK(albedo("float", "0.25") == 0.25);
 }
 
-TEST_CASE("ply: other names of normals and radius are known", "[io][points]") {
+TEST_CASE("ply: other names for normals and radius are recognised", "[io][points]") {
   const Scratch scratch;
   const auto path =
       scratch.file("a.ply", one_point(std::string(kXyz) +
@@ -196,7 +196,8 @@ TEST_CASE("ply: other names of normals and radius are known", "[io][points]") {
   CHECK(surfel.radius == 7);
 }
 
-TEST_CASE("ply: elements around the vertices are passed over, lists included", "[io][points]") {
+TEST_CASE("ply: elements before and after the vertices are skipped, lists included",
+          "[io][points]") {
   const Scratch scratch;
   const std::string elements =
       "element camera 2\nproperty float a\nproperty double b\n"
@@ -212,7 +213,7 @@ TEST_CASE("ply: elements around the vertices are passed over, lists included", "
   CHECK(read_all(scratch.file("b.ply", data)).at(0).position == glm::dvec3(7, 8, 9));
 }
 
-TEST_CASE("ply: a point that breaks a rule is named with its place", "[io][points]") {
+TEST_CASE("ply: a point that breaks a rule is reported with its place", "[io][points]") {
   const Scratch scratch;
   const std::string normals =
       std::string(kXyz) + "property float nx\nproperty float ny\nproperty float nz\n";
@@ -239,7 +240,7 @@ TEST_CASE("ply: a point that breaks a rule is named with its place", "[io][point
   std::string binary = binary_cloud(false);
   const std::size_t record = (binary.size() - binary.find("end_header\n") - 11) / 3;
   const std::size_t second = binary.size() - 2 * record;
-  binary.replace(second + 36, 4, raw(-1.0F));  // its radius
+  binary.replace(second + 36, 4, raw(-1.0F));  // radius of the second point
   CHECK(fault(scratch, binary) ==
         "offset " + std::to_string(second) +
             ": point 1: the radius is negative, not a number or beyond the range of float");
@@ -313,7 +314,7 @@ TEST_CASE("ply: every truncation of a binary file is refused with an offset", "[
   }
 }
 
-TEST_CASE("ply: a list cut anywhere is refused where it is cut", "[io][points]") {
+TEST_CASE("ply: a truncated list is refused at the place of the cut", "[io][points]") {
   const Scratch scratch;
   const std::string whole =
       header("binary_little_endian", "element vertex 1\n" + std::string(kXyz) +
@@ -333,7 +334,7 @@ TEST_CASE("ply: a list cut anywhere is refused where it is cut", "[io][points]")
   CHECK_THAT(fault(scratch, huge), Contains("a record has more than 64 MiB"));
 }
 
-TEST_CASE("ply: every truncation of an ascii file but of its last word is refused",
+TEST_CASE("ply: every truncation of an ascii file is refused, except inside its last word",
           "[io][points]") {
   const Scratch scratch;
   const std::string whole = ascii_cloud();
@@ -343,8 +344,7 @@ TEST_CASE("ply: every truncation of an ascii file but of its last word is refuse
   CHECK(fault(scratch, whole.substr(0, whole.size() - 1)).empty());
 }
 
-TEST_CASE("ply: a gzip file of several members, with or without padding, is read whole",
-          "[io][points]") {
+TEST_CASE("ply: a gzip file with several members, padded or not, is read whole", "[io][points]") {
   const Scratch scratch;
   const auto path = scratch.path() / "a.ply.gz";
   const std::string cloud = binary_cloud(false);
@@ -387,7 +387,7 @@ TEST_CASE("ply: every truncation and every flipped byte of a gzip file is refuse
   }
 }
 
-TEST_CASE("ply: what follows the last element is refused", "[io][points]") {
+TEST_CASE("ply: bytes after the last element are refused", "[io][points]") {
   const Scratch scratch;
   const std::string binary = binary_cloud(false);
   CHECK(fault(scratch, binary + "x") == "offset " + std::to_string(binary.size()) +
@@ -397,7 +397,7 @@ TEST_CASE("ply: what follows the last element is refused", "[io][points]") {
              EndsWith("the file has more data than its header says"));
 }
 
-TEST_CASE("ply: lines of text have exactly the values that they should", "[io][points]") {
+TEST_CASE("ply: a line of text must have exactly the values of its element", "[io][points]") {
   const Scratch scratch;
   CHECK_THAT(fault(scratch, one_point(kXyz, "1 2 3 4")),
              EndsWith("the line has more values than element 'vertex'"));
@@ -414,7 +414,7 @@ TEST_CASE("ply: lines of text have exactly the values that they should", "[io][p
   CHECK(fault(scratch, one_point(kXyz, "1e-999 -0 \t 3 \r")).empty());
 }
 
-TEST_CASE("points: which files are clouds", "[io][points]") {
+TEST_CASE("points: a file counts as a cloud by its ending and its header", "[io][points]") {
   const Scratch scratch;
   CHECK(is_point_file(scratch.file("a.ply", one_point(kXyz, "1 2 3"))));
   const auto mesh = [&](const char* element) {

@@ -29,7 +29,7 @@ std::string fault(const Scratch& scratch, const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("xyz: 3, 6, 7 and 10 values a line are read", "[io][points]") {
+TEST_CASE("xyz: lines of 3, 6, 7 and 10 values are read", "[io][points]") {
   const Scratch scratch;
   const auto info = [&](const std::string& text) {
     return open_points(scratch.file("a.xyz", text)).info;
@@ -58,7 +58,7 @@ TEST_CASE("xyz: a file without points gives none", "[io][points]") {
   }
 }
 
-TEST_CASE("xyz: lines at fault are named", "[io][points]") {
+TEST_CASE("xyz: an invalid line is reported by its number", "[io][points]") {
   const Scratch scratch;
   CHECK_THAT(fault(scratch, "1 2 3 4\n"),
              EndsWith("line 1: 4 values, but lines of XYZ have 3, 6, 7 or 10"));
@@ -88,7 +88,7 @@ TEST_CASE("xyz: every truncation gives points or a refusal that names the file",
   }
 }
 
-TEST_CASE("xyz: a line longer than the buffer is read, one beyond 64 MiB is refused",
+TEST_CASE("xyz: a line longer than the buffer is read, one above 64 MiB is refused",
           "[io][points]") {
   const Scratch scratch;
   const std::string blanks(700'000, ' ');

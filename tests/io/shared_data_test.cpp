@@ -1,4 +1,4 @@
-// Real files: counts that are known, and that nothing odd does more than be refused.
+// Real files: known counts are found, and odd files are read or refused.
 #include <iostream>
 #include <map>
 #include <vector>
@@ -35,8 +35,8 @@ std::uint64_t count_points(const std::filesystem::path& path) {
   return total;
 }
 
-// Reads a file by every reader that its folder is for; any exception but a refusal that names the
-// file fails the test. Names that say nothing are replaced by ones that choose the reader.
+// Reads a file with every reader that its folder is for; any exception except a refusal that names
+// the file fails the test. Names without an ending get one that chooses the reader.
 void survive(const Scratch& scratch, const std::string& folder, const std::filesystem::path& path) {
   const auto check = [](const std::filesystem::path& at, const auto& read) {
     const std::string text = refusal([&] { read(at); });
@@ -59,7 +59,7 @@ void survive(const Scratch& scratch, const std::string& folder, const std::files
 
 }  // namespace
 
-TEST_CASE("real meshes: triangles are as many as their sources say", "[io][shared]") {
+TEST_CASE("real meshes: the number of triangles is what their sources say", "[io][shared]") {
   const auto data = data_or_skip();
   if (!data) return;
   const std::map<std::string, std::size_t> expected = {{"dragon_vrip_res4.ply.gz", 11'102},
@@ -73,7 +73,7 @@ TEST_CASE("real meshes: triangles are as many as their sources say", "[io][share
     INFO(name);
     const MeshFile file = read_mesh(*data / "meshes" / name);
     const Mesh& mesh = file.mesh;
-    // Some have triangles without area, which are dropped.
+    // Some files have triangles without area, which are dropped.
     CHECK(mesh.triangles.size() <= count);
     CHECK(mesh.triangles.size() + count / 10 >= count);
     CHECK(mesh.material_of.size() == mesh.triangles.size());
@@ -95,7 +95,7 @@ TEST_CASE("real meshes: the camera and the lamp of a Cornell box are found", "[i
   CHECK(lamps == 1);
 }
 
-TEST_CASE("real clouds: points are as many as their sources say", "[io][shared]") {
+TEST_CASE("real clouds: the number of points is what their sources say", "[io][shared]") {
   const auto data = data_or_skip();
   if (!data) return;
   CHECK(count_points(*data / "points/cgal-building.ply") == 100'000);
@@ -126,7 +126,7 @@ TEST_CASE("real pictures: environment maps of every compression are read", "[io]
     CHECK_THROWS_AS(decode(size), DataError);
 }
 
-TEST_CASE("odd files: each is read or refused by name", "[io][shared]") {
+TEST_CASE("odd files: each file is read or refused by name", "[io][shared]") {
   const auto data = data_or_skip();
   if (!data) return;
   const Scratch scratch;

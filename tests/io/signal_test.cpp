@@ -31,7 +31,7 @@ int in_child(Body body) {
 
 }  // namespace
 
-TEST_CASE("signals: each of them removes the temporary files and ends the process as before",
+TEST_CASE("signals: a fatal signal removes the temporary files and ends the process as before",
           "[io][signal]") {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     const Scratch scratch;
@@ -52,7 +52,7 @@ TEST_CASE("signals: each of them removes the temporary files and ends the proces
   }
 }
 
-TEST_CASE("signals: an ignored one stays ignored", "[io][signal]") {
+TEST_CASE("signals: an ignored signal stays ignored", "[io][signal]") {
   const int status = in_child([] {
     std::signal(SIGHUP, SIG_IGN);
     remove_temporaries_on_signal();
@@ -62,7 +62,7 @@ TEST_CASE("signals: an ignored one stays ignored", "[io][signal]") {
   CHECK(WEXITSTATUS(status) == 77);
 }
 
-TEST_CASE("signals: one that comes while threads make and drop files leaves none behind",
+TEST_CASE("signals: a signal that arrives while threads make files leaves none behind",
           "[io][signal]") {
   for (int round = 0; round < 10; ++round) {
     const Scratch scratch;

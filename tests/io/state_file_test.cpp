@@ -1,4 +1,4 @@
-// States that are written whole, and refused when they are not.
+// States are written whole, and refused when they are not whole.
 #include "engine/io/file/state_file.h"
 
 #include <fstream>
@@ -29,7 +29,7 @@ void rewrite(const std::filesystem::path& path, const std::vector<char>& bytes) 
 
 }  // namespace
 
-TEST_CASE("state: what was put is got in the same order", "[io][state]") {
+TEST_CASE("state: values are read in the order in which they were written", "[io][state]") {
   const std::vector<std::byte> bytes = some_state();
   StateReader state(bytes, "here");
   CHECK(state.get_count(7) == 7);
@@ -43,7 +43,7 @@ TEST_CASE("state: what was put is got in the same order", "[io][state]") {
   CHECK_THROWS_WITH(again.get_count(6), Catch::Contains("out of range"));
 }
 
-TEST_CASE("state: every proper prefix ends too early", "[io][state]") {
+TEST_CASE("state: every proper prefix is refused as cut short", "[io][state]") {
   const std::vector<std::byte> bytes = some_state();
   for (std::size_t n = 0; n < bytes.size(); ++n) {
     const std::vector<std::byte> prefix(bytes.begin(),
@@ -82,7 +82,7 @@ TEST_CASE("state: a file that is cut, longer or has a flipped bit is refused", "
   CHECK_THROWS_AS(read_state(path), DataError);
 }
 
-TEST_CASE("lock: one at a time holds a file", "[io][state]") {
+TEST_CASE("lock: only one lock at a time holds a file", "[io][state]") {
   const Scratch scratch;
   const std::filesystem::path path = scratch.path() / "locked";
   {
@@ -90,7 +90,7 @@ TEST_CASE("lock: one at a time holds a file", "[io][state]") {
     CHECK_THROWS_WITH(FileLock(path),
                       Catch::Contains(path.string()) && Catch::Contains("another program"));
     std::filesystem::remove(path);
-    const FileLock other(path);  // of another file with that name
+    const FileLock other(path);  // locks another file with the same name
     CHECK(std::filesystem::exists(path));
   }
   const FileLock again(path);

@@ -32,7 +32,7 @@ std::string fault(const Scratch& scratch, const std::string& bytes) {
 
 }  // namespace
 
-TEST_CASE("stl: text and binary are told apart by their size", "[io][mesh]") {
+TEST_CASE("stl: text and binary are distinguished by their size", "[io][mesh]") {
   const Scratch scratch;
   const Mesh text = read_mesh(scratch.file("a.STL", kText)).mesh;
   REQUIRE(text.triangles.size() == 1);

@@ -1,4 +1,4 @@
-// Polygons to triangles: same area, same winding, nothing outside.
+// Cutting polygons into triangles: same area, same winding, nothing outside.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -23,7 +23,7 @@ glm::dvec3 area_vector(const Polygon& p) {
   return sum / 2.0;
 }
 
-// The triangles cover the polygon once: the oriented areas and the sizes have the same sum.
+// Checks that the triangles cover the polygon once: oriented areas and sizes have the same sum.
 void check_cover(const Polygon& polygon) {
   Triangles triangles;
   triangulate(polygon, triangles);
@@ -40,7 +40,7 @@ void check_cover(const Polygon& polygon) {
   CHECK(size == Approx(glm::length(expected)).epsilon(1e-9));
 }
 
-// Cuts ears by asking every corner about every other, without any bound on the work.
+// Cuts ears by testing every corner against every other, without any bound on the work.
 class PlainClipper {
  public:
   explicit PlainClipper(const Polygon& polygon) : at_(polygon) {
@@ -53,7 +53,7 @@ class PlainClipper {
 
   Triangles clip() {
     Triangles triangles;
-    std::size_t at = 0;  // in the ring
+    std::size_t at = 0;  // place in the ring
     for (std::size_t passed = 0; ring_.size() > 3 && passed < ring_.size();) {
       const std::size_t n = ring_.size();
       const std::uint32_t a = ring_[(at + n - 1) % n], b = ring_[at], c = ring_[(at + 1) % n];
@@ -95,7 +95,7 @@ class PlainClipper {
   std::vector<bool> inward_;
 };
 
-// Flat, counter-clockwise as a whole, with its first corner at the origin: as it is projected.
+// Returns the polygon as it is projected: flat, counter-clockwise, its first corner at the origin.
 Polygon normal_form(Polygon polygon) {
   if (area_vector(polygon).z < 0) std::ranges::reverse(polygon);
   const glm::dvec3 base = polygon[0];
@@ -108,7 +108,7 @@ glm::dvec3 on_circle(double turns, double radius) {
   return {radius * std::cos(angle), radius * std::sin(angle), 0};
 }
 
-// Teeth of random depth or of the same.
+// A comb whose teeth have random depths or the same depth.
 Polygon comb(std::size_t corners, std::optional<std::uint32_t> seed = {}) {
   Polygon polygon{{0, 0, 0}, {1, 0, 0}};
   std::mt19937 random(seed.value_or(0));
@@ -132,7 +132,7 @@ Polygon spiral(std::size_t corners, double turns) {
   return polygon;
 }
 
-// Every other corner inwards; or each at random.
+// A star: every other corner lies inwards, or each at random.
 Polygon star(std::size_t corners, double inner, std::optional<std::uint32_t> seed = {}) {
   Polygon polygon;
   std::mt19937 random(seed.value_or(0));
@@ -144,7 +144,7 @@ Polygon star(std::size_t corners, double inner, std::optional<std::uint32_t> see
   return polygon;
 }
 
-// So many sides with corners along them, which lie on a line but for rounding.
+// A regular polygon with corners along its sides, which lie on a line except for rounding.
 Polygon dotted_sides(std::size_t corners, int sides) {
   Polygon polygon;
   const auto each = static_cast<int>(corners) / sides;
@@ -225,9 +225,8 @@ TEST_CASE("triangulate: random stars of any number of corners are covered once",
   }
 }
 
-TEST_CASE(
-    "triangulate: the triangles and their order are those of asking every corner about every other",
-    "[io][triangulate]") {
+TEST_CASE("triangulate: triangles and their order equal those of testing every pair of corners",
+          "[io][triangulate]") {
   std::mt19937 random(7);
   std::vector<Polygon> polygons;
   for (std::uint32_t i = 0; i < 60; ++i) {
@@ -248,7 +247,7 @@ TEST_CASE(
   CHECK(different == 0);
 }
 
-TEST_CASE("triangulate: half a million corners are covered once and take few looks",
+TEST_CASE("triangulate: half a million corners are covered once with few tests",
           "[io][triangulate]") {
   constexpr std::size_t kCorners = 500'000;
   const double line = 8 * std::log2(kCorners);
@@ -274,7 +273,7 @@ TEST_CASE("triangulate: half a million corners are covered once and take few loo
   check(star(kCorners, 0.1, 1), 2 * std::sqrt(kCorners));
 }
 
-TEST_CASE("triangulate: half a million corners of a polygon that cuts itself take few looks",
+TEST_CASE("triangulate: a self-intersecting polygon of half a million corners takes few tests",
           "[io][triangulate]") {
   constexpr std::size_t kCorners = 500'000;
   Polygon rose, walk{glm::dvec3(0)};
@@ -293,8 +292,7 @@ TEST_CASE("triangulate: half a million corners of a polygon that cuts itself tak
   }
 }
 
-TEST_CASE("triangulate: after the most looks that are allowed the rest becomes a fan",
-          "[io][triangulate]") {
+TEST_CASE("triangulate: after the maximum of tests the rest becomes a fan", "[io][triangulate]") {
   const Polygon polygon = star(2000, 0.1, 1);
   Triangles all;
   const TriangulationCounts whole = triangulate(polygon, all);
@@ -304,13 +302,13 @@ TEST_CASE("triangulate: after the most looks that are allowed the rest becomes a
     CHECK(triangles.size() == all.size());
     CHECK(counts.looks <= whole.looks);
     CHECK(counts.fan_corners > 3);
-    // Up to there the ears are the same.
+    // The ears are the same up to that point.
     const auto ears = static_cast<std::ptrdiff_t>(polygon.size() - counts.fan_corners);
     CHECK(std::equal(triangles.begin(), triangles.begin() + ears, all.begin()));
   }
 }
 
-TEST_CASE("triangulate: what is no polygon gives no triangle, what is no simple one still ends",
+TEST_CASE("triangulate: fewer than three corners give no triangle, random ones still end",
           "[io][triangulate]") {
   Triangles triangles;
   triangulate({}, triangles);

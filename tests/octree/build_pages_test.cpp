@@ -18,7 +18,7 @@
 using namespace ptc;
 using namespace ptc::test;
 
-TEST_CASE("build: a container gives its points back in order", "[build]") {
+TEST_CASE("build: a container returns its points in order", "[build]") {
   const TemporaryDirectory dir;
   const std::vector<Surfel> surfels = random_surfels(3000, 7);
   const SortedScene scene = sort_scene(surfels);
@@ -46,7 +46,7 @@ TEST_CASE("build: a container gives its points back in order", "[build]") {
   }
 }
 
-TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
+TEST_CASE("build: the block size of the stream changes no byte of the container", "[build]") {
   const TemporaryDirectory dir;
   const SortedScene scene = sort_scene(random_surfels(5000, 8));
   const auto write = [&](const std::string& name, std::size_t block) {
@@ -60,7 +60,8 @@ TEST_CASE("build: the block size of the stream changes no byte", "[build]") {
   CHECK(bytes_of(dir / "one.ptcx") == bytes_of(dir / "all.ptcx"));
 }
 
-TEST_CASE("build: radii of points from any one on are those of all", "[build][checkpoint]") {
+TEST_CASE("build: radii estimated from any point on equal those of a full pass",
+          "[build][checkpoint]") {
   SortedScene scene = sort_scene(random_surfels(140'000, 6));
   for (PointRecord& record : scene.records) record.radius = 0;
   const auto radii = [&](std::uint64_t first) {
@@ -87,7 +88,7 @@ TEST_CASE("build: radii of points from any one on are those of all", "[build][ch
   }
 }
 
-TEST_CASE("build: when the stream fails no page is on its way any more", "[build]") {
+TEST_CASE("build: no page is still being written after the stream failed", "[build]") {
   const TemporaryDirectory dir;
   const SortedScene scene = sort_scene(random_surfels(200'000, 9));
   struct Failing : PointStream {
@@ -104,7 +105,7 @@ TEST_CASE("build: when the stream fails no page is on its way any more", "[build
     ContainerWriter writer(dir / "a.ptcx", {.frame = scene.frame});
     Failing stream(scene.records);
     Progress silent;
-    // The executor is gone before the writer is: pages that were still being compressed would use
+    // The executor is destroyed before the writer: pages that are still being compressed would use
     // it.
     CHECK_THROWS_WITH(build_pages(stream, writer, {}, ThreadPool(2), silent), "the stream failed");
     const std::uintmax_t bytes = written();
@@ -123,7 +124,7 @@ TEST_CASE("build: a container without points has no root", "[build]") {
   CHECK(reader.point_pages().empty());
 }
 
-TEST_CASE("radius: discs of an even grid come to circumscribe its cells", "[build][radius]") {
+TEST_CASE("radius: discs of an even grid circumscribe its cells", "[build][radius]") {
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {0, 0, 0}, {300, 0, 0}, {0, 300, 0}, 1, glm::vec3(1));
   for (Surfel& s : surfels) s.radius = 0;
@@ -166,8 +167,9 @@ TEST_CASE("radius: given radii stay, coincident points get the median", "[build]
 
 namespace {
 
-/// Radii of up to 2^16 points by their definition, in lattice units: every point against every one.
-/// @param each  whether the points of a place count each or as one
+/// Returns the radii of up to 2^16 points by their definition, in lattice units: every point
+/// against every other.
+/// @param each  true: coincident points count each; false: they count as one
 std::vector<double> plain_radii(const std::vector<PointRecord>& records, bool each) {
   std::vector<std::array<double, 3>> all, others;
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -213,7 +215,7 @@ Estimated estimate(const SortedScene& scene) {
   return estimated;
 }
 
-/// So many points at random in the unit cube, and so many more in the places of some of them.
+/// Returns random points in the unit cube, and more points in the places of some of them.
 SortedScene stacked_scene(std::size_t places, std::size_t more, std::size_t shared) {
   std::vector<Surfel> surfels = random_surfels(places, 3);
   for (std::size_t i = 0; i < more; ++i) surfels.push_back(surfels[i * i % shared]);
@@ -223,7 +225,7 @@ SortedScene stacked_scene(std::size_t places, std::size_t more, std::size_t shar
 
 }  // namespace
 
-TEST_CASE("radius: radii are those of their definition to the bit, whatever lies in one place",
+TEST_CASE("radius: radii equal their definition to the bit, however many points coincide",
           "[build][radius]") {
   for (const auto& [places, more, shared] :
        {std::array{1500, 0, 1}, std::array{1000, 900, 1000}, std::array{1000, 500, 40},
@@ -256,7 +258,7 @@ TEST_CASE("radius: radii are those of their definition to the bit, whatever lies
   }
 }
 
-TEST_CASE("radius: points that lie ten in each place get radii that let places reach each other",
+TEST_CASE("radius: points that coincide ten by ten get radii that reach the neighbouring places",
           "[build][radius]") {
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {0, 0, 0}, {60, 0, 0}, {0, 60, 0}, 1, glm::vec3(1));
@@ -271,7 +273,7 @@ TEST_CASE("radius: points that lie ten in each place get radii that let places r
   }
 }
 
-TEST_CASE("radius: neighbours are searched once or twice for a place, however many points it has",
+TEST_CASE("radius: each place is searched for neighbours once or twice, however many points it has",
           "[build][radius]") {
   const Estimated lone = estimate(stacked_scene(1, 199'999, 1));
   CHECK(lone.counts.searches <= 8);  // two for each chunk

@@ -1,4 +1,4 @@
-// Builds that end at a checkpoint and go on from it.
+// Builds that end at a checkpoint and are continued from it.
 #include <memory>
 #include <optional>
 
@@ -25,7 +25,7 @@ struct Saved {
   std::vector<std::byte> state;
 };
 
-/// Rounded points with radii, in the pages of one profile or another.
+/// Rounded points with radii, and builds of them under any profile.
 struct Setting {
   std::uint8_t page_shift = 12;
   BuildOptions tree;
@@ -37,7 +37,7 @@ class Rebuild {
   Rebuild(const SortedScene& scene, const Setting& setting)
       : scene_(scene), setting_(setting), executor_(setting.threads) {}
 
-  /// Builds from a checkpoint or from the first point on; stops after so many checkpoints.
+  /// Builds from a checkpoint or from the first point on; stops after this many checkpoints.
   void run(const std::filesystem::path& target, const std::filesystem::path& partial,
            const std::optional<Saved>& from, std::size_t most = kPoints) {
     const WriterOptions options{
@@ -77,8 +77,8 @@ SortedScene scene_without_radii() {
     scene.records[100'000 + i].key = scene.records[100'000].key;  // split by rank
   std::ranges::stable_sort(scene.records, {}, &PointRecord::key);
   for (PointRecord& record : scene.records) record.radius = 0;
-  // Behind a point that is not rounded lies one that may not go in front of it: the key before
-  // counts in every block.
+  // After a point that is not rounded comes one that must not move in front of it: the previous key
+  // matters in every block.
   for (std::size_t i = 2; i < kPoints; i += 2) {
     PointRecord &before = scene.records[i - 1], &record = scene.records[i];
     if (before.key == record.key) continue;
@@ -92,7 +92,8 @@ SortedScene scene_without_radii() {
 
 }  // namespace
 
-TEST_CASE("checkpoint: a build goes on from each to the same bytes", "[build][checkpoint]") {
+TEST_CASE("checkpoint: a build continued from any checkpoint gives the same bytes",
+          "[build][checkpoint]") {
   const TemporaryDirectory dir;
   const SortedScene scene = scene_without_radii();
   for (const Setting& setting :
@@ -106,7 +107,8 @@ TEST_CASE("checkpoint: a build goes on from each to the same bytes", "[build][ch
       Rebuild first(scene, setting);
       CHECK_THROWS_WITH(first.run(dir / "again.ptcx", dir / "pages", {}, k), "killed");
       CHECK_FALSE(std::filesystem::exists(dir / "again.ptcx"));
-      std::filesystem::resize_file(dir / "pages", 100 << 20);  // what lies behind is cut
+      std::filesystem::resize_file(dir / "pages",
+                                   100 << 20);  // the bytes beyond the state are cut off
       Setting other = setting;
       other.threads = 3 - setting.threads;
       Rebuild second(scene, other);
@@ -154,7 +156,7 @@ TEST_CASE("checkpoint: every prefix of a state is refused", "[build][checkpoint]
   }
 }
 
-TEST_CASE("checkpoint: an unfinished container that is not what it was is refused",
+TEST_CASE("checkpoint: an unfinished container that was changed is refused",
           "[build][checkpoint]") {
   const TemporaryDirectory dir;
   const SortedScene scene = scene_without_radii();

@@ -16,7 +16,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// Keeps groups; references count up in page and slot.
+/// A sink that keeps groups; references count up in page and slot.
 struct KeptGroups {
   std::vector<NodeGroup> groups;
   ChildRef add(const NodeGroup& group) {
@@ -44,8 +44,7 @@ Tree build(const std::vector<PointRecord>& records, std::uint32_t leaf_points, d
   return tree;
 }
 
-/// Keeps what a builder emits, with the numbers of groups for references, as SubtreeGroups has
-/// them.
+/// A sink that keeps what a builder emits, with group numbers as references, as SubtreeGroups does.
 struct Emitted : GroupSink {
   SubtreeGroups out;
   ChildRef add(const GroupView& group, std::uint64_t end) override {
@@ -56,7 +55,7 @@ struct Emitted : GroupSink {
   }
 };
 
-/// The groups of one builder given `block` points at a time, and its result.
+/// The groups and the result of one builder that is given `block` points at a time.
 std::pair<SubtreeGroups, OctreeBuilder::Result> streamed(std::span<const PointRecord> records,
                                                          std::uint32_t leaf_points,
                                                          std::size_t block, unsigned threads) {
@@ -73,13 +72,13 @@ std::pair<SubtreeGroups, OctreeBuilder::Result> streamed(std::span<const PointRe
 bool equal(const SubtreeGroups& a, const SubtreeGroups& b) {
   return std::ranges::equal(
       a.groups, b.groups, [&](const SubtreeGroups::Group& x, const SubtreeGroups::Group& y) {
-        const std::size_t size = std::min(x.size, y.size);  // the one that is padded is longer
+        const std::size_t size = std::min(x.size, y.size);  // the padded one is longer
         return x.end == y.end && std::ranges::equal(std::span(a.bytes).subspan(x.begin, size),
                                                     std::span(b.bytes).subspan(y.begin, size));
       });
 }
 
-/// The octree by definition, top down: the leaves as (first, count), in order.
+/// Returns the leaves of the octree by its top-down definition, as (first, count), in order.
 void expected_leaves(const std::vector<PointRecord>& records, std::uint64_t first,
                      std::uint64_t count, std::uint32_t leaf_points,
                      std::vector<std::pair<std::uint64_t, std::uint64_t>>& leaves) {
@@ -88,7 +87,7 @@ void expected_leaves(const std::vector<PointRecord>& records, std::uint64_t firs
     return;
   }
   const int level = common_level(records[first].key, records[first + count - 1].key);
-  REQUIRE(level < kLatticeBits);  // no coincident cell with more than leaf_points in this test
+  REQUIRE(level < kLatticeBits);  // this test has no coincident cell of more than leaf_points
   for (std::uint64_t begin = first; begin < first + count;) {
     std::uint64_t end = begin + 1;
     while (end < first + count &&
@@ -117,7 +116,7 @@ std::vector<std::pair<std::uint64_t, std::uint64_t>> leaves_of(const Tree& tree)
 
 }  // namespace
 
-TEST_CASE("octree: leaves are those of the top-down definition", "[build][octree]") {
+TEST_CASE("octree: leaves equal those of the top-down definition", "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(5000, 1));
   for (const std::uint32_t leaf_points : {1U, 2U, 8U, 100U, 4999U}) {
     const Tree tree = build(scene.records, leaf_points, scene.frame.unit());
@@ -127,7 +126,7 @@ TEST_CASE("octree: leaves are those of the top-down definition", "[build][octree
   }
 }
 
-TEST_CASE("octree: a group's cell holds all its points and no deeper cell does",
+TEST_CASE("octree: a group's cell is the deepest one that holds all its points",
           "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(3000, 2));
   const Tree tree = build(scene.records, 4, scene.frame.unit());
@@ -152,7 +151,7 @@ TEST_CASE("octree: a group's cell holds all its points and no deeper cell does",
   CHECK(last == scene.records.size());
 }
 
-TEST_CASE("octree: spheres hold every disc below them and sums agree with the points",
+TEST_CASE("octree: spheres contain every disc below them, and sums agree with the points",
           "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(2000, 3));
   const double unit = scene.frame.unit();
@@ -203,7 +202,7 @@ TEST_CASE("octree: a million coincident points split by rank into full leaves", 
   CHECK(tree.root.node.area == Approx(0.5e6));
 }
 
-TEST_CASE("octree: up to leaf_points points make a root group with one leaf", "[build][octree]") {
+TEST_CASE("octree: at most leaf_points points make a root group with one leaf", "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(8, 4));
   for (std::size_t count = 1; count <= 8; ++count) {
     const auto [groups, result] = streamed(std::span(scene.records).first(count), 8, 3, 1);
@@ -225,7 +224,7 @@ TEST_CASE("octree: up to leaf_points points make a root group with one leaf", "[
 TEST_CASE("octree: blocks and threads change neither groups nor their order", "[build][octree]") {
   std::vector<PointRecord> spread = sort_scene(random_surfels(30'000, 5)).records;
   std::vector<PointRecord> heaps =
-      spread;  // heaps of coincident points of any size, alone and among others
+      spread;  // sets of coincident points of any size, alone and among others
   std::size_t at = 0;
   for (const std::size_t count : {1U, 2U, 7U, 8U, 9U, 600U, 4095U, 4096U, 4097U, 9000U}) {
     for (std::size_t i = 1; i < count; ++i) heaps[at + i].key = heaps[at].key;
@@ -249,7 +248,7 @@ TEST_CASE("octree: blocks and threads change neither groups nor their order", "[
   }
 }
 
-TEST_CASE("octree: points that coincide far from the corner have their mean where they are",
+TEST_CASE("octree: the mean of points that coincide far from the corner is their place",
           "[build][octree]") {
   std::vector<PointRecord> points(1000);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -264,7 +263,7 @@ TEST_CASE("octree: points that coincide far from the corner have their mean wher
   }
 }
 
-TEST_CASE("octree: points without area or with opposite normals still have a middle and a cone",
+TEST_CASE("octree: points without area or with opposite normals still have a mean and a cone",
           "[build][octree]") {
   std::vector<PointRecord> points(2);
   points[0].key = encode_morton({0, 0, 0});
@@ -281,7 +280,7 @@ TEST_CASE("octree: points without area or with opposite normals still have a mid
   CHECK(opposite.facing[1] == Approx(2));
 }
 
-TEST_CASE("octree: the slab of a plane is thin, of opposite normals as thick as the sphere",
+TEST_CASE("octree: the slab of a plane is thin, that of opposite normals as thick as the sphere",
           "[build][octree]") {
   std::vector<PointRecord> points(64);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -291,7 +290,7 @@ TEST_CASE("octree: the slab of a plane is thin, of opposite normals as thick as 
   }
   const NodeSummary plane = summarise_points(points, 1);
   CHECK(plane.thickness == 0);
-  points[0].normal = encode_octahedral({0, 0.6F, 0.8F});  // a disc on a slant
+  points[0].normal = encode_octahedral({0, 0.6F, 0.8F});  // a slanted disc
   CHECK(summarise_points(points, 1).thickness == Approx(3 * 0.6).epsilon(0.02));
   points[0].normal = encode_octahedral({0, 0, 1});
   points[0].key = encode_morton({1000, 2000, 507});  // a disc above
@@ -301,7 +300,7 @@ TEST_CASE("octree: the slab of a plane is thin, of opposite normals as thick as 
   above.mean[2] += 10;
   const std::array<const NodeSummary*, 2> sheets{&plane, &above};
   CHECK(summarise_nodes(sheets).thickness == Approx(5));
-  NodeSummary turned = plane;  // a wall beside the floor
+  NodeSummary turned = plane;  // a wall next to the floor
   std::swap(turned.facing[0], turned.facing[4]);
   const std::array<const NodeSummary*, 2> corner{&plane, &turned};
   const NodeSummary crease = summarise_nodes(corner);
@@ -312,7 +311,7 @@ TEST_CASE("octree: the slab of a plane is thin, of opposite normals as thick as 
   CHECK(summarise_nodes(pair).thickness == summarise_nodes(pair).radius);
 }
 
-TEST_CASE("octree: cones hold every normal to the last bit", "[build][octree]") {
+TEST_CASE("octree: cones contain every normal to the last bit", "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(20'000, 5));
   const auto holds = [](const NodeSummary& node, const PointRecord& p) {
     const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);

@@ -1,4 +1,4 @@
-// Rounded points: within the bounds that are told, in order, and rounded only once.
+// Rounded points: within the documented bounds, in order, and rounded only once.
 #include "engine/octree/rounding.h"
 
 #include <algorithm>
@@ -32,7 +32,8 @@ std::vector<PointRecord> rounded(const std::vector<PointRecord>& records, const 
   return out;
 }
 
-/// Surfels whose radii differ by 2^20 and that lie in heaps, so that rounded cells meet.
+/// Surfels whose radii differ by factors up to 2^20 and that lie in heaps, so that rounded cells
+/// meet.
 std::vector<Surfel> heaps() {
   std::vector<Surfel> surfels = random_surfels(20000, 5);
   for (std::size_t i = 0; i < surfels.size(); ++i) {
@@ -46,13 +47,14 @@ std::vector<Surfel> heaps() {
 
 }  // namespace
 
-TEST_CASE("rounding: a point does not depend on which others come with it", "[build][rounding]") {
+TEST_CASE("rounding: a point is rounded the same, whatever block it comes in",
+          "[build][rounding]") {
   SortedScene scene = sort_scene(heaps());
   const std::vector<PointRecord> one = rounded(scene.records, scene.frame, 1);
   const std::vector<PointRecord> all = rounded(scene.records, scene.frame, scene.records.size());
   CHECK(std::ranges::equal(one, all, {}, &PointRecord::key, &PointRecord::key));
   std::size_t moved_by_others =
-      0;  // else the pieces that are rounded side by side would not matter
+      0;  // points moved by an earlier one: without any, the blocks could not matter
   for (std::size_t i = 1; i < all.size(); ++i) {
     moved_by_others += rounded({scene.records[i]}, scene.frame, 1)[0].key != all[i].key;
   }
@@ -88,14 +90,14 @@ TEST_CASE("rounding: points stay in order and within the bounds", "[build][round
   CHECK(radius <= kRoundedRadius);
   CHECK(normal <= kRoundedNormal);
   CHECK(radiance <= kRoundedRadiance);
-  // Bounds that say something: half of them is not enough.
+  // The bounds are tight: half of them would be too small.
   CHECK(position > 0.5 * kRoundedPosition);
   CHECK(radius > 0.5 * kRoundedRadius);
   CHECK(normal > 0.5 * kRoundedNormal);
   CHECK(radiance > 0.5 * kRoundedRadiance);
 }
 
-TEST_CASE("rounding: what is rounded stays, and blocks do not matter", "[build][rounding]") {
+TEST_CASE("rounding: rounded points stay as they are, whatever the blocks", "[build][rounding]") {
   const SortedScene scene = sort_scene(heaps());
   const std::vector<PointRecord> once = rounded(scene.records, scene.frame);
   const auto same = [&](const std::vector<PointRecord>& other) {
@@ -108,7 +110,8 @@ TEST_CASE("rounding: what is rounded stays, and blocks do not matter", "[build][
   CHECK(same(rounded(scene.records, scene.frame, 1)));
 }
 
-TEST_CASE("rounding: axes, ends of ranges and points without radius stay", "[build][rounding]") {
+TEST_CASE("rounding: axes, range ends and points without radius stay as they are",
+          "[build][rounding]") {
   Frame frame;
   std::vector<PointRecord> records(5);
   for (std::size_t i = 0; i < records.size(); ++i)

@@ -1,4 +1,4 @@
-// Loops on a bounded pool.
+// Parallel loops on a bounded pool of threads.
 #include "engine/parallel/thread_pool.h"
 
 #include <atomic>
@@ -17,14 +17,15 @@ namespace {
 
 constexpr unsigned kThreadCounts[] = {1, 2, 3, 8};
 
-// Long enough for the other threads to arrive.
+// Waits long enough for the other threads to arrive.
 void linger() {
   std::this_thread::sleep_for(std::chrono::microseconds(200));
 }
 
 }  // namespace
 
-TEST_CASE("executor: it has as many threads as asked for, or as the machine", "[base][executor]") {
+TEST_CASE("executor: it has as many threads as requested, or as the machine has cores",
+          "[base][executor]") {
   for (const unsigned threads : kThreadCounts) CHECK(ThreadPool(threads).threads() == threads);
   CHECK(ThreadPool(0).threads() >= 1);
 }
@@ -53,7 +54,7 @@ TEST_CASE("executor: ranges are the aligned pieces of the count", "[base][execut
       }
     CHECK_THROWS_AS(executor.for_ranges(1, 0, [](std::size_t, std::size_t) {}),
                     std::invalid_argument);
-    std::size_t pieces = 0;  // begin + grain would wrap
+    std::size_t pieces = 0;  // begin + grain would overflow
     executor.for_ranges(10, SIZE_MAX, [&](std::size_t, std::size_t end) { pieces += end; });
     CHECK(pieces == 10);
   }
@@ -71,7 +72,7 @@ TEST_CASE("executor: a thread index is in range and never used twice at a time",
       for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
       }
       linger();
-      // On a loaded machine the second thread may be late: it is waited for, 10 s at most.
+      // On a loaded machine the second thread may be late: wait for it, at most 10 s.
       for (int i = 0; threads > 1 && most < 2 && i < 10'000; ++i) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }
@@ -104,7 +105,8 @@ TEST_CASE("executor: a nested loop keeps its thread's index and runs no outer bo
   }
 }
 
-TEST_CASE("executor: calls from threads of its user neither deadlock nor mix", "[base][executor]") {
+TEST_CASE("executor: concurrent calls from the caller's own threads neither deadlock nor mix",
+          "[base][executor]") {
   const ThreadPool executor(2);
   std::vector<std::thread> users;
   std::atomic<std::size_t> sum = 0;
@@ -134,7 +136,7 @@ TEST_CASE("executor: the exception of a body reaches the caller and stops the lo
     CHECK(begun < 50000);
     CHECK_THROWS_AS(executor.for_each(1, [](std::size_t, unsigned) { throw 1; }), int);
 
-    std::atomic<int> after = 0;  // it can be used again
+    std::atomic<int> after = 0;  // the executor can be used again
     executor.for_each(10, [&](std::size_t, unsigned) { ++after; });
     CHECK(after == 10);
   }
@@ -153,7 +155,7 @@ TEST_CASE("executor: an exception passes through nested loops", "[base][executor
   }
 }
 
-TEST_CASE("executor: what a body wrote is seen by the caller", "[base][executor]") {
+TEST_CASE("executor: the caller sees everything that the bodies wrote", "[base][executor]") {
   for (const unsigned threads : kThreadCounts) {
     const ThreadPool executor(threads);
     std::vector<int> values(5000, 0);

@@ -1,4 +1,4 @@
-// Emissive triangles, against the form factor of a rectangle.
+// Emissive triangles, compared with the form factor of a rectangle.
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -14,8 +14,9 @@ namespace {
 
 const glm::vec3 kUp(0, 1, 0);
 
-// Form factor from a small patch to a parallel rectangle a x b at distance c, a corner over it.
-// Source: Howell, A catalog of radiation heat transfer configuration factors, B-4.
+// Returns the form factor from a small patch to a parallel rectangle a x b at distance c, one
+// corner of which lies over the patch. Source: Howell, A catalog of radiation heat transfer
+// configuration factors, B-4.
 double corner_factor(double a, double b, double c) {
   const double x = a / c;
   const double y = b / c;
@@ -24,7 +25,7 @@ double corner_factor(double a, double b, double c) {
   return (x / hx * std::atan(y / hx) + y / hy * std::atan(x / hy)) / (2 * kPiDouble);
 }
 
-// A square lamp of half width h at a height, which looks down, made of n x n quads.
+// A square lamp of half width h at a height, which faces down, made of n x n quads.
 Mesh lamp(float h, float height, int n, const glm::vec3& radiance) {
   Mesh mesh = ground(50);
   mesh.materials.emplace_back();
@@ -68,7 +69,7 @@ TEST_CASE("area light: a square overhead gives pi times radiance times its form 
       const DirectLight light(scene, {});
       const double expected = 2 * kPiDouble * 4 * corner_factor(1, 1, static_cast<double>(height));
       const Spread found = irradiance(light, {0, 0, 0}, kUp, 400);
-      // Of many emitters, few are drawn that are near: noise, until all are near or all are far.
+      // Few near emitters are sampled among many far ones: this is noisy until all are near or far.
       const bool is_noisy = n == 12 && height < 0.1f;
       CHECK(found.mean == Approx(expected).epsilon(is_noisy ? 0.15 : 0.02));
       CHECK(found.deviation < (is_noisy ? 1 : 0.25) * expected);
@@ -76,28 +77,28 @@ TEST_CASE("area light: a square overhead gives pi times radiance times its form 
   }
 }
 
-TEST_CASE("area light: beside and beyond the lamp it is exact as well", "[scene][lights]") {
+TEST_CASE("area light: the light is exact next to the lamp and beyond it, too", "[scene][lights]") {
   const Mesh mesh = lamp(1, 1, 2, glm::vec3(1));
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
   for (const double x : {0.5, 1.0, 2.0, 6.0}) {
-    // Rectangles with a corner over the point: to x + 1, less to x - 1 (its sign included).
+    // Subtract the rectangle to x - 1 from the one to x + 1; both have a corner over the point.
     const double near = std::copysign(corner_factor(std::abs(x - 1), 1, 1), x - 1);
     const double expected = kPiDouble * 2 * (corner_factor(x + 1, 1, 1) - (x == 1 ? 0 : near));
     CHECK(irradiance(light, {x, 0, 0}, kUp, 400).mean == Approx(expected).epsilon(0.02));
   }
 }
 
-TEST_CASE("area light: a wall that the lamp stands on gets its part above the horizon",
+TEST_CASE("area light: a floor gets the light of the part of a lamp above its horizon",
           "[scene][lights]") {
-  // A lamp that looks along -x, from the floor up, seen from the floor.
+  // A lamp that faces -x and reaches through the floor, seen from the floor.
   Mesh mesh = ground(50);
   mesh.materials.emplace_back();
   mesh.materials[1].emission = glm::vec3(1);
   add_quad(mesh, {1, -2, -1}, {0, 0, 2}, {0, 4, 0}, 1);
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
-  // Patch square to a rectangle of height a and width b from its foot on, at distance c (Howell
+  // The patch is perpendicular to a rectangle of height a and width b, at distance c (Howell
   // B-5): (atan(b / c) - c / sqrt(a^2 + c^2) atan(b / sqrt(a^2 + c^2))) / 2 pi; twice, for both
   // sides.
   const double diagonal = std::sqrt(5.0);
@@ -105,7 +106,7 @@ TEST_CASE("area light: a wall that the lamp stands on gets its part above the ho
   CHECK(irradiance(light, {0, 0, 0}, kUp, 400).mean == Approx(kPiDouble * factor).epsilon(0.02));
 }
 
-TEST_CASE("area light: it shines on its front side only", "[scene][lights]") {
+TEST_CASE("area light: a lamp shines on its front side only", "[scene][lights]") {
   Mesh mesh = lamp(1, 1, 1, glm::vec3(1));
   mesh.materials[1].double_sided = true;
   const RayScene scene(mesh);
@@ -115,7 +116,7 @@ TEST_CASE("area light: it shines on its front side only", "[scene][lights]") {
   CHECK(light.irradiance({0.3, 1, 0.2}, -kUp, {}, 1).local == glm::vec3(0));  // on itself
 }
 
-TEST_CASE("area light: what stands between hides it", "[scene][lights]") {
+TEST_CASE("area light: an object in between hides the lamp", "[scene][lights]") {
   Mesh mesh = lamp(1, 2, 1, glm::vec3(1));
   add_quad(mesh, {-5, 1, -5}, {5, 0, 0}, {0, 0, 10});  // the half x < 0
   const RayScene scene(mesh);
@@ -125,7 +126,7 @@ TEST_CASE("area light: what stands between hides it", "[scene][lights]") {
   CHECK(light.irradiance({-3, 0, 0}, kUp, {}, 1).local == glm::vec3(0));
 }
 
-TEST_CASE("area light: lamps of different power give the sum of each", "[scene][lights]") {
+TEST_CASE("area light: lamps of different power add up", "[scene][lights]") {
   Mesh mesh = ground(50);
   double expected = 0;
   Random random(1);
@@ -162,7 +163,7 @@ TEST_CASE("area light: ten million metres away the light is the same", "[scene][
   }
 }
 
-TEST_CASE("area light: degenerate and black emitters give nothing", "[scene][lights]") {
+TEST_CASE("area light: degenerate and black emitters give no light", "[scene][lights]") {
   Mesh mesh = ground(1);
   mesh.materials.emplace_back();
   mesh.materials[1].emission = glm::vec3(1);

@@ -48,7 +48,7 @@ TEST_CASE("camera: the pixel angle is the angle between rays through neighbourin
   CHECK(camera.pixel_angle() == Approx(std::atan2(sine, cosine)).epsilon(1e-3));
 }
 
-TEST_CASE("camera: it has unit directions wherever it looks", "[scene][camera]") {
+TEST_CASE("camera: directions are unit vectors wherever the camera looks", "[scene][camera]") {
   Random random(1);
   for (int i = 0; i < 200; ++i) {
     Camera camera;
@@ -61,7 +61,7 @@ TEST_CASE("camera: it has unit directions wherever it looks", "[scene][camera]")
   }
 }
 
-TEST_CASE("camera: its JSON comes back exactly", "[scene][camera]") {
+TEST_CASE("camera: a camera written as JSON is read back exactly", "[scene][camera]") {
   Random random(2);
   for (int i = 0; i < 200; ++i) {
     Camera camera;
@@ -81,7 +81,7 @@ TEST_CASE("camera: its JSON comes back exactly", "[scene][camera]") {
   }
 }
 
-TEST_CASE("camera: members that are absent keep their defaults", "[scene][camera]") {
+TEST_CASE("camera: absent members keep their defaults", "[scene][camera]") {
   const Camera camera = camera_from_json("{\"width\": 17}");
   CHECK(camera.width == 17);
   CHECK(camera.height == Camera{}.height);
@@ -119,7 +119,7 @@ TEST_CASE("camera: JSON that makes no camera is refused with the member's name",
   refuses("{\"height\": 1e400}", "JSON");
 }
 
-TEST_CASE("camera: what is not finite is not written", "[scene][camera]") {
+TEST_CASE("camera: a camera with non-finite numbers is not written", "[scene][camera]") {
   Camera camera;
   camera.position.y = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_AS(to_json(camera), RequestError);

@@ -31,7 +31,7 @@ std::uint64_t count_points(std::uint64_t wanted) {
   return count;
 }
 
-// Whether a triangle of the point's colour and normal holds it, to a millimetre.
+// Returns true when a triangle of the point's colour and normal contains it, to a millimetre.
 bool is_on(const Mesh& mesh, const Surfel& s) {
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& t = mesh.triangles[i];
@@ -75,7 +75,7 @@ TEST_CASE("city: the same count gives the same points, whatever the block", "[sc
   }
 }
 
-TEST_CASE("city: points are sound surfels inside of the bounds", "[scene][city]") {
+TEST_CASE("city: points are valid surfels inside the bounds", "[scene][city]") {
   for (const std::uint64_t count : {1u, 100u, 5000u, 200'000u}) {
     const Bounds bounds = city_bounds(count);
     const auto city = make_city(count);
@@ -108,13 +108,13 @@ TEST_CASE("city: the discs add up to the mesh's area", "[scene][city]") {
   }
 }
 
-TEST_CASE("city: vertices lie inside of the bounds, and every facet faces out of its solid",
+TEST_CASE("city: vertices lie inside the bounds, and every facet faces out of its solid",
           "[scene][city]") {
   const Bounds bounds = city_bounds(300'000);
   for (const glm::vec3& p : city_mesh(300'000).positions) {
     if (!holds(bounds, glm::dvec3(p))) FAIL("vertex at " << p.x << " " << p.y << " " << p.z);
   }
-  // Seen from high above, there is no back side.
+  // No back side is visible from high above.
   const Mesh mesh = city_mesh(100'000);
   const RayScene scene(mesh);
   Random random(1);
@@ -128,8 +128,7 @@ TEST_CASE("city: vertices lie inside of the bounds, and every facet faces out of
   }
 }
 
-TEST_CASE("city: coverage of the ground and of walls is that of a regular sampling",
-          "[scene][city]") {
+TEST_CASE("city: the ground and the walls are covered as by a regular sampling", "[scene][city]") {
   const Mesh mesh = city_mesh(100'000);
   const auto city = make_city(100'000);
   const Coverage c = measure_coverage(mesh, drain(*city), 0.25, 50'000);
@@ -156,7 +155,7 @@ TEST_CASE("city: the spiral visits every block of a square once", "[scene][city]
   }
 }
 
-TEST_CASE("city: blocks differ, and are the same at every look", "[scene][city]") {
+TEST_CASE("city: blocks differ, and each is the same every time", "[scene][city]") {
   const auto a = build_block({3, 4});
   const auto again = build_block({3, 4});
   const auto b = build_block({4, 3});

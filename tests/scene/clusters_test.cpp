@@ -1,4 +1,4 @@
-// Grouping surface points.
+// Grouping surface points into clusters.
 #include "engine/scene/sampling/clusters.h"
 
 #include <cmath>
@@ -22,7 +22,7 @@ SurfacePoint point(const glm::vec3& position, const glm::vec3& normal, std::uint
   return p;
 }
 
-// n x n points of the unit square, row by row.
+// Returns n x n points of the unit square, row by row.
 std::vector<SurfacePoint> square(int n, const glm::vec3& normal, float height,
                                  std::uint32_t kind = 0) {
   std::vector<SurfacePoint> points;
@@ -36,7 +36,7 @@ std::vector<SurfacePoint> square(int n, const glm::vec3& normal, float height,
   return points;
 }
 
-// Sum of squared distances from points to their cluster.
+// Returns the sum of squared distances from points to their clusters.
 double spread(const std::vector<SurfacePoint>& points, const std::vector<Cluster>& clusters,
               const std::vector<std::uint32_t>& owners) {
   double sum = 0;
@@ -49,7 +49,7 @@ double spread(const std::vector<SurfacePoint>& points, const std::vector<Cluster
 
 }  // namespace
 
-TEST_CASE("clusters: each has members, and its middle is theirs", "[scene][clusters]") {
+TEST_CASE("clusters: each cluster has members, and their mean is its middle", "[scene][clusters]") {
   const auto points = square(64, {0, 1, 0}, 0);
   std::vector<std::uint32_t> owners;
   const auto clusters = cluster_points(points, 200, 6, owners);
@@ -69,7 +69,7 @@ TEST_CASE("clusters: each has members, and its middle is theirs", "[scene][clust
   }
 }
 
-TEST_CASE("clusters: rounds make them compact, down to what a regular grid has",
+TEST_CASE("clusters: rounds make clusters nearly as compact as a regular grid",
           "[scene][clusters]") {
   Mesh mesh = empty_mesh();
   add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
@@ -94,7 +94,7 @@ TEST_CASE("clusters: the owner is the nearest cluster that faces the same way",
           "[scene][clusters]") {
   const auto points = square(48, {0, 1, 0}, 0);
   std::vector<std::uint32_t> owners;
-  // Before the last move the middles are those of one round less.
+  // Before the last move, the middles equal those of one round fewer.
   std::vector<std::uint32_t> ignored;
   const auto clusters = cluster_points(points, 150, 40, owners);
   int astray = 0;
@@ -119,7 +119,7 @@ TEST_CASE("clusters: the two sides of a thin wall stay apart", "[scene][clusters
   }
 }
 
-TEST_CASE("clusters: kinds stay apart", "[scene][clusters]") {
+TEST_CASE("clusters: points of different kinds stay in different clusters", "[scene][clusters]") {
   auto points = square(32, {0, 1, 0}, 0, 0);
   const auto others = square(32, {0, 1, 0}, 0, 1);
   points.insert(points.end(), others.begin(), others.end());
@@ -128,7 +128,7 @@ TEST_CASE("clusters: kinds stay apart", "[scene][clusters]") {
   for (std::size_t i = 0; i < points.size(); ++i) CHECK(clusters[owners[i]].kind == points[i].kind);
 }
 
-TEST_CASE("clusters: points in one place, few points and none are no trouble",
+TEST_CASE("clusters: coincident points, few points and no points are handled",
           "[scene][clusters]") {
   std::vector<std::uint32_t> owners;
   CHECK(cluster_points({}, 5, 6, owners).empty());
@@ -143,8 +143,8 @@ TEST_CASE("clusters: points in one place, few points and none are no trouble",
   CHECK(owners.size() == 3);
 }
 
-TEST_CASE("clusters: a patch of two densities keeps both", "[scene][clusters]") {
-  // The same number of points on a square and on one of an eighth of its width beside it.
+TEST_CASE("clusters: a patch with two densities of points keeps both", "[scene][clusters]") {
+  // Put as many points on a square as on one of an eighth of its width next to it.
   auto points = square(64, {0, 1, 0}, 0);
   for (SurfacePoint p : square(64, {0, 1, 0}, 0)) {
     p.position = glm::vec3(1.1f, 0, 0) + 0.125f * p.position;

@@ -1,4 +1,4 @@
-// Brute force with a hash grid.
+// Coverage by brute force over a hash grid.
 #include "tests/scene/coverage.h"
 
 #include <algorithm>

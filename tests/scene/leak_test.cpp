@@ -33,7 +33,7 @@ LightRig outside() {
 
 constexpr LightSampling kSampling{2, 1, 32};
 
-// A point of the box [-1, 1]^3's wall, some of its coordinates very near to an edge or corner.
+// A point on a wall of the box [-1, 1]^3, sometimes very near to an edge or corner.
 struct WallPoint {
   glm::dvec3 position;
   glm::dvec3 normal;  // inwards
@@ -70,7 +70,7 @@ void check_dark(const Mesh& mesh, const glm::dmat3& rotation, std::uint64_t seed
 
 }  // namespace
 
-TEST_CASE("leak: in a closed box it is dark to the last bit, in corners and at edges too",
+TEST_CASE("leak: a closed box is dark to the last bit, even in its corners and edges",
           "[scene][leak]") {
   Mesh inward = empty_mesh();
   add_box(inward, glm::vec3(-1), glm::vec3(1), true);
@@ -85,7 +85,8 @@ TEST_CASE("leak: in a closed box it is dark to the last bit, in corners and at e
   check_dark(walled, glm::dmat3(1), 3, 3000);
 }
 
-TEST_CASE("leak: a closed box is dark however it is turned and wherever it lies", "[scene][leak]") {
+TEST_CASE("leak: a closed box is dark, however it is turned and wherever it lies",
+          "[scene][leak]") {
   Random random(4);
   for (int i = 0; i < 8; ++i) {
     Mesh mesh = empty_mesh();
@@ -148,11 +149,11 @@ TEST_CASE("leak: no plane hides itself, whatever its tilt, size and place", "[sc
       if (glm::dot(direction, at.geometric_normal) < 0) direction = -direction;
       if (scene.occluded(*origin, direction, 0, infinity)) ++hidden;
     }
-    if (i % 3 != 2) CHECK(hidden == 0);  // two triangles that are not in a plane do see each other
+    if (i % 3 != 2) CHECK(hidden == 0);  // two triangles in different planes do see each other
   }
 }
 
-TEST_CASE("leak: a point under a contact is dark, and beside it is lit", "[scene][leak]") {
+TEST_CASE("leak: a point under a contact is dark, and one next to it is lit", "[scene][leak]") {
   Mesh mesh = ground(10);
   add_box(mesh, {-1, 0, -1}, {1, 2, 1}, false);  // stands on the ground, its bottom in it
   const RayScene scene(mesh);
@@ -165,7 +166,7 @@ TEST_CASE("leak: a point under a contact is dark, and beside it is lit", "[scene
   CHECK(light.irradiance({1.0, 0.5, 0.2}, {1, 0, 0}, {}, 1).sky.x > 1);
 }
 
-TEST_CASE("leak: a normal that leans far over does not put the point under its own surface",
+TEST_CASE("leak: a strongly tilted normal does not put the point under its own surface",
           "[scene][leak]") {
   Random random(7);
   for (int i = 0; i < 20; ++i) {

@@ -1,4 +1,4 @@
-// The light rig's record.
+// The record of a light rig.
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -35,7 +35,7 @@ LightRig random_rig(Random& random) {
 
 }  // namespace
 
-TEST_CASE("light rig: its JSON comes back exactly", "[scene][lights]") {
+TEST_CASE("light rig: a rig written as JSON is read back exactly", "[scene][lights]") {
   Random random(3);
   for (int i = 0; i < 200; ++i) {
     const LightRig rig = random_rig(random);
@@ -57,14 +57,14 @@ TEST_CASE("light rig: its JSON comes back exactly", "[scene][lights]") {
   }
 }
 
-TEST_CASE("light rig: an empty object is no light", "[scene][lights]") {
+TEST_CASE("light rig: an empty object is a rig without lights", "[scene][lights]") {
   const LightRig rig = light_rig_from_json("{}");
   CHECK(rig.suns.empty());
   CHECK(rig.points.empty());
   CHECK(rig.sky.radiance == glm::vec3(0));
 }
 
-TEST_CASE("light rig: directions are made unit", "[scene][lights]") {
+TEST_CASE("light rig: directions are normalized", "[scene][lights]") {
   const LightRig rig = light_rig_from_json(
       "{\"suns\": [{\"to_sun\": [0, 3, 4]}], \"sky\": {\"up\": [0, 0, 1e-30]}}");
   CHECK(rig.suns[0].to_sun == glm::vec3(0, 0.6f, 0.8f));
@@ -120,7 +120,7 @@ TEST_CASE("light rig: JSON that makes no lights is refused with the place", "[sc
   refuses(std::string(5000, '['), "JSON");
 }
 
-TEST_CASE("light rig: what JSON cannot say is not written", "[scene][lights]") {
+TEST_CASE("light rig: values that JSON cannot express are not written", "[scene][lights]") {
   LightRig rig;
   rig.points.push_back({});
   rig.points[0].position.x = std::numeric_limits<double>::infinity();
@@ -130,7 +130,7 @@ TEST_CASE("light rig: what JSON cannot say is not written", "[scene][lights]") {
   CHECK_THROWS_AS(to_json(rig), RequestError);
 }
 
-TEST_CASE("light rig: a map that is not there is an error, no map is none", "[scene][lights]") {
+TEST_CASE("light rig: a missing map is an error, a rig without a map is not", "[scene][lights]") {
   Sky sky;
   CHECK(load_sky_map(sky, "/") == SkyMap::none);
   CHECK(!sky.map);

@@ -1,4 +1,4 @@
-// Suns, point lights and the constant sky, against formulas.
+// Suns, point lights and the constant sky, compared with formulas.
 #include "engine/scene/light/lights.h"
 
 #include <cmath>
@@ -26,7 +26,7 @@ LightRig one_sun(const glm::vec3& to_sun, float radius) {
 
 }  // namespace
 
-TEST_CASE("sun: it gives a plane its irradiance times the cosine", "[scene][lights]") {
+TEST_CASE("sun: a plane gets the sun's irradiance times the cosine", "[scene][lights]") {
   const Mesh mesh = ground(10);
   const RayScene scene(mesh);
   Random random(1);
@@ -34,7 +34,7 @@ TEST_CASE("sun: it gives a plane its irradiance times the cosine", "[scene][ligh
     const glm::vec3 to_sun = random.direction();
     const DirectLight light(scene, one_sun(to_sun, i % 2 == 0 ? 0.0f : 0.00465f));
     const auto result = light.irradiance({0.1, 0, 0.2}, kUp, {}, static_cast<std::uint64_t>(i));
-    if (std::abs(to_sun.y) < 0.01f) continue;  // part of the disc
+    if (std::abs(to_sun.y) < 0.01f) continue;  // the horizon cuts the disc
     const float cosine = std::max(0.0f, to_sun.y);
     CHECK(result.local.x == Approx(3 * cosine).margin(0.01));
     CHECK(result.local.y == Approx(2 * cosine).margin(0.01));
@@ -43,7 +43,8 @@ TEST_CASE("sun: it gives a plane its irradiance times the cosine", "[scene][ligh
   }
 }
 
-TEST_CASE("sun: a wide disc still gives its irradiance to what faces it", "[scene][lights]") {
+TEST_CASE("sun: a wide disc still gives its full irradiance to a surface that faces it",
+          "[scene][lights]") {
   const Mesh mesh = ground(10);
   const RayScene scene(mesh);
   for (const float radius : {0.1f, 0.5f, 1.5f, 1.5707963f}) {
@@ -52,7 +53,8 @@ TEST_CASE("sun: a wide disc still gives its irradiance to what faces it", "[scen
   }
 }
 
-TEST_CASE("sun: a disc half below the horizon gives what its upper half does", "[scene][lights]") {
+TEST_CASE("sun: a disc half below the horizon gives the light of its upper half",
+          "[scene][lights]") {
   const Mesh mesh = ground(10);
   const RayScene scene(mesh);
   const float radius = 0.2f;
@@ -67,7 +69,7 @@ TEST_CASE("sun: a disc half below the horizon gives what its upper half does", "
         Approx(expected).epsilon(0.01));
 }
 
-TEST_CASE("sun: a wall casts a sharp shadow, and half of a disc behind it is half lost",
+TEST_CASE("sun: a wall casts a sharp shadow, and half a disc behind it gives half the light",
           "[scene][lights]") {
   Mesh mesh = ground(10);
   add_quad(mesh, {1, 0, 5}, {0, 0, -10}, {0, 1, 0});  // of height 1 at x = 1
@@ -99,7 +101,7 @@ TEST_CASE("point light: the irradiance falls with the square of the distance", "
   }
 }
 
-TEST_CASE("point light: what stands between hides it, what stands behind does not",
+TEST_CASE("point light: an object in between hides the light, one behind it does not",
           "[scene][lights]") {
   Mesh mesh = ground(10);
   add_quad(mesh, {-1, 1, 1}, {2, 0, 0}, {0, 0, -2});
@@ -111,7 +113,7 @@ TEST_CASE("point light: what stands between hides it, what stands behind does no
   CHECK(light.irradiance({0, 0, 0}, kUp, {}, 1).local.x == Approx(4).epsilon(1e-4));
 }
 
-TEST_CASE("sky: a constant one gives an open plane pi times its radiance", "[scene][lights]") {
+TEST_CASE("sky: a constant sky gives an open plane pi times its radiance", "[scene][lights]") {
   Random random(2);
   for (int i = 0; i < 20; ++i) {
     Mesh mesh = ground(1);
@@ -131,7 +133,7 @@ TEST_CASE("sky: a constant one gives an open plane pi times its radiance", "[sce
   }
 }
 
-TEST_CASE("sky: a wall beside the point hides half of it", "[scene][lights]") {
+TEST_CASE("sky: a wall next to the point hides half of the sky", "[scene][lights]") {
   Mesh mesh = ground(1000);
   add_quad(mesh, {0, 0, 1000}, {0, 1000, 0}, {0, 0, -2000});
   const RayScene scene(mesh);
@@ -145,7 +147,8 @@ TEST_CASE("sky: a wall beside the point hides half of it", "[scene][lights]") {
   CHECK(mean == Approx(1.5708).epsilon(0.01));
 }
 
-TEST_CASE("direct light: the seed fixes the result, another changes it", "[scene][lights]") {
+TEST_CASE("direct light: the seed fixes the result, and another seed changes it",
+          "[scene][lights]") {
   Mesh mesh = ground(10);
   add_box(mesh, {0.5f, 0, -1}, {1, 1, 1}, false);
   const RayScene scene(mesh);
@@ -170,7 +173,7 @@ TEST_CASE("direct light: the numbers of rays may be 0", "[scene][lights]") {
   CHECK(result.sky == glm::vec3(0));
 }
 
-TEST_CASE("direct light: it is finite whatever the arguments", "[scene][lights]") {
+TEST_CASE("direct light: the result is finite whatever the arguments", "[scene][lights]") {
   Mesh mesh = ground(1);
   mesh.materials[0].emission = {1, 2, 3};
   const RayScene scene(mesh);

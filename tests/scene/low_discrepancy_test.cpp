@@ -1,4 +1,4 @@
-// Sample points.
+// Low-discrepancy sample points.
 #include "engine/scene/sampling/low_discrepancy.h"
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 using namespace ptc;
 
-TEST_CASE("square points: 2^k points fall one each into the boxes of every shape",
+TEST_CASE("square points: of 2^k points, one falls into each elementary box of every shape",
           "[scene][sampling]") {
   for (const std::uint64_t seed : {0u, 1u, 12345u}) {
     const SquarePoints points(seed);
@@ -31,7 +31,7 @@ TEST_CASE("square points: 2^k points fall one each into the boxes of every shape
   }
 }
 
-TEST_CASE("square points: the further coordinate is stratified and follows neither of the others",
+TEST_CASE("square points: the third coordinate is stratified and follows neither of the others",
           "[scene][sampling]") {
   const SquarePoints points(7);
   for (unsigned k = 0; k <= 8; ++k) {
@@ -51,7 +51,7 @@ TEST_CASE("square points: the further coordinate is stratified and follows neith
   CHECK(std::abs(with_y) < 0.01);
 }
 
-TEST_CASE("square points: seeds that are neighbours give unrelated points", "[scene][sampling]") {
+TEST_CASE("square points: neighbouring seeds give unrelated points", "[scene][sampling]") {
   double distance = 0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     const glm::vec2 a = SquarePoints(seed).square(0);

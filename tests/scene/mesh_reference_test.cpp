@@ -1,4 +1,4 @@
-// The ray-traced reference, against form factors and a furnace.
+// The ray-traced reference, compared with form factors and a furnace.
 #include "engine/scene/mesh_reference.h"
 
 #include <cmath>
@@ -16,7 +16,8 @@ namespace {
 
 const glm::vec3 kUp(0, 1, 0);
 
-// Form factor from a patch to a rectangle, by its definition: the integral of cos cos' / (pi d^2).
+// Returns the form factor from a patch to a rectangle by its definition, the integral of
+// cos cos' / (pi d^2).
 double factor(const glm::dvec3& at, const glm::dvec3& normal, const glm::dvec3& corner,
               const glm::dvec3& u, const glm::dvec3& v) {
   const glm::dvec3 front = glm::cross(u, v);  // as long as the area is large
@@ -52,7 +53,7 @@ void check_factor(const glm::vec3& corner, const glm::vec3& u, const glm::vec3& 
       factor(at, glm::dvec3(kUp), glm::dvec3(corner), glm::dvec3(u), glm::dvec3(v));
   const unsigned rays = 16384;
   const RayTraced result = trace_mesh(scene, light, at, kUp, rays, {{0, 0, 0}}, 1);
-  // Stratified rays do better than random ones, whose deviation this is.
+  // This is the deviation of random rays; stratified ones do better.
   const double noise = 3 * std::sqrt(expected * (1 - expected) / rays);
   CHECK(static_cast<double>(result.occlusion) == Approx(expected).margin(noise));
   CHECK(static_cast<double>(result.irradiance.x) ==
@@ -88,7 +89,7 @@ TEST_CASE("trace_mesh: a square at a right angle gives its form factor", "[scene
 
 TEST_CASE("trace_mesh: parallel unit squares at unit distance exchange 0.1998",
           "[scene][reference]") {
-  // Howell C-11: 0.19982. The mean over receivers on the lower square.
+  // Howell C-11 gives 0.19982, the mean over receivers on the lower square.
   const Mesh mesh = emitting_quad({0, 1, 0}, {1, 0, 0}, {0, 0, 1});
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
@@ -134,12 +135,12 @@ TEST_CASE("trace_mesh: in a furnace the irradiance is pi times emission plus one
 }
 
 TEST_CASE(
-    "trace_mesh: in a furnace every bounce adds its power of the albedo, however emission arrives",
+    "trace_mesh: in a furnace bounce k adds the k-th power of albedo, however emission arrives",
     "[scene][reference]") {
   const Mesh mesh = furnace();
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
-  // Shadow rays at the last hit bring emission over one reflection more than rays alone.
+  // Shadow rays at the last hit bring emission over one more reflection than rays alone.
   for (const unsigned area_rays : {0u, 16u}) {
     for (unsigned n = 1; n <= 4; ++n) {
       const double expected = 2 - std::pow(0.5, area_rays > 0 ? n : n - 1.0);
@@ -151,7 +152,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("trace_mesh: a lit surface sends albedo over pi times its direct light",
+TEST_CASE("trace_mesh: a lit surface reflects albedo over pi times its direct light",
           "[scene][reference]") {
   // A ceiling over the receiver, lit from below by the sun and the sky.
   Mesh mesh = empty_mesh();
@@ -173,7 +174,7 @@ TEST_CASE("trace_mesh: a back side hides and is black, unless it is double-sided
   Mesh mesh = empty_mesh();
   mesh.materials[0].emission = glm::vec3(5);
   mesh.materials[0].albedo = glm::vec3(1);
-  add_quad(mesh, {-500, 1, -500}, {0, 0, 1000}, {1000, 0, 0});  // looks up
+  add_quad(mesh, {-500, 1, -500}, {0, 0, 1000}, {1000, 0, 0});  // faces up
   LightRig rig;
   rig.suns.push_back({{0, -1, 0}, {2, 2, 2}, 0});  // from below
   {
@@ -190,7 +191,7 @@ TEST_CASE("trace_mesh: a back side hides and is black, unless it is double-sided
         Approx(2).epsilon(0.02));
 }
 
-TEST_CASE("trace_mesh: it is the same ten million metres away", "[scene][reference]") {
+TEST_CASE("trace_mesh: the result is the same ten million metres away", "[scene][reference]") {
   Mesh mesh = emitting_quad({-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
   add_box(mesh, {0.25f, 0.25f, 0.25f}, {0.5f, 0.5f, 0.5f}, false);
   const RayScene scene(mesh);
@@ -204,7 +205,7 @@ TEST_CASE("trace_mesh: it is the same ten million metres away", "[scene][referen
   CHECK(there.irradiance.x == Approx(here.irradiance.x).epsilon(1e-4));
 }
 
-TEST_CASE("trace_mesh: without rays or normal there is nothing", "[scene][reference]") {
+TEST_CASE("trace_mesh: without rays or without a normal the result is zero", "[scene][reference]") {
   const Mesh mesh = emitting_quad({-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
   const RayScene scene(mesh);
   const DirectLight light(scene, {});

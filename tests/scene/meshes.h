@@ -12,24 +12,24 @@
 
 namespace ptc {
 
-/// A mesh without triangles and with one material: albedo 0.5, one-sided.
+/// Returns a mesh without triangles and with one material: albedo 0.5, one-sided.
 [[nodiscard]] Mesh empty_mesh();
 void add_triangle(Mesh& mesh, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
                   std::uint16_t material = 0);
-/// Two triangles that front the side of u x v.
+/// Adds two triangles whose front is on the side of u x v.
 void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v,
               std::uint16_t material = 0);
-/// The six sides of a box; they front the outside, or the inside.
+/// Adds the six sides of a box, whose fronts face outwards or inwards.
 void add_box(Mesh& mesh, const glm::vec3& low, const glm::vec3& high, bool inward);
 
-/// A square of the plane y = 0 around the origin that looks up.
+/// Returns a square of the plane y = 0 around the origin that faces up.
 [[nodiscard]] Mesh ground(float half_width);
 [[nodiscard]] Mesh sphere(float radius, int rings);
 
-/// Turns all positions; the origin stays.
+/// Turns all positions; the origin of the mesh stays.
 void turn(Mesh& mesh, const glm::mat3& rotation);
 
-/// Area of one side of all triangles.
+/// Returns the area of one side of all triangles.
 [[nodiscard]] double one_sided_area(const Mesh& mesh);
 [[nodiscard]] std::vector<Surfel> drain(PointSource& source, std::size_t block = 1000);
 

@@ -1,4 +1,4 @@
-// Rays against a mesh, with a loop over all triangles in double as the oracle.
+// Rays at a mesh, with a loop over all triangles in double as the oracle.
 #include "engine/scene/ray_scene.h"
 
 #include <cmath>
@@ -21,7 +21,7 @@ constexpr double kFar = std::numeric_limits<double>::infinity();
 struct Expected {
   double distance = kFar;
   std::uint32_t triangle = 0;
-  double margin = 0;  // least barycentric coordinate
+  double margin = 0;  // smallest barycentric coordinate
 };
 
 // Solves origin + t d = (1 - u - v) a + u b + v c for each triangle by Cramer's rule.
@@ -81,7 +81,7 @@ TEST_CASE("ray scene: the closest hit is that of a loop over all triangles", "[s
   CHECK(hits > 1000);
 }
 
-TEST_CASE("ray scene: hits outside of near and far do not count", "[scene][rays]") {
+TEST_CASE("ray scene: hits outside the range from near to far do not count", "[scene][rays]") {
   const Mesh mesh = ground(1);
   const RayScene scene(mesh);
   const glm::dvec3 origin(0.1, 2, 0.2);
@@ -96,7 +96,8 @@ TEST_CASE("ray scene: hits outside of near and far do not count", "[scene][rays]
   CHECK(!scene.occluded(origin, -down, 0, kFar));
 }
 
-TEST_CASE("ray scene: ten million metres away it hits what it hits at home", "[scene][rays]") {
+TEST_CASE("ray scene: ten million metres away the hits are the same as at the origin",
+          "[scene][rays]") {
   Random random(2);
   Mesh mesh = soup(random, 100);
   Mesh moved = mesh;
@@ -116,7 +117,7 @@ TEST_CASE("ray scene: ten million metres away it hits what it hits at home", "[s
   }
 }
 
-TEST_CASE("ray scene: a ray from far away hits as precisely as one from near", "[scene][rays]") {
+TEST_CASE("ray scene: a ray from far away hits as precisely as one from nearby", "[scene][rays]") {
   const Mesh mesh = sphere(1, 40);
   const RayScene scene(mesh);
   Random random(3);
@@ -134,7 +135,7 @@ TEST_CASE("ray scene: a ray from far away hits as precisely as one from near", "
   }
 }
 
-TEST_CASE("ray scene: positions far from the mesh's own zero keep the precision of its extent",
+TEST_CASE("ray scene: positions far from the mesh's origin keep the precision of its extent",
           "[scene][rays]") {
   Mesh mesh = empty_mesh();
   add_quad(mesh, {4095, 4096, 4097}, {2, 0, 0}, {0, 0, -2});
@@ -230,7 +231,7 @@ TEST_CASE("ray scene: an empty mesh is never hit", "[scene][rays]") {
   }
 }
 
-TEST_CASE("ray scene: a mesh that is not consistent is refused", "[scene][rays]") {
+TEST_CASE("ray scene: an inconsistent mesh is refused", "[scene][rays]") {
   const Mesh sound = ground(1);
   const auto refuses = [&](auto&& spoil) {
     Mesh mesh = sound;
@@ -247,7 +248,7 @@ TEST_CASE("ray scene: a mesh that is not consistent is refused", "[scene][rays]"
   refuses([](Mesh& m) { m.positions[3].z = std::numeric_limits<float>::quiet_NaN(); });
 }
 
-TEST_CASE("ray scene: rays that make no sense miss", "[scene][rays]") {
+TEST_CASE("ray scene: invalid rays miss", "[scene][rays]") {
   const Mesh mesh = ground(1);
   const RayScene scene(mesh);
   const double nan = std::numeric_limits<double>::quiet_NaN();

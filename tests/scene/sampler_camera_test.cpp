@@ -14,7 +14,7 @@ using namespace ptc;
 
 namespace {
 
-// Looks down at the ground from a height.
+// A camera that looks down at the ground from a height.
 Camera overhead(double height) {
   Camera camera;
   camera.position = {0, height, 0};
@@ -35,7 +35,7 @@ std::vector<Surfel> sample(const Mesh& mesh, const SamplingOptions& options) {
 
 }  // namespace
 
-TEST_CASE("spacing field: it is the distance times the angle in view, and the spacing elsewhere",
+TEST_CASE("spacing field: it is distance times pixel angle in view, and the spacing elsewhere",
           "[scene][sampler]") {
   SamplingOptions options;
   options.spacing = 0.5;
@@ -49,14 +49,14 @@ TEST_CASE("spacing field: it is the distance times the angle in view, and the sp
   CHECK(field.at({0, 7, 0}, 0) == Approx(3 * angle).margin(1e-9));
   CHECK(field.at({0, -90, 0}, 0) == 0.5);              // not wider than the spacing
   CHECK(field.at({0, 12, 0}, 0) == 0.5);               // behind the camera
-  CHECK(field.at({0, 0, 6}, 0) == 0.5);                // beside the view
-  CHECK(field.at({0, 0, 4.5}, 0) < 0.5);               // just beside it: enlarged
+  CHECK(field.at({0, 0, 6}, 0) == 0.5);                // outside the view
+  CHECK(field.at({0, 0, 4.5}, 0) < 0.5);               // just outside, where the view is enlarged
   CHECK(field.at({9, 0, 0}, 0) < 0.5);                 // the picture is wider than high
   CHECK(field.at({0, 0, 6}, 3) < 0.5);                 // a ball that reaches into it
   CHECK(field.at({0, 0, 0}, 1) == Approx(9 * angle));  // by its nearest point
 }
 
-TEST_CASE("spacing field: a ball gets the finest spacing that any of its points asks for",
+TEST_CASE("spacing field: a ball gets the finest spacing that any of its points needs",
           "[scene][sampler]") {
   SamplingOptions options;
   options.spacing = 0.5;
@@ -71,7 +71,7 @@ TEST_CASE("spacing field: a ball gets the finest spacing that any of its points 
   }
 }
 
-TEST_CASE("sampler: near a camera surfels are as close as its pixels, and cover as well",
+TEST_CASE("sampler: near a camera surfels are as close as its pixels and cover as well",
           "[scene][sampler]") {
   const Mesh mesh = ground(10);
   SamplingOptions options;
@@ -89,7 +89,7 @@ TEST_CASE("sampler: near a camera surfels are as close as its pixels, and cover 
     }
     if (p.z > 7) CHECK(static_cast<double>(s.radius) > 0.6 * 0.25 * std::sqrt(0.5));
   }
-  // The distance grows towards the border of the square of 4 x 4, so a little fewer.
+  // There are a little fewer, because the distance grows towards the border of the 4 x 4 square.
   CHECK(in_view == Approx(16 / (fine * fine)).epsilon(0.12));
   CHECK(covered_area(surfels) == Approx(400).epsilon(1e-6));
   const Coverage c = measure_coverage(mesh, surfels, 0.25, 40000);
@@ -110,7 +110,7 @@ TEST_CASE("sampler: a camera that sees nothing changes nothing", "[scene][sample
   for (std::size_t i = 0; i < with.size(); ++i) CHECK(with[i].position == without[i].position);
 }
 
-TEST_CASE("sampler: a camera on the surface asks for no more than the finest spacing",
+TEST_CASE("sampler: a camera on the surface makes nothing finer than the finest spacing",
           "[scene][sampler]") {
   const Mesh mesh = ground(1);
   SamplingOptions options;

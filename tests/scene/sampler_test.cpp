@@ -1,4 +1,4 @@
-// Mesh to surfels: number, area, evenness, light.
+// Sampling a mesh: number, area, evenness and light of the surfels.
 #include "engine/scene/sampling/sampler.h"
 
 #include <algorithm>
@@ -62,7 +62,7 @@ Mesh fan(int n) {
   return mesh;
 }
 
-// Two large triangles beside n x n small quads.
+// Two large triangles next to n x n small quads.
 Mesh huge_and_tiny(int n) {
   Mesh mesh = empty_mesh();
   add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
@@ -77,7 +77,7 @@ Mesh huge_and_tiny(int n) {
 struct Shape {
   const char* name;
   Mesh mesh;
-  double uncovered;  // share that may be
+  double uncovered;  // share of the surface that may be uncovered
 };
 
 std::vector<Shape> shapes() {
@@ -104,7 +104,7 @@ bool equal_bytes(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
 
 }  // namespace
 
-TEST_CASE("sampler: the number is met within 2 %, and the sum of 2 r^2 is the mesh's area",
+TEST_CASE("sampler: the count is met within 2 %, and the sum of 2 r^2 is the mesh's area",
           "[scene][sampler]") {
   for (const Shape& shape : shapes()) {
     for (const std::uint64_t count : {1u, 2u, 13u, 100u, 2000u}) {
@@ -149,7 +149,7 @@ TEST_CASE("sampler: surfels lie on the mesh and have its normals and colours", "
   }
 }
 
-TEST_CASE("sampler: a surfel has the mean normal of its patch where the mesh is finer",
+TEST_CASE("sampler: a surfel has the mean normal of its patch when the mesh is finer",
           "[scene][sampler]") {
   Mesh mesh = empty_mesh();  // a corrugated square, flat in the mean
   constexpr int kRoofs = 200;
@@ -164,7 +164,7 @@ TEST_CASE("sampler: a surfel has the mean normal of its patch where the mesh is 
   CHECK(tilt < 0.02 * static_cast<double>(surfels.size()));  // 0.07 with the normals of the roofs
 }
 
-TEST_CASE("sampler: surfels stick out over an edge about as much as they leave out",
+TEST_CASE("sampler: surfels extend past an edge about as much as they leave uncovered",
           "[scene][sampler]") {
   const auto surfels = sample(ground(1), 2000);
   const auto covered = [&](float x, float z) {
@@ -185,7 +185,7 @@ TEST_CASE("sampler: surfels stick out over an edge about as much as they leave o
   CHECK(std::abs(net) < 0.05);  // 0.2 with the discs about their middles
 }
 
-TEST_CASE("sampler: what lies inside a solid gives no surfels", "[scene][sampler]") {
+TEST_CASE("sampler: surfaces inside a solid give no surfels", "[scene][sampler]") {
   Mesh mesh = cube();
   const auto alone = sample(mesh, 3000);
   add_box(mesh, glm::vec3(-0.25F), glm::vec3(0.25F), false);
@@ -195,7 +195,7 @@ TEST_CASE("sampler: what lies inside a solid gives no surfels", "[scene][sampler
   CHECK(sample(mesh, options).size() == Approx(alone.size()).epsilon(0.02));
 }
 
-TEST_CASE("sampler: a surfel's light is the mean over its patch, its buried part left out",
+TEST_CASE("sampler: a surfel's light is the mean over its patch without the buried part",
           "[scene][sampler]") {
   Mesh mesh = ground(1);
   LightRig rig;
@@ -217,7 +217,8 @@ TEST_CASE("sampler: a surfel's light is the mean over its patch, its buried part
   }
 }
 
-TEST_CASE("sampler: a given spacing gives area over its square surfels", "[scene][sampler]") {
+TEST_CASE("sampler: a given spacing gives as many surfels as its square fits into the area",
+          "[scene][sampler]") {
   SamplingOptions options;
   options.spacing = 0.05;
   options.count = 5;
@@ -244,7 +245,7 @@ TEST_CASE("sampler: radiance is emission plus albedo over pi times irradiance",
   }
 }
 
-TEST_CASE("sampler: emitters keep their power, and what lies beside them stays dark",
+TEST_CASE("sampler: emitters keep their power, and surfaces next to them stay dark",
           "[scene][sampler]") {
   Mesh mesh = ground(1);
   mesh.materials.emplace_back();
@@ -258,7 +259,7 @@ TEST_CASE("sampler: emitters keep their power, and what lies beside them stays d
     power += 2 * static_cast<double>(s.radius * s.radius * s.radiance.x);
   }
   CHECK(power == Approx(10).epsilon(0.01));
-  // Smaller than a surfel, it is not lost either: a surfel takes its part.
+  // An emitter smaller than a surfel is not lost either: a surfel takes its power.
   power = 0;
   for (const Surfel& s : sample(mesh, 8)) {
     power += 2 * static_cast<double>(s.radius * s.radius * s.radiance.x);
@@ -266,7 +267,7 @@ TEST_CASE("sampler: emitters keep their power, and what lies beside them stays d
   CHECK(power == Approx(10).epsilon(0.3));
 }
 
-TEST_CASE("sampler: a fine texture is averaged over what a surfel stands for", "[scene][sampler]") {
+TEST_CASE("sampler: a fine texture is averaged over the patch of a surfel", "[scene][sampler]") {
   Mesh mesh = ground(1);
   Image checks{64, 64, {}};
   for (int i = 0; i < 64 * 64; ++i)
@@ -338,7 +339,7 @@ TEST_CASE("sampler: the surfels are the same for any number of threads and any b
   CHECK(equal_bytes(one, sample(mesh, options, rig, 2, 1)));
 }
 
-TEST_CASE("sampler: in a closed box all surfels are dark, to the last bit", "[scene][sampler]") {
+TEST_CASE("sampler: in a closed box all surfels are dark to the last bit", "[scene][sampler]") {
   Mesh mesh = empty_mesh();
   add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
   Random random(1);
@@ -354,7 +355,8 @@ TEST_CASE("sampler: in a closed box all surfels are dark, to the last bit", "[sc
   CHECK(lit == 0);
 }
 
-TEST_CASE("sampler: ten million metres away the surfels are the same, moved", "[scene][sampler]") {
+TEST_CASE("sampler: ten million metres away the surfels are the same, only moved",
+          "[scene][sampler]") {
   Mesh mesh = sphere(1, 20);
   const auto here = sample(mesh, 3000);
   mesh.origin = {1e7, -2e7, 3e7};
@@ -391,14 +393,14 @@ TEST_CASE("sampler: a mesh without area gives no surfels", "[scene][sampler]") {
   add_triangle(mesh, {0, 0, 0}, {1, 0, 0}, {2, 0, 0});
   CHECK(sample(mesh, 100).empty());
   CHECK(spacing_for(mesh, 100) == 0);
-  add_triangle(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});  // and with it, just on this
+  add_triangle(mesh, {0, 0, 0}, {1, 0, 0},
+               {0, 1, 0});  // now there are surfels, on this triangle alone
   const auto surfels = sample(mesh, 100);
   CHECK(surfels.size() == 100);
   for (const Surfel& s : surfels) CHECK(s.normal == glm::vec3(0, 0, 1));
 }
 
-TEST_CASE("sampler: the spacing for a number of surfels is the root of area over it",
-          "[scene][sampler]") {
+TEST_CASE("sampler: the spacing for n surfels is the root of area over n", "[scene][sampler]") {
   Mesh mesh = cube();
   CHECK(spacing_for(mesh, 600) == Approx(0.1));
   mesh.materials[0].double_sided = true;
@@ -406,7 +408,7 @@ TEST_CASE("sampler: the spacing for a number of surfels is the root of area over
   CHECK_THROWS_AS(spacing_for(mesh, 0), RequestError);
 }
 
-TEST_CASE("sampler: options that make no sense are refused", "[scene][sampler]") {
+TEST_CASE("sampler: invalid options are refused", "[scene][sampler]") {
   const Mesh mesh = cube();
   const auto refuses = [&](auto&& spoil) {
     SamplingOptions options;
@@ -426,7 +428,7 @@ TEST_CASE("sampler: options that make no sense are refused", "[scene][sampler]")
   refuses([](SamplingOptions& o) { o.camera->height = 0; });
 }
 
-TEST_CASE("sampler: a spacing beyond all bounds gives one surfel, or none", "[scene][sampler]") {
+TEST_CASE("sampler: a spacing larger than any mesh gives one surfel or none", "[scene][sampler]") {
   SamplingOptions options;
   for (const double spacing : {1e3, 1e30, 1e300}) {
     options.spacing = spacing;
@@ -436,7 +438,7 @@ TEST_CASE("sampler: a spacing beyond all bounds gives one surfel, or none", "[sc
   }
 }
 
-TEST_CASE("sampler: it streams: the first surfels of very many come at once", "[scene][sampler]") {
+TEST_CASE("sampler: the first of very many surfels are available at once", "[scene][sampler]") {
   const Mesh mesh = cube();
   const RayScene scene(mesh);
   const DirectLight light(scene, {});

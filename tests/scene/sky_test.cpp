@@ -1,4 +1,4 @@
-// The sky map: where its pixels lie, and what they give.
+// The sky map: where its pixels lie, and the light that they give.
 #include <cmath>
 #include <memory>
 
@@ -24,7 +24,7 @@ void set(Image& image, unsigned x, unsigned y, const glm::vec3& value) {
   image.pixels[std::size_t{y} * image.width + x] = value;
 }
 
-// Solid angle of a pixel.
+// Returns the solid angle of a pixel.
 double pixel_sr(const Image& image, unsigned y) {
   const double top = std::cos(kPiDouble * y / image.height);
   const double bottom = std::cos(kPiDouble * (y + 1) / image.height);
@@ -40,7 +40,8 @@ Image noise(unsigned width, unsigned height, Random& random) {
   return image;
 }
 
-// Integral of radiance times cosine over the hemisphere around a normal, by a fine grid.
+// Returns the integral of radiance times cosine over the hemisphere around a normal, by a fine
+// grid.
 glm::dvec3 integral(const Sky& sky, const glm::vec3& normal) {
   glm::dvec3 sum(0);
   const int rows = 800;
@@ -59,13 +60,13 @@ glm::dvec3 integral(const Sky& sky, const glm::vec3& normal) {
 
 }  // namespace
 
-TEST_CASE("sky map: with +y up its columns look along -z, +x, +z, -x and its top row at the zenith",
+TEST_CASE("sky map: with +y up, columns face -z, +x, +z, -x and the top row the zenith",
           "[scene][sky]") {
   auto map = black(8, 4);
   Sky sky;
   sky.radiance = glm::vec3(1);
   sky.map = map;
-  // Two pixels, so that the border between them, at column x, is brightest.
+  // Light two pixels, so that the border between them, at column x, is brightest.
   const auto brightest = [&](unsigned x, unsigned y) {
     *map = *black(8, 4);
     set(*map, x, y, glm::vec3(1));
@@ -86,7 +87,7 @@ TEST_CASE("sky map: with +y up its columns look along -z, +x, +z, -x and its top
   CHECK(sky.at({0, -1, 0}).x == 0);
 }
 
-TEST_CASE("sky map: another up turns it by the smallest rotation", "[scene][sky]") {
+TEST_CASE("sky map: another up direction turns the map by the smallest rotation", "[scene][sky]") {
   auto map = black(64, 32);
   set(*map, 32, 16, glm::vec3(1));
   set(*map, 31, 16, glm::vec3(1));
@@ -122,7 +123,7 @@ TEST_CASE("sky map: place and direction are inverse to each other", "[scene][sky
   }
 }
 
-TEST_CASE("sky map: without a map the radiance comes from everywhere", "[scene][sky]") {
+TEST_CASE("sky map: without a map the radiance is the same everywhere", "[scene][sky]") {
   Sky sky;
   sky.radiance = {1, 2, 3};
   CHECK(sky.at({0, -1, 0}) == glm::vec3(1, 2, 3));
@@ -155,7 +156,7 @@ TEST_CASE("sky map: one bright pixel gives its radiance times solid angle times 
   }
 }
 
-TEST_CASE("sky map: a bright pixel below the horizon gives nothing", "[scene][sky]") {
+TEST_CASE("sky map: a bright pixel below the horizon gives no light", "[scene][sky]") {
   const Mesh mesh = ground(1000);
   const RayScene scene(mesh);
   auto map = black(64, 32);
@@ -187,7 +188,7 @@ TEST_CASE("sky map: any map and any tilt give the integral of radiance times cos
   }
 }
 
-TEST_CASE("sky density: it integrates to 1, and samples have the density they say",
+TEST_CASE("sky density: it integrates to 1, and samples follow the density that they report",
           "[scene][sky]") {
   Random random(3);
   Sky sky;

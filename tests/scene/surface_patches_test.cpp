@@ -91,7 +91,7 @@ TEST_CASE("patches: every part of the surface gets its share of the points", "[s
   }
 }
 
-TEST_CASE("patches: the first surfel of a patch is the number of those before",
+TEST_CASE("patches: the index of a patch's first surfel is the number of surfels before it",
           "[scene][patches]") {
   const Mesh mesh = sphere(1, 20);
   const SpacingField field = constant(0.05);
@@ -106,7 +106,7 @@ TEST_CASE("patches: the first surfel of a patch is the number of those before",
   CHECK(before == patches.surfels());
 }
 
-TEST_CASE("patches: the same patch is spread the same way again", "[scene][patches]") {
+TEST_CASE("patches: spreading a patch again gives the same points", "[scene][patches]") {
   const Mesh mesh = sphere(1, 12);
   const SpacingField field = constant(0.05);
   const SurfacePatches patches(mesh, field, 300);
@@ -119,7 +119,7 @@ TEST_CASE("patches: the same patch is spread the same way again", "[scene][patch
   }
 }
 
-TEST_CASE("patches: kinds come one after another", "[scene][patches]") {
+TEST_CASE("patches: patches are ordered by kind", "[scene][patches]") {
   Mesh mesh = empty_mesh();
   mesh.materials.resize(4);
   mesh.materials[1].emission = glm::vec3(1);
@@ -143,7 +143,7 @@ TEST_CASE("patches: kinds come one after another", "[scene][patches]") {
   CHECK(last == 3);
 }
 
-TEST_CASE("patches: a needle of any length is cut no deeper than a path can say",
+TEST_CASE("patches: a needle of any length is cut no deeper than a path can record",
           "[scene][patches]") {
   Mesh mesh = empty_mesh();
   add_triangle(mesh, {0, 0, 0}, {1e6f, 0, 0}, {1e6f, 1e-6f, 0});
@@ -156,7 +156,7 @@ TEST_CASE("patches: a needle of any length is cut no deeper than a path can say"
   CHECK(area == Approx(0.5).epsilon(1e-5));
 }
 
-TEST_CASE("patches: a mesh without area has none", "[scene][patches]") {
+TEST_CASE("patches: a mesh without area has no patches", "[scene][patches]") {
   Mesh mesh = empty_mesh();
   const SpacingField field = constant(0.1);
   CHECK(SurfacePatches(mesh, field, 100).size() == 0);

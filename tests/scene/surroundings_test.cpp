@@ -17,7 +17,7 @@ const glm::vec3 kUp(0, 1, 0);
 
 }  // namespace
 
-TEST_CASE("surroundings: a disc stays where the surface goes on, flat or curved",
+TEST_CASE("surroundings: a disc stays where the surface continues, flat or curved",
           "[scene][surroundings]") {
   const Mesh plane = ground(1);
   const RayScene scene(plane);
@@ -29,7 +29,7 @@ TEST_CASE("surroundings: a disc stays where the surface goes on, flat or curved"
   CHECK(glm::length(move_inwards(round, {0, 1, 0}, kUp, 0.3F)) == 0);
 }
 
-TEST_CASE("surroundings: a disc that sticks out over an edge moves to where it leaves out as much",
+TEST_CASE("surroundings: a disc past an edge moves until it extends as much as it leaves out",
           "[scene][surroundings]") {
   Random random(1);
   for (int i = 0; i < 20; ++i) {
@@ -62,7 +62,7 @@ TEST_CASE("surroundings: a corner moves a disc from both edges, a strip from nei
   CHECK(glm::length(move_inwards(narrow, {0, 0, 0}, kUp, kRadius)) < 0.02F * kRadius);
 }
 
-TEST_CASE("surroundings: a disc stays where another surface hides what sticks out",
+TEST_CASE("surroundings: a disc stays where another surface hides the part past the edge",
           "[scene][surroundings]") {
   Mesh mesh = ground(1);
   add_quad(mesh, {1, 0, 1}, {0, 0, -2}, {0, 1, 0});
@@ -71,9 +71,8 @@ TEST_CASE("surroundings: a disc stays where another surface hides what sticks ou
   CHECK(move_inwards(scene, {-0.95, 0, 0}, kUp, kRadius).x > 0.3F * kRadius);
 }
 
-TEST_CASE(
-    "surroundings: inside a solid and where solids touch a place is buried, elsewhere it is not",
-    "[scene][surroundings]") {
+TEST_CASE("surroundings: a place is buried inside a solid and where solids touch, nowhere else",
+          "[scene][surroundings]") {
   Mesh mesh = empty_mesh();
   add_box(mesh, {-2, -1, -2}, {2, 0, 2}, false);
   add_box(mesh, {-0.5F, 0, -0.5F}, {0.5F, 1, 0.5F}, false);  // stands on the first
@@ -89,7 +88,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("surroundings: what shows itself or its reflecting back buries nothing",
+TEST_CASE("surroundings: a surface that shows its front or a reflecting back buries nothing",
           "[scene][surroundings]") {
   Mesh room = empty_mesh();
   add_box(room, glm::vec3(-1), glm::vec3(1), true);
@@ -107,11 +106,12 @@ TEST_CASE("surroundings: what shows itself or its reflecting back buries nothing
   CHECK(!is_buried(reflecting, {0, -1, 0}, kUp, 1));
 }
 
-TEST_CASE("surroundings: what a surface lies on is buried", "[scene][surroundings]") {
+TEST_CASE("surroundings: the place under a surface that lies on another is buried",
+          "[scene][surroundings]") {
   const Mesh plane = ground(1);
   const auto up = static_cast<float>(RayScene(plane).epsilon());
   Mesh mesh = plane;
-  add_quad(mesh, {-0.5F, up, 0.5F}, {0, 0, -1}, {1, 0, 0});  // looks down
+  add_quad(mesh, {-0.5F, up, 0.5F}, {0, 0, -1}, {1, 0, 0});  // faces down
   const RayScene scene(mesh);
   CHECK(is_buried(scene, {0, 0, 0}, kUp, 1));
   CHECK(!is_buried(scene, {0.7, 0, 0}, kUp, 1));

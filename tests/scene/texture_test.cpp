@@ -23,7 +23,7 @@ Image numbered() {
 
 }  // namespace
 
-TEST_CASE("texture: at a pixel's centre it is the pixel, and row 0 is at v = 1",
+TEST_CASE("texture: at a pixel's centre the value is the pixel's, and row 0 is at v = 1",
           "[scene][texture]") {
   const Image image = numbered();
   for (unsigned y = 0; y < 2; ++y) {
@@ -36,7 +36,8 @@ TEST_CASE("texture: at a pixel's centre it is the pixel, and row 0 is at v = 1",
   }
 }
 
-TEST_CASE("texture: between centres it is their mean, across the border too", "[scene][texture]") {
+TEST_CASE("texture: between centres the value is their mean, across the border, too",
+          "[scene][texture]") {
   const Image image = numbered();
   CHECK(sample_texture(image, {0.25f, 0.75f}).x == Approx(0.5f));
   CHECK(sample_texture(image, {0.0f, 0.75f}).x == Approx(1.5f));  // of columns 3 and 0
@@ -44,7 +45,8 @@ TEST_CASE("texture: between centres it is their mean, across the border too", "[
   CHECK(sample_texture(image, {0.125f, 1.0f}).y == Approx(0.5f));  // of rows 0 and 1
 }
 
-TEST_CASE("texture: odd coordinates and empty pictures give a finite colour", "[scene][texture]") {
+TEST_CASE("texture: unusual coordinates and empty pictures give a finite colour",
+          "[scene][texture]") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float inf = std::numeric_limits<float>::infinity();
   for (const float odd : {nan, inf, -inf, 1e30f, -1e30f, 1e-30f, -1e-30f}) {

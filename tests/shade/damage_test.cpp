@@ -1,5 +1,4 @@
-// Shading past pages that cannot be read: what stands in for them, and the bound on what that
-// changes.
+// Shading past pages that cannot be read: what stands in for them, and the bound on the change.
 #include <fstream>
 #include <optional>
 
@@ -16,15 +15,15 @@ namespace {
 
 constexpr double kSpacing = 0.05;
 
-/// A receiver of the whole scene and of the damaged one.
+/// The results of a receiver in the whole scene and in the damaged one.
 struct Pair {
   Shading expected, found;
   double bound = 0;
   [[nodiscard]] double off() const { return std::abs(found.occlusion - expected.occlusion); }
 };
 
-/// A scene, the small one where none is given, whole and with two bytes changed in the payload of
-/// some pages.
+/// A scene, whole and with two bytes changed in the payload of some pages. Without an argument it
+/// is small_scene().
 struct Damaged {
   Scene scene;
   std::unique_ptr<ContainerReader> broken;
@@ -55,7 +54,7 @@ struct Damaged {
     broken = std::make_unique<ContainerReader>(scene.dir / "broken.ptcx");
   }
 
-  /// Every so many receivers, each by itself, with a bound of its own.
+  /// Shades every step-th receiver by itself, which gives each a bound of its own.
   [[nodiscard]] std::vector<Pair> shade_alone(std::size_t step, LostPages& lost) const {
     const SceneView whole(*scene.container), view(*broken, &lost);
     PageCache whole_cache(*scene.container, {.memory_bytes = 64U << 20}),
@@ -98,7 +97,7 @@ bool same(const Shading& a, const Shading& b) {
 
 }  // namespace
 
-TEST_CASE("damage: of a whole scene nothing is lost and no bit differs", "[shade][damage]") {
+TEST_CASE("damage: in a whole scene no page is lost and no bit differs", "[shade][damage]") {
   const Damaged damaged;
   LostPages lost(*damaged.broken);
   const auto run = damaged.shade(&lost);
@@ -108,7 +107,7 @@ TEST_CASE("damage: of a whole scene nothing is lost and no bit differs", "[shade
   CHECK(run.counts.damage.max_bound == 0);
 }
 
-TEST_CASE("damage: without leave to go on a lost page is an error that names file, place and rule",
+TEST_CASE("damage: unless it is tolerated, a lost page is an error that names file, place and rule",
           "[shade][damage]") {
   Damaged damaged;
   for (const std::uint32_t page :
@@ -125,7 +124,7 @@ TEST_CASE("damage: without leave to go on a lost page is an error that names fil
   }
 }
 
-TEST_CASE("damage: what stands in changes no receiver by more than its bound", "[shade][damage]") {
+TEST_CASE("damage: stand-ins change no receiver by more than its bound", "[shade][damage]") {
   Damaged damaged;
   const std::vector<std::uint32_t> nodes = damaged.node_pages();
   const auto points = damaged.scene.container->point_pages();
@@ -157,7 +156,7 @@ TEST_CASE("damage: what stands in changes no receiver by more than its bound", "
   CHECK(tight > damaged.scene.receivers.size() / 7 * trials.size() / 2);
 }
 
-TEST_CASE("damage: the worst that can stand in comes near its bound", "[shade][damage]") {
+TEST_CASE("damage: the worst possible stand-in comes near its bound", "[shade][damage]") {
   // Two piles of equal discs in one leaf: their summed area fills its sphere, and they themselves
   // cover little.
   std::vector<Surfel> piles;
@@ -186,7 +185,7 @@ TEST_CASE("damage: the worst that can stand in comes near its bound", "[shade][d
   CHECK(tightest > 0.8);
 }
 
-TEST_CASE("damage: neither threads nor the cap change what stands in", "[shade][damage]") {
+TEST_CASE("damage: neither threads nor the cap change the stand-ins", "[shade][damage]") {
   Damaged damaged;
   const auto points = damaged.scene.container->point_pages();
   damaged.break_pages({points[10], points[30], damaged.node_pages().back()});
@@ -208,7 +207,7 @@ TEST_CASE("damage: neither threads nor the cap change what stands in", "[shade][
   CHECK(first->counts.damage.stand_ins > 0);
 }
 
-TEST_CASE("damage: without the root there is nothing to stand in", "[shade][damage]") {
+TEST_CASE("damage: nothing can stand in for a lost root", "[shade][damage]") {
   Damaged damaged;
   damaged.break_pages({damaged.scene.container->superblock().root_page});
   LostPages lost(*damaged.broken);

@@ -34,7 +34,7 @@ const DirectionGrid& fine_grid() {
 
 }  // namespace
 
-TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole sky",
+TEST_CASE("direction buffer: an empty buffer is open everywhere and sees the whole sky",
           "[shade][buffer]") {
   const DirectionGrid grid(32, [](const glm::vec3&) { return glm::vec3(1, 2, 3); });
   DirectionBuffer buffer(32);
@@ -52,7 +52,8 @@ TEST_CASE("direction buffer: an empty one is open everywhere and sees the whole 
 TEST_CASE(
     "direction buffer: irradiance from a gradient does not depend on the turn of the receiver",
     "[shade][buffer]") {
-  // Radiance 1 + cos(angle to z): E(n) = pi + 2 pi / 3 n.z, whatever the cube's pixels are.
+  // Radiance 1 + cos(angle to z) gives E(n) = pi + 2 pi / 3 n.z, whatever the pixels of the cube
+  // are.
   const DirectionGrid grid(32, [](const glm::vec3& d) { return glm::vec3(1 + d.z); });
   DirectionBuffer buffer(32);
   std::mt19937 bits(2);
@@ -112,7 +113,7 @@ TEST_CASE("direction buffer: a disc close to the receiver never covers more than
   }
 }
 
-TEST_CASE("direction buffer: the back of a disc is black, and clear within two radii",
+TEST_CASE("direction buffer: the back of a disc is black, and transparent within two radii",
           "[shade][buffer]") {
   const std::uint32_t white = encode_rgbe({1, 1, 1});
   const auto shade = [&](float distance, Sides sides) {
@@ -126,7 +127,7 @@ TEST_CASE("direction buffer: the back of a disc is black, and clear within two r
   CHECK(shade(2.5F, Sides::front).occlusion == 0);
 }
 
-TEST_CASE("direction buffer: the nearer of two walls is seen whatever is drawn first",
+TEST_CASE("direction buffer: the nearer of two walls is seen, whichever is drawn first",
           "[shade][buffer]") {
   const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0});
   for (const bool near_first : {true, false}) {
@@ -156,7 +157,7 @@ TEST_CASE("direction buffer: coplanar overlapping discs divide half way between 
 }
 
 TEST_CASE(
-    "direction buffer: right over a plane of discs only the disc of the nearest centre is seen",
+    "direction buffer: right above a plane of discs only the disc with the nearest centre is seen",
     "[shade][buffer]") {
   const std::uint32_t red = encode_rgbe({1, 0, 0}), green = encode_rgbe({0, 1, 0}),
                       blue = encode_rgbe({0, 0, 1});
@@ -193,7 +194,7 @@ TEST_CASE("direction buffer: an emitter moving across pixels changes the light s
   CHECK(largest < 0.08F * least);                          // at most two or three at once
 }
 
-TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiver, to first order",
+TEST_CASE("direction buffer: discs drawn from elsewhere move with the receiver, to first order",
           "[shade][buffer]") {
   std::mt19937 bits(7);
   std::uniform_real_distribution<float> uniform;
@@ -222,9 +223,10 @@ TEST_CASE("direction buffer: what was drawn from elsewhere moves with the receiv
   CHECK(moved < 0.1 * unmoved);
 }
 
-TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wherever it lies",
-          "[shade][buffer]") {
-  // Centres 0.3 to 3 radii away: discs around the receiver, edge-on, across several faces.
+TEST_CASE(
+    "direction buffer: a disc near the receiver covers as much as rays find, wherever it lies",
+    "[shade][buffer]") {
+  // Centres are 0.3 to 3 radii away: discs around the receiver, edge-on, across several faces.
   std::mt19937 bits(11);
   std::uniform_real_distribution<float> unit(0, 1);
   const DirectionGrid& grid = fine_grid();
@@ -236,7 +238,7 @@ TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wher
     buffer.clear();
     draw_disc(grid, buffer, to, normal, 1, 0, Sides::both);
     const glm::vec3 up = random_direction(bits);
-    // Stratified cosine directions about `up`.
+    // Trace stratified cosine directions about `up`.
     constexpr int kSide = 128;
     const glm::vec3 x = glm::normalize(
         glm::cross(up, std::abs(up.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
@@ -255,10 +257,9 @@ TEST_CASE("direction buffer: a disc near the receiver covers what rays say, wher
   }
 }
 
-TEST_CASE(
-    "direction buffer: a disc covers as much across the middle of the cube as a little beside it",
-    "[shade][buffer]") {
-  // Centres of discs in a plane through the cube's middle, and so far beside it.
+TEST_CASE("direction buffer: a disc covers as much across the middle of the cube as next to it",
+          "[shade][buffer]") {
+  // Centres of discs in a plane through the middle of the cube, and this far next to it.
   const glm::mat3 to_world = glm::transpose(fine_grid().rotation());
   std::mt19937 bits(13);
   std::uniform_real_distribution<float> unit(0, 1);
@@ -284,7 +285,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("direction buffer: what is left out below a horizon changes no sum over it",
+TEST_CASE("direction buffer: pixels left out below a horizon change no sum above it",
           "[shade][buffer]") {
   std::mt19937 bits(12);
   std::uniform_real_distribution<float> unit(0, 1);

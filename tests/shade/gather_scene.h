@@ -12,7 +12,7 @@
 
 namespace ptc::test {
 
-/// A container of surfels, its readers and receivers.
+/// A container of surfels, its reader, and receivers.
 struct Scene {
   TemporaryDirectory dir;
   std::unique_ptr<ContainerReader> container;

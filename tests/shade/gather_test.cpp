@@ -1,4 +1,4 @@
-// The gather against formulas, against every surfel, and against rays.
+// The gather, compared with formulas, with drawing every surfel, and with rays.
 #include <cmath>
 #include <numbers>
 
@@ -16,7 +16,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// The same scene and receivers, turned and moved.
+/// Returns a scene and its receivers, turned and moved.
 void transform(std::vector<Surfel>& surfels, std::vector<Receiver>& receivers,
                const glm::dmat3& turn, const glm::dvec3& move) {
   for (Surfel& s : surfels) {
@@ -38,7 +38,7 @@ glm::dmat3 tilted() {
 
 }  // namespace
 
-TEST_CASE("gather: a plane alone has no occlusion, in any attitude and at any scale",
+TEST_CASE("gather: a lone plane has no occlusion, at any tilt and at any scale",
           "[shade][gather]") {
   for (const double scale : {1e-3, 1.0, 1e4}) {
     for (int turn = 0; turn < 4; ++turn) {
@@ -49,7 +49,7 @@ TEST_CASE("gather: a plane alone has no occlusion, in any attitude and at any sc
       add_rectangle(surfels, {0, 0, 0}, u * scale, glm::normalize(v) * scale, 0.02 * scale,
                     glm::vec3(1));
       Scene scene(surfels);
-      for (std::size_t i = 0; i < surfels.size(); i += 23) {  // rims, corners and inside
+      for (std::size_t i = 0; i < surfels.size(); i += 23) {  // at rims, in corners and inside
         const Surfel& s = surfels[i];
         scene.receivers.push_back(
             {s.position + glm::dvec3(s.normal * (0.15F * s.radius)), s.normal});
@@ -61,7 +61,7 @@ TEST_CASE("gather: a plane alone has no occlusion, in any attitude and at any sc
   }
 }
 
-TEST_CASE("gather: a floor beside a wall sees the analytic form factor up to the crease",
+TEST_CASE("gather: a floor next to a wall gets the analytic form factor up to the crease",
           "[shade][gather]") {
   constexpr double kSpacing = 0.02;
   std::vector<Surfel> surfels;
@@ -72,7 +72,8 @@ TEST_CASE("gather: a floor beside a wall sees the analytic form factor up to the
   std::vector<double> expected;
   for (double d = 0.02; d < 2; d *= 1.15) {
     scene.receivers.push_back({{d, 0, 0.1 * kSpacing}, {0, 0, 1}});
-    // Differential area to a perpendicular rectangle with one edge in its plane, halves of width 3.
+    // Differential area to a perpendicular rectangle with one edge in its plane, two halves of
+    // width 3.
     const double a = d / 3, b = 2.0 / 3;
     const double half =
         (std::atan(1 / a) - a / std::hypot(a, b) * std::atan(1 / std::hypot(a, b))) /
@@ -92,7 +93,7 @@ TEST_CASE("gather: parallel squares exchange the analytic form factor", "[shade]
   add_rectangle(surfels, {-0.5, 0.5, 1}, {1, 0, 0}, {0, -1, 0}, 0.01, glm::vec3(2));
   Scene scene(surfels);
   scene.receivers.push_back({{0, 0, 0}, {0, 0, 1}});
-  const double x = 0.5;  // from the middle: four quarters of half width at distance 1
+  const double x = 0.5;  // from the middle there are four quarters of half width at distance 1
   const double quarter = x / std::hypot(1, x) * std::atan(x / std::hypot(1, x)) / std::numbers::pi;
   const Shading s = scene.shade()[0];
   CHECK(s.occlusion == Approx(4 * quarter).margin(0.01));
@@ -118,7 +119,7 @@ TEST_CASE("gather: a closed box keeps the sky out, whichever way its walls face"
   wall({0, 0, 0}, {0, 0, 2}, {2, 0, 0});
   wall({0, 2, 0}, {2, 0, 0}, {0, 0, 2});
   Scene scene(surfels);
-  // On the floor, up to a cell and a half from the walls, and in mid-air.
+  // Receivers lie on the floor, up to a cell and a half from the walls, and in mid-air.
   for (int j = 0; j < 30; ++j) {
     for (int i = 0; i < 30; ++i) {
       const double x = 0.08 + 1.84 * i / 29, y = 0.08 + 1.84 * j / 29;
@@ -136,7 +137,7 @@ TEST_CASE("gather: a closed box keeps the sky out, whichever way its walls face"
   }
   const double mean = sum / static_cast<double>(scene.receivers.size());
   CAPTURE(worst, mean);
-  // Discs of clusters on a slant leave pinholes (spec/shading.md#weaknesses).
+  // Discs of slanted clusters leave pinholes (spec/shading.md#weaknesses).
   CHECK(worst <= 0.005);
   CHECK(mean <= 0.0005);
 }
@@ -161,8 +162,7 @@ TEST_CASE("gather: nothing shines through a wall, from either side", "[shade][ga
   }
 }
 
-TEST_CASE("gather: equals drawing every surfel when no cluster may stand for any",
-          "[shade][gather]") {
+TEST_CASE("gather: without clusters it equals drawing every surfel", "[shade][gather]") {
   Scene scene(small_scene(0.08));
   add_floor_receivers(scene.receivers, 0.08);
   scene.receivers.resize(200);
@@ -204,7 +204,7 @@ TEST_CASE(
   CHECK(e.occlusion_mean > 0.1);  // the scene does occlude
 }
 
-TEST_CASE("gather: every instruction set that the machine has gives the same shading",
+TEST_CASE("gather: every instruction set of the machine gives the same shading",
           "[shade][gather]") {
   Scene scene(small_scene(0.05));
   add_floor_receivers(scene.receivers, 0.05);
@@ -282,7 +282,7 @@ TEST_CASE("gather: threads, cap, page order and mmap change no bit", "[shade][ga
   CHECK_FALSE(same(scene.shade({.gather = {.solid_angle = 0.02F}})));
 }
 
-TEST_CASE("gather: a scene ten million metres away equals the same scene at home",
+TEST_CASE("gather: a scene ten million metres away has the shading of the same scene at the origin",
           "[shade][gather]") {
   std::vector<Surfel> surfels = small_scene(0.04);
   Scene home(surfels);
@@ -297,14 +297,14 @@ TEST_CASE("gather: a scene ten million metres away equals the same scene at home
   CHECK(e.irradiance_rms < 0.02);
 }
 
-TEST_CASE("gather: scenes ten thousand kilometres apart shade in one call as each alone",
+TEST_CASE("gather: scenes ten thousand kilometres apart shade in one call as each does alone",
           "[shade][gather]") {
-  // Relative to the cell around both, floats tell half a unit apart: more than plate and receivers
-  // are.
+  // Relative to the cell around both, floats resolve half a unit, which is more than the distance
+  // of plate and receivers.
   for (int attempt = 0; attempt < 8; ++attempt) {
     const glm::dvec3 gap = glm::dvec3(1e7, 1e7, 1e7) + 0.37 * attempt;
     std::vector<Surfel> surfels;
-    add_rectangle(surfels, {-2, -2, 0.1}, {0, 4, 0}, {4, 0, 0}, 0.05, glm::vec3(1));  // looks down
+    add_rectangle(surfels, {-2, -2, 0.1}, {0, 4, 0}, {4, 0, 0}, 0.05, glm::vec3(1));  // faces down
     std::vector<Receiver> receivers;
     for (int i = 0; i < 64; ++i) {
       receivers.push_back(
@@ -328,9 +328,10 @@ TEST_CASE("gather: scenes ten thousand kilometres apart shade in one call as eac
   }
 }
 
-TEST_CASE("gather: receivers with nothing near share sums over one buffer", "[shade][gather]") {
+TEST_CASE("gather: receivers without anything near share the sums over one buffer",
+          "[shade][gather]") {
   std::vector<Surfel> surfels;
-  add_rectangle(surfels, {-3, -3, 5}, {0, 6, 0}, {6, 0, 0}, 0.1, glm::vec3(2));  // looks down
+  add_rectangle(surfels, {-3, -3, 5}, {0, 6, 0}, {6, 0, 0}, 0.1, glm::vec3(2));  // faces down
   Scene scene(surfels);
   for (int i = 0; i < 400; ++i)
     scene.receivers.push_back({{0.034 * (i % 20), 0.034 * (i / 20), 0}, {0, 0, 1}});
@@ -345,8 +346,8 @@ TEST_CASE("gather: receivers with nothing near share sums over one buffer", "[sh
 }
 
 TEST_CASE(
-    "gather: receivers beside each other, over and under one disc's plane, see it each from its "
-    "own side",
+    "gather: neighbouring receivers above and below the plane of a disc each see their own side "
+    "of it",
     "[shade][gather]") {
   const std::vector<Surfel> surfels(
       1, {.position = {0.8, 0, 0}, .normal = {0, 0, 1}, .radius = 1, .radiance = glm::vec3(1)});
@@ -359,7 +360,7 @@ TEST_CASE(
   for (std::size_t i = 0; i < results.size(); ++i) {
     CAPTURE(scene.receivers[i].position.z);
     CHECK(results[i].occlusion ==
-          Approx(i < 100 ? 0 : 1).margin(0.03));  // backs are clear within two radii
+          Approx(i < 100 ? 0 : 1).margin(0.03));  // backs are transparent within two radii
   }
 }
 
@@ -396,7 +397,7 @@ TEST_CASE("gather: the mean of four variants has less error than one", "[shade][
   CHECK(compare(mean, exact).occlusion_rms < 0.85 * single);
 }
 
-TEST_CASE("gather: coincident surfels and receivers, and empty scenes, are no trouble",
+TEST_CASE("gather: coincident surfels, coincident receivers and empty scenes are handled",
           "[shade][gather]") {
   std::vector<Surfel> surfels(
       5000,
@@ -410,7 +411,7 @@ TEST_CASE("gather: coincident surfels and receivers, and empty scenes, are no tr
   for (const Shading& s : nothing.shade()) CHECK(s.occlusion == 0);
 }
 
-TEST_CASE("gather: receivers right at a disc see at most the hemisphere of it", "[shade][gather]") {
+TEST_CASE("gather: to receivers on a disc it covers at most the hemisphere", "[shade][gather]") {
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0.1, glm::vec3(1));
   Scene scene(surfels);
@@ -426,7 +427,7 @@ TEST_CASE("gather: receivers right at a disc see at most the hemisphere of it", 
   }
 }
 
-TEST_CASE("gather: a back is clear to the receivers of a cell within two radii, and to no others",
+TEST_CASE("gather: a back is transparent to the receivers within two radii and to no others",
           "[shade][gather]") {
   // A disc at the edge of that reach, and one whose plane passes between the receivers.
   for (const Surfel& disc :

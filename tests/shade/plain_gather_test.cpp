@@ -1,4 +1,4 @@
-// Two gathers written apart: one receiver at a time they must agree.
+// Two independent gathers must agree on a single receiver.
 #include "engine/shade/reference/plain_gather.h"
 
 #include <catch2/catch.hpp>
@@ -10,7 +10,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// Shades every receiver alone, by both.
+/// The results of both gathers, which shade every receiver alone.
 struct Pair {
   std::vector<Shading> shared, plain;
   GatherCounts shared_counts, plain_counts;
@@ -36,9 +36,9 @@ Pair shade_alone(const Scene& scene, const GatherOptions& options) {
 
 }  // namespace
 
-TEST_CASE("plain gather: a receiver alone gets what the hierarchical gather gives it",
+TEST_CASE("plain gather: a lone receiver gets the result of the hierarchical gather",
           "[shade][gather]") {
-  // Surfaces, whose clusters are flat, and a cloud of normals at random, whose clusters are not.
+  // Surfaces have flat clusters; a cloud with random normals does not.
   std::vector<Surfel> surfels = small_scene(0.04);
   const std::vector<Surfel> cloud = random_surfels(3000, 7);
   surfels.insert(surfels.end(), cloud.begin(), cloud.end());
@@ -55,7 +55,7 @@ TEST_CASE("plain gather: a receiver alone gets what the hierarchical gather give
         CHECK(glm::dot(pair.shared[i].bent_normal, pair.plain[i].bent_normal) > 0.999F);
         CHECK(pair.shared[i].sky.g == Approx(pair.plain[i].sky.g).margin(0.01));
       }
-      // The cone of normals, which only one of them asks, saves clusters that show their backs.
+      // Only one of them tests the cone of normals, which saves clusters that show their backs.
       CHECK(pair.plain_counts.clusters >= pair.shared_counts.clusters);
       if (sides == Sides::both)
         CHECK(pair.plain_counts.surfels == Approx(pair.shared_counts.surfels).epsilon(0.001));
@@ -69,7 +69,7 @@ TEST_CASE("plain gather: nothing is seen in an empty scene", "[shade][gather]") 
   CHECK(shade_alone(scene, {}).plain[0].occlusion == 0);
 }
 
-TEST_CASE("gather: groups that are children of two nodes are an error, not a walk without end",
+TEST_CASE("gather: groups that are children of two nodes are an error, not an endless walk",
           "[shade][gather]") {
   for (const char* name : {"itself", "cycle", "fan"}) {
     INFO(name);

@@ -1,4 +1,4 @@
-// Shading in other units of length, and of radii that no scene has (engine/shade/scene_scale.h).
+// Shading in other units of length, and with extreme radii (engine/shade/scene_scale.h).
 #include "engine/shade/scene_scale.h"
 
 #include <algorithm>
@@ -73,7 +73,7 @@ std::vector<Receiver> around(std::span<const Surfel> surfels) {
 
 }  // namespace
 
-TEST_CASE("scene scale: in any unit of length a scene has the same shading, bit for bit",
+TEST_CASE("scene scale: the shading does not depend on the unit of length, bit for bit",
           "[shade][scale]") {
   Scene scene(small_scene(0.05));
   add_floor_receivers(scene.receivers, 0.05);
@@ -87,7 +87,7 @@ TEST_CASE("scene scale: in any unit of length a scene has the same shading, bit 
     other.receivers = scaled(scene.receivers, exponent);
     CHECK(differing(other.shade(), whole) == 0);
   }
-  // Areas of clusters do not fit their field any more.
+  // The areas of clusters no longer fit their field.
   for (const int exponent : {-110, 110}) {
     CAPTURE(exponent);
     Scene other(scaled(small_scene(0.05), exponent));
@@ -96,7 +96,8 @@ TEST_CASE("scene scale: in any unit of length a scene has the same shading, bit 
   }
 }
 
-TEST_CASE("scene scale: in any unit of length rays meet the same discs", "[shade][scale]") {
+TEST_CASE("scene scale: the discs that rays meet do not depend on the unit of length",
+          "[shade][scale]") {
   const std::vector<Surfel> surfels = small_scene(0.05);
   std::vector<Receiver> receivers;
   add_floor_receivers(receivers, 0.05);
@@ -116,7 +117,7 @@ TEST_CASE("scene scale: in any unit of length rays meet the same discs", "[shade
   }
 }
 
-TEST_CASE("scene scale: a disc of any radius is a plane to those who stand on it",
+TEST_CASE("scene scale: a disc of any large radius is a plane to receivers on it",
           "[shade][scale]") {
   const std::vector<Receiver> receivers = around(on_ground(1000));
   const auto shade = [&](float radius) {
@@ -147,7 +148,7 @@ TEST_CASE("scene scale: a disc of any radius is a plane to those who stand on it
   }
 }
 
-TEST_CASE("scene scale: receivers that are nowhere near see nothing", "[shade][scale]") {
+TEST_CASE("scene scale: receivers extremely far away see nothing", "[shade][scale]") {
   Scene scene(small_scene(0.1));
   for (const double far : {1e12, 1e20, 1e39, 1e200, 1.7e308}) {
     for (const glm::vec3& normal : {glm::vec3(1, 0, 0), glm::vec3(-1, 0, 0), glm::vec3(0, 1, 0)})

@@ -1,4 +1,4 @@
-// What clusters are drawn as, against the surfels in them.
+// The shapes that clusters are drawn as, compared with the surfels in them.
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -42,7 +42,7 @@ std::vector<Surfel> ball() {
   return surfels;
 }
 
-/// Open above, white outside and black inside.
+/// A bowl that is open above, white outside and black inside.
 std::vector<Surfel> bowl() {
   std::vector<Surfel> surfels = ball();
   std::erase_if(surfels, [](const Surfel& s) { return s.position.z > 0; });
@@ -50,11 +50,12 @@ std::vector<Surfel> bowl() {
 }
 
 struct Covered {
-  double rms, bias;  // of what is covered, over its mean
-  double light;      // bias of the mean radiance of what is covered, over its mean
+  double rms, bias;  // errors of the covered solid angle, over its mean
+  double light;      // bias of the mean radiance of the covered directions, over its mean
 };
 
-/// Receivers all around that look at surfels of which they open no cluster but the largest.
+/// Compares what receivers all around the surfels see with rays. They open no cluster but the
+/// largest.
 Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
   Scene scene(surfels);
   constexpr int kDirections = 200;
@@ -92,20 +93,20 @@ Covered seen_as_clusters(const std::vector<Surfel>& surfels) {
 
 }  // namespace
 
-TEST_CASE("splats: clusters cover little more than what is in them and are as bright",
+TEST_CASE("splats: clusters cover little more than their surfels and are as bright",
           "[shade][gather]") {
   struct Shape {
     const char* name;
     std::vector<Surfel> surfels;
     double rms, bias, light;
   };
-  // A disc spills over the edges of a sheet that stands alone, and an ellipsoid of revolution knows
-  // no length.
+  // A disc extends past the edges of a lone sheet, and an ellipsoid of revolution ignores that a
+  // shape is long.
   const std::vector<Shape> shapes{
       {"a cube", box({1, 1, 1}), 0.30, 0.27, 0.15},
       {"a ball", ball(), 0.48, 0.46, 0.06},
       {"a tower", box({0.6, 0.6, 2}), 0.70, 0.63, 0.04},
-      {"a bowl", bowl(), 0.36, 0.34, 0.18},  // its inside is seen, black
+      {"a bowl", bowl(), 0.36, 0.34, 0.18},  // its black inside is seen
       {"a wall of two sides", box({2, 2, 0.1}), 0.46, 0.08, 0.03},
       {"a sheet", stack_of_sheets(1), 0.33, 0.30, 0.02},
       {"six sheets that face one way", stack_of_sheets(6), 0.27, 0.04, 0.02}};

@@ -1,4 +1,4 @@
-// Rays at a container part by part, against rays at all of it.
+// Rays at a container part by part, compared with rays at all of it.
 #include "engine/shade/reference/streamed_rays.h"
 
 #include <catch2/catch.hpp>
@@ -9,7 +9,8 @@
 using namespace ptc;
 using namespace ptc::test;
 
-TEST_CASE("streamed rays: parts of a scene give what the whole gives", "[shade][rays]") {
+TEST_CASE("streamed rays: tracing part by part gives the result of the whole scene",
+          "[shade][rays]") {
   Scene scene(small_scene(0.02));
   add_floor_receivers(scene.receivers, 0.02);
   const auto receivers = std::span<const Receiver>(scene.receivers).first(300);

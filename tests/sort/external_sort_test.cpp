@@ -1,4 +1,4 @@
-// The external sort against std::stable_sort, and what becomes of its memory, file and errors.
+// The external sort, compared with std::stable_sort; its memory, its files and its errors.
 #include "engine/sort/external_sort.h"
 
 #include <malloc.h>
@@ -28,7 +28,7 @@ namespace {
 constexpr std::uint64_t kMiB = 1 << 20;
 constexpr std::uint64_t kMinCap = kMiB / 4;  // runs of 1536 records
 
-// A directory that is removed with all that should not be in it.
+// A directory that is removed together with anything left in it.
 struct TempDirectory {
   std::filesystem::path path;
 
@@ -80,7 +80,7 @@ std::size_t open_files() {
   return static_cast<std::size_t>(std::distance(begin(files), end(files)));
 }
 
-// Makes files no larger than that for as long as it lives: a full disk that needs no disk.
+// Limits the size of files while it lives, which simulates a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(std::uint64_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -113,7 +113,7 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
       CHECK(same_bytes(one.records, expected));
       CHECK(same_bytes(two.records, expected));
       for (const std::uint64_t told :
-           {input.size() / 100, 10 * input.size()}) {  // wrong guesses cost time alone
+           {input.size() / 100, 10 * input.size()}) {  // wrong guesses only cost time
         CHECK(same_bytes(sort(input, cap, 2, sample, told).records, expected));
       }
       CHECK(same_bytes(sort(input, cap, 1, sample, input.size()).records, expected));
@@ -131,7 +131,7 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
   }
 }
 
-TEST_CASE("external sort: what the disk has no room for is refused before it begins",
+TEST_CASE("external sort: a sort that does not fit on the disk is refused before it begins",
           "[sort][external]") {
   const TempDirectory directory;
   const ThreadPool executor(1);
@@ -142,11 +142,11 @@ TEST_CASE("external sort: what the disk has no room for is refused before it beg
     CHECK(error.code() == std::errc::no_space_on_device);
     CHECK_THAT(error.what(), Catch::Matchers::Contains(directory.path.string()));
     CHECK_THAT(error.what(), Catch::Matchers::Contains(
-                                 "36366567.0 GB"));  // what is wanted, less what a guess may be off
+                                 "36366567.0 GB"));  // the need, less the possible error of a guess
   }
 }
 
-TEST_CASE("external sort: no, few and misleading samples cost passes, not the result",
+TEST_CASE("external sort: missing, small or misleading samples cost passes, not the result",
           "[sort][external]") {
   const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
   const std::vector<PointRecord> expected = stable_sorted(input);
@@ -196,7 +196,7 @@ TEST_CASE("external sort: equal keys beyond memory stream in the order of the in
     const std::vector<PointRecord> input = make_records(keys, 80000);
     const Outcome outcome = sort(input, kMinCap, 2, sample_of(input, 500));
     CHECK(same_bytes(outcome.records, stable_sorted(input)));
-    // They are not partitioned again and again.
+    // Equal keys are not partitioned again and again.
     CHECK(outcome.statistics.spilled_bytes < 3 * input.size() * kSpilledBytes);
   }
 }
@@ -212,7 +212,7 @@ TEST_CASE("external sort: every count around a run's end is sorted", "[sort][ext
   }
 }
 
-TEST_CASE("external sort: blocks of any size come out the same", "[sort][external]") {
+TEST_CASE("external sort: blocks of any size give the same stream", "[sort][external]") {
   const TempDirectory directory;
   const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
@@ -230,8 +230,7 @@ TEST_CASE("external sort: blocks of any size come out the same", "[sort][externa
     }
 }
 
-TEST_CASE("external sort: a block that is offered is filled as long as there are records",
-          "[sort][external]") {
+TEST_CASE("external sort: each block is filled as long as there are records", "[sort][external]") {
   const TempDirectory directory;
   const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
@@ -243,7 +242,8 @@ TEST_CASE("external sort: a block that is offered is filled as long as there are
   CHECK(stream->next(out) == 5000);
 }
 
-TEST_CASE("external sort: the digest is that of the set, however it came", "[sort][digest]") {
+TEST_CASE("external sort: the digest depends on the set of records, not on their order",
+          "[sort][digest]") {
   const TempDirectory directory;
   const ThreadPool one(1), two(2);
   const auto digest = [&](std::span<const PointRecord> records, const Executor& executor,
@@ -275,7 +275,7 @@ TEST_CASE("external sort: the digest is that of the set, however it came", "[sor
   CHECK(digest(twice, one, 5) != before);
 }
 
-TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops",
+TEST_CASE("external sort: no file is left when the sort ends, wherever it stops",
           "[sort][external]") {
   const TempDirectory directory;
   const ThreadPool two(2);
@@ -298,7 +298,8 @@ TEST_CASE("external sort: the file is gone when the sort ends, wherever it stops
   CHECK(std::filesystem::is_empty(directory.path));
 }
 
-TEST_CASE("external sort: adding after the end and ending twice are refused", "[sort][external]") {
+TEST_CASE("external sort: add() after finish() and a second finish() are refused",
+          "[sort][external]") {
   const TempDirectory directory;
   const ThreadPool one(1);
   ExternalSorter sorter({kMiB, {directory.path}}, one, {});
@@ -308,7 +309,7 @@ TEST_CASE("external sort: adding after the end and ending twice are refused", "[
   CHECK_THROWS_AS(ExternalSorter({1000, {directory.path}}, one, {}), std::invalid_argument);
 }
 
-TEST_CASE("external sort: a directory that cannot be written to is named once it is needed",
+TEST_CASE("external sort: a directory that cannot be written to is named when it is needed",
           "[sort][external]") {
   const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::lattice, 50000);
@@ -347,7 +348,7 @@ TEST_CASE("external sort: a disk that fills up is reported and leaves nothing be
   }
 }
 
-TEST_CASE("external sort: what one directory does not take goes to the others",
+TEST_CASE("external sort: records that one directory cannot take go to the others",
           "[sort][external]") {
   const TempDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
@@ -355,7 +356,7 @@ TEST_CASE("external sort: what one directory does not take goes to the others",
   const ThreadPool two(2);
   std::vector<std::filesystem::path> directories(2, directory.path);
   if (std::filesystem::exists("/dev/shm"))
-    directories[1] = "/dev/shm";  // on a disk of its own, with other room
+    directories[1] = "/dev/shm";  // on another disk, with its own free space
   const FileSizeLimit limit(input.size() * kSpilledBytes * 7 / 10);
   {
     ExternalSorter sorter({kMiB, directories}, two, sample);
@@ -371,7 +372,8 @@ TEST_CASE("external sort: what one directory does not take goes to the others",
       std::system_error);
 }
 
-TEST_CASE("external sort: a stream that failed does not look as if it ended", "[sort][external]") {
+TEST_CASE("external sort: a stream that failed does not look like one that ended",
+          "[sort][external]") {
   const TempDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);  // 2 MB
   const std::vector<MortonKey> one_key(1000, input.front().key);
@@ -379,7 +381,7 @@ TEST_CASE("external sort: a stream that failed does not look as if it ended", "[
     const ThreadPool executor(threads);
     ExternalSorter sorter({kMinCap, {directory.path}}, executor, one_key);
     sorter.add(input);
-    // The first spill fits, the partition of the bucket that is too large does not.
+    // The first spill fits on the disk, the partition of the oversized bucket does not.
     const FileSizeLimit limit(input.size() * kSpilledBytes + kMiB);
     const std::unique_ptr<PointStream> stream = sorter.finish();
     std::vector<PointRecord> out(input.size());
@@ -389,14 +391,15 @@ TEST_CASE("external sort: a stream that failed does not look as if it ended", "[
 
 namespace {
 
-// Lets the peak of resident memory start again from what is resident now.
+// Resets the peak of resident memory to what is resident now.
 bool reset_peak() {
   malloc_trim(0);
   std::ofstream("/proc/self/clear_refs") << "5";
   return peak_resident_bytes() < resident_bytes() + kMiB;
 }
 
-// Sorts so many random records under a cap without holding them itself. @return whether it spilled
+// Sorts this many random records under a cap without holding them itself. @return true if it
+// spilled
 bool sort_random(std::size_t count, std::uint64_t cap, const Executor& executor, bool fair_sample) {
   const TempDirectory directory;
   std::mt19937_64 random(1);
@@ -427,8 +430,7 @@ bool sort_random(std::size_t count, std::uint64_t cap, const Executor& executor,
 
 }  // namespace
 
-TEST_CASE("external sort: resident memory stays below the cap and is given back",
-          "[sort][external]") {
+TEST_CASE("external sort: resident memory stays below the cap and is freed", "[sort][external]") {
   constexpr std::uint64_t kCap = 8 * kMiB;
   if (kSanitized || !reset_peak()) {
     WARN(
@@ -446,7 +448,7 @@ TEST_CASE("external sort: resident memory stays below the cap and is given back"
         const std::uint64_t before = resident_bytes();
         const std::size_t count = (spills ? 5 * kCap : kCap * 2 / 5) / sizeof(PointRecord);
         CHECK(sort_random(count, kCap, executor, fair_sample) == spills);
-        CHECK(peak_resident_bytes() < before + kCap + kMiB);   // stacks and such are beside it
+        CHECK(peak_resident_bytes() < before + kCap + kMiB);   // stacks and the like come on top
         CHECK(peak_resident_bytes() > before + kCap * 3 / 4);  // else this would test nothing
         CHECK(resident_bytes() < before + kMiB);
       }

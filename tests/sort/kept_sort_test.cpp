@@ -39,7 +39,7 @@ struct Kept {
     state = writer.take();
   }
 
-  /// The sorted records from `first` on, by another sorter.
+  /// Returns the sorted records from `first` on, read by another sorter.
   std::vector<PointRecord> from(std::uint64_t first, std::uint64_t cap = kCap) const {
     SortOptions other = options;
     other.memory_bytes = cap;
@@ -71,8 +71,8 @@ void write_at(const std::filesystem::path& path, std::size_t offset,
              static_cast<std::streamsize>(bytes.size()));
 }
 
-/// Sorts what is kept with such bytes in the place of what was written to one file, which must be
-/// refused by name, after nothing but the first of the sorted records was handed out.
+/// Sorts kept records after some bytes of one file were replaced. The file must be refused by name,
+/// after at most the first of the sorted records were handed out.
 void check_torn(const Kept& kept, std::span<const PointRecord> expected,
                 const std::filesystem::path& file, std::size_t offset,
                 std::span<const std::byte> torn) {
@@ -103,11 +103,11 @@ void check_torn(const Kept& kept, std::span<const PointRecord> expected,
 
 }  // namespace
 
-TEST_CASE("kept sort: another sorter goes on from any record under any cap", "[sort][kept]") {
+TEST_CASE("kept sort: another sorter continues from any record under any cap", "[sort][kept]") {
   for (const Keys keys : kAllKeys) {
     const std::vector<PointRecord> input = make_records(keys, 20000);
     const std::vector<PointRecord> expected = stable_sorted(input);
-    for (const bool fair : {true, false}) {  // else buckets are partitioned again
+    for (const bool fair : {true, false}) {  // false: buckets are partitioned again
       const Kept kept(
           input, fair ? sample_of(input, 2000) : std::vector<MortonKey>(100, input.front().key));
       for (const std::uint64_t first : {0u, 1u, 400u, 7777u, 19999u, 20000u}) {
@@ -119,14 +119,14 @@ TEST_CASE("kept sort: another sorter goes on from any record under any cap", "[s
   }
 }
 
-TEST_CASE("kept sort: what memory would hold is on the disk, too, and so is nothing",
+TEST_CASE("kept sort: records that memory would hold are on the disk, and no records work",
           "[sort][kept]") {
   const std::vector<PointRecord> input = make_records(Keys::surface, 10);
   CHECK(same_bytes(Kept(input, {}).from(0, 1 << 20), stable_sorted(input)));
   CHECK(Kept({}, {}).from(0).empty());
 }
 
-TEST_CASE("kept sort: records stay on the disk until they are given back", "[sort][kept]") {
+TEST_CASE("kept sort: records stay on the disk until they are discarded", "[sort][kept]") {
   const std::vector<PointRecord> input = make_records(Keys::surface, 200'000);
   const std::vector<PointRecord> expected = stable_sorted(input);
   const Kept kept(input, sample_of(input, 2000));
@@ -157,7 +157,7 @@ TEST_CASE("kept sort: records stay on the disk until they are given back", "[sor
   CHECK(blocks() < all / 2);
 }
 
-TEST_CASE("kept sort: files and tables that are not what they were are refused", "[sort][kept]") {
+TEST_CASE("kept sort: changed files and tables are refused", "[sort][kept]") {
   const std::vector<PointRecord> input = make_records(Keys::surface, 3000);
   const Kept kept(input, sample_of(input, 300));
   const auto open = [&](std::span<const std::byte> state) {
@@ -184,18 +184,18 @@ TEST_CASE("kept sort: files and tables that are not what they were are refused",
   CHECK_THROWS_WITH(open(kept.state), Catch::Contains(kept.options.kept_files[0].string()));
 }
 
-TEST_CASE("kept sort: records that are not what was written are refused by name before they go out",
+TEST_CASE("kept sort: changed records are refused by file name before they are handed out",
           "[sort][kept]") {
   constexpr std::size_t kCount = 40 * kPageRecords, kWholeBlocks = 4 * kPageRecords;
   static_assert(kCount % kWholeBlocks == 0 && kWholeBlocks * kSpilledBytes % kDirectBytes == 0);
   std::uint64_t cap =
-      4 * kCap;  // what a run holds of a range is larger than the blocks that are handed out
+      4 * kCap;  // a run's part of a range is larger than the blocks that are handed out
   while (plan_sort(cap, 2, kCount).run_records / 2 % kWholeBlocks != 0)
-    cap += kDirectBytes;  // no byte of the files belongs to no record
+    cap += kDirectBytes;  // every byte of the files belongs to a record
   for (const Keys keys : {Keys::surface, Keys::equal, Keys::heavy}) {
     const std::vector<PointRecord> input = make_records(keys, kCount);
     const std::vector<PointRecord> expected = stable_sorted(input);
-    for (const bool fair : {true, false}) {  // else buckets are partitioned again
+    for (const bool fair : {true, false}) {  // false: buckets are partitioned again
       const Kept kept(input,
                       fair ? sample_of(input, 2000)
                            : std::vector<MortonKey>(100, MortonKey{~std::uint64_t{0}, 0}),
@@ -208,7 +208,7 @@ TEST_CASE("kept sort: records that are not what was written are refused by name 
         REQUIRE(whole.size() >= 3 * kDirectBytes);
         constexpr std::size_t kSteps = 19;
         for (std::size_t step = 0; step < kSteps; ++step) {
-          // A byte: of the key, of what is behind it, of each in turn.
+          // Change one byte: of the key, of the rest, of each in turn.
           const std::size_t record =
               step * (whole.size() / kSpilledBytes - 1) / (kSteps - 1) * kSpilledBytes;
           for (const std::size_t offset :
@@ -216,14 +216,14 @@ TEST_CASE("kept sort: records that are not what was written are refused by name 
             const std::byte flipped = whole[offset] ^ std::byte{0x10};
             check_torn(kept, expected, file, offset, {&flipped, 1});
           }
-          // A block that was not written, or is another.
+          // Replace a block by zeros or by another one.
           const std::size_t block =
               step * (whole.size() / kDirectBytes - 1) / (kSteps - 1) * kDirectBytes;
           check_torn(kept, expected, file, block, std::vector<std::byte>(kDirectBytes));
           const std::size_t other = block == 0 ? kDirectBytes : 0;
           check_torn(kept, expected, file, block, std::span(whole).subspan(other, kDirectBytes));
         }
-        // Two records of a range that are whole, in each other's place.
+        // Swap two whole records of a range.
         std::vector<std::byte> exchanged(whole.begin() + kSpilledBytes,
                                          whole.begin() + 2 * kSpilledBytes);
         exchanged.insert(exchanged.end(), whole.begin(), whole.begin() + kSpilledBytes);

@@ -1,4 +1,4 @@
-// The stable partition against one class after another.
+// The stable partition, compared with copying one class after another.
 #include "engine/sort/partition.h"
 
 #include <catch2/catch.hpp>
@@ -39,7 +39,7 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
         for (const PointRecord& r : input)
           class_of.push_back(static_cast<std::uint16_t>(classify(r)));
         CHECK(ClassCounts(input, class_of, classes, blocks, three).starts() == starts);
-        for (std::size_t shift = 0; shift < 8; ++shift) {  // places in a cache line
+        for (std::size_t shift = 0; shift < 8; ++shift) {  // offsets in a cache line
           std::vector<PointRecord> out(count + 8);
           counts.scatter(out.data() + shift, classify, three);
           REQUIRE(same_bytes(std::span(out).subspan(shift, count), expected));
@@ -61,8 +61,7 @@ TEST_CASE("partition: classes ascend and keep their order for any number of bloc
       }
 }
 
-TEST_CASE("partition: the differences are the bits that are not the same in all keys",
-          "[sort][partition]") {
+TEST_CASE("partition: the differences are the bits in which keys differ", "[sort][partition]") {
   const ThreadPool two(2);
   std::vector<PointRecord> input(100, numbered({0xf0, 1}, 0));
   const auto classify = [](const PointRecord&) { return std::size_t{0}; };
@@ -76,7 +75,7 @@ TEST_CASE("partition: the differences are the bits that are not the same in all 
   CHECK(differences() == MortonKey{~std::uint64_t{0xf0}, 3});
 }
 
-TEST_CASE("partition: blocks are as many as threads but never cost much memory",
+TEST_CASE("partition: there are as many blocks as threads, unless they would take much memory",
           "[sort][partition]") {
   CHECK(partition_blocks(100, 32, 8) == 1);
   CHECK(partition_blocks(10'000'000, 2048, 2) == 2);

@@ -1,4 +1,4 @@
-// The in-memory sort against std::stable_sort.
+// The in-memory sort, compared with std::stable_sort.
 #include "engine/sort/radix_sort.h"
 
 #include <stdexcept>
@@ -51,7 +51,7 @@ TEST_CASE("radix_sort: every small size is sorted", "[sort][radix]") {
       CHECK(sorts(make_records(keys, count, count), one));
 }
 
-TEST_CASE("radix_sort: sizes around the change of method are sorted", "[sort][radix]") {
+TEST_CASE("radix_sort: sizes around the switch of algorithms are sorted", "[sort][radix]") {
   const ThreadPool one(1), two(2);
   for (const std::size_t limit : {1u << 13, 1u << 15, 1u << 17})
     for (const std::size_t count : {limit - 1, limit, limit + 1}) {
@@ -62,7 +62,7 @@ TEST_CASE("radix_sort: sizes around the change of method are sorted", "[sort][ra
     }
 }
 
-TEST_CASE("radix_sort: each single bit of a key decides", "[sort][radix]") {
+TEST_CASE("radix_sort: each bit of a key counts", "[sort][radix]") {
   const ThreadPool one(1);
   for (const std::size_t count : {2u, 40u, 9000u})
     for (int bit = 0; bit < 128; ++bit) {
@@ -88,7 +88,7 @@ TEST_CASE("radix_sort: arrays may begin anywhere in a cache line", "[sort][radix
     radix_sort(std::span(records).subspan(shift, input.size()),
                std::span(scratch).subspan(8 - shift, input.size()), two);
     CHECK(same_bytes(std::span(records).subspan(shift, input.size()), expected));
-    for (std::size_t i = 0; i < 16; ++i) {  // nothing beside them was written
+    for (std::size_t i = 0; i < 16; ++i) {  // nothing was written next to them
       const std::size_t before = i < shift ? i : input.size() + i;
       CHECK(same_bytes({&records[before], 1}, {&guard, 1}));
       const std::size_t beside = i < 8 - shift ? i : input.size() + i;
@@ -97,7 +97,7 @@ TEST_CASE("radix_sort: arrays may begin anywhere in a cache line", "[sort][radix
   }
 }
 
-TEST_CASE("radix_sort: no shape of keys takes many times longer than random ones",
+TEST_CASE("radix_sort: no distribution of keys takes many times longer than random ones",
           "[sort][radix]") {
   const ThreadPool one(1);
   const auto seconds = [&](Keys keys) {
@@ -120,7 +120,7 @@ TEST_CASE("radix_sort: scratch that is too small is refused", "[sort][radix]") {
   CHECK_NOTHROW(radix_sort({}, {}, one));
 }
 
-TEST_CASE("radix_sort: what it allocates beside its scratch is a small part of the records",
+TEST_CASE("radix_sort: apart from scratch, it allocates a small part of the records' size",
           "[sort][radix]") {
   CHECK(radix_sort_bytes(100, 8) < 100 * sizeof(PointRecord));
   CHECK(radix_sort_bytes(10'000'000, 1) < 10'000'000 * sizeof(PointRecord) / 15);

@@ -1,4 +1,5 @@
-// Records for the tests of the sort: keys of every shape, and a payload that tells them apart.
+// Records for the tests of the sort: keys of every distribution, and a payload that identifies
+// them.
 #pragma once
 
 #include <algorithm>
@@ -22,13 +23,13 @@ inline bool same_bytes(std::span<const PointRecord> a, std::span<const PointReco
          (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
 }
 
-/// The oracle.
+/// Returns sorted records: the oracle for all sorts.
 inline std::vector<PointRecord> stable_sorted(std::vector<PointRecord> records) {
   std::ranges::stable_sort(records, {}, &PointRecord::key);
   return records;
 }
 
-/// A record whose payload is its place in the input.
+/// Makes a record whose payload is its place in the input.
 inline PointRecord numbered(const MortonKey& key, std::size_t place) {
   PointRecord r{};
   r.key = key;
@@ -46,7 +47,7 @@ inline PointRecord numbered(const MortonKey& key, std::size_t place) {
 
 enum class Keys {
   random,   // all 128 bits
-  lattice,  // what points have: the highest bits are 0
+  lattice,  // keys of points: the highest bits are 0
   surface,  // points of a wavy sheet, row by row
   ascending,
   descending,
@@ -54,9 +55,9 @@ enum class Keys {
   few,           // 5 different keys
   two_clusters,  // at the ends of the lattice, dense
   low_word,      // the same upper word
-  nested,        // each next bit halves what is left: as skewed as can be
-  heavy,         // 9 of 10 have one key, the others lie around it
-  outlier,       // equal but for the last, which differs in the first bit
+  nested,        // each next bit halves the rest: the most skewed distribution
+  heavy,         // 9 of 10 share one key, the others lie around it
+  outlier,       // equal except for the last, which differs in the first bit
 };
 inline constexpr Keys kAllKeys[] = {Keys::random,    Keys::lattice,      Keys::surface,
                                     Keys::ascending, Keys::descending,   Keys::equal,
@@ -110,7 +111,7 @@ inline std::vector<PointRecord> make_records(Keys keys, std::size_t count, std::
   return records;
 }
 
-/// Every stride-th key.
+/// Returns every stride-th key.
 inline std::vector<MortonKey> sample_of(std::span<const PointRecord> records, std::size_t count) {
   std::vector<MortonKey> sample;
   const std::size_t stride =

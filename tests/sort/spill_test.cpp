@@ -1,4 +1,4 @@
-// Records on disk, and what a sort makes of its cap.
+// Records on disk, and how a sort divides its memory cap.
 #include "engine/sort/spill.h"
 
 #include <sys/stat.h>
@@ -26,7 +26,7 @@ namespace {
 
 const std::filesystem::path kDirectory = std::filesystem::temp_directory_path();
 
-// `count` records in runs of at most `run`, partitioned by splitters of all of them.
+// Spills `count` records in runs of at most `run`, partitioned by splitters of all records.
 std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord> records,
                                    std::size_t run, std::size_t ranges) {
   const ThreadPool two(2);
@@ -45,7 +45,7 @@ std::shared_ptr<Partition> spilled(SpillFile& file, std::span<const PointRecord>
   return partition;
 }
 
-// Bytes on the disk of each file that this process has open and that has no name.
+// Returns the bytes on the disk of each open file of this process that has no name.
 std::vector<std::uint64_t> nameless_files() {
   std::vector<std::uint64_t> files;
   for (const auto& fd : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -64,7 +64,7 @@ std::uint64_t nameless_bytes() {
 
 }  // namespace
 
-TEST_CASE("direct file: what was written is read, aligned or not", "[sort][spill]") {
+TEST_CASE("direct file: written bytes are read back, aligned or not", "[sort][spill]") {
   DirectFile file(kDirectory);
   const Arena memory(16 * kDirectBytes);
   for (std::size_t i = 0; i < memory.size(); ++i) memory.data()[i] = std::byte(i * 7 + i / 256);
@@ -126,21 +126,21 @@ TEST_CASE("spill: each range gives its records back in the order of the input", 
   }
 }
 
-TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
+TEST_CASE("spill: records that were read leave the disk", "[sort][spill]") {
   SpillFile file({&kDirectory, 1});
   const std::uint64_t others = nameless_bytes();
   const std::vector<PointRecord> records = make_records(Keys::surface, 60'000);
   const auto partition = spilled(file, records, 7'000, 20);
   const std::uint64_t all = nameless_bytes() - others;
   CHECK(all >= records.size() * kSpilledBytes);
-  file.discard({}, 0);  // no more than what it is asked for
+  file.discard({}, 0);  // no more than requested
   CHECK(nameless_bytes() - others == all);
 
   SpillReader reader(SpillReader::kMinBytes);
   std::vector<PointRecord> out(records.size());
   for (std::size_t range = 0; range < partition->ranges(); ++range) {
     BucketReader bucket(partition, range);
-    const std::vector<MortonKey> before = bucket.sample(10, reader);  // samples take nothing away
+    const std::vector<MortonKey> before = bucket.sample(10, reader);  // sampling discards nothing
     CHECK(bucket.read(out, reader) == bucket.size());
     std::ranges::sort(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(bucket.size()), {},
                       &PointRecord::key);
@@ -153,10 +153,11 @@ TEST_CASE("spill: what was read leaves the disk", "[sort][spill]") {
   }
   const std::size_t runs = records.size() / 7'000 + 1;
   CHECK(nameless_bytes() - others <=
-        (runs + 4) * kDirectBytes);  // the last block of each, and what says where they are
+        (runs + 4) * kDirectBytes);  // the last block of each run, and the table of their places
 }
 
-TEST_CASE("spill: records are spread over directories and come back from all", "[sort][spill]") {
+TEST_CASE("spill: records are spread over directories and read back from all of them",
+          "[sort][spill]") {
   const std::vector<PointRecord> input = make_records(Keys::surface, 32100);
   const std::vector<std::filesystem::path> directories(3, kDirectory);
   const std::vector<std::uint64_t> others = nameless_files();
@@ -184,7 +185,7 @@ TEST_CASE("spill: records are spread over directories and come back from all", "
   CHECK(same_bytes(sorted, stable_sorted(input)));
 }
 
-TEST_CASE("spill: a place is held when its bytes were appended", "[sort][spill]") {
+TEST_CASE("spill: a place is held only when its bytes were appended", "[sort][spill]") {
   SpillFile file({&kDirectory, 1});
   const Arena memory(8 * kDirectBytes);
   const std::size_t bytes = 3 * kDirectBytes;
@@ -201,7 +202,7 @@ TEST_CASE("spill: a place is held when its bytes were appended", "[sort][spill]"
   CHECK_FALSE(file.holds({1, 0}, 1));
 }
 
-TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
+TEST_CASE("spill: the sample of a range comes from all its parts", "[sort][spill]") {
   const std::vector<PointRecord> input = make_records(Keys::ascending, 5000);
   SpillFile file({&kDirectory, 1});
   const auto partition = spilled(file, input, 600, 3);
@@ -225,7 +226,7 @@ TEST_CASE("spill: a range's sample comes from all its parts", "[sort][spill]") {
   }
 }
 
-TEST_CASE("spill: a read buffer below its least is refused", "[sort][spill]") {
+TEST_CASE("spill: a read buffer below the minimum is refused", "[sort][spill]") {
   CHECK_THROWS_AS(SpillReader(SpillReader::kMinBytes - 1), std::invalid_argument);
 }
 
@@ -249,7 +250,7 @@ TEST_CASE("sort plan: for very many records it uses most of the cap and never mo
   CHECK_NOTHROW(plan_sort(~std::uint64_t{0}, 1, ~std::uint64_t{0}));
 }
 
-TEST_CASE("sort plan: it takes no more memory than lets a range of what comes fit",
+TEST_CASE("sort plan: it takes no more memory than a range of the expected records needs",
           "[sort][plan]") {
   constexpr std::uint64_t kRoom = std::uint64_t{64} << 30;
   const SortPlan least = plan_sort(kRoom, 2, 0);
@@ -258,7 +259,7 @@ TEST_CASE("sort plan: it takes no more memory than lets a range of what comes fi
     CAPTURE(expected);
     const SortPlan plan = plan_sort(kRoom, 2, expected);
     const std::uint64_t block = plan.run_records / 2,
-                        average = expected / plan.ranges;  // what is sorted at once
+                        average = expected / plan.ranges;  // records sorted at once
     CHECK(block >= average * 3 / 2);
     if (expected < 2'900'000'000) {
       CHECK(plan.run_records == least.run_records);

@@ -43,7 +43,7 @@ TEST_CASE("splitters: ranges ascend with the keys", "[sort][splitters]") {
     }
 }
 
-TEST_CASE("splitters: keys that differ are spread evenly", "[sort][splitters]") {
+TEST_CASE("splitters: distinct keys are spread evenly", "[sort][splitters]") {
   for (const Keys shape : {Keys::random, Keys::lattice, Keys::surface, Keys::low_word}) {
     const Splitters splitters(keys_of(shape, 20000, 1), 64);
     CHECK(splitters.size() == 64);
@@ -54,7 +54,7 @@ TEST_CASE("splitters: keys that differ are spread evenly", "[sort][splitters]") 
   }
 }
 
-TEST_CASE("splitters: a splitter's own key begins its range", "[sort][splitters]") {
+TEST_CASE("splitters: the key of a splitter begins its range", "[sort][splitters]") {
   const Splitters splitters({{1, 10}, {1, 20}, {1, 30}, {2, 0}, {3, 5}, {3, 6}}, 6);
   REQUIRE(splitters.size() == 6);  // every key but the first
   CHECK(splitters({0, 0}) == 0);
@@ -87,7 +87,7 @@ TEST_CASE("splitters: a frequent key has a range of its own", "[sort][splitters]
   }
 }
 
-TEST_CASE("splitters: a sample of one key leaves it alone in a range", "[sort][splitters]") {
+TEST_CASE("splitters: the only key of a sample gets a range of its own", "[sort][splitters]") {
   for (const MortonKey key : {MortonKey{0, 0}, MortonKey{3, 4}, MortonKey{kOnes, kOnes}})
     for (const std::size_t count : {1u, 2u, 1000u}) {
       const Splitters splitters(std::vector<MortonKey>(count, key), 8);
@@ -106,7 +106,7 @@ TEST_CASE("splitters: different keys in a sample never all share a range", "[sor
       }
 }
 
-TEST_CASE("splitters: no sample and too few ranges are refused", "[sort][splitters]") {
+TEST_CASE("splitters: an empty sample and too few ranges are refused", "[sort][splitters]") {
   CHECK_THROWS_AS(Splitters({}, 8), std::invalid_argument);
   CHECK_THROWS_AS(Splitters({{1, 1}}, 2), std::invalid_argument);
   CHECK_THROWS_AS(Splitters({{1, 1}}, 65536), std::invalid_argument);

@@ -20,7 +20,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// The smallest scene: one page of points, one of nodes, the meta page.
+/// The smallest scene has one page of points, one of nodes, and the meta page.
 SampleOptions tiny() {
   SampleOptions options;
   options.points = 3;
@@ -52,7 +52,7 @@ class Patient {
   std::vector<std::byte> bytes_;
 };
 
-/// Text of the error that reading everything ends with; nothing when it does not.
+/// Returns the text of the error that reading everything throws; nothing when it throws none.
 std::optional<std::string> refusal(const std::filesystem::path& path) {
   try {
     static_cast<void>(walk(path));
@@ -62,8 +62,8 @@ std::optional<std::string> refusal(const std::filesystem::path& path) {
   }
 }
 
-/// Bytes that a reader may ignore: padding after pages, and the superblocks, of which there are
-/// two.
+/// Returns the bytes that a reader may ignore: padding after pages, and the superblocks, of which
+/// there are two.
 std::vector<bool> ignorable(const std::filesystem::path& path) {
   const Forgery parts(path);
   std::vector<bool> may(parts.superblock.file_bytes, false);
@@ -79,7 +79,7 @@ std::vector<bool> ignorable(const std::filesystem::path& path) {
   }
   const std::uint64_t directory = parts.superblock.directory_offset;
   allow(last, directory);
-  allow(directory + 64 + parts.directory[0].stored_bytes, may.size());  // and the superblocks
+  allow(directory + 64 + parts.directory[0].stored_bytes, may.size());  // and the two superblocks
   return may;
 }
 
@@ -111,7 +111,7 @@ TEST_CASE("reader: a flipped bit in any byte is refused or changes nothing", "[s
   CHECK(refusal(path) == std::nullopt);
 }
 
-TEST_CASE("reader: every proper prefix is refused, and why is said", "[store][damage]") {
+TEST_CASE("reader: every proper prefix is refused with the reason", "[store][damage]") {
   const ScratchDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
@@ -138,7 +138,7 @@ TEST_CASE("reader: every proper prefix is refused, and why is said", "[store][da
   CHECK(misnamed == 0);
 }
 
-TEST_CASE("reader: a file of many pages cut at any block is refused", "[store][damage]") {
+TEST_CASE("reader: a file of many pages that is cut at any block is refused", "[store][damage]") {
   const ScratchDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   SampleOptions options;
@@ -156,7 +156,7 @@ TEST_CASE("reader: a file of many pages cut at any block is refused", "[store][d
   CHECK(taken == 0);
 }
 
-TEST_CASE("reader: bytes after the end are refused, and how many is said", "[store][damage]") {
+TEST_CASE("reader: bytes after the end are refused with their number", "[store][damage]") {
   const ScratchDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
@@ -170,7 +170,7 @@ TEST_CASE("reader: bytes after the end are refused, and how many is said", "[sto
   CHECK(refusal(path) == std::nullopt);
 }
 
-TEST_CASE("reader: one whole superblock is enough, none is not", "[store][damage]") {
+TEST_CASE("reader: one whole superblock is enough, and none is refused", "[store][damage]") {
   const ScratchDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
@@ -188,7 +188,7 @@ TEST_CASE("reader: one whole superblock is enough, none is not", "[store][damage
   CHECK_THAT(refusal(path).value_or(""), Catch::Contains("unfinished or truncated"));
 }
 
-TEST_CASE("reader: files that are no containers are refused", "[store][damage]") {
+TEST_CASE("reader: files that are not containers are refused", "[store][damage]") {
   const ScratchDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_file(path, {});

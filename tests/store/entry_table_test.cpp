@@ -1,4 +1,4 @@
-// Entries come back as they were set, and memory does not hold them until then.
+// Entries are read back as they were set, and are not held in memory in between.
 #include "engine/store/entry_table.h"
 
 #include <stdexcept>
@@ -37,8 +37,7 @@ std::vector<std::byte> encoded_entries(std::uint32_t pages) {
 
 }  // namespace
 
-TEST_CASE("entry table: entries set in any order are encoded in that of pages",
-          "[store][entries]") {
+TEST_CASE("entry table: entries set in any order are encoded in page order", "[store][entries]") {
   const ScratchDirectory scratch;
   EntryTable table(scratch.path());
   CHECK(table.complete());
@@ -58,7 +57,7 @@ TEST_CASE("entry table: entries set in any order are encoded in that of pages",
   CHECK_THROWS_AS(table.add(kMaxPages - 3), RequestError);
 }
 
-TEST_CASE("entry table: pages are added and set by several threads", "[store][entries]") {
+TEST_CASE("entry table: several threads can add and set pages", "[store][entries]") {
   const ScratchDirectory scratch;
   EntryTable table(scratch.path());
   constexpr std::uint32_t kEach = 2000;
@@ -75,7 +74,7 @@ TEST_CASE("entry table: pages are added and set by several threads", "[store][en
   CHECK((table.encoded() == encoded_entries(2 * kEach)));
 }
 
-TEST_CASE("entry table: a page takes no more than a bit of memory", "[store][entries]") {
+TEST_CASE("entry table: a page takes no more than one bit of memory", "[store][entries]") {
   const ScratchDirectory scratch;
   EntryTable table(scratch.path());
   constexpr std::uint32_t kPages = 300'000;  // whose entries take 9.6 MB

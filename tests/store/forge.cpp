@@ -1,4 +1,5 @@
-// Takes containers apart and puts them together with the encoders alone: the oracle for the writer.
+// Takes containers apart and puts them together with nothing but the encoders: the oracle for the
+// writer.
 #include "tests/store/forge.h"
 
 #include <algorithm>

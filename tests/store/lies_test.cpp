@@ -1,5 +1,5 @@
-// Containers whose checksums are right and whose structure is not: each lie is found, and the error
-// names file, place and rule.
+// Containers whose checksums are correct and whose structure is not: each lie is found, and the
+// error names file, place and rule.
 #include <algorithm>
 #include <cstring>
 #include <functional>
@@ -20,12 +20,12 @@ using namespace ptc::test;
 
 namespace {
 
-/// The directory numbers the sample's pages: 3 pages for each run of points, then nodes, then meta.
+/// The numbers of the sample's pages: 3 pages for each run of points, then nodes, then meta.
 constexpr std::uint32_t kPoint = 0;
 constexpr std::uint32_t kAttribute = 1;
 constexpr std::uint32_t kSecondGroup = 2;
 
-constexpr std::size_t kRadiusColumn = 16;  // bytes a point in front of it (spec/points.md)
+constexpr std::size_t kRadiusColumn = 16;  // bytes of a point before the column (spec/points.md)
 
 class Liar {
  public:
@@ -37,7 +37,7 @@ class Liar {
   [[nodiscard]] std::filesystem::path path() const { return scratch_ / "a.ptcx"; }
   [[nodiscard]] Forgery truth() const { return Forgery(path()); }
 
-  /// Expects that opening or reading finds the lie under `clause`, and says `text`.
+  /// Expects that opening or reading reports the lie under `clause`, with `text`.
   void expect(const std::string& clause, const std::function<void(Forgery&)>& lie,
               const std::string& text = "") const {
     Forgery forgery = truth();
@@ -73,7 +73,7 @@ std::uint32_t last_point_page(const Forgery& f) {
   return last;
 }
 
-/// Gives a page another payload, in header and entry alike.
+/// Gives a page another payload, in both its header and its entry.
 void replace(Forgery& f, std::uint32_t page, std::vector<std::byte> payload) {
   const auto bytes = static_cast<std::uint32_t>(payload.size());
   f.pages[page].stored = std::move(payload);
@@ -81,7 +81,7 @@ void replace(Forgery& f, std::uint32_t page, std::vector<std::byte> payload) {
   f.entries[page].stored_bytes = f.entries[page].raw_bytes = bytes;
 }
 
-/// Changes the first child reference that `pick` takes, anywhere in the node pages.
+/// Changes the first child reference that `pick` accepts, anywhere in the node pages.
 void change_reference(Forgery& f, const std::function<bool(ChildRef&)>& pick) {
   for (std::uint32_t page = 0; page < f.entries.size(); ++page) {
     if (f.entries[page].type != PageType::node) continue;
@@ -127,7 +127,7 @@ TEST_CASE("reader: pages that overlap are found", "[store][lies]") {
   });
 }
 
-TEST_CASE("reader: counts that the directory belies are found", "[store][lies]") {
+TEST_CASE("reader: counts that contradict the directory are found", "[store][lies]") {
   const Liar liar;
   for (const int by : {-1, 1}) {
     const auto step = static_cast<std::uint64_t>(by);  // wraps around, as the addition does
@@ -147,7 +147,7 @@ TEST_CASE("reader: counts that the directory belies are found", "[store][lies]")
   });
 }
 
-TEST_CASE("reader: point pages that do not give a point its place are found", "[store][lies]") {
+TEST_CASE("reader: point pages whose lengths misplace points are found", "[store][lies]") {
   const Liar liar;
   liar.expect("point-pages", [](Forgery& f) { f.superblock.points_per_page -= 8; });
   liar.expect("point-pages", [](Forgery& f) {  // the short page is not the last
@@ -159,7 +159,7 @@ TEST_CASE("reader: point pages that do not give a point its place are found", "[
   });
 }
 
-TEST_CASE("reader: root and meta page of another kind are found", "[store][lies]") {
+TEST_CASE("reader: a root or meta page of the wrong type is found", "[store][lies]") {
   const Liar liar;
   liar.expect("superblock-root", [](Forgery& f) { f.superblock.root_page = kPoint; });
   liar.expect("superblock-root", [](Forgery& f) { f.superblock.root_page = kNoPage; });
@@ -207,7 +207,7 @@ TEST_CASE("reader: attribute pages that do not match the point pages are found",
   });
 }
 
-TEST_CASE("reader: a page that lies where another should is found", "[store][lies]") {
+TEST_CASE("reader: a page in the place of another is found", "[store][lies]") {
   const Liar liar;
   liar.expect("page-agreement", [](Forgery& f) {
     REQUIRE(f.entries[1].stored_bytes == f.entries[4].stored_bytes);
@@ -248,7 +248,7 @@ TEST_CASE("reader: a page of another file is found", "[store][lies]") {
   }
 }
 
-TEST_CASE("reader: a directory that is not the superblock's is found", "[store][lies]") {
+TEST_CASE("reader: a directory that does not match the superblock is found", "[store][lies]") {
   const Liar liar;
   liar.expect("superblock-digest", [](Forgery& f) {
     f.last_word = [](Superblock& a, Superblock& b) { a.content_xxh3[1] = b.content_xxh3[1] ^= 1; };
@@ -274,7 +274,7 @@ TEST_CASE("reader: a directory that is not the superblock's is found", "[store][
               [](Forgery& f) { f.last_word = [](Superblock& a, Superblock&) { a.area += 1; }; });
 }
 
-TEST_CASE("reader: the entry at fault is named by its place in the file", "[store][lies]") {
+TEST_CASE("reader: a wrong entry is named by its place in the file", "[store][lies]") {
   SampleOptions options;
   options.points = 40000;
   options.attribute_groups = 0;
@@ -289,7 +289,7 @@ TEST_CASE("reader: the entry at fault is named by its place in the file", "[stor
   CHECK_THROWS_WITH(walk(scratch / "lied.ptcx"), Catch::Contains("offset " + std::to_string(at)));
 }
 
-TEST_CASE("reader: references to groups that there are not are found", "[store][lies]") {
+TEST_CASE("reader: references to nonexistent groups are found", "[store][lies]") {
   const Liar liar;
   const Forgery truth = liar.truth();
   const auto interior = [&](const std::function<void(ChildRef&)>& change) {

@@ -1,4 +1,4 @@
-// What was written comes back, for every codec and page size.
+// What was written is read back, for every codec and page size.
 #include <algorithm>
 #include <string>
 
@@ -13,7 +13,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// Every page as it was given to the writer.
+/// Checks every page against what the writer was given.
 void check_pages(const ContainerReader& reader, const Sample& sample) {
   PageDecoder decoder;
   std::vector<std::byte> buffer(reader.page_payload_limit());
@@ -55,7 +55,7 @@ void check_index(const ContainerReader& reader, const Sample& sample) {
 
 }  // namespace
 
-TEST_CASE("container: pages come back from every codec and page size", "[store][reader]") {
+TEST_CASE("container: pages are read back under every codec and page size", "[store][reader]") {
   const ScratchDirectory scratch;
   for (const Codec codec : {Codec::raw, Codec::zstd}) {
     for (std::uint8_t shift = 12; shift <= 20; ++shift) {
@@ -98,7 +98,7 @@ TEST_CASE("container: compression is used where it saves space", "[store][reader
   CHECK(zstd_bytes < raw_bytes * 3 / 4);
 }
 
-TEST_CASE("container: a scene without points is a container", "[store][reader]") {
+TEST_CASE("container: a scene without points is a valid container", "[store][reader]") {
   const ScratchDirectory scratch;
   SampleOptions options;
   options.points = 0;
@@ -111,7 +111,7 @@ TEST_CASE("container: a scene without points is a container", "[store][reader]")
   CHECK_FALSE(walk(scratch / "empty.ptcx").empty());
 }
 
-TEST_CASE("container: a directory of several pages comes back", "[store][reader]") {
+TEST_CASE("container: a directory of several pages is read back", "[store][reader]") {
   const ScratchDirectory scratch;
   SampleOptions options;
   options.points = 40000;
@@ -123,7 +123,7 @@ TEST_CASE("container: a directory of several pages comes back", "[store][reader]
   check_pages(reader, sample);
 }
 
-TEST_CASE("container: the superblock comes back as finish() returned it", "[store][reader]") {
+TEST_CASE("container: the superblock is read back as finish() returned it", "[store][reader]") {
   const ScratchDirectory scratch;
   const Sample sample = write_sample(scratch / "a.ptcx", {});
   const ContainerReader reader(scratch / "a.ptcx");
@@ -132,7 +132,7 @@ TEST_CASE("container: the superblock comes back as finish() returned it", "[stor
   CHECK(reader.path() == scratch / "a.ptcx");
 }
 
-TEST_CASE("reader: a page that there is not is refused, as is a small buffer", "[store][reader]") {
+TEST_CASE("reader: a nonexistent page is refused, as is a small buffer", "[store][reader]") {
   const ScratchDirectory scratch;
   write_sample(scratch / "a.ptcx", {});
   const ContainerReader reader(scratch / "a.ptcx");
@@ -146,7 +146,8 @@ TEST_CASE("reader: a page that there is not is refused, as is a small buffer", "
   CHECK_THROWS_AS(reader.read_page(0, small, decoder), std::invalid_argument);
 }
 
-TEST_CASE("forgery: a container taken apart and put together is the same", "[store][support]") {
+TEST_CASE("forgery: taking a container apart and putting it together gives the same bytes",
+          "[store][support]") {
   const ScratchDirectory scratch;
   for (const std::uint32_t points : {0u, 1u, 500u, 20000u}) {
     SampleOptions options;

@@ -19,7 +19,7 @@ namespace {
 
 using Facts = PageSummary;
 
-/// A group as it is planned: which points it covers and what its children are.
+/// The plan of a group: the points that it covers, and its children.
 struct Plan {
   std::uint64_t first = 0;
   std::uint64_t end = 0;
@@ -50,7 +50,7 @@ class Tree {
         sample_(sample),
         limit_((std::size_t{1} << writer.header().page_shift) - kPageHeaderBytes) {}
 
-  /// From the leaves up: each tier of eight groups becomes the children of one above it.
+  /// Builds the tree from the leaves up: every eight groups of a tier become children of one above.
   void write(std::uint32_t leaf_points) {
     std::vector<Plan> tier = leaves(leaf_points);
     int level = 0;
@@ -215,7 +215,7 @@ void write_unfinished(ContainerWriter& writer, const SampleOptions& options, Sam
   superblock.area = 3;
   superblock.flux = {1, 2, 3};
   if (!points.empty()) Tree(writer, points, sample).write(options.leaf_points);
-  // From the last to the first: numbers and places in the file disagree.
+  // Write from the last page to the first, so that numbers and places in the file disagree.
   for (std::size_t page = sample.pages.size(); page-- > 0;) {
     const Sample::Page& it = sample.pages[page];
     writer.write_page(static_cast<std::uint32_t>(page), it.facts, it.payload);

@@ -22,7 +22,7 @@ class ScratchDirectory {
   ScratchDirectory& operator=(const ScratchDirectory&) = delete;
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
-  [[nodiscard]] std::size_t files() const;  ///< how many entries it has, hidden ones included
+  [[nodiscard]] std::size_t files() const;  ///< number of entries, hidden ones included
 
  private:
   std::filesystem::path path_;
@@ -35,7 +35,7 @@ struct SampleOptions {
   unsigned attribute_groups = 2;  ///< group g has a half and g components of u8
 };
 
-/// What went into a sample, page by page in the order of their numbers.
+/// The content of a sample, page by page in the order of their numbers.
 struct Sample {
   struct Page {
     PageSummary facts;
@@ -46,14 +46,14 @@ struct Sample {
   Superblock superblock;  ///< as finish() returned it
 };
 
-/// Surfels by ascending key, the same for the same count.
+/// Returns points by ascending key, the same ones for the same count.
 [[nodiscard]] std::vector<PointRecord> sample_points(std::uint32_t count);
 
-/// Writes a container: random surfels under a tree of eight children a group that is cut by rank,
-/// not by place. The reader does not look at places.
+/// Writes a container: random points under a tree with eight children in each group. It is cut by
+/// rank, not by place, because the reader does not look at places.
 Sample write_sample(const std::filesystem::path& target, const SampleOptions& options);
 
-/// The same, up to but without finish().
+/// Writes everything that write_sample() writes before it calls finish().
 void write_unfinished(ContainerWriter& writer, const SampleOptions& options, Sample& sample);
 
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path);

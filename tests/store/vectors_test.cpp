@@ -1,5 +1,5 @@
-// The conformance vectors of the specification: every good one is read whole, every bad one refused
-// by the rule that it is named after.
+// The conformance vectors of the specification: every good one is read whole, every bad one is
+// refused by the rule that it is named after.
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -22,7 +22,7 @@ std::filesystem::path today() {
   return std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors";
 }
 
-/// Where there are good vectors: those of today, and of each version that was released.
+/// Returns the folders of good vectors: the current ones, and those of each released version.
 std::vector<std::filesystem::path> roots() {
   std::vector<std::filesystem::path> found{today()};
   std::error_code none_released;
@@ -50,7 +50,7 @@ std::string rule_of(const std::filesystem::path& path) {
 
 }  // namespace
 
-TEST_CASE("vectors: every good one is read whole", "[store][vectors]") {
+TEST_CASE("vectors: every good vector is read whole", "[store][vectors]") {
   for (const auto& root : roots()) {
     for (const auto& path : vectors(root / "good")) {
       INFO(path);
@@ -59,7 +59,8 @@ TEST_CASE("vectors: every good one is read whole", "[store][vectors]") {
   }
 }
 
-TEST_CASE("vectors: every good one holds what the second reader found", "[store][vectors]") {
+TEST_CASE("vectors: every good vector has the content that the second reader found",
+          "[store][vectors]") {
   for (const auto& root : roots()) {
     std::set<std::string> expected, found;
     std::ifstream table(root / "good.txt");
@@ -74,7 +75,7 @@ TEST_CASE("vectors: every good one holds what the second reader found", "[store]
   }
 }
 
-TEST_CASE("vectors: every bad one is refused by its rule", "[store][vectors]") {
+TEST_CASE("vectors: every bad vector is refused by its rule", "[store][vectors]") {
   for (const auto& path : vectors(today() / "bad")) {
     INFO(path.filename());
     try {
@@ -87,7 +88,7 @@ TEST_CASE("vectors: every bad one is refused by its rule", "[store][vectors]") {
   }
 }
 
-TEST_CASE("vectors: what only a verifier must find is read whole or refused by its rule",
+TEST_CASE("vectors: a vector for verifiers is read whole or refused by its rule",
           "[store][vectors]") {
   for (const auto& path : vectors(today() / "verify")) {
     INFO(path.filename());

@@ -1,4 +1,4 @@
-// The file as it lies on the disk, what the writer refuses, and that it is whole or not there.
+// The file as it lies on the disk, what the writer refuses, and that a file is whole or absent.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 using Facts = PageSummary;
 
-/// A limit on the length of files that this process writes, as a full disk would be.
+/// A limit on the length of files that this process writes, which simulates a full disk.
 class FileLimit {
  public:
   explicit FileLimit(rlim_t bytes) : ignored_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -57,7 +57,7 @@ TEST_CASE("writer: pages lie in the order of the calls, aligned, padded with zer
     expected = round_up(offset + 64 + stored, unit);
     expect_zeros(offset + 64 + stored, expected);
   };
-  // The sample is written from its last page to its first; the meta page comes after all.
+  // The sample is written from its last page to its first; the meta page comes last.
   for (std::size_t page = sample.pages.size(); page-- > 0;) {
     expect_page(parts.entries[page].offset, parts.entries[page].stored_bytes, 512);
   }
@@ -97,7 +97,7 @@ TEST_CASE("writer: pages copied in their stored form give the same container", "
   write_sample(scratch / "a.ptcx", {});
   const ContainerReader from(scratch / "a.ptcx");
   ContainerWriter to(scratch / "b.ptcx", {12, Codec::zstd, 1, from.header().uuid});
-  const std::uint32_t copied = from.page_count() - 1;  // the meta page is written anew
+  const std::uint32_t copied = from.page_count() - 1;  // the meta page is written again
   for (std::uint32_t page = 0; page < copied; ++page) CHECK(to.reserve_page() == page);
   std::vector<std::byte> stored;
   for (std::uint32_t page = copied; page-- > 0;) {
@@ -134,7 +134,7 @@ TEST_CASE("writer: nothing follows finish()", "[store][writer]") {
   CHECK_THROWS_AS(writer.finish(sample.meta, sample.superblock), std::invalid_argument);
 }
 
-TEST_CASE("writer: a page that no reader would take is refused", "[store][writer]") {
+TEST_CASE("writer: a page that no reader would accept is refused", "[store][writer]") {
   const ScratchDirectory scratch;
   Sample sample;
   write_sample(scratch / "good.ptcx", {});
@@ -181,7 +181,7 @@ TEST_CASE("writer: a page that no reader would take is refused", "[store][writer
   CHECK_NOTHROW(writer.write_page(page, good, payload));
 }
 
-TEST_CASE("writer: a superblock that the pages belie is refused", "[store][writer]") {
+TEST_CASE("writer: a superblock that contradicts the pages is refused", "[store][writer]") {
   const ScratchDirectory scratch;
   const auto refused = [&](const auto& lie) {
     Sample sample;
@@ -202,7 +202,7 @@ TEST_CASE("writer: a superblock that the pages belie is refused", "[store][write
   CHECK(scratch.files() == 0);
 }
 
-TEST_CASE("writer: a page size or frame that there is not is refused before a file is made",
+TEST_CASE("writer: an invalid page size or frame is refused before a file is made",
           "[store][writer]") {
   const ScratchDirectory scratch;
   for (const std::uint8_t shift : {std::uint8_t{0}, std::uint8_t{11}, std::uint8_t{21}}) {
@@ -213,7 +213,8 @@ TEST_CASE("writer: a page size or frame that there is not is refused before a fi
   CHECK(scratch.files() == 0);
 }
 
-TEST_CASE("writer: without finish() neither target nor temporary is left", "[store][writer]") {
+TEST_CASE("writer: without finish() neither the target nor a temporary file is left",
+          "[store][writer]") {
   const ScratchDirectory scratch;
   try {
     Sample sample;
@@ -226,7 +227,7 @@ TEST_CASE("writer: without finish() neither target nor temporary is left", "[sto
   CHECK(scratch.files() == 0);
 }
 
-TEST_CASE("writer: a write that fails, at every block, leaves the old file as it was",
+TEST_CASE("writer: a write that fails at any block leaves the old file as it was",
           "[store][writer]") {
   const ScratchDirectory scratch;
   SampleOptions options;

@@ -1,4 +1,4 @@
-// Whether a sanitizer watches: it keeps shadow memory, so that resident sizes say less.
+// Whether a sanitizer is active: it keeps shadow memory, which makes resident sizes meaningless.
 #pragma once
 
 namespace ptc::test {

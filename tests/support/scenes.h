@@ -12,7 +12,7 @@
 
 namespace ptc::test {
 
-/// A directory that is removed with all it holds.
+/// A directory that is removed together with its contents.
 class TemporaryDirectory {
  public:
   TemporaryDirectory();
@@ -28,10 +28,10 @@ class TemporaryDirectory {
   std::filesystem::path path_;
 };
 
-/// All bytes of a file; none where there is none.
+/// Returns all bytes of a file; none when the file does not exist.
 [[nodiscard]] std::vector<char> bytes_of(const std::filesystem::path& path);
 
-/// Records one block after another from a vector, at most `block` at once.
+/// A stream of the records of a vector, at most `block` at a time.
 class VectorStream : public PointStream {
  public:
   explicit VectorStream(std::vector<PointRecord> records, std::size_t block = 1000)
@@ -56,15 +56,16 @@ void write_scene(const std::filesystem::path& target, const std::vector<Surfel>&
                  const BuildOptions& options = {}, std::uint8_t page_shift = 12,
                  Codec codec = Codec::zstd);
 
-/// A rectangle of n x m surfels: low corner, two edges; the normal is edge_u x edge_v.
+/// Adds a rectangle of n x m surfels from a corner and two edges; the normal is edge_u x edge_v.
 void add_rectangle(std::vector<Surfel>& surfels, const glm::dvec3& corner, const glm::dvec3& edge_u,
                    const glm::dvec3& edge_v, double spacing, const glm::vec3& radiance);
 
-/// A sphere of about 4 pi r^2 / spacing^2 surfels, normals outwards.
+/// Adds a sphere of about 4 pi r^2 / spacing^2 surfels with normals outwards.
 void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double radius,
                 double spacing, const glm::vec3& radiance);
 
-/// `count` surfels in the unit cube from a fixed stream, normals and radii at random.
+/// Returns `count` random surfels in the unit cube with random normals and radii, the same ones for
+/// the same seed.
 [[nodiscard]] std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed);
 
 }  // namespace ptc::test

@@ -1,4 +1,4 @@
-// Where checksums lie and what they cover (spec/checksums.md).
+// Containers whose checksums are made correct again after a change (spec/checksums.md).
 #include "tests/verify/damage.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Small containers, faults in them whose checksums are right, and what the check says of them.
+// Small containers, faults in them under correct checksums, and what the verifier reports.
 #pragma once
 
 #include <cstddef>
@@ -14,24 +14,25 @@
 
 namespace ptc::test {
 
-/// A room with a ball in it, lit unevenly: flat cells, round cells, colours.
+/// Returns a room with a ball in it, lit unevenly: flat cells, round cells, colours.
 [[nodiscard]] std::vector<Surfel> small_scene();
 
-/// What verify_container() finds in a file, a line each; empty when nothing is wrong.
+/// Returns what verify_container() finds in a file, one line for each fault; empty when it finds
+/// none.
 [[nodiscard]] std::string fault_of(const std::filesystem::path& path);
 
-/// A container of raw pages in memory, whose payloads, page headers and superblock may be changed
-/// and all checksums made right again.
+/// A container of raw pages in memory. Payloads, page headers and superblock can be changed;
+/// write() corrects all checksums.
 class OpenContainer {
  public:
-  /// @param path  of a container with codec raw and one directory page
+  /// @param path  a container with codec raw and one directory page
   explicit OpenContainer(const std::filesystem::path& path);
 
   [[nodiscard]] std::size_t pages() const noexcept { return entries_.size(); }
   [[nodiscard]] PageHeader& header(std::size_t page) { return headers_[page]; }
   [[nodiscard]] std::span<std::byte> payload(std::size_t page);
   [[nodiscard]] Superblock& superblock() noexcept { return superblock_; }
-  /// Writes it with checksums that are right.
+  /// Writes the container with correct checksums.
   void write(const std::filesystem::path& target);
 
  private:

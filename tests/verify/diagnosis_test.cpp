@@ -1,4 +1,4 @@
-// What a verification says of the cause of damage, and how far it sees past it.
+// The cause of damage that a verification reports, and how far it looks past the damage.
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -21,7 +21,7 @@ VerifyReport verify(const std::filesystem::path& path, const VerifyOptions& opti
   return verify_container(path, options, silent);
 }
 
-/// A container of some dozens of small pages, and where they lie.
+/// A container of some dozens of small pages, and the places of these pages.
 struct Subject {
   TemporaryDirectory directory;
   std::filesystem::path path = directory / "scene.ptcx";
@@ -60,7 +60,7 @@ void check_one(const VerifyReport& report, Cause cause, const std::string& code)
   CHECK(code_of(report.findings[0]) == code);
 }
 
-/// As a transfer in text mode does.
+/// Replaces line ends, as a transfer in text mode does.
 Bytes with_line_ends(const Bytes& bytes) {
   Bytes out;
   for (const std::byte b : bytes) {
@@ -93,7 +93,7 @@ TEST_CASE("diagnosis: a flipped bit is named wherever it is", "[verify]") {
   }
 }
 
-TEST_CASE("diagnosis: what copies and transfers do is told apart", "[verify]") {
+TEST_CASE("diagnosis: typical faults of copies and transfers are distinguished", "[verify]") {
   const Subject subject;
   const auto all = static_cast<std::ptrdiff_t>(subject.whole.size());
   const auto cut = [&](std::ptrdiff_t left) {
@@ -156,7 +156,7 @@ TEST_CASE("diagnosis: what copies and transfers do is told apart", "[verify]") {
   }
 }
 
-TEST_CASE("diagnosis: pages in the wrong place are told from those of other files", "[verify]") {
+TEST_CASE("diagnosis: misplaced pages are distinguished from pages of other files", "[verify]") {
   const Subject subject(Codec::raw);
   const auto copy_page = [](const Bytes& from, std::ptrdiff_t source, Bytes& to,
                             std::ptrdiff_t target, std::ptrdiff_t bytes) {
@@ -186,7 +186,7 @@ TEST_CASE("diagnosis: pages in the wrong place are told from those of other file
   }
 }
 
-TEST_CASE("diagnosis: what is whole is checked past what is lost", "[verify]") {
+TEST_CASE("diagnosis: intact parts are checked past lost ones", "[verify]") {
   const Subject subject(Codec::raw, 9000);
   const std::size_t pages = subject.entries.size();
   const auto payload_of = [&](Bytes& b, std::size_t page) -> std::byte& {
@@ -223,7 +223,7 @@ TEST_CASE("diagnosis: what is whole is checked past what is lost", "[verify]") {
   }
 }
 
-TEST_CASE("diagnosis: packed channels whose names are lost are no crash", "[verify]") {
+TEST_CASE("diagnosis: packed channels whose names are lost do not crash the check", "[verify]") {
   const TemporaryDirectory directory;
   const auto good = std::filesystem::path(PTC_SOURCE_DIR) / "spec/vectors/good/attributes.ptcx",
              path = directory / "a.ptcx";
@@ -260,7 +260,7 @@ TEST_CASE("diagnosis: the rest of a tree is checked past a damaged page", "[veri
   CHECK_FALSE(report.tree_checked);
 }
 
-TEST_CASE("verify: each level finds what those below do not", "[verify]") {
+TEST_CASE("verify: each level finds faults that lower levels do not", "[verify]") {
   const Subject subject(Codec::raw);
   const auto found_at = [&](const std::function<void(Bytes&)>& damage) {
     int level = 0;
@@ -294,7 +294,7 @@ TEST_CASE("verify: a tree that differs within the rounding is found by building 
   OpenContainer wrong(subject.path);
   std::size_t page = 0;
   while (wrong.header(page).type != PageType::node) ++page;
-  // Spheres may be wider by 2^-8 than their points take: some can take one more step.
+  // Spheres may be wider than their points by 2^-8, so that some can take one more step.
   for (std::uint32_t slot = 0; slot < wrong.header(page).record_count; ++slot) {
     const NodePage nodes(wrong.payload(page).data(), wrong.header(page).record_count);
     auto& radius = const_cast<std::byte*>(nodes[slot].radius())[0];

@@ -1,4 +1,4 @@
-// salvage_container(): what is whole is kept, in order and beside its channels, whatever else is
+// salvage_container(): whatever is whole is kept, in order and with its channels, whatever else is
 // lost.
 #include "engine/verify/salvage.h"
 
@@ -27,8 +27,8 @@ namespace {
 using Bytes = std::vector<std::byte>;
 constexpr std::size_t kPoints = 3000;
 
-/// Points with the radiance of their number, and the number once more as a channel: what is kept
-/// says which it was.
+/// Points whose radiance is their number, with the number again as a channel, so that each kept
+/// point says which one it was.
 void write_numbered(const std::filesystem::path& path) {
   SortedScene scene = sort_scene(random_surfels(kPoints, 4));
   for (std::size_t i = 0; i < scene.records.size(); ++i) {
@@ -58,8 +58,8 @@ void write_numbered(const std::filesystem::path& path) {
 
 struct Kept {
   SalvageReport report;
-  std::vector<std::size_t> points;   ///< their numbers, from 0 on
-  std::vector<std::size_t> channel;  ///< likewise from 1 on; 0 where it was lost
+  std::vector<std::size_t> points;   ///< numbers of the kept points, from 0 on
+  std::vector<std::size_t> channel;  ///< values of their channel, from 1 on; 0 where it was lost
 };
 
 struct Patient {
@@ -86,7 +86,7 @@ struct Patient {
     how(bytes);
     write_file(path, bytes);
   }
-  /// Two bytes of a payload, which no flipped bit explains.
+  /// Changes two bytes of a payload, which no single flipped bit explains.
   void spoil(Bytes& bytes, std::uint32_t page) const {
     bytes[entries[page].offset + kPageHeaderBytes] ^= std::byte{0xff};
     bytes[entries[page].offset + kPageHeaderBytes + 1] ^= std::byte{0xff};
@@ -117,7 +117,7 @@ struct Patient {
     return kept;
   }
 
-  /// Points but those of a page, by their numbers.
+  /// Returns the numbers of all points except those of a page.
   [[nodiscard]] std::vector<std::size_t> all_but(std::size_t lost_page = ~std::size_t{0}) const {
     std::vector<std::size_t> numbers;
     for (std::size_t i = 0; i < kPoints; ++i) {
@@ -136,7 +136,7 @@ void check_beside(const Kept& kept) {
 
 }  // namespace
 
-TEST_CASE("salvage: what costs nothing is kept whole", "[verify][salvage]") {
+TEST_CASE("salvage: damage that costs nothing leaves everything kept", "[verify][salvage]") {
   const Patient patient;
   const auto all = static_cast<std::ptrdiff_t>(patient.whole.size());
   const auto directory = static_cast<std::ptrdiff_t>(patient.superblock.directory_offset);
@@ -188,7 +188,7 @@ TEST_CASE("salvage: what costs nothing is kept whole", "[verify][salvage]") {
   }
 }
 
-TEST_CASE("salvage: a lost page costs what lies in it", "[verify][salvage]") {
+TEST_CASE("salvage: a lost page costs only its own content", "[verify][salvage]") {
   const Patient patient;
   SECTION("points") {
     for (const std::size_t lost : {std::size_t{0}, std::size_t{7}, patient.points.size() - 1}) {
@@ -230,7 +230,7 @@ TEST_CASE("salvage: a lost page costs what lies in it", "[verify][salvage]") {
   }
 }
 
-TEST_CASE("salvage: of an unfinished file what was written is kept", "[verify][salvage]") {
+TEST_CASE("salvage: the written part of an unfinished file is kept", "[verify][salvage]") {
   const Patient patient;
   const auto cut_behind = [&](std::uint32_t page) {
     patient.damage([&](Bytes& b) {
@@ -279,7 +279,7 @@ TEST_CASE("salvage: of an unfinished file what was written is kept", "[verify][s
   }
 }
 
-TEST_CASE("salvage: where nothing proves itself nothing is written", "[verify][salvage]") {
+TEST_CASE("salvage: without any whole page of points nothing is written", "[verify][salvage]") {
   const Patient patient;
   Progress silent;
   const auto refused = [&](const std::function<void(Bytes&)>& how) {
@@ -301,7 +301,8 @@ TEST_CASE("salvage: where nothing proves itself nothing is written", "[verify][s
   CHECK_FALSE(std::filesystem::exists(patient.target));
 }
 
-TEST_CASE("salvage: whatever happens to a file, what is kept was in it", "[verify][salvage]") {
+TEST_CASE("salvage: whatever happens to a file, only its own points are kept",
+          "[verify][salvage]") {
   const Patient patient;
   std::mt19937 random(11);
   const auto below = [&](std::size_t n) {

@@ -1,4 +1,4 @@
-// verify_container() and what pages say: faults behind checksums that are right.
+// verify_container() and the content of pages: faults under correct checksums.
 #include <algorithm>
 #include <cstring>
 #include <functional>
@@ -15,12 +15,12 @@
 namespace ptc::test {
 namespace {
 
-/// A number of a group's child: where it lies and by how much it is moved.
+/// One number of a group's child: its place, and by how much to change it.
 struct Edit {
   const char* what;
   std::size_t bytes;  ///< 1 or 2
   int by;
-  std::function<std::size_t(const GroupView&, int)> at;  ///< from the group's first byte
+  std::function<std::size_t(const GroupView&, int)> at;  ///< offset from the group's first byte
 };
 
 std::size_t column(const GroupView& group, int child, std::size_t k) {
@@ -57,7 +57,7 @@ std::filesystem::path write_raw(const std::filesystem::path& path,
   return path;
 }
 
-/// A container of raw pages, to be changed and judged.
+/// A container of raw pages that is changed and verified.
 struct Specimen {
   TemporaryDirectory directory;
   OpenContainer container;
@@ -65,7 +65,7 @@ struct Specimen {
   explicit Specimen(const std::vector<Surfel>& surfels, const BuildOptions& tree = {})
       : container(write_raw(directory / "scene.ptcx", surfels, tree)) {}
 
-  /// What verify_container() says of the container as it is now.
+  /// Returns what verify_container() reports about the container as it is now.
   [[nodiscard]] std::string fault() {
     container.write(directory / "wrong.ptcx");
     return fault_of(directory / "wrong.ptcx");
@@ -87,8 +87,8 @@ void for_each_child(OpenContainer& container, Body&& body) {
   }
 }
 
-/// True when no reader can tell the difference: radiance of an axis that nothing faces, or a number
-/// at the end of its range that has nowhere to go, or one below the verifier's slack.
+/// Returns true when no reader can see the difference: the radiance of an axis that nothing faces,
+/// a number at the end of its range, or a change below the verifier's tolerance.
 bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at, long before) {
   if (std::strcmp(edit.what, "radiance") == 0) {
     const auto k = static_cast<int>((at - column(group, 0, 14)) / 4) / group.size();
@@ -98,7 +98,7 @@ bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at
            before + edit.by > 255;
   }
   if (std::strcmp(edit.what, "cone axis") == 0) return false;
-  if (std::strcmp(edit.what, "thickness") == 0) {  // of a plane it is below what sums may move
+  if (std::strcmp(edit.what, "thickness") == 0) {  // that of a plane is below the tolerance of sums
     const double radius =
         static_cast<double>(decode_ufloat16(GroupView::u16_at(group.radius(), child)));
     return static_cast<double>(decode_ufloat16(static_cast<std::uint16_t>(before))) < 1e-4 * radius;
@@ -112,7 +112,7 @@ bool is_moot(const Edit& edit, const GroupView& group, int child, std::size_t at
 
 }  // namespace
 
-TEST_CASE("verify: a wrong number in any node is found though checksums are right", "[verify]") {
+TEST_CASE("verify: a wrong number in any node is found under correct checksums", "[verify]") {
   Specimen specimen(small_scene(), {.leaf_points = 12});
   OpenContainer& container = specimen.container;
   REQUIRE(specimen.fault() == "");
@@ -140,8 +140,7 @@ TEST_CASE("verify: a wrong number in any node is found though checksums are righ
   CHECK(tried > 500);
 }
 
-TEST_CASE("verify: a reference that leads elsewhere is found though checksums are right",
-          "[verify]") {
+TEST_CASE("verify: a reference that leads elsewhere is found under correct checksums", "[verify]") {
   Specimen specimen(small_scene(), {.leaf_points = 4});
   OpenContainer& container = specimen.container;
   std::size_t tried = 0;
@@ -150,7 +149,7 @@ TEST_CASE("verify: a reference that leads elsewhere is found though checksums ar
     std::byte* place = start + 24 + 8 * child;
     std::uint64_t before = 0;
     std::memcpy(&before, place, 8);
-    for (std::uint64_t by = 1; by < 6; ++by) {  // to other groups, other first points, other counts
+    for (std::uint64_t by = 1; by < 6; ++by) {  // other groups, other first points, other counts
       for (const std::uint64_t after :
            {before + (by << (interior ? 32 : 0)), before + (by << (interior ? 0 : 48))}) {
         std::memcpy(place, &after, 8);
@@ -163,7 +162,7 @@ TEST_CASE("verify: a reference that leads elsewhere is found though checksums ar
   CHECK(tried > 300);
 }
 
-TEST_CASE("verify: a group with a wrong level or cell is found though checksums are right",
+TEST_CASE("verify: a group with a wrong level or cell is found under correct checksums",
           "[verify]") {
   Specimen specimen(small_scene(), {.leaf_points = 4});
   OpenContainer& container = specimen.container;
@@ -188,7 +187,7 @@ TEST_CASE("verify: a group with a wrong level or cell is found though checksums 
   });
 }
 
-TEST_CASE("verify: a page header that says otherwise is found though checksums are right",
+TEST_CASE("verify: a page header that contradicts its page is found under correct checksums",
           "[verify]") {
   Specimen specimen(random_surfels(500, 4));
   OpenContainer& container = specimen.container;
@@ -211,8 +210,7 @@ TEST_CASE("verify: a page header that says otherwise is found though checksums a
   }
 }
 
-TEST_CASE("verify: wrong totals in the superblock are found though checksums are right",
-          "[verify]") {
+TEST_CASE("verify: wrong totals in the superblock are found under correct checksums", "[verify]") {
   Specimen specimen(small_scene());
   const auto fault = [&](const std::function<void(Superblock&)>& edit) {
     const Superblock before = specimen.container.superblock();
@@ -238,7 +236,7 @@ TEST_CASE("verify: wrong totals in the superblock are found though checksums are
   CHECK(fault([](Superblock& s) { s.header.frame.origin[0] += s.header.frame.unit(); }) != "");
 }
 
-TEST_CASE("verify: points that descend from page to page are found, and no tree is made of them",
+TEST_CASE("verify: points that descend from page to page are found, and no tree is built of them",
           "[verify]") {
   Specimen specimen(random_surfels(500, 4));
   OpenContainer& container = specimen.container;
@@ -258,7 +256,7 @@ TEST_CASE("verify: points that descend from page to page are found, and no tree 
   CHECK_FALSE(report.tree_digest);
 }
 
-TEST_CASE("verify: a point that moved is found though checksums are right", "[verify]") {
+TEST_CASE("verify: a point that moved is found under correct checksums", "[verify]") {
   Specimen specimen(small_scene());
   OpenContainer& container = specimen.container;
   struct PointEdit {

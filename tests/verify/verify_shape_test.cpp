@@ -1,4 +1,4 @@
-// verify_container() and trees of another shape than the builder's.
+// verify_container() and trees that the builder would not build.
 #include <algorithm>
 
 #include <catch2/catch.hpp>
@@ -13,7 +13,7 @@
 namespace ptc::test {
 namespace {
 
-/// Writes points under a tree of one group, whose leaves are runs of so many points.
+/// Writes points under a tree of one group, whose leaves have these numbers of points.
 void write_flat_tree(const std::filesystem::path& target, const SortedScene& scene, int level,
                      const std::vector<std::uint32_t>& runs) {
   ContainerWriter writer(target, {.page_shift = 12, .codec = Codec::raw, .frame = scene.frame});
@@ -64,7 +64,7 @@ void write_flat_tree(const std::filesystem::path& target, const SortedScene& sce
 
 }  // namespace
 
-TEST_CASE("verify: a tree that splits where none should is found", "[verify]") {
+TEST_CASE("verify: a tree that splits where the rules do not is found", "[verify]") {
   const TemporaryDirectory directory;
   const auto path = directory / "scene.ptcx";
   std::vector<Surfel> surfels = random_surfels(32, 11);
@@ -100,7 +100,7 @@ TEST_CASE("verify: a tree that splits where none should is found", "[verify]") {
   write_flat_tree(path, scene, 0, joined);
   CHECK_THAT(fault_of(path), Contains("spec/nodes.md#node-children"));
 
-  SortedScene few = scene;  // of two octants, but no more than a leaf holds
+  SortedScene few = scene;  // points of two octants, but no more than a leaf holds
   const std::uint32_t both = octants[0] + octants[1];
   REQUIRE(both <= 8);
   few.records.resize(both);

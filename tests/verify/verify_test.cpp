@@ -1,4 +1,4 @@
-// verify_container() and files: good ones pass, every damaged byte is found.
+// verify_container() and files: good ones pass, and every damaged byte is found.
 #include "engine/verify/verify.h"
 
 #include <fcntl.h>
@@ -183,8 +183,7 @@ TEST_CASE("verify: the error names where the flipped byte lies", "[verify]") {
   }
 }
 
-TEST_CASE("verify: all damaged pages are named in the order of the file, or the first alone",
-          "[verify]") {
+TEST_CASE("verify: all damaged pages are named in file order, or only the first", "[verify]") {
   const TemporaryDirectory directory;
   const auto path = directory / "scene.ptcx";
   write_scene(path, random_surfels(5000, 9), {.leaf_points = 8}, 12, Codec::raw);
@@ -219,7 +218,7 @@ TEST_CASE("verify: all damaged pages are named in the order of the file, or the 
   CHECK(few.damage == damaged.size());
 }
 
-TEST_CASE("verify: bytes that belong to no page must be zero", "[verify]") {
+TEST_CASE("verify: bytes that belong to no page and are not zero are found", "[verify]") {
   const TemporaryDirectory directory;
   const auto path = directory / "scene.ptcx";
   write_scene(path, small_scene(), {}, 12, Codec::zstd);

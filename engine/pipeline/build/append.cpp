@@ -9,8 +9,8 @@
 namespace ptc {
 namespace {
 
-/// Of the scene's point pages: raw when the first ones are, as single pages may be that do not
-/// compress.
+/// Returns the codec of the scene's point pages. Single pages that do not compress are stored raw,
+/// so only a scene whose first 16 pages are all raw counts as raw.
 Codec codec_of(const ContainerReader& scene) {
   constexpr std::size_t kPages = 16;
   const auto pages = scene.point_pages();
@@ -25,11 +25,13 @@ Codec codec_of(const ContainerReader& scene) {
 
 void check_extensible(const ContainerReader& scene) {
   if (scene.header().feature_ro_compat != 0) {
-    throw DataError(scene.path().string() + ": the file uses a feature that forbids to extend it");
+    throw DataError(scene.path().string() +
+                    ": the file uses a feature that forbids appending to it");
   }
   const std::vector<Channel>& channels = scene.meta().channels;
   if (channels.empty()) return;
-  throw DataError(scene.path().string() + ": new points would have no " + channels.front().name +
+  throw DataError(scene.path().string() + ": the appended points would have no " +
+                  channels.front().name +
                   ": append to the scene as it was before it was shaded, and shade the result");
 }
 
@@ -56,7 +58,7 @@ Meta extended_meta(const Meta& scene, const Meta& added) {
     const auto [at, is_new] = meta.text.try_emplace(key, value);
     if (!is_new && key == kInputsKey) at->second += " " + value;
   }
-  // One spacing says nothing of two.
+  // The record has room for one spacing: drop it when old and new points differ in theirs
   const auto was = scene.text.find(kSpacingKey), is = added.text.find(kSpacingKey);
   const bool same = was != scene.text.end() && is != added.text.end() && was->second == is->second;
   if (!same) meta.text.erase(kSpacingKey);

@@ -1,3 +1,21 @@
+// A build from the request to the published container.
+//
+//   sort()    inputs --> ExternalSorter --> spill files, or memory
+//                              |
+//   build()                    v  sorted points, a chain of streams
+//             estimate_radii      only for inputs without radii
+//                              v
+//             merge_points        only with `append`: with the points of the scene
+//                              v
+//             round_points        only in the profiles fast and compact
+//                              v
+//             build_pages         octree and pages; checkpoints with `resume`
+//                              v
+//             ContainerWriter::finish()
+//
+// Every stage of build() is a PointStream that pulls blocks from the one before it, so that no
+// stage holds more than its own blocks. The memory cap goes to the inputs and the sort first; when
+// the sort is done, the directory of the output takes its place.
 #include "engine/pipeline/build/build_container.h"
 
 #include <algorithm>
@@ -29,9 +47,10 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kCheckpointBytes = 8
-                                           << 20;  // of a checkpoint on its way, beside open pages
-constexpr std::uint64_t kOpenPages = 48;           // in it and in its copies
+// Memory of a checkpoint that is being saved: kCheckpointBytes, and as many open pages as there are
+// in it and in its copies.
+constexpr std::uint64_t kCheckpointBytes = 8 << 20;
+constexpr std::uint64_t kOpenPages = 48;
 
 std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Frame& frame) {
   std::vector<MortonKey> keys;
@@ -57,7 +76,7 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double sp
   return meta;
 }
 
-/// Names of inputs, of which no more are kept than a quarter of a page holds.
+/// Cuts a list of names to what a quarter of a page holds.
 std::string shortened(const std::string& names, std::uint8_t page_shift) {
   const std::size_t most = std::size_t{1} << page_shift >> 2;
   if (names.size() <= most) return names;
@@ -65,8 +84,9 @@ std::string shortened(const std::string& names, std::uint8_t page_shift) {
   return end == std::string::npos ? std::string("...") : names.substr(0, end) + " ...";
 }
 
-/// Equal points, settings and record give an equal file, so its name in the world is made of them.
-/// @param scene  that they are added to, or zeros
+/// Returns the UUID of a container. Equal points, settings and record give an equal file, so they
+/// are all that the UUID is made of.
+/// @param scene  UUID of the container that the points are appended to; zeros when there is none
 Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildRequest& request,
                   const Meta& meta, const Uuid& scene) {
   std::string text = fmt::format(
@@ -80,32 +100,37 @@ Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildR
   return uuid_of(std::as_bytes(std::span(text)));
 }
 
-/// All points on their way through the sort, and what the container is made with.
+/// A sort that has taken all points, and what else the container is made with.
 struct SortedPoints {
   std::unique_ptr<ExternalSorter> sorter;
   BuildPlan plan;
 };
 
-/// One build, from the request to the published container.
+/// One build, from the request to the published container. run() is called once.
 class Build {
  public:
   Build(const BuildRequest& request, const std::filesystem::path& target, Progress& progress)
       : request_(request), target_(target), progress_(progress), executor_(request.run.threads) {}
 
   BuildReport run() {
+    // Check the request, open the scene and what an interrupted build left
     check_request();
     if (!request_.append.empty()) open_scene();
     if (request_.resume) resumption_ = std::make_unique<Resumption>(request_, target_);
     if (resumption_ && resumption_->plan() && was_published()) return std::move(report_);
+
+    // Sort the points, or reopen the sorted ones, and build the container
     const bool goes_on = resumption_ && resumption_->plan();
     SortedPoints points = goes_on ? SortedPoints{} : sort();
     try {
       if (goes_on) points = take_up();
       build(points);
-    } catch (const DataError& error) {  // what was kept is not what it was
+    } catch (const DataError& error) {  // a kept file changed since it was written
       if (resumption_) resumption_->refuse(error);
       throw;
     }
+
+    // Complete the report, remove what was kept
     report_.sort = points.sorter->statistics();
     if (resumption_) resumption_->remove();
     tell_lone_points();
@@ -125,23 +150,23 @@ class Build {
     require(request_.checkpoint_points >= 1, "checkpoint_points", "1 or more");
   }
 
-  /// The scene that is added to.
+  /// Opens the container that the points are appended to, and takes over its lights.
   void open_scene() {
     std::error_code absent;
     if (request_.resume && std::filesystem::equivalent(request_.append, target_, absent)) {
       throw RequestError("resume",
-                         "`resume` with `append` goes into another file than the scene: the same "
-                         "command could not begin anew once " +
+                         "`resume` with `append` needs a target other than the scene: the same "
+                         "command could not begin again once " +
                              target_.string() + " is replaced");
     }
     if (request_.city_points > 0) {
       throw RequestError("append",
-                         "`append` goes without `city_points`: what is added is read "
-                         "from files");
+                         "`append` excludes `city_points`: the points to append are read from "
+                         "files");
     }
     scene_ = std::make_unique<ContainerReader>(request_.append);
     check_extensible(*scene_);
-    // The record of the scene stays; without meshes to light, its sky picture is not needed.
+    // Keep the lights of the scene; without meshes to light, their sky picture is not loaded
     if (scene_->meta().text.contains(kLightsKey)) {
       request_.lights = has_meshes() ? recorded_lights(*scene_, progress_) : LightRig{};
     }
@@ -162,7 +187,7 @@ class Build {
                               : frame_around(low, high);
   }
 
-  /// What the meta page says.
+  /// Returns the record for the meta page.
   [[nodiscard]] Meta record(const BuildInputs& inputs, double spacing) const {
     Meta meta = make_meta(request_, inputs, spacing);
     if (scene_) meta = extended_meta(scene_->meta(), meta);
@@ -171,7 +196,8 @@ class Build {
     return meta;
   }
 
-  /// Of points and nodes, whose pages are some 4 to each 10 of points where the scene is a city.
+  /// Estimates the number of pages of points and nodes. In a city there are some 4 pages of nodes
+  /// for each 10 of points; 5 are assumed.
   [[nodiscard]] std::uint64_t pages_of(std::uint64_t points) const {
     return points / points_per_page({.page_shift = request_.page_shift}) * 3 / 2;
   }
@@ -180,8 +206,10 @@ class Build {
     return budget_of(request_.run.memory_bytes, "this scene's build");
   }
 
-  /// Gives the sort what the cap leaves. When the sort is done, the directory takes its place.
-  /// @param budget  charged with the inputs
+  /// Gives the sort the memory that the cap leaves. When the sort is done, the directory takes its
+  /// place.
+  /// @param budget    already charged with the inputs
+  /// @param expected  number of points that will come; 0 when it is not known
   [[nodiscard]] SortOptions sort_options(MemoryBudget budget, std::uint64_t expected) const {
     const std::uint64_t pages = pages_of(expected + scene_points());
     budget.charge("pages that are written",
@@ -203,7 +231,9 @@ class Build {
     return options;
   }
 
+  /// Feeds all inputs to a sort, which writes them to the disk when memory does not hold them.
   SortedPoints sort() {
+    // Read and measure the inputs, choose the frame
     BuildInputs inputs = read_inputs(request_, report_.seconds, progress_);
     if (inputs.bounds.empty() && !scene_)
       throw DataError("the input has no points and no triangles");
@@ -211,6 +241,8 @@ class Build {
     SortedPoints points{
         .plan = {.frame = frame_of(inputs.bounds), .estimate_radii = inputs.clouds.estimate_radii}};
     const Frame& frame = points.plan.frame;
+
+    // Charge the inputs to the memory cap
     MemoryBudget budget = build_budget();
     if (request_.mesh) charge_mesh(budget, *request_.mesh, nullptr);
     if (const LitMesh* lit = inputs.lit.get()) {
@@ -218,8 +250,10 @@ class Build {
       budget.charge("sampling", sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count,
                                                executor_.threads()));
     }
+
+    // Start the sort, and check that the disks have room. How many surfels a given spacing makes of
+    // a mesh is not known beforehand
     const std::uint64_t known = request_.city_points + inputs.clouds.points;
-    // A given spacing does not say how many points it makes of a mesh.
     const bool by_spacing = inputs.lit && request_.sampling.spacing > 0;
     const std::uint64_t expected =
         by_spacing ? 0 : known + (inputs.lit ? request_.sampling.count : 0);
@@ -227,6 +261,8 @@ class Build {
     points.sorter =
         std::make_unique<ExternalSorter>(options, executor_, keys_of(inputs.sample, frame));
     tell_space(expected, points.sorter->expected_spill(), options.temp_dirs);
+
+    // Feed the points, then plan the container: its record and its UUID depend on all of them
     double spacing = 0;
     {
       const Stage stage(report_.seconds, progress_, inputs.lit ? "sample and light" : "partition",
@@ -240,6 +276,7 @@ class Build {
     return points;
   }
 
+  /// Reports the disk space of the build, and refuses the build when there is too little.
   void tell_space(std::uint64_t expected, std::uint64_t spilled,
                   std::span<const std::filesystem::path> temps) {
     report_.space =
@@ -247,16 +284,17 @@ class Build {
     if (spilled > 0) progress_.note(space_text(report_.space, temps, target_));
   }
 
-  /// Points that were built before a build was resumed are not counted.
+  /// Reports points whose radius could not be estimated. Points that an interrupted build had built
+  /// are not counted.
   void tell_lone_points() const {
     if (radius_counts_.without_radius == 0) return;
     progress_.note(fmt::format(
-        "the input gives no radii, and for {} points they cannot be estimated: all points "
-        "near them lie in the same place; their radius is 0 and they are not seen",
+        "the input gives no radii, and those of {} points cannot be estimated, because all points "
+        "near them lie in the same place: their radius is 0, and they are not seen",
         radius_counts_.without_radius));
   }
 
-  /// The points of an earlier build.
+  /// Reopens the sorted points of an interrupted build.
   SortedPoints take_up() {
     SortedPoints points{.plan = *resumption_->plan()};
     StateReader state = resumption_->sorter_state();
@@ -267,14 +305,14 @@ class Build {
     state.end();
     if (const auto& checkpoint = resumption_->checkpoint())
       report_.resumed_points = checkpoint->place.points;
-    progress_.note(fmt::format("going on with {} of {} points in {}", report_.resumed_points,
+    progress_.note(fmt::format("continuing with {} of {} points in {}", report_.resumed_points,
                                scene_points() + points.sorter->statistics().points,
                                resumption_->partial().string()));
     return points;
   }
 
-  /// True when an earlier build was killed between the container's publication and the removal of
-  /// what it had kept.
+  /// Returns true when an earlier build was killed between the publication of the container and the
+  /// removal of its files. Removes them then.
   bool was_published() {
     if (std::filesystem::file_size(resumption_->partial()) > 0 || !std::filesystem::exists(target_))
       return false;
@@ -285,14 +323,16 @@ class Build {
           report_.superblock.writer != writer_name())
         return false;
     } catch (const FormatError&) {
-      return false;  // what was there before
+      return false;  // the target is an older file
     }
     report_.resumed_points = report_.superblock.points;
     resumption_->remove();
     return true;
   }
 
+  /// Builds the container from the sorted points and publishes it.
   void build(SortedPoints& points) {
+    // Create the container, or reopen it as it was at the checkpoint
     const BuildPlan& plan = points.plan;
     const std::uint64_t all = scene_points() + points.sorter->statistics().points;
     const Stage stage(report_.seconds, progress_, "sort and build", all, "points");
@@ -308,11 +348,14 @@ class Build {
     const BuildPlace place = from ? from->place : BuildPlace{};
     progress_.advance(place.points);
 
-    // Of an extended scene a build goes on where it ended by merging once more what was merged.
+    // Find the first sorted point that is needed. A build that appends merges again from the
+    // beginning, because a checkpoint records its place in the merged stream alone
     const std::uint64_t first = scene_ ? 0 : place.points;
     const auto needed = scene_                ? first_of_all
                         : plan.estimate_radii ? first_for_radii
                                               : first_for_itself;
+
+    // Chain the streams: estimate radii, merge with the scene, round
     const std::unique_ptr<PointStream> sorted = points.sorter->finish(needed(first));
     std::unique_ptr<PointStream> with_radii, old, moved, merged, rounded;
     PointStream* stream = sorted.get();
@@ -330,10 +373,13 @@ class Build {
       stream =
           (rounded = round_points(*stream, plan.frame.unit(), executor_, place.last_key)).get();
     }
+
+    // Write all pages and publish the container
     report_.superblock =
         writer.finish(plan.meta, build_from(*stream, writer, *points.sorter, needed));
   }
 
+  /// Builds the pages, from the checkpoint when there is one, and saves further checkpoints.
   Superblock build_from(PointStream& points, ContainerWriter& writer, ExternalSorter& sorter,
                         std::uint64_t (*needed)(std::uint64_t)) {
     if (!resumption_) return build_pages(points, writer, request_.tree, executor_, progress_);
@@ -349,6 +395,7 @@ class Build {
     return build_pages(points, writer, request_.tree, executor_, progress_, checkpoints);
   }
 
+  // Each returns the first sorted point that is needed to continue at `point`, as first_for_radii()
   static std::uint64_t first_for_itself(std::uint64_t point) { return point; }
   static std::uint64_t first_of_all(std::uint64_t /*point*/) { return 0; }
 
@@ -358,7 +405,7 @@ class Build {
   const ThreadPool executor_;
   BuildReport report_;
   RadiusCounts radius_counts_;
-  std::unique_ptr<ContainerReader> scene_;  ///< that the points are added to; null: none
+  std::unique_ptr<ContainerReader> scene_;  ///< container that is appended to; null: none
   std::unique_ptr<Resumption> resumption_;
 };
 

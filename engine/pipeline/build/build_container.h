@@ -1,4 +1,18 @@
-// Builds containers: meshes, clouds or a procedural city to sorted, lit surfels under an octree.
+// Builds containers: the entry point of the library that makes a .ptcx from meshes and clouds.
+//
+//   meshes ---- sample, light ---.
+//   clouds ---- read ------------+--> external sort ----> octree, pages ----> target.ptcx
+//   city ------ generate --------'    by Morton key       in one pass         published by rename
+//
+// Memory stays within a cap however many points there are: points that do not fit go through
+// temporary files. The result depends on the request alone, not on the cap, the number of threads
+// or the directories.
+//
+//   ptc::BuildRequest request;
+//   request.inputs = {"dragon.obj"};
+//   request.run.memory_bytes = 1 << 30;
+//   ptc::Progress silent;
+//   const ptc::BuildReport report = ptc::build_container(request, "dragon.ptcx", silent);
 #pragma once
 
 #include <cstdint>
@@ -19,46 +33,66 @@
 
 namespace ptc {
 
+/// Everything that the bytes of a container follow from, and the resources for building it.
+///
+/// Surfels come from `inputs` and `mesh` together, or from `city_points`. Meshes are sampled and
+/// lit; clouds keep their own points, whose radiance is taken from the file or, without one there,
+/// from the colour.
 struct BuildRequest {
-  std::vector<std::filesystem::path> inputs;  ///< meshes and clouds
-  std::shared_ptr<const Mesh> mesh;           ///< a mesh in memory, beside those of the inputs
-  std::uint64_t city_points = 0;              ///< the procedural city instead of inputs
-  /// A container to which the inputs are added: its points keep what they are, their order and
-  /// their lights, and are not sorted again. The cube doubles until it holds all; then its points
-  /// move by less than a unit of the new lattice.
+  /// Mesh files and clouds, in any mixture. A cloud needs normals.
+  std::vector<std::filesystem::path> inputs;
+  /// A mesh in memory, added to those of `inputs`; null: none. Excludes `resume`.
+  std::shared_ptr<const Mesh> mesh;
+  /// Number of points of the procedural city, which is built in place of inputs; 0: no city.
+  std::uint64_t city_points = 0;
+  /// A container to which the inputs are appended; empty: none. Its points keep their order and
+  /// their light and are not sorted again. The cube of the scene doubles until it holds all points;
+  /// if it does, the old points move by less than one unit of the new lattice. The lights that the
+  /// container records replace `lights`. Excludes `city_points`; it may be the target itself,
+  /// except with `resume`.
   std::filesystem::path append;
-  bool backdrop = false;           ///< sets the meshes on a ground before a red wall
-  std::optional<LightRig> lights;  ///< of the meshes (clouds come lit); empty: a default_rig()
-                                   ///< unless a mesh emits light
-  SamplingOptions sampling;
-  BuildOptions tree;
-  std::uint8_t page_shift = 16;
-  Profile profile = Profile::compact;
-  /// Goes on where a build of the same request ended, however it did, and leaves what another needs
-  /// to do so unless it comes to its end. Once the points are sorted, no more than
-  /// `checkpoint_points` of them and what is taken at once is built again; a sort that did not come
-  /// to its end begins anew. All points go to temporary files, even if memory would hold them.
+  bool backdrop = false;  ///< sets the meshes on a ground in front of a red wall
+  /// Lights of the meshes; clouds are lit already. Empty: default_rig(), or no lights at all when
+  /// one of the meshes emits light.
+  std::optional<LightRig> lights;
+  SamplingOptions sampling;            ///< how densely meshes are sampled, and with how many rays
+  BuildOptions tree;                   ///< the octree's leaves and the order of its pages
+  std::uint8_t page_shift = 16;        ///< a page has 2^page_shift bytes, 12 to 20
+  Profile profile = Profile::compact;  ///< how points are rounded and compressed
+  /// Continues an interrupted build of the same request, and leaves files from which another build
+  /// can continue if this one is interrupted in turn. Once the points are sorted, an interruption
+  /// costs `checkpoint_points` of them and the block that is being built; before that, the sort
+  /// starts again. All points go to temporary files, even if memory would hold them.
   bool resume = false;
+  /// Number of points between two checkpoints of a build with `resume`, 1 or more.
   std::uint64_t checkpoint_points = std::uint64_t{1} << 22;
-  RunOptions run;
+  RunOptions run;  ///< memory, threads and temporary directories
 };
 
+/// The result of a build, and what it cost.
 struct BuildReport {
-  Superblock superblock;
-  std::uint64_t resumed_points = 0;  ///< of an earlier build
-  BuildSpace space;
-  SortStatistics sort;
-  StageSeconds seconds;
+  Superblock superblock;             ///< of the published container: counts, bounds and totals
+  std::uint64_t resumed_points = 0;  ///< points that an interrupted build had built before
+  BuildSpace space;                  ///< bytes on the disks, estimated before the build
+  SortStatistics sort;               ///< points that were sorted and bytes that were spilled
+  StageSeconds seconds;              ///< wall time of each stage
 };
 
-/// Samples and lights meshes, reads clouds, sorts, builds the octree and publishes the container.
-/// The same request gives the same bytes for any number of threads and any cap. Notes what it takes
-/// on the disk when it is known beforehand that the points go through temporary files, and refuses
-/// it when there is no room.
-/// @throws DataError for bad input and for what an earlier build left when it is damaged or of
-///         another request; RequestError for a request that cannot be fulfilled; LimitError for a
-///         cap that is too small (the text names the least that works); std::system_error, also
-///         when a file may not grow so large: see fail_write() of limits on the size of files
+/// Builds a container and publishes it under the name `target`.
+///
+/// The stages are: sample and light the meshes, read the clouds, sort everything by Morton key,
+/// build the octree, write the pages. The same request gives the same bytes for any number of
+/// threads and any memory cap. The target appears, or is replaced, whole and at the very end; a
+/// build that throws leaves it as it was.
+/// @param progress  gets the stages, warnings about the inputs and, when points go through
+///                  temporary files, a note with the disk space that this takes
+/// @throws RequestError when the request contradicts itself or a setting is out of range;
+///         LimitError when the memory cap is too small: the text names the least that works;
+///         DataError, FormatError for an input that is not what its format requires, and for files
+///         of an interrupted build that are damaged or belong to another request;
+///         std::system_error when the system refuses: ENOSPC before the build when the disks have
+///         too little room, EFBIG as fail_write() says
+/// Memory: at most RunOptions::memory_bytes.
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
                             Progress& progress);
 

@@ -1,3 +1,10 @@
+// Two passes over the inputs of a build.
+//
+//   read_inputs()   files --> bounds, about 2^16 sample positions, meshes in memory
+//   feed_inputs()   files, meshes, city --> blocks of 2^14 surfels --> records --> sort
+//
+// Clouds are read twice, so that their points never have to fit in memory. The second pass counts
+// them again: a file that changed in between is an error.
 #include "engine/pipeline/build/build_inputs.h"
 
 #include <algorithm>
@@ -17,17 +24,17 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kBlock = 1 << 14;       // surfels between source and sort
-constexpr std::size_t kSampleKeys = 1 << 16;  // for the sort's splitters
+constexpr std::size_t kBlock = 1 << 14;       // surfels read from a source at once
+constexpr std::size_t kSampleKeys = 1 << 16;  // positions that the sort's splitters need
 
-/// Keeps an even share of the sample while it is larger than the sort needs.
+/// Drops every second position of a sample that is twice as large as the sort needs.
 void thin(std::vector<glm::dvec3>& sample) {
   if (sample.size() < 2 * kSampleKeys) return;
   for (std::size_t i = 0; i < sample.size() / 2; ++i) sample[i] = sample[2 * i];
   sample.resize(sample.size() / 2);
 }
 
-/// Points spread over a mesh by area, for splitters.
+/// Returns about kSampleKeys positions that are spread over a mesh by area, in scene units.
 std::vector<glm::dvec3> sample_triangles(const Mesh& mesh) {
   const auto area = [&](const std::array<std::uint32_t, 3>& t) {
     const glm::vec3& a = mesh.positions[t[0]];
@@ -37,8 +44,8 @@ std::vector<glm::dvec3> sample_triangles(const Mesh& mesh) {
   for (const auto& t : mesh.triangles) total += static_cast<double>(area(t));
   const double step = total / static_cast<double>(kSampleKeys);
   std::vector<glm::dvec3> sample;
-  double due = 0;
-  double golden = 0;  // where in the triangle: the golden ratio spreads them
+  double due = 0;     // area that was passed and has no position yet
+  double golden = 0;  // place in the triangle; multiples of the golden ratio spread evenly
   for (const auto& t : mesh.triangles) {
     for (due += static_cast<double>(area(t)); due > 0 && step > 0; due -= step) {
       golden = std::fmod(golden + 0.618033988749895, 1.0);
@@ -49,7 +56,7 @@ std::vector<glm::dvec3> sample_triangles(const Mesh& mesh) {
   return sample;
 }
 
-/// Points spread over the ground of the city.
+/// Returns a grid of 256 x 256 positions on the ground of the city, in scene units.
 std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
   const glm::dvec3 extent = bounds.high - bounds.low;
   const int up =
@@ -66,7 +73,7 @@ std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
   return sample;
 }
 
-/// Moves everything a source gives into the sort. @return how many points
+/// Feeds all points of a source to the sort. @return the number of points
 std::uint64_t feed(PointSource& source, const Frame& frame, ExternalSorter& sorter,
                    const Executor& executor, Progress& progress) {
   std::vector<Surfel> surfels(kBlock);
@@ -83,7 +90,8 @@ std::uint64_t feed(PointSource& source, const Frame& frame, ExternalSorter& sort
   return points;
 }
 
-/// Coloured clouds without radiance glow as they were photographed.
+/// A source that takes a point's colour as its radiance: a cloud with colours and without radiance
+/// was photographed as it glows.
 class Photographed : public PointSource {
  public:
   explicit Photographed(std::unique_ptr<PointSource> source) : source_(std::move(source)) {}
@@ -129,7 +137,7 @@ BuildInputs read_files(const BuildRequest& request, Progress& progress) {
   const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
   inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
   inputs.lit = std::make_unique<LitMesh>(std::move(mesh), inputs.lights);
-  return_freed_memory();  // what reading the file and building the tree took
+  return_freed_memory();  // that reading the files and building the ray scene took
   return inputs;
 }
 

@@ -1,4 +1,5 @@
-// What a build is made from: meshes, clouds or the city, measured, then moved into the sort.
+// The inputs of a build: meshes, clouds or the city. They are measured first and then fed to the
+// sort, because the sort needs the bounds and a sample of the points before the first of them.
 #pragma once
 
 #include <cstdint>
@@ -25,16 +26,18 @@ struct Clouds {
     std::uint64_t points = 0;
   };
   std::vector<Cloud> files;
-  Bounds bounds;
-  std::vector<glm::dvec3> sample;
-  std::uint64_t points = 0;
-  bool estimate_radii = false;
+  Bounds bounds;                   ///< of all points, scene units
+  std::vector<glm::dvec3> sample;  ///< positions of an even share of the points, scene units
+  std::uint64_t points = 0;        ///< in all files
+  bool estimate_radii = false;     ///< one of the files gives no radii
 
-  /// @throws DataError when the points have no normals
+  /// Reads a cloud to its end and adds it to the others.
+  /// @throws DataError when the points have no normals or the file breaks its format
   void measure(const std::filesystem::path& path, Progress& progress);
 };
 
-/// The meshes of a request under rays and light; gone before the sort needs its memory.
+/// The joined meshes of a request, ready for rays and light. It is destroyed before the sort needs
+/// its memory.
 struct LitMesh {
   LitMesh(Mesh m, const LightRig& lights) : mesh(std::move(m)), rays(mesh), light(rays, lights) {}
 
@@ -43,26 +46,30 @@ struct LitMesh {
   DirectLight light;
 };
 
-/// What a build is made from, and what the sort must know of it beforehand.
+/// The measured inputs of a build, and what the sort must know about them beforehand.
 struct BuildInputs {
-  Bounds bounds;
-  std::vector<glm::dvec3> sample;  ///< places, for splitters
+  Bounds bounds;                   ///< of all inputs, scene units; empty when they have no points
+  std::vector<glm::dvec3> sample;  ///< positions for the sort's splitters, scene units
   Clouds clouds;
   LightRig lights;
-  bool emitters = false;         ///< among the triangles
-  std::unique_ptr<LitMesh> lit;  ///< null without triangles
+  bool emitters = false;         ///< at least one material emits light
+  std::unique_ptr<LitMesh> lit;  ///< null when the inputs have no triangles
 };
 
-/// Reads and measures what is asked for. @throws DataError, std::system_error
+/// Reads the meshes and measures the clouds of a request.
+/// @param seconds  gets a row for the stage "read", except for a city
+/// @throws DataError, std::system_error
 [[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, StageSeconds& seconds,
                                       Progress& progress);
 
-/// Moves all surfels into the sort; meshes are sampled and lit, and gone afterwards.
-/// @return  the spacing of those on meshes, 0 without @throws DataError when a file changed since
-/// it was read
+/// Feeds the surfels of all inputs to the sort. Meshes are sampled and lit on the way, and freed
+/// afterwards.
+/// @return  distance between neighbouring surfels on the meshes, scene units; 0 without meshes
+/// @throws DataError when a cloud changed since it was measured; std::system_error
 double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
                    ExternalSorter& sorter, const Executor& executor, Progress& progress);
 
+/// Returns the coordinates of a point as the array that Frame takes.
 [[nodiscard]] inline std::array<double, 3> to_array(const glm::dvec3& p) {
   return {p.x, p.y, p.z};
 }

@@ -11,10 +11,10 @@
 namespace ptc {
 namespace {
 
-/// Bytes that a point takes in the file.
+/// Bytes that a point takes in a container.
 struct PointBytes {
-  double least;  ///< less than in any scene that was measured, without nodes
-  double usual;  ///< in the city, with its share of nodes
+  double least;  ///< less than a point took in any scene that was measured, nodes not counted
+  double usual;  ///< bytes of a point in the city, its share of the nodes included
 };
 
 PointBytes point_bytes(Profile profile) noexcept {
@@ -46,8 +46,8 @@ BuildSpace require_build_space(std::uint64_t points, std::uint64_t temp_bytes, P
                          free_bytes({&directory, 1})};
   if (all(bytes.least) > space.output_free_bytes) {
     throw std::system_error(ENOSPC, std::generic_category(),
-                            fmt::format("some {} points take about {} in {}, with {} free", points,
-                                        amount_text(space.output_bytes), directory.string(),
+                            fmt::format("some {} points take about {} in {}, which has {} free",
+                                        points, amount_text(space.output_bytes), directory.string(),
                                         amount_text(space.output_free_bytes)));
   }
   return space;

@@ -11,7 +11,8 @@
 namespace ptc {
 namespace {
 
-/// Appends a box as 12 triangles, front sides outwards, relative to the mesh's origin.
+/// Appends a box of 12 triangles whose front sides face outwards.
+/// @param low, high  opposite corners, scene units
 void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Material& material) {
   Mesh box;
   box.origin = low;
@@ -31,7 +32,7 @@ void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Ma
   append_mesh(mesh, box, glm::dmat4(1));
 }
 
-/// Puts a ground below the mesh and a red wall to its left.
+/// Appends a ground below the mesh and a red wall to its left.
 void add_backdrop(Mesh& mesh) {
   const Bounds bounds = mesh.bounds();
   const glm::dvec3 extent = bounds.high - bounds.low;
@@ -51,6 +52,7 @@ void add_backdrop(Mesh& mesh) {
 
 Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
                  Progress& progress, std::vector<MeshCamera>* cameras) {
+  // The first mesh is taken over, so that a single one is never copied
   Mesh mesh;
   const auto join = [&mesh]<class M>(M&& other) {
     if (mesh.triangles.empty()) {
@@ -59,6 +61,8 @@ Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* a
       append_mesh(mesh, other, glm::dmat4(1));
     }
   };
+
+  // Read the mesh files
   for (const std::filesystem::path& input : inputs) {
     if (is_point_file(input)) continue;
     MeshFile file = read_mesh(input);
@@ -68,6 +72,8 @@ Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* a
     if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
     join(std::move(file.mesh));
   }
+
+  // Add the mesh in memory and the backdrop
   if (also) {
     check_mesh(*also);
     join(*also);

@@ -1,4 +1,4 @@
-// The meshes of a request as they are sampled and rendered.
+// Loads the meshes of a request, for sampling and for rendering.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +9,14 @@
 
 namespace ptc {
 
-/// Reads meshes and joins them to one; clouds among the inputs are passed over.
-/// @param also      a mesh in memory that comes after those of the inputs, or null
-/// @param backdrop  sets the meshes on a ground before a red wall
+/// Reads meshes and joins them into one. Clouds among the inputs are skipped.
+/// @param also      a mesh in memory, joined after those of the inputs; null: none
+/// @param backdrop  sets the meshes on a ground in front of a red wall
 /// @param progress  gets the warnings of each file as notes that begin with its name
-/// @param cameras   gets the cameras of the files; may be null
-/// @throws DataError, std::system_error; RequestError as check_mesh() of `also`
+/// @param cameras   gets the cameras of the files, in their order; may be null
+/// @return          the joined mesh; without triangles when there is none to read
+/// @throws DataError for a file that breaks its format; RequestError when check_mesh() refuses
+///         `also`; std::system_error
 [[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also,
                                bool backdrop, Progress& progress,
                                std::vector<MeshCamera>* cameras = nullptr);

@@ -1,3 +1,11 @@
+// Reading and writing the files of a build that can be continued.
+//
+// The manifest is written twice: without a table when the build begins, so that the next build
+// knows which spill files to remove, and with the table when all points have entered the sort.
+//
+//   begin()                keep()                   save() ...              remove()
+//   request | spills | -   request | spills | plan  id | place | writer     all files,
+//                          and sorter, hash = id    | state of the build    the manifest last
 #include "engine/pipeline/build/resume.h"
 
 #include <unistd.h>
@@ -31,9 +39,10 @@ const char* name_of(Profile profile) {
   return "unknown";
 }
 
-/// A line "NAME: VALUE" for each thing that the bytes of the container follow from; names of fields
-/// stand in backquotes, as in a RequestError.
+/// Returns a line "NAME: VALUE" for everything that the bytes of the container follow from. Names
+/// of fields stand in backquotes, as in a RequestError.
 std::string text_of(const BuildRequest& request) {
+  // Record the program and the files, by size and time of change
   std::string text;
   const auto line = [&](const char* name, const auto& value) {
     text += fmt::format("{}: {}\n", name, value);
@@ -47,6 +56,8 @@ std::string text_of(const BuildRequest& request) {
   };
   for (const std::filesystem::path& input : request.inputs) file("an input", input);
   if (!request.append.empty()) file("`append`", request.append);
+
+  // Record the settings of the surfels
   const SamplingOptions& sampling = request.sampling;
   line("`city_points`", request.city_points);
   line("`backdrop`", request.backdrop);
@@ -58,6 +69,8 @@ std::string text_of(const BuildRequest& request) {
   line("`sampling.finest`", sampling.finest);
   const LightSampling& rays = sampling.lights;
   line("the rays to lights", fmt::format("{} {} {}", rays.sun_rays, rays.area_rays, rays.sky_rays));
+
+  // Record the settings of the container
   line("`tree.leaf_points`", request.tree.leaf_points);
   line("`tree.levels_per_stream`", request.tree.levels_per_stream);
   line("`page_shift`", fmt::format("{} bytes", 1U << request.page_shift));
@@ -65,7 +78,7 @@ std::string text_of(const BuildRequest& request) {
   return text;
 }
 
-/// What the first line of `now` that is another in `before` says.
+/// Describes the first line in which two texts of text_of() differ, for an error.
 std::string difference(const std::string& before, const std::string& now) {
   std::istringstream old_lines(before), new_lines(now);
   std::string old_line, new_line;
@@ -103,7 +116,7 @@ BuildPlan get_plan(StateReader& state) {
   plan.frame.origin = state.get<std::array<double, 3>>();
   plan.frame.edge = state.get<double>();
   const std::span<const std::byte> uuid = state.get_bytes();
-  state.require(uuid.size() == plan.uuid.size(), "a container's name of another length");
+  state.require(uuid.size() == plan.uuid.size(), "the container's UUID has another length");
   std::ranges::copy(uuid, plan.uuid.begin());
   plan.meta = decode_meta(state.get_bytes());
   plan.estimate_radii = state.get<std::uint8_t>() != 0;
@@ -119,22 +132,23 @@ Resumption::Resumption(const BuildRequest& request, const std::filesystem::path&
       request_(text_of(request)) {
   if (request.mesh) {
     throw RequestError("resume",
-                       "`resume` goes with inputs from files: a mesh in memory is gone "
-                       "when a build is taken up");
+                       "`resume` needs inputs from files: a mesh in memory is lost when a build "
+                       "is interrupted");
   }
+  // Name the spill files after the whole path: two outputs may share a temporary directory
   const std::string whole = std::filesystem::absolute(target).lexically_normal().string();
-  const std::uint64_t name = xxh3_64(
-      std::as_bytes(std::span(whole)));  // two outputs may share a directory for temporary files
+  const std::uint64_t name = xxh3_64(std::as_bytes(std::span(whole)));
   for (const std::filesystem::path& directory : temp_dirs(request.run, target)) {
     spills_.push_back(directory / fmt::format("{}.resume-spill-{:016x}-{}",
                                               target.filename().string(), name, spills_.size()));
   }
+  // Lock the unfinished container, and open the files of an interrupted build
   lock_ = std::make_unique<FileLock>(pages_);
   try {
     if (std::filesystem::exists(manifest_)) load_manifest();
     if (plan_ && std::filesystem::exists(at_)) load_checkpoint();
   } catch (const DataError& error) {
-    if (std::filesystem::file_size(pages_) == 0) remove_file(pages_);  // perhaps the lock's own
+    if (std::filesystem::file_size(pages_) == 0) remove_file(pages_);  // the lock may have made it
     refuse(error);
   }
   if (!plan_) begin();
@@ -143,26 +157,31 @@ Resumption::Resumption(const BuildRequest& request, const std::filesystem::path&
 void Resumption::refuse(const DataError& error) const {
   std::vector<std::filesystem::path> files{manifest_, at_, pages_};
   files.insert(files.end(), spills_.begin(), spills_.end());
-  throw DataError(fmt::format("{}; to start anew, remove {}", error.what(), names_text(files)));
+  throw DataError(fmt::format("{}; to start again, remove {}", error.what(), names_text(files)));
 }
 
 void Resumption::load_manifest() {
+  // Compare the request that the files belong to
   const std::vector<std::byte> bytes = read_state(manifest_);
   StateReader state(bytes, manifest_.string());
   const std::string request = state.get_text();
   if (request != request_) {
-    throw DataError(fmt::format("{}: it is of another build: {}", manifest_.string(),
+    throw DataError(fmt::format("{}: it belongs to another build: {}", manifest_.string(),
                                 difference(request, request_)));
   }
+
+  // Remove the spill files of a sort that did not end
   std::vector<std::filesystem::path> spills;
   for (std::uint64_t count = state.get_count(1 << 10); count > 0; --count)
     spills.emplace_back(state.get_text());
   const std::span<const std::byte> sorted = state.get_bytes();
   state.end();
-  if (sorted.empty()) {  // killed in the sort
+  if (sorted.empty()) {  // the build was killed before the end of its sort
     std::ranges::for_each(spills, remove_file);
     return;
   }
+
+  // Take over the plan and the state of the sorter
   spills_ = std::move(spills);
   StateReader rest(sorted, manifest_.string());
   plan_ = get_plan(rest);
@@ -175,7 +194,7 @@ void Resumption::load_manifest() {
 void Resumption::load_checkpoint() {
   const std::vector<std::byte> bytes = read_state(at_);
   StateReader state(bytes, at_.string());
-  if (state.get<std::uint64_t>() != id_) return;  // of an earlier build: this one had none yet
+  if (state.get<std::uint64_t>() != id_) return;  // left by an earlier build: this one has none yet
   Checkpoint& checkpoint = checkpoint_.emplace();
   checkpoint.place.points = state.get<std::uint64_t>();
   checkpoint.place.last_key = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
@@ -227,7 +246,7 @@ void Resumption::save(const Checkpoint& checkpoint) const {
   write_state(at_, state.take());
 }
 
-// The manifest last: what is left of a removal that was cut short is known by it.
+// The manifest goes last: if the removal is interrupted, it still names the files that are left.
 void Resumption::remove() noexcept {
   std::ranges::for_each(spills_, remove_file);
   remove_file(state_temporary(at_));

@@ -1,11 +1,16 @@
-// A build that goes on where another ended (engine/ptc.h, BuildRequest::resume).
+// The files from which an interrupted build can be continued (build_container.h,
+// BuildRequest::resume).
 //
-//   OUT.resume        what is built from what; once all points are sorted by range, also the table
-//   of the temporary files OUT.resume-pages  the container as far as it got OUT.resume-at     the
-//   last checkpoint TEMP/OUT.resume-spill-*  the sorted ranges, in every --temp directory
+//   OUT.resume                the manifest: the request and, once all points are partitioned, the
+//                             table of the spill files
+//   OUT.resume-pages          the unfinished container
+//   OUT.resume-at             the last checkpoint
+//   TEMP/OUT.resume-spill-*   the points by range of keys, in every directory for temporary files
 //
-// Each is on the disk, whole, before the next stands on it: the ranges before the table, the pages
-// before the checkpoint, the checkpoint before the ranges that it no longer needs are given back.
+// Each file is on the disk, whole, before another one refers to it:
+//
+//   spill files  -->  manifest  -->  pages  -->  checkpoint  -->  blocks of spill files freed
+//                     (keep)         (sync)      (save)           (discard_before)
 #pragma once
 
 #include <cstdint>
@@ -27,55 +32,61 @@
 
 namespace ptc {
 
-/// What a container is made with, known once all points are there.
+/// Everything that the container is made with besides its points; known once all points have
+/// entered the sort.
 struct BuildPlan {
   Frame frame;
   Uuid uuid{};
   Meta meta;
-  bool estimate_radii = false;
+  bool estimate_radii = false;  ///< at least one input gives no radii
 };
 
-/// A moment to go on from.
+/// A moment of a build from which another process can continue it.
 struct Checkpoint {
   BuildPlace place;
   WriterState writer;
-  std::vector<std::byte> build;  ///< for Checkpoints::from
+  std::vector<std::byte> build;  ///< state of build_pages(), for Checkpoints::from
 };
 
-/// What is kept of a build, and for whom. Until the points are sorted nothing outlives it, unless
-/// the process is killed.
+/// The files of one build that can be continued: opens those of an interrupted build, and writes
+/// new ones. Until keep() is called, the destructor removes all of them; afterwards they stay until
+/// remove().
 class Resumption {
  public:
-  /// Takes up what an earlier build of the same request left; what that did not bring to the end of
-  /// the sort goes.
-  /// @throws DataError when what is there is damaged, or of another request: the text names what
-  /// differs;
-  ///         std::system_error, also when another process is at it
+  /// Reopens the files of an interrupted build of the same request, or begins new ones. Files of a
+  /// build that was interrupted before the end of its sort are removed.
+  /// @throws RequestError when the request has a mesh in memory;
+  ///         DataError when a file is damaged or belongs to another request: the text says what
+  ///         differs;
+  ///         std::system_error, also when another process is building the same target
   Resumption(const BuildRequest& request, const std::filesystem::path& target);
   Resumption(const Resumption&) = delete;
   Resumption& operator=(const Resumption&) = delete;
 
-  /// The container's name while it is unfinished.
+  /// The path of the unfinished container.
   [[nodiscard]] const std::filesystem::path& partial() const noexcept { return pages_; }
-  /// Names for SortOptions::kept_files.
+  /// The paths of the spill files, for SortOptions::kept_files.
   [[nodiscard]] const std::vector<std::filesystem::path>& spills() const noexcept {
     return spills_;
   }
 
-  /// What was kept once the points were sorted; empty: they must be sorted.
+  /// The plan of the interrupted build; empty when the points must be sorted from the beginning.
   [[nodiscard]] const std::optional<BuildPlan>& plan() const noexcept { return plan_; }
-  /// Of the sorter that sorted them.
+  /// Returns the state from which an ExternalSorter reopens the spill files. @pre plan()
   [[nodiscard]] StateReader sorter_state() const { return {sorter_, manifest_.string()}; }
-  /// From which to go on; empty: from the first point on.
+  /// The checkpoint to continue from; empty when the build starts at the first sorted point.
   [[nodiscard]] const std::optional<Checkpoint>& checkpoint() const noexcept { return checkpoint_; }
+  /// Returns the state of build_pages() at the checkpoint. @pre checkpoint()
   [[nodiscard]] StateReader build_state() const { return {checkpoint_->build, at_.string()}; }
 
-  /// From now on, all points sorted, what there is stays.
+  /// Makes all files outlive this object. To be called once, when all points have entered the sort.
   void keep(const BuildPlan& plan, ExternalSorter& sorter);
+  /// Replaces the checkpoint on the disk.
   void save(const Checkpoint& checkpoint) const;
-  /// Tells what to remove to start anew. @throws DataError with it behind what `error` says
+  /// Refuses to continue from damaged files.
+  /// @throws DataError with the text of `error`, followed by the files to remove for a new start
   [[noreturn]] void refuse(const DataError& error) const;
-  /// Removes all, once the container is published.
+  /// Removes all files. To be called when the container is published.
   void remove() noexcept;
 
  private:
@@ -90,25 +101,27 @@ class Resumption {
   std::vector<std::byte> sorter_;
   std::optional<BuildPlan> plan_;
   std::optional<Checkpoint> checkpoint_;
-  std::uint64_t id_ = 0;  ///< of what was sorted: a checkpoint belongs to it
+  std::uint64_t id_ = 0;  ///< hash of the plan and the sorter's state; checkpoints record it
   std::unique_ptr<FileLock> lock_;
-  std::vector<std::unique_ptr<TemporaryName>>
-      unsorted_;  ///< all files, until what is in them is worth keeping
+  /// Removes all files with this object, until keep() releases them.
+  std::vector<std::unique_ptr<TemporaryName>> unsorted_;
 };
 
-/// Saves checkpoints of a build while it goes on.
+/// Saves checkpoints of a build on a thread of its own, while the build continues.
 class CheckpointSaver {
  public:
-  /// @param first_needed  of the points before which a build at some point needs none
-  /// All must outlive this.
+  /// @param first_needed  index of the first sorted point that a build needs to continue at a given
+  ///                      point; the disk blocks of earlier points are freed
+  /// All arguments must outlive this.
   CheckpointSaver(const Resumption& resumption, ContainerWriter& writer, ExternalSorter& sorter,
                   std::uint64_t (*first_needed)(std::uint64_t));
-  /// Waits for the one that is on its way.
+  /// Waits for the checkpoint that is being saved; its error is lost.
   ~CheckpointSaver();
   CheckpointSaver(const CheckpointSaver&) = delete;
   CheckpointSaver& operator=(const CheckpointSaver&) = delete;
 
-  /// Waits for the one before. @throws what went wrong with it
+  /// Waits for the previous checkpoint, then starts to save this one.
+  /// @throws whatever went wrong with the previous one
   void save(const BuildPlace& place, std::vector<std::byte> build);
 
  private:

@@ -1,4 +1,15 @@
-// Containers to clouds and to other containers (engine/pipeline/convert/convert.h).
+// Conversions of containers, page by page or point by point.
+//
+// A container keeps the channels of a point on pages of their own, one column for each component; a
+// PLY keeps them in the row of the point. spread_columns() transposes one page:
+//
+//   attribute page (group)             rows of floats, one for each point
+//   a0 a1 a2 .. | b0 b1 b2 .. | ..     a0 b0 ..  a1 b1 ..  a2 b2 ..
+//
+// A container becomes another container in one of two ways. copy_pages() decodes and encodes each
+// page under its old number. rebuild_pages() streams the points through the octree builder, because
+// another page size or rounded points make other pages, and moves the channels to pages of the new
+// length.
 #include "engine/pipeline/convert/convert.h"
 
 #include <algorithm>
@@ -29,7 +40,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kTextBytes = std::size_t{1} << 20;
+constexpr std::size_t kTextBytes = std::size_t{1} << 20;  // text that is collected for one write
 
 std::vector<std::uint16_t> groups_of(const ContainerReader& container) {
   std::set<std::uint16_t> groups;
@@ -55,8 +66,10 @@ float load_value(ChannelType type, const std::byte* at) {
   return 0;
 }
 
-/// Fills the place of `channels`, all of one group, in rows of `stride` floats: one row a point.
-/// @param payload  of an attribute page: one column of `count` values for each component
+/// Writes the values of `channels`, all of one group, into rows of `stride` floats, one row for
+/// each point.
+/// @param payload  the payload of an attribute page: one column of `count` values per component
+/// @param rows     where the first component goes in the first row
 void spread_columns(std::span<const Channel> channels, const std::byte* payload, std::size_t count,
                     float* rows, std::size_t stride) {
   for (const Channel& channel : channels) {
@@ -69,7 +82,7 @@ void spread_columns(std::span<const Channel> channels, const std::byte* payload,
   }
 }
 
-/// Point pages one after another with the values of all channels.
+/// A pass over the point pages of a container, together with the values of all channels.
 class PageCursor {
  public:
   explicit PageCursor(const ContainerReader& container)
@@ -89,15 +102,15 @@ class PageCursor {
     return true;
   }
 
-  std::vector<Surfel> surfels;
-  std::vector<float> values;  ///< of all channels, point by point
+  std::vector<Surfel> surfels;  ///< points of the page that next() read
+  std::vector<float> values;    ///< their channels, point by point
 
  private:
   void read_channels(std::uint32_t count) {
     values.resize(count * floats_);
     std::span<const Channel> rest = container_.meta().channels;
     float* place = values.data();
-    while (!rest.empty()) {  // channels are by group
+    while (!rest.empty()) {  // the format orders channels by group
       const std::uint16_t group = rest.front().group;
       const auto last =
           std::ranges::find_if(rest, [&](const Channel& c) { return c.group != group; });
@@ -113,18 +126,19 @@ class PageCursor {
   const ContainerReader& container_;
   PointScan scan_;
   PageDecoder decoder_;
-  std::vector<std::byte> payload_;  ///< of an attribute page
-  std::size_t floats_ = 0;          ///< a point
+  std::vector<std::byte> payload_;  ///< of the current attribute page
+  std::size_t floats_ = 0;          ///< values of one point in all channels
 };
 
-/// Numbers as text that reads back to the same bits.
+/// Appends a surfel as a line of numbers that read back to the same bits.
 void append_line(std::string& text, const Surfel& s) {
   fmt::format_to(std::back_inserter(text), "{} {} {} {} {} {} {} {} {} {}\n", s.position.x,
                  s.position.y, s.position.z, s.normal.x, s.normal.y, s.normal.z, s.radius,
                  s.radiance.r, s.radiance.g, s.radiance.b);
 }
 
-/// A name of its own for the copy: pages of the original must not pass for its pages.
+/// Returns the UUID of the copy. It is another one than that of the original, whose pages must not
+/// pass for pages of the copy.
 Uuid derived_uuid(const ContainerReader& container, Profile profile, std::uint8_t page_shift) {
   std::array<std::byte, sizeof(Uuid) + 2> text;
   std::ranges::copy(container.header().uuid, text.begin());
@@ -133,7 +147,8 @@ Uuid derived_uuid(const ContainerReader& container, Profile profile, std::uint8_
   return uuid_of(text);
 }
 
-/// All pages but the meta page under their numbers, in the order in which they lie in the file.
+/// Copies all pages but the meta page, with their numbers and in the order in which they lie in the
+/// file.
 void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progress& progress) {
   std::vector<std::uint32_t> order(container.page_count());
   std::iota(order.begin(), order.end(), 0U);
@@ -150,6 +165,7 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
   }
 }
 
+/// Writes the channels of a container again, on pages as long as those of the writer.
 void repage_channels(const ContainerReader& container, ContainerWriter& writer) {
   const std::uint32_t full = points_per_page(writer.header());
   for (const std::uint16_t group : groups_of(container)) {
@@ -172,6 +188,8 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   }
 }
 
+/// Builds the octree again from the points of a container, and moves its channels.
+/// @param round  rounds the points
 Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round,
                          const Executor& executor, Progress& progress) {
   const Superblock& from = container.superblock();
@@ -217,12 +235,15 @@ void write_xyz(const ContainerReader& container, const std::filesystem::path& ta
 
 Superblock write_container(const ContainerReader& container, const std::filesystem::path& target,
                            const RecodeOptions& options, Progress& progress) {
+  // Complete the record: rounding is noted once
   const FileHeader& from = container.header();
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
   Meta meta = container.meta();
   const bool round =
       is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
   check_meta(meta, page_shift);
+
+  // Check the memory cap
   const ThreadPool executor(options.run.threads);
   const std::uint64_t pages =
       (std::uint64_t{container.page_count()} << from.page_shift >> page_shift) +
@@ -232,11 +253,13 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   budget.charge("pages that are written",
                 ContainerWriter::memory_bytes(pages, page_shift, executor.threads()));
   budget.require();
+
+  // Copy the pages where they can keep their numbers, build them again elsewhere. finish() gives
+  // the meta page the last number: where it had another one, the other pages cannot keep theirs
   ContainerWriter writer(target, {.page_shift = page_shift,
                                   .codec = codec_of(options.profile),
                                   .uuid = derived_uuid(container, options.profile, page_shift),
                                   .frame = from.frame});
-  // finish() numbers the meta page last: where it was not, the others cannot keep their numbers.
   const bool same_pages = page_shift == from.page_shift && !round &&
                           container.superblock().meta_page == container.page_count() - 1;
   Superblock superblock = container.superblock();

@@ -1,4 +1,10 @@
-// One kind of file into another.
+// Converts containers: the entry points of the library that write a container as a .ply, as an .xyz
+// or as a container of another profile or page size.
+//
+//   const ptc::ContainerReader scene("dragon.ptcx");
+//   ptc::Progress silent;
+//   ptc::container_to_ply(scene, "dragon.ply", silent);
+//   ptc::recode_container(scene, "small.ptcx", {.profile = ptc::Profile::compact}, silent);
 #pragma once
 
 #include <filesystem>
@@ -11,41 +17,55 @@
 
 namespace ptc {
 
-/// True when a file is a container by its name or, whatever its name, by its first bytes.
-/// @throws std::system_error
+/// Returns true when a file is a container: by its ending, which is .ptcx, or by its first bytes.
+/// @throws std::system_error when the ending is another and the file cannot be read
 [[nodiscard]] bool is_container(const std::filesystem::path& path);
 
+/// The settings of recode_container().
 struct RecodeOptions {
-  Profile profile = Profile::exact;
-  std::optional<std::uint8_t> page_shift;  ///< empty: as it was
-  RunOptions run;
+  Profile profile = Profile::exact;        ///< how points are rounded and compressed
+  std::optional<std::uint8_t> page_shift;  ///< a page has 2^page_shift bytes; empty: as before
+  RunOptions run;                          ///< memory and threads; there are no temporary files
 };
 
-/// What a conversion moved.
+/// The result of a conversion, and what it cost.
 struct ConvertReport {
-  std::uint64_t points = 0;
+  std::uint64_t points = 0;              ///< number of points that were written
   std::optional<Superblock> superblock;  ///< of the target when it is a container
-  StageSeconds seconds;
+  StageSeconds seconds;                  ///< wall time of each stage
 };
 
-/// Writes the points of a container with all its channels as columns of a PLY.
-/// @throws FormatError, std::system_error   Memory: the open container and a few pages, within
-/// kBufferBytes.
+/// Writes the points of a container as a binary PLY, with all its channels as columns
+/// (spec/points.md#ply).
+///
+/// Points keep their order. The target is published when it is complete; a conversion that throws
+/// leaves it as it was.
+/// @throws FormatError when the container is damaged; std::system_error
+/// Memory: the open container and a few pages, within kBufferBytes.
 ConvertReport container_to_ply(const ContainerReader& container,
                                const std::filesystem::path& target, Progress& progress);
 
-/// Writes the points of a container as lines "x y z nx ny nz radius r g b", r g b the radiance;
-/// every number reads back to the same bits.
+/// Writes the points of a container as text: lines "x y z nx ny nz radius r g b" after one line of
+/// comment, where r g b is the radiance. Every number reads back to the same bits. Channels are
+/// left out.
+///
+/// Points keep their order. The target is published when it is complete; a conversion that throws
+/// leaves it as it was.
+/// @throws FormatError when the container is damaged; std::system_error
+/// Memory: the open container, a page and 1 MiB of text, within kBufferBytes.
 ConvertReport container_to_xyz(const ContainerReader& container,
                                const std::filesystem::path& target, Progress& progress);
 
-/// Writes a container anew: the same points, channels and record in another profile or page size.
-/// What was rounded stays so. While the page size stays and points are not rounded, pages keep
-/// their order and numbers; else the octree is built again from the points. The same input gives
-/// the same bytes.
-/// @throws FormatError, std::system_error, LimitError for a cap that is too small; RequestError
-/// when
-///         the record does not fit a page of the new size
+/// Writes a container again: the same points, channels and record in another profile or page size.
+///
+/// Points that are rounded already stay as they are, whatever the profile. When the page size stays
+/// and no points are to be rounded, pages keep their order and their numbers; otherwise the octree
+/// is built again from the points. The same input gives the same bytes. The target is published
+/// when it is complete; a conversion that throws leaves it as it was.
+/// @throws RequestError when the record does not fit a page of the new size; LimitError when the
+///         memory cap is too small: the text names the least that works; FormatError when the
+///         container is damaged; std::system_error
+/// Memory: at most RunOptions::memory_bytes.
 ConvertReport recode_container(const ContainerReader& container,
                                const std::filesystem::path& target, const RecodeOptions& options,
                                Progress& progress);

@@ -22,8 +22,8 @@ namespace {
 
 constexpr std::size_t kBatch = 16 * Shader::kBlock;  // points in memory at once
 
-/// Coarser settings for the bounces before the last: a receiver sees many points, over which their
-/// errors average out.
+/// Returns the coarser settings of the bounces before the last: a receiver sees many points, and
+/// their errors average out over them.
 GatherOptions coarser(const GatherOptions& gather) {
   GatherOptions coarse = gather;
   coarse.solid_angle *= 3;
@@ -32,7 +32,8 @@ GatherOptions coarser(const GatherOptions& gather) {
   return coarse;
 }
 
-/// The points of a scene as first lit, with what a shader finds added to their radiance.
+/// The points of a scene with the light of one more bounce: the radiance that they were built with,
+/// plus what a shader finds. Points are shaded kBatch at a time, as next() asks for them.
 class BouncedPoints : public PointStream {
  public:
   BouncedPoints(const ContainerReader& first, Shader& shader, float lift, Progress& progress)
@@ -57,6 +58,7 @@ class BouncedPoints : public PointStream {
 
  private:
   void shade_batch() {
+    // Read the next points and shade them
     at_ = 0;
     count_ = points_.next(records_);
     for (std::size_t i = 0; i < count_; ++i)
@@ -65,6 +67,8 @@ class BouncedPoints : public PointStream {
     shader_.shade(std::span(receivers_).first(count_), std::span(results_).first(count_),
                   progress_);
     cpu_ += ptc::cpu_seconds() - before;
+
+    // Add the light that they reflect
     for (std::size_t i = 0; i < count_; ++i) {
       PointRecord& record = records_[i];
       for (std::size_t c = 0; c < 3; ++c) {
@@ -85,7 +89,7 @@ class BouncedPoints : public PointStream {
   std::vector<PointRecord> records_;
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
-  std::size_t count_ = 0, at_ = 0;  // of the batch
+  std::size_t count_ = 0, at_ = 0;  // points of the batch, and the next one to hand out
   double cpu_ = 0;
 };
 
@@ -106,13 +110,17 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
                                               Progress& progress) {
   if (options.bounces > 1 && lit_by_emitters(scene)) {
     throw RequestError("bounces",
-                       "more than one of `bounces` would count the light of the scene's emissive "
-                       "triangles twice: build the container with `sampling.lights.area_rays` 0");
+                       "`bounces` above 1 would count the light of the scene's emissive triangles "
+                       "twice: build the container with `sampling.lights.area_rays` 0");
   }
+
+  // Shade the points more coarsely than the receivers, by the light of surfaces alone
   ShadeOptions shade = options.shade;
   shade.sky = {};
   shade.gather = coarser(shade.gather);
   shade.variants = 1;
+
+  // Write one container for each bounce but the last, each lit by the one before
   const Superblock& from = scene.superblock();
   std::unique_ptr<ContainerReader> lit;
   for (unsigned bounce = 1; bounce < options.bounces; ++bounce) {

@@ -1,4 +1,9 @@
 // Light of more than one bounce (spec/shading.md#bounces).
+//
+//   bounce 1: scene ------ shade all points ------> temporary container 1
+//   bounce 2: container 1  shade all points ------> temporary container 2, replaces 1
+//   ...
+//   last bounce: the receivers of the run look at the last container
 #pragma once
 
 #include <filesystem>
@@ -11,30 +16,31 @@
 
 namespace ptc {
 
+/// The settings of bounce_light().
 struct BounceOptions {
-  unsigned bounces = 1;  ///< of light that reaches a receiver
-  ShadeOptions
-      shade;  ///< of the receivers; the points are shaded more coarsely, and without the sky
-  float lift = 0.15F;  ///< in radii of a surfel
-  std::filesystem::path temp_dir;
+  unsigned bounces = 1;  ///< reflections of the light before it reaches a receiver, at most
+  /// Settings for the receivers of the run. The points of the scene are shaded more coarsely, and
+  /// without the sky.
+  ShadeOptions shade;
+  float lift = 0.15F;              ///< height of a point above its surfel, in radii of the surfel
+  std::filesystem::path temp_dir;  ///< directory of the temporary containers
 };
 
-/// Charges the two temporary containers of which one is read while the next is written; nothing for
-/// one bounce or none.
+/// Charges the memory of the two temporary containers of which one is read while the next is
+/// written; nothing for fewer than two bounces.
 void charge_bounces(MemoryBudget& budget, const ContainerReader& scene, unsigned bounces,
                     unsigned threads);
 
-/// What receivers look at to see light of `bounces` bounces: the points and the tree of `scene`,
-/// with the radiance of every point as first lit plus albedo / pi times its irradiance of a bounce
-/// less.
+/// Makes the container that receivers look at to see light of `bounces` bounces.
 ///
-/// The points are shaded in their order, so they need no second sort; one temporary container a
-/// bounce, two at once. Depends on neither threads nor cap.
-/// @param report  gets a stage and the CPU time of every pass
-/// @return        null for one bounce or none: the scene itself
-/// @throws RequestError when the surfels are lit by emissive triangles that are surfels
-/// too;
-///         FormatError, std::system_error
+/// It has the points and the tree of `scene`. The radiance of a point is the radiance that it was
+/// built with plus albedo / pi times its irradiance of one bounce less. Points are shaded in their
+/// order, so that they need no second sort. There is one temporary container for each bounce but
+/// the last, and at most two exist at once. The result depends on neither threads nor memory cap.
+/// @param report  gets the wall time and the CPU time of every pass
+/// @return        null for fewer than two bounces: receivers look at the scene itself
+/// @throws RequestError when emissive triangles lit the surfels, because their light would count
+///         twice; FormatError, std::system_error
 /// Memory: the cache of `shade`, what charge_bounces() charges, and buffers within kBufferBytes.
 [[nodiscard]] std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
                                                             const BounceOptions& options,

@@ -1,3 +1,10 @@
+// Every phase that reads the scene may use all the memory that prepare() found for the page cache,
+// because no two of them run at once:
+//
+//   prepare()   bounces before the last   a cache for each, one after another
+//   tune()      rays, then gathers        surfels under rays, then a cache; both are freed
+//   shade()     Shader, Estimator         one cache for both
+//   check()     rays                      surfels under rays; finish() has freed the cache
 #include "engine/pipeline/light/lighting.h"
 
 #include <cmath>
@@ -37,7 +44,7 @@ void check_combination(const LightingRequest& request) {
   const bool traces_rays = request.error || request.check.receivers > 0;
   if (request.estimate && !traces_rays) {
     throw RequestError("estimate",
-                       "`estimate` needs rays to go by: ask for `error` or `check`, too");
+                       "`estimate` needs rays to compare with: ask for `error` or `check` as well");
   }
   if (!request.tolerate_damage) return;
   if (request.bounces > 1) {
@@ -47,11 +54,12 @@ void check_combination(const LightingRequest& request) {
   }
   if (traces_rays) {
     throw RequestError("tolerate_damage",
-                       "`tolerate_damage` goes without `error` and `check`: their rays read every "
+                       "`tolerate_damage` excludes `error` and `check`: their rays read every "
                        "point. Salvage the scene first");
   }
 }
 
+/// Sums up the damaged pages that a run met.
 DamageReport damage_report(const ContainerReader& scene, const LostPages& lost,
                            const DamageCounts& stand_ins) {
   DamageReport report{.pages = lost.list(), .stand_ins = stand_ins};
@@ -63,6 +71,7 @@ DamageReport damage_report(const ContainerReader& scene, const LostPages& lost,
   return report;
 }
 
+/// Checks a request before a constructor uses it. @throws RequestError
 const LightingRequest& checked(const LightingRequest& request) {
   check_ranges(request);
   check_combination(request);
@@ -104,13 +113,17 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
   ReceiverPlaces compared;
   if (request_.error || request_.estimate) {
     const std::vector<Pilot> pilots = find_pilots();
-    std::vector<Shading> traced;  // two results by rays of each compared receiver
+    std::vector<Shading> traced;  // two results by rays for each compared receiver
+
+    // Choose the settings
     if (request_.error) {
       const Stage stage(report_.seconds, progress_, "tune", 0, "receivers");
       report_.tuning = ptc::tune(lit(), options_, *request_.error, pilots, executor_, progress_,
                                  compared, traced);
       options_.gather = report_.tuning->gather;
     }
+
+    // Fit the estimates; tune() has traced the pilots already
     if (request_.estimate) {
       const Stage stage(report_.seconds, progress_, "estimate", 0, "receivers");
       if (!request_.error) {
@@ -121,6 +134,8 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
       options_.cache = &estimator_->cache();
     }
   }
+
+  // Start the sample for check(), without the pilots, and the gather
   sample_.emplace(request_.check, std::move(compared));
   shader_ = std::make_unique<Shader>(lit(), options_, executor_);
 }

@@ -1,7 +1,8 @@
-// What shading points and rendering a picture have in common: one run of the gather.
+// One run of the gather: what shading points and rendering a picture have in common.
 //
-//   open the scene -> prepare: memory, earlier bounces -> tune: settings by pilots -> shade ... ->
-//   finish
+//   Lighting()  ->  prepare()        ->  tune()       ->  shade() ...  ->  finish()  ->  check()
+//   open the        divide memory,       settings by      block by         complete      rays at
+//   scene           earlier bounces      pilots           block            the report    a sample
 #pragma once
 
 #include <cstdint>
@@ -28,96 +29,114 @@
 
 namespace ptc {
 
-/// How receivers are lit by the surfels of a container.
+/// The common part of the requests to shade points and to render a picture: the scene whose surfels
+/// light the receivers, the quality and the resources.
 struct LightingRequest {
   std::filesystem::path scene;  ///< container whose surfels occlude and emit
-  /// Bounces of light off surfaces; every bounce but the last shades all points of the scene. 0:
-  /// occlusion and sky alone, whatever GatherOptions::bleeding says.
+  /// Reflections of the light before it reaches a receiver, at most. Every bounce but the last
+  /// shades all points of the scene. 0: occlusion and sky alone, whatever GatherOptions::bleeding
+  /// says.
   unsigned bounces = 1;
+  /// Settings of the gather, between speed and error. With `error` only its sides count.
   GatherOptions gather;
-  /// The error to meet, above 0 and at most 1, as CheckError::relative(). It chooses `gather`,
-  /// except for its sides.
+  /// Error to meet, above 0 and at most 1, as CheckError::relative(); it chooses the settings of
+  /// `gather` (spec/shading.md#error). Empty: `gather` is used as it is.
   std::optional<double> error;
-  /// Adds the estimated error of every receiver; needs `error` or `check`.
+  /// Estimates the error of every receiver, for about twice the time. Needs `error` or `check`.
   bool estimate = false;
-  float lift = 0.15F;  ///< receivers rise above their surfel by so many of its radii
-  BackEnd back_end = BackEnd::pread;
-  /// Goes on past pages of the scene that break a rule. Excludes `error`, `check` and more than one
-  /// bounce, which need every point.
+  float lift = 0.15F;  ///< height of a receiver above its surfel, in radii of the surfel
+  BackEnd back_end = BackEnd::pread;  ///< how pages are read
+  /// Shades past pages of the scene that break a rule, and reports them. Excludes `error`, `check`
+  /// and more than one bounce, which need every point.
   bool tolerate_damage = false;
-  CheckRequest check;
-  RunOptions run;
+  CheckRequest check;  ///< how many receivers are compared with rays
+  RunOptions run;      ///< memory, threads and temporary directories
 };
 
-/// A scene that was shaded past damaged pages (spec/shading.md#damage).
+/// The damage of a scene that was shaded past damaged pages (spec/shading.md#damage).
 struct DamageReport {
-  std::map<std::uint32_t, std::string> pages;  ///< needed and damaged, by number, with the reason
-  std::uint64_t points = 0;                    ///< on these pages: neither shaded nor seen
-  std::size_t node_pages = 0;                  ///< among these pages; a salvage builds them again
-  DamageCounts stand_ins;  ///< what was drawn instead, with a bound on the error
+  /// Damaged pages that the run needed, by number, with the rule that each breaks.
+  std::map<std::uint32_t, std::string> pages;
+  std::uint64_t points = 0;    ///< points on these pages, neither shaded nor seen
+  std::size_t node_pages = 0;  ///< number of node pages among them; a salvage builds them again
+  DamageCounts stand_ins;      ///< clusters drawn in place of lost ones, with a bound on the error
 };
 
-/// What a run did.
+/// The results and the costs of a run.
 struct LightingReport {
-  std::uint64_t receivers = 0;
-  unsigned bounces = 1;
-  double shade_cpu_seconds = 0;   ///< CPU time of the gather alone, all threads
-  double bounce_cpu_seconds = 0;  ///< CPU time of the gathers of earlier bounces, all threads
-  GatherCounts gather;
-  CacheStatistics cache;
-  std::optional<TuningReport> tuning;      ///< when an error was asked for
-  std::optional<EstimateReport> estimate;  ///< when estimates were asked for
-  std::optional<CheckReport> check;        ///< when a check was asked for
-  std::optional<DamageReport> damage;      ///< when damage was tolerated
-  StageSeconds seconds;
+  std::uint64_t receivers = 0;             ///< number of receivers that were shaded
+  unsigned bounces = 1;                    ///< as LightingRequest::bounces
+  double shade_cpu_seconds = 0;            ///< CPU time of the last bounce's gather, all threads
+  double bounce_cpu_seconds = 0;           ///< CPU time of earlier bounces' gathers, all threads
+  GatherCounts gather;                     ///< work of the last bounce's gather
+  CacheStatistics cache;                   ///< page cache of the last bounce's gather
+  std::optional<TuningReport> tuning;      ///< present when an error was asked for
+  std::optional<EstimateReport> estimate;  ///< present when estimates were asked for
+  std::optional<CheckReport> check;        ///< present when a check was asked for
+  std::optional<DamageReport> damage;      ///< present when damage was tolerated
+  StageSeconds seconds;                    ///< wall time of each stage
 };
 
-/// Receivers that were shaded.
+/// The results for a block of receivers. The spans belong to a Lighting.
 struct LitReceivers {
   std::span<const Shading> shading;
-  std::span<const ErrorEstimate> estimates;  ///< empty when none were asked for
+  std::span<const ErrorEstimate> estimates;  ///< empty when no estimates were asked for
 };
 
-/// One run of the gather, phase by phase: prepare(), tune(), any number of shade(), finish().
-/// Threads: one caller. Memory: within the cap of the request.
+/// One run of the gather, phase by phase: prepare(), tune(), shade() any number of times, finish(),
+/// check().
+/// Memory: within the cap of the request.   Threads: one caller at a time.
 class Lighting {
  public:
   /// Checks the request and opens the scene.
   /// @param request   must outlive this
-  /// @param report    gets what the run does; must outlive this
+  /// @param report    is filled by the phases; must outlive this
+  /// @param progress  gets the stages; must outlive this
   /// @throws RequestError when a part of the request is out of range or excludes another;
   ///         FormatError, std::system_error
   Lighting(const LightingRequest& request, LightingReport& report, Progress& progress);
   ~Lighting();
 
+  /// The open container of the request.
   [[nodiscard]] const ContainerReader& scene() const noexcept { return scene_; }
+  /// The threads of the run.
   [[nodiscard]] const Executor& executor() const noexcept { return executor_; }
-  /// Where damaged pages are noted; null when damage is an error.
+  /// The list to which damaged pages are added; null when damage is an error.
   [[nodiscard]] LostPages* lost() const noexcept { return lost_.get(); }
 
-  /// Takes what is left of the budget as page cache, then adds the light of earlier bounces.
-  /// @param budget    charged with all that the caller takes besides
+  /// Gives the rest of the budget to the page cache, then shades the bounces before the last.
+  /// @param budget    already charged with everything else that the caller takes
+  /// @param sky       sky that lights the receivers
   /// @param variants  as ShadeOptions::variants
-  /// @param target    tells where temporary files go when the run does not
-  /// @throws LimitError when the cap is too small
+  /// @param target    output of the run; its directory gets temporary files when the request names
+  ///                  no directories for them
+  /// @throws LimitError when the cap is too small; RequestError when further bounces would count
+  ///         light twice; FormatError, std::system_error
   void prepare(MemoryBudget budget, const Sky& sky, unsigned variants,
                const std::filesystem::path& target);
 
-  /// Chooses the settings and prepares estimates, as far as they are asked for.
-  /// @param find_pilots  gives receivers that stand for the run; called when they are needed
+  /// Chooses the settings and prepares the estimates, as far as the request asks for them.
+  /// @param find_pilots  returns receivers that stand for the run; called only when needed
+  /// @pre prepare()
   void tune(const std::function<std::vector<Pilot>()>& find_pilots);
 
-  /// The settings that shade() uses.
+  /// The settings of the gather that shade() uses.
   [[nodiscard]] const GatherOptions& gather() const noexcept { return options_.gather; }
 
-  /// Shades receivers along the Z-curve; see Shader::shade(), also for `variant`.
-  /// @return one result for each receiver, valid until the next call
+  /// Shades a block of receivers. They should follow the Z-curve from call to call, because
+  /// neighbours share pages.
+  /// @param variant  as for Shader::shade()
+  /// @return         one result for each receiver, valid until the next call
+  /// @throws FormatError when a page is damaged and damage is not tolerated; std::system_error
+  /// @pre tune()
   LitReceivers shade(std::span<const Receiver> receivers, unsigned variant = 0);
 
-  /// Completes the report and gives back the memory of the page cache.
+  /// Completes the report and frees the page cache. Nothing can be shaded afterwards.
   void finish();
 
-  /// Compares a sample of the receivers with rays, if a check is asked for. finish() comes first.
+  /// Compares a sample of the shaded receivers with rays, if the request asks for a check.
+  /// @param seen  light and mesh that the rays meet besides the surfels
+  /// @pre finish()
   void check(const CheckScene& seen);
 
  private:
@@ -129,13 +148,15 @@ class Lighting {
   ThreadPool executor_;
   ContainerReader scene_;
   std::unique_ptr<LostPages> lost_;
-  std::unique_ptr<ContainerReader> bounced_;  ///< the scene with earlier bounces; null: one bounce
+  /// The scene with the light of earlier bounces; null for fewer than two bounces.
+  std::unique_ptr<ContainerReader> bounced_;
   ShadeOptions options_;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Shader> shader_;
   std::optional<CheckSample> sample_;
   std::vector<Shading> results_;
 
+  /// The container that receivers look at.
   [[nodiscard]] const ContainerReader& lit() const noexcept {
     return bounced_ ? *bounced_ : scene_;
   }

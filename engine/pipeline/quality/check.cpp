@@ -7,14 +7,15 @@
 namespace ptc {
 namespace {
 
-/// @param traced  two of each, side by side
+/// Sums up the errors of a set of receivers.
+/// @param traced  two results by rays for each receiver, side by side
 CheckError errors(std::span<const Shading> ours, std::span<const Shading> traced) {
   ErrorSums sums;
   for (std::size_t i = 0; i < ours.size(); ++i) sums.add(ours[i], traced[2 * i], traced[2 * i + 1]);
   return sums.error();
 }
 
-/// Calls body() and returns the CPU microseconds of one of `count`.
+/// Calls body() and returns its CPU time in microseconds, divided by `count`.
 template <class Body>
 double timed(std::size_t count, const Body& body) {
   const double before = cpu_seconds();
@@ -46,13 +47,14 @@ void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shadi
 CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const CheckScene& seen,
                                  std::uint64_t memory_bytes, const Executor& executor,
                                  Progress& progress) const {
+  // Shoot half of the rays from each of two copies: independent halves give the noise of the rays
   CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
   if (receivers_.empty()) return report;
   const std::vector<Receiver> twice = two_of_each(receivers_);
   const unsigned half = (request_.rays + 1) / 2;
   std::vector<Shading> traced(twice.size());
 
-  // Rays at the surfels
+  // Trace rays at the surfels
   {
     StreamedRays discs(scene, sides, sky_function(seen.sky), memory_bytes);
     report.disc_microseconds =
@@ -62,7 +64,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
   report.discs = errors(results_, traced);
   if (!estimates_.empty()) report.estimate = check_estimates(estimates_, results_, traced);
 
-  // Rays at the mesh
+  // Trace rays at the mesh
   if (!seen.light || !seen.mesh) return report;
   report.mesh_microseconds = timed(receivers_.size(), [&] {
     executor.for_each(twice.size(), [&](std::size_t i, unsigned) {

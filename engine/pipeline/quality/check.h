@@ -1,4 +1,4 @@
-// Checks some receivers of a run against rays.
+// Compares a sample of a run's receivers with rays.
 #pragma once
 
 #include <cstdint>
@@ -16,47 +16,55 @@
 
 namespace ptc {
 
-/// A check of some receivers against rays in the same run. Rays at the surfels keep to the memory
-/// cap; rays at the mesh need no more memory than rendering it does.
+/// A check of a run: some of its receivers are compared with rays.
+///
+/// Rays at the surfels show the error of the gather alone; rays at the mesh, where there is one,
+/// that of the surfels too. Rays at the surfels keep to the memory cap; rays at the mesh need no
+/// more memory than rendering it does.
 struct CheckRequest {
-  unsigned receivers = 0;  ///< about so many, spread over all; 0: no check
-  unsigned rays = 4096;    ///< cosine-distributed, for each receiver
+  unsigned receivers = 0;  ///< maximum of receivers to compare, spread over all; 0: no check
+  unsigned rays = 4096;    ///< cosine-distributed rays for each receiver
 };
 
-/// What a check found.
+/// The errors that a check found, and the time that it took.
 struct CheckReport {
-  std::size_t receivers = 0;
-  unsigned rays = 0;                      ///< for each receiver
-  CheckError discs;                       ///< against rays at the same surfels
-  std::optional<EstimateCheck> estimate;  ///< of the estimates, when the run made some
-  std::optional<CheckError> mesh;         ///< against rays at the mesh, when there is one
+  std::size_t receivers = 0;              ///< number of receivers that were compared
+  unsigned rays = 0;                      ///< rays for each receiver
+  CheckError discs;                       ///< errors against rays at the same surfels
+  std::optional<EstimateCheck> estimate;  ///< quality of the estimates, when the run made some
+  std::optional<CheckError> mesh;         ///< errors against rays at the mesh, when there is one
   double disc_microseconds = 0;           ///< CPU time of one receiver's rays at the surfels
   double mesh_microseconds = 0;           ///< CPU time of one receiver's rays at the mesh
 };
 
-/// What the rays of a check meet besides the surfels of the scene.
+/// The light and the mesh that the rays of a check meet, besides the surfels of the scene.
 struct CheckScene {
   const Sky& sky;
-  const RayScene* mesh = nullptr;      ///< null: no rays at a mesh
-  const DirectLight* light = nullptr;  ///< of the mesh
-  LightPaths paths;                    ///< followed by rays at the mesh
+  const RayScene* mesh = nullptr;      ///< mesh of the picture; null: no rays at a mesh
+  const DirectLight* light = nullptr;  ///< direct light at the mesh
+  LightPaths paths;                    ///< paths of the light that rays at the mesh follow
 };
 
-/// Keeps an even sample of a run's receivers with their shading, the same sample each time
-/// (reservoir sampling, Vitter 1985, algorithm R).
+/// An even sample of a run's receivers with their shading. The same receivers in the same order
+/// give the same sample (reservoir sampling, Vitter 1985, algorithm R).
 class CheckSample {
  public:
-  /// @param apart  receivers that must not be chosen, because settings were chosen by them
+  /// @param apart  receivers that must not be in the sample, because the settings were chosen by
+  ///               their errors
   explicit CheckSample(const CheckRequest& request, ReceiverPlaces apart = {})
       : request_(request), apart_(std::move(apart)) {}
 
-  /// @param estimates  one for each receiver, or none
+  /// Offers shaded receivers to the sample.
+  /// @param estimates  one for each receiver; empty when the run makes none
   void add(std::span<const Receiver> receivers, std::span<const Shading> results,
            std::span<const ErrorEstimate> estimates = {});
 
+  /// Traces rays at the sampled receivers and compares.
   /// @param scene         the container that the receivers were shaded from
+  /// @param sides         sides of the surfels that stop rays
   /// @param memory_bytes  cap for rays at the surfels, at least StreamedRays::kMinBytes
-  /// @param progress      advances by one for each receiver, twice for each reference
+  /// @param progress      advances by one for each half of a receiver's reference: by two for each
+  ///                      receiver at the surfels, and by two more at the mesh
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides,
                                     const CheckScene& seen, std::uint64_t memory_bytes,
                                     const Executor& executor, Progress& progress) const;
@@ -65,7 +73,7 @@ class CheckSample {
   CheckRequest request_;
   ReceiverPlaces apart_;
   std::uint64_t seen_ = 0;
-  std::mt19937_64 bits_;  // with its default seed
+  std::mt19937_64 bits_;  // with its default seed, so that the sample is the same each time
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
   std::vector<ErrorEstimate> estimates_;

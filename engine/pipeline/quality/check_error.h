@@ -1,28 +1,28 @@
-// Errors of shaded receivers, as reports give them.
+// The errors of shaded receivers against rays, as reports give them.
 #pragma once
 
 #include <algorithm>
 
 namespace ptc {
 
-/// Errors over a set of receivers, ours minus those of the rays. The noise of the rays themselves
-/// is given apart and is not part of the errors.
+/// The errors of a set of receivers: the results of the gather minus those of the rays. The noise
+/// of the rays is reported separately and is not part of the errors.
 struct CheckError {
   double occlusion_rms = 0;     ///< root mean square, absolute: occlusion goes from 0 to 1
   double occlusion_bias = 0;    ///< mean, absolute
   double occlusion_mean = 0;    ///< mean occlusion by the rays
-  double occlusion_noise = 0;   ///< root mean square error of the rays
+  double occlusion_noise = 0;   ///< root mean square error of the rays, absolute
   double irradiance_rms = 0;    ///< root mean square over receivers and RGB, over irradiance_mean
   double irradiance_bias = 0;   ///< mean, over irradiance_mean
   double irradiance_mean = 0;   ///< mean irradiance by the rays over receivers and RGB, W / m^2
   double irradiance_noise = 0;  ///< root mean square error of the rays, over irradiance_mean
 
-  /// The error that a user asks for: the larger of both errors, each over its mean. Occlusion alone
-  /// counts where no light arrives.
+  /// The error that a user asks for: the larger of the errors of occlusion and irradiance, each
+  /// over its mean. Occlusion alone counts where no light arrives.
   [[nodiscard]] double relative() const noexcept {
     return std::max(occlusion_mean > 0 ? occlusion_rms / occlusion_mean : 0.0, irradiance_rms);
   }
-  /// The noise of the rays in the measure of relative().
+  /// The noise of the rays, measured as relative() measures the error.
   [[nodiscard]] double relative_noise() const noexcept {
     return std::max(occlusion_mean > 0 ? occlusion_noise / occlusion_mean : 0.0, irradiance_noise);
   }

@@ -1,4 +1,4 @@
-// Errors of shaded receivers against rays, without what the rays themselves are off.
+// Errors of shaded receivers against rays, free of the noise of the rays.
 #pragma once
 
 #include <span>
@@ -9,25 +9,31 @@
 
 namespace ptc {
 
-/// Every receiver twice, side by side: rays of different seeds are independent.
+/// Returns every receiver twice, side by side. The two are traced with different seeds, which makes
+/// their results independent.
 [[nodiscard]] std::vector<Receiver> two_of_each(std::span<const Receiver> receivers);
 
-/// Leaves out light from surfaces: what a gather without bleeding is compared with.
+/// Removes the light from surfaces, because a gather without bleeding is compared with the rest.
 void leave_out_bleeding(std::span<Shading> traced);
 
-/// Sums over receivers, each shaded by us and twice by rays.
+/// Sums of errors over receivers, each of which was shaded by the gather and traced twice.
 ///
-/// With a and b independent and right in the mean, (ours - a) (ours - b) is in the mean the square
-/// of our error alone, and (a - b)^2 / 4 that of (a + b) / 2.
+/// Let `ours` be the result of the gather and a, b two results by rays that are independent and
+/// unbiased. The expected value of (ours - a) (ours - b) is then the squared error of the gather
+/// alone: the noise of a and of b cancels, because neither is squared. The expected value of
+/// (a - b)^2 / 4 is the squared error of the mean (a + b) / 2.
 class ErrorSums {
  public:
-  /// @param a, b  by rays, of different seeds
+  /// Adds a receiver.
+  /// @param a, b  its results by rays of different seeds
   void add(const Shading& ours, const Shading& a, const Shading& b);
+  /// Adds the receivers of other sums.
   void add(const ErrorSums& other);
-  /// Zeros of no receivers.
+  /// Returns the errors over all receivers; zeros when there are none.
   [[nodiscard]] CheckError error() const;
 
  private:
+  /// Weighted sums for one quantity: squared errors, errors, squared noise and values by rays.
   struct Quantity {
     double square = 0, difference = 0, noise = 0, mean = 0;
 

@@ -1,3 +1,8 @@
+// The line of an estimate, and its worth.
+//
+// The squared error of a pilot receiver is the product of its distances to two independent results
+// by rays (error_sums.h). It is unbiased, so the line is fitted to many of them; a single one says
+// little and may be negative.
 #include "engine/pipeline/quality/estimate.h"
 
 #include <algorithm>
@@ -27,7 +32,7 @@ Quantity irradiance_of(const Shading& s) {
   return {3, {v.r, v.g, v.b}};
 }
 
-/// Mean over components of (ours - a) (ours - b).
+/// Returns the mean of (ours - a) (ours - b) over the components.
 double product(const Quantity& ours, const Quantity& a, const Quantity& b) {
   double sum = 0;
   for (std::size_t c = 0; c < ours.components; ++c)
@@ -39,7 +44,7 @@ double squared_difference(const Quantity& a, const Quantity& b) {
   return product(a, b, b);
 }
 
-/// Ranks from 0; equal values have the mean of theirs.
+/// Returns the rank of each value, counted from 0. Equal values share the mean of their ranks.
 std::vector<double> ranks_of(std::span<const double> values) {
   std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), 0);
@@ -54,6 +59,7 @@ std::vector<double> ranks_of(std::span<const double> values) {
   return ranks;
 }
 
+/// Returns the linear correlation of two series of equal length; 0 when one of them is constant.
 double correlation(std::span<const double> a, std::span<const double> b) {
   const auto n = static_cast<double>(a.size());
   const double mean_a = std::accumulate(a.begin(), a.end(), 0.0) / n,
@@ -67,14 +73,14 @@ double correlation(std::span<const double> a, std::span<const double> b) {
   return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
 }
 
-/// A receiver that was checked.
+/// One quantity of a receiver that was compared with rays.
 struct Checked {
   double estimate = 0;
-  double error = 0;   ///< absolute, against the mean of both halves of its rays
-  double square = 0;  ///< of the error, without bias
+  double error = 0;   ///< distance to the mean of both results by rays
+  double square = 0;  ///< squared error, unbiased
 };
 
-/// RMS error of some of them.
+/// Returns the RMS error of some receivers.
 double rms_of(std::span<const Checked> checked) {
   double sum = 0;
   for (const Checked& c : checked) sum += c.square;
@@ -83,6 +89,7 @@ double rms_of(std::span<const Checked> checked) {
 }
 
 EstimateWorth worth_of(std::vector<Checked> checked) {
+  // Sum up all receivers
   EstimateWorth worth;
   const double all = rms_of(checked);
   if (!(all > 0)) return worth;
@@ -95,10 +102,14 @@ EstimateWorth worth_of(std::vector<Checked> checked) {
     squares += c.estimate * c.estimate;
     if (c.error <= 2 * c.estimate) ++within;
   }
+
+  // Compare estimates with errors over all receivers
   const auto count = static_cast<double>(checked.size());
   worth.rank = correlation(ranks_of(estimates), ranks_of(errors));
   worth.rms = std::sqrt(squares / count) / all;
   worth.within_twice = static_cast<double>(within) / count;
+
+  // Compare the receivers with the largest and the smallest estimates
   std::ranges::stable_sort(checked, {}, &Checked::estimate);
   const std::span<const Checked> sorted(checked);
   const std::size_t tenth = (sorted.size() + 9) / 10, third = (sorted.size() + 2) / 3;
@@ -109,6 +120,9 @@ EstimateWorth worth_of(std::vector<Checked> checked) {
   return worth;
 }
 
+/// Returns the worth of the estimates of one quantity.
+/// @param which        the member of ErrorEstimate that estimates it
+/// @param quantity_of  takes the quantity out of a Shading
 template <class QuantityOf>
 EstimateWorth worth_of(std::span<const ErrorEstimate> estimates, float ErrorEstimate::*which,
                        std::span<const Shading> ours, std::span<const Shading> traced,
@@ -127,6 +141,8 @@ EstimateWorth worth_of(std::span<const ErrorEstimate> estimates, float ErrorEsti
   return worth_of(std::move(checked));
 }
 
+/// Fits the line of one quantity to the compared receivers.
+/// @param shaded, other  their results with both variants
 template <class QuantityOf>
 ErrorLine line_of(std::span<const Shading> shaded, std::span<const Shading> other,
                   std::span<const Shading> traced, const QuantityOf& quantity_of) {
@@ -143,6 +159,7 @@ ErrorLine line_of(std::span<const Shading> shaded, std::span<const Shading> othe
 }  // namespace
 
 ErrorLine fit_errors(std::span<const ErrorSample> samples) {
+  // Sum the moments of differences d and errors e
   const auto n = static_cast<double>(samples.size());
   double d = 0, e = 0, dd = 0, de = 0;
   for (const ErrorSample& s : samples) {
@@ -151,6 +168,9 @@ ErrorLine fit_errors(std::span<const ErrorSample> samples) {
     dd += s.squared_difference * s.squared_difference;
     de += s.squared_difference * s.squared_error;
   }
+
+  // Fit by least squares; fall back to a flat line where the slope is not positive, and to a line
+  // through the origin where the constant is negative
   if (!(e > 0)) return {};
   const ErrorLine flat{.constant = e / n};
   if (!(dd > 0)) return flat;
@@ -190,7 +210,7 @@ Estimator::Estimator(const ContainerReader& scene, const ShadeOptions& options,
                                                              .threads = readers_of(executor, true),
                                                              .back_end = options.back_end})) {
   options_.cache = cache_.get();
-  options_.sky = {};  // no estimate of it
+  options_.sky = {};  // the sky is not estimated
   options_.variants = std::max(2U, options.variants);
   report_.pilots = traced.size() / 2;
   const double before = cpu_seconds();

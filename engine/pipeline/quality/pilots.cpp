@@ -5,8 +5,8 @@ namespace ptc {
 PilotPlan plan_pilots(std::uint64_t receivers) {
   constexpr std::uint64_t kMinPilots = 64, kMaxPilots = 128;
   constexpr std::uint64_t kMinLength = 64, kMaxLength = 256;  // receivers of a pilot
-  constexpr std::uint64_t kMinStride = 16;  // rather fewer pilots than shorter ones
-  constexpr std::uint64_t kShare = 16;      // one in so many receivers is in a pilot
+  constexpr std::uint64_t kMinStride = 16;  // a small run has fewer pilots instead of shorter ones
+  constexpr std::uint64_t kShare = 16;      // one in 16 receivers is in a pilot
   if (receivers == 0) return {};
   const std::uint64_t room =
       std::max(std::min<std::uint64_t>(receivers, 2), receivers / kMinStride);

@@ -1,3 +1,9 @@
+// Bisection over a ladder of settings, with a bound on the error at each step.
+//
+// Half of the pilots choose a rung, the other half confirm it: the rung that looks best at some
+// pilots looks too good at them. A rung counts as good enough when its error is below what is asked
+// in 95 of 100 resamples of the pilots, not just in their mean. The noise of the rays does not
+// count as error (error_sums.h), so the rays need only be as many as make it small.
 #include "engine/pipeline/quality/tuning.h"
 
 #include <algorithm>
@@ -13,8 +19,8 @@
 namespace ptc {
 namespace {
 
-/// None of them is slower and less exact than another on most scenes. Usual errors: means over
-/// terrain, city and dragon.
+/// Settings none of which is both slower and less exact than another on most scenes. Usual errors
+/// are means over the terrain, the city and the dragon.
 constexpr std::array kLadder{
     Rung{0.4F, 0.8F, 16, 0.114},     Rung{0.2F, 0.4F, 16, 0.075},
     Rung{0.1F, 0.4F, 16, 0.074},     Rung{0.06F, 0.3F, 16, 0.063},
@@ -26,13 +32,17 @@ constexpr std::array kLadder{
     Rung{0.001F, 0.03F, 64, 0.010},
 };
 
+// Number of resamples of the pilots, and the sorted one whose error is the bound: the errors of 19
+// in 20 resamples are below it
 constexpr unsigned kResamples = 200;
-constexpr unsigned kBelow = 190;  // of them, sorted: errors of 19 in 20 samples of pilots are below
+constexpr unsigned kBelow = 190;
 
-/// Sides of squares of rays: how a reference begins, and the most that its noise may lead to.
+// The rays of a result form a square. Its side in the first attempt, its maximum, and the noise of
+// one result over the error that is asked for, above which a second attempt is made
 constexpr unsigned kFirstSide = 16, kMaxSide = 128;
-constexpr double kNoise = 0.7;  // of a half, over what is asked
+constexpr double kNoise = 0.7;
 
+/// The search of tune() and climb(): trace, then begin_shading(), then choose() and measure().
 class Tuner {
  public:
   Tuner(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots,
@@ -44,9 +54,9 @@ class Tuner {
         compared_(compared_of(pilots)),
         errors_(ladder().size()) {}
 
-  /// Traces as many rays as it takes for each half of a reference to be off by less than what is
-  /// asked: squares of errors add up, so that the mean over some hundred receivers hardly suffers.
-  /// @return  rays of a half
+  /// Traces as many rays as it takes for the noise of each result to be below the error that is
+  /// asked for. That is enough: noise is averaged out over some hundred receivers.
+  /// @return  number of rays of each of the two results of a receiver
   unsigned trace_for(double asked, Progress& progress) {
     StreamedRays discs(scene_, options_.gather.sides, {}, options_.cache_bytes);
     unsigned side = kFirstSide;
@@ -60,7 +70,8 @@ class Tuner {
     return side * side;
   }
 
-  /// @param side  of the square of rays of a half
+  /// Traces all compared receivers.
+  /// @param side  side of the square of rays of a result
   void trace(StreamedRays& discs, unsigned side, Progress& progress) {
     const std::vector<Receiver> twice = two_of_each(compared_);
     traced_.resize(twice.size());
@@ -68,7 +79,7 @@ class Tuner {
     if (!options_.gather.bleeding) leave_out_bleeding(traced_);
   }
 
-  /// Makes room for pages; no rays are traced any more.
+  /// Frees the memory of the rays and gives it to a page cache. No rays can be traced afterwards.
   void begin_shading() {
     return_freed_memory();
     cache_ = std::make_unique<PageCache>(scene_, CacheOptions{.memory_bytes = options_.cache_bytes,
@@ -76,14 +87,16 @@ class Tuner {
                                                               .back_end = options_.back_end});
   }
 
-  /// The cheapest rung that all pilots hold for good enough; the ladder's size when there is none.
+  /// Returns the cheapest rung that meets `asked` at the choosing and at the confirming pilots; the
+  /// size of the ladder when there is none.
   std::size_t choose(double asked) {
     std::size_t rung = cheapest(asked);
     while (rung < ladder().size() && bound(rung, kConfirming) > asked) ++rung;
     return rung;
   }
 
-  /// @param all  of both parts, not of those alone that confirm
+  /// Returns the error of a rung at the confirming pilots.
+  /// @param all  at the choosing pilots, too
   CheckError measure(std::size_t rung, bool all) {
     ErrorSums sums;
     for (const std::size_t part : {kChoosing, kConfirming}) {
@@ -100,11 +113,11 @@ class Tuner {
  private:
   static constexpr std::size_t kChoosing = 0, kConfirming = 1;  // even and odd pilots
 
-  /// The cheapest rung that the choosing pilots hold for good enough, if errors fall along the
-  /// ladder; its size when none is.
+  /// Returns the cheapest rung that meets `asked` at the choosing pilots, provided that errors fall
+  /// along the ladder; the size of the ladder when there is none.
   std::size_t cheapest(double asked) {
-    std::size_t low = 0,
-                high = ladder().size();  // below low: too coarse; from high on: good enough
+    // Rungs below `low` are too coarse, rungs from `high` on are good enough
+    std::size_t low = 0, high = ladder().size();
     std::size_t at = rung_of(asked);
     while (low < high) {
       at = std::clamp(at, low, high - 1);
@@ -119,7 +132,7 @@ class Tuner {
     return high;
   }
 
-  /// What one half of a reference is off, as CheckError::relative().
+  /// Returns the noise of one of the two results of a receiver, as CheckError::relative().
   [[nodiscard]] double noise_of_half() const {
     ErrorSums sums;
     for (std::size_t i = 0; i < compared_.size(); ++i)
@@ -127,19 +140,20 @@ class Tuner {
     return std::sqrt(2) * sums.error().relative_noise();
   }
 
-  /// The first rung whose usual error is at most so much.
+  /// Returns the first rung whose usual error is at most `error`; the size of the ladder when there
+  /// is none.
   static std::size_t rung_of(double error) {
     const auto found =
         std::ranges::find_if(ladder(), [&](const Rung& rung) { return rung.usual_error <= error; });
     return static_cast<std::size_t>(found - ladder().begin());
   }
 
-  /// An error that the run's is below with some confidence: a quantile over samples of the pilots
-  /// with replacement (Efron 1979).
+  /// Returns an upper bound on the error of the run, at a confidence of 95 %: a quantile over
+  /// resamples of the pilots with replacement (Efron 1979).
   double bound(std::size_t rung, std::size_t part) {
     const std::vector<ErrorSums>& errors = errors_of(rung, part);
     if (errors.empty()) return 0;
-    std::mt19937_64 bits;  // its default seed
+    std::mt19937_64 bits;  // with its default seed, so that the bound is the same each time
     std::vector<double> samples(kResamples);
     for (double& sample : samples) {
       ErrorSums sums;
@@ -150,13 +164,14 @@ class Tuner {
     return samples[kBelow];
   }
 
-  /// Errors of each pilot of a part.
+  /// Returns the errors of each pilot of a part at a rung, shaded at the first call.
   const std::vector<ErrorSums>& errors_of(std::size_t rung, std::size_t part) {
     std::vector<ErrorSums>& errors = errors_[rung][part];
     if (errors.empty()) errors = shade(ladder()[rung].options(options_.gather), part);
     return errors;
   }
 
+  /// Shades the pilots of a part. @return the errors of each pilot
   std::vector<ErrorSums> shade(const GatherOptions& gather, std::size_t part) {
     const SceneView view(scene_);
     std::vector<std::unique_ptr<DirectionGrid>> grids;
@@ -177,8 +192,9 @@ class Tuner {
     return errors;
   }
 
+  /// Compares the results of a pilot with its rays.
   [[nodiscard]] ErrorSums compare(std::size_t index, std::span<const Shading> results) const {
-    std::size_t first = 0;  // of this pilot's in traced_
+    std::size_t first = 0;  // index of the pilot's first result in traced_
     for (std::size_t i = 0; i < index; ++i) first += 2 * pilots_[i].compared();
     ErrorSums sums;
     for (std::size_t k = 0; k < pilots_[index].compared(); ++k) {
@@ -193,10 +209,10 @@ class Tuner {
   std::span<const Pilot> pilots_;
   const Executor& executor_;
   std::unique_ptr<PageCache> cache_;
-  std::vector<Receiver> compared_;  // of all pilots, in order
-  std::vector<Shading> traced_;     // two of each
-  std::vector<std::array<std::vector<ErrorSums>, 2>>
-      errors_;  // by rung and part; empty: not yet shaded
+  std::vector<Receiver> compared_;  // compared receivers of all pilots, in order
+  std::vector<Shading> traced_;     // two results by rays for each of them
+  // By rung and part, one for each pilot; empty where the pilots are not shaded yet
+  std::vector<std::array<std::vector<ErrorSums>, 2>> errors_;
   std::uint64_t shaded_ = 0;
 };
 
@@ -209,15 +225,20 @@ std::span<const Rung> ladder() {
 TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
                   std::span<const Pilot> pilots, const Executor& executor, Progress& progress,
                   ReceiverPlaces& compared, std::vector<Shading>& traced) {
+  // Trace rays at the pilots
   Tuner tuner(scene, options, pilots, executor);
   for (const Receiver& receiver : tuner.compared()) compared.add(receiver);
   const double before = cpu_seconds();
   const unsigned rays = tuner.trace_for(asked, progress);
   const double tracing_done = cpu_seconds();
+
+  // Choose the setting
   tuner.begin_shading();
   const std::size_t chosen = tuner.choose(asked);
   const bool met = chosen < ladder().size();
   const std::size_t rung = std::min(chosen, ladder().size() - 1);
+
+  // Report the setting and its error
   TuningReport report{.asked = asked,
                       .met = met,
                       .gather = ladder()[rung].options(options.gather),

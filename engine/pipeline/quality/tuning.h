@@ -1,4 +1,9 @@
 // Finds the cheapest settings of the gather that meet an error (spec/shading.md#error).
+//
+//   ladder()   coarse, cheap  |--|--|--|--|--|--|--|--|--|--|--|--|--|--|  fine, slow
+//                                       ^        usual error of the rungs: where the search begins
+//              even pilots              |==>|    choose a rung by bisection
+//              odd pilots                   |>|  confirm it, or climb on
 #pragma once
 
 #include <cstdint>
@@ -11,13 +16,14 @@
 
 namespace ptc {
 
-/// One setting of the ladder, with the error that scenes usually have with it.
+/// One setting of the ladder, and the error that it usually leads to.
 struct Rung {
   float solid_angle, parallax;  ///< as in GatherOptions
   unsigned resolution;          ///< as in GatherOptions
-  double usual_error;           ///< as CheckError::relative()
+  double usual_error;           ///< mean over three scenes, as CheckError::relative()
 
-  /// The setting for a run that gives its own sides and bleeding.
+  /// Returns the options of a gather with this setting.
+  /// @param run  options of the run, which keep their sides and bleeding
   [[nodiscard]] GatherOptions options(const GatherOptions& run) const {
     return {.solid_angle = solid_angle,
             .parallax = parallax,
@@ -27,44 +33,50 @@ struct Rung {
   }
 };
 
-/// All settings to choose from, from coarse and cheap to fine.
+/// Returns all settings to choose from, from coarse and cheap to fine and slow.
 [[nodiscard]] std::span<const Rung> ladder();
 
-/// What became of an error that was asked for (spec/shading.md#error).
+/// The result of a search for settings that meet an error (spec/shading.md#error).
 struct TuningReport {
-  double asked = 0;       ///< as CheckError::relative()
+  double asked = 0;       ///< error that was asked for, as CheckError::relative()
   bool met = false;       ///< false: the finest setting was taken, and `measured` is its error
-  GatherOptions gather;   ///< the setting that was chosen
-  unsigned setting = 0;   ///< its index in ladder()
+  GatherOptions gather;   ///< setting that was chosen
+  unsigned setting = 0;   ///< index of that setting in ladder()
   unsigned settings = 0;  ///< size of ladder()
-  CheckError measured;  ///< at the pilots that did not choose it; at all pilots when it is not met
+  /// Error of the setting at the pilots that did not choose it; at all pilots when `met` is false
+  /// or there is only one pilot.
+  CheckError measured;
   std::size_t pilots = 0;        ///< number of receivers compared with rays
-  unsigned rays = 0;             ///< rays for each of them
-  std::uint64_t shaded = 0;      ///< receivers shaded to choose, over all settings that were tried
-  double ray_cpu_seconds = 0;    ///< all threads, loading the surfels included
-  double shade_cpu_seconds = 0;  ///< all threads
+  unsigned rays = 0;             ///< rays for each of these receivers
+  std::uint64_t shaded = 0;      ///< receivers that were shaded, over all settings that were tried
+  double ray_cpu_seconds = 0;    ///< CPU time of the rays, all threads, loading surfels included
+  double shade_cpu_seconds = 0;  ///< CPU time of the gathers, all threads
 };
 
 /// Compares pilots with rays at the same surfels and finds the cheapest setting that meets `asked`.
-/// @param options   of the run. Of its gather only sides and bleeding count. Its cache_bytes, at
-///                  least StreamedRays::kMinBytes, are the cap of the rays too
+/// The result depends on neither threads nor memory cap.
+/// @param options   options of the run. Only sides and bleeding of its gather count. Its
+///                  cache_bytes, at least StreamedRays::kMinBytes, are the cap of the rays too
+/// @param asked     relative error, above 0 and at most 1
 /// @param compared  gets the receivers of the pilots that were compared
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by
-/// pilot
+///                  pilot
+/// @throws FormatError when a page is damaged; std::system_error
 [[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options,
                                 double asked, std::span<const Pilot> pilots,
                                 const Executor& executor, Progress& progress,
                                 ReceiverPlaces& compared, std::vector<Shading>& traced);
 
-/// What a setting of the ladder gives and costs.
+/// The error and the cost of one setting of the ladder.
 struct RungError {
   CheckError error;
-  double us_per_receiver = 0;  ///< CPU time in microseconds
+  double us_per_receiver = 0;  ///< CPU time of one receiver, microseconds
 };
 
 /// Compares pilots with rays at every setting of the ladder.
 /// @param options  as for tune()
-/// @param rays     for each half of a reference, a square number
+/// @param rays     number of rays of each of the two results of a receiver, a square number
+/// @return         one row for each setting, in the order of ladder()
 [[nodiscard]] std::vector<RungError> climb(const ContainerReader& scene,
                                            const ShadeOptions& options,
                                            std::span<const Pilot> pilots, unsigned rays,

@@ -1,3 +1,6 @@
+// Samples are added with their weights, so the layers are means at any time. Estimated errors are
+// averaged as squares: the error of a mean is at most the root mean square of the errors, whether
+// the errors of the samples have the same sign or not.
 #include "engine/pipeline/render/film.h"
 
 #include <cmath>
@@ -9,6 +12,7 @@
 namespace ptc {
 namespace {
 
+/// Returns the components of all pixels one after another, as image files take them.
 std::vector<float> flatten(const std::vector<glm::vec3>& values) {
   std::vector<float> flat;
   flat.reserve(values.size() * 3);

@@ -1,4 +1,4 @@
-// The layers of a picture while it is rendered, and their files.
+// The layers of a picture while it is rendered, and the files they are written to.
 #pragma once
 
 #include <cstdint>
@@ -15,35 +15,44 @@
 
 namespace ptc {
 
-/// A picture file and what it shows.
+/// A picture file and the layer that it shows.
 struct PictureTarget {
-  std::filesystem::path path;  ///< .exr: all layers; .png: one
-  std::string layer =
-      "beauty";  ///< of a .png: beauty, direct, indirect, occlusion (white: open), albedo
+  std::filesystem::path path;  ///< an .exr gets all layers, a .png one of them
+  /// Layer of a .png: beauty, direct, indirect, occlusion (white: uncovered) or albedo.
+  std::string layer = "beauty";
 };
 
-/// Weighted means over the samples of every pixel, layer by layer, row 0 at the top.
+/// The layers of a picture: weighted means over the samples of every pixel, row 0 at the top.
+/// Memory: pixel_bytes() for each pixel.
 class Film {
  public:
+  /// Makes a black picture.
+  /// @param width, height  in pixels
+  /// @param estimates      adds the layers occlusion_error and irradiance_error
   Film(unsigned width, unsigned height, bool estimates);
 
-  /// Bytes of memory that a pixel takes.
+  /// Returns the bytes of memory that a pixel takes.
   [[nodiscard]] static std::uint64_t pixel_bytes(bool estimates) noexcept;
 
   /// Adds a sample that meets a surface.
+  /// @param pixel   y * width + x
+  /// @param weight  share of the sample in its pixel; the samples of a pixel add up to 1
   void add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading, float weight);
-  /// Adds the estimated error of such a sample.
+  /// Adds the estimated error of a sample that meets a surface.
+  /// @pre the film has estimates
   void add(std::size_t pixel, const ErrorEstimate& estimate, float weight);
   /// Adds a sample that meets nothing but the sky.
+  /// @param radiance  W / (m^2 sr)
   void add_sky(std::size_t pixel, const glm::vec3& radiance, float weight) {
     beauty_[pixel] += weight * radiance;
   }
 
-  /// Completes the layers of estimates; nothing can be added afterwards.
+  /// Completes the layers of estimates: mean squares become root mean squares. Nothing can be added
+  /// afterwards.
   void finish();
 
-  /// Writes one file after another, each whole or not at all.
-  /// @param exposure  stops, for a .png of light
+  /// Writes the files one after another, each whole or not at all.
+  /// @param exposure  stops by which a .png of light is brightened; occlusion and albedo stay
   /// @throws std::system_error
   void write(std::span<const PictureTarget> targets, float exposure) const;
 
@@ -54,7 +63,8 @@ class Film {
   unsigned width_, height_;
   std::vector<glm::vec3> beauty_, direct_, indirect_, bent_normal_, albedo_;
   std::vector<float> occlusion_, alpha_;
-  std::vector<float> occlusion_error_, irradiance_error_;  ///< squared until finish(); may be empty
+  /// Mean squares until finish(), root mean squares afterwards; empty without estimates.
+  std::vector<float> occlusion_error_, irradiance_error_;
 };
 
 }  // namespace ptc

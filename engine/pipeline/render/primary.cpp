@@ -12,6 +12,7 @@
 namespace ptc {
 namespace {
 
+/// A view by rays: one ray for each sample, lit by shadow rays at the place that it meets.
 class MeshView : public PrimaryView {
  public:
   MeshView(const RayScene& scene, const DirectLight& light, const LightSampling& sampling,
@@ -54,10 +55,12 @@ class MeshView : public PrimaryView {
   float lift_;
 };
 
-/// A view of everything from the front, the right and above: as near as all corners of the bounds
-/// allow. A backdrop is larger than what stands on it and may leave the picture.
+/// Returns a camera that sees everything from the front, the right and above, as near as all
+/// corners of the bounds allow. A backdrop is larger than what stands on it, so it is seen from
+/// half the distance and may leave the picture.
 Camera overview(const Superblock& superblock, bool backdrop,
                 const std::optional<std::array<unsigned, 2>>& size) {
+  // Look at the middle of the bounds
   const glm::dvec3 low(superblock.bounds_low[0], superblock.bounds_low[1],
                        superblock.bounds_low[2]);
   const glm::dvec3 high(superblock.bounds_high[0], superblock.bounds_high[1],
@@ -70,6 +73,8 @@ Camera overview(const Superblock& superblock, bool backdrop,
   camera.look_at = (low + high) * 0.5;
   const glm::dvec3 away = glm::normalize(glm::dvec3(0.45, 0.35, 1));
   camera.position = camera.look_at + away;
+
+  // Step back until every corner is in the picture, with a margin of 5 %
   const CameraAxes axes = axes_of(camera);
   const double tall = std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * 0.95;
   const double wide = tall * camera.width / camera.height;

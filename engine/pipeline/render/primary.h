@@ -1,4 +1,4 @@
-// What a camera sees: the surface behind every sample of a picture.
+// Primary visibility: the surface that a camera sees behind every sample of a picture.
 #pragma once
 
 #include <array>
@@ -18,47 +18,57 @@
 
 namespace ptc {
 
+/// The place where the ray of a sample meets a surface.
 struct PrimaryHit {
-  glm::dvec3 position{0};
-  glm::vec3 normal{0};  ///< unit, towards the camera
-  float lift = 0;       ///< scene units to rise along `offset_normal` before shading
-  glm::vec3 offset_normal{0};
-  glm::vec3 albedo{0};
-  glm::vec3 direct{0};        ///< emission and reflected light of lamps, sky left out unless baked
-  bool sky_included = false;  ///< `direct` has the sky's light already
+  glm::dvec3 position{0};      ///< scene units
+  glm::vec3 normal{0};         ///< shading normal, unit, turned towards the camera
+  float lift = 0;              ///< scene units to rise along `offset_normal` before shading
+  glm::vec3 offset_normal{0};  ///< normal of the surface itself, unit, turned towards the camera
+  glm::vec3 albedo{0};         ///< 0 to 1
+  /// Radiance that leaves towards the camera: emission, and reflected light of the lamps. The sky
+  /// is left out, unless `sky_included` is set.
+  glm::vec3 direct{0};
+  bool sky_included = false;  ///< true when `direct` includes reflected light of the sky
 };
 
-/// Samples per pixel lie on a side x side grid.
+/// The surfaces that a camera sees. The samples of a pixel lie on a grid of side x side.
+/// Threads: at() may be called concurrently.
 class PrimaryView {
  public:
   virtual ~PrimaryView() = default;
-  /// @param x, y  sample on the grid of width * side by height * side
+  /// Returns the nearest surface behind a sample; nothing where the camera sees the sky.
+  /// @param x, y  place on the grid of samples, width * side by height * side, (0, 0) top left
   [[nodiscard]] virtual std::optional<PrimaryHit> at(unsigned x, unsigned y) const = 0;
 };
 
-/// Rays at the mesh, lit by shadow rays.
-/// @param lift  scene units
+/// Makes a view that traces rays at a mesh and lights it by shadow rays.
+/// @param scene, light  must outlive the view
+/// @param side          samples along the side of a pixel
+/// @param lift          height of receivers above the mesh, scene units
 [[nodiscard]] std::unique_ptr<PrimaryView> view_mesh(const RayScene& scene,
                                                      const DirectLight& light,
                                                      const LightSampling& sampling,
                                                      const Camera& camera, unsigned side,
                                                      float lift);
 
-/// The surfels themselves, drawn as discs into a depth buffer: for clouds without a mesh. `direct`
-/// is their baked radiance.   Memory: 24 bytes a sample.
-/// @param lift  in radii of a surfel
-/// @param lost  where damaged pages are told, whose points are then not seen; null: they are errors
+/// Makes a view of the surfels themselves, drawn as discs into a depth buffer: for clouds without a
+/// mesh. PrimaryHit::direct is their baked radiance.
+/// @param side  samples along the side of a pixel
+/// @param lift  height of receivers above their surfel, in radii of the surfel
+/// @param lost  gets the damaged pages, whose points are not seen; null: damaged pages are errors
+/// @throws FormatError when a page is damaged and `lost` is null; std::system_error
+/// Memory: 24 bytes for each sample.
 [[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene,
                                                         const Camera& camera, unsigned side,
                                                         float lift, LostPages* lost,
                                                         const Executor& executor,
                                                         Progress& progress);
 
-/// The camera where none is given: the container's, else the mesh's first, else one that sees
-/// everything from the front, the right and above.
-/// @param backdrop  the scene has one, which is larger than what stands on it and may leave the
-/// picture
-/// @param size      of the picture that it is for, if not the camera's own
+/// Returns the camera of a request that names none: the one recorded in the container or, without a
+/// record, the first one of the mesh files or, without that, one that sees everything from the
+/// front, the right and above.
+/// @param backdrop  the scene stands on a backdrop, which is larger and may leave the picture
+/// @param size      width and height of the picture; empty: those of the camera
 [[nodiscard]] Camera default_camera(const ContainerReader& scene,
                                     std::span<const MeshCamera> cameras, bool backdrop,
                                     const std::optional<std::array<unsigned, 2>>& size);

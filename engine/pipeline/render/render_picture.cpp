@@ -1,3 +1,12 @@
+// A picture is rendered tile by tile. Within a tile, sample s of every pixel is shaded in one go,
+// with variant s of the gather, so that the errors of a pixel's samples differ and average out:
+//
+//   +--------+--------+--      one pixel, side = 2      for each tile
+//   |  tile  |        |          +---+---+                for each sample s
+//   | 256^2  |        |          | 0 | 1 |                  hits of sample s in all pixels
+//   +--------+--------+--        +---+---+                  shade the hits with variant s
+//   |        |        |          | 2 | 3 |                  add results, or the sky, to the film
+//                                +---+---+
 #include "engine/pipeline/render/render_picture.h"
 
 #include <algorithm>
@@ -23,11 +32,14 @@ namespace {
 
 constexpr unsigned kTileSide = 256;  // pixels
 constexpr unsigned kMaxVariants = 16;
-constexpr std::uint64_t kSplatBytes = 24;      // of a sample, see view_surfels()
-constexpr std::uint64_t kReceiverBytes = 320;  // of a pixel of a tile: hit, receiver, result, order
-constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);  // besides
+// Bytes of a sample in the depth buffer of view_surfels(), of a pixel of a tile (hit, receiver,
+// result, order), and of what estimates add to that pixel
+constexpr std::uint64_t kSplatBytes = 24;
+constexpr std::uint64_t kReceiverBytes = 320;
+constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);
 
-/// What the camera sees and what lights it, alive as long as the view.
+/// The subject of a picture: the camera, what it sees and what lights it. The view refers to the
+/// other members.
 struct Subject {
   Camera camera;
   unsigned side = 1;  ///< samples of a pixel lie on a grid of side x side
@@ -40,7 +52,8 @@ struct Subject {
   [[nodiscard]] std::uint64_t samples() const { return pixels() * side * side; }
 };
 
-/// The side of the grid on which a pixel's samples lie.
+/// Returns the side of the grid on which the samples of a pixel lie.
+/// @throws RequestError when `samples` is no square number
 unsigned side_of(unsigned samples) {
   const auto side = static_cast<unsigned>(std::lround(std::sqrt(samples)));
   if (side == 0 || side * side != samples) {
@@ -51,6 +64,7 @@ unsigned side_of(unsigned samples) {
   return side;
 }
 
+/// @throws RequestError when a picture of this camera has no pixels or too many
 void check_size(const Camera& camera) {
   const std::uint64_t pixels = std::uint64_t{camera.width} * camera.height;
   const unsigned longer = std::max(camera.width, camera.height);
@@ -76,19 +90,19 @@ void load_subject(Subject& subject, const RenderRequest& request, const Containe
   check_size(subject.camera);
 }
 
-/// Makes the view of a subject's mesh, by rays.
+/// Makes a view of the subject's mesh by rays.
 void make_mesh_view(Subject& subject, const RenderRequest& request, const ContainerReader& scene,
                     const LightRig& lights) {
   const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
   subject.rays = std::make_unique<RayScene>(subject.mesh);
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
-  return_freed_memory();  // what reading the files and building the rays' tree took
+  return_freed_memory();  // that reading the files and building the ray scene took
   subject.view =
       view_mesh(*subject.rays, *subject.light, request.light_sampling, subject.camera, subject.side,
                 lift_height(static_cast<float>(surfel_radius), request.lift, scene.header().frame));
 }
 
-/// Makes the view of the scene's surfels, drawn into a depth buffer.
+/// Makes a view of the scene's surfels, drawn into a depth buffer.
 void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
                       LightingReport& report, Progress& progress) {
   const ContainerReader& scene = lighting.scene();
@@ -97,7 +111,7 @@ void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
                               lighting.executor(), progress);
 }
 
-/// What rendering takes besides the gather.
+/// Returns a budget that is charged with everything that rendering takes besides the gather.
 MemoryBudget picture_budget(const RenderRequest& request, const Subject& subject) {
   MemoryBudget budget = budget_of(request.run.memory_bytes, "this picture");
   const std::uint64_t receiver = kReceiverBytes + (request.estimate ? kEstimateBytes : 0);
@@ -115,14 +129,16 @@ Receiver receiver_at(const PrimaryHit& hit) {
   return {hit.position + glm::dvec3(hit.offset_normal * hit.lift), hit.normal};
 }
 
-/// Samples lie on a grid of side x side in every pixel.
+/// Returns the place of a pixel's sample on the grid of all samples.
 std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample, unsigned side) {
   return {x * side + sample % side, y * side + sample / side};
 }
 
-/// Windows of samples that stand for a picture's, where they see something.
+/// Returns windows of receivers that stand for all receivers of a picture. Windows in which the
+/// camera meets nothing are left out.
 std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
-  // Multiples of these shares cover the plane evenly (Roberts 2018).
+  // Choose the size of a window; multiples of the shares kGolden cover the plane evenly (Roberts
+  // 2018)
   constexpr double kGolden[2] = {0.7548776662466927, 0.5698402909980532};
   constexpr std::uint64_t kMaxWidth = 16;
   const Camera& camera = subject.camera;
@@ -132,7 +148,9 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
       static_cast<unsigned>(std::min<std::uint64_t>({kMaxWidth, camera.width, plan.receivers}));
   const auto height =
       static_cast<unsigned>(std::min<std::uint64_t>(camera.height, plan.receivers / width));
-  std::vector<Pilot> pilots(2 * plan.count);  // twice as many, because some see nothing
+
+  // Find what the windows see, in twice as many as are wanted: some may see nothing
+  std::vector<Pilot> pilots(2 * plan.count);
   executor.for_each(pilots.size(), [&](std::size_t i, unsigned) {
     const auto place = [&](int axis, unsigned room) {
       const double turn = kGolden[axis] * static_cast<double>(i + 1);
@@ -149,14 +167,16 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
       }
     }
   });
+
+  // Keep the first ones that see something
   std::erase_if(pilots, [](const Pilot& pilot) { return pilot.receivers.empty(); });
   pilots.resize(std::min(pilots.size(), plan.count));
   return pilots;
 }
 
-/// Renders a picture tile by tile, one sample of every pixel at a time. Each of a pixel's samples
-/// is shaded with a variant of its own, so that what one of them resolves too coarsely the others
-/// average out.
+/// Renders a picture tile by tile, one sample of every pixel at a time. Each sample of a pixel is
+/// shaded with a variant of its own, so that what one of them resolves too coarsely averages out
+/// over the others.
 class TileRenderer {
  public:
   TileRenderer(const Subject& subject, const Sky& sky, Lighting& lighting, Film& film)
@@ -233,21 +253,22 @@ class TileRenderer {
   std::vector<Receiver> receivers_;
 };
 
-/// @throws RequestError when a picture's ending is neither .exr nor .png
+/// @throws RequestError when there is no target, when the ending of one is neither .exr nor .png,
+///         or when estimates have no .exr to go to
 void check_targets(std::span<const PictureTarget> targets, bool estimate) {
-  if (targets.empty()) throw RequestError("targets", "no picture is named that is to be written");
+  if (targets.empty()) throw RequestError("targets", "no picture to write is named");
   bool exr = false;
   for (const PictureTarget& target : targets) {
     const std::string ending = lower_extension(target.path);
     if (ending != ".exr" && ending != ".png") {
-      throw RequestError("targets", "the name of a picture ends in .exr or .png, not as in " +
+      throw RequestError("targets", "the name of a picture must end in .exr or .png, but is " +
                                         target.path.string());
     }
     exr |= ending == ".exr";
   }
   if (estimate && !exr) {
     throw RequestError("estimate",
-                       "`estimate` adds layers, which an .exr has alone: name one to write");
+                       "`estimate` adds layers, which only an .exr has: name an .exr as output");
   }
 }
 
@@ -255,7 +276,7 @@ void check_targets(std::span<const PictureTarget> targets, bool estimate) {
 
 LightingReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
                               Progress& progress) {
-  // Open the scene, load what the camera sees
+  // Open the scene and load what the camera sees
   LightingReport report;
   check_targets(targets, request.estimate);
   Subject subject{.side = side_of(request.samples)};
@@ -266,7 +287,7 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   const bool sees_mesh = !subject.mesh.triangles.empty();
   if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
 
-  // Divide the memory, bring the light of earlier bounces, choose the settings
+  // Divide the memory, shade earlier bounces, choose the settings
   lighting.prepare(picture_budget(request, subject), lights.sky,
                    std::min(request.samples, kMaxVariants), targets.front().path);
   if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
@@ -278,7 +299,7 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
     const Stage stage(report.seconds, progress, "render", subject.samples(), "samples");
     TileRenderer(subject, lights.sky, lighting, film).render_all(progress);
   }
-  lighting.finish();  // gives back the page cache, so that there is room for copies of the layers
+  lighting.finish();  // frees the page cache, so that there is room for copies of the layers
   film.finish();
   film.write(targets, request.exposure);
 

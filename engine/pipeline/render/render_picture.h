@@ -1,4 +1,15 @@
-// Renders pictures: a container, and what a camera sees, to .exr and .png files.
+// Renders pictures: the entry point of the library that lights what a camera sees.
+//
+//   mesh, or the surfels --- primary visibility ---> receivers ---.
+//                                                                 +--> layers --> .exr and .png
+//   scene.ptcx ------------- surfels that occlude and emit -------'
+//
+//   ptc::RenderRequest request;
+//   request.scene = "dragon.ptcx";
+//   request.meshes = {"dragon.obj"};
+//   ptc::Progress silent;
+//   const ptc::PictureTarget targets[] = {{.path = "dragon.exr"}, {.path = "dragon.png"}};
+//   const ptc::LightingReport report = ptc::render_picture(request, targets, silent);
 #pragma once
 
 #include <array>
@@ -17,31 +28,53 @@
 
 namespace ptc {
 
-/// A picture of a mesh, or of the surfels themselves, by the light of a container's surfels.
+/// A picture to render. LightingRequest has the scene, the quality and the resources.
+///
+/// The camera sees `meshes` and `mesh` together or, without triangles there, the surfels of the
+/// scene. Either way the surfels light what it sees.
 struct RenderRequest : LightingRequest {
-  std::vector<std::filesystem::path> meshes;  ///< what the camera sees; empty: the surfels
-  std::shared_ptr<const Mesh> mesh;           ///< a mesh in memory, besides those
-  bool backdrop = false;                      ///< sets the meshes on a ground before a red wall
-  std::optional<Camera> camera;  ///< empty: the mesh's or the build's, else a view of everything
-  std::optional<std::array<unsigned, 2>> size;  ///< width and height in place of the camera's
-  unsigned samples = 4;                         ///< per pixel, a square number
-  std::optional<LightRig> lights;               ///< empty: those that the scene was built with
-  /// Shadow rays of the camera's samples. Emissive triangles are surfels, so the gather brings
-  /// their light; area rays would add it once more.
+  /// Mesh files that the camera sees; clouds among them are skipped.
+  std::vector<std::filesystem::path> meshes;
+  /// A mesh in memory, seen together with those of `meshes`; null: none.
+  std::shared_ptr<const Mesh> mesh;
+  bool backdrop = false;  ///< sets the meshes on a ground in front of a red wall
+  /// Camera of the picture; empty: the one that the scene was built with or, without that, the
+  /// first one of the mesh files or, without that, one that sees everything.
+  std::optional<Camera> camera;
+  /// Width and height of the picture in pixels; empty: those of the camera.
+  std::optional<std::array<unsigned, 2>> size;
+  unsigned samples = 4;  ///< samples of each pixel, a square number
+  /// Lights of the meshes and of the sky; empty: those that the scene was built with.
+  std::optional<LightRig> lights;
+  /// Shadow rays of each sample at a mesh. Emissive triangles are surfels too, so the gather brings
+  /// their light already; area rays would add it a second time.
   LightSampling light_sampling{.sun_rays = 4, .area_rays = 0, .sky_rays = 0};
-  float exposure = 0;  ///< stops, for a .png of light
+  float exposure = 0;  ///< stops by which a .png of light is brightened
 };
 
-/// Renders to .exr (beauty as RGB and the layers direct, indirect, occlusion, bent_normal, albedo
-/// and alpha) and .png (one of them).
+/// Renders a picture and writes it to one or more files.
 ///
-/// direct = emission + albedo / pi * (lights + sky), indirect = albedo / pi * irradiance from
-/// surfaces, beauty = direct + indirect. Pixels that meet nothing show the sky. Estimates add the
-/// layers occlusion_error and irradiance_error to an .exr: the root mean square over the samples of
-/// a pixel, which is an upper bound on the error of their mean.
-/// @param targets  one or more files, all from one rendering
-/// @throws RequestError when the request excludes itself, LimitError for a cap that is too small,
-///         DataError and FormatError for damaged input, std::system_error
+///   layer              components
+///   (RGB)              3   beauty = direct + indirect; pixels that meet nothing show the sky
+///   direct             3   emission + albedo / pi * (irradiance from lights + sky)
+///   indirect           3   albedo / pi * irradiance from surfaces
+///   occlusion          1   cosine-weighted share of the hemisphere that is covered, 0 to 1
+///   bent_normal        3   mean of the uncovered directions
+///   albedo             3   reflected share of the light, 0 to 1
+///   alpha              1   share of the samples that meet a surface
+///   occlusion_error    1   only with LightingRequest::estimate
+///   irradiance_error   1   only with LightingRequest::estimate, W / m^2
+///
+/// An .exr gets all layers, a .png one of them. Each layer is the mean over the samples of a pixel,
+/// except that the layers of estimates are root mean squares, which are upper bounds on the error
+/// of that mean. Each file is published whole or not at all.
+/// @param targets   one or more files, all from one rendering
+/// @param progress  gets the stages, and notes about the meshes and the scene's record
+/// @return          what the run did, cost and, if asked for, how exact it was
+/// @throws RequestError when the request contradicts itself or a setting is out of range;
+///         LimitError when the memory cap is too small: the text names the least that works;
+///         DataError, FormatError for damaged input; std::system_error
+/// Memory: at most RunOptions::memory_bytes.
 LightingReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
                               Progress& progress);
 

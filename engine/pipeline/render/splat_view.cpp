@@ -1,5 +1,19 @@
-// Primary visibility without a mesh: a perspective depth buffer of discs
-// (engine/pipeline/render/primary.h).
+// Primary visibility without a mesh: a perspective depth buffer of discs (primary.h).
+//
+// A surfel is a disc with centre c, unit normal n and radius r in the axes of the camera. Its image
+// is an ellipse: span() finds the extent of the ellipse along an axis, cover() tests every sample
+// within. The ray of a sample is k = (x, y, 1), and it meets the plane of the disc at t k:
+//
+//    eye *----------------------- z
+//          `  .         / disc
+//               `  .   /
+//                    `*  t = (c . n) / (k . n), a hit when |t k - c| < r
+//                    /   `  .
+//                              k
+//
+// 64 pages are drawn at a time: pages are projected in parallel, then bands of 16 rows of samples
+// are drawn in parallel, each in the order of the points. A sample belongs to one band, so the
+// picture does not depend on the number of threads.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,9 +34,9 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kPagesAtOnce = 64;
-constexpr unsigned kBandRows = 16;  // samples: rows that one thread draws
+constexpr unsigned kBandRows = 16;  // rows of samples that one thread draws
 
-/// What a sample keeps of the surfel it sees.
+/// The part of a surfel that a sample keeps.
 struct Payload {
   std::uint32_t radiance = 0;  // rgbe
   std::array<std::int16_t, 2> normal{};
@@ -30,15 +44,16 @@ struct Payload {
   std::array<std::uint8_t, 3> albedo{};
 };
 
-/// A disc in front of the camera, in its axes: x to the right, y down, z forward; in edges of the
-/// frame.
+/// A disc in front of the camera, in the camera's axes: x to the right, y down, z forward. Lengths
+/// are in edges of the frame.
 struct Projected {
   glm::vec3 centre{0}, normal{0};
   float radius = 0;
-  unsigned x0 = 0, x1 = 0, y0 = 0, y1 = 0;  // samples that it may cover
+  unsigned x0 = 0, x1 = 0, y0 = 0, y1 = 0;  // samples that it may cover, [x0, x1) x [y0, y1)
   Payload payload;
 };
 
+/// A view by a depth buffer that the constructor fills.
 class SurfelView : public PrimaryView {
  public:
   SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift,
@@ -88,16 +103,16 @@ class SurfelView : public PrimaryView {
     Payload payload;
   };
 
-  /// The ray of a sample, in the camera's axes.
+  /// Returns the ray of a sample in the camera's axes, with z = 1.
   [[nodiscard]] glm::vec3 ray(unsigned x, unsigned y) const {
     return {(static_cast<float>(x) + 0.5F - 0.5F * static_cast<float>(width_)) / focal_,
             (static_cast<float>(y) + 0.5F - 0.5F * static_cast<float>(height_)) / focal_, 1};
   }
 
-  /// Pages are projected side by side, then bands of rows drawn side by side, in the order of
-  /// points.
+  /// Draws the discs of some pages. The result depends on the order of the points alone.
   void draw(const ContainerReader& scene, std::span<const std::uint32_t> pages, LostPages* lost,
             const Executor& executor, Progress& progress) {
+    // Project the pages in parallel
     std::vector<std::vector<Projected>> discs(pages.size());
     executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
       PointScan scan(scene, pages.subspan(i, 1), noted_in(lost));
@@ -109,6 +124,8 @@ class SurfelView : public PrimaryView {
         project(to_surfel(points[k], scene.header().frame), discs[i]);
       }
     });
+
+    // Draw bands of rows in parallel
     executor.for_each((height_ + kBandRows - 1) / kBandRows, [&](std::size_t band, unsigned) {
       const auto first = static_cast<unsigned>(band) * kBandRows;
       const unsigned last = std::min(height_, first + kBandRows);
@@ -121,9 +138,10 @@ class SurfelView : public PrimaryView {
     });
   }
 
+  /// Appends the disc of a surfel, if the picture may show it.
   void project(const Surfel& surfel, std::vector<Projected>& discs) const {
     Projected disc{
-        .centre = scale_.way(position_, surfel.position) * axes_,  // times the transpose
+        .centre = scale_.way(position_, surfel.position) * axes_,  // v * M is transpose(M) * v
         .normal = surfel.normal * axes_,
         .radius = scale_.radius(surfel.radius),
         .payload = {
@@ -141,8 +159,11 @@ class SurfelView : public PrimaryView {
     discs.push_back(disc);
   }
 
-  /// Samples along an axis whose centres lie within the disc's projection, exactly; all of them
-  /// when it reaches behind the camera.
+  /// Finds the samples along an axis whose centres lie within the projection of a disc: exactly
+  /// these, or all samples when the disc reaches behind the camera.
+  /// @param axis         0 for x, 1 for y
+  /// @param size         number of samples along the axis
+  /// @param first, last  get the range [first, last)
   void span(const Projected& disc, int axis, unsigned size, unsigned& first, unsigned& last) const {
     const float r2 = disc.radius * disc.radius;
     const glm::vec3& c = disc.centre;
@@ -151,7 +172,7 @@ class SurfelView : public PrimaryView {
     first = 0;
     last = size;
     if (c.z <= 0 || p <= 1e-4F * r2) return;
-    // (c_a - u c_z)^2 = r^2 |k|^2 - r^2 (n.k)^2 with k = (1, -u) along the axis and z.
+    // Solve (c_a - u c_z)^2 = r^2 |k|^2 - r^2 (n.k)^2 for u, with k = (1, -u) along the axis and z
     const float across = c.z * n[axis] - c[axis] * n.z;
     const float other = n[1 - axis];
     const float square = c.z * c.z + c[axis] * c[axis] - across * across - r2 * other * other;
@@ -164,6 +185,7 @@ class SurfelView : public PrimaryView {
     last = static_cast<unsigned>(std::clamp(high, 0.0F, end));
   }
 
+  /// Draws a disc into the rows [y0, y1) of samples.
   void cover(const Projected& disc, unsigned y0, unsigned y1) {
     const float height = glm::dot(disc.centre, disc.normal);
     const float square = disc.radius * disc.radius;
@@ -174,7 +196,7 @@ class SurfelView : public PrimaryView {
         const glm::vec3 off = along * t - disc.centre;
         const float distance = glm::dot(off, off);
         if (!(t > 0 && distance < square)) continue;
-        // The nearest centre wins where coplanar discs overlap, as in the gather.
+        // Let the nearest centre win where coplanar discs overlap, as in the gather
         const float bumped = t + 0.01F / disc.radius * distance;
         Sample& sample = samples_[std::size_t{y} * width_ + x];
         if (bumped < sample.depth) sample = {bumped, disc.payload};

@@ -1,3 +1,9 @@
+// Receivers are read in Z-order, shaded in batches and written in the same order. Pilots, which
+// choose the settings, are short runs of the same receivers:
+//
+//   receivers    |--------------------------------------------------------------------------|
+//   pilots         |====|            |====|            |====|            |====|       tune()
+//   batches      |--------|--------|--------|--------|--------|--------|--------|----- shade()
 #include "engine/pipeline/shade/shade_container.h"
 
 #include <algorithm>
@@ -25,25 +31,31 @@ namespace {
 
 constexpr std::size_t kBatch = 16 * Shader::kBlock;  // receivers in memory at once
 
-/// Some of a container's points in order, in blocks.
+/// An even selection of a container's points, in their order and in blocks.
+///
+/// Point i of `all` is selected when a multiple of all / wanted falls on it. share_ counts this in
+/// integers, as Bresenham's algorithm does: it grows by `wanted` for each point, and a point at
+/// which it reaches `all` is selected and takes `all` off.
 class PointCursor {
  public:
-  /// @param wanted  how many points, evenly spread; at most as many as there are
-  /// @param from    index of the first wanted point that next() gives, below `wanted`
-  /// @param lost    where damaged pages are noted, whose points are passed over; null: damaged
-  ///                pages are errors
+  /// @param wanted  number of points to select, at most as many as there are
+  /// @param from    index among the selected points of the first that next() gives, below `wanted`
+  /// @param lost    gets the damaged pages, whose points are skipped; null: damaged pages are
+  ///                errors
   PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0,
               LostPages* lost = nullptr)
       : container_(container), wanted_(wanted), scan_(container, noted_in(lost)) {
     if (from == 0) return;
     const std::uint64_t points = all_points();
-    const std::uint64_t passed = (from * points + wanted - 1) / wanted;  // `from` are taken of them
+    const std::uint64_t passed =
+        (from * points + wanted - 1) / wanted;  // they hold `from` selected
     share_ = passed * wanted - from * points;
     scan_.skip(static_cast<std::size_t>(passed / container.superblock().points_per_page));
     if (scan_.next())
       at_ = static_cast<std::uint32_t>(passed % container.superblock().points_per_page);
   }
 
+  /// Fills `out` from the front. @return the number of points, 0 at the end
   std::size_t next(std::span<Surfel> out) {
     std::size_t filled = 0;
     while (filled < out.size()) {
@@ -66,7 +78,7 @@ class PointCursor {
  private:
   [[nodiscard]] std::uint64_t all_points() const noexcept { return container_.superblock().points; }
 
-  /// Passes over the pages up to the next one with a wanted point.
+  /// Skips the pages before the next one with a selected point, without reading them.
   void pass_unwanted_pages() {
     while (const std::uint32_t count = scan_.next_count()) {
       const std::uint64_t share = share_ + wanted_ * count;
@@ -78,11 +90,12 @@ class PointCursor {
 
   const ContainerReader& container_;
   std::uint64_t wanted_;
-  std::uint64_t share_ = 0;  // wanted_ for each point passed, less all_points() for each one taken
+  std::uint64_t share_ = 0;  // wanted_ for each point passed, less all_points() for each selected
   PointScan scan_;
   std::uint32_t at_ = 0;  // next point of the page
 };
 
+/// Returns the text by which a shaded container records its settings.
 std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
   std::string text =
       fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
@@ -93,7 +106,7 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
   return text;
 }
 
-/// The receivers of a request, open.
+/// The open container of a request's receivers.
 struct OpenReceivers {
   OpenReceivers(const ShadeRequest& request, const std::filesystem::path& target,
                 const Lighting& lighting, Progress& progress)
@@ -106,14 +119,14 @@ struct OpenReceivers {
   [[nodiscard]] std::uint64_t all() const { return container.superblock().points; }
   [[nodiscard]] PointCursor cursor() const { return {container, wanted, 0, lost}; }
 
-  std::unique_ptr<ContainerReader> other;  ///< null: the scene's own points
+  std::unique_ptr<ContainerReader> other;  ///< null: the receivers are the scene's own points
   const ContainerReader& container;
-  std::uint64_t wanted;  ///< points that were asked for
-  LostPages* lost;       ///< where damaged pages are noted; null: they are errors
-  std::uint64_t points;  ///< wanted points that can be read
+  std::uint64_t wanted;  ///< number of points that were asked for
+  LostPages* lost;       ///< gets the damaged pages; null: damaged pages are errors
+  std::uint64_t points;  ///< number of wanted points that can be read
 
  private:
-  /// A container is opened as it is; a cloud is built into one for the time of the run.
+  /// Opens a container as it is; builds a cloud into a temporary one.
   static std::unique_ptr<ContainerReader> open(const ShadeRequest& request,
                                                const std::filesystem::path& target,
                                                Progress& progress) {
@@ -144,23 +157,23 @@ void check_target(const ShadeRequest& request, const std::filesystem::path& targ
   if (ending == ".ply") return;
   if (ending != ".ptcx") {
     throw RequestError(
-        "target", "the name of what is shaded ends in .ptcx or .ply, not as in " + target.string());
+        "target", "the name of the output must end in .ptcx or .ply, but is " + target.string());
   }
   if (request.tolerate_damage && request.receivers.empty()) {
     throw RequestError("tolerate_damage",
-                       "`tolerate_damage` goes with a .ply as output: a copy of the container "
-                       "would keep what is damaged. Name a .ply, or salvage the scene first");
+                       "`tolerate_damage` needs a .ply as output: a copy of the container would "
+                       "keep what is damaged. Name a .ply, or salvage the scene first");
   }
 }
 
 void check_count(const OpenReceivers& receivers, const std::filesystem::path& target) {
   if (receivers.wanted == receivers.all() || lower_extension(target) == ".ply") return;
   throw RequestError("count",
-                     "`count` goes with a .ply as output: a container holds all points of the "
-                     "receivers. Name a .ply, or shade them all");
+                     "`count` needs a .ply as output: a container holds all points of the "
+                     "receivers. Name a .ply, or shade all points");
 }
 
-/// Runs of points that stand for all that are shaded.
+/// Returns runs of receivers that stand for all receivers, each from the middle of its stride.
 std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
   const PilotPlan plan = plan_pilots(receivers.points);
   std::vector<Pilot> pilots(plan.count);
@@ -202,7 +215,7 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   check_count(receivers, target);
   const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene(), progress).sky;
 
-  // Divide the memory, bring the light of earlier bounces, choose the settings
+  // Divide the memory, shade earlier bounces, choose the settings
   MemoryBudget budget = budget_of(request.run.memory_bytes, "shading");
   if (receivers.other) charge_directory(budget, *receivers.other);
   budget.charge("the output's directory", sink_bytes(target, receivers.container));
@@ -220,7 +233,7 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   lighting.finish();
   sink->finish();
 
-  // Compare some of them with rays
+  // Compare a sample of the receivers with rays
   lighting.check({.sky = sky, .paths = {.bounces = request.bounces}});
   return report;
 }

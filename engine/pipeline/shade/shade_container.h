@@ -1,4 +1,14 @@
-// Shades points: a container, and receivers, to shaded points.
+// Shades points: the entry point of the library that gathers the light of a container's surfels.
+//
+//   scene.ptcx --------- surfels that occlude and emit ---.
+//                                                         +--> shade_container() --> target
+//   scene, other.ptcx or cloud --- receivers -------------'                          .ptcx or .ply
+//
+//   ptc::ShadeRequest request;
+//   request.scene = "dragon.ptcx";
+//   request.error = 0.05;  // chooses the cheapest settings that meet a relative error of 5 %
+//   ptc::Progress silent;
+//   const ptc::LightingReport report = ptc::shade_container(request, "shaded.ptcx", silent);
 #pragma once
 
 #include <cstdint>
@@ -11,22 +21,39 @@
 
 namespace ptc {
 
-/// Points to shade by the light of a container's surfels.
+/// Points to shade. LightingRequest has the scene, the quality and the resources.
 struct ShadeRequest : LightingRequest {
-  std::filesystem::path receivers;  ///< cloud or container to shade; empty: the scene's own points
-  std::uint64_t count = 0;          ///< points to shade, evenly spread in order; 0: all
-  std::optional<Sky> sky;           ///< empty: the sky that the scene was built with
+  /// Cloud or container whose points are shaded; empty: the points of the scene itself. A cloud is
+  /// sorted into a temporary container first, so that its points leave in Z-order.
+  std::filesystem::path receivers;
+  /// Number of points to shade, evenly spread over all in their order; 0: all points. Fewer than
+  /// all need a .ply as target.
+  std::uint64_t count = 0;
+  /// Sky that lights the receivers; empty: the sky that the scene was built with.
+  std::optional<Sky> sky;
 };
 
-/// Shades every receiver and writes it to `target`.
+/// Shades every receiver and writes the results to `target`, whose ending chooses the format.
 ///
-/// A .ptcx gets the receivers' container with the channels occlusion, bent_normal, irradiance, sky
-/// and indirect, where indirect = albedo / pi * (irradiance + sky); a .ply gets the same as
-/// columns. Estimates follow as occlusion_error and irradiance_error. Damage can be tolerated in
-/// the scene's own points only when they go to a .ply.
-/// @throws RequestError when the request excludes itself, LimitError for a cap that is too small,
-///         DataError and FormatError for damaged input, std::system_error. Nothing is then left
-///         under the target's name
+///   channel            components
+///   occlusion          1   cosine-weighted share of the hemisphere that is covered, 0 to 1
+///   bent_normal        3   unit mean of the uncovered directions; the normal when none is
+///   irradiance         3   from surfaces, W / m^2
+///   sky                3   irradiance from the uncovered sky, W / m^2
+///   indirect           3   albedo / pi * (irradiance + sky): the radiance that leaves
+///   occlusion_error    1   estimated error, only with LightingRequest::estimate
+///   irradiance_error   1   estimated error, W / m^2, only with LightingRequest::estimate
+///
+/// A .ptcx is a copy of the receivers' container with these channels, stored as halves; channels of
+/// an earlier shading are replaced. A .ply has one row for each point, with its surfel and these
+/// channels as columns. With `tolerate_damage` the scene's own points can only go to a .ply.
+/// @param progress  gets the stages, and notes about the scene's record
+/// @return          what the run did, cost and, if asked for, how exact it was
+/// @throws RequestError when the request contradicts itself or a setting is out of range;
+///         LimitError when the memory cap is too small: the text names the least that works;
+///         DataError, FormatError for damaged input; std::system_error. A run that throws leaves
+///         the target as it was, unless it throws in the check, which comes last
+/// Memory: at most RunOptions::memory_bytes.
 LightingReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
                                Progress& progress);
 

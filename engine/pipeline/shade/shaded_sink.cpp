@@ -1,3 +1,10 @@
+// Shaded points as columns of a PLY, or as attribute pages of a container.
+//
+// A container is copied page by page, without decoding, and gets one attribute page for each point
+// page. Its payload holds one column of halves for each component:
+//
+//   copied pages, without meta page    | new attribute pages                    | meta page
+//   point and node pages, old channels | occlusion occlusion ... bent_normal.x bent_normal.x ...
 #include "engine/pipeline/shade/shaded_sink.h"
 
 #include <algorithm>
@@ -17,12 +24,12 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint16_t kGroup = 1;  // of the channels that shading adds
+constexpr std::uint16_t kGroup = 1;  // group of the channels that shading adds
 
-/// What shading says of a point, in the order of the channels.
+/// The channels that shading adds to a point.
 struct ShadedChannels {
   static constexpr std::size_t kPlain = 1 + 3 + 3 + 3 + 3;
-  static constexpr std::size_t kFloats = kPlain + 2;  // with estimates
+  static constexpr std::size_t kFloats = kPlain + 2;  // with both estimates
 
   static std::vector<Channel> channels(bool estimates) {
     std::vector<Channel> channels{{"occlusion", ChannelType::half, 1, kGroup},
@@ -40,7 +47,8 @@ struct ShadedChannels {
 
 using ShadedValues = std::array<float, ShadedChannels::kFloats>;
 
-/// Values of a shaded surfel: outgoing radiance is albedo / pi times what arrives.
+/// Returns the values of a shaded surfel in the order of the channels. The radiance that leaves is
+/// albedo / pi times the irradiance.
 ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEstimate& estimate) {
   const glm::vec3 out = albedo * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float>;
   return {s.occlusion,
@@ -60,6 +68,7 @@ ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEst
           estimate.irradiance};
 }
 
+/// A cloud with the channels as columns.
 class PlySink : public ShadedSink {
  public:
   PlySink(const std::filesystem::path& target, std::uint64_t count, bool estimates)
@@ -79,11 +88,11 @@ class PlySink : public ShadedSink {
   void finish() override { writer_.finish(); }
 
  private:
-  std::size_t floats_;  // of a point
+  std::size_t floats_;  // values of one point
   PlyWriter writer_;
 };
 
-/// A copy of the receivers' container with one attribute page behind each point page. Channels of
+/// A copy of the receivers' container with one attribute page more for each point page. Channels of
 /// an earlier shading are left out.
 class ContainerSink : public ShadedSink {
  public:
@@ -101,7 +110,7 @@ class ContainerSink : public ShadedSink {
       if (std::ranges::find(meta_.channels, channel.name, &Channel::name) == meta_.channels.end())
         continue;
       throw DataError(from.path().string() + ": its channel " + channel.name +
-                      " has the name of one that shading adds: name a .ply as output");
+                      " has the name of a channel that shading adds: name a .ply as output");
     }
     meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());
     meta_.text["shading"] = settings;
@@ -137,7 +146,8 @@ class ContainerSink : public ShadedSink {
         std::min<std::uint64_t>(from_.superblock().points_per_page, left));
   }
 
-  /// Point and node pages keep their numbers, so that references hold: they precede all others.
+  /// Copies all pages but the meta page and the channels of an earlier shading. Point and node
+  /// pages precede all others, so they keep their numbers and references to them stay valid.
   void copy_pages() {
     std::vector<std::byte> stored;
     for (std::uint32_t page = 0; page < from_.page_count(); ++page) {
@@ -150,6 +160,7 @@ class ContainerSink : public ShadedSink {
     }
   }
 
+  /// Writes the collected values as one attribute page, column by column.
   void flush() {
     const std::size_t count = values_.size();
     std::vector<std::byte> payload(count * floats_ * 2);
@@ -169,7 +180,7 @@ class ContainerSink : public ShadedSink {
   }
 
   const ContainerReader& from_;
-  std::size_t floats_;  // of a point
+  std::size_t floats_;  // values of one point
   Meta meta_;
   std::vector<PackedColumn> columns_;
   ContainerWriter writer_;
@@ -182,7 +193,7 @@ class ContainerSink : public ShadedSink {
 std::uint64_t sink_bytes(const std::filesystem::path& target,
                          const ContainerReader& receivers) noexcept {
   if (lower_extension(target) == ".ply") return 0;
-  // An attribute page for each page at the most.
+  // There is at most one attribute page for each page
   return ContainerWriter::memory_bytes(2 * std::uint64_t{receivers.page_count()},
                                        receivers.header().page_shift, 1);
 }

@@ -1,4 +1,4 @@
-// Where shaded points go: a cloud, or a container's copy with new channels.
+// The files that shaded points are written to: a cloud, or a copy of a container with new channels.
 #pragma once
 
 #include <cstdint>
@@ -14,27 +14,37 @@
 
 namespace ptc {
 
-/// Takes shaded points in order.
+/// A file to which shaded points are written in their order. It is published by finish(); without
+/// that, nothing is left under its name.
 class ShadedSink {
  public:
   virtual ~ShadedSink() = default;
-  /// @param estimates  as many, or none where the sink was made without
+  /// Appends a block of points.
+  /// @param shading    one result for each surfel
+  /// @param estimates  one for each surfel; empty when the sink was made without estimates
+  /// @throws std::system_error
   virtual void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
                      std::span<const ErrorEstimate> estimates) = 0;
+  /// Completes and publishes the file. @throws std::system_error
   virtual void finish() = 0;
 };
 
-/// A sink for .ply or .ptcx, by the target's ending.
-/// @param receivers  whose points are shaded: a container's are copied with them
-/// @param points     how many will come
-/// @param settings   of the shading, for the container's record
+/// Makes a sink for a .ply or a .ptcx, by the ending of the target.
+/// @param receivers  container of the points that are shaded; a .ptcx copies its pages, so it must
+///                   outlive the sink
+/// @param points     number of points that will be written
+/// @param settings   the settings of the shading, for the record of a .ptcx
+/// @param estimates  points come with estimated errors
+/// @throws DataError when a channel of the receivers has the name of one that shading adds;
+///         RequestError when the record does not fit a page; std::system_error
 [[nodiscard]] std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
                                                            const ContainerReader& receivers,
                                                            std::uint64_t points,
                                                            const std::string& settings,
                                                            bool estimates);
 
-/// What it takes of the directory that it writes.
+/// Returns the bytes of memory that a sink needs for the pages and the directory of a .ptcx; 0 for
+/// a .ply.
 [[nodiscard]] std::uint64_t sink_bytes(const std::filesystem::path& target,
                                        const ContainerReader& receivers) noexcept;
 

@@ -1,4 +1,4 @@
-// Intervals, ticks and names of values.
+// Intervals, ticks and labels of axes.
 #include "tools/bench/chart/axis.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ Axis around(const Values& values, bool log) {
   return axis_around(values, log);
 }
 
-// Names are what the reader sees of ticks, and free of roundings.
+// Returns the labels of ticks: what a reader sees, free of rounding.
 std::string names(const Values& ticks) {
   std::string text;
   for (const double tick : ticks) text.append(text.empty() ? "" : " ").append(tick_label(tick));
@@ -29,7 +29,7 @@ std::string names(const Values& ticks) {
 
 }  // namespace
 
-TEST_CASE("axis: a logarithmic one is ticked at 1, 2 and 5 of each decade", "[chart][axis]") {
+TEST_CASE("axis: a logarithmic axis has ticks at 1, 2 and 5 of each decade", "[chart][axis]") {
   const Axis axis{3, 700, true};
   CHECK(names(ticks_of(axis)) == "5 10 20 50 100 200 500");
   CHECK(names(ticks_of(axis, 1)) == "10 100");
@@ -38,7 +38,7 @@ TEST_CASE("axis: a logarithmic one is ticked at 1, 2 and 5 of each decade", "[ch
   CHECK(names(ticks_of({0.5, 2e7, true}, 2)) == "1 100 10k 1M");
 }
 
-TEST_CASE("axis: a logarithmic one over less than three such ticks is ticked as linear",
+TEST_CASE("axis: a logarithmic axis with fewer than three such ticks has linear ones",
           "[chart][axis]") {
   CHECK(names(ticks_of({21, 90, true})) == "30 40 50 60 70 80 90");
   CHECK(names(ticks_of({21, 90, true}, 1)) == "40 60 80");
@@ -47,7 +47,7 @@ TEST_CASE("axis: a logarithmic one over less than three such ticks is ticked as 
   CHECK(names(ticks_of({20, 100, true})) == "20 50 100");
 }
 
-TEST_CASE("axis: a linear one is ticked at multiples of 1, 2 or 5", "[chart][axis]") {
+TEST_CASE("axis: a linear axis has ticks at multiples of 1, 2 or 5", "[chart][axis]") {
   CHECK(names(ticks_of({0, 1})) == "0 0.2 0.4 0.6 0.8 1");
   CHECK(names(ticks_of({0, 1}, 1)) == "0 0.5 1");
   CHECK(names(ticks_of({0, 1}, 2)) == "0 1");
@@ -78,7 +78,7 @@ TEST_CASE("axis: ticks of any interval lie inside, ascend and are few", "[chart]
   }
 }
 
-TEST_CASE("axis: the finest ticks that fit are taken, and two when none does", "[chart][axis]") {
+TEST_CASE("axis: the finest ticks that fit are chosen, and two when none fit", "[chart][axis]") {
   const Axis axis{3, 70000, true};
   const auto at_most = [&](std::size_t most) {
     return names(ticks_that_fit(
@@ -90,13 +90,13 @@ TEST_CASE("axis: the finest ticks that fit are taken, and two when none does", "
   CHECK(at_most(0) == "100 10k");
 }
 
-TEST_CASE("axis: minor ticks are all nine of a decade, on few decades only", "[chart][axis]") {
+TEST_CASE("axis: minor ticks are all nine of a decade, and only on few decades", "[chart][axis]") {
   CHECK(names(minor_ticks({7, 31, true})) == "7 8 9 10 20 30");
   CHECK(minor_ticks({7, 31, false}).empty());
   CHECK(minor_ticks({1, 1.1e6, true}).empty());
 }
 
-TEST_CASE("axis: values lie inside with air around them", "[chart][axis]") {
+TEST_CASE("axis: values lie inside with a margin around them", "[chart][axis]") {
   for (const bool log : {false, true}) {
     for (const Values& values : {Values{3, 700}, Values{650, 700}, Values{5}, Values{1e-300, 1e300},
                                  Values{1e15, 1e15 + 1}, Values{4e307, 1e-300}}) {
@@ -113,21 +113,21 @@ TEST_CASE("axis: values lie inside with air around them", "[chart][axis]") {
   CHECK(around({-2, 1}, false).low == Approx(-2.18));
 }
 
-TEST_CASE("axis: a linear one begins at 0 unless that wastes more than half", "[chart][axis]") {
+TEST_CASE("axis: a linear axis begins at 0 unless that wastes more than half", "[chart][axis]") {
   CHECK(around({3, 6}, false).low == 0);
   CHECK(around({0, 6}, false).low == 0);
   CHECK(around({3.1, 6}, false).low > 2.5);
   CHECK(around({-0.1, 6}, false).low < -0.1);
 }
 
-TEST_CASE("axis: a logarithmic one does not blow up differences of a few percent",
+TEST_CASE("axis: a logarithmic axis does not magnify differences of a few percent",
           "[chart][axis]") {
   const Axis axis = around({100, 101}, true);
   CHECK(axis.high / axis.low == Approx(1.25));
   CHECK(axis.share(std::sqrt(100.0 * 101)) == Approx(0.5));
 }
 
-TEST_CASE("axis: what it cannot show does not stretch it", "[chart][axis]") {
+TEST_CASE("axis: values that it cannot show do not stretch it", "[chart][axis]") {
   const Values odd = {NAN, kInfinity, -kInfinity, 5, 50};
   CHECK(around(odd, false).high == Approx(53));
   CHECK(around({0, -3, 5, 50}, true).low == around({5, 50}, true).low);
@@ -149,7 +149,7 @@ TEST_CASE("axis: shares are even in values or in their logarithms", "[chart][axi
   CHECK(Axis{10, 1000, true}.share(1000) == 1);
 }
 
-TEST_CASE("axis: names are short", "[chart][axis]") {
+TEST_CASE("axis: labels are short", "[chart][axis]") {
   CHECK(tick_label(0) == "0");
   CHECK(tick_label(0.1 + 0.2) == "0.3");
   CHECK(tick_label(-2.5) == "−2.5");

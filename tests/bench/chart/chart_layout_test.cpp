@@ -1,4 +1,4 @@
-// Where things go, and how series look.
+// The places of everything in a chart, and the styles of series.
 #include "tools/bench/chart/chart_layout.h"
 
 #include <algorithm>
@@ -49,7 +49,7 @@ bool overlap(const Box& a, const Box& b) {
 
 }  // namespace
 
-TEST_CASE("chart layout: panels lie in the chart and beside each other", "[chart]") {
+TEST_CASE("chart layout: panels lie in the chart and next to each other", "[chart]") {
   for (std::size_t panels = 1; panels <= 7; ++panels) {
     for (unsigned columns = 1; columns <= 5; ++columns) {
       const ChartLayout layout = layout_of(chart_of(panels, columns));
@@ -67,7 +67,7 @@ TEST_CASE("chart layout: panels lie in the chart and beside each other", "[chart
   }
 }
 
-TEST_CASE("chart layout: a legend of many names goes on in the next row", "[chart]") {
+TEST_CASE("chart layout: a legend of many names continues in the next row", "[chart]") {
   const ChartLayout few = layout_of(chart_of(3, 3, 3));
   const ChartLayout many = layout_of(chart_of(3, 3, 20));
   REQUIRE(many.legend.size() == 20);
@@ -78,7 +78,7 @@ TEST_CASE("chart layout: a legend of many names goes on in the next row", "[char
   }
 }
 
-TEST_CASE("chart layout: values lie between the axes, names of values apart", "[chart]") {
+TEST_CASE("chart layout: values lie between the axes, and their labels do not overlap", "[chart]") {
   const Ruler ruler;
   Chart chart = chart_of(6, 3);
   for (std::size_t i = 0; i < 6; ++i) {  // up to 900, 9k, 90k ...
@@ -126,7 +126,7 @@ TEST_CASE("chart layout: a panel is empty when no point has both values", "[char
   CHECK_FALSE(layout.panels[2].empty);
 }
 
-TEST_CASE("chart layout: one name has one style, 42 names have different ones", "[chart]") {
+TEST_CASE("chart layout: a name has one style, and 42 names have different styles", "[chart]") {
   Chart chart = chart_of(2, 2, 42);
   std::ranges::reverse(chart.panels[1].series);
   const std::vector<SeriesStyle> styles = styles_of(chart);

@@ -1,4 +1,4 @@
-// Files of charts.
+// The files of charts.
 #include "tools/bench/chart/chart.h"
 
 #include <cmath>
@@ -40,7 +40,7 @@ std::string svg_of(const Scratch& scratch, const Chart& chart) {
   return slurp(scratch.path() / "drawn.svg");
 }
 
-// The number after the first `name`, which ends in "px".
+// Returns the number after the first `name`, which ends in "px".
 unsigned long attribute(const std::string& svg, const std::string& name) {
   const std::size_t begin = svg.find(name);
   REQUIRE(begin != std::string::npos);
@@ -50,7 +50,7 @@ unsigned long attribute(const std::string& svg, const std::string& name) {
   return value;
 }
 
-// Pixels of an 8-bit sRGB colour in the left or the right half of a picture.
+// Counts the pixels of an 8-bit sRGB colour in the left or the right half of a picture.
 std::size_t count_of(const Image& image, bool right, int red, int green, int blue) {
   const glm::vec3 colour(srgb_to_linear(red / 255.0), srgb_to_linear(green / 255.0),
                          srgb_to_linear(blue / 255.0));
@@ -86,7 +86,7 @@ TEST_CASE("chart: an SVG can be searched for titles, axes, names and the note", 
   CHECK(title < svg.find("<path"));
 }
 
-TEST_CASE("chart: equal charts are equal bytes, whatever was drawn before", "[chart]") {
+TEST_CASE("chart: equal charts give equal bytes, whatever was drawn before", "[chart]") {
   const Scratch scratch;
   const std::string svg = svg_of(scratch, sample());
   static_cast<void>(drawn(scratch, sample()));
@@ -99,7 +99,7 @@ TEST_CASE("chart: equal charts are equal bytes, whatever was drawn before", "[ch
   CHECK(svg_of(scratch, other) != svg);
 }
 
-TEST_CASE("chart: a PNG has two pixels a unit and is mostly white", "[chart]") {
+TEST_CASE("chart: a PNG has two pixels per unit and is mostly white", "[chart]") {
   const Scratch scratch;
   const Image image = drawn(scratch, sample());
   const std::string svg = svg_of(scratch, sample());
@@ -175,7 +175,7 @@ TEST_CASE("chart: the drawing shows dashes, bars, limits and labels", "[chart]")
   CHECK_FALSE(differs([](Panels& panels) { panels[0].limits.push_back({1.7e308, "far"}); }));
   CHECK_FALSE(differs([](Panels& panels) { panels[0].limits.push_back({-1, "below"}); }));
   CHECK_FALSE(differs([](Panels& panels) { panels[0].limits.push_back({NAN, "none"}); }));
-  // A bar from x to x is none.
+  // A bar from x to x is not drawn.
   CHECK_FALSE(differs([](Panels& panels) {
     ChartPoint& point = panels[0].series[0].points[1];
     point.x_low = point.x_high = point.x;
@@ -224,7 +224,7 @@ TEST_CASE("chart: what cannot be drawn is refused and leaves no file", "[chart]"
   check_refused(scratch, "a.svg", chart);
 }
 
-TEST_CASE("chart: a target that cannot be written keeps what was there", "[chart]") {
+TEST_CASE("chart: a target that cannot be written keeps its old content", "[chart]") {
   const Scratch scratch;
   for (const char* ending : {".svg", ".png"}) {
     const auto name = std::string("a") + ending;

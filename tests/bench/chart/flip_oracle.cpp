@@ -15,7 +15,7 @@ namespace {
 
 using Colours = std::vector<glm::dvec3>;
 
-// IEC 61966-2-1, rows X, Y, Z, and its inverse; white is the sum of each row.
+// The matrix of IEC 61966-2-1, rows X, Y, Z, and its inverse; white is the sum of each row.
 constexpr double kXyz[3][3] = {{0.4123907992659595, 0.3575843393838780, 0.1804807884018343},
                                {0.2126390058715104, 0.7151686787677559, 0.0721923153607337},
                                {0.0193308187155918, 0.1191947797946259, 0.9505321522496608}};
@@ -53,7 +53,8 @@ double hyab(glm::dvec3 a, glm::dvec3 b) {
   return std::abs(a.x - b.x) + std::hypot(a.y - b.y, a.z - b.z);
 }
 
-// Sum over a square of weights given by their place, with the outermost pixels beyond the edges.
+// Sums over a square with weights that depend on the place; edge pixels are repeated beyond the
+// edges.
 glm::dvec3 sum_at(const Colours& colours, const Image& shape, int x, int y, int radius,
                   const std::function<glm::dvec3(int, int)>& weight) {
   glm::dvec3 sum(0);
@@ -81,7 +82,7 @@ struct Oracle {
     for (const glm::vec3& pixel : image.pixels) colours.push_back(ycxcz(glm::dvec3(pixel)));
   }
 
-  // Section "spatial filtering".
+  // See section "spatial filtering".
   [[nodiscard]] glm::dvec3 seen(int x, int y) const {
     const int radius = static_cast<int>(
         std::ceil(3 * std::sqrt(0.04 / (2 * kPiDouble * kPiDouble)) * pixels_per_degree));
@@ -98,7 +99,7 @@ struct Oracle {
     return hunted(glm::clamp(times(kRgb, xyz), 0.0, 1.0));
   }
 
-  // Lengths of edge and point vectors. Section "feature pipeline".
+  // Lengths of edge and point vectors; see section "feature pipeline".
   [[nodiscard]] std::array<double, 2> features(int x, int y) const {
     const double sigma = 0.5 * 0.082 * pixels_per_degree;
     const int radius = static_cast<int>(std::ceil(3 * sigma));

@@ -1,4 +1,4 @@
-// FLIP a second time, to compare with: in double, straight from the paper, nothing separated.
+// A second FLIP to compare with: in double, straight from the paper, without separable filters.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,8 @@
 
 namespace ptc {
 
-/// Two-dimensional sums over every neighbour. @param test  values in [0, 1]
+/// Returns the error of every pixel by two-dimensional sums over all neighbours.
+/// @param test  values in [0, 1]
 [[nodiscard]] std::vector<double> flip_oracle(const Image& test, const Image& reference,
                                               double pixels_per_degree);
 

@@ -1,4 +1,4 @@
-// LDR-FLIP: what the formulas say of plain colours, a second implementation, and what eyes expect.
+// LDR-FLIP, compared with formulas for plain colours, a second implementation, and expectations.
 #include "tools/bench/chart/flip.h"
 
 #include <cmath>
@@ -38,7 +38,7 @@ Image checkerboard(unsigned side) {
   return image;
 }
 
-// The error of two plain colours, from L* a* b* as tables of sRGB colours give them.
+// Returns the error of two plain colours, from L* a* b* in tables of sRGB colours.
 double error_of_lab(glm::dvec3 a, glm::dvec3 b) {
   const auto distance = [](glm::dvec3 p, glm::dvec3 q) {
     return std::abs(p.x - q.x) +
@@ -51,7 +51,7 @@ double error_of_lab(glm::dvec3 a, glm::dvec3 b) {
   return share < 0.4 ? share * 0.95 / 0.4 : 0.95 + 0.05 * (share - 0.4) / 0.6;
 }
 
-// That every pixel has this error.
+// Checks that every pixel has this error.
 void check_error(const Image& test, const Image& reference, double expected) {
   for (const float error : flip(test, reference)) {
     REQUIRE(static_cast<double>(error) == Approx(expected).margin(2e-5));
@@ -73,7 +73,8 @@ TEST_CASE("flip: the order of the two pictures does not matter", "[chart][flip]"
   CHECK(mean_flip(a, b) == mean_flip(b, a));
 }
 
-TEST_CASE("flip: plain colours have the error that tables of L* a* b* give", "[chart][flip]") {
+TEST_CASE("flip: plain colours have the error that follows from tables of L* a* b*",
+          "[chart][flip]") {
   const glm::dvec3 black(0);
   const glm::dvec3 white(100, 0, 0);
   const glm::dvec3 red(53.2408, 80.0925, 67.2032);
@@ -93,7 +94,7 @@ TEST_CASE("flip: black against white is 0.967, green against blue exactly 1", "[
   CHECK(mean_flip(plain({0, 1, 0}), plain({0, 0, 1})) == 1);
 }
 
-TEST_CASE("flip: noise has the errors of sums over every neighbour", "[chart][flip]") {
+TEST_CASE("flip: the error of noise equals direct sums over all neighbours", "[chart][flip]") {
   for (const float pixels_per_degree : {10.0F, 31.5F, 67.0F}) {
     const Image a = noise(17, 12, 3);
     Image b = a;
@@ -118,13 +119,13 @@ TEST_CASE("flip: from farther away a checkerboard looks more like grey", "[chart
   CHECK(before < 0.3);
 }
 
-TEST_CASE("flip: a thin line is seen as a feature beyond its colour", "[chart][flip]") {
+TEST_CASE("flip: a thin line counts as a feature beyond its colour", "[chart][flip]") {
   const Image grey = plain(glm::vec3(0.4F), 41, 41);
   Image line = grey;
   for (unsigned y = 0; y < 41; ++y) line.pixels[41 * y + 20] = glm::vec3(0.5F);
   const std::size_t middle = std::size_t{41} * 20 + 20;
   const double error = static_cast<double>(flip(line, grey)[middle]);
-  // Of the step, the blur of the achromatic channel leaves the weight of its middle.
+  // The blur of the achromatic channel leaves the weight of its middle from the step.
   double sum = 0;
   for (int i = -10; i <= 10; ++i) sum += std::exp(-9.8696 * i * i / (67 * 67 * 0.0047));
   const auto left = static_cast<float>(0.4 + 0.1 / sum);
@@ -134,7 +135,7 @@ TEST_CASE("flip: a thin line is seen as a feature beyond its colour", "[chart][f
   CHECK(flip(line, grey)[middle - 20] == 0);
 }
 
-TEST_CASE("flip: values outside [0, 1] are clamped and no number is black", "[chart][flip]") {
+TEST_CASE("flip: values outside [0, 1] are clamped, and NaN is black", "[chart][flip]") {
   CHECK(mean_flip(plain({-1, 2, NAN}), plain({0, 1, 0})) == 0);
   CHECK(mean_flip(plain({INFINITY, -INFINITY, 1}), plain({1, 0, 1})) == 0);
 }
@@ -145,7 +146,8 @@ TEST_CASE("flip: pictures smaller than the filters are compared", "[chart][flip]
   CHECK(flip(noise(30, 1, 1), noise(30, 1, 2), 1000).size() == 30);
 }
 
-TEST_CASE("flip: different sizes, no pixels and impossible eyes are refused", "[chart][flip]") {
+TEST_CASE("flip: different sizes, empty pictures and impossible pixels per degree are refused",
+          "[chart][flip]") {
   const Image image = plain({}, 4, 3);
   CHECK_THROWS_AS(flip(image, plain({}, 3, 4)), std::invalid_argument);
   CHECK_THROWS_AS(flip(image, plain({}, 4, 2)), std::invalid_argument);

@@ -1,4 +1,4 @@
-// Labels beside points.
+// Labels next to points.
 #include "tools/bench/chart/label_placer.h"
 
 #include <catch2/catch.hpp>
@@ -55,14 +55,15 @@ TEST_CASE("labels: no label leaves the area or covers a marker or another label"
   CHECK(placed.size() < 40);
 }
 
-TEST_CASE("labels: one without room is not placed", "[chart][labels]") {
+TEST_CASE("labels: a label without room is not placed", "[chart][labels]") {
   LabelPlacer placer(kArea);
   placer.block({0, 0, 100, 100});
   CHECK_FALSE(placer.place(boxes_around({50, 50}, 6, 20, 10)));
   CHECK_FALSE(LabelPlacer(kArea).place(boxes_around({50, 50}, 6, 101, 10)));
 }
 
-TEST_CASE("labels: lines are avoided, and crossed where they are everywhere", "[chart][labels]") {
+TEST_CASE("labels: lines are avoided, and crossed only where they are everywhere",
+          "[chart][labels]") {
   LabelPlacer placer(kArea);
   placer.avoid({50, 40}, {80, 10});  // through the box above right
   const auto boxes = boxes_around({50, 40}, 6, 20, 10);

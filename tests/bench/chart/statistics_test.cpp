@@ -1,4 +1,4 @@
-// Hand-computed spreads and errors.
+// Spreads and errors, compared with values computed by hand.
 #include "tools/bench/chart/statistics.h"
 
 #include <cmath>
@@ -9,7 +9,8 @@
 
 using namespace ptc;
 
-TEST_CASE("spread: of odd and even numbers of runs in any order", "[chart][statistics]") {
+TEST_CASE("spread: it is right for odd and even numbers of runs in any order",
+          "[chart][statistics]") {
   const Spread one = spread_of({7});
   CHECK(one.median == 7);
   CHECK(one.low == 7);
@@ -22,12 +23,12 @@ TEST_CASE("spread: of odd and even numbers of runs in any order", "[chart][stati
   CHECK(spread_of({3, 5}).median == 4);
 }
 
-TEST_CASE("spread: of no run or of what is no number is refused", "[chart][statistics]") {
+TEST_CASE("spread: no runs and NaN are refused", "[chart][statistics]") {
   CHECK_THROWS_AS(spread_of({}), std::invalid_argument);
   CHECK_THROWS_AS(spread_of({1, NAN, 2}), std::invalid_argument);
 }
 
-TEST_CASE("errors: four pairs worked out by hand", "[chart][statistics]") {
+TEST_CASE("errors: four pairs have the errors computed by hand", "[chart][statistics]") {
   // Differences 1, -1, 3, 1: squares 12, sum 4.
   const std::vector<double> ours = {2, 1, 6, 5};
   const std::vector<double> reference = {1, 2, 3, 4};
@@ -44,7 +45,7 @@ TEST_CASE("errors: four pairs worked out by hand", "[chart][statistics]") {
   CHECK(relative.reference_mean == 2.5);
 }
 
-TEST_CASE("errors: floats give what their doubles give", "[chart][statistics]") {
+TEST_CASE("errors: floats give the errors of the same values as doubles", "[chart][statistics]") {
   const std::vector<float> ours = {0.1F, 1, 1e8F};
   const std::vector<float> reference = {0.2F, 1e-9F, 99999992.0F};
   const ErrorStatistics errors = error_statistics(ours, reference);
@@ -75,7 +76,7 @@ TEST_CASE("errors: the 99th percentile is the nearest rank of the absolute error
   CHECK(percentile(1000) == 990);
 }
 
-TEST_CASE("errors: one that is no number makes every figure NaN", "[chart][statistics]") {
+TEST_CASE("errors: a single NaN makes every figure NaN", "[chart][statistics]") {
   std::vector<double> ours(300, 1);
   const std::vector<double> reference(300, 0.5);
   for (std::size_t i = 0; i < ours.size(); i += 2) ours[i] = NAN;
@@ -85,7 +86,7 @@ TEST_CASE("errors: one that is no number makes every figure NaN", "[chart][stati
   CHECK(std::isnan(errors.percentile_99));
 }
 
-TEST_CASE("errors: unequal or no values are refused", "[chart][statistics]") {
+TEST_CASE("errors: unequal numbers of values and no values are refused", "[chart][statistics]") {
   const std::vector<double> two(2);
   const std::vector<double> three(3);
   CHECK_THROWS_AS(error_statistics(two, three), std::invalid_argument);
@@ -104,8 +105,7 @@ TEST_CASE("errors: a reference without a mean above 0 has no relative error",
   CHECK(relative.reference_mean == 0);
 }
 
-TEST_CASE("power law: it is found again, and its middle where measurements lie about it",
-          "[chart]") {
+TEST_CASE("power law: an exact law is recovered, and a noisy one through its middle", "[chart]") {
   const PowerLaw exact =
       fit_power_law({{1, 3}, {10, 3 * std::pow(10, 0.7)}, {1000, 3 * std::pow(1000, 0.7)}});
   CHECK(exact.factor == Approx(3));
