@@ -81,10 +81,6 @@ struct NodeGroup {
   std::vector<NodeChild> children;  ///< 1 (a root that is a leaf) to 8, in Morton order
 };
 
-/// Returns the bytes that a group of n children takes in a page, including its slot. The padding of
-/// the slot table to a multiple of 8 is not included.
-[[nodiscard]] std::size_t node_group_bytes(std::size_t children) noexcept;
-
 /// Appends a group as it lies in a page, with its padding. The sphere, the slab and the cone are
 /// widened by as much as quantisation moves their centre, normal and axis.
 /// @param group  its numbers must be finite; all but means, axes and cosines must not be negative

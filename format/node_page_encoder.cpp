@@ -223,10 +223,6 @@ void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexc
   store(group.data(), kGroupHeadBytes + 8 * static_cast<std::size_t>(i), encode_ref(ref));
 }
 
-std::size_t node_group_bytes(std::size_t children) noexcept {
-  return round_to_slot(group_content_bytes(children)) + sizeof(std::uint16_t);
-}
-
 NodePageEncoder::NodePageEncoder(std::size_t payload_limit)
     : limit_(std::min(payload_limit, kMaxPayload)) {}
 

@@ -12,16 +12,10 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
-#include <condition_variable>
 #include <exception>
-#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <utility>
-#include <vector>
-
-#include "engine/base/memory.h"
-#include "engine/cache/frame_table.h"
 
 namespace ptc {
 namespace {
@@ -47,6 +41,7 @@ std::uint64_t reader_bytes(const ContainerReader& container, unsigned threads, B
 
 /// Frames within the cap; more than the pages and a working set for each thread are of no use.
 std::uint32_t count_frames(const ContainerReader& container, const CacheOptions& options) {
+  if (options.threads == 0) throw std::invalid_argument("page cache: no threads");
   const std::uint64_t least = PageCache::min_bytes(container, options.threads, options.back_end);
   if (options.memory_bytes < least) {
     throw std::invalid_argument("page cache: " + std::to_string(options.memory_bytes) +
@@ -77,134 +72,108 @@ std::uint32_t choose_slots(const CacheOptions& options, std::uint32_t frames) {
   return options.local_slots;
 }
 
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
 }  // namespace
 
-struct PageCache::Impl {
-  Impl(const ContainerReader& from, const CacheOptions& with)
-      : Impl(from, with, count_frames(from, with)) {}
-  Impl(const ContainerReader& from, const CacheOptions& with, std::uint32_t frames)
-      : container(from),
-        options(with),
-        reads_ahead(with.read_ahead && with.back_end == BackEnd::io_uring),
-        slots(choose_slots(with, frames)),
-        table({from.page_count(), frames, with.threads, slots}, with.replacement),
-        frame_stride(frame_bytes(from)),
-        arena(frames * frame_stride),
-        seats(with.threads) {}
+PageCache::View PageCache::view(std::uint32_t frame) const noexcept {
+  return {arena_.data() + frame * frame_stride_, table_.page_bytes(frame),
+          table_.record_count(frame)};
+}
 
-  PageReader::View view(std::uint32_t frame) const noexcept {
-    return {arena.data() + frame * frame_stride, table.page_bytes(frame),
-            table.record_count(frame)};
-  }
+// Holds a page that hold() did not find.
+std::uint32_t PageCache::acquire(std::uint32_t page, const Caller& caller) {
+  std::unique_lock lock(mutex_);
+  statistics_.lookups += caller.lookups;
+  statistics_.shared_hits += caller.shared_hits;
+  statistics_.local_hits += caller.lookups - 1 - caller.shared_hits;
+  const std::uint32_t frame = table_.join(caller.number, page);
+  if (frame == kNoFrame) return load(lock, page, caller);
+  ++statistics_.shared_hits;
+  const auto begin = Clock::now();
+  loaded_.wait(lock, [&] { return table_.state(frame) != FrameTable::State::loading; });
+  statistics_.wait_seconds += seconds_since(begin);
+  if (table_.state(frame) == FrameTable::State::ready) return frame;
+  const std::exception_ptr error = table_.error(frame);
+  table_.leave(caller.number, frame);
+  lock.unlock();
+  std::rethrow_exception(error);
+}
 
-  /// What a reader brings along to the shared level.
-  struct Caller {
-    std::uint32_t number;
-    PageDecoder& decoder;
-    PageSource& source;
-    std::uint64_t lookups;  ///< not yet added to the statistics, this one included
-    std::uint64_t shared_hits;
-  };
-
-  /// Holds a page that hold() did not find.
-  std::uint32_t acquire(std::uint32_t page, const Caller& caller) {
-    std::unique_lock lock(mutex);
-    statistics.lookups += caller.lookups;
-    statistics.shared_hits += caller.shared_hits;
-    statistics.local_hits += caller.lookups - 1 - caller.shared_hits;
-    const std::uint32_t frame = table.join(caller.number, page);
-    if (frame == kNoFrame) return load(lock, page, caller);
-    ++statistics.shared_hits;
-    const auto begin = Clock::now();
-    loaded.wait(lock, [&] { return table.state(frame) != FrameTable::State::loading; });
-    statistics.wait_seconds += seconds_since(begin);
-    if (table.state(frame) == FrameTable::State::ready) return frame;
-    const std::exception_ptr error = table.error(frame);
-    table.leave(caller.number, frame);
-    lock.unlock();
-    std::rethrow_exception(error);
-  }
-
-  std::uint32_t load(std::unique_lock<std::mutex>& lock, std::uint32_t page, const Caller& caller) {
-    ++statistics.misses;
-    const std::uint32_t frame = table.claim(caller.number, page);
-    lock.unlock();
-    PageHeader header;
-    double waited = 0;
-    try {
-      const std::span<const std::byte> image = fetch(page, caller.source, waited);
-      header = container.decode_page(
-          page, image, {arena.data() + frame * frame_stride, frame_stride - kGuardBytes},
-          caller.decoder);
-    } catch (...) {
-      lock.lock();
-      table.fail(frame, std::current_exception());
-      table.leave(caller.number, frame);
-      loaded.notify_all();
-      throw;
-    }
+std::uint32_t PageCache::load(std::unique_lock<std::mutex>& lock, std::uint32_t page,
+                              const Caller& caller) {
+  ++statistics_.misses;
+  const std::uint32_t frame = table_.claim(caller.number, page);
+  lock.unlock();
+  PageHeader header;
+  double waited = 0;
+  try {
+    const std::span<const std::byte> image = fetch(page, caller.source, waited);
+    header = container_.decode_page(
+        page, image, {arena_.data() + frame * frame_stride_, frame_stride_ - kGuardBytes},
+        caller.decoder);
+  } catch (...) {
     lock.lock();
-    statistics.bytes_read += kPageHeaderBytes + std::uint64_t{header.stored_bytes};
-    statistics.wait_seconds += waited;
-    table.ready(frame, header.raw_bytes, header.record_count);
-    loaded.notify_all();
-    return frame;
+    table_.fail(frame, std::current_exception());
+    table_.leave(caller.number, frame);
+    loaded_.notify_all();
+    throw;
   }
+  lock.lock();
+  statistics_.bytes_read += kPageHeaderBytes + std::uint64_t{header.stored_bytes};
+  statistics_.wait_seconds += waited;
+  table_.ready(frame, header.raw_bytes, header.record_count);
+  loaded_.notify_all();
+  return frame;
+}
 
-  // Pages of a kind follow the Z-curve, and so do receivers: the next one is wanted soon more often
-  // than not.
-  std::span<const std::byte> fetch(std::uint32_t page, PageSource& source, double& waited) const {
-    const auto begin = Clock::now();
-    const std::uint32_t next = reads_ahead ? next_of_kind(page) : kNoPage;
-    if (next != kNoPage && !table.present(next)) {
-      const ContainerReader::PageRange range = container.page_range(next);
-      source.expect(range.offset, range.bytes);
-    }
-    const ContainerReader::PageRange range = container.page_range(page);
-    const std::span<const std::byte> image = source.read(range.offset, range.bytes);
-    waited = seconds_since(begin);
-    return image;
+// Pages of a kind follow the Z-curve, and so do receivers: the next one is wanted soon more often
+// than not.
+std::span<const std::byte> PageCache::fetch(std::uint32_t page, PageSource& source,
+                                            double& waited) const {
+  const auto begin = Clock::now();
+  const std::uint32_t next = reads_ahead_ ? next_of_kind(page) : kNoPage;
+  if (next != kNoPage && !table_.present(next)) {
+    const ContainerReader::PageRange range = container_.page_range(next);
+    source.expect(range.offset, range.bytes);
   }
+  const ContainerReader::PageRange range = container_.page_range(page);
+  const std::span<const std::byte> image = source.read(range.offset, range.bytes);
+  waited = seconds_since(begin);
+  return image;
+}
 
-  std::uint32_t next_of_kind(std::uint32_t page) const {
-    const PageType type = container.entry(page).type;
-    if (type != PageType::point && type != PageType::node) return kNoPage;
-    const std::span<const std::uint32_t> kind =
-        type == PageType::point ? container.point_pages() : container.node_pages();
-    const auto next = std::ranges::upper_bound(kind, page);
-    return next == kind.end() ? kNoPage : *next;
-  }
-
-  using Clock = std::chrono::steady_clock;
-  static double seconds_since(Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-  }
-
-  const ContainerReader& container;
-  const CacheOptions options;
-  const bool reads_ahead;
-  const std::uint32_t slots;
-  mutable std::mutex
-      mutex;  ///< guards statistics, seats and what of the table is not for readers alone
-  std::condition_variable loaded;
-  FrameTable table;
-  const std::uint64_t frame_stride;
-  Arena arena;
-  CacheStatistics statistics;
-  std::vector<bool> seats;  ///< by number of a reader: there is one
-};
+std::uint32_t PageCache::next_of_kind(std::uint32_t page) const {
+  const PageType type = container_.entry(page).type;
+  if (type != PageType::point && type != PageType::node) return kNoPage;
+  const std::span<const std::uint32_t> kind =
+      type == PageType::point ? container_.point_pages() : container_.node_pages();
+  const auto next = std::ranges::upper_bound(kind, page);
+  return next == kind.end() ? kNoPage : *next;
+}
 
 double CacheStatistics::hit_rate() const noexcept {
   if (lookups == 0) return 1;
   return 1 - static_cast<double>(misses) / static_cast<double>(lookups);
 }
 
-PageCache::PageCache(const ContainerReader& container, const CacheOptions& options) {
-  if (options.threads == 0) throw std::invalid_argument("page cache: no threads");
-  impl_ = std::make_unique<Impl>(container, options);
-}
+PageCache::PageCache(const ContainerReader& container, const CacheOptions& options)
+    : PageCache(container, options, count_frames(container, options)) {}
 
-PageCache::~PageCache() = default;
+PageCache::PageCache(const ContainerReader& container, const CacheOptions& options,
+                     std::uint32_t frames)
+    : container_(container),
+      options_(options),
+      reads_ahead_(options.read_ahead && options.back_end == BackEnd::io_uring),
+      slots_(choose_slots(options, frames)),
+      table_({container.page_count(), frames, options.threads, slots_}, options.replacement),
+      frame_stride_(frame_bytes(container)),
+      arena_(frames * frame_stride_),
+      seats_(options.threads) {}
 
 std::uint64_t PageCache::min_bytes(const ContainerReader& container, unsigned threads,
                                    BackEnd back_end) {
@@ -218,60 +187,52 @@ std::uint64_t PageCache::bytes_for(const ContainerReader& container, unsigned th
          frames * frame_bytes(container);
 }
 
-const ContainerReader& PageCache::container() const noexcept {
-  return impl_->container;
-}
-
-std::uint32_t PageCache::local_slots() const noexcept {
-  return impl_->slots;
-}
-
 CacheStatistics PageCache::statistics() const {
-  const std::lock_guard lock(impl_->mutex);
-  CacheStatistics sum = impl_->statistics;
-  sum.evictions = impl_->table.evictions();
-  sum.frames = impl_->table.size();
-  sum.peak_frames = impl_->table.peak();
+  const std::lock_guard lock(mutex_);
+  CacheStatistics sum = statistics_;
+  sum.evictions = table_.evictions();
+  sum.frames = table_.size();
+  sum.peak_frames = table_.peak();
   return sum;
 }
 
 PageReader::PageReader(PageCache& cache)
-    : shared_(*cache.impl_),
-      table_(std::make_unique<Slot[]>(shared_.slots)),
-      mask_(shared_.slots - 1),
-      source_(make_page_source(shared_.options.back_end, shared_.container.file(),
-                               max_stored(shared_.container))) {
+    : shared_(cache),
+      table_(std::make_unique<Slot[]>(shared_.slots_)),
+      mask_(shared_.slots_ - 1),
+      source_(make_page_source(shared_.options_.back_end, shared_.container_.file(),
+                               max_stored(shared_.container_))) {
   static_assert(sizeof(Slot) <= kTableSlotBytes);
-  const std::lock_guard lock(shared_.mutex);
-  const auto seat = std::ranges::find(shared_.seats, false);
-  if (seat == shared_.seats.end()) {
+  const std::lock_guard lock(shared_.mutex_);
+  const auto seat = std::ranges::find(shared_.seats_, false);
+  if (seat == shared_.seats_.end()) {
     throw std::invalid_argument("page cache: more readers than it was made for");
   }
   *seat = true;
-  number_ = static_cast<std::uint32_t>(seat - shared_.seats.begin());
+  number_ = static_cast<std::uint32_t>(seat - shared_.seats_.begin());
 }
 
 PageReader::~PageReader() {
-  const std::lock_guard lock(shared_.mutex);
-  for (std::uint32_t slot = 0; slot <= mask_; ++slot) shared_.table.release(number_, slot);
-  shared_.statistics.lookups += lookups_;
-  shared_.statistics.shared_hits += shared_hits_;
-  shared_.statistics.local_hits += lookups_ - shared_hits_;
-  shared_.seats[number_] = false;
+  const std::lock_guard lock(shared_.mutex_);
+  for (std::uint32_t slot = 0; slot <= mask_; ++slot) shared_.table_.release(number_, slot);
+  shared_.statistics_.lookups += lookups_;
+  shared_.statistics_.shared_hits += shared_hits_;
+  shared_.statistics_.local_hits += lookups_ - shared_hits_;
+  shared_.seats_[number_] = false;
 }
 
-const PageReader::View& PageReader::find(std::uint32_t page) {
+const PageCache::View& PageReader::find(std::uint32_t page) {
   if (pins_ != 0) {
     --lookups_;
     throw std::logic_error("page cache: a page is asked for while this reader has another pinned");
   }
-  if (page >= shared_.container.page_count()) {
+  if (page >= shared_.container_.page_count()) {
     --lookups_;
     throw std::invalid_argument("page cache: page " + std::to_string(page) + " does not exist");
   }
   Slot& slot = table_[page & mask_];
   slot.page = kEmpty;  // and stays so when the page does not arrive
-  std::uint32_t frame = shared_.table.hold(number_, page);
+  std::uint32_t frame = shared_.table_.hold(number_, page);
   if (frame != kNoFrame) {
     ++shared_hits_;
   } else {

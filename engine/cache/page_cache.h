@@ -1,12 +1,17 @@
 // Pages in memory under a hard cap: a shared level and a per-thread level in front of it.
 #pragma once
 
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <utility>
+#include <vector>
 
+#include "engine/base/memory.h"
+#include "engine/cache/frame_table.h"
 #include "engine/cache/page_source.h"
 #include "engine/cache/replacement.h"
 #include "engine/store/reader.h"
@@ -57,7 +62,6 @@ class PageCache {
   /// @throws std::invalid_argument when the cap is too small (the text names the least that works),
   ///         when `threads` is 0, or when `local_slots` is not a power of two that the frames allow
   PageCache(const ContainerReader& container, const CacheOptions& options);
-  ~PageCache();
   PageCache(const PageCache&) = delete;
   PageCache& operator=(const PageCache&) = delete;
 
@@ -68,17 +72,52 @@ class PageCache {
   [[nodiscard]] static std::uint64_t bytes_for(const ContainerReader& container, unsigned threads,
                                                std::uint64_t frames,
                                                BackEnd back_end = BackEnd::pread);
-  [[nodiscard]] const ContainerReader& container() const noexcept;
+  [[nodiscard]] const ContainerReader& container() const noexcept { return container_; }
   /// Sums over the shared level and all readers that have ended. The hits of a living reader since
   /// its last miss are not included.
   [[nodiscard]] CacheStatistics statistics() const;
   /// The number of pages that each reader keeps resident for itself.
-  [[nodiscard]] std::uint32_t local_slots() const noexcept;
+  [[nodiscard]] std::uint32_t local_slots() const noexcept { return slots_; }
 
  private:
   friend class PageReader;
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+
+  /// A page in its frame.
+  struct View {
+    const std::byte* payload = nullptr;
+    std::uint32_t bytes = 0;
+    std::uint32_t record_count = 0;
+  };
+
+  /// What a reader brings along to the shared level.
+  struct Caller {
+    std::uint32_t number;
+    PageDecoder& decoder;
+    PageSource& source;
+    std::uint64_t lookups;      ///< not yet added to the statistics, this one included
+    std::uint64_t shared_hits;  ///< not yet added to the statistics
+  };
+
+  PageCache(const ContainerReader& container, const CacheOptions& options, std::uint32_t frames);
+
+  [[nodiscard]] View view(std::uint32_t frame) const noexcept;
+  std::uint32_t acquire(std::uint32_t page, const Caller& caller);
+  std::uint32_t load(std::unique_lock<std::mutex>& lock, std::uint32_t page, const Caller& caller);
+  std::span<const std::byte> fetch(std::uint32_t page, PageSource& source, double& waited) const;
+  [[nodiscard]] std::uint32_t next_of_kind(std::uint32_t page) const;
+
+  const ContainerReader& container_;
+  const CacheOptions options_;
+  const bool reads_ahead_;
+  const std::uint32_t slots_;
+  /// Guards statistics_, seats_ and those parts of the table that readers do not own.
+  mutable std::mutex mutex_;
+  std::condition_variable loaded_;
+  FrameTable table_;
+  const std::uint64_t frame_stride_;
+  Arena arena_;
+  CacheStatistics statistics_;
+  std::vector<bool> seats_;  ///< by number of a reader: whether it exists
 };
 
 /// A resident page, which is not evicted while its guard lives.
@@ -141,25 +180,19 @@ class PageReader {
   [[nodiscard]] PageGuard pin(std::uint32_t page) {
     const Slot& slot = table_[page & mask_];
     ++lookups_;
-    const View& view = slot.page == page ? slot.view : find(page);
+    const PageCache::View& view = slot.page == page ? slot.view : find(page);
     return {view.payload, view.bytes, view.record_count, pins_};
   }
 
  private:
-  friend struct PageCache::Impl;
   static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};  ///< no page number, not even kNoPage
-  struct View {
-    const std::byte* payload = nullptr;
-    std::uint32_t bytes = 0;
-    std::uint32_t record_count = 0;
-  };
   struct Slot {
     std::uint64_t page = kEmpty;
-    View view;
+    PageCache::View view;
   };
-  const View& find(std::uint32_t page);
+  const PageCache::View& find(std::uint32_t page);
 
-  PageCache::Impl& shared_;
+  PageCache& shared_;
   std::uint32_t number_;  ///< among the readers
   std::unique_ptr<Slot[]> table_;
   std::uint32_t mask_;

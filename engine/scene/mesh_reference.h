@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 

@@ -12,6 +12,7 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/octree/subtree.h"
+#include "format/node_layout.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -123,5 +124,7 @@ TEST_CASE("payload: the cube and 22 bytes of bounds are as large as a child of s
           "[bench][payload]") {
   const auto cube = std::ranges::find(payloads(), std::string("cube"), &Payload::name);
   REQUIRE(cube != payloads().end());
-  CHECK(2 * (cube->stored_bytes() + 22) == node_group_bytes(4) - node_group_bytes(2));
+  const std::size_t two_children =
+      round_to_slot(group_content_bytes(4)) - round_to_slot(group_content_bytes(2));
+  CHECK(2 * (cube->stored_bytes() + 22) == two_children);
 }

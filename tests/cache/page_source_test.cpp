@@ -38,7 +38,7 @@ class NoiseFile {
   const std::vector<std::byte> bytes = noise(1'000'003);
 
  private:
-  ScratchDirectory scratch_;
+  TemporaryDirectory scratch_;
 };
 
 }  // namespace

@@ -25,7 +25,7 @@ class SceneFile {
   [[nodiscard]] std::filesystem::path path() const { return scratch_ / "a.ptcx"; }
 
  private:
-  ScratchDirectory scratch_;
+  TemporaryDirectory scratch_;
 };
 
 /// Returns a number from 0 to n - 1, the same for the same seed on every system.

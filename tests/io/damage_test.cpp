@@ -39,7 +39,7 @@ std::string binary_ply() {
 
 TEST_CASE("damage: a flipped byte of any format changes the data or has it refused, no more",
           "[io][damage]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::vector<std::pair<std::string, std::string>> wholes = {
       {"a.ply", kPlyMesh},
       {"a.ply", binary_ply()},
@@ -69,7 +69,7 @@ TEST_CASE("damage: a flipped byte of any format changes the data or has it refus
 }
 
 TEST_CASE("damage: every truncation of every format is read or refused", "[io][damage]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const std::string& whole : {kPlyMesh, binary_ply()}) {
     for (std::size_t size = 0; size < whole.size() - 2; ++size) {
       const auto path = scratch.file("a.ply", whole.substr(0, size));

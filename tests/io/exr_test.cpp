@@ -84,7 +84,7 @@ void check_picture(const Image& image, const std::array<float, 3>& base) {
 }  // namespace
 
 TEST_CASE("exr: a picture with more pixels than the caller allows is refused", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   write_exr(path, 10, 20, {{.values = std::vector<float>(600, 1.0F)}});
   CHECK(read_image(path, 200).width == 10);
@@ -94,7 +94,7 @@ TEST_CASE("exr: a picture with more pixels than the caller allows is refused", "
 }
 
 TEST_CASE("exr: a float colour layer is read back bit for bit", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   const std::vector<float> values = ramp(5 * 3 * 3);
   write_exr(path, 5, 3, {{"", ExrLayer::Kind::colour, true, values}});
@@ -109,7 +109,7 @@ TEST_CASE("exr: a float colour layer is read back bit for bit", "[io][exr]") {
 
 TEST_CASE("exr: layers have the channels, types and compression that the header promises",
           "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   write_exr(path, 4, 2,
             {{"", ExrLayer::Kind::colour, false, ramp(24)},
@@ -132,14 +132,14 @@ TEST_CASE("exr: layers have the channels, types and compression that the header 
 }
 
 TEST_CASE("exr: halves saturate instead of becoming infinite", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   write_exr(path, 1, 1, {{"", ExrLayer::Kind::colour, false, {1e9F, 65504, 65519}}});
   CHECK(read_image(path).at(0, 0) == glm::vec3(65504));
 }
 
 TEST_CASE("exr: layers that do not fit are refused and leave no file", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   const ExrLayer good{"", ExrLayer::Kind::colour, false, ramp(12)};
   CHECK_THROWS_AS(write_exr(path, 2, 1, {good}), std::invalid_argument);
@@ -151,7 +151,7 @@ TEST_CASE("exr: layers that do not fit are refused and leave no file", "[io][exr
 }
 
 TEST_CASE("exr: every compression, type and tiling of the library is read", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   for (const Imf::Compression compression :
        {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
@@ -166,7 +166,7 @@ TEST_CASE("exr: every compression, type and tiling of the library is read", "[io
 }
 
 TEST_CASE("exr: pictures with more rows than one block are read whole", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   for (const unsigned tile : {0U, 100U}) {
     write_with_library(path, {"R", Imf::PIZ_COMPRESSION, Imf::FLOAT, {{0, -5}, {2, 594}}, tile});
@@ -179,7 +179,7 @@ TEST_CASE("exr: pictures with more rows than one block are read whole", "[io][ex
 }
 
 TEST_CASE("exr: Y alone is grey, a missing colour is 0, other channels are skipped", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   write_with_library(path, {"Y"});
   check_picture(read_image(path), {0, 0, 0});
@@ -193,7 +193,7 @@ TEST_CASE("exr: Y alone is grey, a missing colour is 0, other channels are skipp
 }
 
 TEST_CASE("exr: negative and non-finite values become 0", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   write_exr(path, 2, 1, {{"", ExrLayer::Kind::colour, true, {-1, NAN, 2, INFINITY, -INFINITY, 3}}});
   const Image image = read_image(path);
@@ -202,7 +202,7 @@ TEST_CASE("exr: negative and non-finite values become 0", "[io][exr]") {
 }
 
 TEST_CASE("exr: every truncation is refused", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   for (const unsigned tile : {0U, 4U}) {
     write_with_library(path, {"RGB", Imf::ZIP_COMPRESSION, Imf::HALF, {{0, 0}, {6, 9}}, tile});
@@ -215,7 +215,7 @@ TEST_CASE("exr: every truncation is refused", "[io][exr]") {
 }
 
 TEST_CASE("exr: a flipped byte changes the picture or has it refused, no more", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   for (const unsigned tile : {0U, 4U}) {
     write_with_library(path, {"RGB", Imf::PIZ_COMPRESSION, Imf::HALF, {{0, 0}, {6, 9}}, tile});
@@ -232,7 +232,7 @@ TEST_CASE("exr: a flipped byte changes the picture or has it refused, no more", 
 }
 
 TEST_CASE("exr: a header that claims a huge picture is refused", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   write_with_library(path, {"RGB", Imf::ZIP_COMPRESSION, Imf::HALF, {{0, 0}, {6, 9}}});
   std::string bytes = slurp(path);
@@ -244,7 +244,7 @@ TEST_CASE("exr: a header that claims a huge picture is refused", "[io][exr]") {
 }
 
 TEST_CASE("exr: an attribute whose length does not match its type is refused", "[io][exr]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
   write_with_library(path, {"RGB", Imf::ZIP_COMPRESSION, Imf::HALF, {{0, 0}, {6, 9}}});
   const std::string whole = slurp(path);

@@ -62,7 +62,7 @@ class FileSizeLimit {
 
 TEST_CASE("input file: ranges inside the file are read, ranges past its end are refused",
           "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const InputFile file(scratch.file("f", "0123456789"));
   CHECK(file.size() == 10);
   for (std::size_t offset = 0; offset <= 12; ++offset) {
@@ -81,7 +81,7 @@ TEST_CASE("input file: ranges inside the file are read, ranges past its end are 
 }
 
 TEST_CASE("input file: anything but a regular file is refused by name", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK(error_of([&] { const InputFile file(scratch.path()); }) == EISDIR);
   CHECK(error_of([&] { const InputFile file(scratch.path() / "none"); }) == ENOENT);
   REQUIRE(::mkfifo((scratch.path() / "pipe").c_str(), 0600) == 0);
@@ -91,7 +91,7 @@ TEST_CASE("input file: anything but a regular file is refused by name", "[io][fi
 }
 
 TEST_CASE("input file: a moved-from file is closed once", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   InputFile first(scratch.file("f", "abc"));
   const InputFile second(std::move(first));
   CHECK(read_text(second, 0, 3) == "abc");
@@ -99,7 +99,7 @@ TEST_CASE("input file: a moved-from file is closed once", "[io][file]") {
 }
 
 TEST_CASE("output file: the old file stays until the new one is published", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto target = scratch.file("out", "old");
   {
     OutputFile file(target);
@@ -118,7 +118,7 @@ TEST_CASE("output file: the old file stays until the new one is published", "[io
 }
 
 TEST_CASE("output file: without publish() nothing is left", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   {
     OutputFile file(scratch.path() / "out");
     file.append(bytes_of("lost"));
@@ -129,7 +129,7 @@ TEST_CASE("output file: without publish() nothing is left", "[io][file]") {
 
 TEST_CASE("output file: a write that fails leaves the old file, whichever write it is",
           "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto target = scratch.file("out", "old");
   for (rlim_t limit = 0; limit < 40; limit += 4) {
     const FileSizeLimit full(limit);
@@ -144,7 +144,7 @@ TEST_CASE("output file: a write that fails leaves the old file, whichever write 
 }
 
 TEST_CASE("output file: directories and devices are refused as targets", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK(error_of([&] { OutputFile file(scratch.path()); }) == EISDIR);
   CHECK(error_of([&] { OutputFile file(scratch.path() / "name" / ""); }) == EISDIR);
   CHECK(error_of([&] { OutputFile file(scratch.path() / "."); }) == EISDIR);
@@ -154,7 +154,7 @@ TEST_CASE("output file: directories and devices are refused as targets", "[io][f
 }
 
 TEST_CASE("output file: a link stays a link and permissions stay", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto real = scratch.file("real", "old");
   REQUIRE(::chmod(real.c_str(), 0640) == 0);
   std::filesystem::create_symlink("real", scratch.path() / "link");
@@ -169,14 +169,14 @@ TEST_CASE("output file: a link stays a link and permissions stay", "[io][file]")
 }
 
 TEST_CASE("output file: a name of the maximum length is published", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   OutputFile file(scratch.path() / std::string(255, 'n'));
   file.publish();
   CHECK(scratch.listing() == std::string(255, 'n'));
 }
 
 TEST_CASE("output file: threads write disjoint ranges", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   OutputFile file(scratch.path() / "out");
   std::vector<std::thread> threads;
   for (std::size_t t = 0; t < 4; ++t) {
@@ -196,12 +196,11 @@ TEST_CASE("output file: threads write disjoint ranges", "[io][file]") {
 }
 
 TEST_CASE("temp file: it has no name and keeps what is written", "[io][file]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   TempFile first(scratch.path());
   CHECK(scratch.listing().empty());
   first.write_at(5, bytes_of("hello"));
   TempFile file(std::move(first));
-  file.drop_cache();
   CHECK(read_text(file, 5, 5) == "hello");
   CHECK(read_text(file, 0, 5) == std::string(5, '\0'));
   CHECK_THROWS_AS(read_text(file, 6, 5), DataError);

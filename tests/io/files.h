@@ -10,25 +10,9 @@
 #include <string>
 #include <string_view>
 
+#include "tests/support/temporary_directory.h"
+
 namespace ptc {
-
-/// A directory that is removed together with its contents.
-class Scratch {
- public:
-  Scratch();
-  ~Scratch();
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  /// Writes a file of these bytes and returns its path.
-  std::filesystem::path file(const std::string& name, std::string_view bytes) const;
-  /// Returns the names of all entries, sorted and separated by blanks.
-  [[nodiscard]] std::string listing() const;
-
- private:
-  std::filesystem::path path_;
-};
 
 [[nodiscard]] std::string slurp(const std::filesystem::path& path);
 

@@ -68,7 +68,7 @@ std::string base64(const std::string& bytes) {
 }
 
 struct Files {
-  Scratch scratch;
+  test::TemporaryDirectory scratch;
   Files() { scratch.file("a b.bin", buffer_bytes()); }
 
   MeshFile read(const Json& json) const { return read_mesh(scratch.file("a.gltf", json.dump())); }

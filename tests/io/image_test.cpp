@@ -128,7 +128,7 @@ Image gradient() {
 }  // namespace
 
 TEST_CASE("png: all 256 values are read back as written", "[io][image]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Image image = gradient();
   write_png(scratch.path() / "a.png", image);
   CHECK(scratch.listing() == "a.png");
@@ -144,7 +144,7 @@ TEST_CASE("png: all 256 values are read back as written", "[io][image]") {
 }
 
 TEST_CASE("png: values outside [0, 1] are clamped, and NaN is black", "[io][image]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   write_png(scratch.path() / "a.png", {2, 1, {{-1, 2, NAN}, {INFINITY, -INFINITY, 0.5F}}});
   const Image back = read_image(scratch.path() / "a.png");
   CHECK(back.at(0, 0) == glm::vec3(0, 1, 0));
@@ -154,7 +154,7 @@ TEST_CASE("png: values outside [0, 1] are clamped, and NaN is black", "[io][imag
 }
 
 TEST_CASE("png: sizes that do not match the pixels are refused", "[io][image]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {2, 2, {glm::vec3(0)}}),
                   std::invalid_argument);
   CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {}), std::invalid_argument);
@@ -174,7 +174,7 @@ TEST_CASE("image: TGA, BMP and HDR give the same four pixels", "[io][image]") {
 }
 
 TEST_CASE("image: every truncation of every format is refused", "[io][image]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   write_png(scratch.path() / "a.png", gradient());
   for (const std::string& whole :
        {slurp(scratch.path() / "a.png"), four_colours_tga(), four_colours_tga_rle(),
@@ -187,7 +187,7 @@ TEST_CASE("image: every truncation of every format is refused", "[io][image]") {
 }
 
 TEST_CASE("image: a flipped byte changes the picture or has it refused, no more", "[io][image]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   write_png(scratch.path() / "a.png", {3, 2, std::vector<glm::vec3>(6, glm::vec3(0.5F))});
   for (const std::string& whole :
        {slurp(scratch.path() / "a.png"), four_colours_tga(), four_colours_tga_rle(),
@@ -251,7 +251,7 @@ TEST_CASE("image: a small file cannot claim many pixels", "[io][image]") {
 }
 
 TEST_CASE("image: a file that is not a picture is refused by name", "[io][image]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const std::string text : {"", "GIF89a......", "hello"}) {
     const auto path = scratch.file("a.png", text);
     CHECK_THROWS_WITH(static_cast<void>(read_image(path)),

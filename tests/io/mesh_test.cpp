@@ -127,7 +127,7 @@ TEST_CASE("append: transforms without an inverse and too many materials are refu
 }
 
 TEST_CASE("mesh: file names with an unknown ending are refused", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const char* name : {"a.blend", "a.dae", "a", "a.gltf.gz"}) {
     CHECK_THAT(refusal([&] { static_cast<void>(read_mesh(scratch.file(name, "x"))); }),
                Contains(name) && Contains("not a mesh"));

@@ -45,7 +45,7 @@ TEST_CASE("mesh warnings: a part is printed as one line of at most some 300 prin
 }
 
 TEST_CASE("mesh warnings: many undefined materials take one line", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   for (int i = 0; i < 1000; ++i) text += "usemtl m" + std::to_string(i) + "\nf 1 2 3\n";
   const MeshFile file = read_mesh(scratch.file("a.obj", text));

@@ -13,18 +13,18 @@ namespace {
 
 const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
-MeshFile read(const Scratch& scratch, const std::string& text) {
+MeshFile read(const test::TemporaryDirectory& scratch, const std::string& text) {
   return read_mesh(scratch.file("a.obj", text));
 }
 
-std::string fault(const Scratch& scratch, const std::string& text) {
+std::string fault(const test::TemporaryDirectory& scratch, const std::string& text) {
   return refusal([&] { static_cast<void>(read(scratch, text)); });
 }
 
 }  // namespace
 
 TEST_CASE("obj: indices count from one or from the end, and may leave out any part", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string start = kSquare + "vt 0.5\nvt 0 1 7\nvn 0 0 1\n";
   for (const char* face : {"f 1 2 3", "f -4 -3 -2", "f 1/1 2/1 3/2", "f 1//1 2//1 3//1",
                            "f 1/1/1 2/2/1 3/2/1", "f 1/1/ 2/1/ 3/1/", "f 1/-2/-1 2/-1/-1 3/1/1",
@@ -36,7 +36,7 @@ TEST_CASE("obj: indices count from one or from the end, and may leave out any pa
 }
 
 TEST_CASE("obj: corners that differ in any index become separate vertices", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string start = kSquare + "vt 0 0\nvt 1 1\nvn 0 0 1\nvn 0 1 0\n";
   const Mesh shared = read(scratch, start + "f 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/1/1 4/1/1\n").mesh;
   CHECK(shared.positions.size() == 4);
@@ -48,7 +48,7 @@ TEST_CASE("obj: corners that differ in any index become separate vertices", "[io
 }
 
 TEST_CASE("obj: faces without normals among others get flat ones", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Mesh mesh =
       read(scratch, kSquare + "v 0 0 5\nvn 0 1 1\nf 1//1 2//1 3//1\nf 1 4 3\nf 1 2 5\n").mesh;
   REQUIRE(mesh.normals.size() == mesh.positions.size());
@@ -58,7 +58,7 @@ TEST_CASE("obj: faces without normals among others get flat ones", "[io][mesh]")
 }
 
 TEST_CASE("obj: millimetres are kept ten million metres from the origin", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Mesh mesh =
       read(scratch, "v 10000000.001 0 0\nv 10000000.003 0 0\nv 10000000.001 0.002 0\nf 1 2 3\n")
           .mesh;
@@ -67,7 +67,7 @@ TEST_CASE("obj: millimetres are kept ten million metres from the origin", "[io][
 }
 
 TEST_CASE("obj: materials come from the library, textures from files next to it", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   write_png(scratch.path() / "my red.png", {1, 1, {glm::vec3(1, 0, 0)}});
   scratch.file("a b.mtl",
                "Kd 9 9 9\nnewmtl red wall\nKd 0.5 0.25 2\nmap_Kd -s 1 1 -o 0.5 -bm 2 my red.png\n"
@@ -102,7 +102,7 @@ TEST_CASE("obj: materials come from the library, textures from files next to it"
 
 TEST_CASE("obj: a line may name several libraries, with escaped blanks and missing ones",
           "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   scratch.file("one.mtl", "newmtl a\nKd 1 0 0\n");
   scratch.file("two three.mtl", "newmtl b\nKd 0 1 0\n");
   const MeshFile file = read(scratch, kSquare +
@@ -117,7 +117,7 @@ TEST_CASE("obj: a line may name several libraries, with escaped blanks and missi
 }
 
 TEST_CASE("obj: a texture that is not a picture is reported once, with the reason", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   scratch.file("a.png", "no picture");
   scratch.file("a.mtl", "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd a.png\n");
   const MeshFile file =
@@ -128,7 +128,7 @@ TEST_CASE("obj: a texture that is not a picture is reported once, with the reaso
 }
 
 TEST_CASE("obj: a texture that is named in several ways is loaded as one picture", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   write_png(scratch.path() / "a.png", {1, 1, {glm::vec3(1, 0, 0)}});
   scratch.file("a.mtl", "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd .\\././x/..//a.png\n");
   const Mesh mesh =
@@ -140,7 +140,7 @@ TEST_CASE("obj: a texture that is named in several ways is loaded as one picture
 
 // This would take ten minutes if the library were read for each of the lines.
 TEST_CASE("obj: a library that is named on 30,000 lines is read once", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   std::string library = "newmtl a\nKd 1 0 0\n";
   for (int i = 0; i < 40'000; ++i) library += "newmtl m" + std::to_string(i) + "\nKd 1 1 1\n";
   scratch.file("a.mtl", library);
@@ -154,7 +154,7 @@ TEST_CASE("obj: a library that is named on 30,000 lines is read once", "[io][mes
 
 TEST_CASE("textures: pictures with more pixels than their files justify are left out",
           "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Image white{100, 100, std::vector<glm::vec3>(10'000, glm::vec3(1))};
   std::vector<std::string> pictures;
   for (const char* name : {"a.png", "b.png", "c.png"}) {
@@ -183,7 +183,7 @@ TEST_CASE("textures: pictures with more pixels than their files justify are left
 }
 
 TEST_CASE("obj: files that break a rule are refused by line", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK_THAT(fault(scratch, kSquare + "f 1 2 0\n"),
              EndsWith("line 5: an index refers to no vertex"));
   CHECK_THAT(fault(scratch, kSquare + "f 1 2 -5\n"),
@@ -207,7 +207,7 @@ TEST_CASE("obj: files that break a rule are refused by line", "[io][mesh]") {
 }
 
 TEST_CASE("obj: every truncation gives a mesh or a refusal", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string whole =
       kSquare + "vt 0 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 \\\n3/1/1 4/1/1\nf -1 -2 -3\n";
   for (std::size_t size = 0; size < whole.size(); ++size) {

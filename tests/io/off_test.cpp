@@ -12,18 +12,18 @@ namespace {
 
 const std::string kBody = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
 
-MeshFile read(const Scratch& scratch, const std::string& text) {
+MeshFile read(const test::TemporaryDirectory& scratch, const std::string& text) {
   return read_mesh(scratch.file("a.off", text));
 }
 
-std::string fault(const Scratch& scratch, const std::string& text) {
+std::string fault(const test::TemporaryDirectory& scratch, const std::string& text) {
   return refusal([&] { static_cast<void>(read(scratch, text)); });
 }
 
 }  // namespace
 
 TEST_CASE("off: all forms of the header give the same square", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const char* header :
        {"OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\n", "4 1 0\n", "OFF # comment\n\n4 1\n",
         "# first\nOFF\r\n# second\n4 1 0 # third\n", "COFF\n4 1 4\n"}) {
@@ -37,7 +37,7 @@ TEST_CASE("off: all forms of the header give the same square", "[io][mesh]") {
 
 TEST_CASE("off: normals and texture coordinates are found before and after the colours",
           "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Mesh mesh =
       read(scratch,
            "STCNOFF\n3 1 0\n0 0 0 0 0 2 255 0 0 255 0.1 0.2\n"
@@ -51,7 +51,7 @@ TEST_CASE("off: normals and texture coordinates are found before and after the c
 }
 
 TEST_CASE("off: files that break a rule are refused by line", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK_THAT(fault(scratch, "OFF BINARY\n"), EndsWith("line 1: binary OFF is not supported"));
   CHECK_THAT(fault(scratch, "4OFF\n"), EndsWith("line 1: this kind of OFF is not supported"));
   CHECK_THAT(fault(scratch, "OFF\nx\n"),
@@ -77,7 +77,7 @@ TEST_CASE("off: files that break a rule are refused by line", "[io][mesh]") {
 }
 
 TEST_CASE("off: every truncation is refused, except inside the last word", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string whole = "OFF\n4 1 0\n" + kBody;
   for (std::size_t size = 0; size < whole.size() - 1; ++size) {
     CHECK_FALSE(fault(scratch, whole.substr(0, size)).empty());

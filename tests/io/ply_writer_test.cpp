@@ -31,7 +31,7 @@ std::vector<Surfel> make_surfels(std::size_t count) {
 }  // namespace
 
 TEST_CASE("ply writer: every value of every surfel is read back bit for bit", "[io][writer]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply";
   for (const std::size_t count : {0U, 1U, 20'000U}) {  // none, one, more than one buffer
     const std::vector<Surfel> surfels = make_surfels(count);
@@ -56,7 +56,7 @@ TEST_CASE("ply writer: every value of every surfel is read back bit for bit", "[
 }
 
 TEST_CASE("ply writer: named columns follow the values of the surfel", "[io][writer]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply";
   const std::vector<Surfel> surfels = make_surfels(2);
   PlyWriter writer(path, 2, {{"occlusion", 1}, {"irradiance", 3}, {"bent", 3, true}, {"pair", 2}});
@@ -80,7 +80,7 @@ TEST_CASE("ply writer: named columns follow the values of the surfel", "[io][wri
 }
 
 TEST_CASE("ply writer: wrong numbers of points or values leave no file", "[io][writer]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply";
   const std::vector<Surfel> surfels = make_surfels(3);
   for (const std::uint64_t announced : {2U, 4U}) {
@@ -97,7 +97,7 @@ TEST_CASE("ply writer: wrong numbers of points or values leave no file", "[io][w
 }
 
 TEST_CASE("ply writer: column names that are invalid or taken are refused", "[io][writer]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply";
   const auto make = [&](std::vector<PointColumn> columns) { PlyWriter writer(path, 0, columns); };
   CHECK_THROWS_AS(make({{"", 1}}), std::invalid_argument);
@@ -124,7 +124,7 @@ TEST_CASE("ply writer: channels get free names, vectors with x, y and z", "[io][
                                           "radiance_", "radius_", "pair", "pair_1_", "radiance__"});
   CHECK(columns[0].vector);
   CHECK_FALSE(columns[1].vector);
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply";
   PlyWriter(path, 0, columns).finish();
   CHECK_THAT(slurp(path), Contains("property float bent_normal_x\nproperty float bent_normal_y\n"));

@@ -90,7 +90,7 @@ std::string gzipped(const std::filesystem::path& path, const std::string& bytes)
 }
 
 // Returns the error for a cloud of these lines, without the path.
-std::string fault(const Scratch& scratch, const std::string& bytes) {
+std::string fault(const test::TemporaryDirectory& scratch, const std::string& bytes) {
   const auto path = scratch.file("fault.ply", bytes);
   std::string text = refusal([&] { static_cast<void>(read_all(path)); });
   const std::string prefix = path.string() + ": ";
@@ -108,7 +108,7 @@ constexpr std::string_view kXyz = "property float x\nproperty float y\nproperty 
 
 TEST_CASE("ply: ascii, both binary orders, CRLF headers and gzip give the same points",
           "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   check_cloud(read_all(scratch.file("a.ply", ascii_cloud())));
   check_cloud(read_all(scratch.file("b.ply", binary_cloud(false))));
   check_cloud(read_all(scratch.file("c.PLY", binary_cloud(true))));
@@ -130,7 +130,7 @@ TEST_CASE("ply: ascii, both binary orders, CRLF headers and gzip give the same p
 }
 
 TEST_CASE("ply: the points do not depend on the size of the requested blocks", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.file("a.ply", binary_cloud(false));
   for (std::size_t block = 1; block <= 4; ++block) check_cloud(read_all(path, block));
   PointFile file = open_points(path);
@@ -143,7 +143,7 @@ TEST_CASE("ply: the points do not depend on the size of the requested blocks", "
 }
 
 TEST_CASE("ply: the header is known before the points are read", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const PointFileInfo full = open_points(scratch.file("a.ply", binary_cloud(false))).info;
   CHECK(full.count == 3);
   CHECK((full.has_normals && full.has_radius && full.has_radiance && full.has_albedo));
@@ -160,7 +160,7 @@ TEST_CASE("ply: the header is known before the points are read", "[io][points]")
 }
 
 TEST_CASE("ply: colours are sRGB as integers and linear as floats", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto albedo = [&](const std::string& type, const std::string& value,
                           const char* prefix = "") {
     std::string properties(kXyz);
@@ -184,7 +184,7 @@ TEST_CASE("ply: colours are sRGB as integers and linear as floats", "[io][points
 }
 
 TEST_CASE("ply: other names for normals and radius are recognised", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path =
       scratch.file("a.ply", one_point(std::string(kXyz) +
                                           "property float normal_x\nproperty float normal_y\n"
@@ -198,7 +198,7 @@ TEST_CASE("ply: other names for normals and radius are recognised", "[io][points
 
 TEST_CASE("ply: elements before and after the vertices are skipped, lists included",
           "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string elements =
       "element camera 2\nproperty float a\nproperty double b\n"
       "element face 2\nproperty list uchar int vertex_indices\nproperty uchar flag\n"
@@ -214,7 +214,7 @@ TEST_CASE("ply: elements before and after the vertices are skipped, lists includ
 }
 
 TEST_CASE("ply: a point that breaks a rule is reported with its place", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string normals =
       std::string(kXyz) + "property float nx\nproperty float ny\nproperty float nz\n";
   const std::string with_radius = std::string(kXyz) + "property float radius\n";
@@ -247,7 +247,7 @@ TEST_CASE("ply: a point that breaks a rule is reported with its place", "[io][po
 }
 
 TEST_CASE("ply: headers that break a rule are refused by line", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string good = "ply\nformat ascii 1.0\nelement vertex 1\n" + std::string(kXyz);
   const auto refused = [&](const std::string& text) { return fault(scratch, text); };
   CHECK(refused("") == "offset 0: not a PLY file");
@@ -281,7 +281,7 @@ TEST_CASE("ply: headers that break a rule are refused by line", "[io][points]") 
 }
 
 TEST_CASE("ply: a count that the file cannot hold is refused when it is opened", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const char* format : {"ascii", "binary_little_endian"}) {
     for (const char* count : {"2", "4294967296", "9223372036854775807"}) {
       const auto path = scratch.file(
@@ -302,7 +302,7 @@ TEST_CASE("ply: a count that the file cannot hold is refused when it is opened",
 }
 
 TEST_CASE("ply: every truncation of a binary file is refused with an offset", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const bool big : {false, true}) {
     const std::string whole = binary_cloud(big);
     const std::size_t data = whole.find("end_header\n") + 11;
@@ -315,7 +315,7 @@ TEST_CASE("ply: every truncation of a binary file is refused with an offset", "[
 }
 
 TEST_CASE("ply: a truncated list is refused at the place of the cut", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string whole =
       header("binary_little_endian", "element vertex 1\n" + std::string(kXyz) +
                                          "element face 1\nproperty list uint double i\n") +
@@ -336,7 +336,7 @@ TEST_CASE("ply: a truncated list is refused at the place of the cut", "[io][poin
 
 TEST_CASE("ply: every truncation of an ascii file is refused, except inside its last word",
           "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string whole = ascii_cloud();
   for (std::size_t size = 0; size < whole.size() - 2; ++size) {
     CHECK_FALSE(fault(scratch, whole.substr(0, size)).empty());
@@ -345,7 +345,7 @@ TEST_CASE("ply: every truncation of an ascii file is refused, except inside its 
 }
 
 TEST_CASE("ply: a gzip file with several members, padded or not, is read whole", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply.gz";
   const std::string cloud = binary_cloud(false);
   for (const std::size_t cut : {std::size_t{1}, cloud.size() / 2, cloud.size() - 1}) {
@@ -358,7 +358,7 @@ TEST_CASE("ply: a gzip file with several members, padded or not, is read whole",
 
 TEST_CASE("ply: a gzip file that unpacks to more than 64 MiB and 256 times its size is refused",
           "[io][ply]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply.gz";
   const std::string header =
       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
@@ -373,7 +373,7 @@ TEST_CASE("ply: a gzip file that unpacks to more than 64 MiB and 256 times its s
 
 TEST_CASE("ply: every truncation and every flipped byte of a gzip file is refused",
           "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply.gz";
   const std::string whole = gzipped(path, binary_cloud(false));
   for (std::size_t size = 0; size < whole.size(); ++size) {
@@ -388,7 +388,7 @@ TEST_CASE("ply: every truncation and every flipped byte of a gzip file is refuse
 }
 
 TEST_CASE("ply: bytes after the last element are refused", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string binary = binary_cloud(false);
   CHECK(fault(scratch, binary + "x") == "offset " + std::to_string(binary.size()) +
                                             ": the file has more data than its header says");
@@ -398,7 +398,7 @@ TEST_CASE("ply: bytes after the last element are refused", "[io][points]") {
 }
 
 TEST_CASE("ply: a line of text must have exactly the values of its element", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK_THAT(fault(scratch, one_point(kXyz, "1 2 3 4")),
              EndsWith("the line has more values than element 'vertex'"));
   CHECK_THAT(fault(scratch, one_point(kXyz, "10000 2000 ")),
@@ -415,7 +415,7 @@ TEST_CASE("ply: a line of text must have exactly the values of its element", "[i
 }
 
 TEST_CASE("points: a file counts as a cloud by its ending and its header", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK(is_point_file(scratch.file("a.ply", one_point(kXyz, "1 2 3"))));
   const auto mesh = [&](const char* element) {
     return scratch.file("b.ply",

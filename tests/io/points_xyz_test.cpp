@@ -22,7 +22,7 @@ std::vector<Surfel> read_all(const std::filesystem::path& path, std::size_t bloc
   return all;
 }
 
-std::string fault(const Scratch& scratch, const std::string& text) {
+std::string fault(const test::TemporaryDirectory& scratch, const std::string& text) {
   const auto path = scratch.file("a.xyz", text);
   return refusal([&] { static_cast<void>(read_all(path)); });
 }
@@ -30,7 +30,7 @@ std::string fault(const Scratch& scratch, const std::string& text) {
 }  // namespace
 
 TEST_CASE("xyz: lines of 3, 6, 7 and 10 values are read", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto info = [&](const std::string& text) {
     return open_points(scratch.file("a.xyz", text)).info;
   };
@@ -52,14 +52,14 @@ TEST_CASE("xyz: lines of 3, 6, 7 and 10 values are read", "[io][points]") {
 }
 
 TEST_CASE("xyz: a file without points gives none", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const char* text : {"", "\n\n", "# nothing"}) {
     CHECK(read_all(scratch.file("a.xyz", text)).empty());
   }
 }
 
 TEST_CASE("xyz: an invalid line is reported by its number", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK_THAT(fault(scratch, "1 2 3 4\n"),
              EndsWith("line 1: 4 values, but lines of XYZ have 3, 6, 7 or 10"));
   CHECK_THAT(fault(scratch, "1 2 3\n\n1 2 3 0 0 1\n"),
@@ -80,7 +80,7 @@ TEST_CASE("xyz: an invalid line is reported by its number", "[io][points]") {
 }
 
 TEST_CASE("xyz: every truncation gives points or a refusal that names the file", "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string whole = "0.5 1.5 2.5 0 0 1 0.25\n1 2 3 1 0 0 4\n";
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const std::string text = fault(scratch, whole.substr(0, size));
@@ -90,7 +90,7 @@ TEST_CASE("xyz: every truncation gives points or a refusal that names the file",
 
 TEST_CASE("xyz: a line longer than the buffer is read, one above 64 MiB is refused",
           "[io][points]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string blanks(700'000, ' ');
   CHECK(read_all(scratch.file("a.xyz", "1 2" + blanks + "3\n4 5 6\n")).size() == 2);
   CHECK_THAT(fault(scratch, std::string((std::size_t{1} << 26) + 10, ' ') + "1 2 3\n"),

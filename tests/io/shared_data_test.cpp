@@ -37,7 +37,8 @@ std::uint64_t count_points(const std::filesystem::path& path) {
 
 // Reads a file with every reader that its folder is for; any exception except a refusal that names
 // the file fails the test. Names without an ending get one that chooses the reader.
-void survive(const Scratch& scratch, const std::string& folder, const std::filesystem::path& path) {
+void survive(const test::TemporaryDirectory& scratch, const std::string& folder,
+             const std::filesystem::path& path) {
   const auto check = [](const std::filesystem::path& at, const auto& read) {
     const std::string text = refusal([&] { read(at); });
     if (!text.empty()) CHECK(text.find(at.filename().string()) != std::string::npos);
@@ -129,7 +130,7 @@ TEST_CASE("real pictures: environment maps of every compression are read", "[io]
 TEST_CASE("odd files: each file is read or refused by name", "[io][shared]") {
   const auto data = data_or_skip();
   if (!data) return;
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   std::size_t files = 0;
   for (const std::string folder : {"ply", "obj", "off", "gltf", "exr", "text"}) {
     for (const auto& entry :

@@ -34,7 +34,7 @@ int in_child(Body body) {
 TEST_CASE("signals: a fatal signal removes the temporary files and ends the process as before",
           "[io][signal]") {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    const Scratch scratch;
+    const test::TemporaryDirectory scratch;
     const auto old = scratch.file("b", "old");
     const int status = in_child([&] {
       remove_temporaries_on_signal();
@@ -65,7 +65,7 @@ TEST_CASE("signals: an ignored signal stays ignored", "[io][signal]") {
 TEST_CASE("signals: a signal that arrives while threads make files leaves none behind",
           "[io][signal]") {
   for (int round = 0; round < 10; ++round) {
-    const Scratch scratch;
+    const test::TemporaryDirectory scratch;
     const int status = in_child([&] {
       remove_temporaries_on_signal();
       std::atomic<int> made = 0;

@@ -60,7 +60,7 @@ TEST_CASE("state: every proper prefix is refused as cut short", "[io][state]") {
 }
 
 TEST_CASE("state: a file that is cut, longer or has a flipped bit is refused", "[io][state]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::filesystem::path path = scratch.path() / "state";
   write_state(path, some_state());
   CHECK(read_state(path) == some_state());
@@ -83,7 +83,7 @@ TEST_CASE("state: a file that is cut, longer or has a flipped bit is refused", "
 }
 
 TEST_CASE("lock: only one lock at a time holds a file", "[io][state]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::filesystem::path path = scratch.path() / "locked";
   {
     const FileLock lock(path);

@@ -26,14 +26,14 @@ std::string binary() {
   return bytes;
 }
 
-std::string fault(const Scratch& scratch, const std::string& bytes) {
+std::string fault(const test::TemporaryDirectory& scratch, const std::string& bytes) {
   return refusal([&] { static_cast<void>(read_mesh(scratch.file("a.stl", bytes))); });
 }
 
 }  // namespace
 
 TEST_CASE("stl: text and binary are distinguished by their size", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Mesh text = read_mesh(scratch.file("a.STL", kText)).mesh;
   REQUIRE(text.triangles.size() == 1);
   CHECK(text.origin == glm::dvec3(1e7, 1, 0));
@@ -44,7 +44,7 @@ TEST_CASE("stl: text and binary are distinguished by their size", "[io][mesh]") 
 }
 
 TEST_CASE("stl: files that break a rule are refused by line", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   CHECK_THAT(fault(scratch, "no\n"),
              EndsWith("line 1: the line does not begin with a keyword of STL"));
   CHECK_THAT(fault(scratch, "solid\nvertex 1 2\n"),
@@ -56,7 +56,7 @@ TEST_CASE("stl: files that break a rule are refused by line", "[io][mesh]") {
 }
 
 TEST_CASE("stl: every truncation before the last line is refused", "[io][mesh]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const std::string& whole : {kText, binary()}) {
     for (std::size_t size = 0; size < whole.size() - 8; ++size) {
       CHECK_FALSE(fault(scratch, whole.substr(0, size)).empty());

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/numbers.h"
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "tests/scene/meshes.h"
 

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/mesh_reference.h"
 #include "engine/scene/sampling/directions.h"

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/sampling/directions.h"
 #include "tests/scene/meshes.h"
 

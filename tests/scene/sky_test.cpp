@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/numbers.h"
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/light/sky_map.h"
 #include "engine/scene/sampling/directions.h"

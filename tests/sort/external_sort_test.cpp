@@ -19,6 +19,7 @@
 #include "engine/sort/spill.h"
 #include "tests/sort/records.h"
 #include "tests/support/sanitizers.h"
+#include "tests/support/temporary_directory.h"
 
 using namespace ptc;
 using namespace ptc::test;
@@ -27,21 +28,6 @@ namespace {
 
 constexpr std::uint64_t kMiB = 1 << 20;
 constexpr std::uint64_t kMinCap = kMiB / 4;  // runs of 1536 records
-
-// A directory that is removed together with anything left in it.
-struct TempDirectory {
-  std::filesystem::path path;
-
-  TempDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "ptc_sort_XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path = name;
-  }
-  ~TempDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path, ignored);
-  }
-};
 
 struct Outcome {
   std::vector<PointRecord> records;
@@ -63,15 +49,15 @@ std::vector<PointRecord> drain(PointStream& stream, std::size_t block) {
 
 Outcome sort(std::span<const PointRecord> input, std::uint64_t cap, unsigned threads,
              std::span<const MortonKey> sample, std::uint64_t expected = 0) {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const ThreadPool executor(threads);
-  ExternalSorter sorter({cap, {directory.path}, expected}, executor, sample);
+  ExternalSorter sorter({cap, {directory.path()}, expected}, executor, sample);
   add_in_blocks(sorter, input, 3001);
   Outcome outcome;
   outcome.records = drain(*sorter.finish(), 2222);
   outcome.statistics = sorter.statistics();
   outcome.digest = sorter.digest();
-  CHECK(std::filesystem::is_empty(directory.path));
+  CHECK(std::filesystem::is_empty(directory.path()));
   return outcome;
 }
 
@@ -133,14 +119,15 @@ TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort
 
 TEST_CASE("external sort: a sort that does not fit on the disk is refused before it begins",
           "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const ThreadPool executor(1);
   try {
-    const ExternalSorter sorter({kMinCap, {directory.path}, std::uint64_t{1} << 50}, executor, {});
+    const ExternalSorter sorter({kMinCap, {directory.path()}, std::uint64_t{1} << 50}, executor,
+                                {});
     FAIL("begun");
   } catch (const std::system_error& error) {
     CHECK(error.code() == std::errc::no_space_on_device);
-    CHECK_THAT(error.what(), Catch::Matchers::Contains(directory.path.string()));
+    CHECK_THAT(error.what(), Catch::Matchers::Contains(directory.path().string()));
     CHECK_THAT(error.what(), Catch::Matchers::Contains(
                                  "36366567.0 GB"));  // the need, less the possible error of a guess
   }
@@ -213,13 +200,13 @@ TEST_CASE("external sort: every count around a run's end is sorted", "[sort][ext
 }
 
 TEST_CASE("external sort: blocks of any size give the same stream", "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
   const std::vector<PointRecord> expected = stable_sorted(input);
   for (const std::uint64_t cap : {kMinCap, 16 * kMiB})
     for (const std::size_t block : {1u, 13u, 4096u, 100000u}) {
-      ExternalSorter sorter({cap, {directory.path}}, two, {});
+      ExternalSorter sorter({cap, {directory.path()}}, two, {});
       add_in_blocks(sorter, input, block);
       const std::unique_ptr<PointStream> stream = sorter.finish();
       CHECK(same_bytes(drain(*stream, block), expected));
@@ -231,10 +218,10 @@ TEST_CASE("external sort: blocks of any size give the same stream", "[sort][exte
 }
 
 TEST_CASE("external sort: each block is filled as long as there are records", "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 20000);
-  ExternalSorter sorter({kMinCap, {directory.path}}, two, {});
+  ExternalSorter sorter({kMinCap, {directory.path()}}, two, {});
   sorter.add(input);
   const std::unique_ptr<PointStream> stream = sorter.finish();
   std::vector<PointRecord> out(15000);
@@ -244,11 +231,11 @@ TEST_CASE("external sort: each block is filled as long as there are records", "[
 
 TEST_CASE("external sort: the digest depends on the set of records, not on their order",
           "[sort][digest]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const ThreadPool one(1), two(2);
   const auto digest = [&](std::span<const PointRecord> records, const Executor& executor,
                           std::size_t block) {
-    ExternalSorter sorter({64 * kMiB, {directory.path}}, executor, {});
+    ExternalSorter sorter({64 * kMiB, {directory.path()}}, executor, {});
     add_in_blocks(sorter, records, block);
     return sorter.digest();
   };
@@ -277,36 +264,36 @@ TEST_CASE("external sort: the digest depends on the set of records, not on their
 
 TEST_CASE("external sort: no file is left when the sort ends, wherever it stops",
           "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const ThreadPool two(2);
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);
   const std::size_t files = open_files();
   {
-    ExternalSorter sorter({kMinCap, {directory.path}}, two, {});
+    ExternalSorter sorter({kMinCap, {directory.path()}}, two, {});
     sorter.add(input);
     CHECK(open_files() == files + 1);
   }
   CHECK(open_files() == files);
   for (const std::size_t taken : {0u, 1u, 30000u}) {
-    ExternalSorter sorter({kMinCap, {directory.path}}, two, {});
+    ExternalSorter sorter({kMinCap, {directory.path()}}, two, {});
     sorter.add(input);
     const std::unique_ptr<PointStream> stream = sorter.finish();
     std::vector<PointRecord> out(taken);
     CHECK(stream->next(out) == taken);
   }
   CHECK(open_files() == files);
-  CHECK(std::filesystem::is_empty(directory.path));
+  CHECK(std::filesystem::is_empty(directory.path()));
 }
 
 TEST_CASE("external sort: add() after finish() and a second finish() are refused",
           "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const ThreadPool one(1);
-  ExternalSorter sorter({kMiB, {directory.path}}, one, {});
+  ExternalSorter sorter({kMiB, {directory.path()}}, one, {});
   const std::unique_ptr<PointStream> stream = sorter.finish();
   CHECK_THROWS_AS(sorter.add({}), std::invalid_argument);
   CHECK_THROWS_AS(sorter.finish(), std::invalid_argument);
-  CHECK_THROWS_AS(ExternalSorter({1000, {directory.path}}, one, {}), std::invalid_argument);
+  CHECK_THROWS_AS(ExternalSorter({1000, {directory.path()}}, one, {}), std::invalid_argument);
 }
 
 TEST_CASE("external sort: a directory that cannot be written to is named when it is needed",
@@ -325,7 +312,7 @@ TEST_CASE("external sort: a directory that cannot be written to is named when it
 
 TEST_CASE("external sort: a disk that fills up is reported and leaves nothing behind",
           "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::lattice, 100000);  // 4 MB
   const ThreadPool two(2);
   for (const std::uint64_t room : {std::uint64_t{0}, kMiB / 10, kMiB, 3 * kMiB}) {
@@ -335,26 +322,26 @@ TEST_CASE("external sort: a disk that fills up is reported and leaves nothing be
     {
       const FileSizeLimit limit(room);
       try {
-        ExternalSorter sorter({kMiB, {directory.path}}, two, {});
+        ExternalSorter sorter({kMiB, {directory.path()}}, two, {});
         add_in_blocks(sorter, input, 1000);
         static_cast<void>(sorter.finish());
       } catch (const std::system_error& error) {
         message = error.what();
       }
     }
-    CHECK_THAT(message, Catch::Contains(directory.path.string()));
+    CHECK_THAT(message, Catch::Contains(directory.path().string()));
     CHECK(open_files() == files);
-    CHECK(std::filesystem::is_empty(directory.path));
+    CHECK(std::filesystem::is_empty(directory.path()));
   }
 }
 
 TEST_CASE("external sort: records that one directory cannot take go to the others",
           "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::surface, 100000);  // 4 MB
   const std::vector<MortonKey> sample = sample_of(input, 1000);
   const ThreadPool two(2);
-  std::vector<std::filesystem::path> directories(2, directory.path);
+  std::vector<std::filesystem::path> directories(2, directory.path());
   if (std::filesystem::exists("/dev/shm"))
     directories[1] = "/dev/shm";  // on another disk, with its own free space
   const FileSizeLimit limit(input.size() * kSpilledBytes * 7 / 10);
@@ -374,12 +361,12 @@ TEST_CASE("external sort: records that one directory cannot take go to the other
 
 TEST_CASE("external sort: a stream that failed does not look like one that ended",
           "[sort][external]") {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   const std::vector<PointRecord> input = make_records(Keys::surface, 50000);  // 2 MB
   const std::vector<MortonKey> one_key(1000, input.front().key);
   for (const unsigned threads : {1u, 2u}) {
     const ThreadPool executor(threads);
-    ExternalSorter sorter({kMinCap, {directory.path}}, executor, one_key);
+    ExternalSorter sorter({kMinCap, {directory.path()}}, executor, one_key);
     sorter.add(input);
     // The first spill fits on the disk, the partition of the oversized bucket does not.
     const FileSizeLimit limit(input.size() * kSpilledBytes + kMiB);
@@ -401,13 +388,13 @@ bool reset_peak() {
 // Sorts this many random records under a cap without holding them itself. @return true if it
 // spilled
 bool sort_random(std::size_t count, std::uint64_t cap, const Executor& executor, bool fair_sample) {
-  const TempDirectory directory;
+  const TemporaryDirectory directory;
   std::mt19937_64 random(1);
   std::vector<MortonKey> sample(1000, MortonKey{1, 1});
   if (fair_sample)
     for (MortonKey& key : sample) key = key_of(Keys::lattice, 0, 1, random);
   std::vector<PointRecord> block(4096);
-  ExternalSorter sorter({cap, {directory.path}}, executor, sample);
+  ExternalSorter sorter({cap, {directory.path()}}, executor, sample);
   for (std::size_t i = 0; i < count; i += block.size()) {
     for (PointRecord& r : block) r.key = key_of(Keys::lattice, 0, 1, random);
     sorter.add(block);

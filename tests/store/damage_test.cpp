@@ -86,7 +86,7 @@ std::vector<bool> ignorable(const std::filesystem::path& path) {
 }  // namespace
 
 TEST_CASE("reader: a flipped bit in any byte is refused or changes nothing", "[store][damage]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
   const std::vector<std::byte> content = walk(path);
@@ -112,7 +112,7 @@ TEST_CASE("reader: a flipped bit in any byte is refused or changes nothing", "[s
 }
 
 TEST_CASE("reader: every proper prefix is refused with the reason", "[store][damage]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
   Patient file(path);
@@ -139,7 +139,7 @@ TEST_CASE("reader: every proper prefix is refused with the reason", "[store][dam
 }
 
 TEST_CASE("reader: a file of many pages that is cut at any block is refused", "[store][damage]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   SampleOptions options;
   options.points = 20000;
@@ -157,7 +157,7 @@ TEST_CASE("reader: a file of many pages that is cut at any block is refused", "[
 }
 
 TEST_CASE("reader: bytes after the end are refused with their number", "[store][damage]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
   Patient file(path);
@@ -171,7 +171,7 @@ TEST_CASE("reader: bytes after the end are refused with their number", "[store][
 }
 
 TEST_CASE("reader: one whole superblock is enough, and none is refused", "[store][damage]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
   const std::vector<std::byte> content = walk(path);
@@ -189,7 +189,7 @@ TEST_CASE("reader: one whole superblock is enough, and none is refused", "[store
 }
 
 TEST_CASE("reader: files that are not containers are refused", "[store][damage]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_file(path, {});
   CHECK_THAT(refusal(path).value_or(""), Catch::Contains("not a PTCX file"));
@@ -201,7 +201,7 @@ TEST_CASE("reader: files that are not containers are refused", "[store][damage]"
 
 TEST_CASE("reader: a file that shrinks while it is open is an error, not a crash",
           "[store][damage]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const std::filesystem::path path = scratch / "a.ptcx";
   write_sample(path, tiny());
   const ContainerReader reader(path);

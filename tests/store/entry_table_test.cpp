@@ -38,7 +38,7 @@ std::vector<std::byte> encoded_entries(std::uint32_t pages) {
 }  // namespace
 
 TEST_CASE("entry table: entries set in any order are encoded in page order", "[store][entries]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   EntryTable table(scratch.path());
   CHECK(table.complete());
   CHECK(table.encoded().empty());
@@ -58,7 +58,7 @@ TEST_CASE("entry table: entries set in any order are encoded in page order", "[s
 }
 
 TEST_CASE("entry table: several threads can add and set pages", "[store][entries]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   EntryTable table(scratch.path());
   constexpr std::uint32_t kEach = 2000;
   const auto fill = [&] {
@@ -75,7 +75,7 @@ TEST_CASE("entry table: several threads can add and set pages", "[store][entries
 }
 
 TEST_CASE("entry table: a page takes no more than one bit of memory", "[store][entries]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   EntryTable table(scratch.path());
   constexpr std::uint32_t kPages = 300'000;  // whose entries take 9.6 MB
   const std::uint64_t before = resident_bytes();

@@ -57,7 +57,7 @@ class Liar {
   }
 
  private:
-  ScratchDirectory scratch_;
+  TemporaryDirectory scratch_;
 };
 
 std::uint32_t first_of(const Forgery& f, PageType type) {
@@ -227,7 +227,7 @@ TEST_CASE("reader: a page in the place of another is found", "[store][lies]") {
 
 TEST_CASE("reader: a page of another file is found", "[store][lies]") {
   const Liar liar;
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   SampleOptions options;
   options.writer.codec = Codec::raw;
   options.writer.uuid[0] = std::byte{8};
@@ -283,7 +283,7 @@ TEST_CASE("reader: a wrong entry is named by its place in the file", "[store][li
   REQUIRE(f.directory.size() > 2);
   const std::uint32_t page = directory_entries_per_page(f.header) + 5;
   f.entries[page].offset += 64;
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   write_file(scratch / "lied.ptcx", f.bytes());
   const std::uint64_t at = f.superblock.directory_offset + 4096 + 64 + 5 * 32;
   CHECK_THROWS_WITH(walk(scratch / "lied.ptcx"), Catch::Contains("offset " + std::to_string(at)));
@@ -349,7 +349,7 @@ TEST_CASE("reader: payloads that decode to nonsense are found", "[store][lies]")
 }
 
 TEST_CASE("reader: an error in a compressed page names the decoded byte", "[store][lies]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   write_sample(scratch / "a.ptcx", {});
   Forgery f(scratch / "a.ptcx");
   REQUIRE(f.pages[kPoint].header.coding == Coding{Codec::zstd, Filter::columns});

@@ -56,7 +56,7 @@ void check_index(const ContainerReader& reader, const Sample& sample) {
 }  // namespace
 
 TEST_CASE("container: pages are read back under every codec and page size", "[store][reader]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   for (const Codec codec : {Codec::raw, Codec::zstd}) {
     for (std::uint8_t shift = 12; shift <= 20; ++shift) {
       SampleOptions options;
@@ -78,7 +78,7 @@ TEST_CASE("container: pages are read back under every codec and page size", "[st
 }
 
 TEST_CASE("container: compression is used where it saves space", "[store][reader]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   SampleOptions options;
   write_sample(scratch / "zstd.ptcx", options);
   options.writer.codec = Codec::raw;
@@ -99,7 +99,7 @@ TEST_CASE("container: compression is used where it saves space", "[store][reader
 }
 
 TEST_CASE("container: a scene without points is a valid container", "[store][reader]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   SampleOptions options;
   options.points = 0;
   write_sample(scratch / "empty.ptcx", options);
@@ -112,7 +112,7 @@ TEST_CASE("container: a scene without points is a valid container", "[store][rea
 }
 
 TEST_CASE("container: a directory of several pages is read back", "[store][reader]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   SampleOptions options;
   options.points = 40000;
   options.attribute_groups = 0;
@@ -124,7 +124,7 @@ TEST_CASE("container: a directory of several pages is read back", "[store][reade
 }
 
 TEST_CASE("container: the superblock is read back as finish() returned it", "[store][reader]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const Sample sample = write_sample(scratch / "a.ptcx", {});
   const ContainerReader reader(scratch / "a.ptcx");
   CHECK((encode_superblock(reader.superblock()) == encode_superblock(sample.superblock)));
@@ -133,7 +133,7 @@ TEST_CASE("container: the superblock is read back as finish() returned it", "[st
 }
 
 TEST_CASE("reader: a nonexistent page is refused, as is a small buffer", "[store][reader]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   write_sample(scratch / "a.ptcx", {});
   const ContainerReader reader(scratch / "a.ptcx");
   PageDecoder decoder;
@@ -148,7 +148,7 @@ TEST_CASE("reader: a nonexistent page is refused, as is a small buffer", "[store
 
 TEST_CASE("forgery: taking a container apart and putting it together gives the same bytes",
           "[store][support]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   for (const std::uint32_t points : {0u, 1u, 500u, 20000u}) {
     SampleOptions options;
     options.points = points;

@@ -164,22 +164,6 @@ void plan_pages(ContainerWriter& writer, const SampleOptions& options,
 
 }  // namespace
 
-ScratchDirectory::ScratchDirectory() {
-  std::string name = (std::filesystem::temp_directory_path() / "ptc-test-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp " + name);
-  path_ = name;
-}
-
-ScratchDirectory::~ScratchDirectory() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
-std::size_t ScratchDirectory::files() const {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_),
-                                                std::filesystem::directory_iterator()));
-}
-
 std::vector<PointRecord> sample_points(std::uint32_t count) {
   std::mt19937_64 random(count);
   std::vector<PointRecord> points(count);

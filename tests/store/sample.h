@@ -10,23 +10,9 @@
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "format/point_record.h"
+#include "tests/support/temporary_directory.h"
 
 namespace ptc::test {
-
-/// A new directory that is removed with everything in it.
-class ScratchDirectory {
- public:
-  ScratchDirectory();
-  ~ScratchDirectory();
-  ScratchDirectory(const ScratchDirectory&) = delete;
-  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
-  [[nodiscard]] std::size_t files() const;  ///< number of entries, hidden ones included
-
- private:
-  std::filesystem::path path_;
-};
 
 struct SampleOptions {
   WriterOptions writer{12, Codec::zstd, 1, Uuid{std::byte{7}}};

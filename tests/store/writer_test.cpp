@@ -42,7 +42,7 @@ class FileLimit {
 
 TEST_CASE("writer: pages lie in the order of the calls, aligned, padded with zeros",
           "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const Sample sample = write_sample(scratch / "a.ptcx", {});
   const std::vector<std::byte> file = read_file(scratch / "a.ptcx");
   const Forgery parts(scratch / "a.ptcx");
@@ -76,14 +76,14 @@ TEST_CASE("writer: pages lie in the order of the calls, aligned, padded with zer
 }
 
 TEST_CASE("writer: the same calls give the same bytes", "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   write_sample(scratch / "a.ptcx", {});
   write_sample(scratch / "b.ptcx", {});
   CHECK((read_file(scratch / "a.ptcx") == read_file(scratch / "b.ptcx")));
 }
 
 TEST_CASE("writer: another uuid changes the bytes, not the content digest", "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   SampleOptions options;
   const Sample a = write_sample(scratch / "a.ptcx", options);
   options.writer.uuid[3] = std::byte{99};
@@ -93,7 +93,7 @@ TEST_CASE("writer: another uuid changes the bytes, not the content digest", "[st
 }
 
 TEST_CASE("writer: pages copied in their stored form give the same container", "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   write_sample(scratch / "a.ptcx", {});
   const ContainerReader from(scratch / "a.ptcx");
   ContainerWriter to(scratch / "b.ptcx", {12, Codec::zstd, 1, from.header().uuid});
@@ -109,7 +109,7 @@ TEST_CASE("writer: pages copied in their stored form give the same container", "
 }
 
 TEST_CASE("writer: each reserved page must be written exactly once", "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   Sample sample;
   ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
   write_unfinished(writer, {}, sample);
@@ -122,7 +122,7 @@ TEST_CASE("writer: each reserved page must be written exactly once", "[store][wr
 }
 
 TEST_CASE("writer: nothing follows finish()", "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   Sample sample;
   ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
   write_unfinished(writer, {}, sample);
@@ -135,7 +135,7 @@ TEST_CASE("writer: nothing follows finish()", "[store][writer]") {
 }
 
 TEST_CASE("writer: a page that no reader would accept is refused", "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   Sample sample;
   write_sample(scratch / "good.ptcx", {});
   {
@@ -182,7 +182,7 @@ TEST_CASE("writer: a page that no reader would accept is refused", "[store][writ
 }
 
 TEST_CASE("writer: a superblock that contradicts the pages is refused", "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   const auto refused = [&](const auto& lie) {
     Sample sample;
     ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
@@ -199,37 +199,38 @@ TEST_CASE("writer: a superblock that contradicts the pages is refused", "[store]
   refused([](Superblock&, Meta& m) { m.channels.push_back({"more", ChannelType::f32, 1, 9}); });
   refused([](Superblock&, Meta& m) { m.text["long"] = std::string(5000, 'x'); });
   refused([](Superblock& s, Meta&) { s.writer = std::string(64, 'x'); });
-  CHECK(scratch.files() == 0);
+  CHECK(scratch.listing().empty());
 }
 
 TEST_CASE("writer: an invalid page size or frame is refused before a file is made",
           "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   for (const std::uint8_t shift : {std::uint8_t{0}, std::uint8_t{11}, std::uint8_t{21}}) {
     CHECK_THROWS_AS(ContainerWriter(scratch / "a.ptcx", {shift, Codec::zstd, 1, {}}),
                     std::invalid_argument);
   }
   CHECK_THROWS_AS(ContainerWriter(scratch / "a.ptcx", {.frame = {{}, 3}}), std::invalid_argument);
-  CHECK(scratch.files() == 0);
+  CHECK(scratch.listing().empty());
 }
 
 TEST_CASE("writer: without finish() neither the target nor a temporary file is left",
           "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   try {
     Sample sample;
     ContainerWriter writer(scratch / "a.ptcx", {12, Codec::zstd, 1, {}});
     write_unfinished(writer, {}, sample);
-    CHECK(scratch.files() == 1);
+    CHECK(scratch.listing().starts_with(".a.ptcx.tmp-"));
+    CHECK(scratch.listing().find(' ') == std::string::npos);
     throw std::runtime_error("the build failed");
   } catch (const std::runtime_error&) {
   }
-  CHECK(scratch.files() == 0);
+  CHECK(scratch.listing().empty());
 }
 
 TEST_CASE("writer: a write that fails at any block leaves the old file as it was",
           "[store][writer]") {
-  const ScratchDirectory scratch;
+  const TemporaryDirectory scratch;
   SampleOptions options;
   options.points = 200;
   write_sample(scratch / "whole.ptcx", options);
@@ -241,7 +242,7 @@ TEST_CASE("writer: a write that fails at any block leaves the old file as it was
       const FileLimit full(limit);
       CHECK_THROWS_AS(write_sample(scratch / "a.ptcx", options), std::system_error);
     }
-    CHECK(scratch.files() == 2);
+    CHECK(scratch.listing() == "a.ptcx whole.ptcx");
     CHECK((read_file(scratch / "a.ptcx") == old));
   }
   const FileLimit enough(length);

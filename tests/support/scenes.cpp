@@ -1,14 +1,11 @@
 #include "tests/support/scenes.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <numbers>
 #include <random>
-#include <system_error>
 
 #include <glm/geometric.hpp>
 
@@ -21,18 +18,6 @@ namespace ptc::test {
 std::vector<char> bytes_of(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
-}
-
-TemporaryDirectory::TemporaryDirectory() {
-  std::string name = (std::filesystem::temp_directory_path() / "ptc-test-XXXXXX").string();
-  if (!mkdtemp(name.data()))
-    throw std::system_error(errno, std::generic_category(), "mkdtemp " + name);
-  path_ = name;
-}
-
-TemporaryDirectory::~TemporaryDirectory() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
 }
 
 std::size_t VectorStream::next(std::span<PointRecord> out) {

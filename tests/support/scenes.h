@@ -9,24 +9,9 @@
 #include "engine/base/surfel.h"
 #include "engine/octree/build_pages.h"
 #include "engine/sort/external_sort.h"
+#include "tests/support/temporary_directory.h"
 
 namespace ptc::test {
-
-/// A directory that is removed together with its contents.
-class TemporaryDirectory {
- public:
-  TemporaryDirectory();
-  ~TemporaryDirectory();
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
-    return path_ / name;
-  }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// Returns all bytes of a file; none when the file does not exist.
 [[nodiscard]] std::vector<char> bytes_of(const std::filesystem::path& path);

@@ -84,58 +84,40 @@ std::vector<PointColumn> ply_columns(std::span<const Channel> channels) {
   return columns;
 }
 
-struct PlyWriter::Impl {
-  Impl(const std::filesystem::path& target, std::uint64_t count, std::vector<PointColumn> extra)
-      : columns(std::move(extra)),
-        header(make_header(count, columns)),
-        announced(count),
-        out(target) {
-    for (const PointColumn& column : columns) values_a_point += column.components;
-    out.put(header.data(), header.size());
-  }
-
-  void put(const Surfel& surfel) {
-    out.put(&surfel.position, sizeof surfel.position);
-    out.put(&surfel.normal, sizeof surfel.normal);
-    out.put(&surfel.radius, sizeof surfel.radius);
-    out.put(&surfel.radiance, sizeof surfel.radiance);
-    out.put(&surfel.albedo, sizeof surfel.albedo);
-  }
-
-  std::vector<PointColumn> columns;
-  std::string header;       // made before the file, so that a bad column leaves no file
-  std::uint64_t announced;  // points of the header
-  std::uint64_t came = 0;   // points of all write() calls
-  std::size_t values_a_point = 0;
-  BufferedOutput out;
-};
-
 PlyWriter::PlyWriter(const std::filesystem::path& target, std::uint64_t count,
                      std::vector<PointColumn> columns)
-    : impl_(std::make_unique<Impl>(target, count, std::move(columns))) {}
-
-PlyWriter::~PlyWriter() = default;
+    : columns_(std::move(columns)),
+      header_(make_header(count, columns_)),
+      announced_(count),
+      out_(target) {
+  for (const PointColumn& column : columns_) values_per_point_ += column.components;
+  out_.put(header_.data(), header_.size());
+}
 
 void PlyWriter::write(std::span<const Surfel> surfels, std::span<const float> values) {
-  const std::size_t stride = impl_->values_a_point;
-  if (values.size() != surfels.size() * stride) {
+  if (values.size() != surfels.size() * values_per_point_) {
     throw std::invalid_argument("PlyWriter: " + std::to_string(values.size()) + " values for " +
                                 std::to_string(surfels.size()) + " points");
   }
-  impl_->came += surfels.size();
-  if (impl_->came > impl_->announced) return;  // finish() will refuse the file
+  written_ += surfels.size();
+  if (written_ > announced_) return;  // finish() will refuse the file
   for (std::size_t i = 0; i < surfels.size(); ++i) {
-    impl_->put(surfels[i]);
-    impl_->out.put(values.data() + i * stride, stride * sizeof(float));
+    const Surfel& surfel = surfels[i];
+    out_.put(&surfel.position, sizeof surfel.position);
+    out_.put(&surfel.normal, sizeof surfel.normal);
+    out_.put(&surfel.radius, sizeof surfel.radius);
+    out_.put(&surfel.radiance, sizeof surfel.radiance);
+    out_.put(&surfel.albedo, sizeof surfel.albedo);
+    out_.put(values.data() + i * values_per_point_, values_per_point_ * sizeof(float));
   }
 }
 
 void PlyWriter::finish() {
-  if (impl_->came != impl_->announced) {
-    throw std::invalid_argument("PlyWriter: " + std::to_string(impl_->came) +
-                                " points instead of " + std::to_string(impl_->announced));
+  if (written_ != announced_) {
+    throw std::invalid_argument("PlyWriter: " + std::to_string(written_) + " points instead of " +
+                                std::to_string(announced_));
   }
-  impl_->out.publish();
+  out_.publish();
 }
 
 }  // namespace ptc

@@ -12,6 +12,7 @@
 
 #include "engine/base/stream.h"
 #include "engine/base/surfel.h"
+#include "engine/io/file/buffered_output.h"
 #include "format/schema.h"
 
 namespace ptc {
@@ -79,7 +80,6 @@ class PlyWriter {
   ///         property or occurs twice
   PlyWriter(const std::filesystem::path& target, std::uint64_t count,
             std::vector<PointColumn> columns);
-  ~PlyWriter();
   /// Writes the next points.
   /// @param values  values of the columns, surfels.size() x sum of components, point by point
   /// @throws std::invalid_argument when `values` has another size; std::system_error
@@ -90,8 +90,12 @@ class PlyWriter {
   void finish();
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::vector<PointColumn> columns_;
+  std::string header_;       ///< made before the file, so that a bad column leaves no file
+  std::uint64_t announced_;  ///< points of the header
+  std::uint64_t written_ = 0;
+  std::size_t values_per_point_ = 0;
+  BufferedOutput out_;
 };
 
 }  // namespace ptc

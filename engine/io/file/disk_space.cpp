@@ -40,13 +40,6 @@ const std::filesystem::path& roomiest(std::span<const std::filesystem::path> dir
   });
 }
 
-bool share_a_disk(std::span<const std::filesystem::path> directories,
-                  const std::filesystem::path& path) {
-  const dev_t disk = disk_of(path);
-  return std::ranges::any_of(
-      directories, [&](const std::filesystem::path& other) { return disk_of(other) == disk; });
-}
-
 void require_room(std::span<const std::filesystem::path> directories, std::uint64_t bytes,
                   const std::string& what) {
   const std::uint64_t free = free_bytes(directories);

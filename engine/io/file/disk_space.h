@@ -19,11 +19,6 @@ namespace ptc {
 [[nodiscard]] const std::filesystem::path& roomiest(
     std::span<const std::filesystem::path> directories);
 
-/// Says whether one of the directories is on the same file system as `path`.
-/// @throws std::system_error that names the path that cannot be examined
-[[nodiscard]] bool share_a_disk(std::span<const std::filesystem::path> directories,
-                                const std::filesystem::path& path);
-
 /// Checks that the directories have `bytes` bytes free together.
 /// @param what  a plural noun for what will be written there, e.g. "5 files"; it begins the message
 /// @throws std::system_error (ENOSPC) when they have fewer

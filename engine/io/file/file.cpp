@@ -375,10 +375,6 @@ void TempFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) 
   write_whole(fd_, directory_, offset, bytes);
 }
 
-void TempFile::drop_cache() const noexcept {
-  ::posix_fadvise(fd_, 0, 0, POSIX_FADV_DONTNEED);
-}
-
 void TempFile::discard(std::uint64_t offset, std::uint64_t bytes) const noexcept {
   discard_blocks(fd_, offset, bytes);
 }

@@ -177,8 +177,6 @@ class TempFile {
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
   /// Writes all bytes from `offset` on. @throws std::system_error, see fail_write()
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
-  /// Advises the system that its page cache need not keep the bytes of this file.
-  void drop_cache() const noexcept;
   /// Frees the disk blocks under these bytes, if the file system can; the bytes read as zero then.
   void discard(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 

@@ -163,25 +163,4 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
   mesh.materials.insert(mesh.materials.end(), added.materials.begin(), added.materials.end());
 }
 
-void write_mesh_ply(const std::filesystem::path& target, const Mesh& mesh) {
-  const std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                             std::to_string(mesh.positions.size()) +
-                             "\nproperty double x\nproperty double y\nproperty double z\n"
-                             "element face " +
-                             std::to_string(mesh.triangles.size()) +
-                             "\nproperty list uchar uint vertex_indices\nend_header\n";
-  BufferedOutput out(target);
-  out.put(header.data(), header.size());
-  for (const glm::vec3& position : mesh.positions) {
-    const glm::dvec3 world = mesh.origin + glm::dvec3(position);
-    out.put(&world, sizeof world);
-  }
-  constexpr std::uint8_t kCorners = 3;
-  for (const auto& triangle : mesh.triangles) {
-    out.put(&kCorners, sizeof kCorners);
-    out.put(triangle.data(), sizeof triangle);
-  }
-  out.publish();
-}
-
 }  // namespace ptc

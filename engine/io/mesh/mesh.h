@@ -85,9 +85,4 @@ struct MeshFile {
 ///         the two have more than 65,536 materials or 2^32 vertices together
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform);
 
-/// Writes a mesh as a binary PLY of positions (double) and triangles, for tests and for a look at
-/// what was sampled. The file replaces `target` as a whole or not at all.
-/// @throws std::system_error
-void write_mesh_ply(const std::filesystem::path& target, const Mesh& mesh);
-
 }  // namespace ptc

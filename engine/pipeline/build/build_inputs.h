@@ -13,6 +13,7 @@
 #include "engine/base/progress.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 #include "engine/sort/external_sort.h"

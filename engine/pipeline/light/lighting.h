@@ -140,8 +140,6 @@ class Lighting {
   void check(const CheckScene& seen);
 
  private:
-  [[nodiscard]] Shader& shader();
-
   const LightingRequest& request_;
   LightingReport& report_;
   Progress& progress_;

@@ -17,7 +17,7 @@ CheckError errors(std::span<const Shading> ours, std::span<const Shading> traced
 
 /// Calls body() and returns its CPU time in microseconds, divided by `count`.
 template <class Body>
-double timed(std::size_t count, const Body& body) {
+double cpu_microseconds(std::size_t count, const Body& body) {
   const double before = cpu_seconds();
   body();
   return (cpu_seconds() - before) * 1e6 / static_cast<double>(count);
@@ -57,8 +57,8 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
   // Trace rays at the surfels
   {
     StreamedRays discs(scene, sides, sky_function(seen.sky), memory_bytes);
-    report.disc_microseconds =
-        timed(receivers_.size(), [&] { discs.trace(twice, half, 0, traced, executor, progress); });
+    report.disc_microseconds = cpu_microseconds(
+        receivers_.size(), [&] { discs.trace(twice, half, 0, traced, executor, progress); });
   }
   if (seen.paths.bounces == 0) leave_out_bleeding(traced);
   report.discs = errors(results_, traced);
@@ -66,7 +66,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
 
   // Trace rays at the mesh
   if (!seen.light || !seen.mesh) return report;
-  report.mesh_microseconds = timed(receivers_.size(), [&] {
+  report.mesh_microseconds = cpu_microseconds(receivers_.size(), [&] {
     executor.for_each(twice.size(), [&](std::size_t i, unsigned) {
       const RayTraced found = trace_mesh(*seen.mesh, *seen.light, twice[i].position,
                                          twice[i].normal, half, seen.paths, i);

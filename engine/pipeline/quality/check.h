@@ -10,6 +10,7 @@
 #include "engine/pipeline/quality/check_error.h"
 #include "engine/pipeline/quality/estimate.h"
 #include "engine/pipeline/quality/pilots.h"
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/mesh_reference.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"

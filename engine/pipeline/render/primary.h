@@ -11,6 +11,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 #include "engine/shade/lost_pages.h"

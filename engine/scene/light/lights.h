@@ -1,18 +1,16 @@
-// Lights, their JSON record, and the direct light that they bring to a surface point.
+// Lights, and their JSON record.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
 #include "engine/io/image/image.h"
-#include "engine/scene/ray_scene.h"
 
 namespace ptc {
 
@@ -112,38 +110,6 @@ struct LightSampling {
   unsigned sun_rays = 4;    ///< for each sun; a sun of angular radius 0 takes 1 in any case
   unsigned area_rays = 16;  ///< over all emissive triangles, by what each may give to the point
   unsigned sky_rays = 64;   ///< cosine-distributed; with a map, half of them by its brightness
-};
-
-/// Direct irradiance at surface points by shadow rays. Results are deterministic: the seed fixes
-/// the sample points.
-/// Memory: 60 bytes for each emissive triangle, 4 bytes for each pixel of the sky map.
-/// Threads: const members may be called concurrently.
-class DirectLight {
- public:
-  /// Prepares the lights of a rig and the emissive triangles of the scene's mesh.
-  /// @param scene  must outlive this
-  /// @throws RequestError when a direction is zero, or a number is negative, not finite or out of
-  ///         range
-  DirectLight(const RayScene& scene, LightRig rig);
-  ~DirectLight();
-
-  /// Irradiance at a point, split by where it comes from, W/m^2.
-  struct Result {
-    glm::vec3 local{0};  ///< from suns, point lights and emissive triangles
-    glm::vec3 sky{0};    ///< from the sky
-  };
-  /// Estimates the irradiance at a point. The estimate is unbiased except for the steps off the
-  /// surface, and finite whatever the arguments are.
-  /// @param position  scene units, on the surface; rays begin a few epsilons off it, see step_off()
-  /// @param normal    of any length; a vector without a direction receives no light
-  [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::vec3& normal,
-                                  const LightSampling& sampling, std::uint64_t seed) const;
-  /// Returns the rig with its directions normalised.
-  [[nodiscard]] const LightRig& rig() const noexcept;
-
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace ptc

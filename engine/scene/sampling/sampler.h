@@ -8,6 +8,7 @@
 #include "engine/base/executor.h"
 #include "engine/io/cloud/points.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 
 namespace ptc {

@@ -30,12 +30,12 @@ Chart sample() {
   return {"Error over time", "Median of 5 runs.", {first, second}, 2};
 }
 
-Image drawn(const Scratch& scratch, const Chart& chart) {
+Image drawn(const test::TemporaryDirectory& scratch, const Chart& chart) {
   write_chart(scratch.path() / "drawn.png", chart);
   return read_image(scratch.path() / "drawn.png");
 }
 
-std::string svg_of(const Scratch& scratch, const Chart& chart) {
+std::string svg_of(const test::TemporaryDirectory& scratch, const Chart& chart) {
   write_chart(scratch.path() / "drawn.svg", chart);
   return slurp(scratch.path() / "drawn.svg");
 }
@@ -65,7 +65,7 @@ std::size_t count_of(const Image& image, bool right, int red, int green, int blu
   return count;
 }
 
-void check_refused(const Scratch& scratch, const char* name, const Chart& chart) {
+void check_refused(const test::TemporaryDirectory& scratch, const char* name, const Chart& chart) {
   CHECK_THROWS_AS(write_chart(scratch.path() / name, chart), std::invalid_argument);
   CHECK(scratch.listing().empty());
 }
@@ -73,7 +73,7 @@ void check_refused(const Scratch& scratch, const char* name, const Chart& chart)
 }  // namespace
 
 TEST_CASE("chart: an SVG can be searched for titles, axes, names and the note", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string svg = svg_of(scratch, sample());
   CHECK(scratch.listing() == "drawn.svg");
   CHECK_THAT(svg, Catch::Matchers::StartsWith("<?xml"));
@@ -87,7 +87,7 @@ TEST_CASE("chart: an SVG can be searched for titles, axes, names and the note", 
 }
 
 TEST_CASE("chart: equal charts give equal bytes, whatever was drawn before", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const std::string svg = svg_of(scratch, sample());
   static_cast<void>(drawn(scratch, sample()));
   const std::string png = slurp(scratch.path() / "drawn.png");
@@ -100,7 +100,7 @@ TEST_CASE("chart: equal charts give equal bytes, whatever was drawn before", "[c
 }
 
 TEST_CASE("chart: a PNG has two pixels per unit and is mostly white", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Image image = drawn(scratch, sample());
   const std::string svg = svg_of(scratch, sample());
   CHECK(image.width == 2 * attribute(svg, " width=\""));
@@ -113,7 +113,7 @@ TEST_CASE("chart: a PNG has two pixels per unit and is mostly white", "[chart]")
 }
 
 TEST_CASE("chart: a name keeps its colour in another panel", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Image image = drawn(scratch, sample());      // the legend is in the left half
   CHECK(count_of(image, false, 0, 114, 178) > 200);  // ours
   CHECK(count_of(image, false, 213, 94, 0) > 200);   // rays
@@ -122,7 +122,7 @@ TEST_CASE("chart: a name keeps its colour in another panel", "[chart]") {
 }
 
 TEST_CASE("chart: a panel without points says so in its middle", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   Chart chart{"", "", {ChartPanel{}}, 1};
   const Image empty = drawn(scratch, chart);
   const auto dark = [](const Image& image) {
@@ -141,7 +141,7 @@ TEST_CASE("chart: a panel without points says so in its middle", "[chart]") {
 }
 
 TEST_CASE("chart: a line is broken where a point cannot be shown", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const auto ink = [&](double y) {
     ChartPanel panel;
     panel.series = {{"a", {{1, 1}, {10, y}, {100, 1}}}};
@@ -153,7 +153,7 @@ TEST_CASE("chart: a line is broken where a point cannot be shown", "[chart]") {
 }
 
 TEST_CASE("chart: the drawing shows dashes, bars, limits and labels", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   const Chart chart = sample();
   const std::string whole = svg_of(scratch, chart);
   const auto differs = [&](auto&& change) {
@@ -183,7 +183,7 @@ TEST_CASE("chart: the drawing shows dashes, bars, limits and labels", "[chart]")
 }
 
 TEST_CASE("chart: no value of any kind breaks a drawing", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const double value : {0.0, -1.0, double{NAN}, kInfinity, -kInfinity, 1.7e308, -1.7e308,
                              2.3e-308, 5e-324, 4e307}) {
     Chart chart{"", "", {}, 4};
@@ -206,7 +206,7 @@ TEST_CASE("chart: no value of any kind breaks a drawing", "[chart]") {
 }
 
 TEST_CASE("chart: what cannot be drawn is refused and leaves no file", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   check_refused(scratch, "a.pdf", sample());
   check_refused(scratch, "svg", sample());
   check_refused(scratch, "a.svg", {});
@@ -225,7 +225,7 @@ TEST_CASE("chart: what cannot be drawn is refused and leaves no file", "[chart]"
 }
 
 TEST_CASE("chart: a target that cannot be written keeps its old content", "[chart]") {
-  const Scratch scratch;
+  const test::TemporaryDirectory scratch;
   for (const char* ending : {".svg", ".png"}) {
     const auto name = std::string("a") + ending;
     CHECK_THROWS_AS(write_chart(scratch.path() / "none" / name, sample()), std::system_error);

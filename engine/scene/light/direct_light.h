@@ -1,0 +1,61 @@
+// The light that reaches a surface point straight from lights and emitters.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include <glm/vec3.hpp>
+
+#include "engine/scene/light/area_lights.h"
+#include "engine/scene/light/lights.h"
+#include "engine/scene/light/sky_map.h"
+#include "engine/scene/ray_scene.h"
+#include "engine/scene/sampling/low_discrepancy.h"
+
+namespace ptc {
+
+/// Direct irradiance at surface points by shadow rays. Results are deterministic: the seed fixes
+/// the sample points.
+/// Memory: 60 bytes for each emissive triangle, 4 bytes for each pixel of the sky map.
+/// Threads: const members may be called concurrently.
+class DirectLight {
+ public:
+  /// Prepares the lights of a rig and the emissive triangles of the scene's mesh.
+  /// @param scene  must outlive this
+  /// @throws RequestError when a direction is zero, or a number is negative, not finite or out of
+  ///         range
+  DirectLight(const RayScene& scene, LightRig rig);
+
+  /// Irradiance at a point, split by where it comes from, W/m^2.
+  struct Result {
+    glm::vec3 local{0};  ///< from suns, point lights and emissive triangles
+    glm::vec3 sky{0};    ///< from the sky
+  };
+  /// Estimates the irradiance at a point. The estimate is unbiased except for the steps off the
+  /// surface, and finite whatever the arguments are.
+  /// @param position  scene units, on the surface; rays begin a few epsilons off it, see step_off()
+  /// @param normal    of any length; a vector without a direction receives no light
+  [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::vec3& normal,
+                                  const LightSampling& sampling, std::uint64_t seed) const;
+  /// Returns the rig with its directions normalised.
+  [[nodiscard]] const LightRig& rig() const noexcept { return rig_; }
+
+ private:
+  struct Place;
+  [[nodiscard]] glm::vec3 from_sun(const Sun& sun, const Place& at, const SquarePoints& points,
+                                   unsigned rays) const;
+  [[nodiscard]] glm::vec3 from_point(const PointLight& point, const Place& at) const;
+  [[nodiscard]] glm::vec3 from_emitters(const Place& at, unsigned rays) const;
+  [[nodiscard]] glm::vec3 from_sky(const Place& at, unsigned rays) const;
+  [[nodiscard]] glm::vec3 along_sky_ray(const Place& at, const glm::vec3& direction,
+                                        float cosine_rays, float map_rays, float map_density) const;
+  [[nodiscard]] bool is_hidden(const Place& at, const glm::dvec3& end) const;
+
+  const RayScene& scene_;
+  LightRig rig_;
+  AreaLights area_;
+  std::optional<SkyDensity> sky_density_;  ///< set when the sky has a map that gives light
+  bool sky_is_black_ = true;
+};
+
+}  // namespace ptc
