@@ -1,5 +1,6 @@
 """Checks that every clause that the sources cite exists in the spec; every rule is listed in errors.md and has a
-vector; released versions are frozen; what security.md names exists; exit codes are told alike.
+vector; released versions are frozen; what security.md names exists; exit codes are told alike; links of the README, the
+guide and the notes lead somewhere.
 
 anchors.py SOURCE_DIR: collects "spec/FILE.md#anchor" and "spec/FILE.md" in sources and documents.
 """
@@ -9,6 +10,7 @@ import re
 import sys
 
 CITED = re.compile(r"spec/([A-Za-z_]+\.md)(?:#([A-Za-z0-9_-]+))?")
+TARGET = re.compile(r"\]\(([^)#:]*)(?:#([^)]+))?\)")
 LINKED = re.compile(r"\]\(([A-Za-z_]*\.md)?(?:#([a-z0-9_-]+))?\)")
 SOURCES = (".h", ".cpp", ".py", ".md", ".txt", ".sh", ".cmake")
 FOLDERS = ("format", "engine", "tools", "tests", "fuzz", "spec")
@@ -98,7 +100,7 @@ def exit_codes(errors):
 
 
 def check_exit_codes(root, documents):
-    """Yields faults: exit codes in programs, help, README or documents that differ from those of errors.md."""
+    """Yields faults: exit codes in programs, help, guide or documents that differ from those of errors.md."""
     names = exit_codes(documents["errors.md"])
     if len(names) < 6:
         yield "spec/errors.md: hardly any exit codes found: the search is broken"
@@ -111,7 +113,8 @@ def check_exit_codes(root, documents):
     declared = {int(code) for code in re.findall(r"^  k[A-Za-z]+ = (\d+),", header, re.M)}
     for code in sorted(declared ^ set(names)):
         yield f"tools/common.h and spec/errors.md do not agree on exit code {code}"
-    texts = {"README.md": read("README.md").split("Exit codes: ")[1].split("\n\n")[0]}
+    guide = "spec/guide/README.md"
+    texts = {guide: read(guide).split("Exit codes: ")[1].split("\n\n")[0]}
     for path, name in (("tools/common.h", "kExitCodes"), ("tools/ptcverify.cpp", "kVerifyCodes")):
         literal = read(path).split(f"char {name}[] =")[1].split(";\n")[0]
         texts[f"{path}: {name}"] = "".join(re.findall(r'"([^"]*)"', literal)).replace("\\n", " ")
@@ -126,6 +129,34 @@ def check_exit_codes(root, documents):
         for code, name in re.findall(r"\bexits? (?:with|code) (\d+)(?: \(([^)]*)\))?", text):
             if names.get(int(code)) != name:
                 yield f"spec/{document}: exit code {code} without the name '{names.get(int(code))}' in brackets behind it"
+
+
+def check_links(root):
+    """Faults: relative links of documents to files or anchors that are not there.
+
+    Files of spec/results are measured one by one: those that its README lists may be missing.
+    """
+    with open(os.path.join(root, "spec", "results", "README.md"), encoding="utf-8") as file:
+        measured = set(re.findall(r"^\| `([a-z0-9-]+\.md)` \|", file.read(), re.M))
+    results = os.path.join(root, "spec", "results", "")
+    links = 0
+    documents = [path for path in sources(root, ("spec",)) if path.endswith(".md")]
+    for path in [os.path.join(root, "README.md"), *sorted(documents)]:
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        for target, anchor in TARGET.findall(text):
+            links += 1
+            full = os.path.normpath(os.path.join(os.path.dirname(path), target)) if target else path
+            where = f"{os.path.relpath(path, root)}: the link to {target}"
+            if not os.path.exists(full):
+                if full not in {os.path.normpath(results + name) for name in measured}:
+                    yield f"{where} leads nowhere"
+            elif anchor and full.endswith(".md"):
+                with open(full, encoding="utf-8") as file:
+                    if anchor not in anchors_of(file.read()):
+                        yield f"{where}#{anchor} leads nowhere"
+    if links < 200:
+        yield f"only {links} links found: the search is broken"
 
 
 def main(root):
@@ -168,6 +199,7 @@ def main(root):
     faults.extend(check_versions(spec, documents["versions.md"]))
     faults.extend(check_exit_codes(root, documents))
     faults.extend(check_security(root, documents["security.md"]))
+    faults.extend(check_links(root))
     if cited < 100:
         faults.append(f"only {cited} citations found: the search is broken")
     print("\n".join(faults) if faults else f"{cited} citations exist")
