@@ -40,6 +40,20 @@ void store(std::byte* bytes, std::size_t at, T value) noexcept {
   std::memcpy(bytes + at, &value, sizeof value);
 }
 
+/// A number at a fixed place of a structure. A structure states each of its fields once, for its
+/// encoder, its decoder and its errors.
+template <class T>
+struct Field {
+  std::size_t at;  ///< bytes from the start of the structure
+
+  /// Reads the field. @pre the structure lies inside the bytes
+  [[nodiscard]] T of(const std::byte* structure) const noexcept { return load<T>(structure, at); }
+  /// Writes the field. @pre the structure lies inside the bytes
+  void put(std::byte* structure, std::type_identity_t<T> value) const noexcept {
+    store(structure, at, value);
+  }
+};
+
 /// Returns the position of the first byte that is not zero, or bytes.size() when all are zero.
 [[nodiscard]] inline std::size_t first_nonzero(std::span<const std::byte> bytes) noexcept {
   const auto found = std::ranges::find_if(bytes, [](std::byte b) { return b != std::byte{0}; });

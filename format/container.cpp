@@ -31,25 +31,50 @@ constexpr std::uint32_t kByteOrderMark = 0x01020304;
 constexpr std::uint16_t kMajor = 1;
 constexpr std::uint8_t kAlignShift = 9;
 constexpr std::uint16_t kChecksumXxh3 = 1;
-constexpr std::size_t kHeaderHashAt = 120;
 constexpr std::uint64_t kKnownIncompat = 0;
-constexpr std::size_t kOriginAt = 64;
-constexpr std::size_t kEdgeAt = 88;
+constexpr std::size_t kUuidAt = 40;
 constexpr double kMaxWhole = 0x1p53;  // doubles hold all whole numbers up to here
+
+namespace field {
+constexpr Field<std::uint64_t> kMagic{0};
+constexpr Field<std::uint16_t> kMajor{8};
+constexpr Field<std::uint16_t> kMinor{10};
+constexpr Field<std::uint32_t> kHeaderBytes{12};
+constexpr Field<std::uint64_t> kIncompat{16};
+constexpr Field<std::uint64_t> kReadOnly{24};
+constexpr Field<std::uint64_t> kCompat{32};
+constexpr Field<std::uint8_t> kPageShift{56};
+constexpr Field<std::uint8_t> kAlignShift{57};
+constexpr Field<std::uint16_t> kChecksum{58};
+constexpr Field<std::uint32_t> kByteOrder{60};
+constexpr Field<std::array<double, 3>> kOrigin{64};
+constexpr Field<double> kEdge{88};
+constexpr Field<std::uint64_t> kHash{120};
+}  // namespace field
+
+namespace entry_field {
+constexpr Field<std::uint64_t> kOffset{0};
+constexpr Field<std::uint32_t> kStoredBytes{8};
+constexpr Field<std::uint32_t> kRawBytes{12};
+constexpr Field<std::uint64_t> kPayloadXxh3{16};
+constexpr Field<std::uint16_t> kType{24};
+constexpr Field<std::uint16_t> kGroup{26};
+constexpr Field<std::uint32_t> kRecordCount{28};
+}  // namespace entry_field
 
 void check_constants(const std::byte* p) {
   constexpr char kConstants[] = "spec/container.md#header-constants";
-  if (load<std::uint32_t>(p, 12) != kBlockBytes) {
-    throw FormatError(12, kConstants, "header_bytes is not 4096");
+  if (field::kHeaderBytes.of(p) != kBlockBytes) {
+    throw FormatError(field::kHeaderBytes.at, kConstants, "header_bytes is not 4096");
   }
-  if (load<std::uint8_t>(p, 57) != kAlignShift) {
-    throw FormatError(57, kConstants, "align_shift is not 9");
+  if (field::kAlignShift.of(p) != kAlignShift) {
+    throw FormatError(field::kAlignShift.at, kConstants, "align_shift is not 9");
   }
-  if (load<std::uint16_t>(p, 58) != kChecksumXxh3) {
-    throw FormatError(58, kConstants, "checksum is not XXH3-64");
+  if (field::kChecksum.of(p) != kChecksumXxh3) {
+    throw FormatError(field::kChecksum.at, kConstants, "checksum is not XXH3-64");
   }
-  if (load<std::uint32_t>(p, 60) != kByteOrderMark) {
-    throw FormatError(60, kConstants, "byte order mark is not 0x01020304");
+  if (field::kByteOrder.of(p) != kByteOrderMark) {
+    throw FormatError(field::kByteOrder.at, kConstants, "byte order mark is not 0x01020304");
   }
 }
 
@@ -59,12 +84,12 @@ void check_frame(const Frame& frame) {
   const auto bits = std::bit_cast<std::uint64_t>(frame.edge);
   const bool power_of_two = (bits & 0x800fffffffffffff) == 0;
   if (!power_of_two || !(frame.edge >= 0x1p-960) || !(frame.edge <= 0x1p1010)) {
-    throw FormatError(kEdgeAt, kFrame, "edge is not a power of two from 2^-960 to 2^1010");
+    throw FormatError(field::kEdge.at, kFrame, "edge is not a power of two from 2^-960 to 2^1010");
   }
   for (const double origin : frame.origin) {
     const double steps = origin / frame.unit();
     if (!(steps >= -kMaxWhole && steps <= kMaxWhole - 0x1p42) || std::rint(steps) != steps) {
-      throw FormatError(kOriginAt, kFrame,
+      throw FormatError(field::kOrigin.at, kFrame,
                         "origin is not a multiple of the unit, or is beyond 2^53 units");
     }
   }
@@ -85,92 +110,93 @@ Uuid uuid_of(std::span<const std::byte> text) noexcept {
 
 void encode_identity(const FileHeader& header, std::span<std::byte, kBlockBytes> block) noexcept {
   std::byte* const p = block.data();
-  store(p, 8, header.major);
-  store(p, 10, header.minor);
-  store(p, 12, static_cast<std::uint32_t>(kBlockBytes));
-  store(p, 16, header.feature_incompat);
-  store(p, 24, header.feature_ro_compat);
-  store(p, 32, header.feature_compat);
-  std::ranges::copy(header.uuid, p + 40);
-  store(p, 56, header.page_shift);
-  store(p, 57, kAlignShift);
-  store(p, 58, kChecksumXxh3);
-  store(p, 60, kByteOrderMark);
-  store(p, kOriginAt, header.frame.origin);
-  store(p, kEdgeAt, header.frame.edge);
+  field::kMajor.put(p, header.major);
+  field::kMinor.put(p, header.minor);
+  field::kHeaderBytes.put(p, static_cast<std::uint32_t>(kBlockBytes));
+  field::kIncompat.put(p, header.feature_incompat);
+  field::kReadOnly.put(p, header.feature_ro_compat);
+  field::kCompat.put(p, header.feature_compat);
+  std::ranges::copy(header.uuid, p + kUuidAt);
+  field::kPageShift.put(p, header.page_shift);
+  field::kAlignShift.put(p, kAlignShift);
+  field::kChecksum.put(p, kChecksumXxh3);
+  field::kByteOrder.put(p, kByteOrderMark);
+  field::kOrigin.put(p, header.frame.origin);
+  field::kEdge.put(p, header.frame.edge);
 }
 
 Block encode_file_header(const FileHeader& header) {
   Block block{};
-  store(block.data(), 0, kFileMagic);
+  field::kMagic.put(block.data(), kFileMagic);
   encode_identity(header, block);
-  store(block.data(), kHeaderHashAt, xxh3_64(std::span(block).first(kHeaderHashAt), kHeaderSeed));
+  field::kHash.put(block.data(), xxh3_64(std::span(block).first(field::kHash.at), kHeaderSeed));
   return block;
 }
 
 FileHeader decode_file_header(std::span<const std::byte> bytes) {
   // Check that the block is a whole header.
-  if (bytes.size() < 8 || load<std::uint64_t>(bytes.data(), 0) != kFileMagic) {
-    throw FormatError(0, "spec/container.md#header-magic", "not a PTCX file");
+  if (bytes.size() < 8 || field::kMagic.of(bytes.data()) != kFileMagic) {
+    throw FormatError(field::kMagic.at, "spec/container.md#header-magic", "not a PTCX file");
   }
   if (bytes.size() < kBlockBytes) {
     throw FormatError(bytes.size(), "spec/container.md#header-length", "file ends in its header");
   }
   const std::byte* const p = bytes.data();
-  const std::uint64_t hash = xxh3_64(bytes.first(kHeaderHashAt), kHeaderSeed);
-  if (load<std::uint64_t>(p, kHeaderHashAt) != hash) {
-    throw FormatError(kHeaderHashAt, "spec/container.md#header-checksum",
+  const std::uint64_t hash = xxh3_64(bytes.first(field::kHash.at), kHeaderSeed);
+  if (field::kHash.of(p) != hash) {
+    throw FormatError(field::kHash.at, "spec/container.md#header-checksum",
                       "file header's checksum is wrong");
   }
 
   // Check that this version and its features are known.
   FileHeader header;
-  header.major = load<std::uint16_t>(p, 8);
-  header.minor = load<std::uint16_t>(p, 10);
+  header.major = field::kMajor.of(p);
+  header.minor = field::kMinor.of(p);
   if (header.major != kMajor) {
-    throw FormatError(8, "spec/container.md#header-version",
+    throw FormatError(field::kMajor.at, "spec/container.md#header-version",
                       "format version " + std::to_string(header.major) + " is not supported");
   }
-  header.feature_incompat = load<std::uint64_t>(p, 16);
-  header.feature_ro_compat = load<std::uint64_t>(p, 24);
-  header.feature_compat = load<std::uint64_t>(p, 32);
+  header.feature_incompat = field::kIncompat.of(p);
+  header.feature_ro_compat = field::kReadOnly.of(p);
+  header.feature_compat = field::kCompat.of(p);
   if ((header.feature_incompat & ~kKnownIncompat) != 0) {
-    throw FormatError(16, "spec/container.md#header-features",
+    throw FormatError(field::kIncompat.at, "spec/container.md#header-features",
                       "file needs a feature that this program does not know");
   }
 
   // Read and check everything else.
   check_constants(p);
-  std::ranges::copy(bytes.subspan(40, 16), header.uuid.begin());
-  header.page_shift = load<std::uint8_t>(p, 56);
+  std::ranges::copy(bytes.subspan(kUuidAt, sizeof(Uuid)), header.uuid.begin());
+  header.page_shift = field::kPageShift.of(p);
   if (header.page_shift < 12 || header.page_shift > 20) {
-    throw FormatError(56, "spec/container.md#header-page-shift", "page_shift is not 12 to 20");
+    throw FormatError(field::kPageShift.at, "spec/container.md#header-page-shift",
+                      "page_shift is not 12 to 20");
   }
-  header.frame = {load<std::array<double, 3>>(p, kOriginAt), load<double>(p, kEdgeAt)};
+  header.frame = {field::kOrigin.of(p), field::kEdge.of(p)};
   check_frame(header.frame);
-  check_zero(bytes, kEdgeAt + 8, kHeaderHashAt);
-  check_zero(bytes, kHeaderHashAt + 8, kBlockBytes);
+  check_zero(bytes, field::kEdge.at + 8, field::kHash.at);
+  check_zero(bytes, field::kHash.at + 8, kBlockBytes);
   return header;
 }
 
 FileHeader decode_repeated_header(std::span<const std::byte> superblock) {
   Block block{};
-  store(block.data(), 0, kFileMagic);
-  std::ranges::copy(superblock.subspan(8, kHeaderHashAt - 8), block.begin() + 8);
-  store(block.data(), kHeaderHashAt, xxh3_64(std::span(block).first(kHeaderHashAt), kHeaderSeed));
+  field::kMagic.put(block.data(), kFileMagic);
+  std::ranges::copy(superblock.subspan(8, field::kHash.at - 8), block.begin() + 8);
+  field::kHash.put(block.data(), xxh3_64(std::span(block).first(field::kHash.at), kHeaderSeed));
   return decode_file_header(block);
 }
 
 void encode_directory_entry(const DirectoryEntry& entry,
                             std::span<std::byte, kDirectoryEntryBytes> out) noexcept {
   std::byte* const p = out.data();
-  store(p, 0, entry.offset);
-  store(p, 8, entry.stored_bytes);
-  store(p, 12, entry.raw_bytes);
-  store(p, 16, entry.payload_xxh3);
-  store(p, 24, static_cast<std::uint16_t>(entry.type));
-  store(p, 26, entry.group);
-  store(p, 28, entry.record_count);
+  entry_field::kOffset.put(p, entry.offset);
+  entry_field::kStoredBytes.put(p, entry.stored_bytes);
+  entry_field::kRawBytes.put(p, entry.raw_bytes);
+  entry_field::kPayloadXxh3.put(p, entry.payload_xxh3);
+  entry_field::kType.put(p, static_cast<std::uint16_t>(entry.type));
+  entry_field::kGroup.put(p, entry.group);
+  entry_field::kRecordCount.put(p, entry.record_count);
 }
 
 DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const FileHeader& file,
@@ -182,29 +208,30 @@ DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const Fi
 
   // Read the fields and check those that a page header has, too.
   DirectoryEntry entry;
-  entry.offset = load<std::uint64_t>(p, 0);
-  entry.stored_bytes = load<std::uint32_t>(p, 8);
-  entry.raw_bytes = load<std::uint32_t>(p, 12);
-  entry.payload_xxh3 = load<std::uint64_t>(p, 16);
-  entry.group = load<std::uint16_t>(p, 26);
-  entry.record_count = load<std::uint32_t>(p, 28);
-  const auto type = load<std::uint16_t>(p, 24);
+  entry.offset = entry_field::kOffset.of(p);
+  entry.stored_bytes = entry_field::kStoredBytes.of(p);
+  entry.raw_bytes = entry_field::kRawBytes.of(p);
+  entry.payload_xxh3 = entry_field::kPayloadXxh3.of(p);
+  entry.group = entry_field::kGroup.of(p);
+  entry.record_count = entry_field::kRecordCount.of(p);
+  const auto type = entry_field::kType.of(p);
   check_page_facts({type, entry.group, entry.stored_bytes, entry.raw_bytes, entry.record_count},
                    file);
   entry.type = static_cast<PageType>(type);
   if (entry.type == PageType::directory) {
-    throw FormatError(24, "spec/container.md#directory-listing", "directory lists itself");
+    throw FormatError(entry_field::kType.at, "spec/container.md#directory-listing",
+                      "directory lists itself");
   }
 
   // Check that the page lies between the header and the superblocks.
   constexpr char kExtent[] = "spec/container.md#directory-extent";
   if (entry.offset % kSectorBytes != 0) {
-    throw FormatError(0, kExtent, "page does not start on a sector");
+    throw FormatError(entry_field::kOffset.at, kExtent, "page does not start on a sector");
   }
   const std::uint64_t end = file_bytes < 2 * kBlockBytes ? 0 : file_bytes - 2 * kBlockBytes;
   if (entry.offset < kBlockBytes || entry.offset > end ||
       round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes) > end - entry.offset) {
-    throw FormatError(0, kExtent, "page lies outside the file's pages");
+    throw FormatError(entry_field::kOffset.at, kExtent, "page lies outside the file's pages");
   }
   return entry;
 }

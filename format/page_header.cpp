@@ -22,11 +22,28 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kPageHashAt = 56;
 constexpr std::uint16_t kNoLevel = 0xffff;
 constexpr std::uint32_t kMaxGroupCount = 0xffff;
 constexpr std::uint64_t kKeyLimit = std::uint64_t{1} << 63;  // halves of keys have 63 bits
 constexpr char kFields[] = "spec/container.md#page-fields";
+
+namespace field {
+constexpr Field<std::uint32_t> kMagic{0};
+constexpr Field<std::uint16_t> kType{4};
+constexpr Field<std::uint8_t> kCodec{6};
+constexpr Field<std::uint8_t> kFilter{7};
+constexpr Field<std::uint32_t> kPageId{8};
+constexpr Field<std::uint32_t> kStoredBytes{12};
+constexpr Field<std::uint32_t> kRawBytes{16};
+constexpr Field<std::uint16_t> kGroup{20};
+constexpr Field<std::uint16_t> kLevel{22};
+constexpr Field<std::uint32_t> kRecordCount{24};
+constexpr Field<std::uint32_t> kReserved{28};
+constexpr Field<std::uint64_t> kFirstKey{32};
+constexpr Field<std::uint64_t> kLastKey{40};
+constexpr Field<std::uint64_t> kPayloadXxh3{48};
+constexpr Field<std::uint64_t> kHash{56};
+}  // namespace field
 
 // Returns the seed of a page header's checksum (spec/checksums.md#page-seed).
 std::uint64_t page_seed(const Uuid& uuid, std::uint32_t page_id, std::uint16_t type) noexcept {
@@ -56,17 +73,19 @@ bool record_count_fits(const PageFacts& facts) noexcept {
 
 // Reads codec and filter and checks that a page of this type may have them.
 Coding decode_coding(const std::byte* p, PageType type) {
-  const auto codec = load<std::uint8_t>(p, 6), filter = load<std::uint8_t>(p, 7);
+  const auto codec = field::kCodec.of(p), filter = field::kFilter.of(p);
   constexpr char kCodec[] = "spec/container.md#page-codec";
-  if (codec > static_cast<std::uint8_t>(Codec::lz4)) throw FormatError(6, kCodec, "unknown codec");
+  if (codec > static_cast<std::uint8_t>(Codec::lz4))
+    throw FormatError(field::kCodec.at, kCodec, "unknown codec");
   if (type == PageType::directory && codec != 0)
-    throw FormatError(6, kCodec, "a directory page is compressed");
+    throw FormatError(field::kCodec.at, kCodec, "a directory page is compressed");
   constexpr char kFilter[] = "spec/container.md#page-filter";
   if (filter > static_cast<std::uint8_t>(Filter::columns))
-    throw FormatError(7, kFilter, "unknown filter");
-  if (filter != 0 && codec == 0) throw FormatError(7, kFilter, "a raw page is filtered");
+    throw FormatError(field::kFilter.at, kFilter, "unknown filter");
+  if (filter != 0 && codec == 0)
+    throw FormatError(field::kFilter.at, kFilter, "a raw page is filtered");
   if (filter != 0 && type != PageType::point && type != PageType::attribute) {
-    throw FormatError(7, kFilter, "a page of this type has no columns to filter");
+    throw FormatError(field::kFilter.at, kFilter, "a page of this type has no columns to filter");
   }
   return {static_cast<Codec>(codec), static_cast<Filter>(filter)};
 }
@@ -74,12 +93,13 @@ Coding decode_coding(const std::byte* p, PageType type) {
 void check_level_and_keys(const PageHeader& header) {
   const bool node = header.type == PageType::node;
   if (node ? header.level > kMaxLevel : header.level != kNoLevel) {
-    throw FormatError(22, kFields, "level does not suit the page's type");
+    throw FormatError(field::kLevel.at, kFields, "level does not suit the page's type");
   }
   const bool keyed = header.type != PageType::directory && header.type != PageType::meta;
   const std::uint64_t limit = keyed ? kKeyLimit : 1;
   if (header.last_key >= limit || header.first_key > header.last_key) {
-    throw FormatError(32, "spec/container.md#page-keys", "first_key or last_key is out of range");
+    throw FormatError(field::kFirstKey.at, "spec/container.md#page-keys",
+                      "first_key or last_key is out of range");
   }
 }
 
@@ -110,22 +130,22 @@ void encode_page_header(const PageHeader& header, const Uuid& uuid,
                         std::span<std::byte, kPageHeaderBytes> out) {
   const auto type = static_cast<std::uint16_t>(header.type);
   std::byte* const p = out.data();
-  store(p, 0, kPageMagic);
-  store(p, 4, type);
-  store(p, 6, static_cast<std::uint8_t>(header.coding.codec));
-  store(p, 7, static_cast<std::uint8_t>(header.coding.filter));
-  store(p, 8, header.page_id);
-  store(p, 12, header.stored_bytes);
-  store(p, 16, header.raw_bytes);
-  store(p, 20, header.group);
-  store(p, 22, header.level);
-  store(p, 24, header.record_count);
-  store(p, 28, std::uint32_t{0});
-  store(p, 32, header.first_key);
-  store(p, 40, header.last_key);
-  store(p, 48, header.payload_xxh3);
+  field::kMagic.put(p, kPageMagic);
+  field::kType.put(p, type);
+  field::kCodec.put(p, static_cast<std::uint8_t>(header.coding.codec));
+  field::kFilter.put(p, static_cast<std::uint8_t>(header.coding.filter));
+  field::kPageId.put(p, header.page_id);
+  field::kStoredBytes.put(p, header.stored_bytes);
+  field::kRawBytes.put(p, header.raw_bytes);
+  field::kGroup.put(p, header.group);
+  field::kLevel.put(p, header.level);
+  field::kRecordCount.put(p, header.record_count);
+  field::kReserved.put(p, std::uint32_t{0});
+  field::kFirstKey.put(p, header.first_key);
+  field::kLastKey.put(p, header.last_key);
+  field::kPayloadXxh3.put(p, header.payload_xxh3);
   const std::uint64_t seed = page_seed(uuid, header.page_id, type);
-  store(p, kPageHashAt, xxh3_64(std::span<const std::byte>(out).first(kPageHashAt), seed));
+  field::kHash.put(p, xxh3_64(std::span<const std::byte>(out).first(field::kHash.at), seed));
 }
 
 PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader& file) {
@@ -134,27 +154,27 @@ PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader
     throw FormatError(bytes.size(), "spec/container.md#page-header", "page header is truncated");
   }
   const std::byte* const p = bytes.data();
-  if (load<std::uint32_t>(p, 0) != kPageMagic) {
-    throw FormatError(0, "spec/container.md#page-magic", "no page starts here");
+  if (field::kMagic.of(p) != kPageMagic) {
+    throw FormatError(field::kMagic.at, "spec/container.md#page-magic", "no page starts here");
   }
   PageHeader header;
-  const auto type = load<std::uint16_t>(p, 4);
-  header.page_id = load<std::uint32_t>(p, 8);
+  const auto type = field::kType.of(p);
+  header.page_id = field::kPageId.of(p);
   const std::uint64_t seed = page_seed(file.uuid, header.page_id, type);
-  if (load<std::uint64_t>(p, kPageHashAt) != xxh3_64(bytes.first(kPageHashAt), seed)) {
-    throw FormatError(kPageHashAt, "spec/container.md#page-checksum",
+  if (field::kHash.of(p) != xxh3_64(bytes.first(field::kHash.at), seed)) {
+    throw FormatError(field::kHash.at, "spec/container.md#page-checksum",
                       "page header's checksum is wrong");
   }
 
   // Read the fields.
-  header.stored_bytes = load<std::uint32_t>(p, 12);
-  header.raw_bytes = load<std::uint32_t>(p, 16);
-  header.group = load<std::uint16_t>(p, 20);
-  header.level = load<std::uint16_t>(p, 22);
-  header.record_count = load<std::uint32_t>(p, 24);
-  header.first_key = load<std::uint64_t>(p, 32);
-  header.last_key = load<std::uint64_t>(p, 40);
-  header.payload_xxh3 = load<std::uint64_t>(p, 48);
+  header.stored_bytes = field::kStoredBytes.of(p);
+  header.raw_bytes = field::kRawBytes.of(p);
+  header.group = field::kGroup.of(p);
+  header.level = field::kLevel.of(p);
+  header.record_count = field::kRecordCount.of(p);
+  header.first_key = field::kFirstKey.of(p);
+  header.last_key = field::kLastKey.of(p);
+  header.payload_xxh3 = field::kPayloadXxh3.of(p);
 
   // Check their rules.
   check_page_facts({type, header.group, header.stored_bytes, header.raw_bytes, header.record_count},
@@ -162,10 +182,11 @@ PageHeader decode_page_header(std::span<const std::byte> bytes, const FileHeader
   header.type = static_cast<PageType>(type);
   header.coding = decode_coding(p, header.type);
   if ((header.coding.codec == Codec::raw) != (header.stored_bytes == header.raw_bytes)) {
-    throw FormatError(12, "spec/container.md#page-length",
+    throw FormatError(field::kStoredBytes.at, "spec/container.md#page-length",
                       "stored_bytes equals raw_bytes without codec raw, or differs with codec raw");
   }
-  if (load<std::uint32_t>(p, 28) != 0) throw FormatError(28, kFields, "reserved field is not zero");
+  if (field::kReserved.of(p) != 0)
+    throw FormatError(field::kReserved.at, kFields, "reserved field is not zero");
   check_level_and_keys(header);
   return header;
 }

@@ -22,6 +22,18 @@
 namespace ptc {
 namespace {
 
+// Fields of the payload, of a channel and of a text's head.
+namespace field {
+constexpr Field<std::uint32_t> kChannels{0};
+constexpr Field<std::uint32_t> kTexts{4};
+constexpr Field<std::uint8_t> kType{32};
+constexpr Field<std::uint8_t> kComponents{33};
+constexpr Field<std::uint16_t> kGroup{34};
+constexpr Field<std::uint32_t> kReserved{36};
+constexpr Field<std::uint32_t> kKeyBytes{0};
+constexpr Field<std::uint32_t> kValueBytes{4};
+}  // namespace field
+
 constexpr std::size_t kHeadBytes = 8;      // channel count, text count
 constexpr std::size_t kChannelBytes = 40;  // name[32], type, components, group, 0
 constexpr std::size_t kNameBytes = 32;
@@ -55,11 +67,11 @@ Channel decode_channel(std::span<const std::byte> bytes, std::size_t at) {
   const std::string_view field = as_text(bytes.first(kNameBytes));
   Channel channel;
   channel.name = field.substr(0, field.find('\0'));
-  channel.type = static_cast<ChannelType>(load<std::uint8_t>(bytes.data(), 32));
-  channel.components = load<std::uint8_t>(bytes.data(), 33);
-  channel.group = load<std::uint16_t>(bytes.data(), 34);
+  channel.type = static_cast<ChannelType>(field::kType.of(bytes.data()));
+  channel.components = field::kComponents.of(bytes.data());
+  channel.group = field::kGroup.of(bytes.data());
   const bool padded = field.find_first_not_of('\0', channel.name.size()) == std::string_view::npos;
-  if (!padded || load<std::uint32_t>(bytes.data(), 36) != 0) {
+  if (!padded || field::kReserved.of(bytes.data()) != 0) {
     throw FormatError(at, "spec/points.md#meta-zero", "channel's reserved bytes are not zero");
   }
   return channel;
@@ -71,8 +83,8 @@ std::pair<std::string_view, std::string_view> decode_text(std::span<const std::b
                                                           std::size_t at) {
   constexpr char kSize[] = "spec/points.md#meta-size";
   if (rest.size() < kTextHeadBytes) throw FormatError(at, kSize, "meta page is truncated");
-  const auto key_bytes = load<std::uint32_t>(rest.data(), 0);
-  const auto value_bytes = load<std::uint32_t>(rest.data(), 4);
+  const auto key_bytes = field::kKeyBytes.of(rest.data());
+  const auto value_bytes = field::kValueBytes.of(rest.data());
   rest = rest.subspan(kTextHeadBytes);
   if (key_bytes > rest.size() || value_bytes > rest.size() - key_bytes) {
     throw FormatError(at, kSize, "text runs past the end of the meta page");
@@ -101,17 +113,17 @@ std::size_t channel_bytes(ChannelType type) noexcept {
 std::vector<std::byte> encode_meta(const Meta& meta) {
   // Write the channels.
   std::vector<std::byte> out(kHeadBytes + kChannelBytes * meta.channels.size());
-  store(out.data(), 0, static_cast<std::uint32_t>(meta.channels.size()));
-  store(out.data(), 4, static_cast<std::uint32_t>(meta.text.size()));
+  field::kChannels.put(out.data(), static_cast<std::uint32_t>(meta.channels.size()));
+  field::kTexts.put(out.data(), static_cast<std::uint32_t>(meta.text.size()));
   for (std::size_t i = 0; i < meta.channels.size(); ++i) {
     const char* const wrong = fault(std::span(meta.channels).first(i + 1));
     if (wrong != nullptr) throw std::invalid_argument(std::string("encode_meta: ") + wrong);
     const Channel& channel = meta.channels[i];
     std::byte* const p = out.data() + kHeadBytes + kChannelBytes * i;
     std::ranges::copy(std::as_bytes(std::span(channel.name)), p);
-    store(p, 32, static_cast<std::uint8_t>(channel.type));
-    store(p, 33, channel.components);
-    store(p, 34, channel.group);
+    field::kType.put(p, static_cast<std::uint8_t>(channel.type));
+    field::kComponents.put(p, channel.components);
+    field::kGroup.put(p, channel.group);
   }
 
   // Append the texts.
@@ -121,8 +133,8 @@ std::vector<std::byte> encode_meta(const Meta& meta) {
           "encode_meta: a text's key is not a name, or its value is not UTF-8");
     }
     std::array<std::byte, kTextHeadBytes> head;
-    store(head.data(), 0, static_cast<std::uint32_t>(key.size()));
-    store(head.data(), 4, static_cast<std::uint32_t>(value.size()));
+    field::kKeyBytes.put(head.data(), static_cast<std::uint32_t>(key.size()));
+    field::kValueBytes.put(head.data(), static_cast<std::uint32_t>(value.size()));
     out.insert(out.end(), head.begin(), head.end());
     append_text(out, key);
     append_text(out, value);
@@ -135,8 +147,8 @@ Meta decode_meta(std::span<const std::byte> payload) {
   if (payload.size() < kHeadBytes) {
     throw FormatError(payload.size(), kSize, "meta page is truncated");
   }
-  const auto channel_count = load<std::uint32_t>(payload.data(), 0);
-  const auto text_count = load<std::uint32_t>(payload.data(), 4);
+  const auto channel_count = field::kChannels.of(payload.data());
+  const auto text_count = field::kTexts.of(payload.data());
   std::span<const std::byte> rest = payload.subspan(kHeadBytes);
   if (channel_count > rest.size() / kChannelBytes) {
     throw FormatError(0, kSize, "channels run past the end of the meta page");

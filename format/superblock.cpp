@@ -24,7 +24,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x5250555358435450;  // "PTCXSUPR", also the seed of the hash
+constexpr std::uint64_t kMagicNumber = 0x5250555358435450;  // "PTCXSUPR", also the seed of the hash
 constexpr std::size_t kHashAt = kBlockBytes - 8;
 constexpr std::size_t kIdentityAt = 8;  // bytes 8 to 119 are those of the file header
 constexpr std::size_t kIdentityBytes = 112;
@@ -34,15 +34,40 @@ constexpr std::array<std::array<std::size_t, 2>, 3> kReserved{
     {{172, 176}, {200, 232}, {kWriterAt + kWriterBytes, kHashAt}}};
 constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 48;
 
+namespace field {
+constexpr Field<std::uint64_t> kMagic{0};
+constexpr Field<std::uint64_t> kFileBytes{120};
+constexpr Field<std::uint32_t> kPageCount{128};
+constexpr Field<std::uint32_t> kDirectoryPages{132};
+constexpr Field<std::uint64_t> kDirectoryOffset{136};
+constexpr Field<std::uint64_t> kDirectoryXxh3{144};
+constexpr Field<std::uint32_t> kMetaPage{152};
+constexpr Field<std::uint32_t> kRootPage{156};
+constexpr Field<std::uint16_t> kRootSlot{160};
+constexpr Field<std::uint16_t> kLevels{162};
+constexpr Field<std::uint32_t> kLeafPoints{164};
+constexpr Field<std::uint32_t> kPointsPerPage{168};
+constexpr Field<std::uint64_t> kPoints{176};
+constexpr Field<std::uint64_t> kNodes{184};
+constexpr Field<std::uint64_t> kNodeGroups{192};
+constexpr Field<std::array<double, 3>> kBoundsLow{232};
+constexpr Field<std::array<double, 3>> kBoundsHigh{256};
+constexpr Field<double> kArea{280};
+constexpr Field<std::array<double, 3>> kFlux{288};
+constexpr Field<std::uint64_t> kContentLow{312};
+constexpr Field<std::uint64_t> kContentHigh{320};
+constexpr Field<std::uint64_t> kHash{kHashAt};
+}  // namespace field
+
 // Checks what binds the block to its file: magic, checksum, file header and length.
 void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
                   std::uint64_t file_bytes) {
-  if (bytes.size() < kBlockBytes || load<std::uint64_t>(bytes.data(), 0) != kMagic) {
-    throw FormatError(0, "spec/container.md#superblock-magic",
+  if (bytes.size() < kBlockBytes || field::kMagic.of(bytes.data()) != kMagicNumber) {
+    throw FormatError(field::kMagic.at, "spec/container.md#superblock-magic",
                       "no superblock at the end: the file is unfinished or truncated");
   }
   const std::byte* const p = bytes.data();
-  if (load<std::uint64_t>(p, kHashAt) != xxh3_64(bytes.first(kHashAt), kMagic)) {
+  if (field::kHash.of(p) != xxh3_64(bytes.first(kHashAt), kMagicNumber)) {
     throw FormatError(kHashAt, "spec/container.md#superblock-checksum",
                       "superblock's checksum is wrong");
   }
@@ -53,9 +78,9 @@ void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
     throw FormatError(kIdentityAt, "spec/container.md#superblock-header",
                       "superblock repeats another file header");
   }
-  const auto recorded = load<std::uint64_t>(p, 120);
+  const auto recorded = field::kFileBytes.of(p);
   if (recorded != file_bytes || file_bytes % kBlockBytes != 0) {
-    throw FormatError(120, "spec/container.md#superblock-length",
+    throw FormatError(field::kFileBytes.at, "spec/container.md#superblock-length",
                       "file has " + std::to_string(file_bytes) + " bytes, its superblock says " +
                           std::to_string(recorded));
   }
@@ -65,19 +90,22 @@ void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
 void check_directory(const Superblock& s) {
   constexpr char kPages[] = "spec/container.md#superblock-pages";
   if (s.page_count == 0 || s.page_count > kMaxPages) {
-    throw FormatError(128, kPages, "page_count is out of range");
+    throw FormatError(field::kPageCount.at, kPages, "page_count is out of range");
   }
   const std::uint32_t full = directory_entries_per_page(s.header);
   if (s.directory_pages != (s.page_count - 1) / full + 1) {
-    throw FormatError(132, kPages, "directory_pages does not suit page_count");
+    throw FormatError(field::kDirectoryPages.at, kPages,
+                      "directory_pages does not suit page_count");
   }
   const std::uint64_t bytes = directory_bytes(s.header, s.page_count);
   const std::uint64_t end = s.file_bytes < 2 * kBlockBytes ? 0 : s.file_bytes - 2 * kBlockBytes;
   if (s.directory_offset % kBlockBytes != 0 || s.directory_offset < kBlockBytes ||
       s.directory_offset > end || end - s.directory_offset != bytes) {
-    throw FormatError(136, kPages, "directory does not end at the superblocks");
+    throw FormatError(field::kDirectoryOffset.at, kPages,
+                      "directory does not end at the superblocks");
   }
-  if (s.meta_page >= s.page_count) throw FormatError(152, kPages, "meta_page is not a page");
+  if (s.meta_page >= s.page_count)
+    throw FormatError(field::kMetaPage.at, kPages, "meta_page is not a page");
 }
 
 // Checks the counts of points and nodes and the place of the root.
@@ -85,23 +113,24 @@ void check_tree(const Superblock& s) {
   constexpr char kRoot[] = "spec/container.md#superblock-root";
   constexpr char kCounts[] = "spec/container.md#superblock-counts";
   if (s.points > kMaxCount || s.nodes > kMaxCount || s.node_groups > s.nodes) {
-    throw FormatError(176, kCounts, "points, nodes or node_groups is out of range");
+    throw FormatError(field::kPoints.at, kCounts, "points, nodes or node_groups is out of range");
   }
   const bool empty = s.points == 0;
   if (empty != (s.nodes == 0) || empty != (s.node_groups == 0)) {
-    throw FormatError(176, kCounts, "nodes without points or points without nodes");
+    throw FormatError(field::kPoints.at, kCounts, "nodes without points or points without nodes");
   }
   if (empty ? s.root_page != kNoPage || s.root_slot != 0 : s.root_page >= s.page_count) {
-    throw FormatError(156, kRoot, "root_page is not a page, or not absent in an empty file");
+    throw FormatError(field::kRootPage.at, kRoot,
+                      "root_page is not a page, or not absent in an empty file");
   }
   if (s.levels > kMaxLevel + 1 || empty != (s.levels == 0)) {
-    throw FormatError(162, kRoot, "levels is out of range");
+    throw FormatError(field::kLevels.at, kRoot, "levels is out of range");
   }
   if (s.leaf_points > kMaxLeafPoints || (s.leaf_points == 0 && !empty)) {
-    throw FormatError(164, kCounts, "leaf_points is out of range");
+    throw FormatError(field::kLeafPoints.at, kCounts, "leaf_points is out of range");
   }
   if (s.points_per_page > points_per_page(s.header) || (s.points_per_page == 0 && !empty)) {
-    throw FormatError(168, kCounts, "points_per_page is out of range");
+    throw FormatError(field::kPointsPerPage.at, kCounts, "points_per_page is out of range");
   }
 }
 
@@ -111,14 +140,14 @@ void check_totals(const Superblock& s) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!std::isfinite(s.bounds_low[axis]) || !std::isfinite(s.bounds_high[axis]) ||
         s.bounds_low[axis] > s.bounds_high[axis]) {
-      throw FormatError(232, kTotals, "bounds are not finite or not ordered");
+      throw FormatError(field::kBoundsLow.at, kTotals, "bounds are not finite or not ordered");
     }
     if (!std::isfinite(s.flux[axis]) || s.flux[axis] < 0) {
-      throw FormatError(288, kTotals, "flux is not finite or negative");
+      throw FormatError(field::kFlux.at, kTotals, "flux is not finite or negative");
     }
   }
   if (!std::isfinite(s.area) || s.area < 0) {
-    throw FormatError(280, kTotals, "area is not finite or negative");
+    throw FormatError(field::kArea.at, kTotals, "area is not finite or negative");
   }
 }
 
@@ -142,31 +171,31 @@ Block encode_superblock(const Superblock& s) {
   // Write the fields; reserved bytes stay zero.
   Block block{};
   std::byte* const p = block.data();
-  store(p, 0, kMagic);
+  field::kMagic.put(p, kMagicNumber);
   encode_identity(s.header, block);
-  store(p, 120, s.file_bytes);
-  store(p, 128, s.page_count);
-  store(p, 132, s.directory_pages);
-  store(p, 136, s.directory_offset);
-  store(p, 144, s.directory_xxh3);
-  store(p, 152, s.meta_page);
-  store(p, 156, s.root_page);
-  store(p, 160, s.root_slot);
-  store(p, 162, s.levels);
-  store(p, 164, s.leaf_points);
-  store(p, 168, s.points_per_page);
-  store(p, 176, s.points);
-  store(p, 184, s.nodes);
-  store(p, 192, s.node_groups);
-  store(p, 232, s.bounds_low);
-  store(p, 256, s.bounds_high);
-  store(p, 280, s.area);
-  store(p, 288, s.flux);
-  store(p, 312, s.content_xxh3[0]);
-  store(p, 320, s.content_xxh3[1]);
+  field::kFileBytes.put(p, s.file_bytes);
+  field::kPageCount.put(p, s.page_count);
+  field::kDirectoryPages.put(p, s.directory_pages);
+  field::kDirectoryOffset.put(p, s.directory_offset);
+  field::kDirectoryXxh3.put(p, s.directory_xxh3);
+  field::kMetaPage.put(p, s.meta_page);
+  field::kRootPage.put(p, s.root_page);
+  field::kRootSlot.put(p, s.root_slot);
+  field::kLevels.put(p, s.levels);
+  field::kLeafPoints.put(p, s.leaf_points);
+  field::kPointsPerPage.put(p, s.points_per_page);
+  field::kPoints.put(p, s.points);
+  field::kNodes.put(p, s.nodes);
+  field::kNodeGroups.put(p, s.node_groups);
+  field::kBoundsLow.put(p, s.bounds_low);
+  field::kBoundsHigh.put(p, s.bounds_high);
+  field::kArea.put(p, s.area);
+  field::kFlux.put(p, s.flux);
+  field::kContentLow.put(p, s.content_xxh3[0]);
+  field::kContentHigh.put(p, s.content_xxh3[1]);
   std::ranges::copy(std::as_bytes(std::span(s.writer)), p + kWriterAt);
   // Seal everything before the checksum.
-  store(p, kHashAt, xxh3_64(std::span(block).first(kHashAt), kMagic));
+  field::kHash.put(p, xxh3_64(std::span(block).first(kHashAt), kMagicNumber));
   return block;
 }
 
@@ -179,24 +208,24 @@ Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader&
   Superblock s;
   s.header = file;
   s.file_bytes = file_bytes;
-  s.page_count = load<std::uint32_t>(p, 128);
-  s.directory_pages = load<std::uint32_t>(p, 132);
-  s.directory_offset = load<std::uint64_t>(p, 136);
-  s.directory_xxh3 = load<std::uint64_t>(p, 144);
-  s.meta_page = load<std::uint32_t>(p, 152);
-  s.root_page = load<std::uint32_t>(p, 156);
-  s.root_slot = load<std::uint16_t>(p, 160);
-  s.levels = load<std::uint16_t>(p, 162);
-  s.leaf_points = load<std::uint32_t>(p, 164);
-  s.points_per_page = load<std::uint32_t>(p, 168);
-  s.points = load<std::uint64_t>(p, 176);
-  s.nodes = load<std::uint64_t>(p, 184);
-  s.node_groups = load<std::uint64_t>(p, 192);
-  s.bounds_low = load<std::array<double, 3>>(p, 232);
-  s.bounds_high = load<std::array<double, 3>>(p, 256);
-  s.area = load<double>(p, 280);
-  s.flux = load<std::array<double, 3>>(p, 288);
-  s.content_xxh3 = {load<std::uint64_t>(p, 312), load<std::uint64_t>(p, 320)};
+  s.page_count = field::kPageCount.of(p);
+  s.directory_pages = field::kDirectoryPages.of(p);
+  s.directory_offset = field::kDirectoryOffset.of(p);
+  s.directory_xxh3 = field::kDirectoryXxh3.of(p);
+  s.meta_page = field::kMetaPage.of(p);
+  s.root_page = field::kRootPage.of(p);
+  s.root_slot = field::kRootSlot.of(p);
+  s.levels = field::kLevels.of(p);
+  s.leaf_points = field::kLeafPoints.of(p);
+  s.points_per_page = field::kPointsPerPage.of(p);
+  s.points = field::kPoints.of(p);
+  s.nodes = field::kNodes.of(p);
+  s.node_groups = field::kNodeGroups.of(p);
+  s.bounds_low = field::kBoundsLow.of(p);
+  s.bounds_high = field::kBoundsHigh.of(p);
+  s.area = field::kArea.of(p);
+  s.flux = field::kFlux.of(p);
+  s.content_xxh3 = {field::kContentLow.of(p), field::kContentHigh.of(p)};
   s.writer = decode_writer(bytes);
 
   // Check their rules and the reserved bytes.
