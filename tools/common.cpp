@@ -1,4 +1,8 @@
-// One place for parsing, checks of files, errors and output of all programs.
+// Parsing, checks of files, errors and output of all programs:
+//
+//   run(): common options -> parse -> check files -> body -> print facts or summary -> exit code
+//                              |           |          |
+//                              +-----------+----------+--> exception -> message -> exit code
 #include "tools/common.h"
 
 #include <algorithm>
@@ -21,20 +25,24 @@
 #include "engine/io/text/text.h"
 #include "format/error.h"
 #include "format/text.h"
+#include "tools/completion.h"
 #include "tools/field_names.h"
+#include "tools/help.h"
+#include "tools/option_text.h"
 #include "tools/values.h"
 
 namespace ptc {
 namespace {
 
-/// A version or feature that is too new is another thing than damage.
+/// Returns kUnsupported for a version or feature that is too new, kInvalidData for damage.
 ExitCode exit_code_of(const FormatError& error) {
   const bool newer =
       error.clause().ends_with("#header-version") || error.clause().ends_with("#header-features");
   return newer ? kUnsupported : kInvalidData;
 }
 
-/// Long work is not begun for an output that cannot be written.
+/// Refuses an output that cannot be written, before long work begins.
+/// @throws std::system_error
 void check_output(const std::filesystem::path& path) {
   const auto refuse = [&](std::errc code) {
     throw std::system_error(std::make_error_code(code), "open " + path.string());
@@ -49,14 +57,15 @@ void check_output(const std::filesystem::path& path) {
   }
 }
 
-/// @throws std::system_error when standard output does not take it, e.g. on a full disk
+/// Writes to standard output.
+/// @throws std::system_error when it does not take the text, for example on a full disk
 void print(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
     throw std::system_error(errno, std::generic_category(), "write to standard output");
   }
 }
 
-/// Refuses names that end in none of `endings`.
+/// Checks that a name ends in one of `endings`.
 std::function<std::string(const std::string&)> ends_in(const std::vector<std::string>& endings) {
   return [endings](const std::string& name) {
     const auto fits = [&](const std::string& ending) { return has_ending(name, ending); };
@@ -69,14 +78,15 @@ std::function<std::string(const std::string&)> ends_in(const std::vector<std::st
   };
 }
 
-/// The end of the program when an allocation fails, in whatever thread: destructors of libraries
-/// allocate, so that unwinding may end in std::terminate. What began before main() is armed too.
+/// Ends the program when an allocation fails in any thread. Unwinding is no way out: destructors of
+/// libraries allocate, so that it may end in std::terminate.
 [[noreturn]] void end_without_memory() {
   remove_temporaries();
   std::fprintf(stderr, "%s: out of memory\n", program_invocation_short_name);
   std::_Exit(kSystem);
 }
 
+// Installed before main(), so that allocations of static objects are covered, too.
 [[maybe_unused]] const std::new_handler before_main = std::set_new_handler(end_without_memory);
 
 }  // namespace
@@ -104,47 +114,69 @@ bool has_ending(const std::filesystem::path& path, const std::string& ending) {
 
 Command::Command(const std::string& name, const std::string& purpose, const std::string& examples,
                  const std::string& exit_codes)
-    : app_(purpose, name) {
-  app_.footer("Examples:\n" + examples + "\nExit codes: " + exit_codes);
-  app_.get_formatter()->column_width(34);
+    : app_(purpose.substr(0, purpose.find('\n')), name),
+      man_text_{.description =
+                    purpose.substr(std::min(app_.get_description().size() + 1, purpose.size())),
+                .exit_codes = exit_codes} {
+  app_.footer(examples);
+  app_.formatter(std::make_shared<HelpFormatter>());
   app_.set_help_flag();  // declared with the other common options, behind those of the program
 }
 
 void Command::add_common_options() {
-  constexpr char kGroup[] = "Common options";
+  constexpr char kGroup[] = "General";
   add_size(app_, "--memory", run_options_.memory_bytes,
-           "Cap on resident bytes, caches included: 256M, 2G")
+           "Cap on resident memory, caches included, such as 256M")
       ->group(kGroup);
-  add_integer(app_, "--threads", run_options_.threads, 0, 4096, "Threads; 0: as many as cores")
+  add_integer(app_, "--threads", run_options_.threads, 0, 4096,
+              "Number of threads; 0 means one for each core")
       ->group(kGroup);
   app_.add_option("--temp", run_options_.temp_dirs,
-                  "Directory for temporary files, again for more [default: the output's]")
+                  "Directory for temporary files; repeatable [default: that of the output]")
       ->type_name("DIR")
       ->allow_extra_args(false)
       ->check(CLI::Validator(CLI::ExistingDirectory).description(""))
       ->group(kGroup);
-  app_.add_flag("--progress", progress_, "Show stages on stderr: on a terminal a bar, else lines")
+  app_.add_flag("--progress", progress_,
+                "Show progress on standard error: a bar on a terminal, else lines")
       ->group(kGroup);
-  app_.add_flag("--quiet", quiet_, "No progress and no summary")->group(kGroup);
-  app_.add_flag("--json", json_, "Print facts and statistics as JSON, not a summary")
+  app_.add_flag("--quiet", quiet_, "Print neither progress nor a summary")->group(kGroup);
+  app_.add_flag("--json", json_, "Print facts and statistics as JSON instead of a summary")
       ->group(kGroup);
   app_.set_version_flag("--version", app_.get_name() + " " PTC_VERSION " (PTCX format 1.0)",
                         "Print the version and exit")
       ->group(kGroup);
   app_.set_help_flag("-h,--help", "Print this help and exit")->group(kGroup);
+  const auto generate = [this](const std::string& kind) {
+    throw CLI::CallForVersion(generated(kind), static_cast<int>(CLI::ExitCodes::Success));
+  };
+  app_.add_option_function<std::string>("--generate", generate)->group("");
+}
+
+std::string Command::generated(const std::string& kind) const {
+  if (kind == "man") return man_page(app_, man_text_);
+  if (kind == "bash") return bash_completion(app_);
+  if (kind == "zsh") return zsh_completion(app_);
+  if (kind == "fish") return fish_completion(app_);
+  refuse("--generate", kind, "man, bash, zsh or fish");
 }
 
 CLI::Option* Command::add_input(const std::string& name, std::filesystem::path& path,
+                                const std::vector<std::string>& endings,
                                 const std::string& description) {
   inputs_.push_back(&path);
-  return app_.add_option(name, path, description)->type_name("FILE");
+  return offer(app_.add_option(name, path, description), endings)
+      ->type_name("FILE")
+      ->group(kFilesGroup);
 }
 
 CLI::Option* Command::add_inputs(const std::string& name, std::vector<std::filesystem::path>& paths,
+                                 const std::vector<std::string>& endings,
                                  const std::string& description) {
   input_lists_.push_back(&paths);
-  return app_.add_option(name, paths, description)
+  return offer(app_.add_option(name, paths, description), endings)
       ->type_name("FILE")
+      ->group(kFilesGroup)
       ->allow_extra_args(name.front() != '-');
 }
 
@@ -152,8 +184,9 @@ CLI::Option* Command::add_output(const std::string& name, std::filesystem::path&
                                  const std::vector<std::string>& endings,
                                  const std::string& description) {
   outputs_.push_back(&path);
-  return app_.add_option(name, path, description)
+  return offer(app_.add_option(name, path, description), endings)
       ->type_name("FILE")
+      ->group(kFilesGroup)
       ->required()
       ->check(ends_in(endings));
 }
@@ -163,8 +196,9 @@ CLI::Option* Command::add_outputs(const std::string& name,
                                   const std::vector<std::string>& endings,
                                   const std::string& description) {
   output_lists_.push_back(&paths);
-  return app_.add_option(name, paths, description)
+  return offer(app_.add_option(name, paths, description), endings)
       ->type_name("FILE")
+      ->group(kFilesGroup)
       ->required()
       ->allow_extra_args(false)
       ->check(ends_in(endings));
@@ -184,7 +218,8 @@ void Command::check_files() const {
 int Command::report(const CLI::ParseError& error) const {
   if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
     const bool help = dynamic_cast<const CLI::CallForHelp*>(&error) != nullptr;
-    print(help ? app_.help() : std::string(error.what()) + "\n");
+    const std::string text = help ? app_.help() : error.what();  // the version, or --generate
+    print(text.ends_with('\n') ? text : text + "\n");
     return kDone;
   }
   std::fprintf(stderr, "%s: %s\nTry '%s --help'.\n", app_.get_name().c_str(),
@@ -211,7 +246,8 @@ int Command::perform(const std::function<Outcome(Progress&)>& body) const {
   if (json_) {
     outcome.facts["peak_resident_bytes"] = peak_resident_bytes();
     outcome.facts["cpu_seconds"] = cpu_seconds();
-    constexpr auto kReplace = nlohmann::json::error_handler_t::replace;  // names that are no UTF-8
+    constexpr auto kReplace =
+        nlohmann::json::error_handler_t::replace;  // of names that are not UTF-8
     const int indent = outcome.lines ? -1 : 2;
     std::string text;
     if (outcome.lines) {
@@ -235,10 +271,10 @@ int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>&
   try {
     add_common_options();
     remove_temporaries_on_signal();
-    std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+    std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error like a full disk
     int exit_code = kDone;
     return parse(argc, argv, exit_code) ? perform(body) : exit_code;
-  } catch (const CLI::ParseError& error) {  // of the body: what only it could judge
+  } catch (const CLI::ParseError& error) {  // of the body, for what only the body can judge
     return report(error);
   } catch (const FormatError& error) {
     return fail(exit_code_of(error), error.what());
@@ -250,9 +286,9 @@ int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>&
     return fail(kUsage, error.what());
   } catch (const std::bad_alloc&) {
     return fail(kSystem, "out of memory");
-  } catch (const std::runtime_error& error) {  // std::system_error, and what libraries refuse
+  } catch (const std::runtime_error& error) {  // std::system_error, and errors of libraries
     return fail(kSystem, error.what());
-  } catch (const std::exception& error) {  // a precondition was broken, by no fault of the user
+  } catch (const std::exception& error) {  // a broken precondition, which no user causes
     return fail(kInternal, std::string("internal error: ") + error.what() +
                                "; this is a defect of the program, please report it");
   }

@@ -1,4 +1,5 @@
-// What every program shares: the common options, the way from errors to exit codes, the result.
+// What every program shares: common options, checks of files, exit codes, output, and the texts
+// that the build asks each program for: man pages and completions of shells.
 #pragma once
 
 #include <filesystem>
@@ -12,76 +13,102 @@
 
 #include "engine/base/progress.h"
 #include "engine/ptc.h"
+#include "tools/man_page.h"
 
 namespace ptc {
 
-/// What a program's exit code says (spec/errors.md#exit-codes).
+/// The meaning of a program's exit code (spec/errors.md#exit-codes).
 enum ExitCode : int {
   kDone = 0,
   kInvalidData = 1,  ///< an input is missing, damaged or not what it should be; data differ
-  kUsage = 2,        ///< the command line asks for what cannot be
-  kSystem = 3,       ///< the machine refused: disk full, no memory
+  kUsage = 2,        ///< the command line asks for something impossible
+  kSystem = 3,       ///< the system refused: a full disk, no memory
   kUnsupported = 4,  ///< a version or feature of the format that this program does not know
   kLimit = 5,        ///< a cap that the user set is too small
   kUnfinished = 6,   ///< ptcverify: the file is unfinished or truncated
   kInternal = 7,     ///< a defect of the program: a precondition of the engine was broken
 };
 
-/// What a program tells when it is done.
+/// The result of a program.
 struct Outcome {
   nlohmann::ordered_json facts;  ///< for machines, printed with --json
   std::string summary;           ///< for people, printed otherwise; lines end with '\n'
-  ExitCode exit_code =
-      kDone;  ///< any other: the summary goes to standard error, whatever was asked for
-  /// Printed with --json, a line each, before the facts, which then take one line too.
+  /// With any other code than kDone the summary goes to standard error, also with --json or
+  /// --quiet.
+  ExitCode exit_code = kDone;
+  /// With --json these are printed before the facts, one line each; the facts then take one line,
+  /// too.
   std::optional<std::vector<nlohmann::ordered_json>> lines = std::nullopt;
 };
 
-/// What the exit codes mean, for --help.
+/// The exit codes for the man page: a line each, "CODE NAME: meaning".
 inline constexpr char kExitCodes[] =
-    "0 done, 1 data invalid or different, 2 usage, 3 system, 4 format not supported,\n"
-    "5 limit too small, 7 internal error.";
+    "0 done: the program did what was asked\n"
+    "1 data invalid or different: an input is missing, damaged or not what it should be\n"
+    "2 usage: the command line asks for something impossible\n"
+    "3 system: the system refused, for example because the disk is full\n"
+    "4 format not supported: the file needs a newer version of the program\n"
+    "5 limit too small: a cap such as --memory is too small; the message names the smallest that "
+    "works\n"
+    "7 internal error: the program has a defect; please report the message";
 
 /// A command line program: declare options on app(), then run().
+///
+/// run() adds the common options --memory, --threads, --temp, --progress, --quiet, --json,
+/// --version and --help, and one that --help does not show: "--generate man|bash|zsh|fish" prints
+/// the program's man page, or its completion for a shell.
 class Command {
  public:
-  /// @param examples  lines of the form "  COMMAND LINE", shown at the end of --help
+  /// @param purpose     first line: a sentence on what the program does, "Builds ..."; further
+  ///                    lines: paragraphs for the man page, with empty lines between them
+  /// @param examples    lines of the form "  COMMAND LINE", each of which may have a line
+  ///                    "  # Comment" before it; they end --help
+  /// @param exit_codes  as kExitCodes
   Command(const std::string& name, const std::string& purpose, const std::string& examples,
           const std::string& exit_codes = kExitCodes);
 
   [[nodiscard]] CLI::App& app() noexcept { return app_; }
-  /// --memory, --threads and --temp, once the body runs.
+  /// The values of --memory, --threads and --temp, which are known once the body runs.
   [[nodiscard]] const RunOptions& run_options() const noexcept { return run_options_; }
 
-  /// Declares a file that is read: it is opened before the body runs, and a file that cannot be is
-  /// bad data. `name` as CLI11 takes it: "scene" is positional, "--mesh" an option.
+  /// Declares a file that is read. It is opened before the body runs: a file that cannot be opened
+  /// or is empty is invalid data.
+  /// @param name     as CLI11 takes it: "SCENE" is positional, "--mesh" is an option
+  /// @param endings  endings that shells propose, such as ".ply"; others are taken, too
   CLI::Option* add_input(const std::string& name, std::filesystem::path& path,
-                         const std::string& description);
-  /// The same, any number of times; an option takes one path each time.
+                         const std::vector<std::string>& endings, const std::string& description);
+  /// Declares files that are read, checked as by add_input(). An option takes one path each time
+  /// that it is given.
   CLI::Option* add_inputs(const std::string& name, std::vector<std::filesystem::path>& paths,
-                          const std::string& description);
-  /// Declares what is written, "-o,--output" or positional, required unless that is taken back. Its
+                          const std::vector<std::string>& endings, const std::string& description);
+  /// Declares a file that is written. It is required until required(false) is called on it. Its
   /// directory must exist when the body runs.
-  /// @param endings  those allowed, e.g. ".exr"; what belongs to none is a usage error
+  /// @param name     "-o,--output" for an option, or positional
+  /// @param endings  endings that are allowed, such as ".exr"; any other is a usage error
   CLI::Option* add_output(const std::string& name, std::filesystem::path& path,
                           const std::vector<std::string>& endings, const std::string& description);
-  /// The same, any number of times but at least once.
+  /// Declares files that are written, at least one of them. The option takes one path each time
+  /// that it is given.
   CLI::Option* add_outputs(const std::string& name, std::vector<std::filesystem::path>& paths,
                            const std::vector<std::string>& endings, const std::string& description);
 
-  /// Parses, calls the body with the progress that was asked for, prints its outcome, and turns
-  /// whatever is thrown into a message on stderr and an exit code.
+  /// Parses the command line, calls the body with the progress that was asked for, prints its
+  /// outcome, and turns every exception into a message on standard error.
+  /// @return the exit code
   [[nodiscard]] int run(int argc, char** argv, const std::function<Outcome(Progress&)>& body);
 
  private:
   void add_common_options();
+  /// The text that --generate prints.
+  [[nodiscard]] std::string generated(const std::string& kind) const;
   void check_files() const;
-  /// False when there is nothing left to do: help, version, usage errors.
+  /// Returns false when nothing is left to do: after --help, --version and usage errors.
   [[nodiscard]] bool parse(int argc, char** argv, int& exit_code);
   [[nodiscard]] int perform(const std::function<Outcome(Progress&)>& body) const;
   [[nodiscard]] int report(const CLI::ParseError& error) const;
 
   CLI::App app_;
+  ManText man_text_;
   RunOptions run_options_;
   bool progress_ = false;
   bool quiet_ = false;
@@ -93,12 +120,12 @@ class Command {
   std::vector<const Paths*> output_lists_;
 };
 
-/// Refuses a file that cannot be opened or is empty. Whatever keeps it from being opened is the
-/// file's fault, unless the machine is out of means.
-/// @throws DataError, std::system_error
+/// Refuses a file that cannot be opened or is empty.
+/// @throws DataError when the file is at fault; std::system_error when the system is: it has no
+///         memory or descriptors left, or the disk does not answer
 void check_input(const std::filesystem::path& path);
 
-/// True when the name ends so, in upper or lower case.
+/// True when the name of a file ends in `ending`, in upper or lower case, and is longer.
 [[nodiscard]] bool has_ending(const std::filesystem::path& path, const std::string& ending);
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// Codecs, page sizes and expert settings from the command line.
+// Codecs, page sizes, lighting and expert settings from the command line.
 #include "tools/options.h"
 
 #include <string>
@@ -10,21 +10,35 @@
 
 namespace ptc {
 
+std::vector<std::string> mesh_endings() {
+  return {".obj", ".obj.gz", ".ply", ".ply.gz", ".off", ".off.gz", ".gltf", ".glb", ".stl"};
+}
+
+std::vector<std::string> input_endings() {
+  std::vector<std::string> endings = mesh_endings();
+  for (const char* cloud : {".xyz", ".xyzn", ".asc", ".txt"}) endings.emplace_back(cloud);
+  return endings;
+}
+
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count) {
-  return add_count(app, "--points", count, "Surfels wanted on the meshes; k, M, G count by 1000")
+  return add_count(app, "--points", count,
+                   "Number of surfels to place on the meshes\n"
+                   "The number is met within 2 %, less the surfels that lie buried inside solids "
+                   "and are left out. Clouds keep their points.")
       ->default_str(std::to_string(count / 1'000'000) + "M")
       ->group("Sampling");
 }
 
 CLI::Option* add_profile(CLI::App& app, Profile& profile) {
-  return add_choice<Profile>(
-      app, "--profile", profile,
-      {{"raw", Profile::raw},
-       {"exact", Profile::exact},
-       {"fast", Profile::fast},
-       {"compact", Profile::compact}},
-      "How points are kept: exact ones as they lie in memory (raw) or compressed; rounded to "
-      "0.001 of their radius, to decode fast or to be small");
+  return add_choice<Profile>(app, "--profile", profile,
+                             {{"raw", Profile::raw},
+                              {"exact", Profile::exact},
+                              {"fast", Profile::fast},
+                              {"compact", Profile::compact}},
+                             "How points are stored: raw, exact, fast or compact\n"
+                             "raw keeps points as they lie in memory. exact compresses them "
+                             "without loss. fast and compact round them to 0.001 of their radius: "
+                             "fast decodes in less time, compact takes fewer bytes.");
 }
 
 CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift) {
@@ -33,7 +47,8 @@ CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift) {
     sizes.emplace_back(std::to_string(1U << (shift - 10)) + "K", shift);
   }
   sizes.emplace_back("1M", 20);
-  return add_choice<std::uint8_t>(app, "--page-size", page_shift, sizes, "Bytes of a page")
+  return add_choice<std::uint8_t>(app, "--page-size", page_shift, sizes,
+                                  "Bytes of a page: a power of two from 4K to 1M")
       ->type_name("SIZE");
 }
 
@@ -43,43 +58,53 @@ CLI::Option* add_back_end(CLI::App& app, BackEnd& back_end) {
                               {"mmap", BackEnd::mmap},
                               {"direct", BackEnd::direct},
                               {"io_uring", BackEnd::io_uring}},
-                             "How pages are read. pread: through the system's file cache; mmap: "
-                             "from it in place, for files "
-                             "that do not change meanwhile; direct: past it; io_uring: past it, "
-                             "the next page meanwhile")
-      ->group("Expert");
+                             "How pages are read: pread, mmap, direct or io_uring\n"
+                             "pread reads through the file cache of the system. mmap reads in "
+                             "place from that cache; the file must not change meanwhile. direct "
+                             "bypasses the cache. io_uring bypasses it, too, and reads the next "
+                             "page in the background.")
+      ->group(kExpertGroup);
 }
 
 CLI::Option* add_bounces(CLI::App& app, unsigned& bounces) {
   return add_integer(app, "--bounces", bounces, 0, 1000,
-                     "Bounces of light off surfaces; each after the first shades all points of the "
-                     "scene once more. "
-                     "0: occlusion and sky alone, in less time");
+                     "Bounces of light; 0 gives occlusion and sky alone\n"
+                     "Every bounce but the last shades all points of the scene once more. 0 takes "
+                     "less time than 1.");
 }
 
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
-  constexpr char kGroup[] = "Expert";
   add_number(app, "--solid-angle", gather.solid_angle, 1e-6, 4 * kPiDouble,
-             "Clusters below it are not opened, sr")
-      ->group(kGroup);
+             "Solid angle in sr up to which a cluster is not opened")
+      ->type_name("SR")
+      ->group(kExpertGroup);
   add_number(app, "--parallax", gather.parallax, 0, kPiDouble,
-             "Receivers that see a cluster within this angle share it, rad")
-      ->group(kGroup);
+             "Angle in rad within which receivers share a cluster\n"
+             "Receivers form groups. A cluster whose directions from a group differ by less than "
+             "this is drawn once for the whole group.")
+      ->type_name("RAD")
+      ->group(kExpertGroup);
   add_number(app, "--inflation", gather.inflation, 0.01, 100,
-             "Footprint of a cluster that is not flat over its projected area, at most")
-      ->group(kGroup);
+             "Maximum footprint of a cluster over its projected area\n"
+             "The limit holds for clusters that are not flat.")
+      ->type_name("FACTOR")
+      ->group(kExpertGroup);
   add_integer(app, "--resolution", gather.resolution, 16, 64,
-              "Direction pixels along a cube edge, a multiple of 16")
+              "Pixels along an edge of the direction cube\n"
+              "A multiple of 16, from 16 to 64.")
       ->check([](const std::string& text) {
         const auto value = parse_number<unsigned>(text);
         return value && *value % 16 == 0 ? std::string() : "must be a multiple of 16, is " + text;
       })
-      ->group(kGroup);
+      ->type_name("PIXELS")
+      ->group(kExpertGroup);
   add_choice<Sides>(app, "--sides", gather.sides, {{"both", Sides::both}, {"front", Sides::front}},
-                    "Which sides of a surfel stop light")
-      ->group(kGroup);
-  add_number(app, "--lift", lift, 0, 100, "Receivers rise above their surfel by so many radii")
-      ->group(kGroup);
+                    "Sides of a surfel that block light: both or front\n"
+                    "front is faster, and right where no back side is ever seen.")
+      ->group(kExpertGroup);
+  add_number(app, "--lift", lift, 0, 100, "Height of receivers above their surfel, in its radii")
+      ->type_name("RADII")
+      ->group(kExpertGroup);
 }
 
 void add_error_option(CLI::App& app, std::optional<double>& error) {
@@ -89,16 +114,17 @@ void add_error_option(CLI::App& app, std::optional<double>& error) {
         parse_number<double>(std::string_view(text).substr(0, text.size() - (percent ? 1 : 0)));
     const double share = number.value_or(0) / (percent ? 100 : 1);
     if (!(share > 0 && share <= 1))
-      refuse("--error", text, "a share above 0 up to 1, as 2% or 0.02");
+      refuse("--error", text, "a share above 0 and at most 1, such as 2% or 0.02");
     error = share;
   };
   CLI::Option* option = app.add_option_function<std::string>(
       "--error", set,
-      "RMS error of occlusion and of light, each over its mean, against rays at the surfels, as 2% "
-      "or 0.02: takes the\n"
-      "cheapest settings that meet it at pilot receivers, or the finest, and says so, where none "
-      "does [default: the\n"
-      "expert settings]");
+      "Find the cheapest settings whose RMS error is at most SHARE, such as 2%\n"
+      "SHARE is a percentage or a number up to 1: 2% and 0.02 are the same. The error is that of "
+      "occlusion and of light, each relative to its mean, against rays that "
+      "are traced at the surfels. Settings are tried at pilot receivers. The cheapest ones that "
+      "meet the error are used; if none does, the finest are used, and the report says so. By "
+      "default the expert settings hold.");
   option->type_name("SHARE")->group("Quality");
   for (const char* name : {"--solid-angle", "--parallax", "--inflation", "--resolution"}) {
     option->excludes(app.get_option(name));
@@ -107,25 +133,27 @@ void add_error_option(CLI::App& app, std::optional<double>& error) {
 
 void add_estimate_option(CLI::App& app, bool& estimate) {
   app.add_flag("--estimate", estimate,
-               "Also write what occlusion and irradiance are off at each receiver, as estimated: "
-               "occlusion_error and\n"
-               "irradiance_error. Wants --error or --check")
+               "Also write the estimated error of each receiver\n"
+               "The channels are occlusion_error and irradiance_error. Requires --error or "
+               "--check.")
       ->group("Quality");
 }
 
 void add_tolerate_damage(CLI::App& app, bool& tolerate) {
   app.add_flag("--tolerate-damage", tolerate,
-               "Go on where a page of the scene is damaged, with the cluster above it in its "
-               "place, and tell how many and\n"
-               "a bound on the error; points on such pages are left out [default: stop]");
+               "Go on past damaged pages of the scene [default: stop]\n"
+               "The cluster above a damaged page stands in for it. The points on the page are "
+               "left out. The report states how many points that are, and a bound on the error.")
+      ->group("Quality");
 }
 
 void add_check_options(CLI::App& app, CheckRequest& check) {
-  constexpr char kGroup[] = "Quality";
   add_integer(app, "--check", check.receivers, 0, 10'000'000,
-              "Compare so many of the receivers with rays")
-      ->group(kGroup);
-  add_integer(app, "--check-rays", check.rays, 1, 1 << 24, "Rays for each of them")->group(kGroup);
+              "Number of receivers to compare with traced rays\n"
+              "The report states the error of occlusion and of irradiance at these receivers.")
+      ->group("Quality");
+  add_integer(app, "--check-rays", check.rays, 1, 1 << 24, "Rays for each receiver of --check")
+      ->group("Quality");
 }
 
 }  // namespace ptc

@@ -1,8 +1,11 @@
-// Options that several programs take.
+// Options that several programs take. Each function declares those in its comment and keeps a
+// reference to the value, which parsing sets.
 #pragma once
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -10,31 +13,37 @@
 
 namespace ptc {
 
-/// --points
+/// Endings of meshes that can be read, for shells to propose.
+[[nodiscard]] std::vector<std::string> mesh_endings();
+/// Endings of meshes and clouds that can be read, for shells to propose.
+[[nodiscard]] std::vector<std::string> input_endings();
+
+/// Declares --points COUNT, from 1.
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count);
-/// --profile raw|exact|fast|compact
+/// Declares --profile raw|exact|fast|compact.
 CLI::Option* add_profile(CLI::App& app, Profile& profile);
-/// --page-size, a power of two from 4K to 1M
+/// Declares --page-size SIZE, a power of two from 4K to 1M; `page_shift` is its logarithm.
 CLI::Option* add_page_size(CLI::App& app, std::uint8_t& page_shift);
-/// --io pread|mmap|direct|io_uring
+/// Declares --io pread|mmap|direct|io_uring.
 CLI::Option* add_back_end(CLI::App& app, BackEnd& back_end);
 
-/// --bounces
+/// Declares --bounces N, 0 to 1000.
 CLI::Option* add_bounces(CLI::App& app, unsigned& bounces);
 
-/// --solid-angle, --parallax, --inflation, --resolution, --sides, --lift
+/// Declares --solid-angle, --parallax, --inflation, --resolution, --sides and --lift.
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift);
 
-/// --error, which stands for all expert settings of the gather that trade time for error
+/// Declares --error SHARE, which stands for the settings of the gather that trade time for error
+/// and excludes them. @pre add_gather_options() was called
 void add_error_option(CLI::App& app, std::optional<double>& error);
 
-/// --estimate
+/// Declares --estimate.
 void add_estimate_option(CLI::App& app, bool& estimate);
 
-/// --tolerate-damage
+/// Declares --tolerate-damage.
 void add_tolerate_damage(CLI::App& app, bool& tolerate);
 
-/// --check and --check-rays
+/// Declares --check N and --check-rays N.
 void add_check_options(CLI::App& app, CheckRequest& check);
 
 }  // namespace ptc

@@ -1,4 +1,6 @@
-// ptcbuild: meshes and clouds to a lit, sorted, hierarchical container.
+// ptcbuild: builds a lit, sorted, hierarchical container from meshes and clouds.
+//
+//   command line -> Arguments -> BuildRequest -> build_container() -> facts and summary
 #include <fmt/format.h>
 
 #include "engine/pipeline/build/append.h"
@@ -12,17 +14,33 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Samples and lights meshes, reads clouds, sorts everything along the Z-curve under a memory\n"
-    "cap and writes a container with an octree.";
+    "Builds a lit PTCX container from meshes and point clouds.\n"
+    "Meshes are sampled into surfels: small discs with a position, a normal, a radius, a colour "
+    "and "
+    "the light that they reflect. Suns, point lights, the sky and emissive triangles light them by "
+    "shadow rays. Clouds keep their points and the light that they come with; a missing radius is "
+    "estimated from the neighbours.\n"
+    "\n"
+    "All points are sorted along the Z-curve within the cap on memory, and an octree is built over "
+    "them. What does not fit in memory goes through temporary files in the directory of the "
+    "output, "
+    "or in those that --temp names. They are removed however the program ends, unless --resume "
+    "keeps them. The room that they need is stated, and checked, before work begins.\n"
+    "\n"
+    "The same command gives the same bytes for any number of threads and any cap on memory.";
 constexpr char kExamples[] =
+    "  # Build a mesh on a ground before a wall, in the default light\n"
     "  ptcbuild dragon.ply --backdrop -o dragon.ptcx\n"
+    "  # Set the number of surfels, the sun and the sky\n"
     "  ptcbuild sponza.obj --points 20M --sun 30,60,4 --sky 0.5,0.6,0.8 -o sponza.ptcx\n"
-    "  ptcbuild scan.ply --memory 512M --progress -o scan.ptcx\n"
-    "  ptcbuild huge.ply --resume --temp . --temp /scratch -o huge.ptcx\n"
+    "  # Build a large cloud on two disks; the same command goes on after an interruption\n"
+    "  ptcbuild huge.ply --resume --memory 512M --temp . --temp /scratch -o huge.ptcx\n"
+    "  # Add a cloud to a container\n"
     "  ptcbuild annex.ply --append scan.ptcx -o scan.ptcx\n"
+    "  # Build a procedural city that is larger than memory\n"
     "  ptcbuild --city 100M --memory 1G --temp /scratch -o city.ptcx\n";
 
-/// What the command line says beyond the request itself.
+/// The request, and the arguments that are turned into it after parsing.
 struct Arguments {
   ptc::BuildRequest request;
   std::filesystem::path output;
@@ -34,18 +52,26 @@ struct Arguments {
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   CLI::App& app = command.app();
   ptc::BuildRequest& request = arguments.request;
-  CLI::Option* inputs =
-      command.add_inputs("inputs", request.inputs,
-                         "Meshes (OBJ, PLY, OFF, glTF, GLB) and clouds (PLY, XYZ), also .gz");
-  command.add_output("-o,--output", arguments.output, {".ptcx"}, "The container to write");
+  CLI::Option* inputs = command.add_inputs(
+      "INPUT", request.inputs, ptc::input_endings(),
+      "Mesh (OBJ, PLY, OFF, glTF, GLB, STL) or cloud (PLY, XYZ)\n"
+      "OBJ, PLY and OFF may be compressed by gzip; the name then ends in .gz. A PLY without faces "
+      "is a cloud. The names of XYZ clouds end in .xyz, .xyzn, .asc or .txt.");
+  command.add_output("-o,--output", arguments.output, {".ptcx"}, "Container to write (.ptcx)");
+  command.add_input(
+      "--append", request.append, {".ptcx"},
+      "Add the inputs to the points of this container\n"
+      "Its points are merged with those of the inputs and not sorted again. Its lights "
+      "hold; its profile, page size and leaves hold unless options say otherwise. The "
+      "output may have the same name: the old file stays until the new one is complete. "
+      "A container that was shaded is refused.");
   ptc::add_count(app, "--city", request.city_points,
-                 "A procedural city of about so many points, no inputs")
-      ->excludes(inputs);
-  command
-      .add_input("--append", request.append,
-                 "A container whose points, lights and profile go before the inputs")
-      ->excludes("--city");
-  app.add_flag("--backdrop", request.backdrop, "Set the meshes on a ground before a red wall");
+                 "Build a procedural city of about COUNT points instead of inputs")
+      ->excludes(inputs)
+      ->excludes("--append")
+      ->group(ptc::kFilesGroup);
+  app.add_flag("--backdrop", request.backdrop, "Set the meshes on a ground before a red wall")
+      ->group(ptc::kFilesGroup);
 }
 
 void declare_sampling(CLI::App& app, Arguments& arguments) {
@@ -53,23 +79,31 @@ void declare_sampling(CLI::App& app, Arguments& arguments) {
   ptc::SamplingOptions& sampling = arguments.request.sampling;
   CLI::Option* points = ptc::add_points(app, sampling.count);
   ptc::add_number(app, "--spacing", sampling.spacing, 1e-30, 1e30,
-                  "Distance between neighbours instead, scene units")
+                  "Distance between neighbouring surfels, in scene units")
+      ->type_name("LENGTH")
       ->default_str("")
       ->excludes(points)
       ->group(kGroup);
-  arguments.camera.declare(app, "Sample finer where this camera looks close");
+}
+
+void declare_camera(CLI::App& app, Arguments& arguments) {
+  ptc::SamplingOptions& sampling = arguments.request.sampling;
+  arguments.camera.declare(app, "Camera position and target: samples nearby surfaces more finely");
   ptc::add_number(app, "--pixels-per-surfel", sampling.pixels_per_surfel, 0.01, 1000,
-                  "At most so many pixels between neighbours in its view")
+                  "Maximum distance of neighbours in its picture, in pixels")
+      ->type_name("N")
       ->group("Camera");
   ptc::add_number(app, "--finest", sampling.finest, 0.001, 1,
-                  "But never below this share of the spacing")
+                  "Minimum distance of neighbours, a share of the spacing")
+      ->type_name("SHARE")
       ->group("Camera");
 }
 
 void declare_lights(CLI::App& app, Arguments& arguments) {
   arguments.lights.declare(app);
   app.add_flag("--no-default-lights", arguments.no_default_lights,
-               "Without any light: no sun from 40,50 and no bluish sky of 0.8")
+               "Leave out the default sun (40,50) and bluish sky\n"
+               "They light meshes when no light is given and none emits light.")
       ->group("Lights");
   ptc::add_light_sampling(app, arguments.request.sampling.lights);
 }
@@ -78,25 +112,33 @@ void declare_container(CLI::App& app, ptc::BuildRequest& request) {
   ptc::add_profile(app, request.profile)->group("Container");
   ptc::add_page_size(app, request.page_shift)->group("Container");
   ptc::add_integer(app, "--leaf", request.tree.leaf_points, 1, ptc::kMaxLeafPoints,
-                   "Cells with no more points are not split")
+                   "Maximum number of points in a leaf of the octree")
       ->group("Container");
   ptc::add_integer(app, "--levels-per-stream", request.tree.levels_per_stream, 1, 63,
-                   "Octree levels that share a stream of node pages")
-      ->group("Expert");
+                   "Octree levels that share one stream of node pages")
+      ->group(ptc::kExpertGroup);
 }
 
 void declare_resume(CLI::App& app, ptc::BuildRequest& request) {
-  constexpr char kGroup[] = "Resume";
-  CLI::Option* resume = app.add_flag("--resume", request.resume,
-                                     "Leave what it takes to go on, and go on with what there is")
-                            ->group(kGroup);
+  constexpr char kGroup[] = "Resuming";
+  CLI::Option* resume =
+      app.add_flag(
+             "--resume", request.resume,
+             "Resume an interrupted build, and keep what a later run needs\n"
+             "The same command, with any --memory, --threads and further --temp directories, "
+             "comes to the same bytes. The state lies next to the output in files whose names "
+             "begin with OUTPUT.resume, and in the directories for temporary files. It is "
+             "removed when the container is complete. All points go through temporary files. "
+             "An unfinished sort starts again.")
+          ->group(kGroup);
   ptc::add_count(app, "--checkpoint", request.checkpoint_points,
-                 "Points that are built again at most, about")
+                 "Maximum number of sorted points to build again, about")
+      ->default_str("4M")
       ->needs(resume)
       ->group(kGroup);
 }
 
-/// What is not given is that of the scene which is added to.
+/// Takes the settings that are not given from the scene that is appended to.
 void adopt_settings(Arguments& arguments, ptc::Command& command) {
   if (arguments.lights.given() || arguments.no_default_lights) {
     throw CLI::ExcludesError("--append", "lights: the scene has its own");
@@ -111,14 +153,14 @@ void adopt_settings(Arguments& arguments, ptc::Command& command) {
 ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
   ptc::BuildRequest& request = arguments.request;
   if (request.inputs.empty() && request.city_points == 0) {
-    throw CLI::RequiredError("a mesh, a cloud or --city");
+    throw CLI::RequiredError("INPUT or --city");
   }
   request.run = command.run_options();
   request.sampling.camera = arguments.camera.camera();
   if (arguments.lights.given() || arguments.no_default_lights)
     request.lights = arguments.lights.rig();
   if (request.city_points > 0 && arguments.lights.given())
-    throw CLI::ExcludesError("--city", "lights: it has its own");
+    throw CLI::ExcludesError("--city", "lights: the city has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);
   const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
 
@@ -144,6 +186,7 @@ int main(int argc, char** argv) {
   declare_sampling(command.app(), arguments);
   declare_lights(command.app(), arguments);
   declare_container(command.app(), arguments.request);
+  declare_camera(command.app(), arguments);
   declare_resume(command.app(), arguments.request);
   return command.run(argc, argv,
                      [&](ptc::Progress& progress) { return build(arguments, command, progress); });

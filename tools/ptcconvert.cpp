@@ -1,4 +1,9 @@
-// ptcconvert: containers to clouds, clouds and meshes to containers, containers to containers.
+// ptcconvert: converts between containers, clouds and meshes.
+//
+//   input        output
+//   container    .ply, .xyz    container_to_ply(), container_to_xyz()
+//   container    .ptcx         recode_container()
+//   cloud, mesh  .ptcx         build_container()
 #include <fmt/format.h>
 
 #include "engine/pipeline/budgets.h"
@@ -11,12 +16,16 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Converts by the names' endings: a container to .ply (with all channels) or .xyz, a cloud or "
-    "a\n"
-    "mesh to .ptcx, a container to .ptcx in another profile or page size.";
+    "Converts containers, clouds and meshes into one another.\n"
+    "The ending of OUTPUT says what to write. A container becomes a .ply with all its channels, an "
+    ".xyz with its points, or a .ptcx in another profile or page size. A cloud or a mesh becomes a "
+    ".ptcx as ptcbuild makes it, with the default light.";
 constexpr char kExamples[] =
+    "  # Write all points and channels as a cloud\n"
     "  ptcconvert lit.ptcx lit.ply\n"
-    "  ptcconvert scan.xyz scan.ptcx --temp /scratch\n"
+    "  # Make a container of a cloud that is larger than memory\n"
+    "  ptcconvert scan.xyz scan.ptcx --memory 512M --temp /scratch\n"
+    "  # Store a container in fewer bytes\n"
     "  ptcconvert scene.ptcx small.ptcx --profile compact --page-size 16K\n";
 
 struct Arguments {
@@ -47,8 +56,8 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
   const bool to_container = ptc::has_ending(arguments.output, ".ptcx");
   if (!ptc::is_container(arguments.input)) {
     if (to_container) return build(arguments, run, progress);
-    throw CLI::ValidationError("output", "clouds and meshes are converted to .ptcx only; '" +
-                                             arguments.output.string() + "' is no such name");
+    throw CLI::ValidationError("OUTPUT", "clouds and meshes are converted to .ptcx only, not to '" +
+                                             arguments.output.string() + "'");
   }
   const ptc::ContainerReader container(arguments.input);
   if (to_container) {
@@ -69,9 +78,12 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
 int main(int argc, char** argv) {
   ptc::Command command("ptcconvert", kPurpose, kExamples);
   Arguments arguments;
-  command.add_input("input", arguments.input, "Container, cloud or mesh")->required();
-  command.add_output("output", arguments.output, {".ptcx", ".ply", ".xyz"},
-                     "What to write: .ptcx, .ply or .xyz");
+  std::vector<std::string> endings = ptc::input_endings();
+  endings.insert(endings.begin(), ".ptcx");
+  command.add_input("INPUT", arguments.input, endings, "Container, cloud or mesh to read")
+      ->required();
+  command.add_output("OUTPUT", arguments.output, {".ptcx", ".ply", ".xyz"},
+                     "File to write (.ptcx, .ply or .xyz)");
   ptc::add_points(command.app(), arguments.sampling.count);
   ptc::add_profile(command.app(), arguments.profile)->group("Container");
   const CLI::Option* page_size =

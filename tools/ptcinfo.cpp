@@ -1,4 +1,4 @@
-// ptcinfo: what a container holds, from its header, superblock, directory and meta page.
+// ptcinfo: prints what a container holds, from its header, superblock, directory and meta page.
 #include <map>
 
 #include <fmt/format.h>
@@ -16,9 +16,14 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr char kPurpose[] = "Prints what a container holds; reads none of its points and nodes.";
+constexpr char kPurpose[] =
+    "Prints what a container holds, without reading its points and nodes.\n"
+    "The summary has the numbers of points, nodes and pages, the bounds in scene units, the bytes "
+    "and the channels. --json adds the record of the build: inputs, lights, camera and settings.";
 constexpr char kExamples[] =
+    "  # Print a summary\n"
     "  ptcinfo scene.ptcx\n"
+    "  # Read one figure in a script\n"
     "  ptcinfo scene.ptcx --json | python3 -c 'import json,sys; "
     "print(json.load(sys.stdin)[\"points\"])'\n";
 
@@ -36,7 +41,8 @@ std::string type_name(ptc::ChannelType type) {
   return "unknown";
 }
 
-/// Pages of one type, in the file with headers and padding left out, and decoded.
+/// Pages of one type: their number, their bytes in the file without headers and padding, and their
+/// bytes once decoded.
 struct Share {
   std::uint64_t pages = 0;
   std::uint64_t stored_bytes = 0;
@@ -55,8 +61,8 @@ std::map<ptc::PageType, Share> shares_of(const ptc::ContainerReader& container) 
   return shares;
 }
 
-/// A page that compression does not shorten is stored raw whatever the codec, so the codec of a
-/// file is that of the first page that was shortened.
+/// The codec of a file. A page that compression does not shorten is stored raw whatever the codec,
+/// so this is the codec of the first page that was shortened; "raw" when none was.
 std::string codec_of(const ptc::ContainerReader& container) {
   for (std::uint32_t page = 0; page < container.page_count(); ++page) {
     if (container.entry(page).stored_bytes == container.entry(page).raw_bytes) continue;
@@ -113,11 +119,13 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   return facts;
 }
 
-/// Refuses a cap that does not hold the file's directory and the texts of its meta page, before
-/// they are read.
+/// Refuses a cap that is too small for the directory of the file and the texts of its meta page,
+/// before they are read.
+/// @throws LimitError
 void require_memory(const std::filesystem::path& path, const ptc::RunOptions& run) {
-  constexpr std::uint64_t kTexts =
-      16;  // page, decoded, as JSON, printed: there control characters take six bytes
+  // Copies of a page of texts: stored, decoded, as JSON, printed. In print a control character
+  // takes six bytes.
+  constexpr std::uint64_t kTexts = 16;
   const ptc::InputFile file(path);
   const ptc::Superblock superblock = ptc::read_superblock(file, ptc::read_file_header(file));
   const std::uint64_t texts = kTexts << superblock.header.page_shift;
@@ -127,7 +135,7 @@ void require_memory(const std::filesystem::path& path, const ptc::RunOptions& ru
   budget.require();
 }
 
-/// Text of a file as people may see it: in quotes, with no character that a terminal would obey.
+/// A text from a file, made safe to print: in quotes, without characters that a terminal obeys.
 std::string quoted(const ordered_json& text) {
   return text.dump(-1, ' ', true);
 }
@@ -167,7 +175,7 @@ std::string summary_of(const ordered_json& facts) {
 int main(int argc, char** argv) {
   ptc::Command command("ptcinfo", kPurpose, kExamples);
   std::filesystem::path file;
-  command.add_input("file", file, "The container to look at")->required();
+  command.add_input("FILE", file, {".ptcx"}, "Container to look at")->required();
   return command.run(argc, argv, [&](ptc::Progress&) -> ptc::Outcome {
     require_memory(file, command.run_options());
     const ptc::ContainerReader container(file);

@@ -1,4 +1,4 @@
-// ptcrender: a picture of a scene, lit directly by rays and indirectly by its surfels.
+// ptcrender: renders a picture of a scene, lit directly by rays and indirectly by its surfels.
 #include <set>
 
 #include "engine/base/error.h"
@@ -12,12 +12,23 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Renders a picture: direct light by rays, indirect light gathered from the container.";
+    "Renders a picture of a container, with direct and indirect light.\n"
+    "Rays from the camera meet the meshes, or the surfels of the container when no mesh is given. "
+    "Direct light comes by shadow rays from the lights and the sky; indirect light is gathered "
+    "from "
+    "the surfels.\n"
+    "\n"
+    "An .exr holds the picture in linear light, in W/m^2/sr, and the layers direct, indirect, "
+    "occlusion, bent_normal and albedo. A .png holds one of them for display.";
 constexpr char kExamples[] =
+    "  # Render a mesh with the light of its container\n"
     "  ptcrender dragon.ptcx --mesh dragon.ply --backdrop -o dragon.png\n"
+    "  # Choose the camera and write all layers\n"
     "  ptcrender room.ptcx --camera 0,1.6,4,0,1.2,0 --fov 50 --size 1920x1080 -o room.exr\n"
-    "  ptcrender dragon.ptcx --error 3% --check 1000 -o dragon.exr\n"
-    "  ptcrender city.ptcx --memory 512M --samples 16 --exposure 0.5 --progress -o city.png\n";
+    "  # Write the picture, and its occlusion as a picture of its own\n"
+    "  ptcrender room.ptcx -o room.png --layer occlusion=occlusion.png\n"
+    "  # Meet an error of 3 %, and measure the error at 1000 receivers\n"
+    "  ptcrender dragon.ptcx --error 3% --check 1000 -o dragon.exr\n";
 
 struct Arguments {
   ptc::RenderRequest request;
@@ -34,42 +45,48 @@ void add_layers(ptc::Command& command, Arguments& arguments) {
     const bool known = kLayers.contains(text.substr(0, equals)) && ptc::has_ending(text, ".png");
     return known && equals != std::string::npos
                ? std::string()
-               : "expects direct=, indirect=, occlusion= or albedo= and a name in .png, not '" +
+               : "expects direct=, indirect=, occlusion= or albedo= and the name of a .png, not '" +
                      text + "'";
   };
-  command.app()
-      .add_option_function<std::vector<std::string>>(
-          "--layer",
-          [&](const std::vector<std::string>& values) {
-            for (const std::string& text : values) {
-              const std::size_t equals = text.find('=');
-              arguments.layers.push_back({text.substr(equals + 1), text.substr(0, equals)});
-            }
-          },
-          "Also write direct, indirect, occlusion or albedo as a PNG; repeatable")
-      ->type_name("LAYER=FILE.png")
+  const auto set = [&](const std::vector<std::string>& values) {
+    for (const std::string& text : values) {
+      const std::size_t equals = text.find('=');
+      arguments.layers.push_back({text.substr(equals + 1), text.substr(0, equals)});
+    }
+  };
+  CLI::Option* layers = command.app().add_option_function<std::vector<std::string>>(
+      "--layer", set, "Also write direct, indirect, occlusion or albedo as PNG; repeatable");
+  ptc::offer(layers, {"direct=", "indirect=", "occlusion=", "albedo="})
+      ->type_name("LAYER=FILE")
+      ->group(ptc::kFilesGroup)
       ->allow_extra_args(false)
       ->check(check);
 }
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   ptc::RenderRequest& request = arguments.request;
-  command.add_input("scene", request.scene, "Container that gives the indirect light")->required();
+  command.add_input("SCENE", request.scene, {".ptcx"}, "Container that gives the indirect light")
+      ->required();
   command.add_outputs("-o,--output", arguments.outputs, {".exr", ".png"},
-                      "The picture: .exr with all layers, or .png; repeatable");
+                      "Picture to write (.exr with all layers, or .png); repeatable");
   add_layers(command, arguments);
-  command.add_inputs("--mesh", request.meshes,
-                     "Mesh that the camera sees, repeatable [default: the surfels themselves]");
-  command.app().add_flag("--backdrop", request.backdrop,
-                         "Set the meshes on a ground before a red wall, as ptcbuild does");
+  command.add_inputs("--mesh", request.meshes, ptc::mesh_endings(),
+                     "Mesh that the camera sees; repeatable [default: the surfels]");
+  command.app()
+      .add_flag("--backdrop", request.backdrop,
+                "Set the meshes on a ground before a red wall, as ptcbuild does")
+      ->group(ptc::kFilesGroup);
 }
 
 void declare_picture(CLI::App& app, Arguments& arguments) {
-  constexpr char kGroup[] = "Picture";
+  constexpr char kGroup[] = "Camera";
   arguments.camera.declare(
-      app, "Its place and what it looks at [default: the mesh's, the build's, a view of all]");
+      app,
+      "Camera position and target [default: from the files]\n"
+      "By default the camera is that of the mesh. Without one it is the camera of the build, and "
+      "without that, one that sees the whole scene.");
   ptc::add_integer(app, "--samples", arguments.request.samples, 1, 4096,
-                   "Rays a pixel, a square number")
+                   "Rays for each pixel, a square number")
       ->check(CLI::Validator(
           [](std::string& text) {
             const std::uint64_t count = std::stoull(text);
@@ -80,20 +97,23 @@ void declare_picture(CLI::App& app, Arguments& arguments) {
           },
           ""))
       ->group(kGroup);
-  ptc::add_number(app, "--exposure", arguments.request.exposure, -64, 64, "Stops, for a .png")
+  ptc::add_number(app, "--exposure", arguments.request.exposure, -64, 64,
+                  "Exposure of a .png, in stops")
+      ->type_name("STOPS")
       ->group(kGroup);
 }
 
 void declare_lights(CLI::App& app, Arguments& arguments) {
   arguments.lights.declare(app);
+  ptc::add_bounces(app, arguments.request.bounces)->group("Lights");
   ptc::add_light_sampling(app, arguments.request.light_sampling);
 }
 
-/// A cloud would be passed over in silence: the camera would see the surfels instead.
+/// Refuses clouds, which would be ignored in silence: the camera would see the surfels instead.
 void refuse_clouds(const std::vector<std::filesystem::path>& meshes) {
   for (const std::filesystem::path& path : meshes) {
     if (!ptc::is_point_file(path)) continue;
-    throw ptc::DataError(path.string() + ": offset 0: a cloud, where --mesh takes a mesh");
+    throw ptc::DataError(path.string() + ": offset 0: this is a cloud; --mesh takes a mesh");
   }
 }
 
@@ -122,13 +142,12 @@ int main(int argc, char** argv) {
   declare_scene(command, arguments);
   declare_picture(command.app(), arguments);
   declare_lights(command.app(), arguments);
-  ptc::add_bounces(command.app(), arguments.request.bounces);
   ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
   ptc::add_error_option(command.app(), arguments.request.error);
-  ptc::add_estimate_option(command.app(), arguments.request.estimate);
-  ptc::add_back_end(command.app(), arguments.request.back_end);
-  ptc::add_tolerate_damage(command.app(), arguments.request.tolerate_damage);
   ptc::add_check_options(command.app(), arguments.request.check);
+  ptc::add_estimate_option(command.app(), arguments.request.estimate);
+  ptc::add_tolerate_damage(command.app(), arguments.request.tolerate_damage);
+  ptc::add_back_end(command.app(), arguments.request.back_end);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     return render(arguments, command.run_options(), progress);
   });

@@ -1,4 +1,4 @@
-// ptcshade: the light that arrives at every point of a scene, or at given receivers.
+// ptcshade: computes the light that arrives at every point of a scene, or at given receivers.
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"
@@ -8,13 +8,27 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Gathers occlusion, bent normal and indirect light at every point of a container, or at other\n"
-    "receivers, and writes them as channels of a container or columns of a PLY.";
+    "Computes occlusion and indirect light at the points of a container.\n"
+    "The light is gathered from the surfels of the container: clusters of the octree stand for "
+    "surfels that are far away. The receivers are the points of the container or those of another "
+    "file.\n"
+    "\n"
+    "The output has the channels occlusion (0 to 1), bent_normal (the mean direction in which a "
+    "point is not covered), irradiance (from surfaces, in W/m^2), sky (irradiance from the sky) "
+    "and "
+    "indirect (reflected light: albedo / pi times the sum of irradiance and sky). A .ptcx output "
+    "is "
+    "a container with these channels; in a .ply they are columns.";
 constexpr char kExamples[] =
+    "  # Shade every point of a container\n"
     "  ptcshade dragon.ptcx -o lit.ptcx\n"
+    "  # Shade a scene that is larger than memory, and show progress\n"
     "  ptcshade city.ptcx --memory 1G --threads 8 --progress -o lit.ptcx\n"
+    "  # Let light bounce four times\n"
     "  ptcshade room.ptcx --bounces 4 -o lit.ptcx\n"
+    "  # Meet an error of 2 %, and measure the error at 1000 points\n"
     "  ptcshade dragon.ptcx --error 2% --check 1000 -o lit.ptcx\n"
+    "  # Shade probes from another file under a grey sky\n"
     "  ptcshade room.ptcx --receivers probes.ply --sky 0.4 -o probes-lit.ply\n";
 
 }  // namespace
@@ -25,23 +39,26 @@ int main(int argc, char** argv) {
   ptc::ShadeRequest request;
   std::filesystem::path output;
   ptc::LightArguments lights;
-  command.add_input("scene", request.scene, "Container whose surfels occlude and emit")->required();
-  command.add_output("-o,--output", output, {".ptcx", ".ply"}, "What to write: .ptcx or .ply");
-  command.add_input("--receivers", request.receivers,
-                    "Cloud or container to shade [default: the scene's own points]");
+  command
+      .add_input("SCENE", request.scene, {".ptcx"},
+                 "Container whose surfels cast shadows and light")
+      ->required();
+  command.add_output("-o,--output", output, {".ptcx", ".ply"}, "File to write (.ptcx or .ply)");
+  command.add_input("--receivers", request.receivers, {".ptcx", ".ply", ".ply.gz", ".xyz"},
+                    "Cloud or container to shade [default: the points of SCENE]");
   ptc::add_count(app, "--count", request.count,
-                 "Shade only so many of the points, evenly spread, into a .ply; k, M, G count by "
-                 "1000 [default: all]");
+                 "Shade only COUNT points, evenly spread, into a .ply [default: all]")
+      ->group(ptc::kFilesGroup);
   lights.declare_sky(app);
   app.get_option("--sky")->description(
-      "Radiance from everywhere, or a latitude-longitude picture of it [default: as built]");
-  ptc::add_bounces(app, request.bounces);
+      "Sky: colour, grey level or latitude-longitude picture [default: as built]");
+  ptc::add_bounces(app, request.bounces)->group("Lights");
   ptc::add_gather_options(app, request.gather, request.lift);
   ptc::add_error_option(app, request.error);
-  ptc::add_estimate_option(app, request.estimate);
-  ptc::add_back_end(app, request.back_end);
-  ptc::add_tolerate_damage(app, request.tolerate_damage);
   ptc::add_check_options(app, request.check);
+  ptc::add_estimate_option(app, request.estimate);
+  ptc::add_tolerate_damage(app, request.tolerate_damage);
+  ptc::add_back_end(app, request.back_end);
 
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     request.run = command.run_options();

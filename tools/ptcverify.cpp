@@ -1,5 +1,9 @@
-// ptcverify: is every byte of a container what the specification says, and if not, what happened to
-// it?
+// ptcverify: checks every byte of a container against the specification, and says what may have
+// damaged it.
+//
+//   file -> verify_container() -> findings -+-> lines, verdict, exit code
+//                                           +-> damage map (--map)
+//   file -> salvage_container() -> a new container with the undamaged pages (--salvage)
 #include <algorithm>
 #include <chrono>
 #include <optional>
@@ -11,6 +15,7 @@
 #include "engine/verify/verify.h"
 #include "tools/common.h"
 #include "tools/damage_map.h"
+#include "tools/option_text.h"
 #include "tools/report.h"
 
 namespace {
@@ -18,21 +23,30 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr char kPurpose[] =
-    "Goes over a container and tells of every fault where it is, which rule it breaks and what may "
-    "have\n"
-    "caused it. Levels: 0 header, superblocks, length; 1 directory and page headers; 2 payload "
-    "checksums\n"
-    "and padding; 3 what pages hold, the tree against its points, totals; 4 the tree built again "
-    "and\n"
-    "compared.";
+    "Checks a container for damage, and salvages what is whole.\n"
+    "Each fault is reported with its offset in the file, the rule of the specification that it "
+    "breaks, and what may have caused it.";
 constexpr char kExamples[] =
+    "  # Check a container\n"
     "  ptcverify scene.ptcx\n"
+    "  # Check the checksums alone, in less time\n"
     "  ptcverify city.ptcx --level 2 --progress\n"
+    "  # Draw a map of the damage, and list all faults for a script\n"
     "  ptcverify broken.ptcx --map damage.svg --json\n"
+    "  # Write the undamaged part to a new container\n"
     "  ptcverify broken.ptcx --salvage kept.ptcx\n";
 constexpr char kVerifyCodes[] =
-    "0 sound, 1 damaged, 2 usage, 3 system, 4 format not supported, 5 limit too small,\n"
-    "6 unfinished or truncated, 7 internal error.";
+    "0 sound: no fault was found\n"
+    "1 damaged: the file is missing or has faults\n"
+    "2 usage: the command line asks for something impossible\n"
+    "3 system: the system refused, for example because the disk cannot be read\n"
+    "4 format not supported: the file needs a newer version of the program\n"
+    "5 limit too small: a cap such as --memory is too small; the message names the smallest that "
+    "works\n"
+    "6 unfinished or truncated: the program that wrote the file did not end, or the end of the "
+    "file "
+    "is missing\n"
+    "7 internal error: the program has a defect; please report the message";
 constexpr std::size_t kMaxLines = 20;
 
 const char* text_of(ptc::Remedy remedy) {
@@ -64,7 +78,7 @@ const char* text_of(ptc::Remedy remedy) {
   return "";
 }
 
-/// What happened, where that is known, and what to do about it.
+/// What happened, if that is known, and what to do about it.
 std::string hint_of(const ptc::Finding& finding) {
   const std::string happened = ptc::explanation_of(finding.cause);
   return (happened.empty() ? "" : happened + ": ") + text_of(finding.remedy());
@@ -110,12 +124,12 @@ std::string findings_text(const std::string& name, const ptc::VerifyReport& repo
   return text;
 }
 
-/// "1 page", "2 pages".
+/// A number with its noun: "1 page", "2 pages".
 std::string counted(std::uint64_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-/// What was looked at, as far as the check came.
+/// The parts of the file that the check reached.
 std::string looked_at(const ptc::VerifyReport& report, int level) {
   if (!report.pages) return "header, superblocks and length";
   if (level == 1) return "directory and headers of " + counted(*report.pages, "page");
@@ -138,7 +152,7 @@ std::string verdict_text(const std::string& name, const ptc::VerifyReport& repor
                      hint_of(report.findings.front()));
 }
 
-/// The value, or null where there is none.
+/// The value as JSON; null when there is none.
 template <class T>
 ordered_json or_null(const std::optional<T>& value) {
   return value ? ordered_json(*value) : ordered_json();
@@ -177,7 +191,7 @@ std::string salvage_text(const std::string& name, const ptc::SalvageReport& kept
   return text + (kept.meta ? "\n" : "; names of channels and texts are lost\n");
 }
 
-/// What can be kept, or why nothing can: the findings are told in either case.
+/// Salvages the file and adds to the outcome what was kept, or why nothing can be kept.
 void add_salvage(const std::filesystem::path& file, const std::filesystem::path& target,
                  const ptc::RunOptions& run, ptc::Progress& progress, ptc::Outcome& outcome) {
   try {
@@ -199,15 +213,27 @@ int main(int argc, char** argv) {
   std::filesystem::path file, map, salvage;
   int level = 3;
   bool fail_fast = false;
-  command.add_input("file", file, "The container to check")->required();
-  command.app()
-      .add_option("--level", level, "How far to go, 0 to 4")
-      ->check(CLI::Range(0, 4))
-      ->capture_default_str();
-  command.app().add_flag("--fail-fast", fail_fast, "Stop at the first fault");
-  command.add_output("--map", map, {".svg", ".png"}, "Draw where the damage lies")->required(false);
-  command.add_output("--salvage", salvage, {".ptcx"}, "Write what is whole to a new container")
+  command.add_input("FILE", file, {".ptcx"}, "Container to check")->required();
+  command
+      .add_output("--salvage", salvage, {".ptcx"}, "Write the undamaged pages to a new container")
       ->required(false);
+  command.add_output("--map", map, {".svg", ".png"}, "Draw where the damage lies (.svg or .png)")
+      ->required(false);
+  constexpr char kGroup[] = "Checking";
+  ptc::offer(
+      command.app().add_option(
+          "--level", level,
+          "0 header, 1 directory, 2 checksums, 3 contents, 4 tree rebuilt\n"
+          "Each level includes those below it. Level 0 checks the header, the superblocks "
+          "and the length of the file; 1 the directory and the page headers; 2 the checksums "
+          "of the payloads and the padding; 3 the contents of all pages, the tree against "
+          "its points, and the totals; 4 builds the tree again and compares it."),
+      {"0", "1", "2", "3", "4"})
+      ->type_name("N")
+      ->check(CLI::Range(0, 4).description(""))
+      ->capture_default_str()
+      ->group(kGroup);
+  command.app().add_flag("--fail-fast", fail_fast, "Stop at the first fault")->group(kGroup);
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     const ptc::RunOptions& run = command.run_options();
     const auto start = std::chrono::steady_clock::now();

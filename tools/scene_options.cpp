@@ -37,21 +37,24 @@ void LightArguments::declare(CLI::App& app) {
   constexpr char kGroup[] = "Lights";
   add_repeated(
       app, "--sun", [this](const std::vector<std::string>& v) { set_suns(v); },
-      "A sun: azimuth from +z to +x and elevation, degrees; irradiance [3]; repeatable")
-      ->type_name("AZIMUTH,ELEVATION[,STRENGTH]")
+      "Sun: azimuth and elevation in degrees, irradiance [3]; repeatable\n"
+      "The azimuth turns from +z to +x. The irradiance is that of a surface that faces the sun, in "
+      "W/m^2.")
+      ->type_name("AZ,EL[,E]")
       ->group(kGroup);
   app.add_option_function<std::string>(
          "--sun-colour",
          [this](const std::string& t) { sun_colour_ = parse_colour("--sun-colour", t); },
-         "Multiplies the strength of all suns")
+         "Colour of all suns, a factor on their irradiance")
       ->type_name("R,G,B")
       ->default_str("1,1,1")
       ->group(kGroup);
-  add_number(app, "--sun-size", sun_degrees_, 0, 90, "Angular diameter of the suns, degrees")
+  add_number(app, "--sun-size", sun_degrees_, 0, 90, "Angular diameter of the suns, in degrees")
+      ->type_name("DEGREES")
       ->group(kGroup);
   add_repeated(
       app, "--point", [this](const std::vector<std::string>& v) { set_points(v); },
-      "A point light and its intensity, W / sr; repeatable")
+      "Point light: position and intensity in W/sr; repeatable")
       ->type_name("X,Y,Z,R,G,B")
       ->group(kGroup);
   declare_sky(app);
@@ -61,16 +64,18 @@ void LightArguments::declare_sky(CLI::App& app) {
   const auto set = [this](const std::string& text) {
     sky_ = text;
     sky_radiance_.reset();
-    // What begins like a number is one: a picture of that name can be given as ./1.exr.
+    // A text of these letters is a number: a picture that has such a name is given as ./1.exr.
     if (text.find_first_not_of("0123456789.,+-eE") == std::string::npos) {
       sky_radiance_ = parse_colour("--sky", text);
     }
   };
   app.add_option_function<std::string>(
-         "--sky", set, "Radiance from everywhere, or a latitude-longitude picture of it")
+         "--sky", set, "Sky: colour, grey level or latitude-longitude picture, in W/m^2/sr")
       ->type_name("R,G,B|L|FILE")
       ->group("Lights");
-  add_number(app, "--sky-scale", sky_scale_, 0, 1e6, "Multiplies the sky")->group("Lights");
+  add_number(app, "--sky-scale", sky_scale_, 0, 1e6, "Factor on the radiance of the sky")
+      ->type_name("FACTOR")
+      ->group("Lights");
 }
 
 void LightArguments::set_suns(const std::vector<std::string>& values) {
@@ -124,36 +129,38 @@ Sky LightArguments::sky() const {
 }
 
 void add_light_sampling(CLI::App& app, LightSampling& sampling) {
-  constexpr char kGroup[] = "Expert";
   constexpr std::uint64_t kMax = 1 << 16;
-  add_integer(app, "--sun-rays", sampling.sun_rays, 1, kMax, "Shadow rays of a point to each sun")
-      ->group(kGroup);
-  add_integer(app, "--sky-rays", sampling.sky_rays, 0, kMax, "Shadow rays of a point to the sky")
-      ->group(kGroup);
+  add_integer(app, "--sun-rays", sampling.sun_rays, 1, kMax,
+              "Shadow rays from each point to each sun")
+      ->group(kExpertGroup);
+  add_integer(app, "--sky-rays", sampling.sky_rays, 0, kMax,
+              "Shadow rays from each point to the sky")
+      ->group(kExpertGroup);
   add_integer(app, "--area-rays", sampling.area_rays, 0, kMax,
-              "Shadow rays of a point to emissive triangles")
-      ->group(kGroup);
+              "Shadow rays from each point to emissive triangles")
+      ->group(kExpertGroup);
 }
 
 void CameraArguments::declare(CLI::App& app, const std::string& purpose) {
   app.add_option_function<std::string>(
          "--camera", [this](const std::string& text) { set_place(text); }, purpose)
-      ->type_name("PX,PY,PZ,TX,TY,TZ")
+      ->type_name("X,Y,Z,X,Y,Z")
       ->group("Camera");
   app.add_option_function<double>(
          "--fov",
          [this](const double& degrees) {
            camera_.vertical_fov = static_cast<float>(glm::radians(degrees));
          },
-         "Vertical field of view of --camera, degrees")
-      ->type_name("NUMBER")
+         "Vertical field of view of --camera, in degrees")
+      ->type_name("DEGREES")
       ->default_str("40.1")
       ->check(in_range(0.01, 179))
       ->needs("--camera")
       ->group("Camera");
   app.add_option_function<std::string>(
-         "--size", [this](const std::string& text) { set_size(text); }, "Pixels of its picture")
-      ->type_name("WIDTHxHEIGHT")
+         "--size", [this](const std::string& text) { set_size(text); },
+         "Width and height of the picture, in pixels")
+      ->type_name("WxH")
       ->default_str(std::to_string(camera_.width) + "x" + std::to_string(camera_.height))
       ->group("Camera");
 }
@@ -168,7 +175,7 @@ void CameraArguments::set_place(const std::string& text) {
 }
 
 void CameraArguments::set_size(const std::string& text) {
-  constexpr unsigned kMax = 1 << 16;  // of an EXR
+  constexpr unsigned kMax = 1 << 16;  // of a side of an EXR
   const std::size_t cross = text.find('x');
   const auto side = [&](std::string_view digits) {
     const auto pixels = parse_number<unsigned>(digits);
@@ -177,7 +184,7 @@ void CameraArguments::set_size(const std::string& text) {
     }
     return *pixels;
   };
-  if (cross == std::string::npos) refuse("--size", text, "WIDTHxHEIGHT, as 960x540");
+  if (cross == std::string::npos) refuse("--size", text, "WIDTHxHEIGHT, such as 960x540");
   const std::string_view whole = text;
   size_ = {side(whole.substr(0, cross)), side(whole.substr(cross + 1))};
 }

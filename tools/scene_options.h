@@ -1,4 +1,4 @@
-// Options that say what lights a scene and where it is seen from.
+// Options for the lights of a scene and for the camera that looks at it.
 #pragma once
 
 #include <array>
@@ -13,18 +13,22 @@
 
 namespace ptc {
 
-/// --sun, --point, --sky and what belongs to them.
+/// The values of --sun, --point, --sky and the options that modify them.
 class LightArguments {
  public:
+  /// Declares the options of suns, point lights and the sky. This object must outlive the parsing.
   void declare(CLI::App& app);
-  /// --sky and --sky-scale alone.
+  /// Declares --sky and --sky-scale alone.
   void declare_sky(CLI::App& app);
 
-  /// True when any light was named.
+  /// True when any light was given.
   [[nodiscard]] bool given() const noexcept;
+  /// True when --sky was given.
   [[nodiscard]] bool sky_given() const noexcept { return !sky_.empty(); }
-  /// The lights; reads the sky's map. @throws DataError when the map is no picture
+  /// The lights that were given. Reads the picture of the sky.
+  /// @throws DataError when the file of the sky is not a picture
   [[nodiscard]] LightRig rig() const;
+  /// The sky that was given, black without one. Reads its picture as rig() does.
   [[nodiscard]] Sky sky() const;
 
  private:
@@ -40,18 +44,20 @@ class LightArguments {
   float sky_scale_ = 1;
 };
 
-/// --sun-rays, --sky-rays, --area-rays
+/// Declares --sun-rays, --sky-rays and --area-rays.
 void add_light_sampling(CLI::App& app, LightSampling& sampling);
 
-/// --camera, --fov and --size.
+/// The values of --camera, --fov and --size.
 class CameraArguments {
  public:
   using Size = std::array<unsigned, 2>;  ///< width and height, pixels
 
-  /// @param purpose  how --camera is described
+  /// Declares the options. This object must outlive the parsing.
+  /// @param purpose  description of --camera
   void declare(CLI::App& app, const std::string& purpose);
-  /// What the options said; empty without --camera.
+  /// The camera that was given; empty without --camera.
   [[nodiscard]] std::optional<Camera> camera() const;
+  /// The size that was given; empty without --size.
   [[nodiscard]] const std::optional<Size>& size() const noexcept { return size_; }
 
  private:

@@ -1,4 +1,4 @@
-// Numbers from words, and what is said when they are none.
+// Numbers from words, and the messages for words that are no numbers.
 #include "tools/values.h"
 
 #include <map>
@@ -6,7 +6,8 @@
 namespace ptc {
 namespace {
 
-/// A number before one of some suffixes, or without; NaN when it is none.
+/// The number that a text spells, times the factor of its suffix if it has one; NaN when the text
+/// is no number or the suffix is unknown.
 double parse_scaled(std::string_view text, const std::map<std::string_view, double>& suffixes) {
   const std::size_t end = text.find_last_of("0123456789.") + 1;
   const auto number = parse_number<double>(text.substr(0, end));
@@ -49,7 +50,7 @@ std::uint64_t parse_count(const std::string& option, const std::string& text) {
   constexpr double kMax = 0x1p48;  // points of a file
   const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
   if (!(count >= 1 && count <= kMax) || std::rint(count) != count) {
-    refuse(option, text, "a whole number from 1 to 2^48, as 250000, 250k or 1.5M");
+    refuse(option, text, "a whole number from 1 to 2^48, such as 250000, 250k or 1.5M");
   }
   return static_cast<std::uint64_t>(count);
 }
@@ -101,7 +102,8 @@ std::uint64_t parse_size(const std::string& option, const std::string& text) {
                                            {"MiB", 0x1p20},
                                            {"GiB", 0x1p30},
                                            {"TiB", 0x1p40}});
-  if (!(bytes >= 1 && bytes <= kMax)) refuse(option, text, "a size as 800000000, 256M or 1.5G");
+  if (!(bytes >= 1 && bytes <= kMax))
+    refuse(option, text, "a size such as 800000000, 256M or 1.5G");
   return static_cast<std::uint64_t>(bytes);
 }
 

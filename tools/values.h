@@ -14,6 +14,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tools/option_text.h"
+
 namespace ptc {
 
 /// The number that the whole of `text` spells; empty when it spells none, or none that is finite.
@@ -28,20 +30,23 @@ template <class T>
   return value;
 }
 
-/// Says that an option expects something else. @throws CLI::ValidationError, as all of these
+/// Refuses the value of an option: "--sun: expects ..., not '...'".
+/// @throws CLI::ValidationError always, as every check of this file does when a value is wrong
 [[noreturn]] void refuse(const std::string& option, const std::string& text,
                          const std::string& expected);
 
-/// Finite numbers separated by commas, as many as one of `counts` says.
+/// Finite numbers separated by commas. Refuses a list whose length is none of `counts`.
 [[nodiscard]] std::vector<double> parse_numbers(const std::string& option, const std::string& text,
                                                 std::initializer_list<std::size_t> counts,
                                                 const std::string& expected);
 
-/// Refuses what is no number from `least` to `most`.
+/// Refuses values that are not finite numbers from `least` to `most`.
 [[nodiscard]] CLI::Validator in_range(double least, double most);
+/// Refuses values that are not whole numbers from `least` to `most`.
 [[nodiscard]] CLI::Validator whole_in_range(std::uint64_t least, std::uint64_t most);
 
-/// A finite number from `least` to `most`; its default is shown in the help.
+/// Declares an option that takes a finite number from `least` to `most`. The value so far is the
+/// default in the help.
 template <class T>
 CLI::Option* add_number(CLI::App& app, const std::string& name, T& value, double least, double most,
                         const std::string& description) {
@@ -52,7 +57,8 @@ CLI::Option* add_number(CLI::App& app, const std::string& name, T& value, double
       ->capture_default_str();
 }
 
-/// A whole number from `least` to `most`; its default is shown in the help.
+/// Declares an option that takes a whole number from `least` to `most`. The value so far is the
+/// default in the help.
 template <class T>
 CLI::Option* add_integer(CLI::App& app, const std::string& name, T& value, std::uint64_t least,
                          std::uint64_t most, const std::string& description) {
@@ -63,39 +69,41 @@ CLI::Option* add_integer(CLI::App& app, const std::string& name, T& value, std::
       ->capture_default_str();
 }
 
-/// One of some words; the one that means the value so far is the default in the help.
+/// Declares an option that takes one of some words. The word for the value so far is the default in
+/// the help; shells propose all of them.
 template <class T>
 CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
                         const std::vector<std::pair<std::string, T>>& choices,
                         const std::string& description) {
-  std::string names;
+  std::vector<std::string> words;
   std::string current;
   for (const auto& [text, choice] : choices) {
-    names += (names.empty() ? "" : "|") + text;
+    words.push_back(text);
     if (choice == value) current = text;
   }
-  const auto set = [&value, choices, name, names](const std::string& text) {
+  const auto set = [&value, choices, name, words](const std::string& text) {
     for (const auto& [word, choice] : choices) {
       if (word != text) continue;
       value = choice;
       return;
     }
-    refuse(name, text, names);
+    refuse(name, text, join(words, "|"));
   };
-  return app.add_option_function<std::string>(name, set, description)
-      ->type_name(names)
+  return offer(app.add_option_function<std::string>(name, set, description), words)
+      ->type_name("NAME")
       ->default_str(current);
 }
 
-/// A whole number from 1, also with k, M or G for powers of 1000: "250k", "1.5M".
+/// A whole number from 1 to 2^48, with k, M or G for powers of 1000 or without: "250k", "1.5M".
 [[nodiscard]] std::uint64_t parse_count(const std::string& option, const std::string& text);
-/// The same as an option.
+/// Declares an option that takes a count as parse_count() does.
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& count,
                        const std::string& description);
 
-/// Bytes, also with K, M, G or T for powers of 1024: "256M", "1.5G".
+/// A number of bytes, with K, M, G or T for powers of 1024 or without: "256M", "1.5G".
 [[nodiscard]] std::uint64_t parse_size(const std::string& option, const std::string& text);
-/// The same as an option; the default is shown in the help.
+/// Declares an option that takes a size as parse_size() does. The value so far is the default in
+/// the help.
 CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& bytes,
                       const std::string& description);
 

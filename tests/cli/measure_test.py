@@ -30,7 +30,7 @@ class Measure(ProgramTest):
 
     def test_every_experiment_writes_a_result(self):
         help_text = self.succeed("ptcbench", "--help").stdout
-        experiments = set(re.findall(r"^  ([a-z]+)  ", help_text.split("Subcommands:")[1], re.MULTILINE))
+        experiments = set(re.findall(r"^  ([a-z]+)  ", help_text.split("Commands:")[1], re.MULTILINE))
         self.assertEqual({command.split()[1] for command in listed().values()}, experiments)
 
     def test_each_command_works_and_writes_its_file(self):

@@ -21,29 +21,37 @@ namespace {
 using namespace ptc::bench;
 
 constexpr char kPurpose[] =
-    "Measures the time and the error of PTCX, against rays at the same scene in the same run; how\n"
-    "time grows, and what each part of the model is worth; sort, build and verification, compared\n"
-    "with the disk alone; the page cache; and the whole way at growing sizes. Writes tables and\n"
-    "draws charts. accuracy, error, growth and model hold their scenes in memory whole, whatever\n"
-    "--memory says.";
+    "Measures time, memory and accuracy of PTCX next to other methods.\n"
+    "Each command measures one subject, and writes tables and draws charts. Errors are measured "
+    "against rays that are traced in the same scene; sort, build and verification are compared "
+    "with "
+    "a disk that moves the same bytes.\n"
+    "\n"
+    "The scenes of accuracy, error, growth and model are held in memory whole, whatever the cap on "
+    "memory.";
 constexpr char kExamples[] =
+    "  # Measure the accuracy in little time\n"
     "  ptcbench accuracy --quick -o charts\n"
+    "  # Measure the accuracy in several scenes, or of one method with one setting\n"
     "  ptcbench accuracy fractal window city dragon.ply.gz+backdrop sponza.obj -o charts\n"
     "  ptcbench accuracy room.obj --set camera --method ptcx --setting 0.02,0.1,32 -o charts\n"
+    "  # Measure the demo, and write a page of results\n"
     "  ptcbench demo dragon.ply.gz+backdrop --memory 256M -o charts --results results\n"
+    "  # Compare the error that is asked for with the error that is met\n"
     "  ptcbench error fractal window city dragon.ply.gz+backdrop -o charts\n"
-    "  ptcbench growth --quick -o charts\n"
+    "  # Measure how time grows with the number of surfels\n"
     "  ptcbench growth --points 2M --points 20M --points 200M --panel surfels --temp /scratch -o "
     "charts\n"
+    "  # Compare what the nodes may hold\n"
     "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n"
+    "  # Measure sort and build next to the disk\n"
     "  ptcbench build --points 1M --points 20M --points 200M --memory 1G --temp /scratch -o "
     "charts\n"
-    "  ptcbench cache --quick -o charts\n"
-    "  ptcbench scale --quick -o charts\n"
+    "  # Measure sizes that are larger than memory\n"
     "  ptcbench scale --points 1700M --repeats 1 --memory 2G --temp /scratch -o charts\n"
-    "  ptcbench sort --quick -o charts\n"
     "  ptcbench sort --points 200M --panel disk --order city --memory 1G --temp /scratch -o "
     "charts\n"
+    "  # Measure a verification in little time\n"
     "  ptcbench verify --quick -o charts\n";
 
 /// The options that all experiments take.
