@@ -269,6 +269,7 @@ int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>&
     return code;
   };
   try {
+    // Prepare.
     add_common_options();
     remove_temporaries_on_signal();
     std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error like a full disk

@@ -161,7 +161,9 @@ std::string zsh_action(const OptionText& option) {
   } else if (option.takes_file()) {
     std::vector<std::string> bare;
     for (const std::string& ending : option.endings) bare.push_back(ending.substr(1));
-    action = "_files -g \"*.(" + join(bare, "|") + ")\"";
+    // One word in brackets at the end of a pattern would be taken for qualifiers.
+    const std::string all = join(bare, "|");
+    action = "_files -g \"*." + (bare.size() > 1 ? "(" + all + ")" : all) + "\"";
   } else if (option.takes_directory()) {
     action = "_files -/";
   }

@@ -1,4 +1,15 @@
-// The map of ptcverify --map.
+// Draws the map of ptcverify --map: the file from its first byte to its last, as rows of squares.
+//
+//   scene.ptcx: damaged                          title
+//   12.3 MB in 190 pages, 1 of them damaged      subtitle
+//      0x0  HPPPPPPPPPPPPPPPPPPPPPPPP            one square: bytes() bytes, a multiple of a sector
+//   0x6000  PPPPNNNNNNNNNNNNXXNNNNNNN            its colour: the kind of page that lies there
+//  0x12000  NNNNNNAAAAAAAAAAAAAAMDDDD            X: damaged, whatever lies there
+//   [] points  [] nodes  [] attributes ...       legend
+//   offset 2335808: page 190: ...                the first findings
+//
+// At most kMaxRows rows are drawn: in a larger file a square stands for more sectors. A square with
+// several kinds shows the last of them in the order of Kind, so damage is never hidden.
 #include "tools/damage_map.h"
 
 #include <algorithm>
@@ -21,7 +32,7 @@ struct KindStyle {
 };
 
 constexpr std::array kStyles{
-    KindStyle{"padding, or nothing known", {0.88, 0.88, 0.88}},
+    KindStyle{"padding or unknown", {0.88, 0.88, 0.88}},
     KindStyle{"points", {0.45, 0.67, 0.85}},
     KindStyle{"nodes", {0.55, 0.76, 0.55}},
     KindStyle{"attributes", {0.75, 0.65, 0.85}},
@@ -52,7 +63,7 @@ Kind kind_of(PageType type) {
   return Kind::nothing;
 }
 
-/// The kinds of equal parts of a file; of several in one part the one that is worth most notice.
+/// A file in equal parts, the squares of the map, each with the kind of page that it holds.
 class Parts {
  public:
   explicit Parts(const VerifyReport& report) : file_bytes_(report.file_bytes) {
@@ -81,8 +92,10 @@ class Parts {
   }
 
  private:
+  /// Gives a kind to the parts that hold bytes from `begin` to `end`, unless they have a later
+  /// kind.
   void mark(std::uint64_t begin, std::uint64_t end, Kind kind) {
-    // What is wrong with the end of a file lies behind its last byte.
+    // A finding on the end of a file lies behind its last byte: it marks the last part.
     begin = std::min(begin, file_bytes_ > 0 ? file_bytes_ - 1 : 0);
     end = std::clamp(end, begin + 1, std::max(begin + 1, file_bytes_));
     for (std::uint64_t part = begin / bytes_; part <= (end - 1) / bytes_ && part < kinds_.size();
@@ -92,18 +105,20 @@ class Parts {
   }
 
   std::uint64_t file_bytes_;
-  std::uint64_t bytes_ = 0;  ///< of a part
+  std::uint64_t bytes_ = 0;  ///< size of a part
   std::vector<Kind> kinds_;
 };
 
+/// At most kMaxLetters bytes of a text, with dots behind it when some are left out.
 std::string shortened(std::string text) {
   if (text.size() <= kMaxLetters) return text;
   std::size_t end = kMaxLetters;
   while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80)
-    --end;  // no half of a letter
+    --end;  // cut between letters of UTF-8
   return text.substr(0, end) + "...";
 }
 
+/// The first findings, a line each, and the number of the others.
 std::vector<std::string> lines_of(const VerifyReport& report) {
   std::vector<std::string> lines;
   for (const Finding& finding : report.findings) {
@@ -144,17 +159,21 @@ void write_damage_map(const std::filesystem::path& target, const std::string& na
                       const VerifyReport& report) {
   const Parts parts(report);
   const std::vector<std::string> lines = lines_of(report);
+
+  // Lay out: title, squares, legend, findings.
   const double legend = kTop + kCell * static_cast<double>(parts.rows()) + 22;
   Picture picture;
   picture.width = kLeft + kCell * static_cast<double>(kColumns) + kMargin;
   picture.height = legend + kLine * static_cast<double>(lines.size()) + kMargin + 8;
   picture.title = fmt::format("{}: {}", name, report.sound() ? "sound" : "damaged");
   for (const std::string& line : lines) picture.description += line + "\n";
+
+  // Draw from top to bottom.
   picture.draw = [&](Canvas& canvas) {
     canvas.fill({0, 0, picture.width, picture.height}, {1, 1, 1});
     canvas.text({kMargin, 22}, shortened(picture.title), {.size = 13, .bold = true});
     canvas.text({kMargin, 40},
-                fmt::format("{}{}; a square is {} bytes", bytes_text(report.file_bytes),
+                fmt::format("{}{}; each square is {} bytes", bytes_text(report.file_bytes),
                             report.pages ? fmt::format(" in {} pages, {} of them damaged",
                                                        *report.pages, *report.damaged_pages)
                                          : std::string(),

@@ -1,4 +1,4 @@
-// A picture of what a verification found in a file.
+// A picture of a file that shows where a verification found damage.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,11 @@
 
 namespace ptc {
 
-/// Draws the file from its first byte to its last, row by row, each cell the kind of what lies
-/// there, red where it is damaged, and the first findings under it.
-/// @param target  .svg or .png
-/// @param name    of the file
+/// Draws the file from its first byte to its last in rows of squares, coloured by the kind of page
+/// and red where it is damaged, with the first findings below.
+/// @param target  the picture to write, .svg or .png
+/// @param name    the name of the file, for the title
+/// @throws std::system_error
 void write_damage_map(const std::filesystem::path& target, const std::string& name,
                       const VerifyReport& report);
 

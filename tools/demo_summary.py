@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the demo's page of figures from what its programs left in a directory."""
+"""Prints the demo's page of figures from the files that its programs wrote to a directory."""
 import json
 import pathlib
 import re
@@ -9,22 +9,25 @@ out = pathlib.Path(sys.argv[1])
 
 
 def facts(name):
+    """What a program printed with --json."""
     return json.loads((out / f"{name}.json").read_text())
 
 
 def peak_mib(name):
-    """Peak resident set as the system saw it (GNU time)."""
+    """Peak resident set in MiB, as GNU time measured it."""
     text = (out / f"{name}.time").read_text()
     return int(re.search(r"Maximum resident set size \(kbytes\): (\d+)", text).group(1)) / 1024
 
 
 def wall(name):
+    """Seconds of wall time."""
     text = (out / f"{name}.time").read_text()
     parts = re.search(r"Elapsed \(wall clock\) time.*: ([\d:.]+)", text).group(1).split(":")
     return sum(float(p) * 60**i for i, p in enumerate(reversed(parts)))
 
 
 def cpu(name):
+    """Seconds of CPU time, user and system together."""
     text = (out / f"{name}.time").read_text()
     return sum(float(re.search(rf"{kind} time \(seconds\): ([\d.]+)", text).group(1)) for kind in ("User", "System"))
 

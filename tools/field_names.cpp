@@ -1,4 +1,5 @@
-// The one place where fields of requests (engine/pipeline) meet options.
+// The one place where fields of requests (engine/pipeline) meet options: errors of the engine name
+// the field in backquotes, the programs print the option.
 #include "tools/field_names.h"
 
 #include <algorithm>
@@ -60,7 +61,7 @@ std::string with_options(std::string_view message) {
     const std::size_t close = open == message.npos ? open : message.find('`', open + 1);
     if (close == message.npos) break;
     const std::string_view option = option_of(message.substr(open + 1, close - open - 1));
-    // Of what is no field the second quote may open the next.
+    // Unless the text between them is a field, the second quote may open the next pair.
     const std::size_t end = option.empty() ? close : close + 1;
     text += option.empty() ? message.substr(0, end) : message.substr(0, open);
     text += option;

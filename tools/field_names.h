@@ -1,4 +1,4 @@
-// What the programs call the fields of requests.
+// The options that set the fields of requests.
 #pragma once
 
 #include <string>
@@ -6,12 +6,12 @@
 
 namespace ptc {
 
-/// The option that sets a field of a request, e.g. "--points" for "sampling.count"; empty where
-/// none does.
+/// The option that sets a field of a request, such as "--points" for "sampling.count"; empty when
+/// no option does.
 [[nodiscard]] std::string_view option_of(std::string_view field) noexcept;
 
-/// A message of the engine with options in place of the names of fields that stand in backquotes in
-/// it. What stands in backquotes and is no field stays.
+/// A message of the engine in which options replace the names of fields that stand in backquotes.
+/// Any other text in backquotes stays as it is.
 [[nodiscard]] std::string with_options(std::string_view message);
 
 }  // namespace ptc

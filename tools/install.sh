@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what packages.txt lists and is not there yet. Asks nothing; without anything missing it
-# touches nothing and needs no network.
+# Installs the packages of packages.txt that are missing. It asks no questions. When nothing is
+# missing it changes nothing and needs no network.
 set -euo pipefail
 
 missing=()

@@ -121,10 +121,10 @@ void add_error_option(CLI::App& app, std::optional<double>& error) {
       "--error", set,
       "Find the cheapest settings whose RMS error is at most SHARE, such as 2%\n"
       "SHARE is a percentage or a number up to 1: 2% and 0.02 are the same. The error is that of "
-      "occlusion and of light, each relative to its mean, against rays that "
-      "are traced at the surfels. Settings are tried at pilot receivers. The cheapest ones that "
-      "meet the error are used; if none does, the finest are used, and the report says so. By "
-      "default the expert settings hold.");
+      "occlusion and of light, each relative to its mean, against rays that are traced at the "
+      "surfels. Settings are tried at pilot receivers. The cheapest ones that meet the error are "
+      "used; if none does, the finest are used, and the report says so. By default the expert "
+      "settings hold.");
   option->type_name("SHARE")->group("Quality");
   for (const char* name : {"--solid-angle", "--parallax", "--inflation", "--resolution"}) {
     option->excludes(app.get_option(name));
@@ -142,8 +142,8 @@ void add_estimate_option(CLI::App& app, bool& estimate) {
 void add_tolerate_damage(CLI::App& app, bool& tolerate) {
   app.add_flag("--tolerate-damage", tolerate,
                "Go on past damaged pages of the scene [default: stop]\n"
-               "The cluster above a damaged page stands in for it. The points on the page are "
-               "left out. The report states how many points that are, and a bound on the error.")
+               "The cluster above a damaged page stands in for it. The points on the page are left "
+               "out. The report states how many points that are, and a bound on the error.")
       ->group("Quality");
 }
 

@@ -16,16 +16,14 @@ namespace {
 constexpr char kPurpose[] =
     "Builds a lit PTCX container from meshes and point clouds.\n"
     "Meshes are sampled into surfels: small discs with a position, a normal, a radius, a colour "
-    "and "
-    "the light that they reflect. Suns, point lights, the sky and emissive triangles light them by "
-    "shadow rays. Clouds keep their points and the light that they come with; a missing radius is "
-    "estimated from the neighbours.\n"
+    "and the light that they reflect. Suns, point lights, the sky and emissive triangles light "
+    "them by shadow rays. Clouds keep their points and the light that they come with; a missing "
+    "radius is estimated from the neighbours.\n"
     "\n"
     "All points are sorted along the Z-curve within the cap on memory, and an octree is built over "
     "them. What does not fit in memory goes through temporary files in the directory of the "
-    "output, "
-    "or in those that --temp names. They are removed however the program ends, unless --resume "
-    "keeps them. The room that they need is stated, and checked, before work begins.\n"
+    "output, or in those that --temp names. They are removed however the program ends, unless "
+    "--resume keeps them. The room that they need is stated, and checked, before work begins.\n"
     "\n"
     "The same command gives the same bytes for any number of threads and any cap on memory.";
 constexpr char kExamples[] =
@@ -61,10 +59,10 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
   command.add_input(
       "--append", request.append, {".ptcx"},
       "Add the inputs to the points of this container\n"
-      "Its points are merged with those of the inputs and not sorted again. Its lights "
-      "hold; its profile, page size and leaves hold unless options say otherwise. The "
-      "output may have the same name: the old file stays until the new one is complete. "
-      "A container that was shaded is refused.");
+      "Its points are merged with those of the inputs and not sorted again. Its lights hold; its "
+      "profile, page size and leaves hold unless options say otherwise. The output may have the "
+      "same name: the old file stays until the new one is complete. A container that was shaded is "
+      "refused.");
   ptc::add_count(app, "--city", request.city_points,
                  "Build a procedural city of about COUNT points instead of inputs")
       ->excludes(inputs)
@@ -125,11 +123,11 @@ void declare_resume(CLI::App& app, ptc::BuildRequest& request) {
       app.add_flag(
              "--resume", request.resume,
              "Resume an interrupted build, and keep what a later run needs\n"
-             "The same command, with any --memory, --threads and further --temp directories, "
-             "comes to the same bytes. The state lies next to the output in files whose names "
-             "begin with OUTPUT.resume, and in the directories for temporary files. It is "
-             "removed when the container is complete. All points go through temporary files. "
-             "An unfinished sort starts again.")
+             "The same command, with any --memory, --threads and further --temp directories, comes "
+             "to the same bytes. The state lies next to the output in files whose names begin with "
+             "OUTPUT.resume, and in the directories for temporary files. It is removed when the "
+             "container is complete. All points go through temporary files. An unfinished sort "
+             "starts again.")
           ->group(kGroup);
   ptc::add_count(app, "--checkpoint", request.checkpoint_points,
                  "Maximum number of sorted points to build again, about")
@@ -150,7 +148,9 @@ void adopt_settings(Arguments& arguments, ptc::Command& command) {
   if (!given("--leaf")) ptc::adopt_leaves(arguments.request, scene);
 }
 
+/// Builds the container and reports it.
 ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
+  // Complete and check the request.
   ptc::BuildRequest& request = arguments.request;
   if (request.inputs.empty() && request.city_points == 0) {
     throw CLI::RequiredError("INPUT or --city");
@@ -164,6 +164,7 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   if (!request.append.empty()) adopt_settings(arguments, command);
   const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
 
+  // Report.
   const ptc::Superblock& made = report.superblock;
   nlohmann::ordered_json facts{{"output", arguments.output.string()}};
   facts.update(ptc::container_facts(made));

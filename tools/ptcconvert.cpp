@@ -28,6 +28,7 @@ constexpr char kExamples[] =
     "  # Store a container in fewer bytes\n"
     "  ptcconvert scene.ptcx small.ptcx --profile compact --page-size 16K\n";
 
+/// What the command line says.
 struct Arguments {
   std::filesystem::path input;
   std::filesystem::path output;
@@ -37,6 +38,7 @@ struct Arguments {
   ptc::SamplingOptions sampling;
 };
 
+/// Builds a container from a cloud or a mesh.
 ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
                          ptc::Progress& progress) {
   ptc::BuildRequest request;
@@ -51,6 +53,7 @@ ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
           .seconds = std::move(built.seconds)};
 }
 
+/// Chooses the conversion by the contents of the input and the ending of the output.
 ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& run,
                            ptc::Progress& progress) {
   const bool to_container = ptc::has_ending(arguments.output, ".ptcx");

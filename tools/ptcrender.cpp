@@ -15,8 +15,7 @@ constexpr char kPurpose[] =
     "Renders a picture of a container, with direct and indirect light.\n"
     "Rays from the camera meet the meshes, or the surfels of the container when no mesh is given. "
     "Direct light comes by shadow rays from the lights and the sky; indirect light is gathered "
-    "from "
-    "the surfels.\n"
+    "from the surfels.\n"
     "\n"
     "An .exr holds the picture in linear light, in W/m^2/sr, and the layers direct, indirect, "
     "occlusion, bent_normal and albedo. A .png holds one of them for display.";
@@ -30,6 +29,7 @@ constexpr char kExamples[] =
     "  # Meet an error of 3 %, and measure the error at 1000 receivers\n"
     "  ptcrender dragon.ptcx --error 3% --check 1000 -o dragon.exr\n";
 
+/// The request, and the arguments that are turned into it after parsing.
 struct Arguments {
   ptc::RenderRequest request;
   std::vector<std::filesystem::path> outputs;
@@ -38,6 +38,7 @@ struct Arguments {
   ptc::CameraArguments camera;
 };
 
+/// Declares --layer and checks its values: a known layer and the name of a PNG.
 void add_layers(ptc::Command& command, Arguments& arguments) {
   static const std::set<std::string> kLayers{"direct", "indirect", "occlusion", "albedo"};
   const auto check = [](const std::string& text) {
@@ -117,6 +118,7 @@ void refuse_clouds(const std::vector<std::filesystem::path>& meshes) {
   }
 }
 
+/// Renders the picture and reports it.
 ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   ptc::RenderRequest& request = arguments.request;
   refuse_clouds(request.meshes);

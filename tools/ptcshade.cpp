@@ -15,10 +15,8 @@ constexpr char kPurpose[] =
     "\n"
     "The output has the channels occlusion (0 to 1), bent_normal (the mean direction in which a "
     "point is not covered), irradiance (from surfaces, in W/m^2), sky (irradiance from the sky) "
-    "and "
-    "indirect (reflected light: albedo / pi times the sum of irradiance and sky). A .ptcx output "
-    "is "
-    "a container with these channels; in a .ply they are columns.";
+    "and indirect (reflected light: albedo / pi times the sum of irradiance and sky). A .ptcx "
+    "output is a container with these channels; in a .ply they are columns.";
 constexpr char kExamples[] =
     "  # Shade every point of a container\n"
     "  ptcshade dragon.ptcx -o lit.ptcx\n"

@@ -44,36 +44,36 @@ constexpr char kVerifyCodes[] =
     "5 limit too small: a cap such as --memory is too small; the message names the smallest that "
     "works\n"
     "6 unfinished or truncated: the program that wrote the file did not end, or the end of the "
-    "file "
-    "is missing\n"
+    "file is missing\n"
     "7 internal error: the program has a defect; please report the message";
 constexpr std::size_t kMaxLines = 20;
 
+/// What to do about a fault, as a sentence without a full stop.
 const char* text_of(ptc::Remedy remedy) {
   switch (remedy) {
     case ptc::Remedy::replace:
-      return "take a good copy of the file, or keep what is whole with --salvage";
+      return "replace the file by a good copy, or keep the undamaged part with --salvage";
     case ptc::Remedy::test_machines:
-      return "test memory and disk of the machines it went through; take a good copy, or use "
-             "--salvage";
+      return "test memory and disk of the machines that it went through; replace it by a good "
+             "copy, or use --salvage";
     case ptc::Remedy::copy_again:
       return "copy the file again, or use --salvage";
     case ptc::Remedy::write_again:
-      return "run it again, or keep what it wrote with --salvage";
+      return "run its writer again, or keep what it wrote with --salvage";
     case ptc::Remedy::transfer:
       return "transfer the file again, or use --salvage";
     case ptc::Remedy::transfer_bare:
       return "transfer the file again, as binary";
     case ptc::Remedy::cut:
-      return "cut the file to the length given, or use --salvage";
+      return "cut the file to the length stated, or use --salvage";
     case ptc::Remedy::rescue:
       return "copy what can be read elsewhere, then use --salvage on the copy";
     case ptc::Remedy::other_file:
       return "this is another kind of file";
     case ptc::Remedy::newer_program:
-      return "use the program that wrote it, or a newer one of this";
+      return "use the program that wrote it, or a newer version of this one";
     case ptc::Remedy::report:
-      return "write it again with another version, and report this";
+      return "write the file again with another version of the program, and report this defect";
   }
   return "";
 }
@@ -96,6 +96,7 @@ ptc::ExitCode exit_code_of(const ptc::VerifyReport& report) {
   return report.sound() ? ptc::kDone : ptc::kInvalidData;
 }
 
+/// A finding as a line of --json (spec/errors.md#findings).
 ordered_json line_for(const ptc::Finding& finding) {
   ordered_json line{{"code", ptc::code_of(finding)},
                     {"severity", finding.severity == ptc::Severity::damage ? "damage" : "warning"},
@@ -112,6 +113,7 @@ ordered_json line_for(const ptc::Finding& finding) {
   return line;
 }
 
+/// A line for each of the first kMaxLines findings, and one for the number of the others.
 std::string findings_text(const std::string& name, const ptc::VerifyReport& report) {
   std::string text;
   const std::size_t shown = std::min(kMaxLines, report.findings.size());
@@ -119,7 +121,7 @@ std::string findings_text(const std::string& name, const ptc::VerifyReport& repo
     text += fmt::format("ptcverify: {}: {}\n", name, line_of(report.findings[i]));
   const std::uint64_t rest = report.damage + report.warnings - shown;
   if (rest > 0)
-    text += fmt::format("ptcverify: {}: and {} more (--json lists {})\n", name, rest,
+    text += fmt::format("ptcverify: {}: and {} more findings; --json lists {}\n", name, rest,
                         report.findings.size());
   return text;
 }
@@ -140,6 +142,7 @@ std::string looked_at(const ptc::VerifyReport& report, int level) {
   return report.tree_digest ? text + ", the tree built again" : text;
 }
 
+/// The last line of a check: valid or damaged, how much was checked, and what to do.
 std::string verdict_text(const std::string& name, const ptc::VerifyReport& report, int level,
                          double seconds) {
   const std::string over = fmt::format("{}, {}, {:.2f} s", looked_at(report, level),
@@ -170,6 +173,7 @@ ordered_json facts_of(const ptc::SalvageReport& kept) {
           {"energy_share", or_null(kept.flux_share)}};
 }
 
+/// A line on what a salvage kept: points, their share of area and energy, channels, texts.
 std::string salvage_text(const std::string& name, const ptc::SalvageReport& kept) {
   const auto of = [](std::uint64_t part, std::uint64_t whole) {
     return fmt::format("{} of {}", part, whole);
@@ -224,10 +228,10 @@ int main(int argc, char** argv) {
       command.app().add_option(
           "--level", level,
           "0 header, 1 directory, 2 checksums, 3 contents, 4 tree rebuilt\n"
-          "Each level includes those below it. Level 0 checks the header, the superblocks "
-          "and the length of the file; 1 the directory and the page headers; 2 the checksums "
-          "of the payloads and the padding; 3 the contents of all pages, the tree against "
-          "its points, and the totals; 4 builds the tree again and compares it."),
+          "Each level includes those below it. Level 0 checks the header, the superblocks and the "
+          "length of the file; 1 the directory and the page headers; 2 the checksums of the "
+          "payloads and the padding; 3 the contents of all pages, the tree against its points, and "
+          "the totals; 4 builds the tree again and compares it."),
       {"0", "1", "2", "3", "4"})
       ->type_name("N")
       ->check(CLI::Range(0, 4).description(""))
@@ -235,6 +239,7 @@ int main(int argc, char** argv) {
       ->group(kGroup);
   command.app().add_flag("--fail-fast", fail_fast, "Stop at the first fault")->group(kGroup);
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
+    // Check the file.
     const ptc::RunOptions& run = command.run_options();
     const auto start = std::chrono::steady_clock::now();
     const ptc::VerifyReport report =
@@ -248,6 +253,8 @@ int main(int argc, char** argv) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const std::string name = ptc::printable(file.string());
     if (!map.empty()) ptc::write_damage_map(map, name, report);
+
+    // Report the findings and the verdict.
     ptc::Outcome outcome;
     outcome.exit_code = exit_code_of(report);
     outcome.lines.emplace();
@@ -270,6 +277,8 @@ int main(int argc, char** argv) {
       outcome.facts["tree_digest"] =
           ptc::hex((*report.tree_digest)[1]) + ptc::hex((*report.tree_digest)[0]);
     outcome.summary = findings_text(name, report) + verdict_text(name, report, level, seconds);
+
+    // Keep what is whole.
     if (!salvage.empty()) add_salvage(file, salvage, run, progress, outcome);
     return outcome;
   });

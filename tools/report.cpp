@@ -1,4 +1,14 @@
-// What runs counted, as JSON and as lines.
+// What a run measured, in two forms: facts_of() makes JSON for machines, X_text() and X_line() make
+// lines for people. A summary has one line for the result and one for the stages; each further line
+// is indented by two blanks and belongs to one option:
+//
+//   lit.ply: 600 receivers, 0.31 s, 99.10 % cache hits
+//     open 0.01 s, shade 0.30 s
+//     error: 2 % asked, 1.61 % measured at 512 pilot receivers with ...     --error
+//     against rays at the surfels: ...                                      --check
+//
+// Keys of the JSON are stable: scripts read them. Times are in seconds of wall time unless the key
+// says CPU, sizes in bytes, errors as shares of a mean unless they are absolute.
 #include "tools/report.h"
 
 #include <numeric>
@@ -64,29 +74,29 @@ std::string tuning_text(const TuningReport& tuning) {
       fmt::format("{} sr, {} rad, {} pixels", g.solid_angle, g.parallax, g.resolution);
   const double measured = 100 * tuning.measured.relative();
   if (tuning.met) {
-    return fmt::format("  error {:.4g} % asked: {} (setting {} of {}), {:.2f} % at {} pilots\n",
-                       100 * tuning.asked, setting, tuning.setting + 1, tuning.settings, measured,
-                       tuning.pilots);
+    return fmt::format(
+        "  error: {:.4g} % asked, {:.2f} % measured at {} pilot receivers with {} (setting {} of "
+        "{})\n",
+        100 * tuning.asked, measured, tuning.pilots, setting, tuning.setting + 1, tuning.settings);
   }
   return fmt::format(
-      "  error {:.4g} % asked is below the floor: the finest setting ({}) has {:.2f} % at {} "
-      "pilots, "
-      "whose rays are off by {:.2f} %\n",
+      "  error: {:.4g} % asked is below the floor: the finest setting ({}) has {:.2f} % at {} "
+      "pilot receivers, whose rays are off by {:.2f} %\n",
       100 * tuning.asked, setting, measured, tuning.pilots, 100 * tuning.measured.relative_noise());
 }
 
 std::string worth_line(const char* of, const EstimateWorth& worth) {
   return fmt::format(
-      "  estimates of {}: rank correlation {:.2f}, their RMS {:.2f} of the error's; RMS error "
-      "{:.2f} of it in "
-      "their top tenth, {:.2f} in the bottom one; {:.1f} % within twice\n",
+      "  estimates of {}: rank correlation {:.2f} with the error, RMS {:.2f} times that of the "
+      "error; RMS error {:.2f} times the overall one in the top tenth of estimates, {:.2f} times "
+      "in the bottom tenth; {:.1f} % of errors within twice the estimate\n",
       of, worth.rank, worth.rms, worth.top_tenth, worth.bottom_tenth, 100 * worth.within_twice);
 }
 
 std::string check_line(const char* against, const CheckError& error) {
   return fmt::format(
-      "  against rays at the {}: occlusion rms {:.4f} bias {:+.4f}, irradiance rms "
-      "{:.2f} % bias {:+.2f} %; error {:.2f} %\n",
+      "  against rays at the {}: occlusion RMS error {:.4f}, bias {:+.4f}; irradiance RMS error "
+      "{:.2f} %, bias {:+.2f} %; error {:.2f} %\n",
       against, error.occlusion_rms, error.occlusion_bias, 100 * error.irradiance_rms,
       100 * error.irradiance_bias, 100 * error.relative());
 }
@@ -156,7 +166,7 @@ ordered_json facts_of(const CheckReport& check) {
   return facts;
 }
 
-/// Over all receivers of a run.
+/// The mean over all receivers of a run of the bound on the change of their occlusion.
 double mean_bound(const LightingReport& report) {
   const double sum =
       static_cast<double>(report.damage->stand_ins.bounds) * DamageCounts::kBoundUnit;
@@ -184,13 +194,13 @@ std::string damage_text(const LightingReport& report) {
   const std::string pages = count == 1 ? "1 page" : fmt::format("{} pages, the first", count);
   std::string text = fmt::format(
       "  damaged: {}: {}; {} points left out\n"
-      "  {} receivers see what stands in for them: occlusion changed by at most {:.4f}, by at most "
-      "{:.6f} in the mean of all\n",
+      "  {} receivers see stand-ins for them: their occlusion changes by at most {:.4f}, the mean "
+      "over all receivers by at most {:.6f}\n",
       pages, printable(first), damage.points, damage.stand_ins.receivers,
       damage.stand_ins.max_bound, mean_bound(report));
   if (damage.node_pages > 0) {
     text += fmt::format(
-        "  {} of them hold nodes, which ptcverify --salvage builds again from the points\n",
+        "  {} of the pages hold nodes, which ptcverify --salvage builds again from the points\n",
         damage.node_pages);
   }
   return text;

@@ -1,4 +1,4 @@
-// Engine statistics as JSON facts and as words.
+// Statistics of the engine as JSON facts for --json, and as lines of a summary.
 #pragma once
 
 #include <string>
@@ -9,24 +9,33 @@
 
 namespace ptc {
 
-/// format_version, points, nodes, node_groups, levels, bounds, pages, page_size, bytes of the file.
+/// The facts that every program states of a container: format_version, points, nodes, node_groups,
+/// levels, bounds in scene units, pages, page_size in bytes, bytes.file.
 [[nodiscard]] nlohmann::ordered_json container_facts(const Superblock& superblock);
+/// The room that a build needs and has, in bytes, for temporary files and for the output.
 [[nodiscard]] nlohmann::ordered_json facts_of(const BuildSpace& space);
+/// Points, buckets and spilled bytes of an external sort.
 [[nodiscard]] nlohmann::ordered_json facts_of(const SortStatistics& sort);
+/// Lookups, hits, evictions, bytes read, frames and waiting time of a page cache.
 [[nodiscard]] nlohmann::ordered_json facts_of(const CacheStatistics& cache);
+/// Receivers, and the nodes and surfels that a gather tested and drew for them.
 [[nodiscard]] nlohmann::ordered_json facts_of(const GatherCounts& counts);
+/// Seconds of each stage by its name, and their total.
 [[nodiscard]] nlohmann::ordered_json facts_of(const StageSeconds& seconds);
+/// Errors against rays at the surfels ("discs") and, where there is one, at the mesh.
 [[nodiscard]] nlohmann::ordered_json facts_of(const CheckReport& check);
+/// All facts of a shading or rendering, with those of its tuning, check and damage if there are
+/// any.
 [[nodiscard]] nlohmann::ordered_json facts_of(const LightingReport& report);
 
-/// "lit.ply: 1000 receivers, 1.20 s, 99.1 % cache hits", the stages, and the check if there was
-/// one.
+/// The summary of a shading or rendering: "lit.ply: 1000 receivers, 1.20 s, 99.10 % cache hits",
+/// the stages, and a line each for damage, tuning and check if there are any.
 [[nodiscard]] std::string shade_text(const std::string& output, const LightingReport& report);
-/// Sum over all stages.
+/// Seconds of all stages together.
 [[nodiscard]] double total_seconds(const StageSeconds& seconds);
-/// "1.23 MB", powers of 1000.
+/// A number of bytes in powers of 1000: "1.23 MB".
 [[nodiscard]] std::string bytes_text(std::uint64_t bytes);
-/// "  read 1.2 s, sort 3.4 s": the stages in their order.
+/// A line of the stages in their order, "  read 1.20 s, sort 3.40 s"; empty without stages.
 [[nodiscard]] std::string stages_text(const StageSeconds& seconds);
 
 }  // namespace ptc

@@ -1,4 +1,12 @@
-// Suns, skies and cameras from the command line.
+// Suns, point lights, skies and cameras from the command line.
+//
+//   --sun 30,60,4          azimuth from +z to +x, elevation above the horizon, irradiance
+//   --point 0,3,0,9,9,9    position, intensity
+//   --sky 0.5,0.6,0.8      radiance; one number is grey, any other text names a picture
+//   --camera 0,1,4,0,1,0   position, target
+//
+// An option's text is checked as soon as it is parsed, so that a wrong one is a usage error. The
+// picture of a sky is read later, by sky(): a wrong picture is invalid data.
 #include "tools/scene_options.h"
 
 #include <cmath>
@@ -13,6 +21,7 @@
 namespace ptc {
 namespace {
 
+/// Three numbers, or one for grey, from 0 to 1e30.
 glm::vec3 parse_colour(const std::string& option, const std::string& text) {
   constexpr char kExpected[] = "R,G,B or one number for grey, none negative";
   const std::vector<double> n = parse_numbers(option, text, {1, 3}, kExpected);
@@ -24,6 +33,7 @@ glm::vec3 parse_colour(const std::string& option, const std::string& text) {
   return colour;
 }
 
+/// Declares an option that takes one value each time that it is given.
 CLI::Option* add_repeated(CLI::App& app, const std::string& name,
                           const std::function<void(const std::vector<std::string>&)>& set,
                           const std::string& description) {

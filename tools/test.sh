@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds everything and runs all tests. Ends with ctest's summary; what a
-# failed test printed stands above it. A second run builds only what changed.
+# Installs the packages that are missing, builds everything and runs all tests. The output ends with
+# the summary of ctest, after the output of each test that failed. A second run builds only what
+# changed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

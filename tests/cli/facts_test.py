@@ -187,7 +187,7 @@ class Facts(ProgramTest):
                 self.assertEqual(facts["tuning"]["asked"], 0.1)
                 self.assertTrue(facts["tuning"]["met"])
                 self.assertLessEqual(facts["check"]["discs"]["relative"], 0.1)
-                self.assertIn("error 10 % asked", self.succeed(*command).stdout)
+                self.assertIn("error: 10 % asked", self.succeed(*command).stdout)
         below = ["ptcshade", self.box, "-o", self.here / "o.ply", "--error", "0.001%"]
         self.assertFalse(json.loads(self.succeed(*below, "--json").stdout)["tuning"]["met"])
         self.assertIn("below the floor", self.succeed(*below).stdout)

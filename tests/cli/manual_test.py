@@ -170,6 +170,10 @@ class Manuals(unittest.TestCase):
     def test_zsh_parses_every_completion(self):
         self.check_each("zsh", "zsh", "-n")
 
+    def test_zsh_takes_no_ending_for_a_qualifier(self):
+        for program in PROGRAMS:
+            self.assertNotRegex(text_of(program, "--generate", "zsh"), r"\*\.\([^|)]*\)")
+
     def test_fish_parses_every_completion(self):
         self.check_each("fish", "fish", "-n")
 

@@ -24,8 +24,7 @@ constexpr char kPurpose[] =
     "Measures time, memory and accuracy of PTCX next to other methods.\n"
     "Each command measures one subject, and writes tables and draws charts. Errors are measured "
     "against rays that are traced in the same scene; sort, build and verification are compared "
-    "with "
-    "a disk that moves the same bytes.\n"
+    "with a disk that moves the same bytes.\n"
     "\n"
     "The scenes of accuracy, error, growth and model are held in memory whole, whatever the cap on "
     "memory.";

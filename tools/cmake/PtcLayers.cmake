@@ -1,5 +1,5 @@
-# Who may include whom, said once: ptc_add_layer() links a layer from this table, and
-# tests/layers.py reads every #include "..." of the tree against it.
+# The layers that each layer may include, in one place: ptc_add_layer() links a layer by this table,
+# and tests/layers.py checks every #include "..." of the tree against it.
 set(PTC_LAYERS_format "")
 set(PTC_LAYERS_engine/base "")
 set(PTC_LAYERS_engine/parallel "engine/base")
@@ -26,13 +26,13 @@ set(PTC_LAYERS_tools/bench "${PTC_LAYERS_tools/bench/experiments};tools/bench/ex
 
 add_library(ptc_options INTERFACE)
 target_compile_features(ptc_options INTERFACE cxx_std_20)
-# No contraction: a fused multiply-add in one build and not in another would change the bytes. Nobody asks for errno or
-# traps of arithmetic, which would keep loops from becoming vectors. Nor does anybody replace a function of the shared
-# libraries, which would keep functions from being inlined.
+# No contraction: a fused multiply-add in one build and not in another would change the bytes. No code reads errno or
+# traps of arithmetic, which would keep the compiler from vectorising loops, and no program replaces a function of the
+# shared libraries, which would keep it from inlining them.
 target_compile_options(ptc_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
   -Wsign-conversion -Wno-missing-field-initializers -ffp-contract=off -fno-math-errno -fno-trapping-math -fno-semantic-interposition
   $<$<BOOL:${PTC_WERROR}>:-Werror>)
-if(PTC_FUZZ)  # what is fuzzed tells which of its branches were taken
+if(PTC_FUZZ)  # instrumented code reports to libFuzzer which branches it took
   target_compile_options(ptc_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 if(PTC_SANITIZE)
@@ -41,7 +41,7 @@ if(PTC_SANITIZE)
 endif()
 
 # ptc_add_layer(<path> SOURCES <files> HEADERS <files> [PUBLIC <libs>] [PRIVATE <libs>])
-# makes the static library ptc_<name>, alias ptc::<name>; its headers are included as "<path>/x.h".
+# makes the static library ptc_<name> with the alias ptc::<name>; its headers are included as "<path>/x.h".
 function(ptc_add_layer path)
   cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
   get_filename_component(name ${path} NAME)
@@ -57,7 +57,8 @@ function(ptc_add_layer path)
   endforeach()
 endfunction()
 
-# ptc_add_tests(<name> SOURCES <files> LINK <libs>) makes test_<name> and registers every TEST_CASE.
+# ptc_add_tests(<name> SOURCES <files> LINK <libs>) makes the executable test_<name> and registers each of its
+# TEST_CASEs with ctest.
 function(ptc_add_tests name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_executable(test_${name} ${ARG_SOURCES})

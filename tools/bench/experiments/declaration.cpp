@@ -6,6 +6,7 @@
 #include "engine/base/error.h"
 #include "engine/base/numbers.h"
 #include "tools/common.h"
+#include "tools/option_text.h"
 #include "tools/values.h"
 
 namespace ptc::bench {
@@ -101,8 +102,9 @@ void Declaration::repeats(unsigned& repeats, unsigned less) {
 
 CLI::Option* Declaration::words(const char* name, std::vector<std::string>& chosen,
                                 const char* description) {
-  return command_->add_option(name, chosen, description)
-      ->type_name(joined(chosen))
+  const std::string text = std::string(description) + " (" + joined(chosen) + ")";
+  return offer(command_->add_option(name, chosen, text), chosen)
+      ->type_name("NAME")
       ->allow_extra_args(false)
       ->check(one_of(chosen));
 }
