@@ -15,6 +15,7 @@
 #include <memory>
 #include <new>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -76,6 +77,36 @@ std::function<std::string(const std::string&)> ends_in(const std::vector<std::st
     }
     return text;
   };
+}
+
+/// A usage error in the words of the help, where CLI11 has words of its own.
+std::string message_of(const CLI::ParseError& error) {
+  const std::string text = error.what();
+  const auto replaced = [](std::string message, std::string_view words, std::string_view by) {
+    const std::size_t at = message.find(words);
+    return at == message.npos ? message : message.replace(at, words.size(), by);
+  };
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+    return "unknown option or argument" + text.substr(std::min(text.find(": "), text.size()));
+  }
+  if (dynamic_cast<const CLI::ExcludesError*>(&error) != nullptr) {
+    return replaced(text, " excludes ", " cannot be combined with ");
+  }
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+    return replaced(text, "A subcommand", "a command");
+  }
+  if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) {  // "--resume = x", a flag
+    return replaced(replaced(text, "Could not convert: ", ""), " = ",
+                    " does not take the value '") +
+           "'";
+  }
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    if (const std::size_t twice = text.find(": At Most 1 "); twice != text.npos) {
+      return text.substr(0, twice) + " is given more than once";
+    }
+    return replaced(replaced(text, ": 1 required ", " needs a value: "), " missing", "");
+  }
+  return text;
 }
 
 /// Ends the program when an allocation fails in any thread. Unwinding is no way out: destructors of
@@ -223,7 +254,7 @@ int Command::report(const CLI::ParseError& error) const {
     return kDone;
   }
   std::fprintf(stderr, "%s: %s\nTry '%s --help'.\n", app_.get_name().c_str(),
-               printable(error.what()).c_str(), app_.get_name().c_str());
+               printable(message_of(error)).c_str(), app_.get_name().c_str());
   return kUsage;
 }
 

@@ -1,8 +1,9 @@
 // Writes completions in the languages of three shells. Each proposes the same:
 //
-//   after an option that takes a value    its words, files with its endings, directories, or
-//   nothing after a dash                          the options elsewhere commands, or files that fit
-//   a positional argument
+//   where                              what
+//   after an option that takes a value  its words, files with its endings, directories, or nothing
+//   after a dash                        options
+//   elsewhere                           commands, or files that fit a positional argument
 #include "tools/completion.h"
 
 #include <algorithm>

@@ -17,6 +17,7 @@
 #include "tools/damage_map.h"
 #include "tools/option_text.h"
 #include "tools/report.h"
+#include "tools/values.h"
 
 namespace {
 
@@ -234,7 +235,7 @@ int main(int argc, char** argv) {
           "the totals; 4 builds the tree again and compares it."),
       {"0", "1", "2", "3", "4"})
       ->type_name("N")
-      ->check(CLI::Range(0, 4).description(""))
+      ->check(ptc::whole_in_range(0, 4))
       ->capture_default_str()
       ->group(kGroup);
   command.app().add_flag("--fail-fast", fail_fast, "Stop at the first fault")->group(kGroup);

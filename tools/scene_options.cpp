@@ -23,7 +23,7 @@ namespace {
 
 /// Three numbers, or one for grey, from 0 to 1e30.
 glm::vec3 parse_colour(const std::string& option, const std::string& text) {
-  constexpr char kExpected[] = "R,G,B or one number for grey, none negative";
+  constexpr char kExpected[] = "R,G,B or one number for grey, from 0 up";
   const std::vector<double> n = parse_numbers(option, text, {1, 3}, kExpected);
   const glm::vec3 colour =
       n.size() == 1 ? glm::vec3(glm::dvec3(n[0])) : glm::vec3(n[0], n[1], n[2]);
@@ -90,7 +90,7 @@ void LightArguments::declare_sky(CLI::App& app) {
 
 void LightArguments::set_suns(const std::vector<std::string>& values) {
   constexpr char kExpected[] =
-      "AZIMUTH,ELEVATION[,STRENGTH], elevation -90 to 90, strength not negative";
+      "AZ,EL[,E] with an elevation from -90 to 90 and an irradiance from 0 up";
   suns_.clear();
   for (const std::string& text : values) {
     const std::vector<double> n = parse_numbers("--sun", text, {2, 3}, kExpected);
@@ -103,7 +103,7 @@ void LightArguments::set_suns(const std::vector<std::string>& values) {
 }
 
 void LightArguments::set_points(const std::vector<std::string>& values) {
-  constexpr char kExpected[] = "X,Y,Z,R,G,B, no colour negative";
+  constexpr char kExpected[] = "X,Y,Z,R,G,B with a position and an intensity from 0 up";
   points_.clear();
   for (const std::string& text : values) {
     const std::vector<double> n = parse_numbers("--point", text, {6}, kExpected);
@@ -176,7 +176,7 @@ void CameraArguments::declare(CLI::App& app, const std::string& purpose) {
 }
 
 void CameraArguments::set_place(const std::string& text) {
-  constexpr char kExpected[] = "PX,PY,PZ,TX,TY,TZ: two different places";
+  constexpr char kExpected[] = "X,Y,Z,X,Y,Z with a position and another place as target";
   const std::vector<double> n = parse_numbers("--camera", text, {6}, kExpected);
   camera_.position = {n[0], n[1], n[2]};
   camera_.look_at = {n[3], n[4], n[5]};

@@ -42,6 +42,22 @@ class Usage(ProgramTest):
             self.assertIn("--help", self.fail_with(2, program))
             self.assertIn("--help", self.fail_with(2, program, "--no-such-option", "file"))
 
+    def test_usage_errors_are_told_in_the_words_of_the_help(self):
+        out = ["-o", self.here / "o.ptcx"]
+        for arguments, text in ((["ptcinfo", self.scene, "--no-such"], "unknown option or argument: --no-such"),
+                                (["ptcinfo", self.scene, "x"], "unknown option or argument: x"),
+                                (["ptcbuild", self.mesh, "--city", "9", *out], "INPUT cannot be combined with --city"),
+                                (["ptcbuild", self.mesh, *out, "--points"], "--points needs a value: COUNT"),
+                                (["ptcbuild", self.mesh, *out, "--leaf", "1", "--leaf", "2"], "--leaf is given more than once"),
+                                (["ptcbuild", self.mesh, *out, "--resume=x"], "--resume does not take the value 'x'"),
+                                (["ptcbuild", self.mesh, *out, "--checkpoint", "9"], "--checkpoint requires --resume"),
+                                (["ptcverify", self.scene, "--level", "5"], "--level: expects a number from 0 to 4, not '5'"),
+                                (["ptcshade", self.scene], "--output is required")):
+            self.assertEqual(self.fail_with(2, *arguments),
+                             f"{arguments[0]}: {text}\nTry '{arguments[0]} --help'.\n")
+        if "ptcbench" in PROGRAMS:
+            self.assertIn("ptcbench: a command is required\n", self.fail_with(2, "ptcbench"))
+
     def test_wrong_values_of_common_options_are_usage_errors(self):
         for program in PROGRAMS:
             operands = {"ptcinfo": [self.scene], "ptcverify": [self.scene],
