@@ -54,6 +54,17 @@ TEST_CASE("option text: the first line is the summary, the default leaves it", "
   CHECK(option.value.empty());
 }
 
+TEST_CASE("option text: what an option excludes is listed in alphabetical order", "[cli]") {
+  CLI::App app("Does nothing.", "ptctest");
+  app.set_help_flag();
+  bool flag = false;
+  CLI::Option* later = app.add_flag("--later", flag);
+  CLI::Option* earlier = app.add_flag("--earlier", flag);
+  app.add_flag("--other", flag)->excludes(later)->excludes(earlier);
+  const OptionText option = groups_of(app).at(0).options.at(2);
+  CHECK(option.excludes == std::vector<std::string>{"--earlier", "--later"});
+}
+
 TEST_CASE("option text: hidden options are in no group", "[cli]") {
   CLI::App app("Does nothing.", "ptctest");
   app.set_help_flag();
