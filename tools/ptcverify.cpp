@@ -60,7 +60,7 @@ const char* text_of(ptc::Remedy remedy) {
     case ptc::Remedy::copy_again:
       return "copy the file again, or use --salvage";
     case ptc::Remedy::write_again:
-      return "run its writer again, or keep what it wrote with --salvage";
+      return "run it again, or keep what it wrote with --salvage";
     case ptc::Remedy::transfer:
       return "transfer the file again, or use --salvage";
     case ptc::Remedy::transfer_bare:

@@ -35,7 +35,7 @@ class Warnings(ProgramTest):
     def test_names_in_a_file_cannot_command_the_terminal(self):
         self.bare.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl \x1b[2Jred\nf 1 2 3\n")
         told = self.succeed("ptcbuild", self.bare, "--points", "500", "-o", self.here / "out.ptcx").stderr
-        self.assertIn("plain grey is used: '\\x1b[2Jred'\n", told)
+        self.assertIn("becomes plain grey: '\\x1b[2Jred'\n", told)
 
 
 if __name__ == "__main__":

@@ -216,7 +216,7 @@ TEST_CASE("resume: spilled points that changed on the disk are refused with the 
     }
     std::filesystem::resize_file(spill, whole.size() - 4096);
     CHECK_THROWS_WITH(build_container(place.request, place.out, silent),
-                      Catch::Contains("another length; to start again, remove"));
+                      Catch::Contains("does not have the recorded length; to start again, remove"));
     CHECK_FALSE(std::filesystem::exists(place.out));
   }
 }

@@ -35,7 +35,7 @@ TEST_CASE("state: values are read in the order in which they were written", "[io
   CHECK(state.get_count(7) == 7);
   CHECK(state.get<double>() == 1.5);
   CHECK(state.get_text() == "spill");
-  CHECK_THROWS_WITH(state.end(), Catch::Contains("here: ") && Catch::Contains("longer"));
+  CHECK_THROWS_WITH(state.end(), Catch::Contains("here: ") && Catch::Contains("more bytes"));
   CHECK(state.get<std::uint8_t>() == 3);
   state.end();
   CHECK_THROWS_AS(state.get<std::uint8_t>(), DataError);

@@ -179,7 +179,7 @@ TEST_CASE("kept sort: changed files and tables are refused", "[sort][kept]") {
   }
   const auto bytes = std::filesystem::file_size(kept.options.kept_files[0]);
   std::filesystem::resize_file(kept.options.kept_files[0], bytes - 4096);
-  CHECK_THROWS_WITH(open(kept.state), Catch::Contains("another length"));
+  CHECK_THROWS_WITH(open(kept.state), Catch::Contains("does not have the recorded length"));
   std::filesystem::remove(kept.options.kept_files[0]);
   CHECK_THROWS_WITH(open(kept.state), Catch::Contains(kept.options.kept_files[0].string()));
 }

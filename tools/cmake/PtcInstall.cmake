@@ -5,6 +5,7 @@
 #   libptc        everything: build, shade, render, verify
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
+find_program(PTC_GZIP gzip REQUIRED)
 
 set(PTC_STORE_LAYERS format base file store)
 set(PTC_LAYERS parallel io scene sort octree verify cache shade pipeline)
@@ -29,6 +30,9 @@ function(ptc_add_library name)
     target_include_directories(${target} INTERFACE $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
       $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
     target_link_libraries(${target} PRIVATE ${ARG_LINK})
+    if(kind STREQUAL SHARED)
+      target_link_options(${target} PRIVATE LINKER:-z,defs)  # nothing is left for a program to find
+    endif()
     add_dependencies(${target} ptc_headers)
   endforeach()
   set_target_properties(${name}_static PROPERTIES EXPORT_NAME ${ARG_EXPORT}-static)
@@ -47,7 +51,7 @@ add_custom_target(ptc_headers ALL DEPENDS ${PROJECT_BINARY_DIR}/include/stamp)
 ptc_add_library(ptc-store EXPORT store LAYERS ${PTC_STORE_LAYERS}
   LINK zstd::libzstd_shared PkgConfig::lz4 PkgConfig::xxhash Threads::Threads)
 ptc_add_library(ptc EXPORT ptc LAYERS ${PTC_LAYERS}
-  LINK TBB::tbb embree OpenEXR::OpenEXR ZLIB::ZLIB fmt::fmt PkgConfig::hwy PkgConfig::uring Threads::Threads)
+  LINK TBB::tbb embree OpenEXR::OpenEXR ZLIB::ZLIB fmt::fmt PkgConfig::hwy PkgConfig::uring PkgConfig::stb Threads::Threads)
 target_link_libraries(ptc_shared PUBLIC ptc-store_shared)
 target_link_libraries(ptc_static PUBLIC ptc-store_static)
 
@@ -73,25 +77,36 @@ endforeach()
 
 if(PTC_TOOLS)
   install(TARGETS ptcbuild ptcshade ptcrender ptcconvert ptcinfo ptcverify RUNTIME COMPONENT ptcx-tools)
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/share/ DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT ptcx-tools
+    PATTERN "*ptcbench*" EXCLUDE PATTERN "man" EXCLUDE)
+  foreach(program ptcbuild ptcshade ptcrender ptcconvert ptcinfo ptcverify)
+    set(page ${PROJECT_BINARY_DIR}/share/man/man1/${program}.1)
+    add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/${program}.1.gz
+      COMMAND ${PTC_GZIP} -9nc ${page} > ${PROJECT_BINARY_DIR}/${program}.1.gz DEPENDS ptc_manuals ${page} VERBATIM)
+    list(APPEND pages ${PROJECT_BINARY_DIR}/${program}.1.gz)
+  endforeach()
+  add_custom_target(ptc_man_pages ALL DEPENDS ${pages})
+  install(FILES ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ptcx-tools)
   install(FILES ${PROJECT_SOURCE_DIR}/spec/ptcx.magic DESTINATION ${CMAKE_INSTALL_DATADIR}/ptcx COMPONENT ptcx-tools)
   install(FILES ${PROJECT_SOURCE_DIR}/tools/install/ptcx.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages
     COMPONENT ptcx-tools)
 endif()
 
 # Debian packages: cmake --preset release -DCMAKE_INSTALL_PREFIX=/usr, then cpack -G DEB
-find_program(PTC_GZIP gzip REQUIRED)
 set(changelog ${PROJECT_BINARY_DIR}/changelog.gz)
 add_custom_command(OUTPUT ${changelog} COMMAND ${PTC_GZIP} -9nc ${PROJECT_SOURCE_DIR}/tools/install/changelog > ${changelog}
   DEPENDS ${PROJECT_SOURCE_DIR}/tools/install/changelog VERBATIM)
 add_custom_target(ptc_changelog ALL DEPENDS ${changelog})
-set(about_libptc "Out-of-core point-based global illumination
- PTCX lights scenes that do not fit in memory. This package has the libraries.")
-set(about_libptc-dev "Out-of-core point-based global illumination (development)
- PTCX lights scenes that do not fit in memory. This package has headers, static libraries, a CMake package and
- pkg-config files.")
+set(about_libptc "Libraries that light scenes of points larger than memory
+ PTCX is out-of-core point-based global illumination. This package has its
+ libraries: libptc, and libptc-store for containers alone.")
+set(about_libptc-dev "Libraries that light scenes larger than memory (development)
+ PTCX is out-of-core point-based global illumination. This package has headers,
+ static libraries, a CMake package and pkg-config files.")
 set(about_ptcx-tools "Lights, verifies and converts scenes of points larger than memory
- PTCX sorts points along a Z-curve, builds an octree whose nodes know their light, keeps both in a checksummed
- container, and computes ambient occlusion, sky light and colour bleeding under a memory cap.")
+ PTCX sorts points along a Z-curve, builds an octree whose nodes know their
+ light, keeps both in a checksummed container, and computes ambient occlusion,
+ sky light and colour bleeding under a memory cap.")
 set(section_libptc libs)
 set(section_libptc-dev libdevel)
 set(section_ptcx-tools graphics)
@@ -111,8 +126,9 @@ endforeach()
 set(CPACK_DEBIAN_LIBPTC-DEV_PACKAGE_DEPENDS "libptc (= ${PROJECT_VERSION}), libglm-dev")
 set(CPACK_DEBIAN_LIBPTC-DEV_PACKAGE_SUGGESTS
   "libzstd-dev, liblz4-dev, libxxhash-dev, libopenexr-dev, libtbb-dev, libembree-dev, libfmt-dev, libhwy-dev, liburing-dev, zlib1g-dev")
+set(CPACK_DEBIAN_LIBPTC_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/tools/install/triggers)
 set(CPACK_PACKAGE_NAME ptcx)
-set(CPACK_PACKAGE_CONTACT "The PTCX authors <ptcx@localhost.localdomain>")
+set(CPACK_PACKAGE_CONTACT "The PTCX authors <ptcx@users.noreply.github.com>")
 set(CPACK_PACKAGING_INSTALL_PREFIX ${CMAKE_INSTALL_PREFIX})
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_STRIP_FILES ON)
