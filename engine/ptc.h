@@ -9,6 +9,8 @@
 #include "engine/pipeline/convert/convert.h"        // IWYU pragma: export
 #include "engine/pipeline/render/render_picture.h"  // IWYU pragma: export
 #include "engine/pipeline/shade/shade_container.h"  // IWYU pragma: export
+#include "engine/sort/external_sort.h"              // IWYU pragma: export
+#include "engine/sort/point_streams.h"              // IWYU pragma: export
 #include "engine/store/container_points.h"          // IWYU pragma: export
 #include "engine/store/point_scan.h"                // IWYU pragma: export
 #include "engine/store/reader.h"                    // IWYU pragma: export

@@ -3,8 +3,8 @@
 //   zstd:  one frame, a single segment with its content size and without a dictionary
 //   LZ4:   | decoded bytes u32 | one block |
 //
-// Both say how many bytes they decode to. The decoder compares that number with the page before it
-// decodes, so a payload can never write past its room or need memory beyond a page.
+// Frame and block say how many bytes they decode to. The decoder compares that number with the page
+// before it decodes, so a payload can never write past its room or need memory beyond a page.
 #include "format/codec.h"
 
 #include <algorithm>
@@ -56,13 +56,13 @@ void check(std::size_t result) {
 
 }  // namespace
 
-PageEncoder::PageEncoder(Codec codec, int level) : codec_(codec), level_(level) {
+PageEncoder::PageEncoder(Codec codec, int level) : codec_(codec) {
   if (codec_ != Codec::zstd) return;
   ZSTD_CCtx* const context = ZSTD_createCCtx();
   if (context == nullptr) throw std::bad_alloc();
   context_ = context;
   try {
-    check(ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, level_));
+    check(ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, level));
     check(ZSTD_CCtx_setParameter(context, ZSTD_c_windowLog, kWindowLog));
   } catch (...) {
     ZSTD_freeCCtx(context);

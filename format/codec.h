@@ -49,7 +49,6 @@ class PageEncoder {
                               std::vector<std::byte>& out);
 
   Codec codec_;
-  int level_;
   void* context_ = nullptr;        ///< ZSTD_CCtx; null for the other codecs
   std::vector<std::byte> packed_;  ///< packed columns; the buffer is kept between calls
 };

@@ -3,8 +3,9 @@
 //   file header   | magic | version | features | uuid | constants | frame | 0 | XXH3 | 0 ... 4095 |
 //                 0       8         16         40     56          64      96  120    128
 //
-//   entry         | offset | stored | raw | payload XXH3 | type | group | records |
-//                 0        8        12    16             24     26      28        32
+//   entry   | offset | stored | raw | payload XXH3 | first_key | records | type | group | level | 0
+//   |
+//           0        8        12    16             24          32        36     37      38      39
 //
 // The fields are decoded in the order in which the spec lists the rules, so that damage is told
 // apart from another version: magic, length, checksum, version, features, and the rest then.
@@ -31,7 +32,7 @@ constexpr std::uint32_t kByteOrderMark = 0x01020304;
 constexpr std::uint16_t kMajor = 1;
 constexpr std::uint8_t kAlignShift = 9;
 constexpr std::uint16_t kChecksumXxh3 = 1;
-constexpr std::uint64_t kKnownIncompat = 0;
+constexpr std::uint64_t kKnownIncompat = kReleaseFeature | kPartsFeature;
 constexpr std::size_t kUuidAt = 40;
 constexpr double kMaxWhole = 0x1p53;  // doubles hold all whole numbers up to here
 
@@ -49,6 +50,7 @@ constexpr Field<std::uint16_t> kChecksum{58};
 constexpr Field<std::uint32_t> kByteOrder{60};
 constexpr Field<std::array<double, 3>> kOrigin{64};
 constexpr Field<double> kEdge{88};
+constexpr Field<std::uint8_t> kPointBytes{96};
 constexpr Field<std::uint64_t> kHash{120};
 }  // namespace field
 
@@ -57,9 +59,12 @@ constexpr Field<std::uint64_t> kOffset{0};
 constexpr Field<std::uint32_t> kStoredBytes{8};
 constexpr Field<std::uint32_t> kRawBytes{12};
 constexpr Field<std::uint64_t> kPayloadXxh3{16};
-constexpr Field<std::uint16_t> kType{24};
-constexpr Field<std::uint16_t> kGroup{26};
-constexpr Field<std::uint32_t> kRecordCount{28};
+constexpr Field<std::uint64_t> kFirstKey{24};
+constexpr Field<std::uint32_t> kRecordCount{32};
+constexpr Field<std::uint8_t> kType{36};
+constexpr Field<std::uint8_t> kGroup{37};
+constexpr Field<std::uint8_t> kLevel{38};
+constexpr Field<std::uint8_t> kReserved{39};
 }  // namespace entry_field
 
 void check_constants(const std::byte* p) {
@@ -102,7 +107,30 @@ void check_zero(std::span<const std::byte> block, std::size_t first, std::size_t
   }
 }
 
+// Checks the entry of a page that is not in the file (spec/points.md#void-pages).
+void check_void(const DirectoryEntry& entry) {
+  if (entry.type == PageType::attribute && entry.offset == 0 && entry.stored_bytes == 0 &&
+      entry.payload_xxh3 == 0) {
+    return;
+  }
+  throw FormatError(entry_field::kRawBytes.at, "spec/container.md#page-length",
+                    "a page without content is no void attribute page");
+}
+
 }  // namespace
+
+PageNumbers::PageNumbers(const Superblock& superblock, std::vector<std::uint8_t> groups)
+    : points_(superblock.point_pages),
+      nodes_{(1U + superblock.attribute_groups) * superblock.point_pages, superblock.node_pages},
+      others_(superblock.page_count - 1 - nodes_.first - nodes_.count),
+      groups_(std::move(groups)) {}
+
+PageNumbers::Range PageNumbers::attributes(std::uint8_t group) const noexcept {
+  const auto found = std::ranges::find(groups_, group);
+  if (found == groups_.end()) return {};
+  const auto before = static_cast<std::uint32_t>(found - groups_.begin());
+  return {(1 + before) * points_, points_};
+}
 
 Uuid uuid_of(std::span<const std::byte> text) noexcept {
   return std::bit_cast<Uuid>(xxh3_128(text));
@@ -123,6 +151,7 @@ void encode_identity(const FileHeader& header, std::span<std::byte, kBlockBytes>
   field::kByteOrder.put(p, kByteOrderMark);
   field::kOrigin.put(p, header.frame.origin);
   field::kEdge.put(p, header.frame.edge);
+  field::kPointBytes.put(p, header.point_bytes);
 }
 
 Block encode_file_header(const FileHeader& header) {
@@ -159,6 +188,10 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
   header.feature_incompat = field::kIncompat.of(p);
   header.feature_ro_compat = field::kReadOnly.of(p);
   header.feature_compat = field::kCompat.of(p);
+  if ((header.feature_incompat & kReleaseFeature) == 0) {
+    throw FormatError(field::kIncompat.at, "spec/container.md#header-draft",
+                      "file is a draft of before version 1.0, which this program does not read");
+  }
   if ((header.feature_incompat & ~kKnownIncompat) != 0) {
     throw FormatError(field::kIncompat.at, "spec/container.md#header-features",
                       "file needs a feature that this program does not know");
@@ -172,9 +205,14 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
     throw FormatError(field::kPageShift.at, "spec/container.md#header-page-shift",
                       "page_shift is not 12 to 20");
   }
+  header.point_bytes = field::kPointBytes.of(p);
+  if (header.point_bytes != kPointBytes && header.point_bytes != kEmittingPointBytes) {
+    throw FormatError(field::kPointBytes.at, "spec/container.md#header-point-bytes",
+                      "point_bytes is neither 34 nor 40");
+  }
   header.frame = {field::kOrigin.of(p), field::kEdge.of(p)};
   check_frame(header.frame);
-  check_zero(bytes, field::kEdge.at + 8, field::kHash.at);
+  check_zero(bytes, field::kPointBytes.at + 1, field::kHash.at);
   check_zero(bytes, field::kHash.at + 8, kBlockBytes);
   return header;
 }
@@ -194,9 +232,12 @@ void encode_directory_entry(const DirectoryEntry& entry,
   entry_field::kStoredBytes.put(p, entry.stored_bytes);
   entry_field::kRawBytes.put(p, entry.raw_bytes);
   entry_field::kPayloadXxh3.put(p, entry.payload_xxh3);
-  entry_field::kType.put(p, static_cast<std::uint16_t>(entry.type));
-  entry_field::kGroup.put(p, entry.group);
+  entry_field::kFirstKey.put(p, entry.first_key);
   entry_field::kRecordCount.put(p, entry.record_count);
+  entry_field::kType.put(p, static_cast<std::uint8_t>(entry.type));
+  entry_field::kGroup.put(p, entry.group);
+  entry_field::kLevel.put(p, entry.level);
+  entry_field::kReserved.put(p, std::uint8_t{0});
 }
 
 DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const FileHeader& file,
@@ -212,15 +253,23 @@ DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const Fi
   entry.stored_bytes = entry_field::kStoredBytes.of(p);
   entry.raw_bytes = entry_field::kRawBytes.of(p);
   entry.payload_xxh3 = entry_field::kPayloadXxh3.of(p);
-  entry.group = entry_field::kGroup.of(p);
+  entry.first_key = entry_field::kFirstKey.of(p);
   entry.record_count = entry_field::kRecordCount.of(p);
-  const auto type = entry_field::kType.of(p);
-  check_page_facts({type, entry.group, entry.stored_bytes, entry.raw_bytes, entry.record_count},
-                   file);
-  entry.type = static_cast<PageType>(type);
+  entry.type = static_cast<PageType>(entry_field::kType.of(p));
+  entry.group = entry_field::kGroup.of(p);
+  entry.level = entry_field::kLevel.of(p);
   if (entry.type == PageType::directory) {
     throw FormatError(entry_field::kType.at, "spec/container.md#directory-listing",
                       "directory lists itself");
+  }
+  if (entry_field::kReserved.of(p) != 0) {
+    throw FormatError(entry_field::kReserved.at, "spec/container.md#page-fields",
+                      "reserved field is not zero");
+  }
+  check_page_facts(entry, file);
+  if (entry.is_void()) {
+    check_void(entry);
+    return entry;
   }
 
   // Check that the page lies between the header and the superblocks.
@@ -237,7 +286,7 @@ DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const Fi
 }
 
 std::uint32_t directory_entries_per_page(const FileHeader& file) noexcept {
-  return payload_limit(file) / static_cast<std::uint32_t>(kDirectoryEntryBytes);
+  return payload_limit(file.page_shift) / static_cast<std::uint32_t>(kDirectoryEntryBytes);
 }
 
 std::uint64_t directory_bytes(const FileHeader& file, std::uint32_t page_count) noexcept {

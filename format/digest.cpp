@@ -38,9 +38,9 @@ ContentDigest& ContentDigest::operator=(ContentDigest&& other) noexcept {
 }
 
 void ContentDigest::add(const DirectoryEntry& entry) {
-  std::array<std::byte, 16> record;
-  store(record.data(), 0, static_cast<std::uint16_t>(entry.type));
-  store(record.data(), 2, entry.group);
+  std::array<std::byte, 16> record{};
+  store(record.data(), 0, static_cast<std::uint8_t>(entry.type));
+  store(record.data(), 1, entry.group);
   store(record.data(), 4, entry.record_count);
   store(record.data(), 8, entry.payload_xxh3);
   XXH3_128bits_update(state_of(state_), record.data(), record.size());

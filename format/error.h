@@ -30,6 +30,8 @@ class FormatError : public std::runtime_error {
   /// Returns what is wrong, without path, offset, page and rule.
   [[nodiscard]] const std::string& text() const noexcept { return text_; }
 
+  /// Returns the path of the file; empty when it is not known.
+  [[nodiscard]] const std::string& file() const noexcept { return where_; }
   /// Returns the number of the page to which the bytes belong, if a reader of pages added it.
   [[nodiscard]] std::optional<std::uint32_t> page() const noexcept { return page_; }
 

@@ -4,8 +4,11 @@
 // compiled. with_instructions() is compiled several times, and all that a loop calls is inlined
 // into each of them, so that one source serves every processor:
 //
-//   void f(std::span<float> x) { with_instructions(widest_instructions(), [&] { ... plain loops ...
-//   }); }
+//   void scale(std::span<float> values, float factor) {
+//     with_instructions(widest_instructions(), [=] {
+//       for (float& value : values) value *= factor;
+//     });
+//   }
 #pragma once
 
 #include <array>

@@ -68,7 +68,7 @@ LatticePoint Frame::to_lattice(const std::array<double, 3>& position) const noex
   const double per_unit = 0x1p42 / edge;
   LatticePoint point;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // Both terms are whole numbers, so their difference adds no rounding error.
+    // Position and origin are whole numbers of units here, so their difference is exact.
     const double steps = std::rint(position[axis] * per_unit) - origin[axis] * per_unit;
     const bool inside = steps > 0 && steps < static_cast<double>(kLatticeMax);
     point[axis] = inside ? static_cast<std::uint64_t>(steps) : steps > 0 ? kLatticeMax : 0;

@@ -2,7 +2,8 @@
 //
 //   a page:     | slot of each group, u16 | zeros | group 0 | group 1 | ...
 //
-//   a group:    | head, 24 bytes | u64 x n | 14 columns of u16 x n | 6 columns of u32 x n | zeros |
+//   a group:    | head, 24 bytes | u64 x n | 15 columns of u16 x n | 6 columns of u32 x n | zeros |
+//                                                                  | 6 more where a point emits
 //
 // The slot table and every group are padded with zeros to a multiple of 8 bytes.
 #pragma once
@@ -15,7 +16,9 @@
 namespace ptc {
 
 inline constexpr std::size_t kGroupHeadBytes = 24;   ///< cell, level, child count, interior mask
-inline constexpr std::size_t kGroupChildBytes = 60;  ///< u64, 8 x u16, 6 x u16, 6 x u32
+inline constexpr std::size_t kGroupChildBytes = 62;  ///< u64, 9 x u16, 6 x u16, 6 x u32
+inline constexpr std::size_t kEmissionBytes = 24;    ///< 6 x u32 of a child in a group that emits
+inline constexpr unsigned kEmitsFlag = 1;            ///< flag of a group with these columns
 inline constexpr std::size_t kSlotUnit = 8;          ///< slots count in bytes of this many
 inline constexpr int kFirstPointBits = 48;           ///< of a leaf's reference; its count follows
 
@@ -29,10 +32,12 @@ enum Column : std::size_t {
   kConeAxis,
   kConeCos,
   kArea,
-  kThickness
+  kThickness,
+  kGreatest
 };
-inline constexpr std::size_t kFacing = 8;     ///< first of 6 columns, one for each axis
-inline constexpr std::size_t kRadiance = 14;  ///< first of 6 columns of u32, one for each axis
+inline constexpr std::size_t kFacing = 9;     ///< first of 6 columns, one for each axis
+inline constexpr std::size_t kRadiance = 15;  ///< first of 6 columns of u32, one for each axis
+inline constexpr std::size_t kEmission = 27;  ///< first of 6 columns of u32, one for each axis
 
 /// Rounds a number of bytes up to a multiple of kSlotUnit.
 [[nodiscard]] constexpr std::size_t round_to_slot(std::size_t bytes) noexcept {
@@ -40,8 +45,9 @@ inline constexpr std::size_t kRadiance = 14;  ///< first of 6 columns of u32, on
 }
 
 /// Returns the bytes of a group of n children without the padding behind it.
-[[nodiscard]] constexpr std::size_t group_content_bytes(std::size_t children) noexcept {
-  return kGroupHeadBytes + kGroupChildBytes * children;
+/// @param emits  whether it has the columns of emission
+[[nodiscard]] constexpr std::size_t group_content_bytes(std::size_t children, bool emits) noexcept {
+  return kGroupHeadBytes + (kGroupChildBytes + (emits ? kEmissionBytes : 0)) * children;
 }
 
 /// Returns the offset of a column from the start of a group of n children, in bytes. Columns of u32

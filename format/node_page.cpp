@@ -23,9 +23,9 @@ constexpr std::uint16_t kUfloat16Limit = 0xff00;  // patterns from here on are i
 // Checks a group that lies whole in the payload, `at` bytes from its start.
 class GroupCheck {
  public:
-  GroupCheck(const std::byte* payload, std::size_t at, std::uint32_t page_count,
+  GroupCheck(const std::byte* payload, std::size_t at, std::uint32_t node_pages,
              std::uint64_t points)
-      : group_(payload + at), at_(at), page_count_(page_count), points_(points), view_(group_) {}
+      : group_(payload + at), at_(at), node_pages_(node_pages), points_(points), view_(group_) {}
 
   void run() const {
     check_cell();
@@ -56,10 +56,8 @@ class GroupCheck {
   void check_zero() const {
     constexpr char kZeroClause[] = "spec/nodes.md#node-zero";
     const auto n = static_cast<std::size_t>(view_.size());
-    const std::size_t end = group_content_bytes(n);
-    if (load<std::uint8_t>(group_, 19) != 0 || load<std::uint32_t>(group_, 20) != 0) {
-      fail(19, kZeroClause, "reserved field is not zero");
-    }
+    const std::size_t end = group_content_bytes(n, view_.emits());
+    if (load<std::uint32_t>(group_, 20) != 0) fail(20, kZeroClause, "reserved field is not zero");
     if (first_nonzero({group_ + end, round_to_slot(end) - end}) != round_to_slot(end) - end) {
       fail(end, kZeroClause, "padding is not zero");
     }
@@ -69,11 +67,11 @@ class GroupCheck {
     const std::size_t offset = kGroupHeadBytes + 8 * static_cast<std::size_t>(i);
     const ChildRef ref = view_.child(i);
     if (ref.interior) {
-      if (ref.page >= page_count_) {
-        fail(offset, "spec/nodes.md#node-reference", "child's page does not exist");
-      }
       if (load<std::uint64_t>(group_, offset) >> kFirstPointBits != 0) {
         fail(offset + 6, "spec/nodes.md#node-zero", "reserved bits are not zero");
+      }
+      if (ref.page >= node_pages_) {
+        fail(offset, "spec/nodes.md#node-reference", "child's page does not exist");
       }
     } else if (ref.point_count == 0 || ref.first_point > points_ ||
                ref.point_count > points_ - ref.first_point) {
@@ -82,17 +80,18 @@ class GroupCheck {
   }
 
   void check_numbers(int i) const {
-    for (const std::byte* const column : {view_.radius(), view_.area(), view_.thickness()}) {
+    for (const std::byte* const column :
+         {view_.radius(), view_.area(), view_.thickness(), view_.greatest()}) {
       if (GroupView::u16_at(column, i) >= kUfloat16Limit) {
         fail(static_cast<std::size_t>(column - group_) + 2 * static_cast<std::size_t>(i),
-             "spec/nodes.md#node-number", "radius, area or thickness is not finite");
+             "spec/nodes.md#node-number", "a radius, area or thickness is not finite");
       }
     }
   }
 
   const std::byte* group_;
   std::size_t at_;
-  std::uint32_t page_count_;
+  std::uint32_t node_pages_;
   std::uint64_t points_;
   GroupView view_;
 };
@@ -113,14 +112,21 @@ NodeSummary decode_summary(const GroupView& group, int i) {
   node.radius = decode_ufloat16(u16(group.radius()));
   node.area = decode_ufloat16(u16(group.area()));
   node.thickness = decode_ufloat16(u16(group.thickness()));
+  node.greatest = decode_ufloat16(u16(group.greatest()));
+  node.emits = group.emits();
   node.cone_axis = decode_octahedral8(u16(group.cone_axis()));
   node.cone_cos = static_cast<float>(snorm16(u16(group.cone_cos())));
   for (std::size_t k = 0; k < 6; ++k) {
     const int axis = static_cast<int>(k);
     node.facing[k] = u16(group.facing(axis)) / kFacingSteps * node.area;
-    const std::array<float, 3> radiance =
-        decode_rgbe(load<std::uint32_t>(group.radiance(axis), 4 * static_cast<std::size_t>(i)));
-    for (std::size_t c = 0; c < 3; ++c) node.flux[k][c] = node.facing[k] * double{radiance[c]};
+    const auto light_of = [&](const std::byte* column) {
+      const std::array<float, 3> light =
+          decode_rgbe(load<std::uint32_t>(column, 4 * static_cast<std::size_t>(i)));
+      return std::array{node.facing[k] * double{light[0]}, node.facing[k] * double{light[1]},
+                        node.facing[k] * double{light[2]}};
+    };
+    node.flux[k] = light_of(group.radiance(axis));
+    if (node.emits) node.power[k] = light_of(group.emission(axis));
   }
   return node;
 }
@@ -128,7 +134,7 @@ NodeSummary decode_summary(const GroupView& group, int i) {
 }  // namespace
 
 NodePage::NodePage(std::span<const std::byte> payload, std::uint32_t group_count,
-                   std::uint32_t page_count, std::uint64_t points)
+                   std::uint32_t node_pages, std::uint64_t points, bool may_emit)
     : payload_(payload.data()), count_(group_count) {
   // Check the slot table.
   constexpr char kSlots[] = "spec/nodes.md#node-slots";
@@ -154,9 +160,14 @@ NodePage::NodePage(std::span<const std::byte> payload, std::uint32_t group_count
       throw FormatError(at + 17, "spec/nodes.md#node-children",
                         "group does not have 1 to 8 children");
     }
-    const std::size_t bytes = round_to_slot(group_content_bytes(n));
+    const unsigned flags = load<std::uint8_t>(payload_, at + 19);
+    if (flags > (may_emit ? kEmitsFlag : 0)) {
+      throw FormatError(at + 19, "spec/nodes.md#node-mask",
+                        "group has a flag that is unknown or not allowed in this file");
+    }
+    const std::size_t bytes = round_to_slot(group_content_bytes(n, flags != 0));
     if (bytes > room) throw FormatError(at, kSlots, "group ends past the payload");
-    GroupCheck(payload_, at, page_count, points).run();
+    GroupCheck(payload_, at, node_pages, points).run();
     at += bytes;
   }
   if (at != payload.size()) throw FormatError(at, kSlots, "bytes follow the last group");

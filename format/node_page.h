@@ -30,7 +30,7 @@ inline constexpr std::uint32_t kMaxLeafPoints = 0xffff;  ///< greatest number of
 /// A reference to what is below a node: a sibling group or a run of points.
 struct ChildRef {
   bool interior = false;          ///< refers to a group; otherwise to points
-  std::uint32_t page = 0;         ///< interior: number of the node page
+  std::uint32_t page = 0;         ///< interior: rank of the node page
   std::uint16_t slot = 0;         ///< interior: slot of the group in that page
   std::uint64_t first_point = 0;  ///< leaf: index of the first point in Morton order, below 2^48
   std::uint32_t point_count = 0;  ///< leaf: number of points, 1 to kMaxLeafPoints
@@ -64,6 +64,10 @@ struct NodeSummary {
   std::array<double, 6> facing{};  ///< sum of area * max(0, n . axis), axes +x -x +y -y +z -z
   /// The sum of area * max(0, n . axis) * radiance for each of the six axes, RGB.
   std::array<std::array<double, 3>, 6> flux{};
+  /// The sum of area * max(0, n . axis) * emission for each of the six axes, RGB.
+  std::array<std::array<double, 3>, 6> power{};
+  double greatest = 0;               ///< the greatest radius of a surfel, lattice units
+  bool emits = false;                ///< whether a surfel emits light
   std::array<float, 3> cone_axis{};  ///< unit axis of a cone that holds every normal n
   float cone_cos = -1;               ///< cosine of the cone's half angle: n . axis >= cone_cos
 };
@@ -87,6 +91,9 @@ struct NodeGroup {
 /// @throws std::invalid_argument when the group has no children or more than 8
 void append_group(const NodeGroup& group, std::vector<std::byte>& out);
 
+/// Returns whether a surfel below a group emits light.
+[[nodiscard]] bool emits_light(const NodeGroup& group) noexcept;
+
 /// Changes the reference of child i of an encoded group. The kind of the child cannot change: an
 /// interior child stays interior and a leaf stays a leaf.
 void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexcept;
@@ -96,7 +103,7 @@ void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexc
 /// them.
 ///
 ///   0  u64 cell.high   8 u64 cell.low
-///   16 u8 level   17 u8 n   18 u8 interior mask   19 u8 0   20 u32 0
+///   16 u8 level   17 u8 n   18 u8 interior mask   19 u8 flags   20 u32 0
 ///   24 u64 child[n]        interior: page | slot << 32     leaf: first point | count << 48
 ///      u16 mean_x[n] mean_y[n] mean_z[n]    in the cell: mean = corner + v / 65536 * cell edge
 ///      u16 radius[n]                        ufloat16 rounded up, lattice units
@@ -104,8 +111,10 @@ void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexc
 ///      u16 cone_cos[n]                      snorm16 rounded down
 ///      u16 area[n]                          ufloat16, scene units squared
 ///      u16 thickness[n]                     ufloat16 rounded up, lattice units
-///      u16 facing[6][n]                     unorm16 of facing / area
-///      u32 radiance[6][n]                   rgbe of flux / facing
+///      u16 greatest[n]                      ufloat16 rounded up, lattice units
+///      u16 facing_k[n], k = 0 to 5          unorm16 of facing / area
+///      u32 radiance_k[n], k = 0 to 5        rgbe of flux / facing
+///      u32 emission_k[n], k = 0 to 5        rgbe of power / facing, where the flag emits is set
 class GroupView {
  public:
   /// @param group  first byte of the group
@@ -121,6 +130,10 @@ class GroupView {
   [[nodiscard]] int size() const noexcept { return static_cast<int>(p_[17]); }
   /// Returns a mask whose bit i says that child i is interior.
   [[nodiscard]] unsigned interior_mask() const noexcept { return static_cast<unsigned>(p_[18]); }
+  /// Returns whether the group has the columns of emission; without them nothing below emits.
+  [[nodiscard]] bool emits() const noexcept {
+    return (static_cast<unsigned>(p_[19]) & kEmitsFlag) != 0;
+  }
   /// Returns the stored reference of child i; decode_reference() explains its bits.
   [[nodiscard]] std::uint64_t reference(int i) const noexcept {
     return load<std::uint64_t>(24 + 8 * static_cast<std::size_t>(i));
@@ -140,14 +153,17 @@ class GroupView {
   [[nodiscard]] const std::byte* cone_cos() const noexcept { return column(5); }
   [[nodiscard]] const std::byte* area() const noexcept { return column(6); }
   [[nodiscard]] const std::byte* thickness() const noexcept { return column(7); }
+  [[nodiscard]] const std::byte* greatest() const noexcept { return column(8); }
   /// Returns the column of facing / area for axis k, 0 to 5, as unorm16.
-  [[nodiscard]] const std::byte* facing(int k) const noexcept { return column(8 + k); }
+  [[nodiscard]] const std::byte* facing(int k) const noexcept { return column(9 + k); }
   /// Returns the column of mean radiance towards axis k, 0 to 5, as rgbe (u32).
-  [[nodiscard]] const std::byte* radiance(int k) const noexcept { return column(14 + 2 * k); }
+  [[nodiscard]] const std::byte* radiance(int k) const noexcept { return column(15 + 2 * k); }
+  /// Returns the column of mean emission towards axis k, 0 to 5, as rgbe (u32). @pre emits()
+  [[nodiscard]] const std::byte* emission(int k) const noexcept { return column(27 + 2 * k); }
 
   /// Returns the group as it lies in the page, without the padding behind it.
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
-    return {p_, group_content_bytes(static_cast<std::size_t>(size()))};
+    return {p_, group_content_bytes(static_cast<std::size_t>(size()), emits())};
   }
 
   /// Returns the i-th value of a column of u16.
@@ -177,7 +193,8 @@ class NodePageEncoder {
   ///                       counts units of 8 bytes in 16 bits.
   explicit NodePageEncoder(std::size_t payload_limit);
   /// Says whether a group of n children still fits.
-  [[nodiscard]] bool fits(std::size_t children) const noexcept;
+  /// @param emits  whether the group has the columns of emission
+  [[nodiscard]] bool fits(std::size_t children, bool emits) const noexcept;
   /// Encodes a group as append_group() does and adds it. @return the slot of the group
   /// @throws std::invalid_argument when it does not fit, or has no children or more than 8
   std::uint16_t add(const NodeGroup& group);
@@ -193,7 +210,7 @@ class NodePageEncoder {
  private:
   /// Appends a slot for a group of n children and returns its number.
   /// @throws std::invalid_argument when the group does not fit, or n is not 1 to 8
-  std::uint16_t new_slot(std::size_t children);
+  std::uint16_t new_slot(std::size_t children, bool emits);
 
   std::size_t limit_;                 ///< greatest size of the payload, bytes
   std::vector<std::uint16_t> slots_;  ///< first unit of each group, counted from the first group
@@ -205,12 +222,12 @@ class NodePage {
  public:
   /// Checks slots, sizes, levels, masks and all references that need no other page: every group
   /// lies in the payload, leaf runs end at or before `points`, page references are below
-  /// `page_count`.
+  /// `node_pages`, and no group has emission unless `may_emit`.
   /// @param payload      the decoded payload, which must outlive this view
   /// @param group_count  PageHeader::record_count of the page
   /// @throws FormatError with the offset in the payload when a rule is broken
-  NodePage(std::span<const std::byte> payload, std::uint32_t group_count, std::uint32_t page_count,
-           std::uint64_t points);
+  NodePage(std::span<const std::byte> payload, std::uint32_t group_count, std::uint32_t node_pages,
+           std::uint64_t points, bool may_emit);
   /// Makes a view without checks. @pre the payload passed the check above when it was loaded
   NodePage(const std::byte* payload, std::uint32_t group_count) noexcept
       : payload_(payload), count_(group_count) {}

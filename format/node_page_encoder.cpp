@@ -48,12 +48,15 @@ bool sane(double x) noexcept {
   return x >= 0 && x <= std::numeric_limits<double>::max();
 }
 
+[[maybe_unused]] bool all_sane(const std::array<double, 3>& values) noexcept {
+  return std::ranges::all_of(values, sane);
+}
+
 [[maybe_unused]] bool storable(const NodeSummary& node) noexcept {
   return std::ranges::all_of(node.mean, [](double x) { return std::isfinite(x); }) &&
-         sane(node.radius) && sane(node.area) && sane(node.thickness) &&
-         std::ranges::all_of(node.facing, sane) &&
-         std::ranges::all_of(node.flux,
-                             [](const auto& f) { return std::ranges::all_of(f, sane); }) &&
+         sane(node.radius) && sane(node.area) && sane(node.thickness) && sane(node.greatest) &&
+         std::ranges::all_of(node.facing, sane) && std::ranges::all_of(node.flux, all_sane) &&
+         std::ranges::all_of(node.power, all_sane) &&
          std::ranges::all_of(node.cone_axis, [](float x) { return std::isfinite(x); }) &&
          std::abs(node.cone_cos) <= 1;
 }
@@ -98,8 +101,8 @@ std::int16_t encode_cone_cos(const NodeSummary& node, std::uint16_t stored_axis)
 class ChildEncoder {
  public:
   ChildEncoder(std::byte* group, std::size_t n, std::size_t i, const LatticePoint& corner,
-               double edge)
-      : group_(group), n_(n), i_(i), corner_(corner), edge_(edge) {}
+               double edge, bool emits)
+      : group_(group), n_(n), i_(i), corner_(corner), edge_(edge), emits_(emits) {}
 
   void encode(const NodeChild& child) {
     assert(storable(child.node));
@@ -136,6 +139,7 @@ class ChildEncoder {
     }
     put(kRadius, encode_ufloat16_up(float_above(radius)));
     put(kThickness, encode_ufloat16_up(float_above(std::min(thickness, radius))));
+    put(kGreatest, encode_ufloat16_up(float_above(node.greatest)));
   }
 
   // Returns the distance between the exact unit normal of the slab and the one that the stored
@@ -166,20 +170,25 @@ class ChildEncoder {
     return std::sqrt(apart);
   }
 
-  // Writes area, shares and radiance.
+  // Writes the mean light of a sum over what faces an axis.
+  void put_light(std::size_t column, const std::array<double, 3>& sum, double facing) {
+    store(group_, column_at(n_, column) + 4 * i_,
+          encode_rgbe(
+              {to_float(sum[0] / facing), to_float(sum[1] / facing), to_float(sum[2] / facing)}));
+  }
+
+  // Writes area, shares, radiance and emission.
   void encode_light(const NodeSummary& node) {
     const std::uint16_t area = encode_ufloat16(to_float(node.area));
     put(kArea, area);
-    if (area == 0) return;  // shares and radiance stay 0
+    if (area == 0) return;  // shares and light stay 0
     for (std::size_t k = 0; k < 6; ++k) {
       const double facing = node.facing[k];
-      if (!(facing > 0)) continue;  // share and radiance stay 0
+      if (!(facing > 0)) continue;  // share and light stay 0
       const double share = std::min(facing / node.area, 1.0);
       put(kFacing + k, to_u16(share * kFacingSteps));
-      const auto& flux = node.flux[k];
-      store(group_, column_at(n_, kRadiance + 2 * k) + 4 * i_,
-            encode_rgbe({to_float(flux[0] / facing), to_float(flux[1] / facing),
-                         to_float(flux[2] / facing)}));
+      put_light(kRadiance + 2 * k, node.flux[k], facing);
+      if (emits_) put_light(kEmission + 2 * k, node.power[k], facing);
     }
   }
 
@@ -188,6 +197,7 @@ class ChildEncoder {
   std::size_t i_;
   const LatticePoint& corner_;
   double edge_;
+  bool emits_;
 };
 
 }  // namespace
@@ -201,7 +211,8 @@ void append_group(const NodeGroup& group, std::vector<std::byte>& out) {
 
   // Write the head and the padding.
   const std::size_t at = out.size();
-  out.resize(at + round_to_slot(group_content_bytes(n)));
+  const bool emits = emits_light(group);
+  out.resize(at + round_to_slot(group_content_bytes(n, emits)));
   std::byte* const to = out.data() + at;
   store(to, 0, group.cell.high);
   store(to, 8, group.cell.low);
@@ -214,9 +225,14 @@ void append_group(const NodeGroup& group, std::vector<std::byte>& out) {
   for (std::size_t i = 0; i < n; ++i) {
     const NodeChild& child = group.children[i];
     interior_mask = static_cast<std::uint8_t>(interior_mask | unsigned{child.ref.interior} << i);
-    ChildEncoder(to, n, i, corner, cell_edge(group.level)).encode(child);
+    ChildEncoder(to, n, i, corner, cell_edge(group.level), emits).encode(child);
   }
   store(to, 18, interior_mask);
+  store(to, 19, static_cast<std::uint8_t>(emits ? kEmitsFlag : 0));
+}
+
+bool emits_light(const NodeGroup& group) noexcept {
+  return std::ranges::any_of(group.children, [](const NodeChild& c) { return c.node.emits; });
 }
 
 void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexcept {
@@ -226,14 +242,14 @@ void set_reference(std::span<std::byte> group, int i, const ChildRef& ref) noexc
 NodePageEncoder::NodePageEncoder(std::size_t payload_limit)
     : limit_(std::min(payload_limit, kMaxPayload)) {}
 
-bool NodePageEncoder::fits(std::size_t children) const noexcept {
+bool NodePageEncoder::fits(std::size_t children, bool emits) const noexcept {
   const std::size_t table = round_to_slot(sizeof(std::uint16_t) * (slots_.size() + 1));
-  const std::size_t group = round_to_slot(group_content_bytes(children));
+  const std::size_t group = round_to_slot(group_content_bytes(children, emits));
   return table + groups_.size() + group <= limit_;
 }
 
-std::uint16_t NodePageEncoder::new_slot(std::size_t children) {
-  if (children < 1 || children > kMaxChildren || !fits(children)) {
+std::uint16_t NodePageEncoder::new_slot(std::size_t children, bool emits) {
+  if (children < 1 || children > kMaxChildren || !fits(children, emits)) {
     throw std::invalid_argument(
         "NodePageEncoder: a group must have 1 to 8 children and fit the page");
   }
@@ -243,13 +259,13 @@ std::uint16_t NodePageEncoder::new_slot(std::size_t children) {
 }
 
 std::uint16_t NodePageEncoder::add(const NodeGroup& group) {
-  const std::uint16_t slot = new_slot(group.children.size());
+  const std::uint16_t slot = new_slot(group.children.size(), emits_light(group));
   append_group(group, groups_);
   return slot;
 }
 
 std::uint16_t NodePageEncoder::add(const GroupView& group) {
-  const std::uint16_t slot = new_slot(static_cast<std::size_t>(group.size()));
+  const std::uint16_t slot = new_slot(static_cast<std::size_t>(group.size()), group.emits());
   const std::span<const std::byte> content = group.bytes();
   groups_.insert(groups_.end(), content.begin(), content.end());
   groups_.resize(round_to_slot(groups_.size()));

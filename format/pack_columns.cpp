@@ -86,13 +86,17 @@ void pack(const std::vector<Value>& values, unsigned bits, std::vector<Value>& c
 void pack_all(std::span<const std::byte> payload, std::uint32_t count,
               std::span<const PackedColumn> columns, std::vector<std::byte>& packed) {
   std::vector<std::uint32_t> values(count), others(count);
-  std::vector<std::uint64_t> coordinates, codes;
+  std::vector<std::uint64_t> wide, codes;
   for (const PackedColumn& column : columns) {
-    if (column.bits == kCoordinateBits) {
-      coordinates.resize(count);
+    if (column.bits == kCoordinateBits || column.bits == 64) {
+      wide.resize(count);
       codes.resize(count);
-      load_coordinates(payload.data(), column, coordinates);
-      pack(coordinates, column.bits, codes, packed);
+      if (column.bits == 64) {
+        load_all<std::uint64_t>(payload.data() + std::size_t{column.before} * count, wide);
+      } else {
+        load_coordinates(payload.data(), column, wide);
+      }
+      pack(wide, column.bits, codes, packed);
       continue;
     }
     load_column(payload.data(), column, values);

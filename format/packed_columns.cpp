@@ -14,6 +14,7 @@
 #include <stdexcept>
 
 #include "format/bytes.h"
+#include "format/container.h"
 #include "format/error.h"
 #include "format/packed_layout.h"
 
@@ -21,7 +22,7 @@ namespace ptc {
 namespace {
 
 constexpr char kPacked[] = "spec/points.md#packed-columns";
-constexpr std::array<PackedColumn, 13> kPointColumns{{
+constexpr std::array<PackedColumn, 16> kPointColumns{{
     {0, kCoordinateBits},
     {4, kCoordinateBits},
     {8, kCoordinateBits},  // x, y, z
@@ -35,7 +36,11 @@ constexpr std::array<PackedColumn, 13> kPointColumns{{
     {30, 8, 9},
     {32, 8, 9},  // albedo: g, r - g, b - g
     {33, 8},     // flags
+    {36, 16},
+    {34, 16, 13},
+    {38, 16, 13},  // emission: g, r - g, b - g
 }};
+constexpr std::size_t kColumnsWithoutEmission = 13;
 
 // A packed column whose head was checked.
 struct Head {
@@ -93,8 +98,12 @@ void sum_up(const Head& head, std::size_t n, const Put& put) {
       return sum_planes<4>(head, n, put);
     case 5:
       return sum_planes<5>(head, n, put);
-    default:
+    case 6:
       return sum_planes<6>(head, n, put);
+    case 7:
+      return sum_planes<7>(head, n, put);
+    default:
+      return sum_planes<8>(head, n, put);
   }
 }
 
@@ -134,7 +143,8 @@ void unpack(const Head& head, std::size_t n, std::span<const PackedColumn> colum
   std::byte* const to = payload + column.before * n;
   if (column.bits == 8) return unpack_values<std::uint8_t>(head, n, minus, to);
   if (column.bits == 16) return unpack_values<std::uint16_t>(head, n, minus, to);
-  unpack_values<std::uint32_t>(head, n, minus, to);
+  if (column.bits == 32) return unpack_values<std::uint32_t>(head, n, minus, to);
+  unpack_values<std::uint64_t>(head, n, minus, to);
 }
 
 }  // namespace
@@ -150,17 +160,18 @@ void check_packed_size(std::size_t bytes, std::uint32_t count,
     throw std::invalid_argument("packed columns: the size of the payload does not match");
 }
 
-std::span<const PackedColumn> packed_point_columns() noexcept {
-  return kPointColumns;
+std::span<const PackedColumn> packed_point_columns(std::uint8_t point_bytes) noexcept {
+  return point_bytes == kPointBytes ? std::span(kPointColumns).first(kColumnsWithoutEmission)
+                                    : std::span(kPointColumns);
 }
 
 std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels,
-                                               std::uint16_t group) {
+                                               std::uint8_t group) {
   std::vector<PackedColumn> columns;
   std::uint32_t before = 0;
   for (const Channel& channel : channels) {
     if (channel.group != group) continue;
-    const auto bytes = static_cast<std::uint8_t>(channel_bytes(channel.type));
+    const auto bytes = static_cast<std::uint8_t>(channel.component_bytes());
     for (unsigned component = 0; component < channel.components; ++component, before += bytes) {
       columns.push_back({.before = before, .bits = static_cast<std::uint8_t>(8 * bytes)});
     }

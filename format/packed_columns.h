@@ -26,18 +26,19 @@ inline constexpr std::uint8_t kCoordinateBits = 42;
 struct PackedColumn {
   static constexpr std::uint8_t kNone = 0xff;  ///< no column is subtracted
   std::uint32_t before = 0;  ///< bytes per point of the columns in front of it in the payload
-  std::uint8_t bits = 0;  ///< bits of a value: 8, 16, 32, or kCoordinateBits for x, y, z of points
+  std::uint8_t bits = 0;  ///< of a value: 8, 16, 32, 64, or kCoordinateBits for x, y, z of points
   std::uint8_t minus = kNone;  ///< index of an earlier column whose values are subtracted first
 };
 
 /// Returns the columns of a point page, in the order in which they are packed. Together they hold
-/// all 34 bytes of each point.
-[[nodiscard]] std::span<const PackedColumn> packed_point_columns() noexcept;
+/// all bytes of each point.
+/// @param point_bytes  FileHeader::point_bytes
+[[nodiscard]] std::span<const PackedColumn> packed_point_columns(std::uint8_t point_bytes) noexcept;
 
 /// Returns the columns of an attribute page of a channel group, one for each component of each
 /// channel, in the order of the payload.
 [[nodiscard]] std::vector<PackedColumn> packed_group_columns(std::span<const Channel> channels,
-                                                             std::uint16_t group);
+                                                             std::uint8_t group);
 
 /// Packs `count` values of each column.
 /// @param payload  the unpacked columns; a point page must keep the rules of PointPage::verify()

@@ -16,9 +16,9 @@ inline constexpr std::size_t kHigh =
 inline constexpr unsigned kHighBits =
     kCoordinateBits - 32;  ///< bits of each coordinate in that column
 
-/// Returns a number whose lowest `bits` bits are one, for fewer than 64 bits.
+/// Returns a number whose lowest `bits` bits are one, for 1 to 64 bits.
 [[nodiscard]] constexpr std::uint64_t mask(unsigned bits) noexcept {
-  return (std::uint64_t{1} << bits) - 1;
+  return ~std::uint64_t{0} >> (64 - bits);
 }
 
 /// Returns the shift of a coordinate's upper bits in the column `high` of a point page: 0 for x, 10

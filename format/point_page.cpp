@@ -18,24 +18,23 @@
 
 #include "format/bytes.h"
 #include "format/error.h"
+#include "format/packed_layout.h"
 #include "format/page_facts.h"
 
 namespace ptc {
 namespace {
 
-constexpr std::size_t kPointBytes = 34;
-constexpr int kHighBits = kLatticeBits - 32;  // of each coordinate in the column `high`
 constexpr std::uint32_t kHighMask = (1u << kHighBits) - 1;
 constexpr std::uint32_t kHighLimit = 1u << (3 * kHighBits);
 
 // Bytes per point in front of each column.
 constexpr std::size_t kPosition = 0;  // x, y, z
-constexpr std::size_t kHigh = 12;
 constexpr std::size_t kRadius = 16;
 constexpr std::size_t kNormal = 20;
 constexpr std::size_t kRadiance = 24;
 constexpr std::size_t kAlbedo = 30;
 constexpr std::size_t kFlags = 33;
+constexpr std::size_t kEmission = 34;
 
 // The order of points along the Z-curve is checked in 32-bit lanes: the upper 31 bits of each
 // coordinate first and then, where these are equal on all axes, the lower 11.
@@ -153,13 +152,15 @@ bool all_below(const std::byte* column, std::size_t count, T limit) noexcept {
 [[maybe_unused]] bool storable(const PointRecord& point) noexcept {
   const auto usual = [](std::uint16_t half) { return half < 0x7c00 || half == 0x8000; };
   return point.radius >= 0 && point.radius <= std::numeric_limits<float>::max() &&
-         point.flags == 0 && std::ranges::all_of(point.radiance, usual);
+         point.flags == 0 && std::ranges::all_of(point.radiance, usual) &&
+         std::ranges::all_of(point.emission, usual);
 }
 
 // Writes columns of `count` numbers.
 class Columns {
  public:
-  explicit Columns(std::uint32_t count) : count_(count), payload_(point_page_bytes(count)) {}
+  Columns(std::size_t count, std::uint8_t point_bytes)
+      : count_(count), payload_(count * point_bytes) {}
 
   template <class T>
   void put(std::size_t bytes_before, std::size_t i, T value) {
@@ -175,18 +176,18 @@ class Columns {
 }  // namespace
 
 std::uint32_t points_per_page(const FileHeader& file) noexcept {
-  return static_cast<std::uint32_t>(payload_limit(file) / kPointBytes) / 8 * 8;
+  return payload_limit(file.page_shift) / file.point_bytes / 8 * 8;
 }
 
-std::uint64_t point_page_bytes(std::uint32_t points) noexcept {
-  return kPointBytes * std::uint64_t{points};
-}
-
-std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
+std::vector<std::byte> encode_point_page(std::span<const PointRecord> points,
+                                         std::uint8_t point_bytes) {
   if (points.empty()) throw std::invalid_argument("encode_point_page: no points");
   assert(std::ranges::is_sorted(points, {}, &PointRecord::key) &&
          std::ranges::all_of(points, storable));
-  Columns columns(static_cast<std::uint32_t>(points.size()));
+  Columns columns(points.size(), point_bytes);
+  const auto not_negative = [](std::uint16_t half) {  // -0 becomes 0
+    return half == 0x8000 ? std::uint16_t{0} : half;
+  };
   PositionBlock q;
   for (std::size_t first = 0; first < points.size(); first += kPositionBlock) {
     // Decode the positions of a block of points.
@@ -198,10 +199,7 @@ std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
     };
     for (std::size_t k = 0; k < 3; ++k) {
       fill(kPosition + 4 * k, [&](std::size_t i) { return static_cast<std::uint32_t>(q[k][i]); });
-      fill(kRadiance + 2 * k, [&](std::size_t i) {
-        const std::uint16_t half = block[i].radiance[k];
-        return half == 0x8000 ? std::uint16_t{0} : half;
-      });
+      fill(kRadiance + 2 * k, [&](std::size_t i) { return not_negative(block[i].radiance[k]); });
       fill(kAlbedo + k, [&](std::size_t i) { return block[i].albedo[k]; });
     }
     fill(kHigh, [&](std::size_t i) {
@@ -213,14 +211,19 @@ std::vector<std::byte> encode_point_page(std::span<const PointRecord> points) {
       fill(kNormal + 2 * k, [&](std::size_t i) { return block[i].normal[k]; });
     }
     fill(kFlags, [&](std::size_t i) { return block[i].flags; });
+    for (std::size_t k = 0; k < 3 && point_bytes != kPointBytes; ++k) {
+      fill(kEmission + 2 * k, [&](std::size_t i) { return not_negative(block[i].emission[k]); });
+    }
   }
   return columns.take();
 }
 
-PointPage::PointPage(std::span<const std::byte> payload, std::uint32_t count)
-    : payload_(payload.data()), count_(count) {
-  if (count == 0 || payload.size() != point_page_bytes(count)) {
-    throw FormatError(0, "spec/points.md#point-size", "payload does not have 34 bytes a point");
+PointPage::PointPage(std::span<const std::byte> payload, std::uint32_t count,
+                     std::uint8_t point_bytes)
+    : PointPage(payload.data(), count, point_bytes) {
+  if (count == 0 || payload.size() != std::size_t{point_bytes} * count) {
+    throw FormatError(0, "spec/points.md#point-size",
+                      "payload does not have " + std::to_string(point_bytes) + " bytes a point");
   }
 }
 
@@ -232,6 +235,7 @@ PointRecord PointPage::operator[](std::uint32_t i) const noexcept {
   point.radiance = radiance(i);
   point.albedo = albedo(i);
   point.flags = value<std::uint8_t>(kFlags, i);
+  point.emission = emission(i);
   return point;
 }
 
@@ -248,6 +252,9 @@ void PointPage::verify() const {
   for (std::size_t k = 0; k < 3; ++k) {
     verify_column<std::uint16_t>(kRadiance + 2 * k, 0x7c00, "spec/points.md#point-radiance",
                                  "radiance is negative or not finite");
+    if (!emits_) continue;
+    verify_column<std::uint16_t>(kEmission + 2 * k, 0x7c00, "spec/points.md#point-radiance",
+                                 "emission is negative or not finite");
   }
   verify_column<std::uint8_t>(kFlags, 1, "spec/points.md#point-flags", "flags are not zero");
 }

@@ -12,15 +12,18 @@
 
 namespace ptc {
 
+/// Three numbers of a colour as half patterns.
+using Half3 = std::array<std::uint16_t, 3>;
+
 /// A surfel whose position is given by its place on the Z-curve.
 struct PointRecord {
-  MortonKey key;                            ///< position on the lattice of the scene's Frame
-  float radius = 0;                         ///< scene units; the disc circumscribes its square cell
-  std::array<std::int16_t, 2> normal{};     ///< octahedral u and v
-  std::array<std::uint16_t, 3> radiance{};  ///< outgoing, RGB as half patterns, W / (m^2 sr)
-  std::array<std::uint8_t, 3> albedo{};     ///< diffuse reflectance, RGB in steps of 1 / 255
-  std::uint8_t flags = 0;                   ///< 0; reserved
-  std::array<std::uint8_t, 6> reserved{};   ///< 0
+  MortonKey key;                         ///< position on the lattice of the scene's Frame
+  float radius = 0;                      ///< scene units; the disc circumscribes its square cell
+  std::array<std::int16_t, 2> normal{};  ///< octahedral u and v
+  Half3 radiance{};                      ///< reflected, RGB as half patterns, W / (m^2 sr)
+  std::array<std::uint8_t, 3> albedo{};  ///< diffuse reflectance, RGB in steps of 1 / 255
+  std::uint8_t flags = 0;                ///< 0; reserved
+  Half3 emission{};                      ///< own light, RGB as half patterns, W / (m^2 sr)
 };
 static_assert(sizeof(PointRecord) == 40 && std::is_trivially_copyable_v<PointRecord>);
 

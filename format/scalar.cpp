@@ -100,9 +100,8 @@ std::uint16_t encode_octahedral8(const std::array<float, 3>& n) noexcept {
 }
 
 std::array<float, 3> decode_octahedral8(std::uint16_t bits) noexcept {
-  const int u = std::max<int>(static_cast<std::int8_t>(bits & 0xff), -127);
-  const int v = std::max<int>(static_cast<std::int8_t>(bits >> 8), -127);
-  return detail::unfold_octahedron(static_cast<float>(u) / 127, static_cast<float>(v) / 127);
+  return detail::to_floats(detail::unfold_octahedron(static_cast<std::int8_t>(bits & 0xff),
+                                                     static_cast<std::int8_t>(bits >> 8), 127));
 }
 
 }  // namespace ptc

@@ -17,18 +17,24 @@ namespace ptc {
 
 namespace detail {
 
-/// Returns the unit vector that belongs to a point on the square [-1, 1]^2 of the unfolded
-/// octahedron.
-[[nodiscard]] inline std::array<float, 3> unfold_octahedron(float u, float v) noexcept {
-  float x = u;
-  float y = v;
-  const float z = 1 - std::abs(u) - std::abs(v);
+/// Returns the unit vector that belongs to a point of the unfolded octahedron, whose corners are at
+/// -q and q. The fold is decided in integers, so that walls along the axes, which lie on it, are
+/// not folded by chance.
+[[nodiscard]] inline std::array<double, 3> unfold_octahedron(int u, int v, int q) noexcept {
+  int x = std::max(u, -q), y = std::max(v, -q);
+  const int a = std::abs(x), b = std::abs(y), z = q - a - b;
   if (z < 0) {
-    x = std::copysign(1 - std::abs(v), u);
-    y = std::copysign(1 - std::abs(u), v);
+    x = x < 0 ? b - q : q - b;
+    y = y < 0 ? a - q : q - a;
   }
-  const float length = std::sqrt(x * x + y * y + z * z);
+  const double length = std::sqrt(
+      static_cast<double>(std::int64_t{x} * x + std::int64_t{y} * y + std::int64_t{z} * z));
   return {x / length, y / length, z / length};
+}
+
+/// Returns the floats nearest to three numbers.
+[[nodiscard]] inline std::array<float, 3> to_floats(const std::array<double, 3>& v) noexcept {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
 }  // namespace detail
@@ -73,10 +79,14 @@ namespace detail {
 /// al. 2014). The angle error is at most 1e-4 rad. The zero vector encodes as +z.
 [[nodiscard]] std::array<std::int16_t, 2> encode_octahedral(const std::array<float, 3>& n) noexcept;
 /// Returns the unit vector of an octahedral u and v; every pair of numbers has one.
+[[nodiscard]] inline std::array<double, 3> decode_octahedral_f64(std::int16_t u,
+                                                                 std::int16_t v) noexcept {
+  return detail::unfold_octahedron(u, v, 32767);
+}
+/// Returns the floats nearest to that vector.
 [[nodiscard]] inline std::array<float, 3> decode_octahedral(std::int16_t u,
                                                             std::int16_t v) noexcept {
-  return detail::unfold_octahedron(static_cast<float>(std::max<int>(u, -32767)) / 32767,
-                                   static_cast<float>(std::max<int>(v, -32767)) / 32767);
+  return detail::to_floats(decode_octahedral_f64(u, v));
 }
 /// Encodes a direction as a point of the unfolded octahedron in two signed bytes, u | v << 8. The
 /// angle error is at most 0.017 rad. The zero vector encodes as +z.

@@ -1,8 +1,9 @@
 // The commit record (spec/container.md#superblock).
 //
-//   0      8                  120                          328          392      4088
-//   | magic | bytes 8 to 119  | length, directory, root,  | writer,    | zeros  | XXH3 of all |
-//   | u64   | of the header   | counts, totals, digest    | 64 bytes   |        | before, u64 |
+//   0      8                120                        328        392  512         3072 4088
+//   | magic | bytes 8 to 119 | length, directory, root, | writer,  | 0 | the last 64 | 0 | XXH3 of
+//   | | u64   | of the header  | counts, totals, digest   | 64 bytes |   | entries     |   | the
+//   rest |
 //
 // decode_superblock() checks from the outside in: first that the block is whole and belongs to this
 // file, then that its numbers do not contradict each other. What the pages themselves hold is
@@ -18,7 +19,7 @@
 #include "format/error.h"
 #include "format/node_page.h"
 #include "format/page_facts.h"
-#include "format/point_page.h"
+#include "format/schema.h"
 #include "format/text.h"
 
 namespace ptc {
@@ -30,8 +31,10 @@ constexpr std::size_t kIdentityAt = 8;  // bytes 8 to 119 are those of the file 
 constexpr std::size_t kIdentityBytes = 112;
 constexpr std::size_t kWriterAt = 328;
 constexpr std::size_t kWriterBytes = 64;
-constexpr std::array<std::array<std::size_t, 2>, 3> kReserved{
-    {{172, 176}, {200, 232}, {kWriterAt + kWriterBytes, kHashAt}}};
+constexpr std::size_t kTailAt = 512;
+constexpr std::size_t kTailEnd = kTailAt + kMaxTailPages * kDirectoryEntryBytes;
+constexpr std::array<std::array<std::size_t, 2>, 4> kReserved{
+    {{170, 172}, {210, 232}, {kWriterAt + kWriterBytes, kTailAt}, {kTailEnd, kHashAt}}};
 constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 48;
 
 namespace field {
@@ -41,15 +44,18 @@ constexpr Field<std::uint32_t> kPageCount{128};
 constexpr Field<std::uint32_t> kDirectoryPages{132};
 constexpr Field<std::uint64_t> kDirectoryOffset{136};
 constexpr Field<std::uint64_t> kDirectoryXxh3{144};
-constexpr Field<std::uint32_t> kMetaPage{152};
-constexpr Field<std::uint32_t> kRootPage{156};
-constexpr Field<std::uint16_t> kRootSlot{160};
-constexpr Field<std::uint16_t> kLevels{162};
-constexpr Field<std::uint32_t> kLeafPoints{164};
-constexpr Field<std::uint32_t> kPointsPerPage{168};
+constexpr Field<std::uint32_t> kPointPages{152};
+constexpr Field<std::uint32_t> kNodePages{156};
+constexpr Field<std::uint32_t> kRootPage{160};
+constexpr Field<std::uint16_t> kRootSlot{164};
+constexpr Field<std::uint16_t> kLevels{166};
+constexpr Field<std::uint16_t> kAttributeGroups{168};
+constexpr Field<std::uint32_t> kLeafPoints{172};
 constexpr Field<std::uint64_t> kPoints{176};
 constexpr Field<std::uint64_t> kNodes{184};
 constexpr Field<std::uint64_t> kNodeGroups{192};
+constexpr Field<std::uint64_t> kTailOffset{200};
+constexpr Field<std::uint16_t> kTailPages{208};
 constexpr Field<std::array<double, 3>> kBoundsLow{232};
 constexpr Field<std::array<double, 3>> kBoundsHigh{256};
 constexpr Field<double> kArea{280};
@@ -86,11 +92,17 @@ void check_sealed(std::span<const std::byte> bytes, const FileHeader& file,
   }
 }
 
-// Checks that the directory has the size of its pages and ends where the superblocks begin.
+// Checks that the directory has the size of its pages and ends where the tail starts.
 void check_directory(const Superblock& s) {
   constexpr char kPages[] = "spec/container.md#superblock-pages";
   if (s.page_count == 0 || s.page_count > kMaxPages) {
     throw FormatError(field::kPageCount.at, kPages, "page_count is out of range");
+  }
+  const std::uint64_t least =
+      (std::uint64_t{1} + s.attribute_groups) * s.point_pages + std::uint64_t{s.node_pages} + 1;
+  if (least > s.page_count) {
+    throw FormatError(field::kPageCount.at, kPages,
+                      "page_count is less than point, attribute, node and meta pages");
   }
   const std::uint32_t full = directory_entries_per_page(s.header);
   if (s.directory_pages != (s.page_count - 1) / full + 1) {
@@ -100,12 +112,42 @@ void check_directory(const Superblock& s) {
   const std::uint64_t bytes = directory_bytes(s.header, s.page_count);
   const std::uint64_t end = s.file_bytes < 2 * kBlockBytes ? 0 : s.file_bytes - 2 * kBlockBytes;
   if (s.directory_offset % kBlockBytes != 0 || s.directory_offset < kBlockBytes ||
-      s.directory_offset > end || end - s.directory_offset != bytes) {
+      s.tail_offset > end || s.directory_offset > s.tail_offset ||
+      s.tail_offset - s.directory_offset != bytes) {
     throw FormatError(field::kDirectoryOffset.at, kPages,
-                      "directory does not end at the superblocks");
+                      "directory does not lie between its offset and the tail");
   }
-  if (s.meta_page >= s.page_count)
-    throw FormatError(field::kMetaPage.at, kPages, "meta_page is not a page");
+}
+
+// Reads the entries of the tail, and checks that they lie where the tail does.
+void read_tail(std::span<const std::byte> bytes, Superblock& s) {
+  constexpr char kTail[] = "spec/container.md#tail-pages";
+  const std::size_t count = field::kTailPages.of(bytes.data());
+  if (count == 0 || count > kMaxTailPages || count > s.page_count) {
+    throw FormatError(field::kTailPages.at, kTail,
+                      "tail_pages is not 1 to 64, or above page_count");
+  }
+  std::uint64_t next = s.tail_offset;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t at = kTailAt + i * kDirectoryEntryBytes;
+    try {
+      s.tail.push_back(decode_directory_entry(bytes.subspan(at), s.header, s.file_bytes));
+    } catch (const FormatError& error) {
+      throw error.rebased(at, "");
+    }
+    const DirectoryEntry& entry = s.tail.back();
+    if (entry.type == PageType::point || entry.type == PageType::attribute ||
+        entry.offset != next) {
+      throw FormatError(at, kTail, "an entry is not of the tail's next page");
+    }
+    next += round_up(kPageHeaderBytes + std::uint64_t{entry.stored_bytes}, kSectorBytes);
+  }
+  if (round_up(next, kBlockBytes) != s.file_bytes - 2 * kBlockBytes) {
+    throw FormatError(field::kTailPages.at, kTail, "the tail does not end at the superblocks");
+  }
+  const std::size_t rest = kTailAt + count * kDirectoryEntryBytes;
+  const std::size_t set = rest + first_nonzero(bytes.subspan(rest, kTailEnd - rest));
+  if (set != kTailEnd) throw FormatError(set, kTail, "bytes behind the entries are not zero");
 }
 
 // Checks the counts of points and nodes and the place of the root.
@@ -119,9 +161,9 @@ void check_tree(const Superblock& s) {
   if (empty != (s.nodes == 0) || empty != (s.node_groups == 0)) {
     throw FormatError(field::kPoints.at, kCounts, "nodes without points or points without nodes");
   }
-  if (empty ? s.root_page != kNoPage || s.root_slot != 0 : s.root_page >= s.page_count) {
+  if (empty ? s.root_page != kNoPage || s.root_slot != 0 : s.root_page >= s.node_pages) {
     throw FormatError(field::kRootPage.at, kRoot,
-                      "root_page is not a page, or not absent in an empty file");
+                      "root_page is not a node page, or not absent in an empty file");
   }
   if (s.levels > kMaxLevel + 1 || empty != (s.levels == 0)) {
     throw FormatError(field::kLevels.at, kRoot, "levels is out of range");
@@ -129,8 +171,8 @@ void check_tree(const Superblock& s) {
   if (s.leaf_points > kMaxLeafPoints || (s.leaf_points == 0 && !empty)) {
     throw FormatError(field::kLeafPoints.at, kCounts, "leaf_points is out of range");
   }
-  if (s.points_per_page > points_per_page(s.header) || (s.points_per_page == 0 && !empty)) {
-    throw FormatError(field::kPointsPerPage.at, kCounts, "points_per_page is out of range");
+  if (s.attribute_groups > kMaxGroup) {
+    throw FormatError(field::kAttributeGroups.at, kCounts, "attribute_groups is above 255");
   }
 }
 
@@ -168,6 +210,9 @@ Block encode_superblock(const Superblock& s) {
   if (s.writer.size() >= kWriterBytes || !is_utf8(s.writer)) {
     throw std::invalid_argument("encode_superblock: writer is not UTF-8 of at most 63 bytes");
   }
+  if (s.tail.size() > kMaxTailPages) {
+    throw std::invalid_argument("encode_superblock: the tail has more than 64 pages");
+  }
   // Write the fields; reserved bytes stay zero.
   Block block{};
   std::byte* const p = block.data();
@@ -178,15 +223,18 @@ Block encode_superblock(const Superblock& s) {
   field::kDirectoryPages.put(p, s.directory_pages);
   field::kDirectoryOffset.put(p, s.directory_offset);
   field::kDirectoryXxh3.put(p, s.directory_xxh3);
-  field::kMetaPage.put(p, s.meta_page);
+  field::kPointPages.put(p, s.point_pages);
+  field::kNodePages.put(p, s.node_pages);
   field::kRootPage.put(p, s.root_page);
   field::kRootSlot.put(p, s.root_slot);
   field::kLevels.put(p, s.levels);
+  field::kAttributeGroups.put(p, s.attribute_groups);
   field::kLeafPoints.put(p, s.leaf_points);
-  field::kPointsPerPage.put(p, s.points_per_page);
   field::kPoints.put(p, s.points);
   field::kNodes.put(p, s.nodes);
   field::kNodeGroups.put(p, s.node_groups);
+  field::kTailOffset.put(p, s.tail_offset);
+  field::kTailPages.put(p, static_cast<std::uint16_t>(s.tail.size()));
   field::kBoundsLow.put(p, s.bounds_low);
   field::kBoundsHigh.put(p, s.bounds_high);
   field::kArea.put(p, s.area);
@@ -194,9 +242,19 @@ Block encode_superblock(const Superblock& s) {
   field::kContentLow.put(p, s.content_xxh3[0]);
   field::kContentHigh.put(p, s.content_xxh3[1]);
   std::ranges::copy(std::as_bytes(std::span(s.writer)), p + kWriterAt);
+  for (std::size_t i = 0; i < s.tail.size(); ++i) {
+    const auto entry = std::span(block).subspan(kTailAt + i * kDirectoryEntryBytes);
+    encode_directory_entry(s.tail[i], entry.first<kDirectoryEntryBytes>());
+  }
   // Seal everything before the checksum.
   field::kHash.put(p, xxh3_64(std::span(block).first(kHashAt), kMagicNumber));
   return block;
+}
+
+bool is_whole_superblock(std::span<const std::byte> bytes) noexcept {
+  const std::byte* const p = bytes.data();
+  return field::kMagic.of(p) == kMagicNumber &&
+         field::kHash.of(p) == xxh3_64(bytes.first(kHashAt), kMagicNumber);
 }
 
 Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader& file,
@@ -212,12 +270,14 @@ Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader&
   s.directory_pages = field::kDirectoryPages.of(p);
   s.directory_offset = field::kDirectoryOffset.of(p);
   s.directory_xxh3 = field::kDirectoryXxh3.of(p);
-  s.meta_page = field::kMetaPage.of(p);
+  s.tail_offset = field::kTailOffset.of(p);
+  s.point_pages = field::kPointPages.of(p);
+  s.node_pages = field::kNodePages.of(p);
+  s.attribute_groups = field::kAttributeGroups.of(p);
   s.root_page = field::kRootPage.of(p);
   s.root_slot = field::kRootSlot.of(p);
   s.levels = field::kLevels.of(p);
   s.leaf_points = field::kLeafPoints.of(p);
-  s.points_per_page = field::kPointsPerPage.of(p);
   s.points = field::kPoints.of(p);
   s.nodes = field::kNodes.of(p);
   s.node_groups = field::kNodeGroups.of(p);
@@ -227,11 +287,13 @@ Superblock decode_superblock(std::span<const std::byte> bytes, const FileHeader&
   s.flux = field::kFlux.of(p);
   s.content_xxh3 = {field::kContentLow.of(p), field::kContentHigh.of(p)};
   s.writer = decode_writer(bytes);
+  s.xxh3 = field::kHash.of(p);
 
   // Check their rules and the reserved bytes.
   check_directory(s);
   check_tree(s);
   check_totals(s);
+  read_tail(bytes, s);
   for (const auto& [first, last] : kReserved) {
     const std::size_t found = first + first_nonzero(bytes.subspan(first, last - first));
     if (found != last)

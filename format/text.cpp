@@ -1,4 +1,4 @@
-// The rules of UTF-8 and of names (spec/README.md#types).
+// The rules of UTF-8 and of names (spec/README.md#types), and text for a terminal.
 #include "format/text.h"
 
 #include <algorithm>
@@ -35,6 +35,21 @@ bool is_utf8(std::string_view text) noexcept {
     text.remove_prefix(bytes);
   }
   return true;
+}
+
+std::string printable(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  const bool utf8 = is_utf8(text);
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<std::uint8_t>(c);
+    if ((byte >= 0x20 && byte < 0x7f) || (byte >= 0x80 && utf8) || c == '\n') {
+      out += c;
+    } else {
+      out.append("\\x").append(1, kDigits[byte >> 4]).append(1, kDigits[byte & 15]);
+    }
+  }
+  return out;
 }
 
 bool is_name(std::string_view text) noexcept {

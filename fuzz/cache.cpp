@@ -1,5 +1,5 @@
 // Property, for any sequence of operations on a page cache over a container: a page is what a
-// direct read returns, stays the same until its reader asks for another, and is refused only where
+// direct read returns, stays the same while its guard lives, and is refused only where
 // a direct read is refused. The counts of the cache add up.
 //
 // The container has two forms, each sound or damaged, and a step may put the other form in its
@@ -30,20 +30,29 @@ using namespace ptc;
 using fuzz::require;
 using Bytes = std::vector<std::byte>;
 
-Bytes make_sample(Codec codec, std::uint32_t points) {
+// Makes a container whose points emit light when `later` is true; it has void pages and pages of
+// later types then.
+Bytes make_sample(Codec codec, std::uint32_t points, bool later = false) {
   test::SampleOptions options;
   options.writer.codec = codec;
   options.points = points;
+  if (later) {
+    options.writer.point_bytes = kEmittingPointBytes;
+    options.void_every = 2;
+    options.later = {PageType{128}, PageType{200}, PageType{200}};
+    options.tail_pages = 4;
+  }
   const auto path = fuzz::MemoryFile::directory() / "sample.ptcx";
   test::write_sample(path, options);
   return test::read_file(path);
 }
 
-// Returns one of four containers, by codec and number of points.
+// Returns one of six containers, by codec, number of points and kinds of pages.
 const Bytes& sample(std::size_t which) {
-  static const std::array<Bytes, 4> samples{
-      make_sample(Codec::raw, 0), make_sample(Codec::raw, 130), make_sample(Codec::zstd, 300),
-      make_sample(Codec::lz4, 700)};
+  static const std::array<Bytes, 6> samples{
+      make_sample(Codec::raw, 0),          make_sample(Codec::raw, 130),
+      make_sample(Codec::zstd, 300),       make_sample(Codec::lz4, 700),
+      make_sample(Codec::zstd, 400, true), make_sample(Codec::raw, 130, true)};
   return samples[which % samples.size()];
 }
 
@@ -103,7 +112,7 @@ class Session {
     try {
       PageCache cache(container_, options);
       while (!from.empty()) step(cache, options, from);
-      for (auto& seat : seats_) seat.reader.reset();
+      for (Seat& seat : seats_) leave(seat);
       check_counts(cache.statistics(), frames);
     } catch (const std::invalid_argument&) {  // a cap below the minimum, or more slots than frames
       require(frames < std::uint64_t{2} * options.threads || options.local_slots > 0);
@@ -122,11 +131,7 @@ class Session {
     const std::uint8_t what = from.take();
     Seat& seat = seats_[from.take() % seats_.size()];
     if (what % 32 == 0) return file_.write(forms_[from.take() % 2]);
-    if (what % 32 == 1) {
-      seat.shows = nullptr;
-      seat.view.reset();
-      return seat.reader.reset();
-    }
+    if (what % 32 == 1) return leave(seat);
     if (!seat.reader && !sit(cache, options, seat)) return;
     // Get a page, then check the views of all seats.
     const std::uint32_t page =
@@ -134,6 +139,13 @@ class Session {
     get(seat, page);
     for (const Seat& other : seats_)
       require(other.shows == nullptr || shows(*other.view, *other.shows));
+  }
+
+  // Removes the reader from a seat, after its view, which must not outlive it.
+  static void leave(Seat& seat) {
+    seat.shows = nullptr;
+    seat.view.reset();
+    seat.reader.reset();
   }
 
   // Adds a reader at a seat, and checks that it is refused exactly when all are in use.

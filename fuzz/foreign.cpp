@@ -78,7 +78,9 @@ void read_cloud(const Path& path) {
     for (std::size_t i = 0; i < count; ++i) {
       const Surfel& s = block[i];
       require(is_finite(s.position) && std::isfinite(s.radius) && s.radius >= 0 &&
-              is_finite(s.radiance));
+              is_finite(s.radiance) && is_finite(s.emission));
+      require(std::min({s.emission.x, s.emission.y, s.emission.z}) >= 0 &&
+              (file.info.has_emission || s.emission == glm::vec3(0)));
       require(file.info.has_normals ? is_unit(s.normal) : s.normal == glm::vec3(0));
       require(is_finite(s.albedo) && std::min({s.albedo.x, s.albedo.y, s.albedo.z}) >= 0);
     }

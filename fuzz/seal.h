@@ -1,7 +1,7 @@
 // Repairs the checksums of a container that was changed, so that readers refuse it by the rules of
 // the format and not by its checksums.
 //
-//   payloads --> page headers --> directory --> content digest --> superblocks
+//   payloads --> page headers --> directory --> content digest, tail --> superblocks
 //
 // Each checksum covers the ones before it, so the order matters. The file's own numbers lead from
 // structure to structure; a number that leads outside the file is ignored.
@@ -17,7 +17,7 @@ namespace ptc::fuzz {
 /// The places of a container's structures, as far as its own numbers lead to places inside it. All
 /// places are offsets from the start of the file, in bytes.
 struct Layout {
-  /// A page that the directory lists.
+  /// A page that the directory lists and that lies in the file.
   struct Page {
     std::size_t entry = 0;         ///< its directory entry
     std::size_t header = 0;        ///< its header, which the payload follows
@@ -28,10 +28,15 @@ struct Layout {
     std::size_t header = 0;  ///< its header, which the entries follow
     std::size_t bytes = 0;   ///< length of its entries
   };
-  std::size_t superblock = 0;  ///< the first superblock
-  std::vector<Page> pages;     ///< only pages whose header and payload lie in the file
+  std::size_t superblock = 0;        ///< the first superblock
+  std::vector<std::size_t> entries;  ///< all directory entries, those of void pages among them
+  std::vector<Page> pages;  ///< only pages whose header and payload lie behind the file header
   std::vector<DirectoryPage> directory;
+  std::size_t tail_entries = 0;  ///< entries that each superblock repeats, at most 64
 };
+
+inline constexpr std::size_t kEntryBytes = 40;      ///< length of a directory entry
+inline constexpr std::size_t kTailEntriesAt = 512;  ///< where a superblock repeats the last entries
 
 /// Finds the structures of a container, which may be damaged in any way.
 /// @param file  at least kMinFile bytes
@@ -49,7 +54,8 @@ enum Seals : unsigned {
   kSealDigest = 16,      ///< content digest
   kSealSuperblock = 32,  ///< checksums of both superblocks
   kSealCopies = 64,      ///< copy of the file header in the first superblock, and the second one
-  kSealAll = 127
+  kSealTail = 128,       ///< copies of the last directory entries in the first superblock
+  kSealAll = 255
 };
 
 /// Gives the structures of a container the checksums of their content. A file of fewer than

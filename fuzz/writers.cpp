@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -39,8 +40,17 @@ Bytes take_bytes(ByteSource& from, std::size_t count) {
   return bytes;
 }
 
-// Makes points that crowd in few cells, coincide, or lie at the corners of the lattice.
-std::vector<PointRecord> take_points(ByteSource& from) {
+// Makes the halves of a colour, finite and not negative.
+Half3 take_halves(ByteSource& from) {
+  Half3 halves;
+  for (auto& half : halves)
+    half = std::min<std::uint16_t>(from.take<std::uint16_t>() & 0x7fff, 0x7bff);
+  return halves;
+}
+
+// Makes points that crowd in few cells, coincide, or lie at the corners of the lattice. One in four
+// emits light where points may.
+std::vector<PointRecord> take_points(ByteSource& from, bool may_emit) {
   std::vector<PointRecord> points;
   const std::uint32_t most = from.below(600);
   LatticePoint place{};
@@ -56,8 +66,8 @@ std::vector<PointRecord> take_points(ByteSource& from) {
     PointRecord& point = points.emplace_back();
     point.key = encode_morton(place);
     point.radius = from.number<float>(0);
-    for (auto& half : point.radiance)
-      half = std::min<std::uint16_t>(from.take<std::uint16_t>() & 0x7fff, 0x7bff);
+    point.radiance = take_halves(from);
+    if (may_emit && from.take() % 4 == 0) point.emission = take_halves(from);
     point.normal = from.take<std::array<std::int16_t, 2>>();
     point.albedo = from.take<std::array<std::uint8_t, 3>>();
     // Repeat one point in four, up to 16 times.
@@ -83,17 +93,45 @@ class Stream : public PointStream {
   std::span<const PointRecord> rest_;
 };
 
-// Makes channels and texts; names may occur twice and groups may be too large.
-Meta take_meta(ByteSource& from) {
+// Makes the type, the role and the facts of a channel, so that they suit each other.
+Channel take_channel(ByteSource& from) {
+  Channel channel;
+  channel.type = static_cast<ChannelType>(1 + from.take() % 14);  // the last are of a later version
+  if (channel_bytes(channel.type) == 0)
+    channel.size = static_cast<std::uint8_t>(1 << from.take() % 4);
+  channel.components = static_cast<std::uint8_t>(1 + from.take() % 16);
+  channel.role = static_cast<ChannelRole>(from.take() % 8);
+  channel.colour_space = static_cast<ColourSpace>(from.take() % 5);
+  const bool counts = channel.type == ChannelType::u32 || channel.type == ChannelType::u64;
+  if (channel.role == ChannelRole::direction || channel.role == ChannelRole::vector)
+    channel.components = 3;
+  if (channel.role == ChannelRole::index && counts) channel.components = 1;
+  if (channel.role == ChannelRole::index && !counts) channel.role = ChannelRole::value;
+  if (from.take() % 2 == 0) {
+    const std::size_t unused = 64 - 8 * channel.component_bytes();
+    channel.no_value = from.take<std::uint64_t>() << unused >> unused;
+  }
+  if (from.take() % 2 == 0) channel.unit = from.text(15, "m/s^2 W1", 8);
+  if (from.take() % 2 == 0) channel.scale = from.number<double>();
+  if (channel.scale == 0) channel.scale = 1;
+  if (from.take() % 2 == 0) channel.offset = from.number<double>();
+  return channel;
+}
+
+// Makes channels and texts. Returns nothing where two channels have one name, or a group has more
+// bytes than a point.
+std::optional<Meta> take_meta(ByteSource& from, std::size_t point_bytes) {
   constexpr char kLetters[] = "abz09_.";
   Meta meta;
   for (std::uint8_t n = from.take() % 4; n > 0; --n) {
-    const auto group =
-        static_cast<std::uint16_t>(meta.channels.empty() ? 1 : meta.channels.back().group);
-    meta.channels.push_back({from.text(31, kLetters, 7),
-                             static_cast<ChannelType>(1 + from.take() % 4),
-                             static_cast<std::uint8_t>(1 + from.take() % 16),
-                             static_cast<std::uint16_t>(std::min(255, group + from.take() % 3))});
+    const int group = meta.channels.empty() ? 1 : meta.channels.back().group;
+    const std::string name = from.text(31, kLetters, 7);
+    if (std::ranges::count(meta.channels, name, &Channel::name) > 0) return {};
+    meta.channels.push_back(take_channel(from));
+    Channel& channel = meta.channels.back();
+    channel.name = name;
+    channel.group = static_cast<std::uint8_t>(std::min(255, group + from.take() % 3));
+    if (group_point_bytes(meta.channels, channel.group) > point_bytes) return {};
   }
   for (std::uint8_t n = from.take() % 3; n > 0; --n) {
     const std::string key = from.text(31, kLetters, 7);
@@ -102,45 +140,48 @@ Meta take_meta(ByteSource& from) {
   return meta;
 }
 
-// Fills a column with finite values.
-void take_column(ByteSource& from, ChannelType type, std::span<std::byte> out) {
-  for (std::byte& b : out) b = from.take<std::byte>();
-  if (type != ChannelType::half && type != ChannelType::f32) return;
-  const std::size_t width = channel_bytes(type);
-  for (std::size_t i = width - 1; i < out.size(); i += width)
-    out[i] &= std::byte{0xbb};  // clears a bit of the exponent, so it is not that of infinity
-}
-
-// Writes the attribute pages of all channel groups and keeps their payloads in `written`.
+// Writes the attribute pages of all channel groups and keeps their payloads in `written`. One page
+// in four has no value that is known, and is void.
 void write_attributes(ByteSource& from, ContainerWriter& writer, const Meta& meta,
                       std::uint64_t points, std::vector<Bytes>& written) {
   const std::uint32_t full = points_per_page(writer.header());
-  std::uint16_t last = 0;
-  for (const Channel& channel : meta.channels) {
-    if (channel.group == std::exchange(last, channel.group)) continue;
-    const auto columns = packed_group_columns(meta.channels, channel.group);
+  for (const std::uint8_t group : channel_groups(meta.channels)) {
     for (std::uint64_t first = 0; first < points; first += full) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, points - first));
-      Bytes& payload =
-          written.emplace_back(count * group_point_bytes(meta.channels, channel.group));
-      std::size_t at = 0;
-      for (const Channel& c : meta.channels) {
-        if (c.group != channel.group) continue;
-        const std::size_t bytes = count * c.components * channel_bytes(c.type);
-        take_column(from, c.type, std::span(payload).subspan(at, bytes));
-        at += bytes;
-      }
-      writer.write_page(
-          writer.reserve_page(),
-          {.type = PageType::attribute, .group = channel.group, .record_count = count}, payload,
-          columns);
+      Bytes& payload = written.emplace_back(count * group_point_bytes(meta.channels, group));
+      fill_void(meta.channels, group, payload);
+      if (from.take() % 4 != 0) payload = take_bytes(from, payload.size());
+      writer.write_attributes(group, payload, count, meta.channels);
     }
   }
 }
 
+// A page of a type that a later version may have.
+struct LaterPage {
+  PageSummary facts;
+  Bytes payload;
+};
+
+// Writes up to three pages of later types, unless the tail has no room for them.
+std::vector<LaterPage> write_later(ByteSource& from, ContainerWriter& writer) {
+  std::vector<LaterPage> pages(from.take() % 4);
+  if (writer.state().node_pages + pages.size() >= kMaxTailPages) return {};
+  for (LaterPage& page : pages)
+    page.facts.type = static_cast<PageType>(kFirstSkippable + from.take() % 128);
+  std::ranges::stable_sort(pages, {}, [](const LaterPage& page) { return page.facts.type; });
+  for (LaterPage& page : pages) {
+    page.facts.rank = writer.reserve_page(page.facts.type);
+    page.facts.record_count = std::max(1U, from.take<std::uint32_t>());
+    page.payload = take_bytes(from, 1 + from.below(payload_limit(writer.header().page_shift)));
+    writer.keep_page(page.facts, page.payload);
+  }
+  return pages;
+}
+
 // Compares everything that a reader returns with what was written.
 void compare(const ContainerReader& reader, const std::vector<PointRecord>& points,
-             const Meta& meta, const std::vector<Bytes>& attributes) {
+             const Meta& meta, const std::vector<Bytes>& attributes,
+             const std::vector<LaterPage>& later) {
   require(reader.meta().channels == meta.channels && reader.meta().text == meta.text);
 
   // Compare the points.
@@ -150,20 +191,34 @@ void compare(const ContainerReader& reader, const std::vector<PointRecord>& poin
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PointRecord &a = points[i], &b = back[i];
     require(a.key == b.key && a.radius == b.radius && a.normal == b.normal &&
-            a.radiance == b.radiance && a.albedo == b.albedo);
+            a.radiance == b.radiance && a.albedo == b.albedo && a.emission == b.emission);
   }
 
   // Compare the attribute pages.
   PageDecoder decoder;
+  const auto read = [&](std::uint32_t page) {
+    Bytes payload(reader.page_payload_limit());
+    payload.resize(reader.read_page(page, payload, decoder).raw_bytes);
+    return payload;
+  };
   std::size_t k = 0;
-  for (std::uint16_t group = 1; group < 256; ++group) {
-    for (const std::uint32_t page : reader.attribute_pages(group)) {
-      Bytes payload(reader.page_payload_limit());
-      payload.resize(reader.read_page(page, payload, decoder).raw_bytes);
-      require(k < attributes.size() && payload == attributes[k++]);
-    }
+  for (unsigned group = 1; group <= kMaxGroup; ++group) {
+    for (const std::uint32_t page : reader.attribute_pages(static_cast<std::uint8_t>(group)))
+      require(k < attributes.size() && read(page) == attributes[k++]);
   }
   require(k == attributes.size());
+
+  // Compare the pages of later types.
+  k = 0;
+  for (std::uint32_t page = 0; page < reader.page_count(); ++page) {
+    const DirectoryEntry& entry = reader.entry(page);
+    if (!is_skippable(entry.type)) continue;
+    require(k < later.size() && entry.type == later[k].facts.type &&
+            reader.rank(page) == later[k].facts.rank &&
+            entry.record_count == later[k].facts.record_count && read(page) == later[k].payload);
+    ++k;
+  }
+  require(k == later.size());
 }
 
 void container(ByteSource& from) {
@@ -172,11 +227,10 @@ void container(ByteSource& from) {
   options.page_shift = static_cast<std::uint8_t>(12 + from.take() % 3);
   options.codec = static_cast<Codec>(from.take() % 3);
   options.uuid = from.take<Uuid>();
-  const Meta meta = take_meta(from);
-  for (const Channel& c : meta.channels) {
-    const auto same = std::ranges::count(meta.channels, c.name, &Channel::name);
-    if (same > 1 || group_point_bytes(meta.channels, c.group) > 34) return;  // not well-formed
-  }
+  const bool may_emit = from.take() % 2 == 0;
+  options.point_bytes = may_emit ? kEmittingPointBytes : kPointBytes;
+  const std::optional<Meta> meta = take_meta(from, options.point_bytes);
+  if (!meta) return;
   BuildOptions build;
   build.leaf_points = 1 + from.take() % 20;
   build.levels_per_stream = 1 + from.take() % 63;
@@ -184,7 +238,7 @@ void container(ByteSource& from) {
   frame.edge = std::ldexp(1.0, static_cast<std::int8_t>(from.take()));
   frame.origin.fill(frame.edge * static_cast<std::int8_t>(from.take()) / 128);
   std::vector<Bytes> attributes;
-  const std::vector<PointRecord> points = take_points(from);
+  const std::vector<PointRecord> points = take_points(from, may_emit);
 
   // Build the container.
   const auto path = fuzz::MemoryFile::directory() / "a.ptcx";
@@ -193,8 +247,9 @@ void container(ByteSource& from) {
   options.frame = frame;
   ContainerWriter writer(path, options);
   const Superblock superblock = build_pages(stream, writer, build, ThreadPool(1), silent);
-  write_attributes(from, writer, meta, points.size(), attributes);
-  const Superblock written = writer.finish(meta, superblock);
+  write_attributes(from, writer, *meta, points.size(), attributes);
+  const std::vector<LaterPage> later = write_later(from, writer);
+  const Superblock written = writer.finish(*meta, superblock);
 
   // Verify it, and compare what it holds.
   require(verify_container(
@@ -205,30 +260,40 @@ void container(ByteSource& from) {
   const ContainerReader reader(path);
   require(reader.superblock().content_xxh3 == written.content_xxh3 &&
           reader.header().uuid == options.uuid);
-  compare(reader, points, meta, attributes);
+  compare(reader, points, *meta, attributes, later);
 }
 
 void ply(ByteSource& from) {
+  // Make surfels, and columns of any channels.
+  const bool emits = from.take() % 2 == 0;
+  const std::optional<Meta> meta = take_meta(from, kEmittingPointBytes);
+  if (!meta) return;
+  const std::vector<PointColumn> columns = ply_columns(meta->channels);
+  std::size_t values = 0;
+  for (const PointColumn& column : columns) values += column.components;
   std::vector<Surfel> surfels(from.take() % 40);
   for (Surfel& s : surfels) {
     for (int i = 0; i < 3; ++i) {
-      s.position[i] = from.number<double>();
+      s.position[i] = std::clamp(from.number<double>(), -kMaxCoordinate, kMaxCoordinate);
       s.radiance[i] = from.number<float>(0);
       s.albedo[i] = static_cast<float>(from.take()) / 255;
+      if (emits) s.emission[i] = from.number<float>(0);
     }
     s.radius = from.number<float>(0);
     s.normal[from.take() % 3] = from.take() % 2 == 0 ? 1.0F : -1.0F;
   }
   const auto path = fuzz::MemoryFile::directory() / "a.ply";
-  PlyWriter writer(path, surfels.size(), {{.name = "extra"}});
-  writer.write(surfels, std::vector<float>(surfels.size(), from.take<float>()));
+
+  // Write them and read them back.
+  PlyWriter writer(path, surfels.size(), emits, columns);
+  writer.write(surfels, std::vector<float>(surfels.size() * values, from.take<float>()));
   writer.finish();
   std::vector<Surfel> back(surfels.size() + 1);
   require(open_points(path).source->next(back) == surfels.size());
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     const Surfel &a = surfels[i], &b = back[i];
     require(a.position == b.position && a.normal == b.normal && a.radius == b.radius &&
-            a.radiance == b.radiance && a.albedo == b.albedo);
+            a.radiance == b.radiance && a.albedo == b.albedo && a.emission == b.emission);
   }
 }
 
@@ -236,8 +301,9 @@ void codec(ByteSource& from) {
   // Make a payload of some columns.
   std::vector<Channel> channels;
   for (std::uint8_t n = 1 + from.take() % 3; n > 0; --n) {
-    channels.push_back({"a", static_cast<ChannelType>(1 + from.take() % 4),
-                        static_cast<std::uint8_t>(1 + from.take() % 2)});
+    channels.push_back({.name = "a",
+                        .type = static_cast<ChannelType>(1 + from.take() % 11),
+                        .components = static_cast<std::uint8_t>(1 + from.take() % 2)});
   }
   const std::vector<PackedColumn> columns = packed_group_columns(channels, 1);
   const std::uint32_t count = 1 + from.below(300);
@@ -278,11 +344,13 @@ NodeGroup take_group(ByteSource& from) {
     }
     NodeSummary& node = child.node;
     for (std::size_t i = 0; i < 3; ++i) node.mean[i] = static_cast<double>(corner[i]) + from.take();
-    for (double* value : {&node.radius, &node.area, &node.thickness})
+    for (double* value : {&node.radius, &node.area, &node.thickness, &node.greatest})
       *value = from.number<double>(0);
     node.thickness = std::min(node.thickness, node.radius);
     for (double& facing : node.facing) facing = node.area * (from.take() / 255.0);
     for (auto& rgb : node.flux) rgb.fill(from.number<float>(0));
+    node.emits = from.take() % 8 == 0;
+    for (auto& rgb : node.power) rgb.fill(node.emits ? from.number<float>(0) : 0);
     node.cone_axis = {0, 0, 1};
     node.cone_cos = static_cast<float>(from.take()) / 127.5F - 1;
   }
@@ -296,16 +364,17 @@ void node_page(ByteSource& from) {
   std::vector<NodeGroup> groups;
   while (!from.empty()) {
     NodeGroup group = take_group(from);
-    if (!encoder.fits(group.children.size())) break;
+    if (!encoder.fits(group.children.size(), emits_light(group))) break;
     require(encoder.add(group) == groups.size());
     groups.push_back(std::move(group));
   }
   if (groups.empty()) return;
 
-  // Decode it: references are equal, and bounds are not narrower.
+  // Decode it: references are equal, and bounds are not narrower. Add each group again.
   const Bytes payload = encoder.take();
-  const NodePage page(payload, static_cast<std::uint32_t>(groups.size()), 100, kPoints);
+  const NodePage page(payload, static_cast<std::uint32_t>(groups.size()), 100, kPoints, true);
   for (std::uint32_t slot = 0; slot < page.size(); ++slot) {
+    require(encoder.add(page[slot]) == slot && page[slot].emits() == emits_light(groups[slot]));
     const NodeGroup back = page.decode(slot);
     const NodeGroup& group = groups[slot];
     require(back.cell == group.cell && back.level == group.level &&
@@ -315,9 +384,11 @@ void node_page(ByteSource& from) {
       require(back.children[i].ref == group.children[i].ref && std::isfinite(b.radius) &&
               b.cone_cos <= a.cone_cos);
       require(b.radius >= std::min(a.radius, 0x1.ffp127) &&
-              b.thickness >= std::min(a.thickness, 0x1.ffp127));
+              b.thickness >= std::min(a.thickness, 0x1.ffp127) &&
+              b.greatest >= std::min(a.greatest, 0x1.ffp127));
     }
   }
+  require(encoder.take() == payload);  // groups were added as they lie in the page
 }
 
 void exr(ByteSource& from) {

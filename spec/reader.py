@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A second reader of PTCX files, laid out like container.md, points.md and nodes.md.
+"""A second reader of PTCX files, laid out like container.md, points.md, nodes.md and parts.md.
 
     reader.py FILE [--json]          check FILE whole; exit 0 valid, 1 broken, 2 usage, 3 system
     reader.py --self-test            compare XXH3 with vectors/xxh3.txt
@@ -7,13 +7,16 @@
 
 Standard library only; pages compressed with zstd are decoded by the `zstd` program. All rules are
 checked but those about the values of summaries (nodes.md#summary). Memory: 24 bytes a point and the
-decoded node pages. As a module: open_container(path) gives points() and groups().
+decoded node pages. As a module: open_container(path) gives points() and groups(); of a scene of
+parts these are those of the parts as well.
 """
 
 import argparse
+import bisect
 import json
 import math
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -26,19 +29,22 @@ from xxh3 import check_table, xxh3_128, xxh3_64
 
 BLOCK, SECTOR = 4096, 512
 PAGE_HEADER_BYTES = 64
-ENTRY_BYTES = 32
+ENTRY_BYTES = 40
 NO_PAGE = 0xFFFFFFFF
-NODE, POINT, DIRECTORY, META, ATTRIBUTE = 1, 2, 3, 4, 5
+NO_LEVEL = 0xFF
+NODE, POINT, DIRECTORY, META, ATTRIBUTE, PARTS = 1, 2, 3, 4, 5, 6
+SKIPPABLE = 128  # the first page type that readers pass over
+RELEASE, HAS_PARTS = 1, 2  # bits of feature_incompat
 RAW, ZSTD, LZ4 = 0, 1, 2
 PACKED = 1  # the filter of packed columns
 
 
 class Broken(Exception):
-    """A rule of the format that the file breaks: where, which, how."""
+    """A rule of the format that the file breaks: where, which, how; of a part, in which file."""
 
     def __init__(self, offset, clause, text):
         super().__init__(f"offset {offset}: {text} ({clause})")
-        self.offset, self.clause, self.text = offset, clause, text
+        self.offset, self.clause, self.text, self.file = offset, clause, text, None
 
 
 def require(holds, offset, clause, text):
@@ -54,9 +60,9 @@ def round_up(n, unit):
 
 FILE_MAGIC = bytes.fromhex("89505443 0d0a1a0a")
 HEADER_SEED = int.from_bytes(b"PTCXHEAD", "little")
-HEADER = struct.Struct("<8sHHIQQQ16sBBHI3dd24sQ")
+HEADER = struct.Struct("<8sHHIQQQ16sBBHI3ddB23sQ")
 
-Header = namedtuple("Header", "identity major minor uuid page_shift origin edge")
+Header = namedtuple("Header", "identity major minor incompat uuid page_shift origin edge point_bytes")
 
 
 def page_size(header):
@@ -79,65 +85,83 @@ def decode_header(block):
     require(len(block) == BLOCK, len(block), "spec/container.md#header-length",
             "file ends in its header")
     (_, major, minor, header_bytes, incompat, _, _, uuid, page_shift, align_shift, checksum,
-     byte_order, x, y, z, edge, reserved, found) = HEADER.unpack_from(block)
+     byte_order, x, y, z, edge, point_bytes, reserved, found) = HEADER.unpack_from(block)
     require(found == xxh3_64(block[:120], HEADER_SEED), 120, "spec/container.md#header-checksum",
             "file header's checksum is wrong")
     require(major == 1, 8, "spec/container.md#header-version", f"version {major} is not supported")
-    require(incompat == 0, 16, "spec/container.md#header-features", "file needs a feature that this program does not know")
+    require(incompat & RELEASE, 16, "spec/container.md#header-draft", "file is a draft of before version 1.0")
+    require(not incompat & ~(RELEASE | HAS_PARTS), 16, "spec/container.md#header-features",
+            "file needs a feature that this program does not know")
     require((header_bytes, align_shift, checksum, byte_order) == (BLOCK, 9, 1, 0x01020304), 12,
             "spec/container.md#header-constants", "a constant has another value")
     require(12 <= page_shift <= 20, 56, "spec/container.md#header-page-shift",
             "page_shift is not 12 to 20")
+    require(point_bytes in (34, 40), 96, "spec/container.md#header-point-bytes",
+            "point_bytes is neither 34 nor 40")
     check_frame_of((x, y, z), edge)
-    require(not any(reserved) and not any(block[128:]), 96, "spec/container.md#header-zero",
+    require(not any(reserved) and not any(block[128:]), 97, "spec/container.md#header-zero",
             "a reserved byte is not zero")
-    return Header(block[8:120], major, minor, uuid, page_shift, (x, y, z), edge)
+    return Header(block[8:120], major, minor, incompat, uuid, page_shift, (x, y, z), edge,
+                  point_bytes)
 
 
 # Page header (container.md#page-header) ----------------------------------------------------------
 
-PAGE = struct.Struct("<4sHBBIIIHHIIQQQQ")
+PAGE = struct.Struct("<4sBBBBIIIIB7sQQQQ")
 
-Page = namedtuple("Page", "type codec filter page_id stored_bytes raw_bytes group level record_count "
+Page = namedtuple("Page", "type group codec filter rank stored_bytes raw_bytes record_count level "
                           "first_key last_key payload_xxh3")
 
 
-def page_seed(uuid, page_id, type_):
-    return xxh3_64(uuid + struct.pack("<IH", page_id, type_))
+def page_seed(uuid, type_, group, rank):
+    return xxh3_64(uuid + struct.pack("<IBB", rank, type_, group))
 
 
-def check_facts(header, at, type_, group, stored, raw, count):
+def check_facts(header, at, type_, group, stored, raw, count, level, first):
     """The rules that page headers and directory entries share."""
     fields = "spec/container.md#page-fields"
-    require(NODE <= type_ <= ATTRIBUTE, at, "spec/container.md#page-type", "unknown page type")
+    require(NODE <= type_ <= PARTS or type_ >= SKIPPABLE, at, "spec/container.md#page-type",
+            "unknown page type")
     require(1 <= raw <= page_size(header) - PAGE_HEADER_BYTES and 1 <= stored <= raw, at,
             "spec/container.md#page-length", "stored_bytes or raw_bytes is out of range")
-    require(1 <= group <= 255 if type_ == ATTRIBUTE else group == 0, at, fields,
-            "group does not suit the page's type")
-    suits = {NODE: count <= 0xFFFF, POINT: raw == POINT_BYTES * count,
-             DIRECTORY: raw == ENTRY_BYTES * count, META: count == 1, ATTRIBUTE: True}
-    require(count >= 1 and suits[type_], at, fields, "record_count does not suit the page")
+    suits = {NODE: count <= 0xFFFF, POINT: raw == header.point_bytes * count,
+             DIRECTORY: raw == ENTRY_BYTES * count, META: count == 1, PARTS: raw == PART_BYTES * count}
+    require(suits.get(type_, True), at, fields, "record_count does not suit the page")
+    check_kind(at, type_, group, count, level, first)
+
+
+def check_kind(at, type_, group, count, level, first):
+    """The rules of an entry that a void page keeps, too."""
+    fields = "spec/container.md#page-fields"
+    require((type_ == ATTRIBUTE) == (group > 0), at, fields, "group does not suit the page's type")
+    require(count >= 1, at, fields, "no records")
+    require(level <= 62 if type_ == NODE else level == NO_LEVEL, at, fields,
+            "level does not suit the page's type")
+    require(first < key_limit(type_), at, "spec/container.md#page-keys", "first_key is out of range")
+
+
+def key_limit(type_):
+    return 1 << 63 if type_ in (NODE, POINT, PARTS) else 1
 
 
 def decode_page_header(header, bytes_, at):
     magic, *fields, found = PAGE.unpack(bytes_)
     require(magic == b"PTCp", at, "spec/container.md#page-magic", "no page starts here")
-    (type_, codec, filter_, page_id, stored, raw, group, level, count, reserved, first, last,
+    (type_, group, codec, filter_, rank, stored, raw, count, level, reserved, first, last,
      hash_) = fields
-    require(found == xxh3_64(bytes_[:56], page_seed(header.uuid, page_id, type_)), at + 56,
+    require(found == xxh3_64(bytes_[:56], page_seed(header.uuid, type_, group, rank)), at + 56,
             "spec/container.md#page-checksum", "page header's checksum is wrong")
-    check_facts(header, at, type_, group, stored, raw, count)
+    check_facts(header, at, type_, group, stored, raw, count, level, first)
     require(codec <= (RAW if type_ == DIRECTORY else LZ4), at + 6,
             "spec/container.md#page-codec", "unknown codec, or a compressed directory page")
     require(filter_ <= (PACKED if type_ in (POINT, ATTRIBUTE) and codec != RAW else 0), at + 7,
             "spec/container.md#page-filter", "unknown filter, or one that suits no such page")
     require((codec == RAW) == (stored == raw), at + 12, "spec/container.md#page-length",
             "stored_bytes equals raw_bytes without codec raw, or differs with codec raw")
-    require(reserved == 0 and (level <= 62 if type_ == NODE else level == 0xFFFF), at + 22,
-            "spec/container.md#page-fields", "level or the reserved field is out of range")
-    limit = 1 if type_ in (DIRECTORY, META) else 1 << 63
-    require(first <= last < limit, at + 32, "spec/container.md#page-keys", "keys are out of range")
-    return Page(type_, codec, filter_, page_id, stored, raw, group, level, count, first, last, hash_)
+    require(not any(reserved), at + 25, "spec/container.md#page-fields", "reserved field is not zero")
+    require(first <= last < key_limit(type_), at + 32, "spec/container.md#page-keys",
+            "keys are out of range")
+    return Page(type_, group, codec, filter_, rank, stored, raw, count, level, first, last, hash_)
 
 
 # Codecs (container.md#codecs) --------------------------------------------------------------------
@@ -239,9 +263,18 @@ def decode_frames(jobs):
 
 # Directory (container.md#directory) --------------------------------------------------------------
 
-ENTRY = struct.Struct("<QIIQHHI")
+ENTRY = struct.Struct("<QIIQQIBBBB")
 
-Entry = namedtuple("Entry", "offset stored_bytes raw_bytes payload_xxh3 type group record_count")
+Entry = namedtuple("Entry", "offset stored_bytes raw_bytes payload_xxh3 first_key record_count type group level")
+
+
+def is_void(entry):
+    return entry.raw_bytes == 0
+
+
+def entry_of(page, offset):
+    return Entry(offset, page.stored_bytes, page.raw_bytes, page.payload_xxh3, page.first_key,
+                 page.record_count, page.type, page.group, page.level)
 
 
 def entries_per_page(header):
@@ -258,11 +291,18 @@ def extent_bytes(entry):
 
 
 def decode_entry(header, bytes_, file_bytes, at):
-    entry = Entry(*ENTRY.unpack(bytes_))
-    check_facts(header, at, entry.type, entry.group, entry.stored_bytes, entry.raw_bytes,
-                entry.record_count)
-    require(entry.type != DIRECTORY, at + 24, "spec/container.md#directory-listing",
+    *fields, reserved = ENTRY.unpack(bytes_)
+    entry = Entry(*fields)
+    require(entry.type != DIRECTORY, at + 36, "spec/container.md#directory-listing",
             "directory lists itself")
+    require(reserved == 0, at + 39, "spec/container.md#page-fields", "reserved field is not zero")
+    if is_void(entry):
+        require(entry.type == ATTRIBUTE and not (entry.offset or entry.stored_bytes or entry.payload_xxh3),
+                at, "spec/container.md#page-length", "a page without content is no void attribute page")
+        check_kind(at, entry.type, entry.group, entry.record_count, entry.level, entry.first_key)
+        return entry
+    check_facts(header, at, entry.type, entry.group, entry.stored_bytes, entry.raw_bytes,
+                entry.record_count, entry.level, entry.first_key)
     require(entry.offset % SECTOR == 0 and entry.offset >= BLOCK
             and entry.offset + extent_bytes(entry) <= file_bytes - 2 * BLOCK, at,
             "spec/container.md#directory-extent", "page lies outside the file's pages")
@@ -273,18 +313,24 @@ def decode_entry(header, bytes_, file_bytes, at):
 
 SUPER_MAGIC = b"PTCXSUPR"
 SUPER_SEED = int.from_bytes(SUPER_MAGIC, "little")
-SUPER = struct.Struct("<8s112sQIIQQIIHHIIIQQQ32s3d3dd3d2Q64s3696sQ")
+TAIL_PAGES = 64
+SUPER = struct.Struct("<8s112sQIIQQIIIHHHHIQQQQH22s3d3dd3d2Q64s120s2560s1016sQ")
 
 Superblock = namedtuple(
     "Superblock", "magic identity file_bytes page_count directory_pages directory_offset "
-    "directory_xxh3 meta_page root_page root_slot levels leaf_points points_per_page reserved "
-    "points nodes node_groups middle bounds_low bounds_high area flux content_xxh3 writer "
-    "rest xxh3")
+    "directory_xxh3 point_pages node_pages root_page root_slot levels attribute_groups reserved "
+    "leaf_points points nodes node_groups tail_offset tail_pages middle bounds_low bounds_high area "
+    "flux content_xxh3 writer after_writer tail rest xxh3")
 
 
 def unpack_superblock(block):
     f = SUPER.unpack(block)
-    return Superblock(*f[:18], f[18:21], f[21:24], f[24], f[25:28], f[28:30], *f[30:])
+    return Superblock(*f[:21], f[21:24], f[24:27], f[27], f[28:31], f[31:33], *f[33:])
+
+
+def nodes_from(s):
+    """The number of the first node page."""
+    return (1 + s.attribute_groups) * s.point_pages
 
 
 def is_text(bytes_):
@@ -302,19 +348,42 @@ def check_counts(header, s, at):
     require(empty == (s.nodes == 0) == (s.node_groups == 0), at + 176, counts,
             "nodes without points or points without nodes")
     least = 0 if empty else 1
-    require(least <= s.leaf_points <= 0xFFFF, at + 164, counts, "leaf_points is out of range")
-    require(least <= s.points_per_page <= points_per_page(header), at + 168, counts,
-            "points_per_page is out of range")
-    require((s.root_page, s.root_slot) == (NO_PAGE, 0) if empty else s.root_page < s.page_count,
-            at + 156, root, "root_page is no page, or not absent in an empty file")
-    require(least <= s.levels <= (0 if empty else 63), at + 162, root, "levels is out of range")
+    require(least <= s.leaf_points <= 0xFFFF, at + 172, counts, "leaf_points is out of range")
+    require(s.attribute_groups <= 255, at + 168, counts, "attribute_groups is above 255")
+    require((s.root_page, s.root_slot) == (NO_PAGE, 0) if empty else s.root_page < s.node_pages,
+            at + 160, root, "root_page is no node page, or not absent in an empty file")
+    require(least <= s.levels <= (0 if empty else 63), at + 166, root, "levels is out of range")
+
+
+def read_tail(header, s, at):
+    """The entries of the last pages, which lie one after another behind the directory."""
+    clause = "spec/container.md#tail-pages"
+    require(1 <= s.tail_pages <= min(TAIL_PAGES, s.page_count), at + 208, clause,
+            "tail_pages is not 1 to 64, or above page_count")
+    entries, place = [], s.tail_offset
+    for i in range(s.tail_pages):
+        part = s.tail[ENTRY_BYTES * i:ENTRY_BYTES * (i + 1)]
+        entries.append(decode_entry(header, part, s.file_bytes, at + 512 + ENTRY_BYTES * i))
+        require(entries[i].type not in (POINT, ATTRIBUTE) and entries[i].offset == place,
+                at + 512 + ENTRY_BYTES * i, clause, "an entry is not of the tail's next page")
+        place += extent_bytes(entries[i])
+    require(round_up(place, BLOCK) == s.file_bytes - 2 * BLOCK, at + 208, clause,
+            "the tail does not end at the superblocks")
+    require(not any(s.tail[ENTRY_BYTES * s.tail_pages:]), at + 512, clause,
+            "bytes behind the entries are not zero")
+    return entries
+
+
+def is_whole_superblock(block):
+    return (len(block) == BLOCK and block[:8] == SUPER_MAGIC
+            and unpack_superblock(block).xxh3 == xxh3_64(block[:4088], SUPER_SEED))
 
 
 def decode_superblock(header, block, file_bytes, at):
     require(len(block) == BLOCK and block[:8] == SUPER_MAGIC, at,
             "spec/container.md#superblock-magic", "no superblock: unfinished or truncated")
     s = unpack_superblock(block)
-    require(s.xxh3 == xxh3_64(block[:4088], SUPER_SEED), at + 4088,
+    require(is_whole_superblock(block), at + 4088,
             "spec/container.md#superblock-checksum", "superblock's checksum is wrong")
     require(s.identity == header.identity, at + 8, "spec/container.md#superblock-header",
             "superblock repeats another file header")
@@ -325,10 +394,12 @@ def decode_superblock(header, block, file_bytes, at):
     require(1 <= s.page_count < NO_PAGE, at + 128, pages, "page_count is out of range")
     require(s.directory_pages == (s.page_count - 1) // entries_per_page(header) + 1, at + 132,
             pages, "directory_pages does not suit page_count")
+    require(nodes_from(s) + s.node_pages + 1 <= s.page_count, at + 128, pages,
+            "page_count is less than point, attribute, node and meta pages")
     require(s.directory_offset % BLOCK == 0 and s.directory_offset >= BLOCK
-            and s.directory_offset + directory_bytes(header, s.page_count)
-            == file_bytes - 2 * BLOCK, at + 136, pages, "directory does not end at superblock A")
-    require(s.meta_page < s.page_count, at + 152, pages, "meta_page is no page")
+            and s.directory_offset + directory_bytes(header, s.page_count) == s.tail_offset
+            and s.tail_offset <= file_bytes - 2 * BLOCK, at + 136, pages,
+            "directory does not lie between its offset and the tail")
     check_counts(header, s, at)
     totals = "spec/container.md#superblock-totals"
     require(all(map(math.isfinite, s.bounds_low + s.bounds_high))
@@ -339,7 +410,8 @@ def decode_superblock(header, block, file_bytes, at):
     text, _, rest = s.writer.partition(b"\0")
     require(len(text) < 64 and is_text(text) and not any(rest), at + 328,
             "spec/container.md#superblock-writer", "writer is not text followed by zeros")
-    require(s.reserved == 0 and not any(s.middle) and not any(s.rest), at + 172, "spec/container.md#superblock-zero",
+    read_tail(header, s, at)
+    require(s.reserved == 0 and not any(s.middle) and not any(s.after_writer) and not any(s.rest), at + 170, "spec/container.md#superblock-zero",
             "a reserved byte is not zero")
     return s
 
@@ -364,24 +436,23 @@ def to_position(header, q):
 
 # Points (points.md) ------------------------------------------------------------------------------
 
-POINT_BYTES = 34
-CHANNEL_BYTES = {1: 1, 2: 2, 3: 2, 4: 4}
+CHANNEL_BYTES = {1: 1, 2: 2, 3: 2, 4: 4, 5: 4, 6: 8, 7: 1, 8: 2, 9: 4, 10: 8, 11: 8}
 NAME_BYTES = frozenset(b"abcdefghijklmnopqrstuvwxyz0123456789_.")
 
-Channel = namedtuple("Channel", "name type components group")
+Channel = namedtuple("Channel", "name type components group role colour_space no_value size unit scale offset")
 Meta = namedtuple("Meta", "channels text")
 
 
 def points_per_page(header):
-    return (page_size(header) - PAGE_HEADER_BYTES) // POINT_BYTES // 8 * 8
+    return (page_size(header) - PAGE_HEADER_BYTES) // header.point_bytes // 8 * 8
 
 
 class Points:
     """The columns of a point page, every value checked."""
 
-    def __init__(self, payload, count, at):
-        require(count >= 1 and len(payload) == POINT_BYTES * count, at,
-                "spec/points.md#point-size", "payload does not have 34 bytes a point")
+    def __init__(self, payload, count, at, point_bytes):
+        require(count >= 1 and len(payload) == point_bytes * count, at,
+                "spec/points.md#point-size", f"payload does not have {point_bytes} bytes a point")
         self.count = count
 
         def column(form, before):
@@ -400,32 +471,45 @@ class Points:
                              f"point {i} precedes the point before it")
         require(max(column("I", 16)) < 0x7F800000, at + 16 * count,
                 "spec/points.md#point-radius", "a radius is negative or not finite")
-        require(max(column("H", 24) + column("H", 26) + column("H", 28)) < 0x7C00,
-                at + 24 * count, "spec/points.md#point-radiance",
-                "radiance is negative or not finite")
-        require(not any(payload[33 * count:]), at + 33 * count, "spec/points.md#point-flags",
-                "flags are not zero")
+        light = (24, 26, 28) + ((34, 36, 38) if point_bytes == 40 else ())
+        require(max(max(column("H", before)) for before in light) < 0x7C00, at + 24 * count,
+                "spec/points.md#point-radiance", "radiance or emission is negative or not finite")
+        require(not any(payload[33 * count:34 * count]), at + 33 * count,
+                "spec/points.md#point-flags", "flags are not zero")
         self.radius = column("f", 16)
         self.normal = list(zip(column("h", 20), column("h", 22)))
         self.radiance = tuple(column("e", before) for before in (24, 26, 28))
         self.albedo = tuple(column("B", before) for before in (30, 31, 32))
+        dark = ((0.0,) * count,) * 3
+        self.emission = tuple(column("e", before) for before in light[3:]) or dark
 
 
 Column = namedtuple("Column", "before bits minus")
-COLUMN_FORM = {8: "B", 16: "H", 32: "I", 42: "I"}  # by bits, as payloads hold them
+COLUMN_FORM = {8: "B", 16: "H", 32: "I", 42: "I", 64: "Q"}  # by bits, as payloads hold them
 POINT_COLUMNS = [Column(0, 42, None), Column(4, 42, None), Column(8, 42, None),
                  Column(16, 32, None), Column(20, 16, None), Column(22, 16, None),
                  Column(26, 16, None), Column(24, 16, 6), Column(28, 16, 6),
                  Column(31, 8, None), Column(30, 8, 9), Column(32, 8, 9), Column(33, 8, None)]
+EMISSION_COLUMNS = [Column(36, 16, None), Column(34, 16, 13), Column(38, 16, 13)]
+
+
+def point_columns(header):
+    return POINT_COLUMNS + (EMISSION_COLUMNS if header.point_bytes == 40 else [])
 
 
 def group_columns(channels, group):
     out, before = [], 0
     for c in channels:
         for _ in range(c.components if c.group == group else 0):
-            out.append(Column(before, 8 * CHANNEL_BYTES[c.type], None))
-            before += CHANNEL_BYTES[c.type]
+            out.append(Column(before, 8 * c.size, None))
+            before += c.size
     return out
+
+
+def void_payload(channels, entry):
+    """The values of a page that is not in the file (points.md#void-pages)."""
+    return b"".join(((c.no_value or 0).to_bytes(c.size, "little")) * (c.components * entry.record_count)
+                    for c in channels if c.group == entry.group)
 
 
 def unpack_columns(packed, columns, count, at):
@@ -452,8 +536,9 @@ def unpack_columns(packed, columns, count, at):
     parts = {}
     for column, numbers in zip(columns, values):
         form = COLUMN_FORM[column.bits]
-        parts[column.before] = struct.pack(f"<{count}{form}", *(v & 0xFFFFFFFF for v in numbers))
-    if columns is POINT_COLUMNS:
+        low = (1 << min(column.bits, 64)) - 1 if column.bits != 42 else 0xFFFFFFFF
+        parts[column.before] = struct.pack(f"<{count}{form}", *(v & low for v in numbers))
+    if columns[0].bits == 42:
         parts[12] = struct.pack(f"<{count}I", *(x >> 32 | y >> 32 << 10 | z >> 32 << 20
                                                 for x, y, z in zip(*values[:3])))
     return b"".join(parts[before] for before in sorted(parts))
@@ -464,34 +549,61 @@ def is_name(bytes_):
 
 
 def group_bytes(channels, group):
-    return sum(CHANNEL_BYTES[c.type] * c.components for c in channels if c.group == group)
+    return sum(c.size * c.components for c in channels if c.group == group)
 
 
-def decode_channel(payload, at, base, earlier):
-    name, type_, components, group, reserved = struct.unpack_from("<32sBBHI", payload, at)
+CHANNEL = struct.Struct("<32sBBBBBBBB16sQddQ")
+
+
+def decode_channel(payload, at, base, earlier, point_bytes):
+    (name, type_, components, group, role, colour_space, flags, size, reserved, unit, no_value, scale,
+     offset, zero) = CHANNEL.unpack_from(payload, at)
     name, _, rest = name.partition(b"\0")
-    require(not any(rest) and reserved == 0, base + at, "spec/points.md#meta-zero",
-            "a channel's reserved byte is not zero")
+    unit, _, after = unit.partition(b"\0")
+    require(not any(rest) and not any(after) and reserved == zero == 0 and flags <= 1
+            and (flags or not no_value), base + at, "spec/points.md#meta-zero",
+            "a channel's reserved byte or bit is not zero")
     clause = "spec/points.md#meta-channel"
     require(is_name(name) and all(c.name != name.decode() for c in earlier), base + at, clause,
             "channel's name is no name or not unique")
-    require(type_ in CHANNEL_BYTES and 1 <= components <= 16 and 1 <= group <= 255
-            and (not earlier or earlier[-1].group <= group), base + at + 32, clause,
-            "channel's type, components or group is out of range")
-    channel = Channel(name.decode(), type_, components, group)
-    require(group_bytes([*earlier, channel], group) <= POINT_BYTES, base + at, clause,
-            "channels of one group take more than 34 bytes a point")
+    require(size in (1, 2, 4, 8) and CHANNEL_BYTES.get(type_, size) == size and 1 <= components <= 16
+            and 1 <= group and (not earlier or earlier[-1].group <= group), base + at + 32, clause,
+            "channel's type, size, components or group is out of range")
+    require(no_value < 1 << 8 * size and len(unit) < 16 and is_text(unit) and scale != 0
+            and math.isfinite(scale) and math.isfinite(offset), base + at + 40, clause,
+            "channel's unit, no_value, scale or offset is out of range")
+    require(components == 3 if role in (2, 3) else role != 5 or (type_ in (5, 6) and components == 1),
+            base + at + 35, clause, "channel's type or components do not suit its role")
+    channel = Channel(name.decode(), type_, components, group, role, colour_space,
+                      no_value if flags else None, size, unit.decode(), scale, offset)
+    require(group_bytes([*earlier, channel], group) <= point_bytes, base + at, clause,
+            "channels of one group take more bytes than a point")
     return channel
 
 
-def decode_meta(payload, base):
+DECIMAL = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", re.ASCII)
+
+
+def has_form(key, value):
+    """Texts whose form is fixed (points.md#texts)."""
+    if key == "up":
+        return value in ("x", "y", "z")
+    if key == "time":
+        return DECIMAL.fullmatch(value) is not None
+    if key == "metres_per_unit":
+        return (DECIMAL.fullmatch(value) is not None and value[0] != "-"
+                and any(digit in "123456789" for digit in value.partition("e")[0]))
+    return True
+
+
+def decode_meta(payload, base, point_bytes):
     size = "spec/points.md#meta-size"
     require(len(payload) >= 8, base, size, "meta page is truncated")
     channel_count, text_count = struct.unpack_from("<II", payload)
-    require(channel_count <= (len(payload) - 8) // 40, base, size, "channels are truncated")
-    channels, text, at = [], {}, 8 + 40 * channel_count
+    require(channel_count <= (len(payload) - 8) // CHANNEL.size, base, size, "channels are truncated")
+    channels, text, at = [], {}, 8 + CHANNEL.size * channel_count
     for i in range(channel_count):
-        channels.append(decode_channel(payload, 8 + 40 * i, base, channels))
+        channels.append(decode_channel(payload, 8 + CHANNEL.size * i, base, channels, point_bytes))
     last = b""
     for _ in range(text_count):
         require(len(payload) - at >= 8, base + at, size, "text is truncated")
@@ -502,6 +614,8 @@ def decode_meta(payload, base):
         value = payload[at + 8 + key_bytes:at + 8 + key_bytes + value_bytes]
         require(is_name(key) and key > last and is_text(value), base + at,
                 "spec/points.md#meta-text", "key is no name or out of order, or value is no text")
+        require(has_form(key.decode(), value.decode()), base + at, "spec/points.md#meta-fact",
+                "a text whose form is fixed has another one")
         text[key.decode()], last, at = value.decode(), key, at + 8 + key_bytes + value_bytes
     require(at == len(payload), base + at, size, "bytes follow the last text")
     return Meta(channels, text)
@@ -510,8 +624,9 @@ def decode_meta(payload, base):
 # Nodes (nodes.md) --------------------------------------------------------------------------------
 
 Child = namedtuple("Child", "interior page slot first count")
-Group = namedtuple("Group", "cell level children at")
-COLUMNS = ("mean_x", "mean_y", "mean_z", "radius", "cone_axis", "cone_cos", "area", "thickness")
+Group = namedtuple("Group", "cell level children emits at")
+COLUMNS = ("mean_x", "mean_y", "mean_z", "radius", "cone_axis", "cone_cos", "area", "thickness",
+           "greatest")
 
 
 def cell_of(key, level):
@@ -531,13 +646,14 @@ def decode_ref(word, interior, pages, points, at):
     return Child(False, 0, 0, first, count)
 
 
-def decode_group(payload, at, base, pages, points):
+def decode_group(payload, at, base, pages, points, may_emit):
     """The group at `at` and the number of bytes it takes."""
     here = base + at
     require(len(payload) - at >= 24, here, "spec/nodes.md#node-slots", "group is truncated")
-    high, low, level, n, mask, zero, zeros = struct.unpack_from("<QQBBBBI", payload, at)
+    high, low, level, n, mask, flags, zeros = struct.unpack_from("<QQBBBBI", payload, at)
     require(1 <= n <= 8, here + 17, "spec/nodes.md#node-children", "group does not have 1 to 8 children")
-    end = at + 24 + 60 * n
+    require(flags <= may_emit, here + 19, "spec/nodes.md#node-mask", "unknown or forbidden flag")
+    end = at + 24 + (86 if flags else 62) * n
     size = round_up(end - at, 8)
     require(size <= len(payload) - at, here, "spec/nodes.md#node-slots", "group is truncated")
     require(level <= 62, here + 16, "spec/nodes.md#node-level", "level is above 62")
@@ -546,18 +662,19 @@ def decode_group(payload, at, base, pages, points):
             "spec/nodes.md#node-cell", "cell has digits after its level's")
     require(mask >> n == 0, here + 18, "spec/nodes.md#node-mask", "interior names no child")
     column = at + 24 + 8 * n
-    require(zero == zeros == 0 and not any(payload[end:at + size]), here + 19,
+    require(zeros == 0 and not any(payload[end:at + size]), here + 20,
             "spec/nodes.md#node-zero", "a reserved field is not zero")
     words = struct.unpack_from(f"<{n}Q", payload, at + 24)
     children = [decode_ref(word, mask >> i & 1, pages, points, here + 24 + 8 * i)
                 for i, word in enumerate(words)]
-    for name, before in (("radius", 6 * n), ("area", 12 * n), ("thickness", 14 * n)):
+    for name, before in (("radius", 6 * n), ("area", 12 * n), ("thickness", 14 * n),
+                         ("greatest", 16 * n)):
         require(max(struct.unpack_from(f"<{n}H", payload, column + before)) < 0xFF00,
                 base + column + before, "spec/nodes.md#node-number", f"{name} is not finite")
-    return Group(cell, level, children, at), size
+    return Group(cell, level, children, bool(flags), at), size
 
 
-def decode_groups(payload, count, base, pages, points):
+def decode_groups(payload, count, base, pages, points, may_emit):
     slots = "spec/nodes.md#node-slots"
     at = round_up(2 * count, 8)
     require(count >= 1 and at <= len(payload), base, slots, "slot table is truncated")
@@ -567,7 +684,7 @@ def decode_groups(payload, count, base, pages, points):
     for slot in range(count):
         require(8 * int.from_bytes(payload[2 * slot:2 * slot + 2], "little") == at,
                 base + 2 * slot, slots, "group does not start where the group before it ends")
-        group, size = decode_group(payload, at, base, pages, points)
+        group, size = decode_group(payload, at, base, pages, points, may_emit)
         groups.append(group)
         at += size
     require(at == len(payload), base + at, slots, "bytes follow the last group")
@@ -584,21 +701,74 @@ def summary(payload, group, i):
     at = group.at + 24 + 8 * n
     out = {name: struct.unpack_from("<H", payload, at + 2 * n * k + 2 * i)[0]
            for k, name in enumerate(COLUMNS)}
-    out["facing"] = struct.unpack_from(f"<{6 * n}H", payload, at + 16 * n)[i::n]
-    out["radiance"] = struct.unpack_from(f"<{6 * n}I", payload, at + 28 * n)[i::n]
+    out["facing"] = struct.unpack_from(f"<{6 * n}H", payload, at + 18 * n)[i::n]
+    out["radiance"] = struct.unpack_from(f"<{6 * n}I", payload, at + 30 * n)[i::n]
+    if group.emits:
+        out["emission"] = struct.unpack_from(f"<{6 * n}I", payload, at + 54 * n)[i::n]
     return out
+
+
+# Parts (parts.md) --------------------------------------------------------------------------------
+
+PART_BYTES = 384
+PART = struct.Struct("<16sQQQQIIQQQQ40s256s")
+PARTS_PAGE, PARTS_COUNT, PARTS_FILE, PARTS_TOP = (
+    f"spec/parts.md#parts-{rule}" for rule in ("page", "count", "file", "top"))
+MOST_NODE_PAGES = (1 << 32) - 2
+
+Part = namedtuple("Part", "uuid superblock_xxh3 file_bytes first_point points first_node_page node_pages "
+                          "first_key last_key name at")
+
+
+def is_path(bytes_):
+    """Whether a name is a path below the folder of the scene."""
+    return (1 <= len(bytes_) <= 255 and is_text(bytes_)
+            and not {b"", b".", b".."}.intersection(bytes_.split(b"/")))
+
+
+def decode_part(payload, at, base):
+    (uuid, hash_, file_bytes, first_point, points, first_page, pages, first_high, first_low, last_high,
+     last_low, reserved, name) = PART.unpack_from(payload, at)
+    require(not any(reserved), base + at + 88, "spec/parts.md#parts-zero", "a reserved byte is not zero")
+    name, _, rest = name.partition(b"\0")
+    require(is_path(name) and not any(rest), base + at + 128, "spec/parts.md#parts-name",
+            "name is no path below the scene's folder, or no zeros follow it")
+    require(max(first_high, first_low, last_high, last_low) < 1 << 63, base + at + 56,
+            "spec/parts.md#parts-order", "half of a key is 2^63 or more")
+    return Part(uuid, hash_, file_bytes, first_point, points, first_page, pages, first_high << 63 | first_low,
+                last_high << 63 | last_low, name.decode(), base + at)
+
+
+def check_parts(parts, own_node_pages):
+    """The rules of the records among each other; the numbers of points and node pages."""
+    points, pages, last, names = 0, own_node_pages, -1, set()
+    for part in parts:
+        require(1 <= part.points <= (1 << 48) - points and part.first_point == points, part.at + 32,
+                PARTS_COUNT, "part is empty, or does not begin where the points before it end")
+        require(part.first_node_page == pages and part.node_pages <= MOST_NODE_PAGES - pages,
+                part.at + 48, PARTS_COUNT, "node pages are too many, or do not begin where those before end")
+        require(last < part.first_key <= part.last_key, part.at + 56, "spec/parts.md#parts-order",
+                "part is not behind the part before it on the curve, or its keys descend")
+        require(part.name not in names, part.at + 128, "spec/parts.md#parts-name",
+                "another part has the same name")
+        names.add(part.name)
+        points, pages, last = points + part.points, pages + part.node_pages, part.last_key
+    return points, pages
 
 
 # Opening (container.md#opening) ------------------------------------------------------------------
 
 class Container:
-    """A file whose header, superblock, directory and meta page are right."""
+    """A file whose header, superblock, directory and meta page are right, and its parts if it has any.
 
-    def __init__(self, path):
+    A file that is opened as a part is refused when it is a scene of parts."""
+
+    def __init__(self, path, as_part=False):
+        self.path, self.as_part, self.parts, self.records = path, as_part, [], []
         self.file = open(path, "rb")
         try:
             self.open()
-        except Broken:
+        except (Broken, OSError):
             self.close()
             raise
 
@@ -606,18 +776,26 @@ class Container:
         self.file_bytes = os.fstat(self.file.fileno()).st_size
         self.has_zstd = shutil.which("zstd") is not None
         self.header = decode_header(self.read(0, min(BLOCK, self.file_bytes)))
+        self.has_parts = bool(self.header.incompat & HAS_PARTS)
+        require(not (self.has_parts and self.as_part), 16, PARTS_FILE, "a part is a scene of parts itself")
         self.superblock = self.choose_superblock()
         self.entries = self.read_directory()
         self.check_structure()
-        s = self.superblock
-        loaded = self.load([s.meta_page])
+        self.meta_page = self.superblock.page_count - 1
         self.meta = Meta([], {})
-        if s.meta_page in loaded:
-            self.meta = decode_meta(loaded[s.meta_page],
-                                    self.entries[s.meta_page].offset + PAGE_HEADER_BYTES)
+        loaded = self.load([self.meta_page])
+        self.knows_meta = self.meta_page in loaded
+        if self.knows_meta:
+            self.meta = decode_meta(loaded[self.meta_page], self.payload_at(self.meta_page),
+                                    self.header.point_bytes)
             self.check_attribute_pages()
+        self.all_node_pages = self.superblock.node_pages  # and those of its parts
+        if self.has_parts:
+            self.open_parts()
 
     def close(self):
+        for part in self.parts:
+            part.close()
         self.file.close()
 
     def read(self, offset, size):
@@ -637,14 +815,21 @@ class Container:
                 yield block, error
 
     def choose_superblock(self):
-        (block_a, a), (block_b, b) = self.superblock_copies()
-        whole = [s for s in (a, b) if isinstance(s, Superblock)]
+        """A whole copy that breaks a rule is refused, whatever the other holds."""
+        copies = list(self.superblock_copies())
+        (block_a, a), (block_b, b) = copies
+        whole = [(block, s) for block, s in copies if is_whole_superblock(block)]
         if not whole:
             self.look_for_superblock()
             raise b if block_b[:8] == SUPER_MAGIC and block_a[:8] != SUPER_MAGIC else a
         require(len(whole) == 1 or block_a == block_b, self.file_bytes - 2 * BLOCK,
                 "spec/container.md#superblock-copies", "the two superblocks differ")
-        return whole[0]
+        _, chosen = whole[0]
+        if isinstance(chosen, Broken):
+            if chosen.clause == "spec/container.md#superblock-length":
+                self.look_for_superblock()
+            raise chosen
+        return chosen
 
     def look_for_superblock(self):
         """One that is whole near the end of a file tells that the file is longer or shorter than it was."""
@@ -672,8 +857,7 @@ class Container:
             page = decode_page_header(self.header, self.read(at, PAGE_HEADER_BYTES), at)
             count = min(entries_per_page(self.header),
                         s.page_count - k * entries_per_page(self.header))
-            require((page.type, page.page_id, page.record_count)
-                    == (DIRECTORY, s.page_count + k, count), at, clause,
+            require((page.type, page.rank, page.record_count) == (DIRECTORY, k, count), at, clause,
                     "not the directory page that belongs here")
             parts.append(self.read(at + PAGE_HEADER_BYTES, page.raw_bytes))
             require(xxh3_64(parts[-1]) == page.payload_xxh3, at + PAGE_HEADER_BYTES, clause,
@@ -684,58 +868,189 @@ class Container:
         return [decode_entry(self.header, whole[i * ENTRY_BYTES:(i + 1) * ENTRY_BYTES],
                              self.file_bytes, self.entry_at(i)) for i in range(s.page_count)]
 
-    def pages_of(self, type_, group=0):
-        return [i for i, e in enumerate(self.entries) if (e.type, e.group) == (type_, group)]
+    def kind_of(self, page):
+        """Type and group (None: any) that a page of this number has, and its rank; of pages behind the node pages
+        only the meta page has them."""
+        s = self.superblock
+        if page < s.point_pages:
+            return POINT, 0, page
+        if page < nodes_from(s):
+            return ATTRIBUTE, None, page % s.point_pages
+        if page < nodes_from(s) + s.node_pages:
+            return NODE, 0, page - nodes_from(s)
+        return (META, 0, 0) if page == s.page_count - 1 else (None, 0, None)
+
+    def check_listing(self):
+        """Every page has the type and group of its place."""
+        s, clause = self.superblock, "spec/container.md#directory-listing"
+        self.ranks = []
+        for page, entry in enumerate(self.entries):
+            type_, group, rank = self.kind_of(page)
+            before = self.entries[page - 1] if page else None
+            if type_ is None:
+                first = page == nodes_from(s) + s.node_pages
+                parts = entry.type == PARTS and self.header.incompat & HAS_PARTS
+                require((parts or entry.type >= SKIPPABLE) and (first or before.type <= entry.type),
+                        self.entry_at(page), clause, f"page {page} has no place behind the node pages")
+                rank = 0 if first or before.type != entry.type else self.ranks[-1] + 1
+            elif type_ == ATTRIBUTE:
+                begins = rank == 0
+                right = entry.group == before.group if not begins else \
+                    page == s.point_pages or entry.group > before.group
+                require(entry.type == type_ and right, self.entry_at(page), clause,
+                        f"page {page} is of another type or group than its place")
+            elif type_ != META:  # meta-page looks at that one
+                require(entry.type == type_, self.entry_at(page), clause,
+                        f"page {page} is of another type than its place")
+            self.ranks.append(rank)
 
     def check_structure(self):
         s, end = self.superblock, BLOCK
         tail = self.file_bytes - 2 * BLOCK
-        for page in sorted(range(s.page_count), key=lambda i: self.entries[i].offset):
+        self.check_listing()
+        body = s.page_count - s.tail_pages
+        for page in sorted(range(body), key=lambda i: self.entries[i].offset):
             entry = self.entries[page]
+            if is_void(entry):
+                continue
             end, start = entry.offset + extent_bytes(entry), end
             require(start <= entry.offset and end <= s.directory_offset, self.entry_at(page),
                     "spec/container.md#directory-overlap", f"page {page} overlaps another")
-        require(self.pages_of(META) == [s.meta_page], tail, "spec/container.md#meta-page",
-                "meta_page is not the one page of type meta")
+        for page, entry in enumerate(self.entries):
+            require((entry.type == META) == (page == s.page_count - 1), self.entry_at(page),
+                    "spec/container.md#meta-page", "the last page is not the one page of type meta")
+        require(read_tail(self.header, s, tail) == self.entries[body:], tail,
+                "spec/container.md#tail-pages", "the tail is not the end of the directory")
         counts = "spec/container.md#superblock-counts"
-        self.point_pages, self.node_pages = self.pages_of(POINT), self.pages_of(NODE)
-        require(s.points == sum(self.entries[i].record_count for i in self.point_pages), tail,
-                counts, "directory has another number of points")
-        require(s.node_groups == sum(self.entries[i].record_count for i in self.node_pages), tail,
-                counts, "directory has another number of groups")
+        self.point_pages = range(s.point_pages)
+        self.node_pages = range(nodes_from(s), nodes_from(s) + s.node_pages)
+        self.own_groups = sum(self.entries[i].record_count for i in self.node_pages)
+        if not self.has_parts:
+            require(s.points == sum(self.entries[i].record_count for i in self.point_pages), tail,
+                    counts, "directory has another number of points")
+            require(s.node_groups == self.own_groups, tail, counts,
+                    "directory has another number of groups")
         require(s.nodes <= 8 * s.node_groups, tail, counts, "more than 8 nodes a group")
         if s.points:
-            root = self.entries[s.root_page]
-            require(root.type == NODE and s.root_slot < root.record_count, tail,
+            require(s.root_slot < self.entries[self.node_pages[s.root_page]].record_count, tail,
                     "spec/container.md#superblock-root", "root group is in no node page")
-        records = b"".join(struct.pack("<HHIQ", e.type, e.group, e.record_count, e.payload_xxh3)
+        records = b"".join(struct.pack("<BBHIQ", e.type, e.group, 0, e.record_count, e.payload_xxh3)
                            for e in self.entries)
         require(xxh3_128(records) == s.content_xxh3, tail, "spec/container.md#superblock-digest",
                 "content digest is not that of the directory")
         full, clause = points_per_page(self.header), "spec/points.md#point-pages"
-        require(not s.points or s.points_per_page == full, tail, clause,
-                "points_per_page is not what a page holds")
-        for page in self.point_pages[:-1]:
-            require(self.entries[page].record_count == full, self.entry_at(page), clause,
-                    f"page {page} is not full")
-        require(not s.points or self.entries[self.point_pages[-1]].record_count <= full, tail,
-                clause, "the last point page is too full")
+        for page in self.point_pages:
+            count, last = self.entries[page].record_count, page == s.point_pages - 1
+            require(count == full or last and count < full, self.entry_at(page), clause,
+                    f"page {page} is not full, or too full")
 
     def check_attribute_pages(self):
-        clause = "spec/points.md#attribute-pages"
-        groups = {c.group for c in self.meta.channels}
-        for page, entry in enumerate(self.entries):
-            require(entry.type != ATTRIBUTE or entry.group in groups, self.entry_at(page), clause,
-                    f"page {page} belongs to no channel")
-        for group in groups:
-            pages = self.pages_of(ATTRIBUTE, group)
-            require(len(pages) == len(self.point_pages), self.file_bytes - 2 * BLOCK, clause,
-                    f"group {group} has not a page for each point page")
-            for page, beside in zip(pages, self.point_pages):
+        clause, s = "spec/points.md#attribute-pages", self.superblock
+        groups = sorted({c.group for c in self.meta.channels})
+        require(len(groups) == s.attribute_groups, self.file_bytes - 2 * BLOCK, clause,
+                "superblock and meta page have different numbers of channel groups")
+        for j, group in enumerate(groups):
+            for beside in self.point_pages:
+                page = (1 + j) * s.point_pages + beside
                 entry, count = self.entries[page], self.entries[beside].record_count
-                require(entry.record_count == count and
-                        entry.raw_bytes == count * group_bytes(self.meta.channels, group),
+                require(entry.group == group and entry.record_count == count and
+                        entry.raw_bytes in (0, count * group_bytes(self.meta.channels, group)),
                         self.entry_at(page), clause, f"page {page} does not suit its points")
+
+    def read_parts(self):
+        """The records of all parts pages."""
+        first, tail = nodes_from(self.superblock) + self.superblock.node_pages, self.file_bytes - 2 * BLOCK
+        pages = [i for i in range(first, self.meta_page) if self.entries[i].type == PARTS]
+        require(pages and not self.point_pages, tail, PARTS_PAGE,
+                "a scene of parts has no parts page, or has points of its own")
+        full = (page_size(self.header) - PAGE_HEADER_BYTES) // PART_BYTES
+        for page in pages[:-1]:
+            require(self.entries[page].record_count == full, self.entry_at(page), PARTS_PAGE,
+                    f"page {page} is not full")
+        payloads = self.load(pages)
+        if len(payloads) < len(pages):
+            raise OSError(f"{self.path}: no zstd program found, which the parts pages need")
+        return [decode_part(payloads[page], at, self.payload_at(page)) for page in pages
+                for at in range(0, len(payloads[page]), PART_BYTES)]
+
+    def open_parts(self):
+        s, tail = self.superblock, self.file_bytes - 2 * BLOCK
+        self.records = self.read_parts()
+        points, self.all_node_pages = check_parts(self.records, s.node_pages)
+        require(s.points == points, tail, PARTS_COUNT, f"parts have {points} points, superblock {s.points}")
+        for record in self.records:
+            self.parts.append(self.open_part(record))
+        groups = self.own_groups + sum(part.superblock.node_groups for part in self.parts)
+        require(s.node_groups == groups, tail, "spec/container.md#superblock-counts",
+                f"scene and parts have {groups} groups")
+
+    def open_part(self, record):
+        path = os.path.join(os.path.dirname(self.path), *record.name.split("/"))
+        try:
+            part = Container(path, as_part=True)
+        except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:
+            raise in_file(path, Broken(0, PARTS_FILE, "there is no such part")) from error
+        except Broken as error:
+            raise in_file(path, error)
+        wrong = self.difference(part, record)
+        if wrong:
+            part.close()
+            raise in_file(path, Broken(0, PARTS_FILE, f"part is not the one that the scene names: {wrong}"))
+        return part
+
+    def difference(self, part, record):
+        """What a part has other than its record or its scene."""
+        s, h = part.superblock, part.header
+        same = {"uuid": h.uuid == record.uuid, "length": s.file_bytes == record.file_bytes,
+                "superblock": s.xxh3 == record.superblock_xxh3, "number of points": s.points == record.points,
+                "number of node pages": s.node_pages == record.node_pages,
+                "frame": (h.origin, h.edge) == (self.header.origin, self.header.edge),
+                "page size": h.page_shift == self.header.page_shift,
+                "point_bytes": h.point_bytes == self.header.point_bytes,
+                "leaf_points": s.leaf_points == self.superblock.leaf_points,
+                "schema": part.meta.channels == self.meta.channels or not (part.knows_meta and self.knows_meta)}
+        if s.points:
+            first, last = part.page_header(part.point_pages[0]), part.page_header(part.point_pages[-1])
+            same["first key"] = first.first_key == record.first_key >> 63
+            same["last key"] = last.last_key == record.last_key >> 63
+        return ", ".join(f"another {name}" for name, holds in same.items() if not holds)
+
+    def part_of_point(self, point):
+        return bisect.bisect_right(self.records, point, key=lambda part: part.first_point) - 1
+
+    def part_of_node_page(self, rank):
+        """The part that has the node page of a rank of the scene; -1 for the scene's own pages."""
+        return bisect.bisect_right(self.records, rank, key=lambda part: part.first_node_page) - 1
+
+    def groups_on(self, rank):
+        """How many groups the node page of a rank has, which may be a part's."""
+        part = self.part_of_node_page(rank)
+        if part < 0:
+            return self.entries[self.node_pages[rank]].record_count
+        return self.parts[part].groups_on(rank - self.records[part].first_node_page)
+
+    def check_targets(self, groups, at):
+        """What groups of this file refer to is there, as far as the directories show."""
+        for group in groups:
+            for child in group.children:
+                if child.interior:
+                    own = child.page < self.superblock.node_pages
+                    require(child.slot < self.groups_on(child.page), at + group.at,
+                            "spec/nodes.md#references" if own else PARTS_TOP, "a child is no group")
+                elif self.parts:
+                    last = child.first + child.count - 1
+                    require(self.part_of_point(child.first) == self.part_of_point(last), at + group.at,
+                            PARTS_TOP, "a leaf has points of two parts")
+
+    def page_header(self, page, image=None):
+        """The header of a page, compared with the directory. image: of the page, where it was read before."""
+        at = self.entries[page].offset
+        image = image or self.read(at, PAGE_HEADER_BYTES)
+        header = decode_page_header(self.header, image[:PAGE_HEADER_BYTES], at)
+        require(header.rank == self.ranks[page] and self.entries[page] == entry_of(header, at), at,
+                "spec/container.md#page-agreement",
+                f"page header is not what the directory says of page {page}")
+        return header
 
     def load(self, pages):
         """Payloads of pages, verified and decoded; without zstd only of those that are raw."""
@@ -743,13 +1058,12 @@ class Container:
         self.headers = {}
         for i in pages:
             entry = self.entries[i]
+            if is_void(entry):
+                out[i], self.headers[i] = void_payload(self.meta.channels, entry), None
+                continue
             at = entry.offset
             image = self.read(at, PAGE_HEADER_BYTES + entry.stored_bytes)
-            page = decode_page_header(self.header, image[:PAGE_HEADER_BYTES], at)
-            require(page.page_id == i and entry == Entry(
-                at, page.stored_bytes, page.raw_bytes, page.payload_xxh3, page.type, page.group,
-                page.record_count), at, "spec/container.md#page-agreement",
-                f"page header is not what the directory says of page {i}")
+            page = self.page_header(i, image)
             stored = image[PAGE_HEADER_BYTES:]
             require(xxh3_64(stored) == page.payload_xxh3, at + PAGE_HEADER_BYTES,
                     "spec/container.md#page-payload", "payload's checksum is wrong")
@@ -765,30 +1079,58 @@ class Container:
         if jobs and self.has_zstd:
             out.update(decode_frames(jobs))
         for i, payload in out.items():
-            if self.headers[i].filter == PACKED:
-                out[i] = self.unpack(self.headers[i], payload)
+            if self.headers[i] and self.headers[i].filter == PACKED:
+                out[i] = self.unpack(self.headers[i], payload, self.payload_at(i))
         return out
 
-    def unpack(self, page, packed):
-        columns = POINT_COLUMNS if page.type == POINT else group_columns(self.meta.channels,
-                                                                         page.group)
-        return unpack_columns(packed, columns, page.record_count, self.payload_at(page.page_id))
+    def unpack(self, page, packed, at):
+        columns = (point_columns(self.header) if page.type == POINT
+                   else group_columns(self.meta.channels, page.group))
+        return unpack_columns(packed, columns, page.record_count, at)
 
     def payload_at(self, page):
         return self.entries[page].offset + PAGE_HEADER_BYTES
 
     def points(self):
         """Point pages in order: Points with columns x, y, z, keys, radius, normal, ..."""
+        for part in self.parts:
+            yield from part.points()
         for page in self.point_pages:
             payload = self.load([page])[page]
-            yield Points(payload, self.entries[page].record_count, self.payload_at(page))
+            yield Points(payload, self.entries[page].record_count, self.payload_at(page),
+                         self.header.point_bytes)
 
     def groups(self, page):
-        """The groups of a node page and its payload, for summary()."""
-        payload = self.load([page])[page]
-        s = self.superblock
-        return decode_groups(payload, self.entries[page].record_count, self.payload_at(page),
-                             s.page_count, s.points), payload
+        """The groups of the node page of a rank and its payload, for summary().
+
+        References of a part's groups are ranks and numbers of the scene."""
+        part = self.part_of_node_page(page)
+        if part >= 0:
+            record = self.records[part]
+            groups, payload = self.parts[part].groups(page - record.first_node_page)
+            return [in_scene(group, record) for group in groups], payload
+        page = self.node_pages[page]
+        return self.decode_nodes(page, payload := self.load([page])[page]), payload
+
+    def decode_nodes(self, page, payload):
+        at = self.payload_at(page)
+        groups = decode_groups(payload, self.entries[page].record_count, at, self.all_node_pages,
+                               self.superblock.points, self.header.point_bytes == 40)
+        self.check_targets(groups, at)
+        return groups
+
+
+def in_file(path, error):
+    """An error that names the file of a part."""
+    error.file = error.file or path
+    return error
+
+
+def in_scene(group, record):
+    """A group of a part with references by the numbers of the scene."""
+    return group._replace(children=[
+        c._replace(page=c.page + record.first_node_page) if c.interior
+        else c._replace(first=c.first + record.first_point) for c in group.children])
 
 
 def open_container(path):
@@ -797,6 +1139,11 @@ def open_container(path):
 
 
 # The program -------------------------------------------------------------------------------------
+
+def shown(path):
+    """A path with its control characters escaped."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in path)
+
 
 def print_verdict(path, facts):
     print(f"{path}: {facts['points']} points, {facts['nodes']} nodes in {facts['groups']} groups "
@@ -830,10 +1177,10 @@ def main():
         facts = verify(options.file)
     except Broken as error:
         if options.json:
-            print(json.dumps({"valid": False, "offset": error.offset, "clause": error.clause,
-                              "text": error.text}))
+            print(json.dumps({"valid": False, "file": error.file or options.file, "offset": error.offset,
+                              "clause": error.clause, "text": error.text}))
         else:
-            print(f"{options.file}: {error}")
+            print(f"{shown(error.file or options.file)}: {error}")
         return 1
     except OSError as error:
         print(f"{options.file}: {error}", file=sys.stderr)

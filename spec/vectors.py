@@ -1,7 +1,7 @@
 """Writes the vectors: reader.py's twin, which makes files instead of reading them.
 
-Which files there are say vectors_good.py, vectors_bad.py and vectors_verify.py, each with a list of
-(name, Draft or bytes). The same bytes each time, but for pages that zstd compressed.
+Which files there are say vectors_good.py, vectors_bad.py, vectors_verify.py and, of scenes of parts,
+vectors_parts.py, each with a list of (name, Draft or bytes). The same bytes each time, but for pages that zstd compressed.
 """
 
 import itertools
@@ -19,7 +19,7 @@ UUID = bytes(range(1, 17))
 UNIT_EDGE = 2.0 ** 22  # edge of the frames here: the unit is 2^-20
 
 
-def encode_points(surfels):
+def encode_points(surfels, point_bytes):
     out = b""
     for axis in range(3):
         out += b"".join(struct.pack("<I", s.q[axis] & 0xFFFFFFFF) for s in surfels)
@@ -32,7 +32,10 @@ def encode_points(surfels):
         out += b"".join(struct.pack("<H", s.half[k]) for s in surfels)
     for k in range(3):
         out += bytes(s.albedo[k] for s in surfels)
-    return out + bytes(len(surfels))
+    out += bytes(len(surfels))
+    for k in range(3 if point_bytes == 40 else 0):
+        out += b"".join(struct.pack("<H", s.own[k]) for s in surfels)
+    return out
 
 
 def pack_columns(payload, columns, count, loose=()):
@@ -94,10 +97,21 @@ def literal_block(content):
             + bytes([more % 255]) + content)
 
 
+def channel(name, type_, components, group, **fields):
+    """A row of the schema: r.Channel with what is not named as usual."""
+    usual = {"role": 0, "colour_space": 0, "no_value": None, "size": r.CHANNEL_BYTES.get(type_, 1),
+             "unit": "", "scale": 1.0, "offset": 0.0}
+    return r.Channel(name, type_, components, group, **{**usual, **fields})
+
+
+def encode_channel(c):
+    return r.CHANNEL.pack(c.name.encode(), c.type, c.components, c.group, c.role, c.colour_space,
+                          c.no_value is not None, c.size, 0, c.unit.encode(), c.no_value or 0,
+                          c.scale, c.offset, 0)
+
+
 def encode_meta(channels=(), text=()):
-    out = struct.pack("<II", len(channels), len(text))
-    for name, type_, components, group in channels:
-        out += struct.pack("<32sBBHI", name.encode(), type_, components, group, 0)
+    out = struct.pack("<II", len(channels), len(text)) + b"".join(map(encode_channel, channels))
     for key, value in text:
         out += struct.pack("<II", len(key), len(value.encode())) + key.encode() + value.encode()
     return out
@@ -108,19 +122,18 @@ def encode_meta(channels=(), text=()):
 class Page:
     """A page to be written. Fields of `header` and `entry` override what follows from the rest."""
 
-    def __init__(self, type_, payload, count, group=0, level=0xFFFF, keys=(0, 0)):
+    def __init__(self, type_, payload, count, group=0, level=r.NO_LEVEL, keys=(0, 0), void=False):
         self.type, self.payload, self.count = type_, bytearray(payload), count
         self.group, self.level, self.keys = group, level, keys
         self.stored, self.codec, self.filter = None, r.RAW, 0
-        self.uuid = None
+        self.uuid, self.void = None, void
         self.header, self.entry = {}, {}
 
-    def fields(self, page_id):
+    def fields(self, rank):
         stored = self.payload if self.stored is None else self.stored
-        out = {"type": self.type, "codec": self.codec, "filter": self.filter,
-               "page_id": page_id,
-               "stored_bytes": len(stored), "raw_bytes": len(self.payload), "group": self.group,
-               "level": self.level, "record_count": self.count, "reserved": 0,
+        out = {"type": self.type, "group": self.group, "codec": self.codec, "filter": self.filter,
+               "rank": rank, "stored_bytes": len(stored), "raw_bytes": len(self.payload),
+               "record_count": self.count, "level": self.level, "reserved": bytes(7),
                "first_key": self.keys[0], "last_key": self.keys[1],
                "payload_xxh3": xxh3_64(bytes(stored))}
         return out, bytes(stored)
@@ -130,41 +143,46 @@ class Draft:
     """A file to be written; tests of a rule change it before or after it becomes bytes."""
 
     def __init__(self, surfels=(), leaf_points=8, page_shift=12, channels=(), text=(),
-                 origin=(0.0, 0.0, 0.0), edge=UNIT_EDGE):
+                 origin=(0.0, 0.0, 0.0), edge=UNIT_EDGE, point_bytes=34, tail_nodes=63):
         self.surfels = sorted(surfels, key=lambda s: s.key)
         self.page_shift, self.leaf_points = page_shift, leaf_points
         self.origin, self.edge, self.unit = origin, edge, edge * 2 ** -42
-        self.head = {"major": 1, "minor": 0, "header_bytes": 4096, "incompat": 0, "ro_compat": 0,
+        self.point_bytes, self.tail_nodes = point_bytes, tail_nodes
+        self.channels = channels = [c if isinstance(c, r.Channel) else channel(*c) for c in channels]
+        self.head = {"major": 1, "minor": 0, "header_bytes": 4096, "incompat": r.RELEASE, "ro_compat": 0,
                      "compat": 0, "uuid": UUID, "page_shift": page_shift, "align_shift": 9,
-                     "checksum": 1, "byte_order": 0x01020304, "origin": origin, "edge": edge, "reserved": bytes(24)}
+                     "checksum": 1, "byte_order": 0x01020304, "origin": origin, "edge": edge, "point_bytes": point_bytes,
+                     "reserved": bytes(23)}
         self.pages, self.super, self.super_b, self.directory = [], {}, {}, {}
-        self.lie = sorted  # page numbers to the order in which the pages lie in the file
+        self.lie = sorted  # numbers of the pages before the tail to the order in which they lie in the file
         self.patches = []  # (offset from the start, or from the end when negative, bytes)
         self.tree = Tree(self.surfels, leaf_points, self.unit)
         self.add_points()
-        self.add_nodes()
         self.add_attributes(channels)
+        self.add_nodes()
         self.pages.append(Page(r.META, encode_meta(channels, text), 1))
 
     def add_points(self):
-        full = ((1 << self.page_shift) - 64) // 34 // 8 * 8
+        full = ((1 << self.page_shift) - 64) // self.point_bytes // 8 * 8
         for i in range(0, len(self.surfels), full):
             part = self.surfels[i:i + full]
-            self.pages.append(Page(r.POINT, encode_points(part), len(part),
+            self.pages.append(Page(r.POINT, encode_points(part, self.point_bytes), len(part),
                                    keys=(part[0].key >> 63, part[-1].key >> 63)))
         self.point_pages = len(self.pages)
 
     def add_nodes(self):
         """Groups in their order, as many to a page as fit."""
+        self.first_node = len(self.pages)
         self.places, batch, room = [], [], 0
         limit = (1 << self.page_shift) - 64
         self.batches = batches = [batch]
         for group in self.tree.groups:
-            size = r.round_up(24 + 60 * len(group[2]), 8)
+            emits = any(c["emits"] for c in group[3])
+            size = r.round_up(24 + (86 if emits else 62) * len(group[2]), 8)
             if batch and r.round_up(2 * len(batch) + 2, 8) + room + size > limit:
                 batch, room = [], 0
                 batches.append(batch)
-            self.places.append((self.point_pages + len(batches) - 1, len(batch)))
+            self.places.append((len(batches) - 1, len(batch)))
             batch.append(group)
             room += size
         for batch in batches:
@@ -184,12 +202,11 @@ class Draft:
                     level=min(group[1] for group in groups), keys=(min(highs), max(highs)))
 
     def renumber(self, order):
-        """Page order[i] becomes page i; references follow."""
-        number = {page: i for i, page in enumerate(order)}
-        self.places = [(number[page], slot) for page, slot in self.places]
-        nodes = map(self.node_page, self.batches)
-        pages = [next(nodes) if page.type == r.NODE else page for page in self.pages]
-        self.pages = [pages[i] for i in order]
+        """Node page order[i] gets rank i; references follow."""
+        rank = {page: i for i, page in enumerate(order)}
+        self.places = [(rank[page], slot) for page, slot in self.places]
+        nodes = [self.node_page(batch) for batch in self.batches]
+        self.pages[self.first_node:self.first_node + len(nodes)] = [nodes[i] for i in order]
 
     def word(self, interior, where):
         if interior:
@@ -198,14 +215,14 @@ class Draft:
         return where[0] | where[1] << 48
 
     def add_attributes(self, channels):
-        for group in sorted({c[3] for c in channels}):
+        for group in sorted({c.group for c in channels}):
             for page in self.pages[:self.point_pages]:
                 payload = b""
-                for _, type_, components, of_group in channels:
-                    if of_group == group:
-                        value = {1: b"\x07", 2: b"\x01\x02", 3: b"\x00\x3c", 4: bytes(4)}[type_]
-                        payload += value * components * page.count
-                self.pages.append(Page(r.ATTRIBUTE, payload, page.count, group, keys=page.keys))
+                for c in channels:
+                    if c.group == group:
+                        value = bytes([7, 60, 0, 0, 1, 0, 0, 0])[:c.size]
+                        payload += value * c.components * page.count
+                self.pages.append(Page(r.ATTRIBUTE, payload, page.count, group))
 
     def pack(self, page, columns, codec, loose=()):
         packed = pack_columns(bytes(page.payload), columns, page.count, loose)
@@ -223,17 +240,17 @@ class Draft:
 
     def identity(self):
         h = self.head
-        return struct.pack("<HHIQQQ16sBBHI3dd24s", h["major"], h["minor"], h["header_bytes"],
+        return struct.pack("<HHIQQQ16sBBHI3ddB23s", h["major"], h["minor"], h["header_bytes"],
                            h["incompat"], h["ro_compat"], h["compat"], h["uuid"], h["page_shift"],
                            h["align_shift"], h["checksum"], h["byte_order"],
-                           *h["origin"], h["edge"], h["reserved"])
+                           *h["origin"], h["edge"], h["point_bytes"], h["reserved"])
 
     def page_image(self, page, fields, stored):
-        names = ("type", "codec", "filter", "page_id", "stored_bytes", "raw_bytes", "group", "level",
-                 "record_count", "reserved", "first_key", "last_key", "payload_xxh3")
-        body = b"PTCp" + struct.pack("<HBBIIIHHIIQQQ", *(fields[name] for name in names))
+        names = ("type", "group", "codec", "filter", "rank", "stored_bytes", "raw_bytes", "record_count",
+                 "level", "reserved", "first_key", "last_key", "payload_xxh3")
+        body = b"PTCp" + struct.pack("<BBBBIIIIB7sQQQ", *(fields[name] for name in names))
         uuid = page.uuid or self.head["uuid"]
-        seed = r.page_seed(uuid, fields["page_id"], fields["type"])
+        seed = r.page_seed(uuid, fields["type"], fields["group"], fields["rank"])
         image = body + struct.pack("<Q", xxh3_64(body, seed)) + stored
         return image + bytes(-len(image) % r.SECTOR)
 
@@ -245,54 +262,93 @@ class Draft:
                  for corner in (low, high)]
         return {"bounds_low": place[0], "bounds_high": place[1],
                 "area": math.fsum(p.area for p in s),
-                "flux": tuple(math.fsum(p.area * p.radiance[c] for p in s) for c in range(3))}
+                "flux": tuple(math.fsum(p.area * (p.radiance[c] + p.emission[c]) for p in s)
+                              for c in range(3))}
 
     def superblock(self, facts, overrides):
         f = {**facts, **overrides}
         body = r.SUPER_MAGIC + f["identity"] + struct.pack(
-            "<QIIQQIIHHIIIQQQ32s3d3dd3d2Q64s3696s", f["file_bytes"], f["page_count"],
-            f["directory_pages"], f["directory_offset"], f["directory_xxh3"], f["meta_page"],
-            f["root_page"], f["root_slot"], f["levels"], f["leaf_points"], f["points_per_page"],
-            f["reserved"], f["points"], f["nodes"], f["node_groups"], f["middle"],
-            *f["bounds_low"], *f["bounds_high"], f["area"], *f["flux"], *f["content_xxh3"],
-            f["writer"], f["rest"])
+            "<QIIQQIIIHHHHIQQQQH22s3d3dd3d2Q64s120s2560s1016s", f["file_bytes"], f["page_count"],
+            f["directory_pages"], f["directory_offset"], f["directory_xxh3"], f["point_pages"],
+            f["node_pages"], f["root_page"], f["root_slot"], f["levels"], f["attribute_groups"],
+            f["reserved"], f["leaf_points"], f["points"], f["nodes"], f["node_groups"],
+            f["tail_offset"], f["tail_pages"], f["middle"], *f["bounds_low"], *f["bounds_high"],
+            f["area"], *f["flux"], *f["content_xxh3"], f["writer"], f["after_writer"], f["tail"],
+            f["rest"])
         return body + struct.pack("<Q", xxh3_64(body, r.SUPER_SEED))
 
     def facts(self):
         groups = self.tree.groups
         root = self.places[self.tree.root] if groups else (r.NO_PAGE, 0)
         return {"identity": self.identity(), "page_count": len(self.pages),
-                "meta_page": [page.type for page in self.pages].index(r.META), "root_page": root[0], "root_slot": root[1],
+                "point_pages": sum(page.type == r.POINT for page in self.pages),
+                "node_pages": sum(page.type == r.NODE for page in self.pages),
+                "attribute_groups": len({c.group for c in self.channels}),
+                "root_page": root[0], "root_slot": root[1],
                 "levels": max((g[1] + 1 for g in groups), default=0),
-                "leaf_points": self.leaf_points, "reserved": 0, "rest": bytes(3696),
-                "points_per_page": ((1 << self.page_shift) - 64) // 34 // 8 * 8,
+                "leaf_points": self.leaf_points, "reserved": 0, "middle": bytes(22),
+                "after_writer": bytes(120), "rest": bytes(1016),
                 "points": len(self.surfels), "nodes": sum(len(g[2]) for g in groups),
-                "node_groups": len(groups), "middle": bytes(32),
-                "writer": b"spec/vectors.py", **self.totals()}
+                "node_groups": len(groups), "writer": b"spec/vectors.py", **self.totals()}
+
+    def tail_from(self):
+        """The number of the first page of the tail."""
+        last = len(self.pages)
+        while last > 0 and self.pages[last - 1].type not in (r.POINT, r.ATTRIBUTE) \
+                and len(self.pages) - last <= self.tail_nodes:
+            last -= 1
+        return last
+
+    def ranks(self):
+        seen, out = {}, []
+        for page in self.pages:
+            out.append(seen.get((page.type, page.group), 0))
+            seen[page.type, page.group] = out[-1] + 1
+        return out
 
     def to_bytes(self):
         head = r.FILE_MAGIC + self.identity()
         out = head + struct.pack("<Q", xxh3_64(head, r.HEADER_SEED))
         out += bytes(r.BLOCK - len(out))
-        entries, records, offsets = b"", b"", {}
-        for i in self.lie(range(len(self.pages))):
-            offsets[i] = len(out)
-            fields, stored = self.pages[i].fields(i)
-            out += self.page_image(self.pages[i], {**fields, **self.pages[i].header}, stored)
+        tail, ranks, offsets = self.tail_from(), self.ranks(), {}
+        images = {}
         for i, page in enumerate(self.pages):
-            e = {**page.fields(i)[0], "offset": offsets[i], **page.entry}
-            entries += r.ENTRY.pack(e["offset"], e["stored_bytes"], e["raw_bytes"],
-                                    e["payload_xxh3"], e["type"], e["group"], e["record_count"])
-            records += struct.pack("<HHIQ", e["type"], e["group"], e["record_count"],
-                                   e["payload_xxh3"])
+            fields, stored = page.fields(ranks[i])
+            images[i] = b"" if page.void else self.page_image(page, {**fields, **page.header}, stored)
+        for i in self.lie(range(tail)):
+            offsets[i] = len(out)
+            out += images[i]
         out += bytes(-len(out) % r.BLOCK)
-        facts = {**self.facts(), "directory_offset": len(out), "directory_xxh3": xxh3_64(entries),
-                 "content_xxh3": xxh3_128(records)}
-        full = ((1 << self.page_shift) - 64) // 32 * 32
+        full = ((1 << self.page_shift) - 64) // r.ENTRY_BYTES * r.ENTRY_BYTES
+        count = len(self.pages)
+        size = (count * r.ENTRY_BYTES // full << self.page_shift) + (
+            r.round_up(64 + count * r.ENTRY_BYTES % full, r.BLOCK) if count * r.ENTRY_BYTES % full else 0)
+        directory_offset, place = len(out), len(out) + size
+        for i in range(tail, count):
+            offsets[i] = place
+            place += len(images[i])
+        entries, records = b"", b""
+        for i, page in enumerate(self.pages):
+            e = {**page.fields(ranks[i])[0], "offset": offsets[i]}
+            if page.void:
+                e.update(offset=0, stored_bytes=0, raw_bytes=0, payload_xxh3=0)
+            e.update(page.entry)
+            entries += r.ENTRY.pack(e["offset"], e["stored_bytes"], e["raw_bytes"], e["payload_xxh3"],
+                                    e["first_key"], e["record_count"], e["type"], e["group"],
+                                    e["level"], e.get("zero", 0))
+            records += struct.pack("<BBHIQ", e["type"], e["group"], 0, e["record_count"],
+                                   e["payload_xxh3"])
+        facts = {**self.facts(), "directory_offset": directory_offset,
+                 "directory_xxh3": xxh3_64(entries), "content_xxh3": xxh3_128(records),
+                 "tail_offset": directory_offset + size, "tail_pages": count - tail,
+                 "tail": entries[tail * r.ENTRY_BYTES:].ljust(2560, b"\0")}
         for k in range(0, len(entries), full):
-            page = Page(r.DIRECTORY, entries[k:k + full], len(entries[k:k + full]) // 32)
-            fields, stored = page.fields(len(self.pages) + k // full)
+            page = Page(r.DIRECTORY, entries[k:k + full], len(entries[k:k + full]) // r.ENTRY_BYTES)
+            fields, stored = page.fields(k // full)
             out += self.page_image(page, {**fields, **self.directory}, stored)
+        out += bytes(-len(out) % r.BLOCK)
+        for i in range(tail, count):
+            out += images[i]
         out += bytes(-len(out) % r.BLOCK)
         facts["directory_pages"] = (len(entries) - 1) // full + 1
         facts["file_bytes"] = len(out) + 2 * r.BLOCK
@@ -305,17 +361,29 @@ class Draft:
 
     def offset(self, page):
         """Where a page of a raw file without changed lengths starts."""
-        return r.BLOCK + sum(r.round_up(64 + len(p.payload), r.SECTOR) for p in self.pages[:page])
+        tail = self.tail_from()
+        sizes = [r.round_up(64 + len(p.payload), r.SECTOR) for p in self.pages]
+        if page < tail:
+            return r.BLOCK + sum(sizes[:page])
+        body = r.round_up(r.BLOCK + sum(sizes[:tail]), r.BLOCK)
+        entries = len(self.pages) * r.ENTRY_BYTES
+        full = ((1 << self.page_shift) - 64) // r.ENTRY_BYTES * r.ENTRY_BYTES
+        directory = (entries // full << self.page_shift) + r.round_up(64 + entries % full, r.BLOCK)
+        return body + directory + sum(sizes[tail:page])
 
 
 def all_vectors():
     """(folder, name, Draft or bytes) of every vector that can be written here."""
     import vectors_bad
     import vectors_good
+    import vectors_parts
     import vectors_verify
-    for folder, source in (("good", vectors_good), ("bad", vectors_bad), ("verify", vectors_verify)):
-        for name, draft in source.vectors():
-            yield folder, name, draft
+    for folder, sources in (("good", (vectors_good.vectors, vectors_parts.good)),
+                            ("bad", (vectors_bad.vectors, vectors_parts.bad)),
+                            ("verify", (vectors_verify.vectors, vectors_parts.verify))):
+        for source in sources:
+            for name, draft in source():
+                yield folder, name, draft
 
 
 def expected(name, draft, whole):
@@ -330,12 +398,12 @@ def write_all(directory):
     """Writes all vectors and good.txt; the number of an exit code."""
     made, lines = 0, []
     for kind, name, draft in all_vectors():
-        folder = os.path.join(directory, kind)
-        os.makedirs(folder, exist_ok=True)
+        path = os.path.join(directory, kind, name + ".ptcx")
+        os.makedirs(os.path.dirname(path), exist_ok=True)
         whole = draft if isinstance(draft, bytes) else draft.to_bytes()
-        with open(os.path.join(folder, name + ".ptcx"), "wb") as file:
+        with open(path, "wb") as file:
             file.write(whole)
-        if kind == "good":
+        if kind == "good" and "/" not in name:  # a part is listed with its scene
             lines.append(expected(name, draft, whole))
         made += 1
     with open(os.path.join(directory, "good.txt"), "w", encoding="utf-8") as file:

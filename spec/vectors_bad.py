@@ -7,7 +7,8 @@ checksums are right but those that the rule is about.
 import struct
 
 import reader as r
-from vectors import UUID, Draft, Page, encode_meta, frame_of, literal_block, pack_columns
+from vectors import (UUID, Draft, Page, channel, encode_meta, frame_of, literal_block,
+                     pack_columns)
 from vectors_good import CHANNELS, changed, one_point, packed, rle_block, zero_point
 from vectors_tree import Surfel, scatter
 
@@ -26,8 +27,10 @@ def bad_header():
     yield "container-header-length", Draft().to_bytes()[:100]
     yield "container-header-checksum", patch(44, b"\xff")
     yield "container-header-version", head(major=2)
-    yield "container-header-features", head(incompat=1 << 5)
-    yield "container-header-features.before-constants", head(incompat=1 << 5, align_shift=13)
+    yield "container-header-features", head(incompat=r.RELEASE | 1 << 5)
+    yield "container-header-features.before-constants", head(incompat=r.RELEASE | 1 << 5, align_shift=13)
+    yield "container-header-draft", head(incompat=0)
+    yield "container-header-point-bytes", head(point_bytes=36)
     yield "container-header-constants", head(align_shift=13)
     yield "container-header-constants.byte-order", head(byte_order=0x04030201)
     yield "container-header-page-shift", Draft(page_shift=11)
@@ -41,7 +44,7 @@ def bad_header():
     yield frame + ".far-below", head(origin=(-2.0 ** 33 - 1, 0.0, 0.0))
     yield frame + ".origin", head(origin=(2.0 ** -21, 0.0, 0.0))
     yield frame + ".far", head(origin=(0.0, 2.0 ** 34, 0.0))
-    yield "container-header-zero", head(reserved=b"\1" + bytes(23))
+    yield "container-header-zero", head(reserved=b"\1" + bytes(22))
     yield "container-header-zero.rest", patch(4095, b"\1")
 
 
@@ -61,15 +64,16 @@ def bad_page():
     yield "container-page-checksum", changed(
         one_point(), lambda d: d.patches.append((d.offset(0) + 32, b"X")))
     yield "container-page-checksum.other-file", other
-    yield "container-page-type", page(both={"type": 6})
+    yield "container-page-type", page(both={"type": 7})
     yield "container-page-type.zero", page(both={"type": 0})
     yield "container-page-codec", page(codec=3)
     yield "container-page-codec.directory", changed(
-        one_point(), lambda d: d.directory.update(codec=1, stored_bytes=95))
+        one_point(), lambda d: d.directory.update(codec=1, stored_bytes=119))
     yield "container-page-filter", changed(packed(r.LZ4), lambda d: d.pages[0].header.update(filter=2))
     yield "container-page-filter.raw", page(filter=1)
     nodes = packed(r.LZ4)
-    nodes.pages[1].stored, nodes.pages[1].codec, nodes.pages[1].filter = rle_block(), r.LZ4, r.PACKED
+    node = nodes.pages[nodes.first_node]
+    node.stored, node.codec, node.filter = rle_block(), r.LZ4, r.PACKED
     yield "container-page-filter.nodes", nodes
     yield "container-page-length", page(both={"raw_bytes": 33})
     yield "container-page-length.above", page(both={"raw_bytes": 0xFFFFFFFF})
@@ -79,11 +83,12 @@ def bad_page():
     yield "container-page-fields.count", page(both={"record_count": 2})
     yield "container-page-fields.no-records", page(both={"record_count": 0})
     yield "container-page-fields.wraps", page(both={"record_count": (1 << 31) + 1})
-    yield "container-page-fields.reserved", page(reserved=1)
+    yield "container-page-fields.reserved", page(reserved=b"\1" + bytes(6))
+    yield "container-page-fields.entry", changed(one_point(), lambda d: d.pages[0].entry.update(zero=1))
     yield "container-page-fields.level", fields
     yield "container-page-keys", page(first_key=1 << 62, last_key=1)
     yield "container-page-keys.bit-63", page(last_key=1 << 63)
-    yield "container-page-agreement", page(page_id=1)
+    yield "container-page-agreement", page(rank=1)
     yield "container-page-agreement.length", changed(
         one_point(), lambda d: d.pages[1].entry.update(raw_bytes=104, stored_bytes=104))
     yield "container-page-agreement.group-count", page(1, record_count=2)
@@ -147,7 +152,7 @@ def bad_packed():
 
 
 def directory_at():
-    return r.round_up(one_point().offset(3), r.BLOCK)
+    return r.round_up(one_point().offset(0) + r.SECTOR, r.BLOCK)
 
 
 def bad_directory():
@@ -156,15 +161,23 @@ def bad_directory():
     extent = "container-directory-extent"
     yield extent, entry(offset=r.BLOCK + 64)
     yield extent + ".header", entry(offset=0)
-    yield extent + ".superblock", entry(offset=directory_at() + r.BLOCK)
+    yield extent + ".superblock", entry(offset=directory_at() + 2 * r.BLOCK)
     yield extent + ".wraps", entry(offset=(1 << 64) - r.BLOCK)
     yield extent + ".end-wraps", entry(offset=(1 << 64) - r.SECTOR)
-    yield "container-directory-listing", entry(type=r.DIRECTORY, raw_bytes=32, stored_bytes=32)
+    yield "container-directory-listing", entry(type=r.DIRECTORY, raw_bytes=40, stored_bytes=40)
+    yield "container-directory-listing.type", entry(type=r.META, first_key=0)
+    groups = Draft(scatter(10, 5), channels=CHANNELS)
+    groups.pages[1:3] = groups.pages[2:0:-1]
+    yield "container-directory-listing.group", groups
+    for name, page in (("parts", Page(r.PARTS, bytes(384), 1)), ("two-meta", Page(r.META, encode_meta(), 1))):
+        draft = one_point()
+        draft.pages.insert(2, page)
+        yield f"container-directory-listing.{name}", draft
     yield "container-directory-overlap", entry(offset=one_point().offset(1))
     yield "container-directory-overlap.directory", entry(offset=directory_at())
-    yield "container-directory-pages", changed(one_point(), lambda d: d.directory.update(page_id=9))
+    yield "container-directory-pages", changed(one_point(), lambda d: d.directory.update(rank=9))
     yield "container-directory-pages.fewer", changed(one_point(), lambda d: d.directory.update(
-        record_count=2, raw_bytes=64, stored_bytes=64))
+        record_count=2, raw_bytes=80, stored_bytes=80))
     yield "container-directory-pages.checksum", changed(
         one_point(), lambda d: d.super.update(directory_xxh3=1))
 
@@ -185,19 +198,29 @@ def bad_superblock():
     yield "container-superblock-length.half", one_point().to_bytes()[:-4096]
     yield "container-superblock-copies", changed(
         one_point(), lambda d: d.super_b.update(area=1.0))
+    yield "container-superblock-copies.rule", changed(
+        one_point(), lambda d: d.super_b.update(reserved=1))
     pages = "container-superblock-pages"
-    yield pages, with_(meta_page=3)
+    yield pages, with_(point_pages=3)
     yield pages + ".none", with_(page_count=0, directory_pages=0)
     yield pages + ".directory", with_(directory_offset=4096)
     yield pages + ".directory-pages", with_(directory_pages=2)
-    many = {"page_count": r.NO_PAGE - 1, "directory_pages": (r.NO_PAGE - 2) // 126 + 1}
+    many = {"page_count": r.NO_PAGE - 1, "directory_pages": (r.NO_PAGE - 2) // 100 + 1}
     yield pages + ".greatest", with_(**many)
-    bytes_ = r.directory_bytes(r.Header(b"", 1, 0, UUID, 12, (0.0,) * 3, 1.0), r.NO_PAGE - 1)
+    bytes_ = r.directory_bytes(r.Header(b"", 1, 0, r.RELEASE, UUID, 12, (0.0,) * 3, 1.0, 34), r.NO_PAGE - 1)
     yield pages + ".wraps", with_(**many, directory_offset=directory_at() + r.BLOCK - bytes_
                                   & (1 << 64) - 1)
+    tail = "container-tail-pages"
+    entries = r.unpack_superblock(one_point().to_bytes()[-r.BLOCK:]).tail
+    yield tail, with_(tail_pages=0)
+    yield tail + ".above", with_(tail_pages=65)
+    yield tail + ".fewer", with_(tail_pages=1)
+    yield tail + ".other-entry", with_(tail=entries[:16] + b"X" + entries[17:])
+    yield tail + ".other-place", with_(tail=entries[:1] + bytes([entries[1] + 2]) + entries[2:])
+    yield tail + ".behind", with_(tail=entries[:80] + b"X" + entries[81:])
     root = "container-superblock-root"
     yield root, with_(root_page=r.NO_PAGE)
-    yield root + ".point-page", with_(root_page=0)
+    yield root + ".beyond", with_(root_page=1)
     yield root + ".slot", with_(root_slot=1)
     yield root + ".levels", with_(levels=64)
     counts = "container-superblock-counts"
@@ -207,7 +230,7 @@ def bad_superblock():
     yield counts + ".above", with_(points=(1 << 48) + 1)
     yield counts + ".groups-above", with_(node_groups=1 << 61, nodes=1 << 48)
     yield counts + ".leaf-points", with_(leaf_points=0)
-    yield counts + ".points-per-page", with_(points_per_page=0)
+    yield counts + ".attribute-groups", changed(Draft(), lambda d: d.super.update(attribute_groups=256))
     totals = "container-superblock-totals"
     yield totals, with_(area=NAN)
     yield totals + ".flux", with_(flux=(0.0, -1.0, 0.0))
@@ -216,14 +239,11 @@ def bad_superblock():
     yield "container-superblock-writer", with_(writer=b"\xff")
     yield "container-superblock-writer.truncated", with_(writer=b"x" * 62 + b"\xc3")
     yield "container-superblock-writer.unended", with_(writer=b"x" * 64)
-    yield "container-superblock-zero", with_(rest=b"\1" + bytes(3695))
+    yield "container-superblock-zero", with_(rest=b"\1" + bytes(1015))
     yield "container-superblock-zero.field", with_(reserved=1)
-    yield "container-superblock-zero.middle", with_(middle=b"\1" + bytes(31))
-    yield "container-meta-page", with_(meta_page=0)
-    two = one_point()
-    two.pages.insert(0, Page(r.META, encode_meta(), 1))
-    two.renumber([1, 2, 0, 3])
-    yield "container-meta-page.two", changed(two, lambda d: d.super.update(meta_page=2))
+    yield "container-superblock-zero.middle", with_(middle=b"\1" + bytes(21))
+    yield "container-superblock-zero.after-writer", with_(after_writer=b"\1" + bytes(119))
+    yield "container-meta-page", changed(one_point(), lambda d: d.pages[2].entry.update(type=128))
 
 
 # points.md ---------------------------------------------------------------------------------------
@@ -243,13 +263,12 @@ def bad_points():
     yield "points-point-radius.negative", payload(16, struct.pack("<f", -0.0))
     yield "points-point-radiance", payload(24, b"\x00\x7c")
     yield "points-point-radiance.negative", payload(28, b"\x00\xbc")
+    yield "points-point-radiance.emission", payload(34, b"\x00\x7c", Draft([Surfel((1, 1, 1))], point_bytes=40))
     yield "points-point-flags", payload(33, b"\1")
     short = Draft(scatter(130, 7))
     first, second = short.pages[0], short.pages[1]
     short.pages[0], short.pages[1] = second, first
     yield "points-point-pages", short
-    yield "points-point-pages.superblock", changed(
-        one_point(), lambda d: d.super.update(points_per_page=104))
 
 
 def bad_meta():
@@ -258,27 +277,35 @@ def bad_meta():
         draft.pages[-1] = Page(r.META, payload, 1)
         return draft
 
-    def channel(*fields, text=()):
-        return meta(encode_meta([fields], text))
+    def with_channel(*fields, **others):
+        return meta(encode_meta([channel(*fields, **others)]))
     size = "points-meta-size"
     yield size, meta(encode_meta() + b"\0")
     yield size + ".short", meta(bytes(4))
     yield size + ".channels", meta(struct.pack("<II", 0xFFFFFFFF, 0))
-    yield size + ".channels-wrap", meta(struct.pack("<II", 1 << 29, 0))  # 40 * 2^29 is 5 * 2^32
+    yield size + ".channels-wrap", meta(struct.pack("<II", 1 << 29, 0))  # 88 * 2^29 is 11 * 2^32
     yield size + ".text-wraps", meta(struct.pack("<IIII", 0, 1, 2, 0xFFFFFFFF) + b"a")
-    yield size + ".one-channel-more", meta(struct.pack("<II", 2, 0) + encode_meta([("a", 3, 1, 1)])[8:])
+    yield size + ".one-channel-more", meta(struct.pack("<II", 2, 0) + encode_meta([channel("a", 3, 1, 1)])[8:])
     yield size + ".texts", meta(struct.pack("<II", 0, 0xFFFFFFFF))
     yield size + ".text", meta(struct.pack("<IIII", 0, 1, 0xFFFFFFFF, 0xFFFFFFFF))
-    yield "points-meta-channel", channel("Upper", 3, 1, 1)
-    yield "points-meta-channel.controls", channel("\x1b[31m", 3, 1, 1)
-    yield "points-meta-channel.unended", channel("a" * 32, 3, 1, 1)
-    yield "points-meta-channel.type", channel("a", 5, 1, 1)
-    yield "points-meta-channel.type-zero", channel("a", 0, 1, 1)
-    yield "points-meta-channel.components", channel("a", 3, 0, 1)
-    yield "points-meta-channel.group", channel("a", 3, 1, 256)
-    yield "points-meta-channel.width", channel("a", 4, 9, 1)
-    yield "points-meta-channel.twice", meta(encode_meta([("a", 3, 1, 1), ("a", 3, 1, 2)]))
-    yield "points-meta-channel.order", meta(encode_meta([("a", 3, 1, 2), ("b", 3, 1, 1)]))
+    yield "points-meta-channel", with_channel("Upper", 3, 1, 1)
+    yield "points-meta-channel.controls", with_channel("\x1b[31m", 3, 1, 1)
+    yield "points-meta-channel.unended", with_channel("a" * 32, 3, 1, 1)
+    yield "points-meta-channel.size", with_channel("a", 4, 1, 1, size=2)
+    yield "points-meta-channel.size-three", with_channel("a", 200, 1, 1, size=3)
+    yield "points-meta-channel.role", with_channel("a", 4, 2, 1, role=2)
+    yield "points-meta-channel.index", with_channel("a", 4, 1, 1, role=5)
+    yield "points-meta-channel.scale", with_channel("a", 4, 1, 1, scale=0.0)
+    yield "points-meta-channel.offset", with_channel("a", 4, 1, 1, offset=NAN)
+    yield "points-meta-channel.no-value", with_channel("a", 1, 1, 1, no_value=256)
+    broken = bytearray(encode_meta([channel("a", 1, 1, 1)]))
+    broken[8 + 40] = 0xFF
+    yield "points-meta-channel.unit", meta(broken)
+    yield "points-meta-channel.components", with_channel("a", 3, 0, 1)
+    yield "points-meta-channel.group", with_channel("a", 3, 1, 0)
+    yield "points-meta-channel.width", with_channel("a", 4, 9, 1)
+    yield "points-meta-channel.twice", meta(encode_meta([channel("a", 3, 1, 1), channel("a", 3, 1, 2)]))
+    yield "points-meta-channel.order", meta(encode_meta([channel("a", 3, 1, 2), channel("b", 3, 1, 1)]))
     text = "points-meta-text"
     yield text, meta(struct.pack("<IIII", 0, 1, 1, 1) + b"a\xff")
     for name, value in (("truncated", b"\xf0\x9d\x84"), ("overlong", b"\xc0\x80")):
@@ -286,23 +313,27 @@ def bad_meta():
     yield text + ".key", meta(encode_meta((), [("A", "")]))
     yield text + ".nul", meta(encode_meta((), [("a", "\0")]))
     yield text + ".order", meta(encode_meta((), [("b", ""), ("a", "")]))
-    for name, at in (("points-meta-zero", 31), ("points-meta-zero.field", 39)):
-        padded = bytearray(encode_meta([("a", 3, 1, 1)]))
-        padded[8 + at] = 1
+    for key, value in (("up", "w"), ("metres_per_unit", "-1"), ("time", "now")):
+        yield f"points-meta-fact.{key}", meta(encode_meta((), [(key, value)]))
+    for name, at in (("points-meta-zero", 31), ("points-meta-zero.field", 39), ("points-meta-zero.unit", 55),
+                     ("points-meta-zero.flag", 37), ("points-meta-zero.no-value", 56),
+                     ("points-meta-zero.end", 80)):
+        padded = bytearray(encode_meta([channel("a", 3, 1, 1)]))
+        padded[8 + at] = 2
         yield name, meta(padded)
 
 
 def bad_attributes():
     clause = "points-attribute-pages"
-    missing = Draft(scatter(10, 5), channels=CHANNELS)
-    del missing.pages[-2]
+    fewer = Draft(scatter(10, 5), channels=CHANNELS)
+    fewer.pages[-1] = Page(r.META, encode_meta([channel(*CHANNELS[0])]), 1)
     other = Draft(scatter(10, 5), channels=CHANNELS)
-    other.pages[-2].group = 8
+    other.pages[2].group = 8
     short = Draft(scatter(10, 5), channels=CHANNELS)
-    del short.pages[-2].payload[-1]
+    del short.pages[2].payload[-1]
     count = Draft(scatter(10, 5), channels=CHANNELS)
-    count.pages[-2].count = 9
-    yield clause, missing
+    count.pages[2].count = 9
+    yield clause, fewer
     yield clause + ".unknown-group", other
     yield clause + ".bytes", short
     yield clause + ".count", count
@@ -332,9 +363,10 @@ def bad_nodes():
     yield "nodes-node-cell", payload(8, struct.pack("<Q", 1))
     yield "nodes-node-cell.bit-63", payload(8 + 8, struct.pack("<Q", 1 << 63))
     yield "nodes-node-mask", payload(8 + 18, b"\2")
+    yield "nodes-node-mask.flag", payload(8 + 19, b"\2")
+    yield "nodes-node-mask.emission", payload(8 + 19, b"\1")
     yield "nodes-node-reference", reference(3, b"\1")
-    yield "nodes-references", reference(0, b"\1")
-    yield "nodes-references.slot", reference(1 | 1 << 32, b"\1")
+    yield "nodes-references", reference(1 << 32, b"\1")
     yield "nodes-node-leaf", reference(0)
     yield "nodes-node-leaf.past-the-end", reference(1 | 1 << 48)
     yield "nodes-node-leaf.two", reference(2 << 48)
@@ -342,11 +374,12 @@ def bad_nodes():
     yield "nodes-node-number", payload(8 + 32 + 6, b"\x00\xff")
     yield "nodes-node-number.area", payload(8 + 32 + 12, b"\xff\xff")
     yield "nodes-node-number.thickness", payload(8 + 32 + 14, b"\0\xff")
+    yield "nodes-node-number.greatest", payload(8 + 32 + 16, b"\0\xff")
     zero = "nodes-node-zero"
-    yield zero, payload(8 + 19, b"\1")
-    yield zero + ".padding", payload(8 + 84, b"\1")
+    yield zero, payload(8 + 20, b"\1")
+    yield zero + ".padding", payload(8 + 86, b"\1")
     yield zero + ".table", payload(2, b"\1")
-    yield zero + ".reference", reference(1 | 1 << 48, b"\1")
+    yield zero + ".reference", reference(1 << 48, b"\1")
 
 
 def vectors():

@@ -4,7 +4,7 @@ import shutil
 import struct
 
 import reader as r
-from vectors import Draft, frame_of
+from vectors import Draft, Page, channel, frame_of
 from vectors_tree import FLOAT_MAX, Surfel, scatter
 
 CHANNELS = (("irradiance", 3, 3, 1), ("occlusion", 1, 1, 1), ("part", 4, 1, 9))
@@ -36,13 +36,27 @@ def corners(distance, **columns):
             for z in (0, distance)]
 
 
+def lamps():
+    """Points of which a few emit light, so that some groups have columns of emission."""
+    surfels = scatter(130, 5)
+    for s in surfels[::40]:
+        s.own = (0x3C00, 0x4000, 1)  # 1, 2, the least half
+        s.emission = tuple(map(r.half_to_float, s.own))
+    return Draft(surfels, leaf_points=2, point_bytes=40)
+
+
 # Pages -------------------------------------------------------------------------------------------
 
-def pages_by_any_number():
-    """Attributes, meta page, points and nodes, by their numbers."""
-    draft = Draft(scatter(130, 5), channels=CHANNELS)
-    draft.renumber(sorted(range(len(draft.pages)), key=lambda i: -draft.pages[i].type))
+def nodes_by_any_rank():
+    """Node pages of which the root's is the first, and the others descend."""
+    draft = Draft(scatter(130, 5), leaf_points=1, channels=CHANNELS)
+    draft.renumber(list(reversed(range(len(draft.batches)))))
     return draft
+
+
+def tail_of(nodes):
+    """All node pages but the last `nodes` ones before the directory."""
+    return Draft(scatter(130, 5), leaf_points=1, channels=CHANNELS, tail_nodes=nodes)
 
 
 def root_first():
@@ -61,9 +75,10 @@ def root_first():
 
 
 def full_directory_pages():
-    """252 pages, 126 to each of two directory pages: three of points, two of nodes, 246 of attributes."""
-    return Draft(scatter(225, 8), leaf_points=8,
-                 channels=[(f"c{k}", 1, 1, k) for k in range(1, 83)])
+    """200 pages, 100 to each of two directory pages: three of points, two of nodes, 194 of attributes, and the meta
+    page."""
+    return Draft(scatter(225, 8), leaf_points=8, page_shift=12,
+                 channels=[(f"c{k}", 1, 1, k) for k in range(1, 43)])
 
 
 def max_leaf():
@@ -90,7 +105,7 @@ def with_frame(content_size_bytes=1, checksum=b""):
 def frames_by_hand():
     """Content sizes of 8, 4 and 2 bytes, blocks as they are, and a checksum of the content."""
     draft = Draft([Surfel((0, 0, 0))], channels=[("a", 1, 16, 1)], text=[("a", 300 * "=")])
-    for page, width, checksum in zip(draft.pages, (1, 8, 4, 2), (ZEROS_XXH64, b"", b"", b"")):
+    for page, width, checksum in zip(draft.pages, (1, 4, 8, 2), (ZEROS_XXH64, b"", b"", b"")):
         page.stored, page.codec = frame_of(bytes(page.payload), width, checksum), r.ZSTD
     return draft
 
@@ -120,7 +135,7 @@ def slope(count=100):
 
 
 def columns_of(channels, group):
-    return r.group_columns([r.Channel(*c) for c in channels], group)
+    return r.group_columns([channel(*c) for c in channels], group)
 
 
 def packed(codec, loose=()):
@@ -146,27 +161,69 @@ def max_shifts():
 # Attributes and texts ----------------------------------------------------------------------------
 
 ALL_TYPES = (("a", 1, 16, 1), ("b.c_9", 2, 1, 1), ("z" * 31, 4, 4, 1), ("half", 3, 16, 2),
-             ("word", 2, 16, 3), ("last", 3, 1, 3), ("float", 4, 8, 255))
-VALUES = {1: ("B", (0, 255, 128, 1)), 2: ("H", (0, 65535, 256, 1)),
-          3: ("H", (0, 0x8000, 1, 0x7BFF, 0xFBFF, 0x3C00)),
-          4: ("I", (0, 1 << 31, 1, 0x7F7FFFFF, 0xFF7FFFFF, 0x3F800000))}
+             ("word", 2, 16, 3), ("last", 3, 1, 3), ("u32", 5, 3, 4), ("u64", 6, 2, 4), ("i8", 7, 3, 5),
+             ("i16", 8, 3, 5), ("i32", 9, 2, 5), ("i64", 10, 2, 6), ("f64", 11, 2, 6), ("float", 4, 8, 255))
+VALUES = {1: (0, 255, 128, 1), 2: (0, 65535, 256, 1), 3: (0, 0x8000, 1, 0x7BFF, 0x7C00, 0xFE00),
+          4: (0, 1 << 31, 1, 0x7F7FFFFF, 0x7F800000, 0xFFFFFFFF), 5: (0, (1 << 32) - 1, 1 << 31, 1),
+          6: (0, (1 << 64) - 1, 1 << 63, 1), 7: (0, 255, 128, 1), 8: (0, 65535, 1 << 15, 1),
+          9: (0, (1 << 32) - 1, 1 << 31, 1), 10: (0, (1 << 64) - 1, 1 << 63, 1),
+          11: (0, 1 << 63, 1, 0x7FEFFFFFFFFFFFFF, 0x7FF0000000000000, (1 << 64) - 1)}
+FORMS = {1: "B", 2: "H", 4: "I", 8: "Q"}
 
 
 def channels_of_every_type():
-    """The widest groups, columns that are not aligned, numbers at the ends of their ranges."""
+    """The widest groups, columns that are not aligned, numbers at the ends of their ranges, infinities and NaN."""
     draft = Draft(slope(101), channels=ALL_TYPES)
     for page in draft.pages:
         if page.type != r.ATTRIBUTE:
             continue
         page.payload = bytearray()
         for _, type_, components, group in ALL_TYPES:
-            form, values = VALUES[type_]
+            values = VALUES[type_]
             for c in range(components if group == page.group else 0):
                 step = 0 if c < components // 2 else 1
-                page.payload += struct.pack(f"<{page.count}{form}", *(
+                page.payload += struct.pack(f"<{page.count}{FORMS[r.CHANNEL_BYTES[type_]]}", *(
                     values[(c + step * i) % len(values)] for i in range(page.count)))
         if page.group > 1:
             draft.pack(page, columns_of(ALL_TYPES, page.group), r.LZ4 if page.group < 3 else r.ZSTD)
+    return draft
+
+
+def schema():
+    """Every role and colour space, units, scales, offsets, values that stand for none, and types of a later version."""
+    return (channel("albedo.srgb", 1, 3, 1, role=1, colour_space=2, unit="1"),
+            channel("normal", 8, 3, 1, role=2, scale=1 / 32767),
+            channel("speed", 4, 3, 1, role=3, unit="m/s"),
+            channel("class", 1, 1, 2, role=4, no_value=0),
+            channel("original_index", 6, 1, 2, role=5),
+            channel("gps_time", 11, 1, 2, role=6, unit="s", offset=1e9),
+            channel("height", 9, 1, 2, unit="m", scale=0.001, offset=-7.5, no_value=1 << 31),
+            channel("later", 200, 1, 3, role=77, colour_space=99, size=8, no_value=(1 << 64) - 1))
+
+
+def void_pages():
+    """Of three point pages, the channels of the second are not known at all; of a group, none on any page."""
+    draft = Draft(scatter(225, 6), channels=schema())
+    for page in draft.pages:
+        if page.type == r.ATTRIBUTE:
+            page.void = page.group == 3 or page is draft.pages[4]
+            if page.void:
+                entry = r.Entry(0, 0, 0, 0, 0, page.count, page.type, page.group, page.level)
+                page.payload = bytearray(r.void_payload(draft.channels, entry))
+    return draft
+
+
+def facts():
+    """The texts whose form is fixed."""
+    return Draft(text=[("crs", "EPSG:25832"), ("metres_per_unit", "3.048e-1"), ("time", "-12.5"),
+                       ("up", "z")])
+
+
+def later_pages():
+    """What a later 1.x may add: skippable pages, unknown bits of feature_compat, a type, roles and texts."""
+    draft = Draft(scatter(130, 5), channels=schema(), text=[("later.key", "of 1.1")])
+    draft.head.update(minor=1, compat=5)
+    draft.pages[-1:-1] = [Page(128, b"later", 9), Page(128, b"more", 1), Page(255, bytes(100), 3)]
     return draft
 
 
@@ -198,8 +255,7 @@ def vectors():
     coincident = [Surfel((5, 6, 7), radius=0.5, radiance=(1, 1, 1))]
     yield "empty", Draft()
     yield "empty-with-channels", Draft(channels=CHANNELS)
-    yield "empty-without-limits", changed(Draft(leaf_points=0),
-                                          lambda d: d.super.update(points_per_page=0))
+    yield "empty-without-limits", Draft(leaf_points=0)
     yield "one-point", one_point()
     yield "corners-of-the-lattice", Draft(corners(top, radius=1), leaf_points=1)
     yield "chain-of-42-levels", Draft([Surfel((0, 0, 0), radius=1)] + [
@@ -210,7 +266,14 @@ def vectors():
     yield "two-pages", two_pages()
     yield "root-first", root_first()
     yield "pages-in-any-place", changed(two_pages(), lambda d: setattr(d, "lie", reversed))
-    yield "pages-by-any-number", pages_by_any_number()
+    yield "nodes-by-any-rank", nodes_by_any_rank()
+    yield "tail-of-one-page", tail_of(0)
+    yield "tail-of-two-pages", tail_of(1)
+    yield "emission", lamps()
+    yield "schema", Draft(scatter(20, 5), channels=schema())
+    yield "void-pages", void_pages()
+    yield "facts", facts()
+    yield "pages-of-a-later-version", later_pages()
     yield "page-shift-20", Draft(scatter(20, 4), page_shift=20)
     yield "directory-pages-full", full_directory_pages()
     yield "attributes", Draft(scatter(130, 5), channels=CHANNELS,

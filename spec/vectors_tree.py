@@ -48,12 +48,12 @@ def octahedral(n, q):
 
 
 def unfold(u, v, q):
-    x, y = max(u, -q) / q, max(v, -q) / q
-    z = 1 - abs(x) - abs(y)
-    if z < 0:
-        x, y = math.copysign(1 - abs(y), x), math.copysign(1 - abs(x), y)
-    length = math.sqrt(x * x + y * y + z * z)
-    return x / length, y / length, z / length
+    a, b = max(u, -q), max(v, -q)
+    c = q - abs(a) - abs(b)
+    if c < 0:
+        a, b = (q - abs(b)) * (-1 if a < 0 else 1), (q - abs(a)) * (-1 if b < 0 else 1)
+    length = math.sqrt(a * a + b * b + c * c)
+    return a / length, b / length, c / length
 
 
 # Points and their summaries (points.md, nodes.md#summary) ----------------------------------------
@@ -62,7 +62,7 @@ class Surfel:
     """A surfel at a lattice point."""
 
     def __init__(self, q, normal=(0, 0, 1), radius=0.0, radiance=(0, 0, 0), albedo=(0, 0, 0),
-                 uv=None):
+                 uv=None, emission=(0, 0, 0)):
         self.q, self.albedo = q, albedo
         self.key = r.interleave(*q)
         self.uv = uv or octahedral(normal, 32767)
@@ -70,6 +70,8 @@ class Surfel:
         self.radius = struct.unpack("<f", struct.pack("<f", radius))[0]
         self.half = tuple(map(half, radiance))
         self.radiance = tuple(map(r.half_to_float, self.half))
+        self.own = tuple(map(half, emission))
+        self.emission = tuple(map(r.half_to_float, self.own))
         self.area = 2 * self.radius * self.radius
 
 
@@ -107,9 +109,10 @@ def angle(a, b):
 class Summary:
     """What a node knows of its points, before it is rounded."""
 
-    def __init__(self, area, weighted, facing, flux):
+    def __init__(self, area, weighted, facing, flux, power, greatest, emits):
         """weighted: (weight, position) of points or children; the weights are areas or all 1."""
-        self.area, self.facing, self.flux = area, facing, flux
+        self.area, self.facing, self.flux, self.power = area, facing, flux, power
+        self.greatest, self.emits = greatest, emits
         weight = sum(w for w, _ in weighted)
         self.mean = tuple(sum(w * p[k] for w, p in weighted) / weight for k in range(3))
         sums = tuple(facing[2 * k] - facing[2 * k + 1] for k in range(3))
@@ -133,15 +136,17 @@ class Summary:
 
 
 def summarise_points(surfels, unit):
-    facing, flux = [0.0] * 6, [[0.0] * 3 for _ in range(6)]
+    facing, flux, power = [0.0] * 6, [[0.0] * 3 for _ in range(6)], [[0.0] * 3 for _ in range(6)]
     for s in surfels:
         for k in range(6):
             share = s.area * max(0.0, s.normal[k // 2] * (1 if k % 2 == 0 else -1))
             facing[k] += share
             for c in range(3):
                 flux[k][c] += share * s.radiance[c]
+                power[k][c] += share * s.emission[c]
     area = sum(s.area for s in surfels)
-    out = Summary(area, [(s.area if area else 1, s.q) for s in surfels], facing, flux)
+    out = Summary(area, [(s.area if area else 1, s.q) for s in surfels], facing, flux, power,
+                  max(s.radius for s in surfels) / unit, any(any(s.own) for s in surfels))
     for s in surfels:
         out.hold(distance(s.q, out.mean) + s.radius / unit, angle(s.normal, out.axis),
                  out.height(s.q) + s.radius / unit * across(s.normal, out.slab))
@@ -152,7 +157,9 @@ def summarise_nodes(nodes):
     area = sum(n.area for n in nodes)
     out = Summary(area, [(n.area if area else 1, n.mean) for n in nodes],
                   [sum(n.facing[k] for n in nodes) for k in range(6)],
-                  [[sum(n.flux[k][c] for n in nodes) for c in range(3)] for k in range(6)])
+                  [[sum(n.flux[k][c] for n in nodes) for c in range(3)] for k in range(6)],
+                  [[sum(n.power[k][c] for n in nodes) for c in range(3)] for k in range(6)],
+                  max(n.greatest for n in nodes), any(n.emits for n in nodes))
     for n in nodes:
         cosine = abs(sum(a * b for a, b in zip(n.slab, out.slab)))
         height = n.thickness * cosine + n.radius * across(n.slab, out.slab)
@@ -193,8 +200,11 @@ def encode_summary(node, corner, edge):
         turned = 1.0
     thickness = (node.thickness + node.radius * turned + moved) * (1 + 2 ** -50)
     out["thickness"] = ufloat16_up(min(thickness, radius))
-    out["radiance"] = [rgbe([x / f for x in light]) if f and out["area"] else 0
-                       for f, light in zip(node.facing, node.flux)]
+    out["greatest"] = ufloat16_up(node.greatest)
+    for name, sums in (("radiance", node.flux), ("emission", node.power)):
+        out[name] = [rgbe([x / f for x in light]) if f and out["area"] else 0
+                     for f, light in zip(node.facing, sums)]
+    out["emits"] = node.emits
     return out
 
 
@@ -202,14 +212,16 @@ def encode_group(cell, level, refs, columns):
     """Bytes of a group. refs: (interior, word); columns: of each child, from encode_summary()."""
     n = len(refs)
     mask = sum(1 << i for i, (interior, _) in enumerate(refs) if interior)
-    out = struct.pack("<QQBBBBI", cell >> 63, cell & (1 << 63) - 1, level, n, mask, 0, 0)
+    emits = any(c["emits"] for c in columns)
+    out = struct.pack("<QQBBBBI", cell >> 63, cell & (1 << 63) - 1, level, n, mask, emits, 0)
     out += struct.pack(f"<{n}Q", *(word for _, word in refs))
     for name in r.COLUMNS:
         out += struct.pack(f"<{n}H", *(c[name] for c in columns))
     for k in range(6):
         out += struct.pack(f"<{n}H", *(c["facing"][k] for c in columns))
-    for k in range(6):
-        out += struct.pack(f"<{n}I", *(c["radiance"][k] for c in columns))
+    for name in ("radiance", "emission") if emits else ("radiance",):
+        for k in range(6):
+            out += struct.pack(f"<{n}I", *(c[name][k] for c in columns))
     return out + bytes(-len(out) % 8)
 
 

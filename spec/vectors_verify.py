@@ -5,7 +5,7 @@ Readers may use them, as far as they check; a verifier refuses them.
 
 import reader as r
 from vectors import Draft, encode_points
-from vectors_good import CHANNELS, changed, one_point
+from vectors_good import changed, lamps, one_point
 from vectors_tree import Surfel, scatter
 
 
@@ -13,7 +13,7 @@ def tree_of(surfels, change, leaf_points=1):
     """A file whose groups were changed before they were encoded."""
     draft = Draft(surfels, leaf_points=leaf_points)
     change(draft.tree.groups)
-    first = draft.point_pages
+    first = draft.first_node
     last = len(draft.pages) - 1
     draft.pages[first:last] = [draft.node_page(draft.tree.groups)]
     return draft
@@ -31,11 +31,11 @@ def verify_container():
     yield "container-padding.directory", changed(
         one_point(), lambda d: d.patches.append((-8192 - 1, b"\1")))
     yield "container-page-keys", changed(
-        one_point(), lambda d: d.pages[0].header.update(first_key=0))
+        one_point(), lambda d: setattr(d.pages[0], "keys", (0, d.pages[0].keys[1])))
     yield "container-page-keys.groups", changed(
-        one_point(), lambda d: d.pages[1].header.update(last_key=1))
+        one_point(), lambda d: setattr(d.pages[1], "keys", (0, 1)))
     yield "container-page-level", changed(
-        one_point(), lambda d: d.pages[1].header.update(level=1))
+        one_point(), lambda d: setattr(d.pages[1], "level", 1))
     yield "container-superblock-checksum", changed(
         one_point(), lambda d: d.patches.append((-4096 + 500, b"X")))
     yield "container-superblock-magic", changed(
@@ -52,13 +52,10 @@ def verify_container():
         one_point(), lambda d: d.super.update(nodes=2))
     yield "container-superblock-root", changed(
         one_point(), lambda d: d.super.update(levels=2))
-    nan = Draft(scatter(10, 5), channels=CHANNELS)
-    nan.pages[-3].payload[:2] = b"\x00\x7e"
-    yield "points-attribute-pages", nan
     swapped = Draft(scatter(113, 9), leaf_points=200)
     surfels = swapped.surfels[:111] + swapped.surfels[112:] + swapped.surfels[111:112]
     for page, part in zip(swapped.pages, (surfels[:112], surfels[112:])):
-        page.payload, page.keys = encode_points(part), (part[0].key >> 63, part[-1].key >> 63)
+        page.payload, page.keys = encode_points(part, 34), (part[0].key >> 63, part[-1].key >> 63)
     yield "points-point-order", swapped
 
 
@@ -115,8 +112,34 @@ def verify_summaries():
     yield "nodes-node-sums.facing", column("facing", [9] * 6)
     yield "nodes-node-sums.radiance", column("radiance", [0, 0, 0, 0, 0x80808080, 0])
     yield "nodes-node-cone", column("cone_cos", 0)
+    yield "nodes-node-greatest", column("greatest", 0x4000)
+
+    def glow(groups):
+        groups[-1][3][0]["emission"] = [0] * 6
+    yield "nodes-node-sums.emission", tree_like(lamps(), glow)
+
+
+def tree_like(draft, change):
+    """A file whose groups were changed, apart from their number and size."""
+    change(draft.tree.groups)
+    draft.pages[draft.first_node:-1] = [draft.node_page(batch) for batch in draft.batches]
+    return draft
+
+
+def draft_points(draft):
+    return draft.pages[:draft.point_pages]
+
+
+def dark_flux(draft):
+    """The sums of the superblock when no point emits light."""
+    return tuple(sum(p.area * p.radiance[c] for p in draft.surfels) for c in range(3))
 
 
 def vectors():
+    dark = lamps()
+    for page in draft_points(dark):
+        page.payload[34 * page.count:] = bytes(6 * page.count)
+    dark.super.update(flux=dark_flux(dark))
+    yield "nodes-node-emission", dark
     for source in (verify_container, verify_tree, verify_summaries):
         yield from source()

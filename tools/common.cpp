@@ -12,18 +12,20 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <map>
 #include <memory>
 #include <new>
+#include <numeric>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/io/file/file.h"
-#include "engine/io/text/text.h"
 #include "format/error.h"
 #include "format/text.h"
 #include "tools/completion.h"
@@ -35,11 +37,12 @@
 namespace ptc {
 namespace {
 
-/// Returns kUnsupported for a version or feature that is too new, kInvalidData for damage.
+/// Returns kUnsupported for a version or feature that this program lacks, kInvalidData for damage.
 ExitCode exit_code_of(const FormatError& error) {
-  const bool newer =
-      error.clause().ends_with("#header-version") || error.clause().ends_with("#header-features");
-  return newer ? kUnsupported : kInvalidData;
+  for (const char* rule : {"#header-version", "#header-draft", "#header-features"}) {
+    if (error.clause().ends_with(rule)) return kUnsupported;
+  }
+  return kInvalidData;
 }
 
 /// Refuses an output that cannot be written, before long work begins.
@@ -79,15 +82,71 @@ std::function<std::string(const std::string&)> ends_in(const std::vector<std::st
   };
 }
 
+/// Returns the number of letters to insert, remove or replace to turn `a` into `b` (Levenshtein
+/// 1966), row by row of the table of the distances between their beginnings.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = std::exchange(row[j + 1], std::min({row[j], row[j + 1], diagonal}) + 1);
+      row[j + 1] = std::min(row[j + 1], replaced);
+    }
+  }
+  return row.back();
+}
+
+/// Returns the long option that `typed` was probably meant to be: the one with the fewest letters
+/// that differ, at most 2. Empty when there is none.
+std::string nearest_option(const CLI::App& app, const std::string& typed) {
+  std::size_t fewest = 3;
+  std::string nearest;
+  for (const OptionGroup& group : groups_of(app)) {
+    for (const OptionText& option : group.options) {
+      for (const std::string& name : option.names) {
+        const std::size_t distance = edit_distance(typed, name);
+        if (!name.starts_with("--") || distance >= fewest) continue;
+        fewest = distance;
+        nearest = name;
+      }
+    }
+  }
+  return nearest;
+}
+
+/// Says which option is unknown, or which argument is one too many.
+std::string message_of_extras(const CLI::App& root) {
+  const std::vector<CLI::App*> commands = root.get_subcommands();
+  const CLI::App& app = commands.empty() ? root : *commands.front();
+  std::vector<std::string> extras = root.remaining(true);
+  std::erase(extras, "--");
+  const std::string first = extras.empty() ? "" : extras.front();
+  if (first.size() > 1 && first.starts_with('-')) {
+    const std::string typed = first.substr(0, first.find('='));
+    const std::string nearest = nearest_option(app, typed);
+    return "unknown option: " + typed + (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+  }
+  std::vector<std::string> taken;
+  for (const OptionGroup& group : groups_of(app)) {
+    for (const OptionText& option : group.options) {
+      if (option.positional()) taken.push_back("one " + option.value);
+    }
+  }
+  return "takes " + (taken.empty() ? "options alone" : join(taken, " and ")) + ", so '" + first +
+         "' is one argument too many";
+}
+
 /// A usage error in the words of the help, where CLI11 has words of its own.
-std::string message_of(const CLI::ParseError& error) {
+std::string message_of(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();
   const auto replaced = [](std::string message, std::string_view words, std::string_view by) {
     const std::size_t at = message.find(words);
     return at == message.npos ? message : message.replace(at, words.size(), by);
   };
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
-    return "unknown option or argument" + text.substr(std::min(text.find(": "), text.size()));
+    return message_of_extras(app);
   }
   if (dynamic_cast<const CLI::ExcludesError*>(&error) != nullptr) {
     return replaced(text, " excludes ", " cannot be combined with ");
@@ -109,6 +168,19 @@ std::string message_of(const CLI::ParseError& error) {
   return text;
 }
 
+/// The lines of kExitCodes and of `own`, one for each code: that of `own` where both have one.
+std::string exit_codes_with(const std::string& own) {
+  std::map<std::string, std::string> by_code;
+  for (const std::string& codes : {std::string(kExitCodes), own}) {
+    for (const std::string& line : split(codes, '\n')) {
+      by_code[line.substr(0, line.find(' '))] = line;
+    }
+  }
+  std::string text;
+  for (const auto& [code, line] : by_code) text += (text.empty() ? "" : "\n") + line;
+  return text;
+}
+
 /// Ends the program when an allocation fails in any thread. Unwinding is no way out: destructors of
 /// libraries allocate, so that it may end in std::terminate.
 [[noreturn]] void end_without_memory() {
@@ -123,6 +195,7 @@ std::string message_of(const CLI::ParseError& error) {
 }  // namespace
 
 void check_input(const std::filesystem::path& path) {
+  if (path == "-") throw DataError("-: standard input is not read yet; give a file");
   try {
     const InputFile file(path);
     if (file.size() == 0) throw DataError(path.string() + ": offset 0: the file is empty");
@@ -148,7 +221,7 @@ Command::Command(const std::string& name, const std::string& purpose, const std:
     : app_(purpose.substr(0, purpose.find('\n')), name),
       man_text_{.description =
                     purpose.substr(std::min(app_.get_description().size() + 1, purpose.size())),
-                .exit_codes = exit_codes} {
+                .exit_codes = exit_codes_with(exit_codes)} {
   app_.footer(examples);
   app_.formatter(std::make_shared<HelpFormatter>());
   app_.set_help_flag();  // declared with the other common options, behind those of the program
@@ -169,7 +242,10 @@ void Command::add_common_options() {
       ->check(CLI::Validator(CLI::ExistingDirectory).description(""))
       ->group(kGroup);
   app_.add_flag("--progress", progress_,
-                "Show progress on standard error: a bar on a terminal, else lines")
+                "Report each stage on standard error [default: a bar on a terminal]\n"
+                "Without this option and without --quiet, a terminal shows a bar that is erased "
+                "when its stage ends. With it, each stage leaves a line, on a terminal and "
+                "elsewhere.")
       ->group(kGroup);
   app_.add_flag("--quiet", quiet_, "Print neither progress nor a summary")->group(kGroup);
   app_.add_flag("--json", json_, "Print facts and statistics as JSON instead of a summary")
@@ -254,7 +330,7 @@ int Command::report(const CLI::ParseError& error) const {
     return kDone;
   }
   std::fprintf(stderr, "%s: %s\nTry '%s --help'.\n", app_.get_name().c_str(),
-               printable(message_of(error)).c_str(), app_.get_name().c_str());
+               printable(message_of(app_, error)).c_str(), app_.get_name().c_str());
   return kUsage;
 }
 
@@ -272,9 +348,10 @@ int Command::perform(const std::function<Outcome(Progress&)>& body) const {
   check_files();
   const auto progress = quiet_      ? std::make_unique<Progress>()
                         : progress_ ? make_stderr_progress()
-                                    : make_stderr_notes();
+                                    : make_stderr_bar();
   Outcome outcome = body(*progress);
   if (json_) {
+    outcome.facts["memory_bytes"] = run_options_.memory_bytes;
     outcome.facts["peak_resident_bytes"] = peak_resident_bytes();
     outcome.facts["cpu_seconds"] = cpu_seconds();
     constexpr auto kReplace =

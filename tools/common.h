@@ -63,9 +63,10 @@ class Command {
   ///                    lines: paragraphs for the man page, with empty lines between them
   /// @param examples    lines of the form "  COMMAND LINE", each of which may have a line
   ///                    "  # Comment" before it; they end --help
-  /// @param exit_codes  as kExitCodes
+  /// @param exit_codes  lines as in kExitCodes: they replace its lines of the same code, or are
+  ///                    added to them
   Command(const std::string& name, const std::string& purpose, const std::string& examples,
-          const std::string& exit_codes = kExitCodes);
+          const std::string& exit_codes = "");
 
   [[nodiscard]] CLI::App& app() noexcept { return app_; }
   /// The values of --memory, --threads and --temp, which are known once the body runs.

@@ -94,15 +94,21 @@ std::string bash_value(const OptionText& option, const std::string& function) {
          "      compopt -o filenames 2>/dev/null\n";
 }
 
-/// Branches on the option before the cursor; options with the same proposals share one.
+/// Branches on the word before the cursor: an option, or a choice that ends with "=" and goes on
+/// with the name of a file. Words with the same proposals share a branch.
 std::string bash_cases(const std::vector<OptionText>& options, const std::string& function) {
-  std::vector<std::pair<std::string, std::vector<std::string>>> branches;  // commands, options
-  for (const OptionText& option : options) {
-    if (option.positional() || option.value.empty()) continue;
-    const std::string commands = bash_value(option, function);
+  std::vector<std::pair<std::string, std::vector<std::string>>> branches;  // commands, words
+  const auto add = [&](const std::string& commands, const std::vector<std::string>& words) {
     auto branch = std::ranges::find(branches, commands, [](const auto& b) { return b.first; });
     if (branch == branches.end()) branch = branches.insert(branch, {commands, {}});
-    branch->second.insert(branch->second.end(), option.names.begin(), option.names.end());
+    branch->second.insert(branch->second.end(), words.begin(), words.end());
+  };
+  for (const OptionText& option : options) {
+    if (option.positional() || option.value.empty()) continue;
+    add(bash_value(option, function), option.names);
+    if (!option.choices.empty() && option.choices.front().ends_with('=')) {
+      add(bash_files(function, option.endings) + "\n", option.choices);
+    }
   }
   std::string text;
   for (const auto& [commands, names] : branches) {
@@ -261,9 +267,14 @@ std::string bash_completion(const CLI::App& app) {
                     "  local current=${{COMP_WORDS[COMP_CWORD]}}{}\n"
                     "  local previous=${{COMP_WORDS[COMP_CWORD-1]}}\n"
                     "  COMPREPLY=()\n"
-                    "  # Bash splits --option=value into three words.\n"
-                    "  [[ $previous == = ]] && previous=${{COMP_WORDS[COMP_CWORD-2]}}\n"
-                    "  [[ $current == = ]] && current=\n"
+                    "  # Bash splits --option=value and word=value into three words.\n"
+                    "  if [[ $current == = ]]; then\n"
+                    "    current=\n"
+                    "    [[ $previous == -* ]] || previous+==\n"
+                    "  elif [[ $previous == = ]]; then\n"
+                    "    previous=${{COMP_WORDS[COMP_CWORD-2]}}\n"
+                    "    [[ $previous == -* ]] || previous+==\n"
+                    "  fi\n"
                     "{}"
                     "  {}_options \"$current\" \"$previous\"\n"
                     "}}\n"

@@ -58,6 +58,7 @@ Kind kind_of(PageType type) {
     case PageType::meta:
       return Kind::meta;
     case PageType::directory:
+    case PageType::parts:
       return Kind::structure;
   }
   return Kind::nothing;

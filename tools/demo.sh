@@ -50,22 +50,22 @@ else
   picture=()
 fi
 
-# timed NAME COMMAND...: runs a command and keeps its JSON, and its time and memory by GNU time
-timed() {
+# stage NAME COMMAND...: runs a command and keeps its facts, with its time and memory
+stage() {
   local name=$1
   shift
   say "$name: $(basename "$1") ${*:2}"
-  /usr/bin/time -v -o "$out/$name.time" "$@" --json --progress >"$out/$name.json"
+  "$@" --json --progress >"$out/$name.json"
 }
 
-timed build "$bin/ptcbuild" "${scene[@]}" --memory "$memory" -o "$out/scene.ptcx"
-timed verify "$bin/ptcverify" "$out/scene.ptcx"
-timed shade "$bin/ptcshade" "$out/scene.ptcx" --memory "$memory" -o "$out/shaded.ply"
-timed render "$bin/ptcrender" "$out/scene.ptcx" "${picture[@]}" --memory "$memory" --exposure -0.6 \
+stage build "$bin/ptcbuild" "${scene[@]}" --memory "$memory" -o "$out/scene.ptcx"
+stage verify "$bin/ptcverify" "$out/scene.ptcx"
+stage shade "$bin/ptcshade" "$out/scene.ptcx" --memory "$memory" -o "$out/shaded.ply"
+stage render "$bin/ptcrender" "$out/scene.ptcx" "${picture[@]}" --memory "$memory" --exposure -0.6 \
   -o "$out/scene.exr" -o "$out/beauty.png" \
   --layer occlusion="$out/occlusion.png" --layer indirect="$out/indirect.png"
 # Rays are faster when memory holds all surfels at once.
-timed check "$bin/ptcrender" "$out/scene.ptcx" "${picture[@]}" --size 480x270 --samples 1 --memory 4G \
+stage check "$bin/ptcrender" "$out/scene.ptcx" "${picture[@]}" --size 480x270 --samples 1 --memory 4G \
   --check "$check" --check-rays 4096 -o "$out/check.png"
 rm "$out/check.png"
 

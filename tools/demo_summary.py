@@ -2,7 +2,6 @@
 """Prints the demo's page of figures from the files that its programs wrote to a directory."""
 import json
 import pathlib
-import re
 import sys
 
 out = pathlib.Path(sys.argv[1])
@@ -13,34 +12,22 @@ def facts(name):
     return json.loads((out / f"{name}.json").read_text())
 
 
-def peak_mib(name):
-    """Peak resident set in MiB, as GNU time measured it."""
-    text = (out / f"{name}.time").read_text()
-    return int(re.search(r"Maximum resident set size \(kbytes\): (\d+)", text).group(1)) / 1024
+def wall(run):
+    """Seconds of wall time of all stages of a program together."""
+    seconds = run["seconds"]
+    return seconds["total"] if isinstance(seconds, dict) else seconds
 
 
-def wall(name):
-    """Seconds of wall time."""
-    text = (out / f"{name}.time").read_text()
-    parts = re.search(r"Elapsed \(wall clock\) time.*: ([\d:.]+)", text).group(1).split(":")
-    return sum(float(p) * 60**i for i, p in enumerate(reversed(parts)))
-
-
-def cpu(name):
-    """Seconds of CPU time, user and system together."""
-    text = (out / f"{name}.time").read_text()
-    return sum(float(re.search(rf"{kind} time \(seconds\): ([\d.]+)", text).group(1)) for kind in ("User", "System"))
-
-
-build, shade, render, check = (facts(n) for n in ("build", "shade", "render", "check"))
+build, verify, shade, render, check = (facts(n) for n in ("build", "verify", "shade", "render", "check"))
 scene_bytes = (out / "scene.ptcx").stat().st_size
 
 print("# Demo\n")
 print(f"{build['points']:,} surfels, {build['nodes']:,} nodes, {scene_bytes / 2**20:.1f} MiB in `scene.ptcx`.\n")
-print("| stage | wall s | CPU s | peak MiB | cap |")
+print("| stage | wall s | CPU s | peak MiB | cap MiB |")
 print("|---|---|---|---|---|")
-for name, cap in (("build", "256M"), ("verify", "2G"), ("shade", "256M"), ("render", "256M")):
-    print(f"| {name} | {wall(name):.1f} | {cpu(name):.1f} | {peak_mib(name):.0f} | {cap} |")
+for name, run in (("build", build), ("verify", verify), ("shade", shade), ("render", render)):
+    peak, cap = (run[key] / 2**20 for key in ("peak_resident_bytes", "memory_bytes"))
+    print(f"| {name} | {wall(run):.1f} | {run['cpu_seconds']:.1f} | {peak:.0f} | {cap:.0f} |")
 
 print("\n| gather | receivers | us of CPU each | page lookups | hit rate | read MiB |")
 print("|---|---|---|---|---|---|")

@@ -26,8 +26,9 @@ constexpr char kDate[] = "2026-11-23";  // when these texts were last revised
 
 constexpr std::size_t kWidth = 80;  // of a line of roff
 
-constexpr std::array<std::string_view, 7> kPrograms{
-    "ptcbench", "ptcbuild", "ptcconvert", "ptcinfo", "ptcrender", "ptcshade", "ptcverify"};
+/// The programs that are installed, each of which has a manual page.
+constexpr std::array<std::string_view, 6> kPrograms{"ptcbuild",  "ptcconvert", "ptcinfo",
+                                                    "ptcrender", "ptcshade",   "ptcverify"};
 
 /// A text as roff takes it, without any markup.
 std::string roff(const std::string& text) {
@@ -72,11 +73,6 @@ std::string filled(const std::string& text) {
 
 std::string heading(const std::string& title) {
   return ".SH " + title + "\n";
-}
-
-std::string upper_case(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::toupper(c); });
-  return text;
 }
 
 /// A summary as the part of NAME behind the dash: no capital, no full stop.

@@ -17,22 +17,25 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+usage() {
+  echo "measure.sh: $*" >&2
+  exit 2
+}
+
 quick= list= only= mesh=
 bin=build/release/bin
 work=build/measure
 results=spec/results
 while [[ $# -gt 0 ]]; do
   case $1 in
+    --bin | --work | --results | --only) [[ $# -gt 1 ]] || usage "$1 needs a value" ;;&
     --quick) quick=1 ;;
     --list) list=1 ;;
     --bin) bin=$2 && shift ;;
     --work) work=$2 && shift ;;
     --results) results=$2 && shift ;;
     --only) only=$2 && shift ;;
-    -*)
-      echo "measure.sh: unknown option $1. The head of the script lists the options" >&2
-      exit 2
-      ;;
+    -*) usage "unknown option $1. The head of the script lists the options" ;;
     *) mesh=$1 ;;
   esac
   shift
@@ -40,10 +43,9 @@ done
 if [[ -n $list ]]; then
   mesh=dragon.ply.gz
 elif [[ ! -r $mesh ]]; then
-  echo "measure.sh: the mesh '$mesh' cannot be read. Give the mesh of the dragon, which tools/demo.sh fetches" >&2
-  exit 2
+  usage "the mesh '$mesh' cannot be read. Give the mesh of the dragon, which tools/demo.sh fetches"
 fi
-failed=()
+failed=() known=
 
 # measure NAME EXPERIMENT ARGUMENT... -- QUICK-ARGUMENT...
 # Writes NAME.md by `ptcbench EXPERIMENT ARGUMENT...`, or with --quick and the QUICK-ARGUMENTs instead.
@@ -58,6 +60,7 @@ measure() {
     return
   fi
   [[ -z $only || $only == "$name" ]] || return 0
+  known=1
   local arguments=("${full[@]}")
   [[ -z $quick ]] || arguments=(--quick "${short[@]}")
   echo "==" "$name: ptcbench" "$experiment" "${arguments[@]}"
@@ -84,6 +87,7 @@ measure instructions instructions -- --points 10k --receivers 4096 --checked 10 
 measure model model fractal window city "$mesh+backdrop" --points 200k -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
 measure mutations mutations -- --every 10007
+measure remote remote -- --points 20k
 measure scale scale --points 20M --points 200M --memory 2G -- --points 20k --points 40k --receivers 100 "${once[@]}"
 measure scale-1700m scale --points 20M --points 200M --points 1700M --repeats 1 --memory 2G -- \
   --points 20k --receivers 100 "${once[@]}"
@@ -92,6 +96,7 @@ measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
   --points 20k --panel disk --order city "${once[@]}"
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 
+[[ -n $list || -n $known ]] || usage "there is no result '$only'. --list prints the names"
 if [[ ${#failed[@]} -gt 0 ]]; then
   echo "measure.sh: these experiments failed: ${failed[*]}" >&2
   exit 1

@@ -10,11 +10,6 @@
 namespace ptc {
 namespace {
 
-std::string upper_case(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::toupper(c); });
-  return text;
-}
-
 constexpr std::string_view kDefaultText = " [default: ";
 
 /// Names in alphabetical order: CLI11 orders by address, which differs from run to run.
@@ -118,6 +113,11 @@ std::vector<std::string> split(const std::string& text, char separator) {
     begin = end + 1;
   }
   return parts;
+}
+
+std::string upper_case(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::toupper(c); });
+  return text;
 }
 
 std::string join(const std::vector<std::string>& parts, const std::string& separator) {

@@ -44,7 +44,8 @@ inline constexpr char kExpertGroup[] = "Expert";
 /// The heading of positional arguments and of the files that a program reads and writes.
 inline constexpr char kFilesGroup[] = "Input and output";
 
-/// Makes shells propose these values: words, or endings of file names, which begin with a point.
+/// Makes shells propose these values: words, or endings of file names, which begin with a point. A
+/// word that ends with "=" is continued by the name of a file with one of the endings.
 /// @return the option
 CLI::Option* offer(CLI::Option* option, const std::vector<std::string>& values);
 
@@ -61,6 +62,9 @@ CLI::Option* offer(CLI::Option* option, const std::vector<std::string>& values);
 
 /// Parts of a text between separators; an empty text has none.
 [[nodiscard]] std::vector<std::string> split(const std::string& text, char separator);
+
+/// A text with its ASCII letters as capitals.
+[[nodiscard]] std::string upper_case(std::string text);
 
 /// Parts with a separator between each two.
 [[nodiscard]] std::string join(const std::vector<std::string>& parts, const std::string& separator);

@@ -20,9 +20,20 @@ std::vector<std::string> input_endings() {
   return endings;
 }
 
+void note_unused(const CLI::App& app, const std::vector<std::string>& options,
+                 const std::string& because, Progress& progress) {
+  std::vector<std::string> given;
+  for (const std::string& option : options) {
+    if (app.count(option) > 0) given.push_back(option);
+  }
+  if (given.empty()) return;
+  progress.note(join(given, ", ") + (given.size() == 1 ? " has" : " have") +
+                " no effect, because " + because);
+}
+
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count) {
   return add_count(app, "--points", count,
-                   "Number of surfels to place on the meshes\n"
+                   "Number of surfels to place on the meshes, about\n"
                    "The number is met within 2 %, less the surfels that lie buried inside solids "
                    "and are left out. Clouds keep their points.")
       ->default_str(std::to_string(count / 1'000'000) + "M")

@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "engine/base/progress.h"
 #include "engine/ptc.h"
 
 namespace ptc {
@@ -17,6 +18,11 @@ namespace ptc {
 [[nodiscard]] std::vector<std::string> mesh_endings();
 /// Endings of meshes and clouds that can be read, for shells to propose.
 [[nodiscard]] std::vector<std::string> input_endings();
+
+/// Notes which of these options were given, though the input leaves them without effect.
+/// @param because  the rest of the note: "--points has no effect, because no input is a mesh"
+void note_unused(const CLI::App& app, const std::vector<std::string>& options,
+                 const std::string& because, Progress& progress);
 
 /// Declares --points COUNT, from 1.
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count);

@@ -1,8 +1,11 @@
 // ptcbuild: builds a lit, sorted, hierarchical container from meshes and clouds.
 //
 //   command line -> Arguments -> BuildRequest -> build_container() -> facts and summary
+#include <algorithm>
+
 #include <fmt/format.h>
 
+#include "engine/io/cloud/points.h"
 #include "engine/pipeline/build/append.h"
 #include "format/node_page.h"
 #include "tools/common.h"
@@ -68,7 +71,11 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
       ->excludes(inputs)
       ->excludes("--append")
       ->group(ptc::kFilesGroup);
-  app.add_flag("--backdrop", request.backdrop, "Set the meshes on a ground before a red wall")
+  app.add_flag(
+         "--backdrop", request.backdrop,
+         "Set the meshes on a ground before a red wall; +y is up\n"
+         "The ground lies below the lowest y of the meshes, and the wall stands to the left of "
+         "their lowest x. Turn a mesh whose z is up before you build it.")
       ->group(ptc::kFilesGroup);
 }
 
@@ -148,6 +155,16 @@ void adopt_settings(Arguments& arguments, ptc::Command& command) {
   if (!given("--leaf")) ptc::adopt_leaves(arguments.request, scene);
 }
 
+/// Notes options that are for meshes when no input is a mesh.
+void note_options_of_meshes(const Arguments& arguments, const CLI::App& app,
+                            ptc::Progress& progress) {
+  if (!std::ranges::all_of(arguments.request.inputs, ptc::is_point_file)) return;
+  ptc::note_unused(app,
+                   {"--points", "--spacing", "--backdrop", "--pixels-per-surfel", "--finest",
+                    "--sun-rays", "--sky-rays", "--area-rays"},
+                   "no input is a mesh", progress);
+}
+
 /// Builds the container and reports it.
 ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
   // Complete and check the request.
@@ -162,6 +179,7 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   if (request.city_points > 0 && arguments.lights.given())
     throw CLI::ExcludesError("--city", "lights: the city has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);
+  note_options_of_meshes(arguments, command.app(), progress);
   const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
 
   // Report.

@@ -6,6 +6,7 @@
 //   cloud, mesh  .ptcx         build_container()
 #include <fmt/format.h>
 
+#include "engine/io/cloud/points.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/run.h"
@@ -53,6 +54,15 @@ ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
           .seconds = std::move(built.seconds)};
 }
 
+/// Notes options that the kinds of the input and of the output leave without effect.
+void note_unused_options(const Arguments& arguments, const CLI::App& app, ptc::Progress& progress) {
+  const bool is_container = ptc::is_container(arguments.input);
+  if (is_container || ptc::is_point_file(arguments.input))
+    ptc::note_unused(app, {"--points"}, "the input is no mesh", progress);
+  if (!ptc::has_ending(arguments.output, ".ptcx"))
+    ptc::note_unused(app, {"--profile", "--page-size"}, "the output is no container", progress);
+}
+
 /// Chooses the conversion by the contents of the input and the ending of the output.
 ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& run,
                            ptc::Progress& progress) {
@@ -93,6 +103,7 @@ int main(int argc, char** argv) {
       ptc::add_page_size(command.app(), arguments.page_shift)->group("Container");
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     arguments.page_size_given = page_size->count() > 0;
+    note_unused_options(arguments, command.app(), progress);
     const ptc::ConvertReport report = convert(arguments, command.run_options(), progress);
     const std::uint64_t bytes = std::filesystem::file_size(arguments.output);
     nlohmann::ordered_json facts{{"output", arguments.output.string()}, {"points", report.points}};

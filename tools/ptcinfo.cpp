@@ -7,16 +7,24 @@
 //
 // No page of points or nodes is read, so the time grows with the directory alone, which takes 32
 // bytes for each page.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
 #include <map>
+#include <span>
 
 #include <fmt/format.h>
 
+#include "engine/base/error.h"
 #include "engine/io/file/file.h"
+#include "engine/octree/rounding.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/run.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/store/commit.h"
 #include "engine/store/reader.h"
+#include "format/point_page.h"
 #include "tools/common.h"
 #include "tools/report.h"
 
@@ -26,8 +34,9 @@ using nlohmann::ordered_json;
 
 constexpr char kPurpose[] =
     "Prints what a container holds, without reading its points and nodes.\n"
-    "The summary has the numbers of points, nodes and pages, the bounds in scene units, the bytes "
-    "and the channels. --json adds the record of the build: inputs, lights, camera and settings.";
+    "The summary has the numbers of points, nodes and pages, the bounds in scene units, the bytes, "
+    "the channels, and the inputs and lights of the build. --json has these in full, with the "
+    "camera and all settings.";
 constexpr char kExamples[] =
     "  # Print a summary\n"
     "  ptcinfo scene.ptcx\n"
@@ -35,18 +44,18 @@ constexpr char kExamples[] =
     "  ptcinfo scene.ptcx --json | python3 -c 'import json,sys; "
     "print(json.load(sys.stdin)[\"points\"])'\n";
 
-std::string type_name(ptc::ChannelType type) {
-  switch (type) {
-    case ptc::ChannelType::u8:
-      return "u8";
-    case ptc::ChannelType::u16:
-      return "u16";
-    case ptc::ChannelType::half:
-      return "half";
-    case ptc::ChannelType::f32:
-      return "f32";
-  }
-  return "unknown";
+// The names of spec/points.md#schema, by their values.
+constexpr std::array kTypes{"",    "u8", "u16", "half", "f32", "u32",
+                            "u64", "i8", "i16", "i32",  "i64", "f64"};
+constexpr std::array kRoles{"value", "colour", "direction", "vector", "label", "index", "time"};
+constexpr std::array kColourSpaces{"none", "rec709", "srgb", "acescg"};
+
+/// Returns the name of a value, or the value itself where a later version defines it.
+template <class Value>
+ordered_json name_or_number(Value value, std::span<const char* const> names) {
+  const auto number = static_cast<std::size_t>(value);
+  if (number < names.size()) return names[number];
+  return number;
 }
 
 /// Pages of one type: their number, their bytes in the file without headers and padding, and their
@@ -82,10 +91,20 @@ std::string codec_of(const ptc::ContainerReader& container) {
 ordered_json channels_of(const ptc::Meta& meta) {
   ordered_json channels = ordered_json::array();
   for (const ptc::Channel& channel : meta.channels) {
-    channels.push_back({{"name", channel.name},
-                        {"type", type_name(channel.type)},
-                        {"components", channel.components},
-                        {"group", channel.group}});
+    ordered_json facts{{"name", channel.name},
+                       {"type", name_or_number(channel.type, kTypes)},
+                       {"components", channel.components},
+                       {"group", channel.group},
+                       {"role", name_or_number(channel.role, kRoles)}};
+    if (channel.colour_space != ptc::ColourSpace::none)
+      facts["colour_space"] = name_or_number(channel.colour_space, kColourSpaces);
+    if (!channel.unit.empty()) facts["unit"] = channel.unit;
+    if (channel.no_value) facts["no_value"] = *channel.no_value;
+    if (channel.scale != 1 || channel.offset != 0) {
+      facts["scale"] = channel.scale;
+      facts["offset"] = channel.offset;
+    }
+    channels.push_back(std::move(facts));
   }
   return channels;
 }
@@ -111,10 +130,18 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
   facts["page_counts"] = {{"point", shares[PageType::point].pages},
                           {"node", shares[PageType::node].pages},
                           {"attribute", shares[PageType::attribute].pages}};
+  if (!container.parts().empty()) {
+    ordered_json& parts = facts["parts"] = ordered_json::array();
+    for (const auto& part : container.parts()) {
+      parts.push_back({{"file", part->path().string()},
+                       {"points", part->superblock().points},
+                       {"bytes", part->superblock().file_bytes}});
+    }
+  }
   facts["codec"] = codec_of(container);
   facts["channels"] = channels_of(container.meta());
   facts["leaf_points"] = superblock.leaf_points;
-  facts["points_per_page"] = superblock.points_per_page;
+  facts["points_per_page"] = ptc::points_per_page(container.header());
   facts["frame"] = {{"origin", superblock.header.frame.origin},
                     {"edge", superblock.header.frame.edge}};
   facts["area"] = superblock.area;
@@ -148,33 +175,115 @@ std::string quoted(const ordered_json& text) {
   return text.dump(-1, ' ', true);
 }
 
+/// A corner of a box, with as many digits as tell a ten-millionth of its longest edge.
+std::string corner_text(const ordered_json& corner, double longest) {
+  std::string text;
+  for (const auto& coordinate : corner) {
+    const auto value = coordinate.get<double>();
+    const auto places = [](double number) { return std::floor(std::log10(std::abs(number))); };
+    const double digits = value == 0 || longest == 0 || std::isinf(longest)
+                              ? 17
+                              : places(value) - places(longest) + 7;
+    text += text.empty() ? "" : " ";
+    text +=
+        digits < 1 ? "0" : fmt::format("{:.{}g}", value, static_cast<int>(std::min(digits, 17.0)));
+  }
+  return text;
+}
+
+/// The bounds in scene units: "-1 0 -1 to 1 2.5 1".
+std::string bounds_text(const ordered_json& bounds) {
+  double longest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    longest =
+        std::max(longest, bounds["high"][axis].get<double>() - bounds["low"][axis].get<double>());
+  }
+  return corner_text(bounds["low"], longest) + " to " + corner_text(bounds["high"], longest);
+}
+
+/// A number with its noun: "1 sun", "2 suns".
+std::string counted(std::size_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// The lights of the record: "1 sun, 0 point lights, a sky".
+std::string lights_text(const ordered_json& record, bool emitters) {
+  try {
+    const ptc::LightRig rig = ptc::light_rig_from_json(record.get<std::string>());
+    std::string text =
+        counted(rig.suns.size(), "sun") + ", " + counted(rig.points.size(), "point light");
+    if (!rig.sky.map_path.empty()) {
+      text += ", the sky of " + quoted(ordered_json(rig.sky.map_path));
+    } else {
+      text += rig.sky.radiance == glm::vec3(0) ? ", no sky" : ", a sky";
+    }
+    return text + (emitters ? ", and materials that emit" : "");
+  } catch (const ptc::DataError&) {
+    return "the record cannot be read: " + quoted(record);
+  }
+}
+
+/// Lines on what the build recorded: inputs, spacing, lights and rounding, as far as it did.
+std::string record_text(const ordered_json& record) {
+  std::string text;
+  if (const auto inputs = record.find(ptc::kInputsKey); inputs != record.end()) {
+    constexpr std::size_t kMaxLetters = 200;
+    const std::string names = quoted(*inputs);
+    text += "  inputs    " +
+            (names.size() <= kMaxLetters
+                 ? names
+                 : names.substr(0, names.rfind(' ', kMaxLetters)) + " ...\"; all with --json") +
+            "\n";
+  }
+  if (const auto spacing = record.find(ptc::kSpacingKey); spacing != record.end()) {
+    const double length = std::strtod(spacing->get<std::string>().c_str(), nullptr);
+    text += fmt::format("  spacing   {:.4g} scene units between surfels of meshes\n", length);
+  }
+  if (const auto lights = record.find(ptc::kLightsKey); lights != record.end()) {
+    text += "  lights    " + lights_text(*lights, record.contains(ptc::kEmittersKey)) + "\n";
+  }
+  if (const auto rounding = record.find(ptc::kRoundingKey); rounding != record.end()) {
+    text += "  rounded   " +
+            (*rounding == ptc::kRounding
+                 ? "position by at most 0.001 of the point's radius, the radius by 1/512 of it, "
+                   "normals by 0.0021 rad, radiance by 1/256 of it"
+                 : quoted(*rounding)) +
+            "\n";
+  }
+  return text;
+}
+
 /// The lines of the summary, from the facts that --json prints.
 std::string summary_of(const ordered_json& facts) {
-  const auto& low = facts["bounds"]["low"];
-  const auto& high = facts["bounds"]["high"];
   const auto bytes = [&](const char* what) {
     return ptc::bytes_text(facts["bytes"][what].get<std::uint64_t>());
   };
   std::string text = fmt::format(
       "{}: PTCX {}, written by {}\n"
-      "  points    {} in {} pages of {}\n"
+      "  pages     {} of {}\n"
+      "  points    {} in {} pages\n"
       "  nodes     {} in {} groups on {} levels\n"
-      "  bounds    {} {} {} to {} {} {}\n"
+      "  bounds    {}\n"
       "  bytes     {}: points {}, nodes {}, channels {}; codec {}\n",
       facts["file"].get<std::string>(), facts["format_version"].get<std::string>(),
-      quoted(facts["writer"]), facts["points"].dump(), facts["page_counts"]["point"].dump(),
-      ptc::bytes_text(facts["page_size"].get<std::uint64_t>()), facts["nodes"].dump(),
-      facts["node_groups"].dump(), facts["levels"].dump(), low[0].dump(), low[1].dump(),
-      low[2].dump(), high[0].dump(), high[1].dump(), high[2].dump(), bytes("file"),
-      bytes("point_pages"), bytes("node_pages"), bytes("attribute_pages"),
-      facts["codec"].get<std::string>());
-  if (const auto rounding = facts["text"].find(ptc::kRoundingKey);
-      rounding != facts["text"].end()) {
-    text += fmt::format("  rounded   {}\n", quoted(*rounding));
+      quoted(facts["writer"]), facts["pages"].dump(),
+      ptc::bytes_text(facts["page_size"].get<std::uint64_t>()), facts["points"].dump(),
+      facts["page_counts"]["point"].dump(), facts["nodes"].dump(), facts["node_groups"].dump(),
+      facts["levels"].dump(), bounds_text(facts["bounds"]), bytes("file"), bytes("point_pages"),
+      bytes("node_pages"), bytes("attribute_pages"), facts["codec"].get<std::string>());
+  if (const auto parts = facts.find("parts"); parts != facts.end()) {
+    for (const auto& part : *parts) {
+      text +=
+          fmt::format("  part      {}: {} points, {}\n", quoted(part["file"]),
+                      part["points"].dump(), ptc::bytes_text(part["bytes"].get<std::uint64_t>()));
+    }
   }
+  text += record_text(facts["text"]);
   for (const auto& channel : facts["channels"]) {
+    const ordered_json& type = channel["type"];
     text += fmt::format("  channel   {}: {} x {}\n", channel["name"].get<std::string>(),
-                        channel["components"].dump(), channel["type"].get<std::string>());
+                        channel["components"].dump(),
+                        type.is_string() ? type.get<std::string>() : "type " + type.dump());
   }
   return text;
 }

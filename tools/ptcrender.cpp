@@ -1,9 +1,13 @@
 // ptcrender: renders a picture of a scene, lit directly by rays and indirectly by its surfels.
+#include <algorithm>
+#include <cstddef>
 #include <set>
+#include <span>
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "tools/common.h"
+#include "tools/option_text.h"
 #include "tools/options.h"
 #include "tools/report.h"
 #include "tools/scene_options.h"
@@ -18,7 +22,9 @@ constexpr char kPurpose[] =
     "from the surfels.\n"
     "\n"
     "An .exr holds the picture in linear light, in W/m^2/sr, and the layers direct, indirect, "
-    "occlusion, bent_normal and albedo. A .png holds one of them for display.";
+    "occlusion, bent_normal, albedo and alpha. With --estimate it also holds occlusion_error and "
+    "irradiance_error. A .png holds the picture or one of the layers direct, indirect, occlusion "
+    "and albedo, for display.";
 constexpr char kExamples[] =
     "  # Render a mesh with the light of its container\n"
     "  ptcrender dragon.ptcx --mesh dragon.ply --backdrop -o dragon.png\n"
@@ -40,10 +46,11 @@ struct Arguments {
 
 /// Declares --layer and checks its values: a known layer and the name of a PNG.
 void add_layers(ptc::Command& command, Arguments& arguments) {
-  static const std::set<std::string> kLayers{"direct", "indirect", "occlusion", "albedo"};
   const auto check = [](const std::string& text) {
+    const auto layers = std::span(ptc::kPictureLayers).subspan(1);  // the first is the output's own
     const std::size_t equals = text.find('=');
-    const bool known = kLayers.contains(text.substr(0, equals)) && ptc::has_ending(text, ".png");
+    const bool known = std::ranges::find(layers, text.substr(0, equals)) != layers.end() &&
+                       ptc::has_ending(text, ".png");
     return known && equals != std::string::npos
                ? std::string()
                : "expects direct=, indirect=, occlusion= or albedo= and the name of a .png, not '" +
@@ -57,7 +64,7 @@ void add_layers(ptc::Command& command, Arguments& arguments) {
   };
   CLI::Option* layers = command.app().add_option_function<std::vector<std::string>>(
       "--layer", set, "Also write direct, indirect, occlusion or albedo as PNG; repeatable");
-  ptc::offer(layers, {"direct=", "indirect=", "occlusion=", "albedo="})
+  ptc::offer(layers, {"direct=", "indirect=", "occlusion=", "albedo=", ".png"})
       ->type_name("LAYER=FILE")
       ->group(ptc::kFilesGroup)
       ->allow_extra_args(false)
@@ -75,7 +82,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
                      "Mesh that the camera sees; repeatable [default: the surfels]");
   command.app()
       .add_flag("--backdrop", request.backdrop,
-                "Set the meshes on a ground before a red wall, as ptcbuild does")
+                "Set the meshes on a ground before a red wall, as ptcbuild does; +y is up")
       ->group(ptc::kFilesGroup);
 }
 
@@ -131,9 +138,12 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   const ptc::LightingReport report = ptc::render_picture(request, targets, progress);
   std::vector<std::string> names;
   for (const ptc::PictureTarget& target : targets) names.push_back(target.path.string());
+  // Outputs stand behind layers in `targets`; the summary names them first.
+  std::vector<std::string> told = names;
+  std::ranges::rotate(told, told.begin() + static_cast<std::ptrdiff_t>(arguments.layers.size()));
   nlohmann::ordered_json facts{{"outputs", names}};
   facts.update(ptc::facts_of(report));
-  return {facts, ptc::shade_text(names.back(), report)};
+  return {facts, ptc::shade_text(ptc::join(told, ", "), report)};
 }
 
 }  // namespace

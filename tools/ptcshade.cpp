@@ -1,4 +1,6 @@
 // ptcshade: computes the light that arrives at every point of a scene, or at given receivers.
+#include <fmt/format.h>
+
 #include "tools/common.h"
 #include "tools/options.h"
 #include "tools/report.h"
@@ -49,7 +51,8 @@ int main(int argc, char** argv) {
       ->group(ptc::kFilesGroup);
   lights.declare_sky(app);
   app.get_option("--sky")->description(
-      "Sky: colour, grey level or latitude-longitude picture [default: as built]");
+      "Sky: colour, grey level or latitude-longitude picture [default: as built]\n"
+      "+y is up: it is the upper edge of the picture.");
   ptc::add_bounces(app, request.bounces)->group("Lights");
   ptc::add_gather_options(app, request.gather, request.lift);
   ptc::add_error_option(app, request.error);
@@ -62,6 +65,11 @@ int main(int argc, char** argv) {
     request.run = command.run_options();
     if (lights.sky_given()) request.sky = lights.sky();
     const ptc::LightingReport report = ptc::shade_container(request, output, progress);
+    const bool all_left = !report.damage || report.damage->points == 0;
+    if (request.count > report.receivers && all_left) {
+      progress.note(fmt::format("--count is more than there are points: all {} are shaded",
+                                report.receivers));
+    }
     nlohmann::ordered_json facts{{"output", output.string()}};
     facts.update(ptc::facts_of(report));
     return {facts, ptc::shade_text(output.string(), report)};

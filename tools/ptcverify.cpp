@@ -10,9 +10,9 @@
 
 #include <fmt/format.h>
 
-#include "engine/io/text/text.h"
 #include "engine/verify/salvage.h"
 #include "engine/verify/verify.h"
+#include "format/text.h"
 #include "tools/common.h"
 #include "tools/damage_map.h"
 #include "tools/option_text.h"
@@ -36,17 +36,13 @@ constexpr char kExamples[] =
     "  ptcverify broken.ptcx --map damage.svg --json\n"
     "  # Write the undamaged part to a new container\n"
     "  ptcverify broken.ptcx --salvage kept.ptcx\n";
+/// What its exit codes mean where that is not as in kExitCodes.
 constexpr char kVerifyCodes[] =
     "0 sound: no fault was found\n"
     "1 damaged: the file is missing or has faults\n"
-    "2 usage: the command line asks for something impossible\n"
     "3 system: the system refused, for example because the disk cannot be read\n"
-    "4 format not supported: the file needs a newer version of the program\n"
-    "5 limit too small: a cap such as --memory is too small; the message names the smallest that "
-    "works\n"
     "6 unfinished or truncated: the program that wrote the file did not end, or the end of the "
-    "file is missing\n"
-    "7 internal error: the program has a defect; please report the message";
+    "file is missing";
 constexpr std::size_t kMaxLines = 20;
 
 /// What to do about a fault, as a sentence without a full stop.
@@ -105,6 +101,7 @@ ordered_json line_for(const ptc::Finding& finding) {
                     {"offset", finding.offset}};
   if (finding.bytes > 0) line["bytes"] = finding.bytes;
   if (finding.page) line["page"] = *finding.page;
+  if (!finding.file.empty()) line["file"] = finding.file;
   line["level"] = finding.level;
   line["text"] = finding.text;
   if (!finding.expected.empty()) line["expected"] = finding.expected;
@@ -143,17 +140,29 @@ std::string looked_at(const ptc::VerifyReport& report, int level) {
   return report.tree_digest ? text + ", the tree built again" : text;
 }
 
+/// True when the file was never a container, as far as its bytes show: it begins like another kind
+/// of file, and no superblock knows of pages.
+bool is_foreign(const ptc::VerifyReport& report) {
+  return !report.sound() && report.findings.front().cause == ptc::Cause::foreign &&
+         report.pages.value_or(0) == 0;
+}
+
 /// The last line of a check: valid or damaged, how much was checked, and what to do.
 std::string verdict_text(const std::string& name, const ptc::VerifyReport& report, int level,
                          double seconds) {
   const std::string over = fmt::format("{}, {}, {:.2f} s", looked_at(report, level),
                                        ptc::bytes_text(report.file_bytes), seconds);
   if (report.sound()) return fmt::format("{}: valid at level {}: {}\n", name, level, over);
+  const ptc::Finding& first = report.findings.front();
+  if (is_foreign(report))
+    return fmt::format("ptcverify: {}: {} ({})\n", name, first.text, first.rule);
   std::string faults = counted(report.damage, "fault");
   if (report.pages)
     faults += fmt::format(" in {} of {}", *report.damaged_pages, counted(*report.pages, "page"));
   return fmt::format("ptcverify: {}: damaged: {} at level {}: {}\n", name, faults, level,
-                     hint_of(report.findings.front()));
+                     first.cause == ptc::Cause::foreign
+                         ? "its beginning is overwritten; keep the undamaged part with --salvage"
+                         : hint_of(first));
 }
 
 /// The value as JSON; null when there is none.
@@ -211,6 +220,25 @@ void add_salvage(const std::filesystem::path& file, const std::filesystem::path&
   }
 }
 
+/// Declares the options that choose what is checked. The variables must outlive the parsing.
+void add_checks(CLI::App& app, int& level, bool& fail_fast) {
+  constexpr char kGroup[] = "Checking";
+  ptc::offer(
+      app.add_option(
+          "--level", level,
+          "0 header, 1 directory, 2 checksums, 3 contents, 4 tree rebuilt\n"
+          "Each level includes those below it. Level 0 checks the header, the superblocks and the "
+          "length of the file; 1 the directory and the page headers; 2 the checksums of the "
+          "payloads and the padding; 3 the contents of all pages, the tree against its points, and "
+          "the totals; 4 builds the tree again and compares it."),
+      {"0", "1", "2", "3", "4"})
+      ->type_name("N")
+      ->check(ptc::whole_in_range(0, 4))
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_flag("--fail-fast", fail_fast, "Stop at the first fault")->group(kGroup);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -224,21 +252,7 @@ int main(int argc, char** argv) {
       ->required(false);
   command.add_output("--map", map, {".svg", ".png"}, "Draw where the damage lies (.svg or .png)")
       ->required(false);
-  constexpr char kGroup[] = "Checking";
-  ptc::offer(
-      command.app().add_option(
-          "--level", level,
-          "0 header, 1 directory, 2 checksums, 3 contents, 4 tree rebuilt\n"
-          "Each level includes those below it. Level 0 checks the header, the superblocks and the "
-          "length of the file; 1 the directory and the page headers; 2 the checksums of the "
-          "payloads and the padding; 3 the contents of all pages, the tree against its points, and "
-          "the totals; 4 builds the tree again and compares it."),
-      {"0", "1", "2", "3", "4"})
-      ->type_name("N")
-      ->check(ptc::whole_in_range(0, 4))
-      ->capture_default_str()
-      ->group(kGroup);
-  command.app().add_flag("--fail-fast", fail_fast, "Stop at the first fault")->group(kGroup);
+  add_checks(command.app(), level, fail_fast);
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     // Check the file.
     const ptc::RunOptions& run = command.run_options();
@@ -277,7 +291,8 @@ int main(int argc, char** argv) {
     if (report.tree_digest)
       outcome.facts["tree_digest"] =
           ptc::hex((*report.tree_digest)[1]) + ptc::hex((*report.tree_digest)[0]);
-    outcome.summary = findings_text(name, report) + verdict_text(name, report, level, seconds);
+    if (!is_foreign(report)) outcome.summary = findings_text(name, report);
+    outcome.summary += verdict_text(name, report, level, seconds);
 
     // Keep what is whole.
     if (!salvage.empty()) add_salvage(file, salvage, run, progress, outcome);

@@ -16,7 +16,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/progress_text.h"
-#include "engine/io/text/text.h"
+#include "format/text.h"
 #include "tools/common.h"
 
 namespace ptc {
@@ -78,6 +78,15 @@ std::string tuning_text(const TuningReport& tuning) {
         "  error: {:.4g} % asked, {:.2f} % measured at {} pilot receivers with {} (setting {} of "
         "{})\n",
         100 * tuning.asked, measured, tuning.pilots, setting, tuning.setting + 1, tuning.settings);
+  }
+  // The finest setting is not met when a resample of the pilots in 20 is above what is asked
+  // (spec/shading.md#error), even where their own error is below.
+  if (measured <= 100 * tuning.asked) {
+    return fmt::format(
+        "  error: {:.4g} % asked cannot be confirmed: the finest setting ({}) has {:.2f} % at {} "
+        "pilot receivers, but these scatter so much that more than 1 in 20 resamples of a half of "
+        "them are above {:.4g} %\n",
+        100 * tuning.asked, setting, measured, tuning.pilots, 100 * tuning.asked);
   }
   return fmt::format(
       "  error: {:.4g} % asked is below the floor: the finest setting ({}) has {:.2f} % at {} "

@@ -48,7 +48,8 @@ void LightArguments::declare(CLI::App& app) {
   add_repeated(
       app, "--sun", [this](const std::vector<std::string>& v) { set_suns(v); },
       "Sun: azimuth and elevation in degrees, irradiance [3]; repeatable\n"
-      "The azimuth turns from +z to +x. The irradiance is that of a surface that faces the sun, in "
+      "The elevation is above the horizon, the plane of x and z; +y is up. The azimuth turns from "
+      "+z to +x. The irradiance is that of a surface that faces the sun, in "
       "W/m^2.")
       ->type_name("AZ,EL[,E]")
       ->group(kGroup);
@@ -58,9 +59,11 @@ void LightArguments::declare(CLI::App& app) {
          "Colour of all suns, a factor on their irradiance")
       ->type_name("R,G,B")
       ->default_str("1,1,1")
+      ->needs("--sun")
       ->group(kGroup);
   add_number(app, "--sun-size", sun_degrees_, 0, 90, "Angular diameter of the suns, in degrees")
       ->type_name("DEGREES")
+      ->needs("--sun")
       ->group(kGroup);
   add_repeated(
       app, "--point", [this](const std::vector<std::string>& v) { set_points(v); },
@@ -80,11 +83,14 @@ void LightArguments::declare_sky(CLI::App& app) {
     }
   };
   app.add_option_function<std::string>(
-         "--sky", set, "Sky: colour, grey level or latitude-longitude picture, in W/m^2/sr")
+         "--sky", set,
+         "Sky: colour, grey level or latitude-longitude picture, in W/m^2/sr\n"
+         "+y is up: it is the upper edge of the picture.")
       ->type_name("R,G,B|L|FILE")
       ->group("Lights");
   add_number(app, "--sky-scale", sky_scale_, 0, 1e6, "Factor on the radiance of the sky")
       ->type_name("FACTOR")
+      ->needs("--sky")
       ->group("Lights");
 }
 

@@ -49,10 +49,13 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
 std::uint64_t parse_count(const std::string& option, const std::string& text) {
   constexpr double kMax = 0x1p48;  // points of a file
   const double count = parse_scaled(text, {{"k", 1e3}, {"K", 1e3}, {"M", 1e6}, {"G", 1e9}});
-  if (!(count >= 1 && count <= kMax) || std::rint(count) != count) {
+  const double whole = std::rint(count);
+  // 4.1 * 1e6 is 4099999.9999999995: the product of a fraction and a suffix is rounded twice.
+  const bool is_whole = std::abs(count - whole) <= whole * 0x1p-50;
+  if (!is_whole || !(whole >= 1 && whole <= kMax)) {
     refuse(option, text, "a whole number from 1 to 2^48, such as 250000, 250k or 1.5M");
   }
-  return static_cast<std::uint64_t>(count);
+  return static_cast<std::uint64_t>(whole);
 }
 
 CLI::Validator in_range(double least, double most) {

@@ -34,11 +34,22 @@ class RequestError : public std::runtime_error {
   std::string field_;
 };
 
+/// Checks one field of a request.
+/// @param field  as for RequestError
+/// @param text   the error's sentence, as for RequestError
+/// @throws RequestError when `holds` is false
+inline void require_request(bool holds, const char* field, const char* text) {
+  if (!holds) throw RequestError(field, text);
+}
+
 /// Reports a memory cap that is too small for the job. what() names the smallest cap that works.
 /// Programs exit with code 5.
 class LimitError : public RequestError {
  public:
-  explicit LimitError(const std::string& text) : RequestError("run.memory_bytes", text) {}
+  /// Makes an error about the cap.
+  /// @param field  the member of the request that holds the cap
+  explicit LimitError(const std::string& text, std::string field = "run.memory_bytes")
+      : RequestError(std::move(field), text) {}
 };
 
 }  // namespace ptc

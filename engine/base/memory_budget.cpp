@@ -16,8 +16,8 @@ std::string mebibytes(std::uint64_t bytes) {
 
 }  // namespace
 
-MemoryBudget::MemoryBudget(std::uint64_t cap_bytes, std::string job)
-    : cap_(cap_bytes), job_(std::move(job)) {}
+MemoryBudget::MemoryBudget(std::uint64_t cap_bytes, std::string job, std::string field)
+    : cap_(cap_bytes), job_(std::move(job)), field_(std::move(field)) {}
 
 void MemoryBudget::charge(std::string part, std::uint64_t bytes) {
   charged_ += bytes;
@@ -36,7 +36,8 @@ std::uint64_t MemoryBudget::rest(const std::string& part, std::uint64_t min_byte
     list += (list.empty() ? "" : ", ") + mebibytes(bytes) + " for " + name;
   }
   throw LimitError("the memory cap is too small for " + job_ + ": the least that works is " +
-                   mebibytes(charged_ + min_bytes) + " (" + list + ")");
+                       mebibytes(charged_ + min_bytes) + " (" + list + ")",
+                   field_);
 }
 
 }  // namespace ptc

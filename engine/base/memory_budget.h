@@ -14,7 +14,8 @@ class MemoryBudget {
  public:
   /// Makes a budget to which nothing is charged yet.
   /// @param job  the purpose of the memory, as in "the memory cap is too small for shading"
-  MemoryBudget(std::uint64_t cap_bytes, std::string job);
+  /// @param field  the member of the request that holds the cap, for LimitError
+  MemoryBudget(std::uint64_t cap_bytes, std::string job, std::string field = "run.memory_bytes");
 
   /// Charges `bytes` for `part`, a noun as in "12M for open pages". The sum may exceed the cap
   /// until rest() or require() is called.
@@ -32,6 +33,7 @@ class MemoryBudget {
   std::uint64_t cap_;          ///< bytes
   std::uint64_t charged_ = 0;  ///< sum of all parts, bytes
   std::string job_;
+  std::string field_;
   std::vector<std::pair<std::string, std::uint64_t>> parts_;  ///< name and bytes of each charge
 };
 

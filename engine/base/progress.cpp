@@ -1,4 +1,5 @@
-// Progress reports written to a file: a bar on a terminal, plain lines elsewhere.
+// Progress reports written to a file: a bar on a terminal, plain lines elsewhere. A passing bar is
+// erased at the end of its stage; any other one leaves a summary.
 //
 //   advance() in any thread          one thread, and only when next_report_ is due
 //   done_ += count        ------->   lock, update state_, write a line, set the next report
@@ -19,6 +20,7 @@
 #include <utility>
 
 #include "engine/base/progress_text.h"
+#include "format/text.h"
 
 namespace ptc {
 namespace {
@@ -37,7 +39,7 @@ void write_text(int fd, std::string_view text) noexcept {
 }
 
 std::string note_line(const std::string& text) {
-  return std::string(program_invocation_short_name) + ": " + text + '\n';
+  return std::string(program_invocation_short_name) + ": " + printable(text) + '\n';
 }
 
 class StderrNotes final : public Progress {
@@ -47,13 +49,16 @@ class StderrNotes final : public Progress {
 
 class FileProgress final : public Progress {
  public:
-  FileProgress(int fd, bool terminal, Clock clock)
-      : fd_(fd), terminal_(terminal), clock_(std::move(clock)) {}
+  FileProgress(int fd, ReportStyle style, Clock clock)
+      : fd_(fd),
+        terminal_(style != ReportStyle::lines),
+        passing_(style == ReportStyle::passing_bar),
+        clock_(std::move(clock)) {}
 
   // Ends the line of a stage that an exception has left, so that the error message starts on a line
   // of its own.
   ~FileProgress() override {
-    if (running_ && terminal_) write("\n");
+    if (running_ && terminal_) passing_ ? redraw("") : write("\n");
   }
 
   void begin(const std::string& stage, std::uint64_t total, const std::string& unit) override {
@@ -63,9 +68,7 @@ class FileProgress final : public Progress {
     done_ = 0;
     start_ = clock_();
     running_ = true;
-    const std::string count =
-        total == 0 ? unit : format_count(static_cast<double>(total)) + " " + unit;
-    if (!terminal_) write(stage + ": " + count + "\n");
+    if (!terminal_) write(progress_start(state_) + '\n');
     next_report_ = start_ + interval();
   }
 
@@ -94,8 +97,8 @@ class FileProgress final : public Progress {
     running_ = false;
     next_report_ = std::numeric_limits<double>::infinity();
     const std::string summary = progress_summary(update(clock_()));
-    if (terminal_) redraw(summary);
-    write(terminal_ ? "\n" : summary + '\n');
+    if (terminal_) redraw(passing_ ? "" : summary);
+    if (!passing_) write(terminal_ ? "\n" : summary + '\n');
   }
 
  private:
@@ -127,6 +130,7 @@ class FileProgress final : public Progress {
 
   const int fd_;
   const bool terminal_;
+  const bool passing_;  // the bar is erased when its stage ends
   const Clock clock_;
   std::atomic<std::uint64_t> done_{0};
   std::atomic<double> next_report_{std::numeric_limits<double>::infinity()};
@@ -143,12 +147,19 @@ double steady_seconds() {
 
 }  // namespace
 
-std::unique_ptr<Progress> make_progress(int fd, bool terminal, Clock clock) {
-  return std::make_unique<FileProgress>(fd, terminal, std::move(clock));
+std::unique_ptr<Progress> make_progress(int fd, ReportStyle style, Clock clock) {
+  return std::make_unique<FileProgress>(fd, style, std::move(clock));
 }
 
 std::unique_ptr<Progress> make_stderr_progress() {
-  return make_progress(STDERR_FILENO, isatty(STDERR_FILENO) == 1, steady_seconds);
+  const bool terminal = isatty(STDERR_FILENO) == 1;
+  return make_progress(STDERR_FILENO, terminal ? ReportStyle::bar : ReportStyle::lines,
+                       steady_seconds);
+}
+
+std::unique_ptr<Progress> make_stderr_bar() {
+  if (isatty(STDERR_FILENO) != 1) return make_stderr_notes();
+  return make_progress(STDERR_FILENO, ReportStyle::passing_bar, steady_seconds);
 }
 
 std::unique_ptr<Progress> make_stderr_notes() {

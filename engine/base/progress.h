@@ -34,6 +34,11 @@ class Progress {
 /// stage, and one every 10 s in between.
 [[nodiscard]] std::unique_ptr<Progress> make_stderr_progress();
 
+/// Returns a report to standard error that draws the bar of make_stderr_progress() on a terminal
+/// and erases it when its stage ends, so that only notes stay. Without a terminal it writes only
+/// notes, as make_stderr_notes() does.
+[[nodiscard]] std::unique_ptr<Progress> make_stderr_bar();
+
 /// Returns a report to standard error that writes only notes, each as a line that begins with the
 /// name of the program.
 [[nodiscard]] std::unique_ptr<Progress> make_stderr_notes();

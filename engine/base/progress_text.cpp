@@ -97,10 +97,16 @@ std::string progress_bar(const StageState& s, std::size_t columns) {
   return (s.stage + bar + share + words).substr(0, columns);
 }
 
+std::string progress_start(const StageState& s) {
+  if (s.total == 0) return s.stage;
+  return s.stage + ": " + format_count(static_cast<double>(s.total)) + " " + s.unit;
+}
+
 std::string progress_summary(const StageState& s) {
   const std::string count = format_count(static_cast<double>(s.done));
   const std::string time = s.elapsed_seconds < 100 ? format("%.1f s", s.elapsed_seconds)
                                                    : format_duration(s.elapsed_seconds);
+  if (s.done == 0) return s.stage + ": " + time;
   return s.stage + ": " + count + " " + s.unit + " in " + time + ", " + format_count(s.rate()) +
          "/s";
 }

@@ -38,15 +38,23 @@ struct StageState {
 /// Returns a line like "sort [####......]  45 % 12.3 M of 27.1 M points, 4.10 M/s, 0:03 left". The
 /// bar takes the columns that the words leave; a line of more than `columns` bytes is cut.
 [[nodiscard]] std::string progress_bar(const StageState& state, std::size_t columns);
-/// Returns a line like "sort: 27.1 M points in 6.6 s, 4.10 M/s".
+/// Returns the first line of a stage: "sort: 27.1 M points", or "read" when the total is not known.
+[[nodiscard]] std::string progress_start(const StageState& state);
+/// Returns a line like "sort: 27.1 M points in 6.6 s, 4.10 M/s", or "read: 0.1 s" for a stage that
+/// counted nothing.
 [[nodiscard]] std::string progress_summary(const StageState& state);
 
 /// A clock that returns the seconds since some fixed moment and never goes back.
 using Clock = std::function<double()>;
 
-/// Returns a report as make_stderr_progress() does, written to the open file `fd`, which it does
-/// not own.
-/// @param terminal  whether to draw a bar in place of plain lines
-[[nodiscard]] std::unique_ptr<Progress> make_progress(int fd, bool terminal, Clock clock);
+/// The form of a report.
+enum class ReportStyle {
+  lines,        ///< plain lines at the start and at the end of a stage, and every 10 s
+  bar,          ///< a bar, which a summary of its stage replaces
+  passing_bar,  ///< a bar, which is erased when its stage ends
+};
+
+/// Returns a report to the open file `fd`, which it does not own.
+[[nodiscard]] std::unique_ptr<Progress> make_progress(int fd, ReportStyle style, Clock clock);
 
 }  // namespace ptc

@@ -1,9 +1,16 @@
-// Boxes that grow by points and by other boxes.
+// The bound on coordinates, and boxes that grow by points and by other boxes.
 #include "engine/base/surfel.h"
+
+#include <cmath>
 
 #include <glm/common.hpp>
 
 namespace ptc {
+
+bool fits_coordinates(const glm::dvec3& p) noexcept {
+  return std::abs(p.x) <= kMaxCoordinate && std::abs(p.y) <= kMaxCoordinate &&
+         std::abs(p.z) <= kMaxCoordinate;
+}
 
 void Bounds::add(const glm::dvec3& p) noexcept {
   add(Bounds{p, p});

@@ -35,8 +35,9 @@ std::size_t max_stored(const ContainerReader& container) {
 
 /// What the readers take: table, decoder, and the back end's buffers.
 std::uint64_t reader_bytes(const ContainerReader& container, unsigned threads, BackEnd back_end) {
-  return threads * (kMaxSlots * kTableSlotBytes + kDecoderBytes +
-                    page_source_bytes(back_end, max_stored(container)));
+  return threads *
+         (kMaxSlots * kTableSlotBytes + kDecoderBytes +
+          PageSources::most(container) * page_source_bytes(back_end, max_stored(container)));
 }
 
 /// Frames within the cap; more than the pages and a working set for each thread are of no use.
@@ -112,7 +113,7 @@ std::uint32_t PageCache::load(std::unique_lock<std::mutex>& lock, std::uint32_t 
   PageHeader header;
   double waited = 0;
   try {
-    const std::span<const std::byte> image = fetch(page, caller.source, waited);
+    const std::span<const std::byte> image = fetch(page, caller.sources, waited);
     header = container_.decode_page(
         page, image, {arena_.data() + frame * frame_stride_, frame_stride_ - kGuardBytes},
         caller.decoder);
@@ -133,27 +134,26 @@ std::uint32_t PageCache::load(std::unique_lock<std::mutex>& lock, std::uint32_t 
 
 // Pages of a kind follow the Z-curve, and so do receivers: the next one is wanted soon more often
 // than not.
-std::span<const std::byte> PageCache::fetch(std::uint32_t page, PageSource& source,
+std::span<const std::byte> PageCache::fetch(std::uint32_t page, PageSources& sources,
                                             double& waited) const {
   const auto begin = Clock::now();
   const std::uint32_t next = reads_ahead_ ? next_of_kind(page) : kNoPage;
   if (next != kNoPage && !table_.present(next)) {
     const ContainerReader::PageRange range = container_.page_range(next);
-    source.expect(range.offset, range.bytes);
+    sources.of(range.part).expect(range.offset, range.bytes);
   }
   const ContainerReader::PageRange range = container_.page_range(page);
-  const std::span<const std::byte> image = source.read(range.offset, range.bytes);
+  if (range.bytes == 0) return {};  // a void page
+  const std::span<const std::byte> image = sources.of(range.part).read(range.offset, range.bytes);
   waited = seconds_since(begin);
   return image;
 }
 
 std::uint32_t PageCache::next_of_kind(std::uint32_t page) const {
-  const PageType type = container_.entry(page).type;
-  if (type != PageType::point && type != PageType::node) return kNoPage;
-  const std::span<const std::uint32_t> kind =
-      type == PageType::point ? container_.point_pages() : container_.node_pages();
-  const auto next = std::ranges::upper_bound(kind, page);
-  return next == kind.end() ? kNoPage : *next;
+  for (const PageNumbers::Range& kind : {container_.point_pages(), container_.node_pages()}) {
+    if (kind.contains(page) && kind.contains(page + 1)) return page + 1;
+  }
+  return kNoPage;
 }
 
 double CacheStatistics::hit_rate() const noexcept {
@@ -200,8 +200,7 @@ PageReader::PageReader(PageCache& cache)
     : shared_(cache),
       table_(std::make_unique<Slot[]>(shared_.slots_)),
       mask_(shared_.slots_ - 1),
-      source_(make_page_source(shared_.options_.back_end, shared_.container_.file(),
-                               max_stored(shared_.container_))) {
+      sources_(shared_.options_.back_end, shared_.container_, max_stored(shared_.container_)) {
   static_assert(sizeof(Slot) <= kTableSlotBytes);
   const std::lock_guard lock(shared_.mutex_);
   const auto seat = std::ranges::find(shared_.seats_, false);
@@ -236,7 +235,7 @@ const PageCache::View& PageReader::find(std::uint32_t page) {
   if (frame != kNoFrame) {
     ++shared_hits_;
   } else {
-    frame = shared_.acquire(page, {number_, decoder_, *source_, std::exchange(lookups_, 0),
+    frame = shared_.acquire(page, {number_, decoder_, sources_, std::exchange(lookups_, 0),
                                    std::exchange(shared_hits_, 0)});
   }
   slot.view = shared_.view(frame);

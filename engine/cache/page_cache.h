@@ -18,6 +18,7 @@
 
 namespace ptc {
 
+/// What a page cache may use, and how it reads.
 struct CacheOptions {
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;  ///< frames and tables together
   unsigned threads = 1;                                   ///< readers that exist at once, at most
@@ -29,6 +30,7 @@ struct CacheOptions {
   std::uint32_t local_slots = 0;
 };
 
+/// What a page cache did since it was made.
 struct CacheStatistics {
   std::uint64_t lookups = 0;      ///< calls of PageReader::pin(): the sum of the next three
   std::uint64_t local_hits = 0;   ///< found in the reader's own table
@@ -80,6 +82,7 @@ class PageCache {
   [[nodiscard]] std::uint32_t local_slots() const noexcept { return slots_; }
 
  private:
+  friend class PageGuard;
   friend class PageReader;
 
   /// A page in its frame.
@@ -93,7 +96,7 @@ class PageCache {
   struct Caller {
     std::uint32_t number;
     PageDecoder& decoder;
-    PageSource& source;
+    PageSources& sources;
     std::uint64_t lookups;      ///< not yet added to the statistics, this one included
     std::uint64_t shared_hits;  ///< not yet added to the statistics
   };
@@ -103,7 +106,7 @@ class PageCache {
   [[nodiscard]] View view(std::uint32_t frame) const noexcept;
   std::uint32_t acquire(std::uint32_t page, const Caller& caller);
   std::uint32_t load(std::unique_lock<std::mutex>& lock, std::uint32_t page, const Caller& caller);
-  std::span<const std::byte> fetch(std::uint32_t page, PageSource& source, double& waited) const;
+  std::span<const std::byte> fetch(std::uint32_t page, PageSources& sources, double& waited) const;
   [[nodiscard]] std::uint32_t next_of_kind(std::uint32_t page) const;
 
   const ContainerReader& container_;
@@ -122,16 +125,13 @@ class PageCache {
 
 /// A resident page, which is not evicted while its guard lives.
 ///
-/// A reader pins one page at a time: asking it for another while a guard lives is a
-/// std::logic_error, at the latest when the other page is not at hand. A guard that was moved from
-/// pins nothing.
+/// A reader pins one page at a time. Asking it for another while a guard lives is a mistake, which
+/// throws std::logic_error unless the other page is in the reader's own table. A guard that was
+/// moved from pins nothing.
 class PageGuard {
  public:
   PageGuard(PageGuard&& other) noexcept
-      : payload_(other.payload_),
-        bytes_(other.bytes_),
-        record_count_(other.record_count_),
-        pins_(std::exchange(other.pins_, nullptr)) {}
+      : view_(other.view_), pins_(std::exchange(other.pins_, nullptr)) {}
   PageGuard& operator=(PageGuard&&) = delete;
   ~PageGuard() {
     if (pins_ != nullptr) --*pins_;
@@ -139,23 +139,19 @@ class PageGuard {
 
   /// The decoded payload, aligned to 64 bytes. Up to 64 bytes beyond bytes() may be read: they are
   /// zero or stale, never unmapped.
-  [[nodiscard]] const std::byte* payload() const noexcept { return payload_; }
+  [[nodiscard]] const std::byte* payload() const noexcept { return view_.payload; }
   /// The size of the payload.
-  [[nodiscard]] std::uint32_t bytes() const noexcept { return bytes_; }
+  [[nodiscard]] std::uint32_t bytes() const noexcept { return view_.bytes; }
   /// The number of records in the payload, from the page's header.
-  [[nodiscard]] std::uint32_t record_count() const noexcept { return record_count_; }
+  [[nodiscard]] std::uint32_t record_count() const noexcept { return view_.record_count; }
 
  private:
   friend class PageReader;
-  PageGuard(const std::byte* payload, std::uint32_t bytes, std::uint32_t record_count,
-            std::uint32_t& pins) noexcept
-      : payload_(payload), bytes_(bytes), record_count_(record_count), pins_(&pins) {
+  PageGuard(const PageCache::View& view, std::uint32_t& pins) noexcept : view_(view), pins_(&pins) {
     ++pins;
   }
 
-  const std::byte* payload_;
-  std::uint32_t bytes_;
-  std::uint32_t record_count_;
+  PageCache::View view_;
   std::uint32_t* pins_;
 };
 
@@ -175,13 +171,12 @@ class PageReader {
   /// Pins a page, which is read when it is not resident. The guard must not outlive the reader.
   /// @throws FormatError, DataError, std::system_error when the page cannot be read, the same for
   ///         all callers that wait for it; std::invalid_argument for a page that does not exist;
-  ///         std::logic_error when this reader would have to give up a pinned page. The reader
-  ///         stays usable.
+  ///         std::logic_error when a guard of this reader lives and the page is not in the reader's
+  ///         own table. The reader stays usable.
   [[nodiscard]] PageGuard pin(std::uint32_t page) {
     const Slot& slot = table_[page & mask_];
     ++lookups_;
-    const PageCache::View& view = slot.page == page ? slot.view : find(page);
-    return {view.payload, view.bytes, view.record_count, pins_};
+    return {slot.page == page ? slot.view : find(page), pins_};
   }
 
  private:
@@ -199,7 +194,7 @@ class PageReader {
   std::uint32_t pins_ = 0;         ///< guards that live
   std::uint64_t lookups_ = 0;      ///< not yet added to the shared statistics
   std::uint64_t shared_hits_ = 0;  ///< not yet added to the shared statistics
-  std::unique_ptr<PageSource> source_;
+  PageSources sources_;
   PageDecoder decoder_;
 };
 

@@ -123,6 +123,22 @@ std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& 
   return std::make_unique<PreadSource>(file, max_bytes);
 }
 
+PageSources::PageSources(BackEnd back_end, const ContainerReader& container, std::size_t max_bytes)
+    : back_end_(back_end), container_(container), max_bytes_(max_bytes) {
+  static_cast<void>(of(0));
+}
+
+PageSource& PageSources::of(std::uint32_t part) {
+  for (const Open& open : open_) {
+    if (open.source && open.part == part) return *open.source;
+  }
+  Open& replaced = open_[next_++ % kOpen];
+  replaced.source.reset();
+  replaced.source = make_page_source(back_end_, container_.file(part), max_bytes_);
+  replaced.part = part;
+  return *replaced.source;
+}
+
 std::uint64_t page_source_bytes(BackEnd back_end, std::size_t max_bytes) noexcept {
   const std::uint64_t room = direct_room(max_bytes);
   return back_end == BackEnd::io_uring ? UringSource::kSlots * room + UringSource::kRingBytes

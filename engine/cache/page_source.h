@@ -1,12 +1,15 @@
 // Reads stored pages from the file into memory, by one of four back ends behind one interface.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
 
 #include "engine/io/file/file.h"
+#include "engine/store/reader.h"
 
 namespace ptc {
 
@@ -44,6 +47,41 @@ class PageSource {
 /// @throws std::system_error when the system or the file system does not support the back end
 [[nodiscard]] std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& file,
                                                            std::size_t max_bytes);
+
+/// The sources of one thread for the files of a container: the scene's own file and those of its
+/// parts. At most kOpen are open at a time, because pages that are needed together lie in few
+/// parts.
+class PageSources {
+ public:
+  static constexpr std::size_t kOpen = 4;
+
+  /// Opens the source of the container's own file.
+  /// @param container  must outlive this
+  /// @param max_bytes  size of the largest range
+  /// @throws std::system_error as make_page_source()
+  PageSources(BackEnd back_end, const ContainerReader& container, std::size_t max_bytes);
+
+  /// Returns the source of a file, as ContainerReader::PageRange::part counts them. It is valid
+  /// until the next call.
+  /// @throws std::system_error as make_page_source()
+  [[nodiscard]] PageSource& of(std::uint32_t part);
+
+  /// Returns the number of sources that may be open at once.
+  [[nodiscard]] static std::size_t most(const ContainerReader& container) noexcept {
+    return std::min(kOpen, 1 + container.parts().size());
+  }
+
+ private:
+  struct Open {
+    std::uint32_t part = 0;
+    std::unique_ptr<PageSource> source;
+  };
+  BackEnd back_end_;
+  const ContainerReader& container_;
+  std::size_t max_bytes_;
+  std::array<Open, kOpen> open_;
+  std::size_t next_ = 0;  ///< the one that the next file replaces
+};
 
 /// Returns the memory that a source takes, bytes.
 [[nodiscard]] std::uint64_t page_source_bytes(BackEnd back_end, std::size_t max_bytes) noexcept;

@@ -10,6 +10,7 @@
 
 #include "engine/octree/octree.h"
 #include "engine/octree/page_order.h"
+#include "engine/sort/point_streams.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
 
@@ -38,9 +39,11 @@ Totals totals_of(const PointPage& points, const Frame& frame) {
     const double radius = points.radius(i);
     const double area = 2.0 * radius * radius;
     totals.area += area;
-    const std::array<std::uint16_t, 3> radiance = points.radiance(i);
-    for (std::size_t c = 0; c < 3; ++c)
-      totals.flux[c] += area * static_cast<double>(decode_half(radiance[c]));
+    const Half3 radiance = points.radiance(i), emission = points.emission(i);
+    for (std::size_t c = 0; c < 3; ++c) {
+      totals.flux[c] +=
+          area * (double{decode_half(radiance[c])} + double{decode_half(emission[c])});
+    }
   }
   totals.low = frame.to_position(low);
   totals.high = frame.to_position(high);
@@ -70,10 +73,10 @@ class Settled {
   Settled(const Settled&) = delete;
   Settled& operator=(const Settled&) = delete;
   ~Settled() {
+    // A build that succeeds has flushed before, and one that fails throws its own error.
     try {
       writer_.flush();
-    } catch (
-        ...) {  // a build that succeeds has flushed before; one that fails throws its own error
+    } catch (...) {
     }
   }
 
@@ -81,27 +84,18 @@ class Settled {
   ContainerWriter& writer_;
 };
 
-/// Reads points until `block` is full or the stream ends. Returns the number of points read.
-std::size_t read_full(PointStream& points, std::span<PointRecord> block) {
-  std::size_t filled = 0;
-  while (filled < block.size()) {
-    const std::size_t count = points.next(block.subspan(filled));
-    if (count == 0) break;
-    filled += count;
-  }
-  return filled;
-}
-
 /// Encodes the points of a block as pages, and adds their totals to the superblock.
-void add_block(std::span<const PointRecord> block, const Frame& frame, const Executor& executor,
+void add_block(std::span<const PointRecord> block, const FileHeader& file, const Executor& executor,
                Superblock& superblock, PageOrder& order) {
-  const std::size_t per_page = superblock.points_per_page;
+  const std::size_t per_page = points_per_page(file);
   std::vector<ContainerWriter::Page> pages((block.size() - 1) / per_page + 1);
   std::vector<Totals> totals(pages.size());
   executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
     const auto page = block.subspan(i * per_page, std::min(per_page, block.size() - i * per_page));
-    pages[i] = point_page(page);
-    totals[i] = totals_of(PointPage(pages[i].payload.data(), pages[i].summary.record_count), frame);
+    pages[i] = point_page(page, file.point_bytes);
+    const PointPage points(pages[i].payload.data(), pages[i].summary.record_count,
+                           file.point_bytes);
+    totals[i] = totals_of(points, file.frame);
   });
   for (std::size_t i = 0; i < pages.size(); ++i) {
     include(superblock, totals[i], pages[i].summary.record_count);
@@ -130,25 +124,24 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
                        const Executor& executor, Progress& progress,
                        const Checkpoints& checkpoints) {
   // Begin with nothing, or where the checkpoint was made.
-  const Frame& frame = writer.header().frame;
+  const FileHeader& file = writer.header();
   Superblock superblock;
   superblock.leaf_points = options.leaf_points;
-  superblock.points_per_page = points_per_page(writer.header());
 
-  const std::size_t per_page = superblock.points_per_page;
+  const std::uint32_t per_page = points_per_page(file);
   const Settled settled(writer);
-  PageOrder order(writer, superblock.points_per_page, options.levels_per_stream);
-  OctreeBuilder octree(order, options.leaf_points, frame.unit(), executor);
+  PageOrder order(writer, per_page, options.levels_per_stream);
+  OctreeBuilder octree(order, options.leaf_points, file.frame.unit(), executor);
   if (checkpoints.from != nullptr) {
     load_totals(*checkpoints.from, superblock);
     order.load(*checkpoints.from, superblock.points);
-    octree.load(*checkpoints.from, writer.state().pages);
+    octree.load(*checkpoints.from, [&](std::uint32_t page) { return order.knows(page); });
   }
   // Build pages and tree block by block.
   std::uint64_t saved = superblock.points;
   std::vector<PointRecord> block(std::max<std::size_t>(kPointsAtOnce / per_page, 1) * per_page);
   while (const std::size_t count = read_full(points, block)) {
-    add_block(std::span(block).first(count), frame, executor, superblock, order);
+    add_block(std::span(block).first(count), file, executor, superblock, order);
     octree.add(std::span(block).first(count));
     writer.write_pages(order.take(), executor);
     progress.advance(count);
@@ -168,13 +161,15 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
   order.finish();
   writer.write_pages(order.take(), executor);
   writer.flush();
+  order.keep_tail();
 
   superblock.nodes = tree.nodes;
   superblock.node_groups = tree.groups;
   superblock.levels = static_cast<std::uint16_t>(tree.levels);
   if (tree.root.interior) {
-    superblock.root_page = tree.root.page;
-    superblock.root_slot = tree.root.slot;
+    const ChildRef root = order.placed(tree.root);
+    superblock.root_page = root.page;
+    superblock.root_slot = root.slot;
   }
   return superblock;
 }

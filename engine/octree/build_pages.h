@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "engine/base/progress.h"
+#include "engine/base/stream.h"
 #include "engine/io/file/state_file.h"
-#include "engine/sort/external_sort.h"
 #include "engine/store/writer.h"
+#include "format/point_record.h"
 
 namespace ptc {
 
@@ -46,8 +47,9 @@ struct Checkpoints {
 /// threads.
 /// @param points  ascending keys in the lattice of the writer's frame
 /// @return  the superblock for ContainerWriter::finish(), with counts, bounds and totals filled in
-/// @throws DataError, FormatError when the state to resume from is invalid; and what stream and
-///         writer throw
+/// @throws DataError, FormatError when the state to resume from is invalid;
+///         std::invalid_argument when a point emits light and WriterOptions::point_bytes is
+///         kPointBytes; and what stream and writer throw
 /// Memory: one open page for each stream. In addition, for a block of 65,536 points (or one page of
 /// points if that is more), the records twice and their pages and nodes three times: some 20 MB in
 /// all.

@@ -13,8 +13,9 @@
 #include <array>
 #include <memory>
 
-#include "engine/sort/external_sort.h"
+#include "engine/base/stream.h"
 #include "format/morton.h"
+#include "format/point_record.h"
 
 namespace ptc {
 

@@ -22,6 +22,8 @@
 namespace ptc {
 namespace {
 
+using KnowsPage = OctreeBuilder::KnowsPage;
+
 /// Saves a node field by field.
 void save_child(const NodeChild& child, StateWriter& state) {
   state.put(static_cast<std::uint8_t>(child.ref.interior));
@@ -34,21 +36,25 @@ void save_child(const NodeChild& child, StateWriter& state) {
   for (const double value : {node.radius, node.area, node.thickness}) state.put(value);
   for (const double value : node.facing) state.put(value);
   for (const auto& flux : node.flux) state.put(flux);
+  state.put(static_cast<std::uint8_t>(node.emits));
+  for (const auto& power : node.power) state.put(power);
+  state.put(node.greatest);
   for (const float value : node.cone_axis) state.put(value);
   state.put(node.cone_cos);
 }
 
 /// Loads a node that save_child() saved.
-/// @param pages, points  numbers of pages and points so far, which its references must be below
+/// @param knows   says whether a page may be one that groups lie on
+/// @param points  number of points so far, which its references must be below
 /// @throws DataError when it refers to what does not exist, or a number is not finite
-NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t points) {
+NodeChild load_child(StateReader& state, const KnowsPage& knows, std::uint64_t points) {
   NodeChild child;
   child.ref.interior = state.get<std::uint8_t>() != 0;
   child.ref.page = state.get<std::uint32_t>();
   child.ref.slot = state.get<std::uint16_t>();
   child.ref.first_point = state.get_count(points);
   child.ref.point_count = state.get<std::uint32_t>();
-  state.require(child.ref.interior ? child.ref.page < pages
+  state.require(child.ref.interior ? knows(child.ref.page)
                                    : child.ref.point_count <= points - child.ref.first_point,
                 "the tree's state refers to a group or to points that do not exist");
   const auto load_number = [&](auto& value) {
@@ -60,6 +66,9 @@ NodeChild load_child(StateReader& state, std::uint32_t pages, std::uint64_t poin
   for (double* value : {&node.radius, &node.area, &node.thickness}) load_number(*value);
   std::ranges::for_each(node.facing, load_number);
   for (auto& flux : node.flux) std::ranges::for_each(flux, load_number);
+  node.emits = state.get<std::uint8_t>() != 0;
+  for (auto& power : node.power) std::ranges::for_each(power, load_number);
+  load_number(node.greatest);
   std::ranges::for_each(node.cone_axis, load_number);
   load_number(node.cone_cos);
   return child;
@@ -225,7 +234,7 @@ void OctreeBuilder::save(StateWriter& state) const {
   }
 }
 
-void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
+void OctreeBuilder::load(StateReader& state, const KnowsPage& knows) {
   // Load the points that wait, and the counts.
   window_ = load_points(state);
   for (std::uint64_t* number : {&window_first_, &last_key_.high, &last_key_.low, &last_rank_,
@@ -237,7 +246,7 @@ void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
       result_.points == window_first_ && (window_.empty() || last_key_ <= window_.front().key),
       "the points in the tree's state are not in order");
   // Load the open cells from the root down.
-  current_ = load_child(state, pages, window_first_);
+  current_ = load_child(state, knows, window_first_);
   path_.resize(static_cast<std::size_t>(state.get_count(kMaxLevel + 1)));
   int above = -1;
   for (NodeGroup& cell : path_) {
@@ -246,7 +255,7 @@ void OctreeBuilder::load(StateReader& state, std::uint32_t pages) {
     state.require(cell.level > above, "the open cells in the tree's state are not nested");
     above = cell.level;
     cell.children.resize(static_cast<std::size_t>(state.get_count(kMaxChildren - 1)));
-    for (NodeChild& child : cell.children) child = load_child(state, pages, window_first_);
+    for (NodeChild& child : cell.children) child = load_child(state, knows, window_first_);
   }
 }
 

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -52,6 +53,8 @@ class OctreeBuilder {
  public:
   /// The most points of a cell that is built by one thread, unless leaf_points is more.
   static constexpr std::uint32_t kSubtreePoints = 4096;
+  /// Says whether a page may be one that GroupSink::add() returned.
+  using KnowsPage = std::function<bool(std::uint32_t page)>;
 
   /// @param leaf_points  1 to kMaxLeafPoints
   /// @param unit         lattice unit in scene units
@@ -64,9 +67,9 @@ class OctreeBuilder {
   /// Saves the state between two calls of add(), for a builder with the same arguments.
   void save(StateWriter& state) const;
   /// Resumes from a saved state, before the first call of add().
-  /// @param pages  number of pages given out so far; groups can only lie in these
+  /// @param knows  says whether a page may be one that the sink returned
   /// @throws DataError, FormatError when the state is invalid
-  void load(StateReader& state, std::uint32_t pages);
+  void load(StateReader& state, const KnowsPage& knows);
 
   /// A finished tree.
   struct Result {

@@ -3,10 +3,14 @@
 // Groups arrive in post-order. Each goes to the open page of its stream, which is its level or a
 // few neighbouring levels, so that a reader that stops at one level reads a compact run of pages:
 //
-//   level 0   . . . . . . . [  page 9   ]     open pages, numbered when they were opened
-//   level 1   . . [ page 4 ][  page 8   ]
-//   level 2   [ page 1 ][ page 3 ][ 7 ]       full pages leave in the order in which they fill up
-//   points    [0][2][5][6]                    a point page leaves before the groups that end in it
+//   level 0   . . . . . . . [        ]     held: pages of the coarsest levels wait for the tail
+//   level 1   . . [        ][        ]     of the file
+//   ------------------------------------ cut: rises when more pages are held than the tail has
+//   level 2   [ page 1 ][ page 3 ][ 7 ]    full pages leave in the order in which they fill up
+//   points    [0][2][5][6]                 a point page leaves before the groups that end in it
+//
+// The page of a group is known when the group is added, its rank is not: a held page has a
+// provisional number, which references to it keep until the page that they lie on leaves.
 #pragma once
 
 #include <cstdint>
@@ -24,31 +28,42 @@
 
 namespace ptc {
 
-/// Returns a page of points that has no number yet.
+/// Returns a page of points that has no rank yet.
 /// @param points  1 to points_per_page, ascending
-[[nodiscard]] ContainerWriter::Page point_page(std::span<const PointRecord> points);
+[[nodiscard]] ContainerWriter::Page point_page(std::span<const PointRecord> points,
+                                               std::uint8_t point_bytes);
 
 /// Collects groups in node pages, with one open page for each stream of levels, and emits pages in
-/// their final order. A node page gets its number when it is opened, so that parents can refer to
-/// groups that are not on disk yet, and is emitted when it is full. A point page is emitted before
-/// the groups that end in it.
+/// their final order. A page below the cut gets its rank when it is opened, so that parents can
+/// refer to groups that are not on disk yet, and is emitted when it is full. Pages of the coarsest
+/// levels are held until keep_tail(). A point page is emitted before the groups that end in it.
+/// Memory: one open page for each stream, and the pages that are held, up to 4 MiB.
 class PageOrder : public GroupSink {
  public:
   using Page = ContainerWriter::Page;
 
-  /// @param writer             gives out page numbers; must outlive this
+  /// @param writer             gives out ranks; must outlive this
   /// @param levels_per_stream  see BuildOptions
   PageOrder(ContainerWriter& writer, std::uint32_t points_per_page, int levels_per_stream);
 
-  /// Adds the next page of points, which gets its number when it is emitted.
+  /// Adds the next page of points, which gets its rank when it is emitted.
   void add(Page points) { points_.push_back(std::move(points)); }
-  /// Adds a group to the page of its stream. @return the page and slot that it will lie in
+  /// Adds a group to the page of its stream.
+  /// @return  the page and slot that it will lie in; the page may be a provisional number
+  /// @throws std::invalid_argument when it emits light, and points of the container have no
+  /// emission
   ChildRef add(const GroupView& group, std::uint64_t end) override;
   /// Returns the pages emitted since the last call.
   [[nodiscard]] std::vector<Page> take() noexcept { return std::exchange(whole_, {}); }
-  /// Emits all pages that are left. Open node pages go deepest level first, so that the coarse
-  /// levels are last in the file.
+  /// Emits all pages that are left but those that are held, the deepest level first.
   void finish();
+  /// Hands the pages that are held to the writer, for the tail: the deepest level first, the root
+  /// last. @pre finish(), and what take() returned was written
+  void keep_tail();
+  /// Returns a reference of add() with the page's rank. @pre keep_tail()
+  [[nodiscard]] ChildRef placed(ChildRef ref) const noexcept;
+  /// Returns whether add() may have returned a page of this number.
+  [[nodiscard]] bool knows(std::uint32_t page) const;
 
   /// Saves the state between two calls. @pre all emitted pages were taken
   void save(StateWriter& state) const;
@@ -62,34 +77,62 @@ class PageOrder : public GroupSink {
   struct Range {
     std::uint64_t first = ~std::uint64_t{0};
     std::uint64_t last = 0;
-    std::uint16_t min_level = 0xffff;
+    std::uint8_t min_level = kNoLevel;
     void include(const GroupView& group);
   };
   /// The open page of a stream of levels.
-  struct Stream {
-    std::uint32_t page;
+  struct Open {
+    std::uint32_t page;  ///< rank, or a provisional number
     NodePageEncoder encoder;
     Range keys{};
   };
+  /// A full page that waits for the tail.
+  struct Held {
+    std::uint32_t page;  ///< provisional number
+    Page content;
+  };
+  /// Some neighbouring levels.
+  struct Stream {
+    std::optional<Open> open;
+    std::vector<Held> held;
+  };
 
+  [[nodiscard]] bool holds(const Stream& stream) const noexcept {
+    return &stream < streams_.data() + cut_;
+  }
+  void open(Stream& stream);
+  void close(Stream& stream);
+  void evict();
+  void emit(std::uint32_t rank, Page page);
+  void place_references(Page& page) const;
   void take_points();
-  void flush(std::optional<Stream>& stream);
-  void load_stream(StateReader& state, std::optional<Stream>& stream, std::uint64_t points);
+  void save_open(const Stream& stream, StateWriter& state) const;
+  void load_open(StateReader& state, Stream& stream, std::uint64_t points);
+  void load_held(StateReader& state, Stream& stream, std::uint64_t points);
+  [[nodiscard]] NodePage load_groups(StateReader& state, std::vector<std::byte>& payload,
+                                     std::uint32_t groups, std::uint64_t points) const;
 
   ContainerWriter& writer_;
   std::uint32_t points_per_page_;
   int levels_per_stream_;
   std::size_t payload_limit_;
-  std::vector<std::optional<Stream>> streams_;  ///< by level / levels_per_stream_
-  std::deque<Page> points_;                     ///< point pages not emitted yet
-  std::uint64_t next_point_ = 0;                ///< number of their first point
-  std::vector<Page> whole_;                     ///< pages emitted and not taken yet
+  bool may_emit_;
+  std::size_t most_held_;             ///< pages that the tail has room for
+  std::vector<Stream> streams_;       ///< by level / levels_per_stream_
+  std::size_t cut_;                   ///< streams below this index are held
+  std::size_t held_pages_ = 0;        ///< pages with a provisional number that has no rank yet
+  std::vector<std::uint32_t> ranks_;  ///< by provisional number; kNoPage: not known yet
+  std::deque<Page> points_;           ///< point pages not emitted yet
+  std::uint64_t next_point_ = 0;      ///< number of their first point
+  std::vector<Page> whole_;           ///< pages emitted and not taken yet
 };
 
 /// Saves points, for load_points().
 void save_points(std::span<const PointRecord> points, StateWriter& state);
-/// Returns the points that save_points() saved.
+/// Returns the points of a page in a state.
+/// @param point_bytes  bytes of a point; save_points() uses kEmittingPointBytes
 /// @throws DataError, FormatError when they break a rule of points
-[[nodiscard]] std::vector<PointRecord> load_points(StateReader& state);
+[[nodiscard]] std::vector<PointRecord> load_points(StateReader& state,
+                                                   std::uint8_t point_bytes = kEmittingPointBytes);
 
 }  // namespace ptc

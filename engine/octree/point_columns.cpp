@@ -38,14 +38,16 @@ inline double to_double(std::uint64_t v) {
 /// Decodes points into columns, in blocks. The fields of a block are first gathered in small
 /// arrays, so that values that are decoded together lie together.
 /// @param stride  values from one column to the next
+/// @param emits   whether there are columns of emission
 void decode_points(const PointRecord* points, std::size_t count, double unit, double* columns,
-                   std::size_t stride) {
+                   std::size_t stride, bool emits) {
   constexpr std::size_t kBlock = kPositionBlock;
   constexpr double kMax = 1e150;  // spec/nodes.md#node-number: what is stored ends at 3e38 anyway
   PositionBlock positions;
   std::array<float, kBlock> radius;
   std::array<std::int16_t, kBlock> u, v;
-  std::array<std::array<std::uint16_t, kBlock>, 3> radiance;
+  std::array<std::array<std::uint16_t, kBlock>, 6> light;  // radiance, emission
+  const std::size_t colours = emits ? 6 : 3;
   for (std::size_t first = 0; first < count; first += kBlock) {
     // Gather the fields of one block.
     const std::size_t n = std::min(kBlock, count - first);
@@ -54,7 +56,8 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
       radius[i] = point.radius;
       u[i] = point.normal[0];
       v[i] = point.normal[1];
-      for (std::size_t c = 0; c < 3; ++c) radiance[c][i] = point.radiance[c];
+      for (std::size_t c = 0; c < 3; ++c) light[c][i] = point.radiance[c];
+      for (std::size_t c = 3; c < colours; ++c) light[c][i] = point.emission[c - 3];
     }
     // Decode positions, radii and areas.
     const auto out = [&](PointColumns::Column k) { return columns + k * stride + first; };
@@ -71,19 +74,19 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
       lattice_radius[i] = scaled < kMax ? scaled : kMax;
       area[i] = 2.0 * r * r;
     }
-    // Decode normals and radiance.
+    // Decode normals and light.
     double* const x = out(PointColumns::kNormalX);
     double* const y = out(PointColumns::kNormalY);
     double* const z = out(PointColumns::kNormalZ);
     for (std::size_t i = 0; i < n; ++i) {
-      const std::array<float, 3> normal = decode_octahedral(u[i], v[i]);
+      const std::array<double, 3> normal = decode_octahedral_f64(u[i], v[i]);
       x[i] = normal[0];
       y[i] = normal[1];
       z[i] = normal[2];
     }
-    for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t c = 0; c < colours; ++c) {
       double* const to = columns + (PointColumns::kRed + c) * stride + first;
-      for (std::size_t i = 0; i < n; ++i) to[i] = decode_half(radiance[c][i]);
+      for (std::size_t i = 0; i < n; ++i) to[i] = decode_half(light[c][i]);
     }
   }
 }
@@ -129,13 +132,14 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
   const V axis_squared = dot(axis, axis), zero = hn::Zero(d), one = hn::Set(d, 1.0);
   // Find the greatest reach of a disc from the centre and from the middle plane, and the smallest
   // cosine of a normal to the axis.
-  V radius = zero, thickness = zero, cosine = one;
+  V radius = zero, thickness = zero, cosine = one, greatest = zero;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
     const Lanes point(points, i, end);
     const V away[3] = {hn::Sub(point[PointColumns::kX], mean[0]),
                        hn::Sub(point[PointColumns::kY], mean[1]),
                        hn::Sub(point[PointColumns::kZ], mean[2])};
     const V wide = point[PointColumns::kDiscRadius];
+    greatest = hn::Max(greatest, point.only(wide, zero));
     radius = hn::Max(radius, point.only(hn::Add(hn::Sqrt(dot(away, away)), wide), zero));
     if (!has_axis) continue;
     const V n[3] = {point[PointColumns::kNormalX], point[PointColumns::kNormalY],
@@ -151,8 +155,29 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
   }
   // Reduce the lanes.
   node.radius = hn::GetLane(hn::MaxOfLanes(d, radius));
+  node.greatest = hn::GetLane(hn::MaxOfLanes(d, greatest));
   set_bounds(node, has_axis, hn::GetLane(hn::MinOfLanes(d, cosine)),
              hn::GetLane(hn::MaxOfLanes(d, thickness)));
+}
+
+/// Sums the emission of points towards the six axes.
+void add_emission(const PointColumns& points, std::size_t begin, std::size_t end,
+                  NodeSummary& node) {
+  for (std::size_t i = begin; i < end; ++i) {
+    std::array<double, 3> emission;
+    for (std::size_t c = 0; c < 3; ++c)
+      emission[c] =
+          points.column(static_cast<PointColumns::Column>(PointColumns::kEmittedRed + c))[i];
+    if (emission == std::array<double, 3>{}) continue;
+    node.emits = true;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto axis = static_cast<PointColumns::Column>(PointColumns::kNormalX + k / 2);
+      const double normal = points.column(axis)[i];
+      const double towards = std::max(k % 2 == 0 ? normal : -normal, 0.0);
+      const double facing = points.column(PointColumns::kDiscArea)[i] * towards;
+      for (std::size_t c = 0; c < 3; ++c) node.power[k][c] += facing * emission[c];
+    }
+  }
 }
 
 /// Implements summarise_points() for one instruction set.
@@ -193,6 +218,7 @@ NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t
     node.flux[k] = {towards[k][1], towards[k][2], towards[k][3]};
   }
   for (std::size_t k = 0; k < 3; ++k) node.mean[k] = origin[k] + node.mean[k] / weight;
+  if (points.emits()) add_emission(points, begin, end, node);
   bound(points, begin, end, node);
   return node;
 }
@@ -209,8 +235,10 @@ HWY_EXPORT(summarise);
 
 void PointColumns::assign(std::span<const PointRecord> points, double unit) {
   stride_ = points.size() + kMaxLanes;
-  values_.resize(kColumns * stride_);
-  HWY_DYNAMIC_DISPATCH(decode_points)(points.data(), points.size(), unit, values_.data(), stride_);
+  emits_ = std::ranges::any_of(points, [](const PointRecord& p) { return p.emission != Half3{}; });
+  values_.resize((emits_ ? kColumns : kEmittedRed) * stride_);
+  HWY_DYNAMIC_DISPATCH(decode_points)
+  (points.data(), points.size(), unit, values_.data(), stride_, emits_);
 }
 
 NodeSummary summarise_points(const PointColumns& points, std::size_t begin, std::size_t end) {

@@ -11,7 +11,7 @@
 namespace ptc {
 
 /// The values of surfels, decoded once, with one column for each value.
-/// Memory: 88 bytes for each point.
+/// Memory: 88 bytes for each point, and 24 more where a point emits light.
 class PointColumns {
  public:
   /// The columns, in the order in which they lie in memory.
@@ -27,6 +27,9 @@ class PointColumns {
     kRed,       ///< radiance
     kGreen,
     kBlue,
+    kEmittedRed,  ///< emission; only when emits()
+    kEmittedGreen,
+    kEmittedBlue,
     kColumns
   };
 
@@ -40,12 +43,16 @@ class PointColumns {
     return values_.data() + k * stride_;
   }
 
+  /// Returns whether a point emits light.
+  [[nodiscard]] bool emits() const noexcept { return emits_; }
+
   /// Lanes of the widest vectors that read columns.
   static constexpr std::size_t kMaxLanes = 8;
 
  private:
   std::size_t stride_ = 0;      ///< values from one column to the next: the points and kMaxLanes
   std::vector<double> values_;  ///< column after column
+  bool emits_ = false;
 };
 
 /// Returns the summary of the points from `begin` up to `end`, with an exact bounding sphere about

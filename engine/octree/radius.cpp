@@ -17,6 +17,7 @@
 #include <nanoflann.hpp>
 
 #include "engine/base/numbers.h"
+#include "engine/sort/point_streams.h"
 
 namespace ptc {
 namespace {
@@ -98,7 +99,8 @@ class RadiusStream : public PointStream {
   RadiusStream(PointStream& sorted, double unit, std::uint64_t first, RadiusCounts& counts)
       : sorted_(sorted), unit_(unit), counts_(counts) {
     at_ = chunk_end_ = static_cast<std::size_t>(first / kChunk * kChunk - first_for_radii(first));
-    fill(chunk_end_);
+    window_.resize(chunk_end_);
+    window_.resize(read_full(sorted_, window_));
     pass_over(*this, first % kChunk);
   }
 
@@ -116,22 +118,12 @@ class RadiusStream : public PointStream {
     const std::size_t keep_from = chunk_end_ - std::min(chunk_end_, kHalo);
     window_.erase(window_.begin(), window_.begin() + static_cast<std::ptrdiff_t>(keep_from));
     const std::size_t chunk_begin = chunk_end_ - keep_from;
-    fill(chunk_begin + kChunk + kHalo);
+    const std::size_t kept = window_.size();
+    window_.resize(chunk_begin + kChunk + kHalo);
+    window_.resize(kept + read_full(sorted_, std::span(window_).subspan(kept)));
     at_ = chunk_begin;
     chunk_end_ = std::min(window_.size(), chunk_begin + kChunk);
     estimate(chunk_begin, chunk_end_);
-  }
-
-  /// Reads points until the window has `size` points or the stream ends.
-  void fill(std::size_t size) {
-    std::size_t filled = window_.size();
-    window_.resize(size);
-    while (filled < size) {
-      const std::size_t count = sorted_.next(std::span(window_).subspan(filled));
-      if (count == 0) break;
-      filled += count;
-    }
-    window_.resize(filled);
   }
 
   /// Estimates the missing radii of the window's points from `begin` up to `end`.

@@ -4,7 +4,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "engine/sort/external_sort.h"
+#include "engine/base/stream.h"
+#include "format/point_record.h"
 
 namespace ptc {
 

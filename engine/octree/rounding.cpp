@@ -71,6 +71,7 @@ class RoundedStream : public PointStream {
     point.radius = rounded_radius(point.radius);
     for (std::int16_t& component : point.normal) component = rounded_normal(component);
     for (std::uint16_t& half : point.radiance) half = rounded_radiance(half);
+    for (std::uint16_t& half : point.emission) half = rounded_radiance(half);
     point.key = rounded_key(point.key, point.radius, before);
   }
 

@@ -4,8 +4,10 @@
 
 #include <memory>
 
-#include "engine/sort/external_sort.h"
+#include "engine/base/executor.h"
+#include "engine/base/stream.h"
 #include "format/container.h"
+#include "format/point_record.h"
 
 namespace ptc {
 

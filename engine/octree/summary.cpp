@@ -94,8 +94,13 @@ NodeSummary summarise_nodes(std::span<const NodeSummary* const> nodes) {
     sum.area += node->area;
     for (std::size_t k = 0; k < 6; ++k) {
       sum.facing[k] += node->facing[k];
-      for (std::size_t c = 0; c < 3; ++c) sum.flux[k][c] += node->flux[k][c];
+      for (std::size_t c = 0; c < 3; ++c) {
+        sum.flux[k][c] += node->flux[k][c];
+        sum.power[k][c] += node->power[k][c];
+      }
     }
+    sum.emits |= node->emits;
+    sum.greatest = std::max(sum.greatest, node->greatest);
   }
   for (std::size_t k = 0; k < 3; ++k) sum.mean[k] = origin[k] + sum.mean[k] / weight;
   // Enclose the spheres, cones and slabs of the parts.

@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <latch>
 #include <mutex>
+#include <string>
+#include <system_error>
 #include <thread>
+#include <vector>
 
+#include "engine/base/error.h"
 #include "engine/parallel/tbb_arena.h"
 
 namespace ptc {
@@ -61,11 +66,37 @@ class Loop final : public TbbArena::Work {
   std::exception_ptr error_;  // the first one
 };
 
+// Throws std::system_error when the system does not let this process have that many more threads.
+// oneTBB starts its threads later, inside itself, and ends the program when one cannot be started.
+void require_threads(unsigned threads) {
+  std::latch over(1);
+  std::vector<std::thread> started;
+  const auto join = [&] {
+    over.count_down();
+    for (std::thread& thread : started) thread.join();
+  };
+  try {
+    started.reserve(threads);
+    while (started.size() < threads) started.emplace_back([&] { over.wait(); });
+  } catch (const std::system_error& error) {
+    const std::size_t count = started.size();
+    join();
+    throw std::system_error(error.code(), "starting " + std::to_string(threads) +
+                                              " threads, of which the system allows " +
+                                              std::to_string(count));
+  }
+  join();
+}
+
 }  // namespace
 
 ThreadPool::ThreadPool(unsigned threads)
-    : threads_(threads == 0 ? std::max(1U, std::thread::hardware_concurrency()) : threads),
-      arena_(threads_ == 1 ? nullptr : std::make_unique<TbbArena>(threads_)) {}
+    : threads_(threads == 0 ? std::max(1U, std::thread::hardware_concurrency()) : threads) {
+  require_request(threads_ <= kMaxThreads, "run.threads", "`run.threads` is not 0 to 4096");
+  if (threads_ == 1) return;
+  require_threads(threads_ - 1);
+  arena_ = std::make_unique<TbbArena>(threads_);
+}
 
 ThreadPool::~ThreadPool() = default;
 

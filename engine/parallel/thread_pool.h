@@ -12,7 +12,12 @@ namespace ptc {
 /// A bounded pool of threads (oneTBB). With one thread, loops run in their caller.
 class ThreadPool final : public Executor {
  public:
-  /// @param threads  0: one for each core of the machine
+  /// The maximum number of threads.
+  static constexpr unsigned kMaxThreads = 4096;
+
+  /// @param threads  0: one for each core of the machine; at most kMaxThreads
+  /// @throws RequestError that names `run.threads` for more
+  /// @throws std::system_error when the system allows fewer threads
   explicit ThreadPool(unsigned threads = 0);
   ~ThreadPool() override;
 

@@ -22,8 +22,9 @@ MemoryBudget budget_of(std::uint64_t cap_bytes, std::string job) {
 }
 
 void charge_directory(MemoryBudget& budget, const ContainerReader& container) {
-  budget.charge("the directory of " + container.path().filename().string(),
-                ContainerReader::kPageBytes * container.page_count());
+  budget.charge(
+      "the directory of " + container.path().filename().string(),
+      ContainerReader::kPageBytes * container.page_count() * (container.parts().empty() ? 1 : 2));
 }
 
 void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {

@@ -39,13 +39,20 @@ std::string lights_record(LightRig rig) {
   return to_json(rig);
 }
 
-void check_meta(const Meta& meta, std::uint8_t page_shift) {
-  const std::size_t bytes = encode_meta(meta).size();
-  const std::size_t most = (std::size_t{1} << page_shift) - kPageHeaderBytes;
+void check_page_shift(std::uint8_t page_shift) {
+  require_request(page_shift >= 12 && page_shift <= 20, "page_shift",
+                  "`page_shift` is not the logarithm of 4 KiB to 1 MiB, 12 to 20");
+}
+
+void check_meta(const Meta& meta, std::uint8_t page_shift, std::uint8_t point_bytes,
+                std::size_t reserve) {
+  check_page_shift(page_shift);
+  const std::size_t bytes = encode_meta(meta, point_bytes).size() + reserve;
+  const std::size_t most = payload_limit(page_shift);
   if (bytes <= most) return;
   throw RequestError("page_shift",
-                     fmt::format("the record of lights, inputs and channels takes {} bytes, but a "
-                                 "page holds {}: choose larger pages with `page_shift`",
+                     fmt::format("the record of lights, inputs and channels takes up to {} bytes, "
+                                 "but a page holds {}: choose larger pages with `page_shift`",
                                  bytes, most));
 }
 

@@ -2,6 +2,8 @@
 // values.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "engine/base/progress.h"
@@ -28,10 +30,17 @@ inline constexpr const char* kRoundingKey = "rounding";  ///< kRounding when poi
 /// @throws RequestError when the sky has a picture and no path
 [[nodiscard]] std::string lights_record(LightRig rig);
 
+/// Checks that pages of 2^page_shift bytes exist in the format.
+/// @throws RequestError when page_shift is not 12 to 20
+void check_page_shift(std::uint8_t page_shift);
+
 /// Checks that a meta page has room for the texts and channels of a record.
-/// @param page_shift  logarithm to the base 2 of the bytes of a page
-/// @throws RequestError when they take more than a page
-void check_meta(const Meta& meta, std::uint8_t page_shift);
+/// @param page_shift   logarithm to the base 2 of the bytes of a page
+/// @param point_bytes  FileHeader::point_bytes
+/// @param reserve     bytes that texts which are not yet in the record may add to it
+/// @throws RequestError when page_shift is not 12 to 20, or they take more than a page
+void check_meta(const Meta& meta, std::uint8_t page_shift, std::uint8_t point_bytes,
+                std::size_t reserve = 0);
 
 /// Returns true when emissive triangles lit the surfels, so that the radiance of the surfels around
 /// an emitter includes the light that it gave them.

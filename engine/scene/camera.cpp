@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/base/numbers.h"
 #include "engine/scene/json_fields.h"
 
 namespace ptc {
@@ -58,11 +59,21 @@ float Camera::pixel_angle() const {
   return static_cast<float>(std::atan(2 * half_height(*this) / height));
 }
 
+void check_camera(const Camera& camera, const char* field) {
+  const auto require = [&](bool holds, const char* text) {
+    if (!holds) throw RequestError(field, "the `" + std::string(field) + "` " + text);
+  };
+  const glm::dvec3 up(camera.up);
+  require(is_finite(camera.position) && is_finite(camera.look_at),
+          "stands or looks where a coordinate is not finite");
+  require(is_finite(up) && up != glm::dvec3(0), "has an up direction of zero or not finite");
+  require(camera.vertical_fov > 0 && camera.vertical_fov < kPi,
+          "has an angle that is not above 0 and below pi");
+  require(camera.width > 0 && camera.height > 0, "has no pixels");
+}
+
 std::string to_json(const Camera& camera) {
-  if (!is_finite(camera.position) || !is_finite(camera.look_at) ||
-      !is_finite(glm::dvec3(camera.up)) || !std::isfinite(camera.vertical_fov)) {
-    throw RequestError("camera", "a number of the `camera` is not finite");
-  }
+  check_camera(camera, "camera");
   return dump_json(Json{{"position", to_json_array(camera.position)},
                         {"look_at", to_json_array(camera.look_at)},
                         {"up", to_json_array(camera.up)},

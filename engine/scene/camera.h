@@ -42,6 +42,12 @@ struct CameraAxes {
 /// the view is nearly vertical.
 [[nodiscard]] CameraAxes axes_of(const Camera& camera);
 
+/// Checks the numbers of a camera.
+/// @param field  the member of the request that holds the camera, for the error
+/// @throws RequestError when a number is not finite, the angle is not in (0, pi), `up` is zero, or
+///         the picture has no pixels
+void check_camera(const Camera& camera, const char* field);
+
 /// Returns the JSON text of a camera, one member for each member of Camera.
 /// @throws RequestError when a member is not finite
 [[nodiscard]] std::string to_json(const Camera& camera);

@@ -20,14 +20,13 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <new>
 #include <stdexcept>
 #include <string>
 
-#include <embree3/rtcore.h>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "engine/base/embree.h"
 #include "engine/base/error.h"
 #include "engine/scene/texture.h"
 
@@ -40,36 +39,6 @@ bool is_sane(const glm::vec3& v) {
   constexpr float kMax = 1e18f;
   return std::abs(v.x) <= kMax && std::abs(v.y) <= kMax && std::abs(v.z) <= kMax;
 }
-
-// Throws the error that a device has pending, if any.
-void check_device(RTCDevice device) {
-  const RTCError error = rtcGetDeviceError(device);
-  if (error == RTC_ERROR_OUT_OF_MEMORY) {
-    // Call the program's handler first, as operator new does: Embree may call std::terminate when
-    // it has to release a scene without memory.
-    if (const std::new_handler handler = std::get_new_handler()) handler();
-    throw std::bad_alloc();
-  }
-  if (error != RTC_ERROR_NONE) {
-    throw std::runtime_error("Embree: error " + std::to_string(static_cast<int>(error)));
-  }
-}
-
-// Owns a handle that one of Embree's rtcNew... functions returned; null is allowed.
-template <typename Handle, void (*release)(Handle)>
-class Owned {
- public:
-  explicit Owned(Handle handle) : handle_(handle) {}
-  ~Owned() {
-    if (handle_ != nullptr) release(handle_);
-  }
-  Owned(const Owned&) = delete;
-  Owned& operator=(const Owned&) = delete;
-  operator Handle() const noexcept { return handle_; }
-
- private:
-  Handle handle_;
-};
 
 // Returns the unit vector along v, or the fallback when v has no direction.
 glm::dvec3 direction_of(const glm::dvec3& v, const glm::dvec3& fallback) {
@@ -125,28 +94,45 @@ Stretch inside_box(const glm::dvec3& origin, const glm::dvec3& direction, const 
   return s;
 }
 
+// Checks the numbers of a material, and that its texture has all its pixels.
+void check_material(const Material& material, const char* field) {
+  for (int k = 0; k < 3; ++k) {
+    require_request(material.albedo[k] >= 0 && material.albedo[k] <= 1, field,
+                    "mesh: the albedo of a material is not 0 to 1");
+    require_request(material.emission[k] >= 0 && std::isfinite(material.emission[k]), field,
+                    "mesh: the emission of a material is negative or not finite");
+  }
+  const Image* const image = material.texture.get();
+  require_request(
+      image == nullptr || image->pixels.size() == std::size_t{image->width} * image->height, field,
+      "mesh: a texture has another number of pixels than its size says");
+}
+
 }  // namespace
 
-void check_mesh(const Mesh& mesh) {
+void check_mesh(const Mesh& mesh, const char* field) {
   const std::size_t vertices = mesh.positions.size();
-  const auto require = [](bool holds, const char* what) {
-    if (!holds) throw RequestError("mesh", std::string("mesh: ") + what);
-  };
-  require(mesh.normals.empty() || mesh.normals.size() == vertices,
-          "the number of normals differs from that of vertices");
-  require(mesh.uvs.empty() || mesh.uvs.size() == vertices,
-          "the number of texture coordinates differs from that of vertices");
-  require(mesh.material_of.size() == mesh.triangles.size(),
-          "the number of material indices differs from that of triangles");
+  require_request(mesh.normals.empty() || mesh.normals.size() == vertices, field,
+                  "mesh: the number of normals differs from that of vertices");
+  require_request(mesh.uvs.empty() || mesh.uvs.size() == vertices, field,
+                  "mesh: the number of texture coordinates differs from that of vertices");
+  require_request(mesh.material_of.size() == mesh.triangles.size(), field,
+                  "mesh: the number of material indices differs from that of triangles");
   for (const glm::vec3& p : mesh.positions)
-    require(is_sane(p), "a position is not finite or beyond 1e18: scale the mesh");
+    require_request(is_sane(p), field,
+                    "mesh: a position is not finite or beyond 1e18: scale the mesh");
   for (const auto& corners : mesh.triangles) {
     for (const std::uint32_t corner : corners)
-      require(corner < vertices, "a triangle has a vertex index out of range");
+      require_request(corner < vertices, field, "mesh: a triangle has a vertex index out of range");
   }
   for (const std::uint16_t material : mesh.material_of) {
-    require(material < mesh.materials.size(), "a triangle has a material index out of range");
+    require_request(material < mesh.materials.size(), field,
+                    "mesh: a triangle has a material index out of range");
   }
+  require_request(std::ranges::all_of(mesh.normals, is_sane), field,
+                  "mesh: a normal is not finite or beyond 1e18");
+  require_request(fits_coordinates(mesh.origin), field, "mesh: the origin is not finite");
+  for (const Material& material : mesh.materials) check_material(material, field);
 }
 
 struct RayScene::Impl {

@@ -13,8 +13,9 @@ namespace ptc {
 
 /// Checks that a mesh can be traced: every index and array length fits, and every position is at
 /// most 1e18 from the mesh's origin on each axis.
+/// @param field  the member of the request that the mesh comes from, for the error
 /// @throws RequestError when it cannot; the message says why
-void check_mesh(const Mesh& mesh);
+void check_mesh(const Mesh& mesh, const char* field = "mesh");
 
 /// A point of a mesh's surface and the material there.
 struct SurfaceHit {

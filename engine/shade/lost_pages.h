@@ -27,8 +27,9 @@ class LostPages {
   explicit LostPages(const ContainerReader& container) : states_(container.page_count()) {}
 
   /// Reports whether a page is damaged; reads the page the first time.
-  /// @param reader  of the same container; the page that it gave before is no longer valid
-  /// @throws std::system_error; std::invalid_argument when the container has no such page
+  /// @param reader  reader of the same container that has no page pinned
+  /// @throws std::system_error; std::invalid_argument when the container has no such page;
+  ///         std::logic_error when the reader has a page pinned
   [[nodiscard]] bool contains(std::uint32_t page, PageReader& reader);
   /// Marks a page that broke a rule when it was read in another way.
   /// @param why  the rule that it broke; the first reason for a page is kept

@@ -15,6 +15,7 @@
 
 namespace ptc {
 
+/// What a shader may use, and how closely it gathers.
 struct ShadeOptions {
   std::uint64_t cache_bytes = std::uint64_t{512} << 20;  ///< page cache of all threads together
   BackEnd back_end = BackEnd::pread;
@@ -22,11 +23,11 @@ struct ShadeOptions {
   /// The radiance that arrives from a direction (unit vector) where nothing covers it, W / (m^2
   /// sr); empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;
-  /// A cache for as many threads, to read through in place of the shader's own; must outlive the
-  /// shader. Null: the shader makes its own.
+  /// A cache that the shader reads through, made for as many threads; it must outlive the shader.
+  /// With null the shader makes its own.
   PageCache* cache = nullptr;
-  /// Where damaged pages are noted, which shading then passes over; must outlive the shader. Null:
-  /// damaged pages are errors.
+  /// The place where damaged pages are noted, which shading then passes over; it must outlive the
+  /// shader. With null, damaged pages are errors.
   LostPages* lost = nullptr;
   /// How many variants there are to choose from. Each turns the direction cube and shifts the
   /// receiver cells in another way.

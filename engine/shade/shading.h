@@ -63,6 +63,15 @@ inline constexpr float kSlim = 0.5F;
 inline constexpr float kSolid = 0.55F;
 /// Share of a cluster's backs that counts where its radiance is dimmed by them.
 inline constexpr float kDark = 0.5F;
+/// Depth of the rim of the shallow paraboloid that stands for a disc, over the disc's radius. It
+/// divides coplanar overlapping discs half way between their centres (spec/shading.md#surfels):
+///
+///     nearness
+///        ^    _-~-_ _-~-_
+///        |  -      X      -       X is half way between the centres, where both discs are
+///        |-       - -       -     equally near
+///        +---------------------
+inline constexpr float kBump = 0.01F;
 
 /// Counts of the clusters that a gather drew in place of children on lost pages
 /// (spec/shading.md#damage).

@@ -73,7 +73,8 @@ void BucketLoader::split(BucketReader bucket, std::span<PointRecord> out,
   // Choose new ranges from a sample of the bucket.
   constexpr std::size_t kSamplesPerRange = 4;  // few, because each sample is a read of its own
   Splitters splitters(bucket.sample(kSamplesPerRange * ranges_, reader_), ranges_);
-  const auto partition = std::make_shared<Partition>(file_, std::move(splitters));
+  const auto partition =
+      std::make_shared<Partition>(file_, std::move(splitters), false, bucket.record_bytes());
   // Write the bucket's records again, run by run, grouped by the new ranges.
   std::vector<std::uint16_t> range_of(out.size());
   while (const std::size_t count = bucket.read(out, reader_)) {

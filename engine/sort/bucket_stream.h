@@ -14,6 +14,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/memory.h"
 #include "engine/sort/external_sort.h"
+#include "engine/sort/radix_sort.h"
 #include "engine/sort/sort_plan.h"
 #include "engine/sort/spill.h"
 

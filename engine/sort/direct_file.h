@@ -38,8 +38,7 @@ class DirectFile {
   /// kDirectBytes; if they are not, or if the file system refuses them, the file uses the page
   /// cache from then on.
   /// @throws std::system_error naming the directory or the file; DataError when the file ends
-  /// within
-  ///         the range
+  ///         within the range
   void read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
   /// Writes all of `bytes` at an offset. Alignment matters as for read_at().
   /// @throws std::system_error naming the directory or the file

@@ -8,13 +8,13 @@
 
 #include "engine/io/file/disk_space.h"
 #include "engine/sort/bucket_stream.h"
+#include "engine/sort/point_streams.h"
 #include "engine/sort/radix_sort.h"
 #include "format/checksum.h"
 
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kPassed = 1 << 14;  // records that are passed over at once
 using Digest = std::array<std::uint64_t, 2>;
 
 Digest sum(const Digest& a, const Digest& b) noexcept {
@@ -42,17 +42,6 @@ class MemoryStream final : public BlockStream {
 };
 
 }  // namespace
-
-void pass_over(PointStream& points, std::uint64_t count) {
-  std::vector<PointRecord> passed(
-      static_cast<std::size_t>(std::min<std::uint64_t>(count, kPassed)));
-  while (count > 0) {
-    const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(count, passed.size()));
-    const std::size_t now = points.next(std::span(passed).first(most));
-    if (now == 0) return;
-    count -= now;
-  }
-}
 
 ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& executor,
                                std::span<const MortonKey> sample)
@@ -108,7 +97,7 @@ std::span<std::uint16_t> ExternalSorter::ranges_of(std::span<const PointRecord> 
 
 std::uint64_t ExternalSorter::expected_spill() const noexcept {
   const bool spills = options_.expected > plan_.run_records || kept_;
-  return spills ? options_.expected * kSpilledBytes : 0;
+  return spills ? options_.expected * record_bytes() : 0;
 }
 
 void ExternalSorter::add(std::span<const PointRecord> records) {
@@ -152,7 +141,8 @@ void ExternalSorter::begin_partition() {
       std::clamp<std::size_t>(sample_.size() / kKeysPerRange, 3, plan_.ranges);
   if (sample_.empty()) sample_.emplace_back();  // no record came, and the files are kept
   if (!file_) file_.emplace(options_.temp_dirs);
-  partition_ = std::make_shared<Partition>(*file_, Splitters(std::move(sample_), ranges), kept_);
+  partition_ = std::make_shared<Partition>(*file_, Splitters(std::move(sample_), ranges), kept_,
+                                           record_bytes());
   sample_ = {};
   range_of_.resize(plan_.run_records);
   partition_->find_ranges(filling_.first(filled_), ranges_of(filling_.first(filled_)), executor_);
@@ -161,7 +151,7 @@ void ExternalSorter::begin_partition() {
 // Groups the filled part while another is filled, and writes the grouped one while that is grouped.
 void ExternalSorter::spill() {
   if (!partition_) begin_partition();
-  if (grouping_.valid()) grouping_.wait();  // it reads the part that is filled next
+  if (grouping_.valid()) grouping_.get();  // it reads the part that is filled next
   const std::span<PointRecord> records = filling_.first(filled_);
   // The first run is whole where it was not known that more would come.
   const bool whole_run = filling_.size() > part_records();
@@ -172,7 +162,7 @@ void ExternalSorter::spill() {
   };
   const bool at_once = whole_run || executor_.threads() == 1;
   grouping_ = std::async(at_once ? std::launch::deferred : std::launch::async, group).share();
-  if (at_once) grouping_.wait();
+  if (at_once) grouping_.get();
   // Direct writes leave the processor free: another thread, even if the executor has only one.
   writing_[turn_] = std::async(std::launch::async, [this, grouped, grouping = grouping_,
                                                     before = writing_[1 - turn_]] {

@@ -21,9 +21,7 @@
 
 namespace ptc {
 
-/// Reads and drops the next `count` points of a stream, or all that are left.
-void pass_over(PointStream& points, std::uint64_t count);
-
+/// What a sort may use: memory, directories, and what is known of its input.
 struct SortOptions {
   /// The cap on all memory of the sort; at least 256 KiB. Memory that the sort has no use for is
   /// not touched: see plan_sort().
@@ -33,11 +31,15 @@ struct SortOptions {
   /// The approximate number of records; 0: unknown. Records that are known not to fit in memory are
   /// spilled earlier, in as many ranges as let each range fit.
   std::uint64_t expected = 0;
+  /// Whether records may have emission; without it, the emission of a record that is spilled is
+  /// lost.
+  bool emits = false;
   /// The names of the temporary files, which then are kept and hold all records, even those that
   /// would fit in memory. Empty: the files have no names.
   std::vector<std::filesystem::path> kept_files;
 };
 
+/// What a sort did so far.
 struct SortStatistics {
   std::uint64_t points = 0;         ///< records that were added
   std::uint64_t spilled_bytes = 0;  ///< bytes written to temporary files; 0 when all fit in memory
@@ -63,8 +65,7 @@ class ExternalSorter {
   /// @param sample    keys drawn evenly from the input, in any order; a few thousand are enough.
   ///                  With fewer than 64, the first records that fill the memory are the sample
   /// @throws std::invalid_argument when the cap is below 256 KiB; std::bad_alloc; std::system_error
-  /// (ENOSPC) when
-  ///         the directories have no room for the expected records
+  ///         (ENOSPC) when the directories have no room for the expected records
   ExternalSorter(const SortOptions& options, const Executor& executor,
                  std::span<const MortonKey> sample);
   /// Resumes from the kept files of an earlier sorter. Nothing can be added; the digest and the
@@ -78,8 +79,11 @@ class ExternalSorter {
 
   /// The bytes of temporary files that the expected records take; 0 when they fit in memory.
   [[nodiscard]] std::uint64_t expected_spill() const noexcept;
+  /// The bytes that a record takes in a temporary file.
+  [[nodiscard]] std::size_t record_bytes() const noexcept {
+    return options_.emits ? kEmittingBytes : kSpilledBytes;
+  }
   /// Adds records.
-  /// @param records  have reserved bytes of 0
   /// @throws std::system_error naming the directory when records cannot be spilled, now or in the
   ///         background since an earlier call; the sorter is then of no further use
   void add(std::span<const PointRecord> records);
@@ -139,13 +143,5 @@ class ExternalSorter {
   std::shared_future<Partition::Starts> grouping_;   ///< of what was filled before
   std::array<std::shared_future<void>, 2> writing_;  ///< of what was grouped into either part
 };
-
-/// Sorts records by key in memory; stable, all 128 bits of a key count. MSD radix sort, insertion
-/// sort for small pieces. Time: linear for keys that are spread evenly, at worst one pass for each
-/// bit of a key.
-/// @param scratch  at least as many records as `records`; its content is undefined afterwards
-/// @throws std::invalid_argument when the scratch is smaller; std::bad_alloc
-void radix_sort(std::span<PointRecord> records, std::span<PointRecord> scratch,
-                const Executor& executor);
 
 }  // namespace ptc

@@ -129,8 +129,7 @@ class ClassCounts {
   /// @param from      at least one record; must outlive this
   /// @param classes   number of classes
   /// @param classify  returns the class of a record, which it is given by reference into `from`;
-  /// the
-  ///                  same each time
+  ///                  the same each time
   template <class Classify>
   ClassCounts(std::span<const PointRecord> from, std::size_t classes, std::size_t blocks,
               const Classify& classify, const Executor& executor)

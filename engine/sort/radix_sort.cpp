@@ -22,8 +22,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "engine/sort/external_sort.h"
 #include "engine/sort/partition.h"
+#include "engine/sort/radix_sort.h"
 
 namespace ptc {
 namespace {

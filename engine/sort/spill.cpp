@@ -42,17 +42,19 @@ bool is_full(const std::error_code& code) noexcept {
 
 /// Returns the checksum of the spilled bytes of records i, i+1, ... of one run's range. The
 /// checksums of consecutive pieces add up to the checksum of the whole range.
+/// @param bytes   spilled bytes of a record
 /// @param stride  bytes from one record to the next
-std::uint64_t digest_of(std::span<const std::byte> records, std::size_t stride,
+std::uint64_t digest_of(std::span<const std::byte> records, std::size_t bytes, std::size_t stride,
                         std::uint64_t i) noexcept {
-  return xxh3_64_sum(records, kSpilledBytes, stride, i);
+  return xxh3_64_sum(records, bytes, stride, i);
 }
 
 /// Restores records from their spilled bytes.
+template <std::size_t kBytes>
 void unpack(const std::byte* bytes, std::span<PointRecord> out) noexcept {
   for (std::size_t i = 0; i < out.size(); ++i) {
     PointRecord record;
-    std::memcpy(static_cast<void*>(&record), bytes + i * kSpilledBytes, kSpilledBytes);
+    std::memcpy(static_cast<void*>(&record), bytes + i * kBytes, kBytes);
     out[i] = record;
   }
 }
@@ -63,10 +65,12 @@ void read_piece(const SpillFile& file, const SpillReader::Piece& piece,
   SpillPlace place = piece.place;
   for (std::span<PointRecord> out = piece.out; !out.empty();) {
     const std::size_t count =
-        std::min(out.size(), (buffer.size() - place.offset % kDirectBytes) / kSpilledBytes);
-    const DirectRange range(place.offset, count * kSpilledBytes);
+        std::min(out.size(), (buffer.size() - place.offset % kDirectBytes) / piece.record_bytes);
+    const DirectRange range(place.offset, count * piece.record_bytes);
     file.read_at({place.volume, range.begin}, buffer.first(range.whole));
-    unpack(buffer.data() + range.lead, out.first(count));
+    const std::byte* const from = buffer.data() + range.lead;
+    piece.record_bytes == kSpilledBytes ? unpack<kSpilledBytes>(from, out.first(count))
+                                        : unpack<kEmittingBytes>(from, out.first(count));
     out = out.subspan(count);
     place.offset += range.bytes;
   }
@@ -100,9 +104,10 @@ SpillFile SpillFile::reopened(StateReader& state) {
   for (std::uint64_t count = state.get_count(kMaxVolumes); count > 0; --count) {
     const std::filesystem::path name = state.get_text();
     const auto end = state.get<std::uint64_t>();
+    std::error_code missing;
+    const bool whole = std::filesystem::file_size(name, missing) == end && !missing;
+    state.require(whole, name.string() + " is missing or does not have the recorded length");
     file.volumes_.push_back(std::make_unique<Volume>(name, DirectFile::Kept::found, end));
-    state.require(std::filesystem::file_size(name) == end,
-                  "a temporary file does not have the recorded length");
   }
   return file;
 }
@@ -192,11 +197,13 @@ void SpillReader::read(const SpillFile& file, std::span<const Piece> pieces) {
   });
 }
 
-Partition::Partition(SpillFile& file, Splitters splitters, bool kept)
-    : file_(file), splitters_(std::move(splitters)), kept_(kept) {}
+Partition::Partition(SpillFile& file, Splitters splitters, bool kept, std::size_t record_bytes)
+    : file_(file), splitters_(std::move(splitters)), kept_(kept), record_bytes_(record_bytes) {}
 
 Partition::Partition(SpillFile& file, StateReader& state)
-    : file_(file), splitters_(state), kept_(true) {
+    : file_(file), splitters_(state), kept_(true), record_bytes_(state.get<std::uint64_t>()) {
+  state.require(record_bytes_ == kSpilledBytes || record_bytes_ == kEmittingBytes,
+                "records have another size than this program writes");
   const std::uint64_t ends = ranges() + 1;
   for (std::uint64_t count = state.get<std::uint64_t>(); count > 0; --count) {
     Run& run = runs_.emplace_back();
@@ -207,13 +214,14 @@ Partition::Partition(SpillFile& file, StateReader& state)
                     "the ranges of a run do not ascend");
     }
     for (std::uint64_t i = 0; i < ranges(); ++i) run.digests.push_back(state.get<std::uint64_t>());
-    state.require(file_.holds(run.place, run.starts.back() * kSpilledBytes),
+    state.require(file_.holds(run.place, run.starts.back() * record_bytes_),
                   "a run lies past the end of its file");
   }
 }
 
 void Partition::save(StateWriter& state) const {
   splitters_.save(state);
+  state.put(std::uint64_t{record_bytes_});
   state.put(std::uint64_t{runs_.size()});
   for (const Run& run : runs_) {
     state.put(run.place.volume);
@@ -231,7 +239,7 @@ std::uint64_t Partition::size(std::size_t range) const noexcept {
 
 void Partition::discard(std::size_t range) const noexcept {
   for (const Run& run : runs_)
-    file_.discard(run.place_of(range, 0), run.size(range) * kSpilledBytes);
+    file_.discard(place_of(run, range, 0), run.size(range) * record_bytes_);
 }
 
 void Partition::find_ranges(std::span<const PointRecord> records,
@@ -257,7 +265,9 @@ Partition::Starts Partition::group_run(std::span<const PointRecord> records,
   const auto known = [&](const PointRecord& record) {
     return range_of[static_cast<std::size_t>(&record - records.data())];
   };
-  counts.scatter_packed<kSpilledBytes>(grouped.data(), known, executor);
+  record_bytes_ == kSpilledBytes
+      ? counts.scatter_packed<kSpilledBytes>(grouped.data(), known, executor)
+      : counts.scatter_packed<kEmittingBytes>(grouped.data(), known, executor);
   const std::vector<std::size_t> starts = counts.starts();
   Starts ends(starts.size());
   std::ranges::transform(starts, ends.begin(),
@@ -269,10 +279,10 @@ void Partition::write_run(std::span<const std::byte> grouped, Starts starts) {
   Run run{.place = {}, .starts = std::move(starts), .digests = {}};
   for (std::size_t range = 0; kept_ && range < ranges(); ++range) {
     const auto part =
-        grouped.subspan(run.starts[range] * kSpilledBytes, run.size(range) * kSpilledBytes);
-    run.digests.push_back(digest_of(part, kSpilledBytes, 0));
+        grouped.subspan(run.starts[range] * record_bytes_, run.size(range) * record_bytes_);
+    run.digests.push_back(digest_of(part, record_bytes_, record_bytes_, 0));
   }
-  run.place = file_.append(grouped.first(run.starts.back() * kSpilledBytes));
+  run.place = file_.append(grouped.first(run.starts.back() * record_bytes_));
   runs_.push_back(std::move(run));
 }
 
@@ -293,7 +303,10 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
   while (filled < out.size() && left_ > 0) {
     const Partition::Run& run = partition_->runs_[run_];
     const std::size_t count = std::min(run.size(range_) - at_, out.size() - filled);
-    if (count > 0) pieces.push_back({run.place_of(range_, at_), out.subspan(filled, count)});
+    if (count > 0) {
+      pieces.push_back({partition_->place_of(run, range_, at_), out.subspan(filled, count),
+                        partition_->record_bytes_});
+    }
     filled += count;
     at_ += count;
     left_ -= count;
@@ -309,7 +322,7 @@ std::size_t BucketReader::read(std::span<PointRecord> out, SpillReader& reader) 
     return filled;
   }
   for (const SpillReader::Piece& piece : pieces)
-    partition_->file_.discard(piece.place, piece.out.size() * kSpilledBytes);
+    partition_->file_.discard(piece.place, piece.out.size() * piece.record_bytes);
   return filled;
 }
 
@@ -319,11 +332,12 @@ void BucketReader::verify(std::size_t run, std::size_t at, std::span<const Point
   for (; !records.empty(); ++run, at = 0) {
     const Partition::Run& from = partition_->runs_[run];
     const std::size_t size = from.size(range_), count = std::min(size - at, records.size());
-    digest_ += digest_of(std::as_bytes(records.first(count)), sizeof(PointRecord), at);
+    digest_ += digest_of(std::as_bytes(records.first(count)), partition_->record_bytes_,
+                         sizeof(PointRecord), at);
     records = records.subspan(count);
     if (at + count < size) return;
     if (std::exchange(digest_, 0) != from.digests[range_])
-      partition_->file_.refuse(from.place_of(range_, 0), size);
+      partition_->file_.refuse(partition_->place_of(from, range_, 0), size);
   }
 }
 
@@ -336,7 +350,9 @@ std::vector<MortonKey> BucketReader::sample(std::size_t count, SpillReader& read
     for (std::size_t i = pieces.size(); i < records.size(); ++i) {
       const std::uint64_t position = sample_position(i, records.size(), size_);
       if (position >= end) break;
-      pieces.push_back({run.place_of(range_, position - begin), {&records[i], 1}});
+      pieces.push_back({partition_->place_of(run, range_, position - begin),
+                        {&records[i], 1},
+                        partition_->record_bytes_});
     }
     begin = end;
   }

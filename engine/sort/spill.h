@@ -26,8 +26,10 @@
 
 namespace ptc {
 
-/// Bytes of a record on disk: all but the reserved ones, which are last.
-inline constexpr std::size_t kSpilledBytes = offsetof(PointRecord, reserved);
+/// Bytes of a record on disk: all but the emission, which is last.
+inline constexpr std::size_t kSpilledBytes = offsetof(PointRecord, emission);
+/// Bytes of a record on disk where records may have emission.
+inline constexpr std::size_t kEmittingBytes = sizeof(PointRecord);
 
 /// Where records lie in a SpillFile.
 struct SpillPlace {
@@ -54,7 +56,7 @@ class SpillFile {
 
   /// Writes records to the volume that will then be the least full, by the room in its directory;
   /// if that has no room after all, to one of the others.
-  /// @param packed  kSpilledBytes of each record. Must begin at a multiple of kDirectBytes, in
+  /// @param packed  the record bytes of each record. Must begin at a multiple of kDirectBytes, in
   ///                memory that is readable up to the next such multiple after its end
   /// @return  where the records lie; the offset is a multiple of kDirectBytes
   /// @throws std::system_error naming the directory
@@ -97,6 +99,7 @@ class SpillReader {
   struct Piece {
     SpillPlace place;
     std::span<PointRecord> out;
+    std::size_t record_bytes;  ///< of a record in the file, kSpilledBytes or kEmittingBytes
   };
 
   /// @param buffer_bytes  buffer for all reads that run at once, at least kMinBytes
@@ -115,14 +118,18 @@ class SpillReader {
 class Partition {
  public:
   /// @param file  must outlive this
-  /// @param kept  records stay on disk after they are read, until they are discarded, and have
-  ///              checksums
-  Partition(SpillFile& file, Splitters splitters, bool kept = false);
+  /// @param kept          records stay on disk after they are read, until they are discarded, and
+  ///                      have checksums
+  /// @param record_bytes  of a record on disk, kSpilledBytes or kEmittingBytes
+  Partition(SpillFile& file, Splitters splitters, bool kept = false,
+            std::size_t record_bytes = kSpilledBytes);
   /// Loads a kept partition that save() wrote. @throws DataError when the table does not fit the
   /// file
   Partition(SpillFile& file, StateReader& state);
   /// Records the splitters and the table of runs.
   void save(StateWriter& state) const;
+  /// Returns the bytes of a record on disk.
+  [[nodiscard]] std::size_t record_bytes() const noexcept { return record_bytes_; }
 
   /// The record numbers within a run where each range begins, and the end of the last one.
   using Starts = std::vector<std::uint32_t>;
@@ -137,7 +144,7 @@ class Partition {
   /// Groups the records of a run by range, in their order within each range, and packs them as they
   /// go to disk. Threads: may run while another run is written.
   /// @param range_of  the range number of each record
-  /// @param grouped   room for kSpilledBytes of each record
+  /// @param grouped   room for record_bytes() of each record
   [[nodiscard]] Starts group_run(std::span<const PointRecord> records,
                                  std::span<const std::uint16_t> range_of,
                                  std::span<std::byte> grouped, const Executor& executor) const;
@@ -164,15 +171,18 @@ class Partition {
     [[nodiscard]] std::size_t size(std::size_t range) const noexcept {
       return starts[range + 1] - starts[range];
     }
-    /// Returns the place of the i-th record of a range in this run.
-    [[nodiscard]] SpillPlace place_of(std::size_t range, std::size_t i) const noexcept {
-      return {place.volume, place.offset + (starts[range] + i) * kSpilledBytes};
-    }
   };
+
+  /// Returns the place of the i-th record of a range in a run.
+  [[nodiscard]] SpillPlace place_of(const Run& run, std::size_t range,
+                                    std::size_t i) const noexcept {
+    return {run.place.volume, run.place.offset + (run.starts[range] + i) * record_bytes_};
+  }
 
   SpillFile& file_;
   Splitters splitters_;
   bool kept_;
+  std::size_t record_bytes_;
   std::vector<Run> runs_;
 };
 
@@ -189,6 +199,8 @@ class BucketReader {
   [[nodiscard]] std::uint64_t left() const noexcept { return left_; }
   /// Returns whether all records have the same key.
   [[nodiscard]] bool single_key() const noexcept;
+  /// Returns the bytes of a record on disk.
+  [[nodiscard]] std::size_t record_bytes() const noexcept { return partition_->record_bytes_; }
   /// Returns whether the partition is kept.
   [[nodiscard]] bool kept() const noexcept { return partition_->kept_; }
   /// Reads the next records into the front of `out`.

@@ -5,7 +5,6 @@
 #include <array>
 #include <optional>
 #include <string>
-#include <variant>
 
 #include "engine/store/structure.h"
 #include "format/checksum.h"
@@ -29,13 +28,12 @@ bool has_superblock_magic(const Block& block) {
   return std::equal(block.begin(), block.begin() + 8, example.begin());
 }
 
-using Copy = std::variant<Superblock, FormatError>;
-
-Copy decode_copy(const Block& block, const FileHeader& header, std::uint64_t file_bytes) {
+bool is_superblock(const Block& block, const FileHeader& header, std::uint64_t file_bytes) {
   try {
-    return decode_superblock(block, header, file_bytes);
-  } catch (const FormatError& error) {
-    return error;
+    static_cast<void>(decode_superblock(block, header, file_bytes));
+    return true;
+  } catch (const FormatError&) {
+    return false;
   }
 }
 
@@ -46,46 +44,52 @@ Copy decode_copy(const Block& block, const FileHeader& header, std::uint64_t fil
                         " than its superblock says");
 }
 
-[[noreturn]] void refuse_damaged(std::uint64_t offset, const FormatError& error) {
-  throw FormatError(offset + error.offset(), error.clause(),
-                    "no superblock is whole: " + error.text());
+[[noreturn]] void refuse_without_superblock(std::uint64_t size) {
+  throw FormatError(size, kMagic, "no superblock at the end: the file is unfinished or truncated");
 }
 
-/// Which of the two copies to trust, when the file has the length for them.
-std::optional<Superblock> trusted_copy(std::uint64_t offset, const std::array<Block, 2>& blocks,
-                                       const std::array<Copy, 2>& copies) {
-  const auto* first = std::get_if<Superblock>(&copies[0]);
-  const auto* second = std::get_if<Superblock>(&copies[1]);
-  if (first != nullptr && second != nullptr && blocks[0] != blocks[1]) {
-    throw FormatError(offset, kCopies, "the two superblocks differ");
+/// Decodes the copy to trust of two at the end of a file, or explains why there is none.
+/// @param offset  of the first copy
+/// @throws FormatError with an offset in the file
+Superblock trusted_copy(const InputFile& file, const FileHeader& header, std::uint64_t offset,
+                        const std::array<Block, 2>& blocks) {
+  const std::optional<std::size_t> whole = whole_superblock(offset, blocks[0], blocks[1]);
+  const std::size_t copy = whole.value_or(has_superblock_magic(blocks[0]) ? 0 : 1);
+  try {
+    return decode_superblock(blocks[copy], header, file.size());
+  } catch (const FormatError& error) {
+    // A superblock of another length explains what is wrong, unless a whole one has this length.
+    if (!whole || error.clause() == kLength) {
+      if (const auto length = committed_length(file, header)) refuse_length(file.size(), *length);
+    }
+    if (!whole && !has_superblock_magic(blocks[copy])) refuse_without_superblock(file.size());
+    throw FormatError(offset + copy * kBlockBytes + error.offset(), error.clause(),
+                      std::string(whole ? "" : "no superblock is whole: ") + error.text());
   }
-  if (first != nullptr) return *first;
-  if (second != nullptr) return *second;
-  return std::nullopt;
 }
 
 Superblock choose_superblock(const InputFile& file, const FileHeader& header) {
   const std::uint64_t size = file.size();
-  std::array<Block, 2> blocks{};
-  std::array<Copy, 2> copies{Superblock{}, Superblock{}};
-  const bool room = size % kBlockBytes == 0 && size >= 3 * kBlockBytes;
-  const std::uint64_t offset = room ? size - 2 * kBlockBytes : 0;
-  if (room) {
-    for (std::size_t i = 0; i < 2; ++i) {
-      blocks[i] = read_block(file, offset + i * kBlockBytes);
-      copies[i] = decode_copy(blocks[i], header, size);
-    }
-    if (auto superblock = trusted_copy(offset, blocks, copies)) return *std::move(superblock);
+  if (size % kBlockBytes != 0 || size < 3 * kBlockBytes) {
+    if (const auto length = committed_length(file, header)) refuse_length(size, *length);
+    refuse_without_superblock(size);
   }
-  if (const auto length = committed_length(file, header)) refuse_length(size, *length);
-  for (std::size_t i = 0; room && i < 2; ++i) {
-    if (!has_superblock_magic(blocks[i])) continue;
-    refuse_damaged(offset + i * kBlockBytes, std::get<FormatError>(copies[i]));
-  }
-  throw FormatError(size, kMagic, "no superblock at the end: the file is unfinished or truncated");
+  const std::uint64_t offset = size - 2 * kBlockBytes;
+  return trusted_copy(file, header, offset,
+                      {read_block(file, offset), read_block(file, offset + kBlockBytes)});
 }
 
 }  // namespace
+
+std::optional<std::size_t> whole_superblock(std::uint64_t offset, std::span<const std::byte> first,
+                                            std::span<const std::byte> second) {
+  const bool whole = is_whole_superblock(first);
+  if (!is_whole_superblock(second)) return whole ? std::optional<std::size_t>(0) : std::nullopt;
+  if (!whole) return 1;
+  if (!std::ranges::equal(first, second))
+    throw FormatError(offset, kCopies, "the two superblocks differ");
+  return 0;
+}
 
 FileHeader read_file_header(const InputFile& file) {
   Block block;
@@ -105,7 +109,7 @@ std::optional<std::uint64_t> committed_length(const InputFile& file, const FileH
     const Block block = read_block(file, offset);
     if (!has_superblock_magic(block)) continue;
     for (const std::uint64_t length : {offset + kBlockBytes, offset + 2 * kBlockBytes}) {
-      if (std::holds_alternative<Superblock>(decode_copy(block, header, length))) return length;
+      if (is_superblock(block, header, length)) return length;
     }
   }
   return std::nullopt;
@@ -124,8 +128,7 @@ void read_directory_page(const InputFile& file, const Superblock& superblock, st
   file.read_at(offset + kPageHeaderBytes, out);
   at_offset(file, offset, [&] {
     const PageHeader page = decode_page_header(image, superblock.header);
-    if (page.type != PageType::directory || page.page_id != superblock.page_count + index ||
-        page.raw_bytes != out.size()) {
+    if (page.type != PageType::directory || page.rank != index || page.raw_bytes != out.size()) {
       throw FormatError(0, kDirectoryPages, "not the directory page that belongs here");
     }
     if (xxh3_64(out) != page.payload_xxh3) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <vector>
 
@@ -12,32 +13,51 @@
 
 namespace ptc {
 
-/// A directory as it grows, kept on the disk as it will be written: pages are numbered before they
-/// are, and lie in any order, so that what memory holds of a page until the end is one bit.
-/// Threads: may be called concurrently.   Memory: a bit a page.
+/// The directory of a container that grows. Pages of each type and channel group are counted before
+/// they are written, and lie in any order in the file; their entries are kept on the disk, encoded.
+///
+/// Threads: all functions may be called concurrently.   Memory: one bit for each page.
 class EntryTable {
  public:
-  /// @param directory  for a nameless file of 32 bytes a page. @throws std::system_error
-  explicit EntryTable(const std::filesystem::path& directory) : file_(directory) {}
+  /// Begins an empty table.
+  /// @param directory  gets a nameless file for each type and group, of 40 bytes for each page
+  explicit EntryTable(std::filesystem::path directory) : directory_(std::move(directory)) {}
 
-  /// Makes it longer by pages that have no entry yet.
-  /// @return  number of the first. @throws RequestError when that would be more than kMaxPages
-  std::uint32_t add(std::uint32_t pages);
+  /// Adds pages of a type and group that have no entry yet.
+  /// @return  the rank of the first one
+  /// @throws RequestError when the container would have more than kMaxPages pages;
+  /// std::system_error
+  std::uint32_t add(PageType type, std::uint8_t group, std::uint32_t pages);
+  /// Returns the number of pages of a type and group.
+  [[nodiscard]] std::uint32_t size(PageType type, std::uint8_t group = 0) const;
+  /// Returns the number of all pages.
   [[nodiscard]] std::uint32_t size() const;
-  /// True when set() was called for the page. @throws std::out_of_range for a page that was not
-  /// added
-  [[nodiscard]] bool has(std::uint32_t page) const;
-  /// True when set() was called for every page.
+  /// Says whether a page was added and set() not called for it.
+  [[nodiscard]] bool awaits(PageType type, std::uint8_t group, std::uint32_t rank) const;
+  /// Says whether set() was called for every page.
   [[nodiscard]] bool complete() const;
-  /// @throws std::out_of_range for a page that was not added; std::system_error
-  void set(std::uint32_t page, const DirectoryEntry& entry);
-  /// The entries of all pages, encoded: every one must have been set. @throws std::system_error
+  /// Sets the entry of the page of this rank among those of its type and group.
+  /// @pre awaits()
+  /// @throws std::system_error
+  void set(std::uint32_t rank, const DirectoryEntry& entry);
+  /// Returns the encoded entries of all pages, in the order of the directory.
+  /// @pre complete()
+  /// @throws std::system_error
   [[nodiscard]] std::vector<std::byte> encoded() const;
 
  private:
+  /// The pages of one type and group.
+  struct Kind {
+    explicit Kind(const std::filesystem::path& directory) : file(directory) {}
+    std::vector<bool> has;
+    TempFile file;
+  };
+  [[nodiscard]] const Kind* find(PageType type, std::uint8_t group) const;
+
   mutable std::mutex mutex_;
-  std::vector<bool> has_;
-  TempFile file_;
+  std::filesystem::path directory_;
+  std::map<unsigned, Kind> kinds_;  ///< in the order of the directory
+  std::uint64_t pages_ = 0;
 };
 
 }  // namespace ptc

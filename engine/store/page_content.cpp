@@ -12,39 +12,42 @@ namespace ptc {
 namespace {
 
 constexpr char kReferences[] = "spec/nodes.md#references";
+constexpr char kTop[] = "spec/parts.md#parts-top";
 
 /// Every interior child is a group that exists: who follows a reference has only to check that
 /// levels increase.
-void verify_references(const NodePage& nodes, std::span<const DirectoryEntry> entries) {
+void verify_references(const NodePage& nodes, const PageRules& rules) {
   for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
     const GroupView group = nodes[slot];
     for (unsigned rest = group.interior_mask(); rest != 0; rest &= rest - 1) {
       const ChildRef child = group.child(std::countr_zero(rest));
-      const DirectoryEntry& target = entries[child.page];
-      if (target.type == PageType::node && child.slot < target.record_count) continue;
-      throw FormatError(0, kReferences,
+      if (child.slot < rules.node_pages[child.page].record_count) continue;
+      throw FormatError(0, child.page < rules.own_pages ? kReferences : kTop,
                         "group " + std::to_string(slot) + " refers to group " +
-                            std::to_string(child.slot) + " of page " + std::to_string(child.page) +
-                            ", which there is not");
+                            std::to_string(child.slot) + " of node page " +
+                            std::to_string(child.page) + ", which there is not");
     }
   }
 }
 
 void verify_content(const PageHeader& page, std::span<const std::byte> payload,
                     const PageRules& rules) {
-  if (page.type == PageType::point) PointPage(payload, page.record_count).verify();
+  if (page.type == PageType::point)
+    PointPage(payload, page.record_count, rules.point_bytes).verify();
   if (page.type != PageType::node) return;
-  if (rules.entries.empty()) {
-    static_cast<void>(
-        NodePage(payload, page.record_count, kNoPage, std::numeric_limits<std::uint64_t>::max()));
+  const bool may_emit = rules.point_bytes != kPointBytes;
+  if (rules.node_pages.empty()) {
+    constexpr auto kAny = std::numeric_limits<std::uint64_t>::max();
+    static_cast<void>(NodePage(payload, page.record_count, kNoPage, kAny, may_emit));
     return;
   }
-  const auto pages = static_cast<std::uint32_t>(rules.entries.size());
-  verify_references(NodePage(payload, page.record_count, pages, rules.points), rules.entries);
+  const auto pages = static_cast<std::uint32_t>(rules.node_pages.size());
+  verify_references(NodePage(payload, page.record_count, pages, rules.points, may_emit), rules);
 }
 
 PayloadColumns columns_of(const PageHeader& page, const PageRules& rules) {
-  if (page.type == PageType::point) return {page.record_count, packed_point_columns()};
+  if (page.type == PageType::point)
+    return {page.record_count, packed_point_columns(rules.point_bytes)};
   if (rules.columns == nullptr) return {page.record_count, {}};
   const auto found = rules.columns->find(page.group);
   if (found == rules.columns->end()) return {page.record_count, {}};

@@ -14,27 +14,30 @@
 
 namespace ptc {
 
-/// Columns of the attribute pages of each channel group.
-using GroupColumns = std::map<std::uint16_t, std::vector<PackedColumn>>;
+/// The columns of the attribute pages of each channel group, by group.
+using GroupColumns = std::map<std::uint8_t, std::vector<PackedColumn>>;
+/// Returns the columns of all groups of a schema.
 [[nodiscard]] GroupColumns columns_by_group(const Meta& meta);
 
-/// What the pages of a file are held to.
+/// What the payloads of a file are checked against.
 struct PageRules {
-  std::span<const DirectoryEntry>
-      entries;               ///< where references may lead; empty: that is not looked at
-  std::uint64_t points = 0;  ///< leaves end at or before
-  const GroupColumns* columns = nullptr;  ///< null: none
+  std::uint8_t point_bytes = kPointBytes;  ///< FileHeader::point_bytes
+  /// Node pages that references may lead to; empty: references are not checked.
+  std::span<const DirectoryEntry> node_pages;
+  std::uint32_t own_pages = kNoPage;      ///< ranks from here on are those of parts (spec/parts.md)
+  std::uint64_t points = 0;               ///< number of points, where the last leaf ends
+  const GroupColumns* columns = nullptr;  ///< of attribute pages; null: these have no columns
 };
 
 /// Decodes a payload whose checksum is right. Point and node pages pass the checks of
 /// PointPage::verify() and NodePage, and each child that a node page refers to exists.
-/// @param out  the first raw_bytes of it are filled
-/// @throws FormatError, its offset from the page's header on
+/// @param out  receives the payload in its first raw_bytes
+/// @throws FormatError whose offset counts from the start of the page's header
 void decode_payload(const PageHeader& page, std::span<const std::byte> stored,
                     const PageRules& rules, std::span<std::byte> out, PageDecoder& decoder);
 
-/// Errors inside a decoded payload, offsets from its header on: they name the byte only when it is
-/// stored as it is.
+/// Returns an error in a decoded payload with its offset counted from the page's header. The offset
+/// is that of the byte at fault when the payload is stored raw, else that of the payload.
 [[nodiscard]] FormatError placed_in_page(const FormatError& error, const PageHeader& page);
 
 }  // namespace ptc

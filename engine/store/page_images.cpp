@@ -12,7 +12,8 @@
 namespace ptc {
 
 PageSummary summary_of(const PageHeader& page) noexcept {
-  return {page.type, page.group, page.level, page.record_count, page.first_key, page.last_key};
+  return {page.type,         page.group,     page.rank,    page.level,
+          page.record_count, page.first_key, page.last_key};
 }
 
 void require_of_writer(bool holds, const char* text) {
@@ -25,28 +26,27 @@ void PageImages::prepare(unsigned threads) {
   }
 }
 
-void PageImages::encode(std::uint32_t page, const PageSummary& summary,
-                        std::span<const std::byte> payload, std::span<const PackedColumn> columns,
-                        unsigned thread, PageImage& image) const {
-  const std::size_t limit = (std::size_t{1} << header_.page_shift) - kPageHeaderBytes;
-  require_of_writer(!payload.empty() && payload.size() <= limit,
-                    "a payload that is empty or longer than a page");
-  if (summary.type == PageType::point) columns = packed_point_columns();
-  Encoding& with = *encodings_[thread];
-  const Coding coding = with.encoder.encode(payload, with.stored, {summary.record_count, columns});
-  take(page, summary, coding, static_cast<std::uint32_t>(payload.size()), with.stored, image);
+bool PageImages::fits_page(std::span<const std::byte> payload) const noexcept {
+  return !payload.empty() && payload.size() <= payload_limit(header_.page_shift);
 }
 
-void PageImages::take(std::uint32_t page, const PageSummary& summary, Coding coding,
-                      std::uint32_t raw_bytes, std::span<const std::byte> stored,
-                      PageImage& image) const {
-  const std::size_t limit = (std::size_t{1} << header_.page_shift) - kPageHeaderBytes;
-  require_of_writer(!stored.empty() && stored.size() <= limit,
-                    "a stored payload that is empty or longer than a page");
+void PageImages::encode(const PageSummary& summary, std::span<const std::byte> payload,
+                        std::span<const PackedColumn> columns, unsigned thread,
+                        PageImage& image) const {
+  require_of_writer(fits_page(payload), "a payload that is empty or longer than a page");
+  if (summary.type == PageType::point) columns = packed_point_columns(header_.point_bytes);
+  Encoding& with = *encodings_[thread];
+  const Coding coding = with.encoder.encode(payload, with.stored, {summary.record_count, columns});
+  take(summary, coding, static_cast<std::uint32_t>(payload.size()), with.stored, image);
+}
+
+void PageImages::take(const PageSummary& summary, Coding coding, std::uint32_t raw_bytes,
+                      std::span<const std::byte> stored, PageImage& image) const {
+  require_of_writer(fits_page(stored), "a stored payload that is empty or longer than a page");
   image.page = {};
   image.page.type = summary.type;
   image.page.coding = coding;
-  image.page.page_id = page;
+  image.page.rank = summary.rank;
   image.page.stored_bytes = static_cast<std::uint32_t>(stored.size());
   image.page.raw_bytes = raw_bytes;
   image.page.group = summary.group;
@@ -57,11 +57,7 @@ void PageImages::take(std::uint32_t page, const PageSummary& summary, Coding cod
   image.page.payload_xxh3 = xxh3_64(stored);
   image.bytes.resize(extent_bytes(image.page.stored_bytes));
   encode_page_header(image.page, header_.uuid, std::span(image.bytes).first<kPageHeaderBytes>());
-  try {
-    static_cast<void>(decode_page_header(image.bytes, header_));
-  } catch (const FormatError& error) {
-    require_of_writer(false, error.what());
-  }
+  refuse_what_readers_refuse([&] { static_cast<void>(decode_page_header(image.bytes, header_)); });
   const auto rest = std::ranges::copy(stored, image.bytes.begin() + kPageHeaderBytes).out;
   std::fill(rest, image.bytes.end(), std::byte{0});
 }

@@ -5,8 +5,7 @@
 
 namespace ptc {
 
-PointScan::PointScan(const ContainerReader& container, std::span<const std::uint32_t> pages,
-                     OnDamage on_damage)
+PointScan::PointScan(const ContainerReader& container, PageNumbers::Range pages, OnDamage on_damage)
     : container_(container),
       pages_(pages),
       on_damage_(std::move(on_damage)),

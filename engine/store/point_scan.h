@@ -19,19 +19,18 @@ namespace ptc {
 ///     while (scan.next()) use(scan.points());
 class PointScan {
  public:
-  /// Is told the number of a damaged page and what is wrong with it.
+  /// Receives the number of a damaged page and what is wrong with it.
   using OnDamage = std::function<void(std::uint32_t page, const FormatError& error)>;
 
-  /// A scan over all point pages, in order.
+  /// Begins a scan over all point pages, in order.
   /// @param container  must outlive the scan
   /// @param on_damage  when given, a damaged page is no error: it is reported here, and whole() is
   ///                   false
   explicit PointScan(const ContainerReader& container, OnDamage on_damage = {})
       : PointScan(container, container.point_pages(), std::move(on_damage)) {}
-  /// A scan over some point pages.
-  /// @param pages  numbers of point pages; must outlive the scan
-  PointScan(const ContainerReader& container, std::span<const std::uint32_t> pages,
-            OnDamage on_damage = {});
+  /// Begins a scan over some point pages.
+  /// @param pages  numbers of point pages
+  PointScan(const ContainerReader& container, PageNumbers::Range pages, OnDamage on_damage = {});
 
   /// Reads the next page.
   /// @return false at the end
@@ -50,11 +49,13 @@ class PointScan {
   /// False when that page is damaged, so that it has no points().
   [[nodiscard]] bool whole() const noexcept { return whole_; }
   /// The points of that page, valid until the next call of next().
-  [[nodiscard]] PointPage points() const { return {payload_.data(), count_}; }
+  [[nodiscard]] PointPage points() const {
+    return {payload_.data(), count_, container_.header().point_bytes};
+  }
 
  private:
   const ContainerReader& container_;
-  std::span<const std::uint32_t> pages_;
+  PageNumbers::Range pages_;
   OnDamage on_damage_;
   std::vector<std::byte> payload_;
   PageDecoder decoder_;

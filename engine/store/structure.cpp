@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <numeric>
-#include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "format/error.h"
 #include "format/node_page.h"
@@ -14,6 +15,8 @@
 namespace ptc {
 namespace {
 
+constexpr char kListing[] = "spec/container.md#directory-listing";
+constexpr char kTail[] = "spec/container.md#tail-pages";
 constexpr char kOverlap[] = "spec/container.md#directory-overlap";
 constexpr char kMeta[] = "spec/container.md#meta-page";
 constexpr char kRoot[] = "spec/container.md#superblock-root";
@@ -39,23 +42,63 @@ class Blame {
   const Superblock& superblock_;
 };
 
+/// Returns the pages of a superblock's counts; the groups are not needed for their places.
+PageNumbers places_of(const Superblock& superblock) {
+  return {superblock, {}};
+}
+
 std::uint64_t count_records(std::span<const DirectoryEntry> entries,
-                            std::span<const std::uint32_t> pages) {
+                            const PageNumbers::Range& pages) {
   // No overflow: fewer than 2^32 pages of less than 2^32 records.
   return std::accumulate(
       pages.begin(), pages.end(), std::uint64_t{0},
       [&](std::uint64_t sum, std::uint32_t page) { return sum + entries[page].record_count; });
 }
 
-/// Each page lies between header and superblocks: that much its entry alone has shown.
+/// Each page has the type and group of its place. Attribute pages of a group stand together, and
+/// groups ascend.
+void verify_listing(const Superblock& superblock, std::span<const DirectoryEntry> entries,
+                    const Blame& blame) {
+  const PageNumbers places = places_of(superblock);
+  for (std::uint32_t page = 0; page < entries.size(); ++page) {
+    const DirectoryEntry& entry = entries[page];
+    PageType wanted = PageType::attribute;
+    std::uint8_t least = 0;
+    if (places.points().contains(page)) {
+      wanted = PageType::point;
+    } else if (places.nodes().contains(page)) {
+      wanted = PageType::node;
+    } else if (page >= places.others().first) {
+      if (page == places.meta()) continue;  // verify_meta_page() looks at it
+      const bool parts = entry.type == PageType::parts &&
+                         (superblock.header.feature_incompat & kPartsFeature) != 0;
+      const bool ordered = page == places.others().first || entries[page - 1].type <= entry.type;
+      if ((parts || is_skippable(entry.type)) && ordered) continue;
+      blame.entry(page, kListing, "has no place behind the node pages");
+    } else if (page % superblock.point_pages != 0) {
+      least = entries[page - 1].group;  // the group of the page before it
+      if (entry.group != least) blame.entry(page, kListing, "is of another group than its place");
+    } else if (page > superblock.point_pages && entry.group <= entries[page - 1].group) {
+      blame.entry(page, kListing, "begins a group that does not ascend");
+    }
+    if (entry.type != wanted) blame.entry(page, kListing, "is of another type than its place");
+  }
+}
+
+/// Each page lies between header and superblocks: that much its entry alone has shown. Pages of the
+/// tail lie behind the directory, one after another: that the superblock's decoder has shown.
 void verify_extents(const Superblock& superblock, std::span<const DirectoryEntry> entries,
                     const Blame& blame) {
-  std::vector<std::uint32_t> order(entries.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::ranges::sort(order, {}, [&](std::uint32_t page) { return entries[page].offset; });
+  const auto body = entries.first(entries.size() - superblock.tail.size());
+  std::vector<std::uint32_t> order;
+  order.reserve(body.size());
+  for (std::uint32_t page = 0; page < body.size(); ++page) {
+    if (!body[page].is_void()) order.push_back(page);
+  }
+  std::ranges::sort(order, {}, [&](std::uint32_t page) { return body[page].offset; });
   std::uint64_t free_from = kBlockBytes;
   for (const std::uint32_t page : order) {
-    const DirectoryEntry& entry = entries[page];
+    const DirectoryEntry& entry = body[page];
     if (entry.offset < free_from) blame.entry(page, kOverlap, "overlaps another page");
     free_from = entry.offset + extent_bytes(entry.stored_bytes);
     if (free_from > superblock.directory_offset) {
@@ -64,27 +107,35 @@ void verify_extents(const Superblock& superblock, std::span<const DirectoryEntry
   }
 }
 
-void verify_meta_page(const Superblock& superblock, std::span<const DirectoryEntry> entries,
-                      const Blame& blame) {
-  if (entries[superblock.meta_page].type != PageType::meta) {
-    blame.superblock(kMeta, "the meta page it names is none");
+/// The superblock repeats the last entries.
+void verify_tail(const Superblock& superblock, std::span<const DirectoryEntry> entries,
+                 const Blame& blame) {
+  if (!std::ranges::equal(entries.last(superblock.tail.size()), superblock.tail)) {
+    blame.superblock(kTail, "the tail that it lists is not the end of the directory");
   }
+}
+
+void verify_meta_page(std::span<const DirectoryEntry> entries, const Blame& blame) {
   for (std::uint32_t page = 0; page < entries.size(); ++page) {
-    if (entries[page].type == PageType::meta && page != superblock.meta_page) {
-      blame.entry(page, kMeta, "is a second meta page");
-    }
+    const bool last = page + 1 == entries.size();
+    if ((entries[page].type == PageType::meta) == last) continue;
+    blame.entry(page, kMeta, last ? "is the last one, and no meta page" : "is a second meta page");
   }
 }
 
 void verify_counts(const Superblock& superblock, std::span<const DirectoryEntry> entries,
-                   const PageIndex& index, const Blame& blame) {
+                   const Blame& blame) {
   const auto same = [&](const char* what, std::uint64_t said, std::uint64_t found) {
     if (said == found) return;
     blame.superblock(kCounts, "superblock says " + std::to_string(said) + " " + what +
                                   ", the directory has " + std::to_string(found));
   };
-  same("points", superblock.points, count_records(entries, index.points));
-  same("node groups", superblock.node_groups, count_records(entries, index.nodes));
+  const PageNumbers places = places_of(superblock);
+  // Those of a scene of parts are checked once its parts are open.
+  if ((superblock.header.feature_incompat & kPartsFeature) == 0) {
+    same("points", superblock.points, count_records(entries, places.points()));
+    same("node groups", superblock.node_groups, count_records(entries, places.nodes()));
+  }
   if (superblock.nodes > superblock.node_groups * kMaxChildren) {
     blame.superblock(kCounts, "superblock says " + std::to_string(superblock.nodes) + " nodes in " +
                                   std::to_string(superblock.node_groups) + " groups");
@@ -94,8 +145,8 @@ void verify_counts(const Superblock& superblock, std::span<const DirectoryEntry>
 void verify_root(const Superblock& superblock, std::span<const DirectoryEntry> entries,
                  const Blame& blame) {
   if (superblock.points == 0) return;
-  const DirectoryEntry& root = entries[superblock.root_page];
-  if (root.type != PageType::node || superblock.root_slot >= root.record_count) {
+  const DirectoryEntry& root = entries[places_of(superblock).nodes()[superblock.root_page]];
+  if (superblock.root_slot >= root.record_count) {
     blame.superblock(kRoot, "the root group it names is in no node page");
   }
 }
@@ -109,37 +160,28 @@ void verify_digest(const Superblock& superblock, std::span<const DirectoryEntry>
 
 /// The page and place of a point follow from its number.
 void verify_point_pages(const Superblock& superblock, std::span<const DirectoryEntry> entries,
-                        const PageIndex& index, const Blame& blame) {
+                        const Blame& blame) {
   const std::uint32_t full = points_per_page(superblock.header);
-  if (superblock.points != 0 && superblock.points_per_page != full) {
-    blame.superblock(kPointPages, "superblock says " + std::to_string(superblock.points_per_page) +
-                                      " points a page, pages of this size hold " +
-                                      std::to_string(full));
-  }
-  for (const std::uint32_t page : index.points) {
+  for (std::uint32_t page = 0; page < superblock.point_pages; ++page) {
     const std::uint32_t count = entries[page].record_count;
-    if (count == full || (count < full && page == index.points.back())) continue;
+    if (count == full || (count < full && page + 1 == superblock.point_pages)) continue;
     blame.entry(page, kPointPages,
                 "holds " + std::to_string(count) + " points instead of " + std::to_string(full));
   }
 }
 
-void verify_group(std::span<const DirectoryEntry> entries, const PageIndex& index,
-                  std::span<const std::uint32_t> pages, std::size_t point_bytes,
-                  const Blame& blame) {
-  for (std::size_t k = 0; k < pages.size(); ++k) {
-    const DirectoryEntry& entry = entries[pages[k]];
-    if (k >= index.points.size()) {
-      blame.entry(pages[k], kAttributePages, "has attributes of no point page");
-    }
-    const std::uint32_t count = entries[index.points[k]].record_count;
+void verify_group(std::span<const DirectoryEntry> entries, const PageNumbers::Range& pages,
+                  std::size_t point_bytes, const Blame& blame) {
+  for (std::uint32_t rank = 0; rank < pages.count; ++rank) {
+    const DirectoryEntry& entry = entries[pages[rank]];
+    const std::uint32_t count = entries[rank].record_count;
     if (entry.record_count != count) {
-      blame.entry(pages[k], kAttributePages,
+      blame.entry(pages[rank], kAttributePages,
                   "has attributes of " + std::to_string(entry.record_count) +
                       " points, its point page has " + std::to_string(count));
     }
-    if (entry.raw_bytes != std::uint64_t{count} * point_bytes) {
-      blame.entry(pages[k], kAttributePages, "is not as long as its channels are");
+    if (!entry.is_void() && entry.raw_bytes != std::uint64_t{count} * point_bytes) {
+      blame.entry(pages[rank], kAttributePages, "is not as long as its channels are");
     }
   }
 }
@@ -160,53 +202,56 @@ std::uint64_t entry_offset(const Superblock& superblock, std::uint32_t page) noe
          std::uint64_t{page % per_page} * kDirectoryEntryBytes;
 }
 
-PageIndex index_pages(std::span<const DirectoryEntry> entries) {
-  PageIndex index;
-  const auto count = [&](PageType type) {
-    return static_cast<std::size_t>(std::ranges::count(entries, type, &DirectoryEntry::type));
-  };
-  index.points.reserve(count(PageType::point));
-  index.nodes.reserve(count(PageType::node));
-  for (std::uint32_t page = 0; page < entries.size(); ++page) {
-    const DirectoryEntry& entry = entries[page];
-    if (entry.type == PageType::point) index.points.push_back(page);
-    if (entry.type == PageType::node) index.nodes.push_back(page);
-    if (entry.type == PageType::attribute) index.attributes[entry.group].push_back(page);
-  }
-  return index;
+PageNumbers page_numbers(const Superblock& superblock, std::span<const DirectoryEntry> entries) {
+  std::vector<std::uint8_t> groups;
+  for (std::uint32_t j = 1; j <= superblock.attribute_groups && superblock.point_pages > 0; ++j)
+    groups.push_back(entries[std::size_t{j} * superblock.point_pages].group);
+  return {superblock, std::move(groups)};
 }
 
-void verify_pages(const Superblock& superblock, std::span<const DirectoryEntry> entries,
-                  const PageIndex& index) {
+std::uint32_t rank_of(const PageNumbers& numbers, std::span<const DirectoryEntry> entries,
+                      std::uint32_t page) {
+  const std::uint32_t points = numbers.points().count;
+  if (page < numbers.nodes().first) return page % points;
+  if (page < numbers.others().first) return page - numbers.nodes().first;
+  if (page == numbers.meta()) return 0;
+  // Pages between node pages and meta page stand by ascending type.
+  const auto others = entries.subspan(numbers.others().first, numbers.others().count);
+  const auto first =
+      std::ranges::lower_bound(others, entries[page].type, {}, &DirectoryEntry::type);
+  return page - numbers.others().first - static_cast<std::uint32_t>(first - others.begin());
+}
+
+void verify_pages(const Superblock& superblock, std::span<const DirectoryEntry> entries) {
   const Blame blame(superblock);
+  verify_listing(superblock, entries, blame);
   verify_extents(superblock, entries, blame);
-  verify_meta_page(superblock, entries, blame);
-  verify_counts(superblock, entries, index, blame);
+  verify_meta_page(entries, blame);
+  verify_tail(superblock, entries, blame);
+  verify_counts(superblock, entries, blame);
   verify_root(superblock, entries, blame);
   verify_digest(superblock, entries, blame);
-  verify_point_pages(superblock, entries, index, blame);
+  verify_point_pages(superblock, entries, blame);
 }
 
 void verify_attributes(const Superblock& superblock, std::span<const DirectoryEntry> entries,
-                       const PageIndex& index, const Meta& meta) {
+                       const Meta& meta) {
   const Blame blame(superblock);
-  std::set<std::uint16_t> groups;
-  for (const Channel& channel : meta.channels) groups.insert(channel.group);
-  for (const auto& [group, pages] : index.attributes) {
-    if (!groups.contains(group)) {
-      blame.entry(
-          pages.front(), kAttributePages,
-          "is of channel group " + std::to_string(group) + ", which the meta page does not name");
-    }
-    verify_group(entries, index, pages, group_point_bytes(meta.channels, group), blame);
+  const std::vector<std::uint8_t> groups = channel_groups(meta.channels);
+  if (groups.size() != superblock.attribute_groups) {
+    blame.superblock(kAttributePages,
+                     "the superblock counts " + std::to_string(superblock.attribute_groups) +
+                         " channel groups, the meta page has " + std::to_string(groups.size()));
   }
-  for (const std::uint16_t group : groups) {
-    const auto found = index.attributes.find(group);
-    const std::size_t count = found == index.attributes.end() ? 0 : found->second.size();
-    if (count == index.points.size()) continue;
-    blame.superblock(kAttributePages, "channel group " + std::to_string(group) + " has " +
-                                          std::to_string(count) + " pages for " +
-                                          std::to_string(index.points.size()) + " point pages");
+  const PageNumbers numbers(superblock, groups);
+  for (const std::uint8_t group : groups) {
+    const PageNumbers::Range pages = numbers.attributes(group);
+    if (!pages.empty() && entries[pages.first].group != group) {
+      blame.entry(pages.first, kAttributePages,
+                  "is of channel group " + std::to_string(entries[pages.first].group) +
+                      " where the meta page has " + std::to_string(group));
+    }
+    verify_group(entries, pages, group_point_bytes(meta.channels, group), blame);
   }
 }
 

@@ -1,46 +1,48 @@
-// What the directory has to say for its pages to make up one scene (spec/container.md#directory).
+// Checks that the pages of a directory make up one scene (spec/container.md#directory).
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <span>
-#include <vector>
 
 #include "format/container.h"
 #include "format/schema.h"
 
 namespace ptc {
 
-/// Page numbers by kind, ascending.
-struct PageIndex {
-  std::vector<std::uint32_t> points;
-  std::vector<std::uint32_t> nodes;
-  std::map<std::uint16_t, std::vector<std::uint32_t>> attributes;  ///< by group
-};
-
-/// What a page takes in the file, header and padding included.
+/// Returns how many bytes a page takes in the file, its header and padding included.
 [[nodiscard]] std::uint64_t extent_bytes(std::uint32_t stored_bytes) noexcept;
 
-/// Where a directory page lies: all but the last are full, and they follow each other without gap.
+/// Returns the offset of a directory page in the file. All directory pages but the last are full,
+/// and they follow each other without a gap.
 [[nodiscard]] std::uint64_t directory_page_offset(const Superblock& superblock,
                                                   std::uint32_t index) noexcept;
 
-/// Where the directory entry of a page lies.
+/// Returns the offset of a page's directory entry in the file.
 [[nodiscard]] std::uint64_t entry_offset(const Superblock& superblock, std::uint32_t page) noexcept;
 
-[[nodiscard]] PageIndex index_pages(std::span<const DirectoryEntry> entries);
+/// Returns the numbers of all pages.
+/// @pre  verify_pages()
+[[nodiscard]] PageNumbers page_numbers(const Superblock& superblock,
+                                       std::span<const DirectoryEntry> entries);
 
-/// Checks, of entries and a superblock that have passed their decoders, that pages lie between
-/// header and directory and do not overlap, that the page counts of the superblock are those of the
-/// directory, and that root and meta page are of their kind.
+/// Returns the rank of a page: the number of pages of the same type and group before it.
+/// @param entries  of all pages
+/// @pre  verify_pages()
+[[nodiscard]] std::uint32_t rank_of(const PageNumbers& numbers,
+                                    std::span<const DirectoryEntry> entries, std::uint32_t page);
+
+/// Checks that the pages of a directory stand in their places, lie between header and directory or
+/// in the tail, and do not overlap, that the superblock counts and repeats what the directory has,
+/// and that the root is in a node page.
+/// @pre    superblock and entries have passed their decoders
 /// @throws FormatError with the offset in the file
-/// Memory: 4 bytes a page.
-void verify_pages(const Superblock& superblock, std::span<const DirectoryEntry> entries,
-                  const PageIndex& index);
+/// Memory: 4 bytes for each page.
+void verify_pages(const Superblock& superblock, std::span<const DirectoryEntry> entries);
 
-/// Checks that every channel group has one attribute page beside each point page, and no other.
+/// Checks that the channel groups of the schema are those of the directory, and that every group
+/// has one attribute page for each point page.
 /// @throws FormatError with the offset in the file
 void verify_attributes(const Superblock& superblock, std::span<const DirectoryEntry> entries,
-                       const PageIndex& index, const Meta& meta);
+                       const Meta& meta);
 
 }  // namespace ptc

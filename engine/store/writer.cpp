@@ -1,7 +1,8 @@
 // Pages, directory and commit record in the order that makes a torn file recognisable
 // (spec/container.md#publishing):
 //
-//   header | pages ... meta page | directory pages | sync | superblock A | B | sync | rename
+//   header | pages ... | directory | coarse pages, meta page | sync | superblock A | B | sync |
+//   rename
 #include "engine/store/writer.h"
 
 #include <algorithm>
@@ -20,24 +21,15 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint16_t kNoLevel = 0xffff;
-constexpr std::uint64_t kFinishBytes = 80;  // memory that finish() takes for each page
-
-// Runs a reader's check on what is about to be written: what fails it is the caller's mistake.
-template <class Check>
-void refuse_what_readers_refuse(Check&& check) {
-  try {
-    check();
-  } catch (const FormatError& error) {
-    require_of_writer(false, error.what());
-  }
-}
+constexpr std::uint64_t kFinishBytes = 96;  // memory that finish() takes for each page
 
 FileHeader make_header(const WriterOptions& options) {
   FileHeader header;
   header.uuid = options.uuid;
   header.page_shift = options.page_shift;
   header.frame = options.frame;
+  header.point_bytes = options.point_bytes;
+  if (options.parts) header.feature_incompat |= kPartsFeature;
   refuse_what_readers_refuse(
       [&] { static_cast<void>(decode_file_header(encode_file_header(header))); });
   return header;
@@ -74,7 +66,8 @@ ContainerWriter::ContainerWriter(const std::filesystem::path& target, const Writ
     : header_(make_header(options)),
       file_(open_output(target, options.partial)),
       entries_(directory_of(file_.temporary())),
-      encoder_(header_, options.codec, options.level) {
+      encoder_(header_, options.codec, options.level),
+      source_(options.source) {
   if (!options.partial.empty()) file_.truncate(0);
   file_.write_at(0, encode_file_header(header_));
 }
@@ -85,8 +78,10 @@ ContainerWriter::ContainerWriter(const std::filesystem::path& target, const Writ
       file_(target, options.partial),
       entries_(directory_of(options.partial)),
       encoder_(header_, options.codec, options.level),
+      source_(options.source),
       end_(state.end) {
-  static_cast<void>(entries_.add(state.pages));
+  static_cast<void>(entries_.add(PageType::point, 0, state.point_pages));
+  static_cast<void>(entries_.add(PageType::node, 0, state.node_pages));
   find_pages(options.partial);
   file_.truncate(end_);
 }
@@ -102,25 +97,25 @@ void ContainerWriter::find_pages(const std::filesystem::path& partial) {
   Block block;
   in.read_at(0, block);
   check(block == encode_file_header(header_), "it is no unfinished container of this scene");
+  std::vector<std::byte> stored;
   std::uint64_t at = kBlockBytes;
   while (at < end_) {
     std::array<std::byte, kPageHeaderBytes> bytes;
     in.read_at(at, bytes);
     const PageHeader page = at_offset(in, at, [&] { return decode_page_header(bytes, header_); });
-    check(page.page_id < entries_.size() && !entries_.has(page.page_id),
-          "a page that was not written");
-    entries_.set(page.page_id, entry_of(page, at));
+    stored.resize(page.stored_bytes);
+    in.read_at(at + kPageHeaderBytes, stored);
+    check(xxh3_64(stored) == page.payload_xxh3, "a page's checksum is wrong");
+    check(entries_.awaits(page.type, page.group, page.rank), "a page that was not written");
+    entries_.set(page.rank, entry_of(page, at));
     at += extent_bytes(page.stored_bytes);
   }
   check(at == end_, "the unfinished container's last page is cut");
 }
 
-std::uint32_t ContainerWriter::reserve_page() {
+std::uint32_t ContainerWriter::reserve_page(PageType type, std::uint8_t group) {
   require_of_writer(!finished_, "a page after finish()");
-  if (entries_.size() >= kMaxPages) {
-    throw DataError(file_.target().string() + ": needs more than 2^32 - 2 pages");
-  }
-  return entries_.add(1);
+  return entries_.add(type, group, 1);
 }
 
 void ContainerWriter::begin_page() {
@@ -134,7 +129,7 @@ void ContainerWriter::flush() {
 
 WriterState ContainerWriter::state() {
   flush();
-  return {entries_.size(), end_};
+  return {entries_.size(PageType::point), entries_.size(PageType::node), end_};
 }
 
 void ContainerWriter::append(const PageImage& image) {
@@ -145,27 +140,46 @@ void ContainerWriter::append(const PageImage& image) {
 void ContainerWriter::append_page(const PageImage& image) {
   const PageHeader& page = image.page;
   const std::uint64_t offset = end_;
-  require_of_writer(page.page_id < entries_.size(), "a page that was not reserved");
-  require_of_writer(!entries_.has(page.page_id), "a page written twice");
+  require_of_writer(entries_.awaits(page.type, page.group, page.rank),
+                    "a page that was not reserved, or a page written twice");
   append(image);
-  entries_.set(page.page_id, entry_of(page, offset));
+  entries_.set(page.rank, entry_of(page, offset));
 }
 
-void ContainerWriter::write_content_page(std::uint32_t page, const PageSummary& summary,
-                                         std::span<const std::byte> payload,
-                                         std::span<const PackedColumn> columns) {
+void ContainerWriter::require_content(const PageSummary& summary) const {
+  require_of_writer(summary.type != PageType::directory && summary.type != PageType::meta,
+                    "directory and meta page are written by finish()");
+}
+
+void ContainerWriter::write_page(const PageSummary& summary, std::span<const std::byte> payload,
+                                 std::span<const PackedColumn> columns) {
+  require_content(summary);
   begin_page();
   encoder_.prepare(1);
-  encoder_.encode(page, summary, payload, columns, 0, image_);
+  encoder_.encode(summary, payload, columns, 0, image_);
   append_page(image_);
 }
 
-void ContainerWriter::write_page(std::uint32_t page, const PageSummary& summary,
-                                 std::span<const std::byte> payload,
-                                 std::span<const PackedColumn> columns) {
-  require_of_writer(summary.type != PageType::directory && summary.type != PageType::meta,
-                    "directory and meta page are written by finish()");
-  write_content_page(page, summary, payload, columns);
+void ContainerWriter::write_attributes(std::uint8_t group, std::span<const std::byte> payload,
+                                       std::uint32_t count, std::span<const Channel> channels) {
+  const PageSummary summary{.type = PageType::attribute,
+                            .group = group,
+                            .rank = reserve_page(PageType::attribute, group),
+                            .record_count = count};
+  std::vector<std::byte> unknown(payload.size());
+  fill_void(channels, group, unknown);
+  if (std::ranges::equal(payload, unknown)) return write_void_page(summary);
+  write_page(summary, payload, packed_group_columns(channels, group));
+}
+
+void ContainerWriter::write_void_page(const PageSummary& summary) {
+  begin_page();
+  require_of_writer(summary.type == PageType::attribute, "a void page that has no attributes");
+  require_of_writer(entries_.awaits(summary.type, summary.group, summary.rank),
+                    "a page that was not reserved, or a page written twice");
+  entries_.set(
+      summary.rank,
+      {.record_count = summary.record_count, .type = summary.type, .group = summary.group});
 }
 
 void ContainerWriter::write_pages(std::vector<Page> pages, const Executor& executor) {
@@ -174,51 +188,83 @@ void ContainerWriter::write_pages(std::vector<Page> pages, const Executor& execu
   begin_page();
   if (images_.size() < pages.size()) images_.resize(pages.size());
   encoder_.prepare(executor.threads());
-  const auto write = [this, pages = std::move(pages), &executor] {
+  auto write = [this, pages = std::move(pages), &executor] {
     executor.for_each(pages.size(), [&](std::size_t i, unsigned thread) {
-      encoder_.encode(pages[i].id, pages[i].summary, pages[i].payload, {}, thread, images_[i]);
+      encoder_.encode(pages[i].summary, pages[i].payload, {}, thread, images_[i]);
     });
     for (const PageImage& image : std::span(images_).first(pages.size())) append_page(image);
   };
   if (executor.threads() == 1) return write();
-  writing_ = std::async(std::launch::async, write);
+  writing_ = std::async(std::launch::async, std::move(write));
 }
 
-void ContainerWriter::write_stored_page(std::uint32_t page, const PageSummary& summary,
-                                        Coding coding, std::uint32_t raw_bytes,
+void ContainerWriter::write_stored_page(const PageSummary& summary, Coding coding,
+                                        std::uint32_t raw_bytes,
                                         std::span<const std::byte> stored) {
-  require_of_writer(summary.type != PageType::directory && summary.type != PageType::meta,
-                    "directory and meta page are written by finish()");
+  require_content(summary);
   begin_page();
-  encoder_.take(page, summary, coding, raw_bytes, stored, image_);
+  encoder_.take(summary, coding, raw_bytes, stored, image_);
   append_page(image_);
 }
 
-// Directory pages are numbered on from the last page and not compressed: each can be recognised and
-// read without the others.
+// Makes room for the next page of the tail.
+PageImage& ContainerWriter::kept_page(const PageSummary& summary) {
+  require_content(summary);
+  require_of_writer(summary.type != PageType::point && summary.type != PageType::attribute,
+                    "a page of the tail that has points or attributes");
+  require_of_writer(entries_.awaits(summary.type, summary.group, summary.rank),
+                    "a page that was not reserved, or a page written twice");
+  require_of_writer(tail_.size() + 1 < kMaxTailPages, "more pages than the tail has");
+  begin_page();
+  return tail_.emplace_back();
+}
+
+void ContainerWriter::keep_page(const PageSummary& summary, std::span<const std::byte> payload) {
+  PageImage& image = kept_page(summary);
+  encoder_.prepare(1);
+  encoder_.encode(summary, payload, {}, 0, image);
+}
+
+void ContainerWriter::keep_stored_page(const PageSummary& summary, Coding coding,
+                                       std::uint32_t raw_bytes, std::span<const std::byte> stored) {
+  encoder_.take(summary, coding, raw_bytes, stored, kept_page(summary));
+}
+
+// Gives the pages of the tail their places, one after another from an offset on.
+void ContainerWriter::place_tail(std::uint64_t offset) {
+  for (const PageImage& image : tail_) {
+    entries_.set(image.page.rank, entry_of(image.page, offset));
+    offset += image.bytes.size();
+  }
+}
+
+// Directory pages are not compressed: each can be recognised and read without the others.
 void ContainerWriter::write_directory(std::span<const std::byte> directory) {
   const std::size_t full = directory_entries_per_page(header_) * kDirectoryEntryBytes;
-  std::uint32_t page = entries_.size();
-  for (std::size_t at = 0; at < directory.size(); at += full, ++page) {
+  PageSummary summary{.type = PageType::directory};
+  for (std::size_t at = 0; at < directory.size(); at += full, ++summary.rank) {
     const auto part = directory.subspan(at, std::min(full, directory.size() - at));
-    const auto bytes = static_cast<std::uint32_t>(part.size());
-    const auto count = static_cast<std::uint32_t>(part.size() / kDirectoryEntryBytes);
-    encoder_.take(page, {PageType::directory, 0, kNoLevel, count, 0, 0}, {}, bytes, part, image_);
+    summary.record_count = static_cast<std::uint32_t>(part.size() / kDirectoryEntryBytes);
+    encoder_.take(summary, {}, static_cast<std::uint32_t>(part.size()), part, image_);
     append(image_);
   }
   end_ = round_up(end_, kBlockBytes);
 }
 
-// Fills in what the writer knows: identity, directory, length.
-void ContainerWriter::complete(Superblock& superblock, std::span<const std::byte> directory) const {
+// Fills in what the writer knows before the directory is made: identity, counts and places.
+void ContainerWriter::complete(Superblock& superblock, const Meta& meta) const {
   const std::uint32_t pages = entries_.size();
   superblock.header = header_;
   superblock.page_count = pages;
+  superblock.point_pages = entries_.size(PageType::point);
+  superblock.node_pages = entries_.size(PageType::node);
+  superblock.attribute_groups = static_cast<std::uint16_t>(channel_groups(meta.channels).size());
   superblock.directory_pages = (pages - 1) / directory_entries_per_page(header_) + 1;
   superblock.directory_offset = end_;
-  superblock.directory_xxh3 = xxh3_64(directory);
-  superblock.file_bytes = end_ + directory_bytes(header_, pages) + 2 * kBlockBytes;
-  superblock.points_per_page = points_per_page(header_);
+  superblock.tail_offset = end_ + directory_bytes(header_, pages);
+  std::uint64_t end = superblock.tail_offset;
+  for (const PageImage& image : tail_) end += image.bytes.size();
+  superblock.file_bytes = round_up(end, kBlockBytes) + 2 * kBlockBytes;
   if (superblock.writer.empty()) superblock.writer = writer_name();
 }
 
@@ -237,39 +283,44 @@ Block ContainerWriter::commit_record(Superblock& superblock, std::span<const std
   Block block{};
   refuse_what_readers_refuse([&] {
     const std::vector<DirectoryEntry> pages = decode_directory(directory, superblock.file_bytes);
+    superblock.directory_xxh3 = xxh3_64(directory);
     superblock.content_xxh3 = content_digest(pages);
+    superblock.tail.assign(pages.end() - static_cast<std::ptrdiff_t>(tail_.size()), pages.end());
     block = encode_superblock(superblock);
     static_cast<void>(decode_superblock(block, header_, superblock.file_bytes));
-    const PageIndex index = index_pages(pages);
-    verify_pages(superblock, pages, index);
-    verify_attributes(superblock, pages, index, meta);
+    verify_pages(superblock, pages);
+    verify_attributes(superblock, pages, meta);
   });
   return block;
 }
 
 Superblock ContainerWriter::finish(const Meta& meta, Superblock superblock) {
-  // Write the meta page
+  // Encode the meta page, the last page of the tail
   require_of_writer(!finished_, "finish() twice");
   flush();
-  require_of_writer(entries_.complete(), "a reserved page that was never written");
-  superblock.meta_page = reserve_page();
-  write_content_page(superblock.meta_page, {PageType::meta, 0, kNoLevel, 1, 0, 0},
-                     encode_meta(meta), {});
+  const PageSummary summary{
+      .type = PageType::meta, .rank = reserve_page(PageType::meta), .record_count = 1};
+  encoder_.prepare(1);
+  encoder_.encode(summary, encode_meta(meta, header_.point_bytes), {}, 0, tail_.emplace_back());
   finished_ = true;
 
-  // Check what is about to be committed as a reader would
-  const std::vector<std::byte> directory = entries_.encoded();
+  // Place the directory and the tail, and check what is about to be committed as a reader would
   end_ = round_up(end_, kBlockBytes);
-  complete(superblock, directory);
+  complete(superblock, meta);
+  place_tail(superblock.tail_offset);
+  require_of_writer(entries_.complete(), "a reserved page that was never written");
+  const std::vector<std::byte> directory = entries_.encoded();
   const Block block = commit_record(superblock, directory, meta);
 
-  // Write the directory; it reaches the disk before the superblocks that commit it
+  // Write them; all else reaches the disk before the superblocks that commit it
   write_directory(directory);
+  for (const PageImage& image : tail_) append(image);
+  end_ = round_up(end_, kBlockBytes);
   file_.sync();
   file_.write_at(end_, block);
   file_.write_at(end_ + kBlockBytes, block);
   file_.sync();
-  file_.publish();
+  file_.publish(source_);
   return superblock;
 }
 

@@ -17,20 +17,28 @@
 
 namespace ptc {
 
+/// What a container is made of, and what it is called until it is published.
 struct WriterOptions {
   std::uint8_t page_shift = 16;  ///< the page size is 2^page_shift bytes; 12 to 20
   Codec codec = Codec::zstd;
   int level = 1;  ///< compression level of zstd, clamped to its range
   Uuid uuid{};    ///< identity of the file, which salts the checksums of its page headers
   Frame frame;    ///< the cube of space that the points' lattice fills
+  std::uint8_t point_bytes = kPointBytes;  ///< kEmittingPointBytes when points may emit light
+  bool parts = false;                      ///< the container is a scene of parts (spec/parts.md)
   /// The name of the file until it is published. The file stays under that name when the writer
   /// ends without finish(). Empty: a temporary name, and nothing stays.
   std::filesystem::path partial;
+  /// The container that the new one is made from, or null; it must outlive the writer. When it has
+  /// the name of the target, finish() must find it there: a file that another program has put in
+  /// its place is not lost.
+  const InputFile* source = nullptr;
 };
 
 /// How far a writer got.
 struct WriterState {
-  std::uint32_t pages = 0;          ///< reserved page numbers
+  std::uint32_t point_pages = 0;    ///< point pages that were reserved
+  std::uint32_t node_pages = 0;     ///< node pages that were reserved
   std::uint64_t end = kBlockBytes;  ///< end of the written pages, bytes from the start of the file
 };
 
@@ -39,8 +47,9 @@ struct WriterState {
 
 /// A container on its way to the disk.
 ///
-/// reserve_page() gives out page numbers, so that a parent can refer to a page that is written
-/// later. Pages may be written in any order; they lie in the file in the order of the calls.
+/// reserve_page() gives out ranks, so that a parent can refer to a page that is written later.
+/// Pages may be written in any order; they lie in the file in the order of the calls. Those that
+/// keep_page() takes wait for finish(), which puts them into the tail (spec/container.md#tail).
 ///
 /// The target stays what it was until finish() returns. A writer that ends before that leaves
 /// nothing behind, unless WriterOptions::partial names the file. A page that a reader would refuse
@@ -74,22 +83,28 @@ class ContainerWriter {
   ContainerWriter& operator=(const ContainerWriter&) = delete;
 
   [[nodiscard]] const FileHeader& header() const noexcept { return header_; }
-  /// Gives out the next page number; the first is 0.
-  /// @throws DataError after 2^32 - 2 pages
-  [[nodiscard]] std::uint32_t reserve_page();
+  /// Gives out the next rank of a type and group; the first is 0.
+  /// @throws RequestError that names `page_shift` after kMaxPages pages
+  [[nodiscard]] std::uint32_t reserve_page(PageType type, std::uint8_t group = 0);
 
   /// Compresses, checksums and writes a page. Each reserved page must be written exactly once.
-  /// @param page     a reserved number
+  /// @param summary  its rank was reserved
   /// @param payload  1 to page size - 64 bytes
   /// @param columns  of an attribute page, from packed_group_columns(), to pack it; empty: it is
-  /// not
-  ///                 packed
-  void write_page(std::uint32_t page, const PageSummary& summary,
-                  std::span<const std::byte> payload, std::span<const PackedColumn> columns = {});
+  ///                 not packed
+  void write_page(const PageSummary& summary, std::span<const std::byte> payload,
+                  std::span<const PackedColumn> columns = {});
+  /// Writes the next attribute page of a group, or notes it as void when none of its values is
+  /// known.
+  /// @param payload   the columns of the group's channels, `count` values each
+  /// @param channels  of the file
+  void write_attributes(std::uint8_t group, std::span<const std::byte> payload, std::uint32_t count,
+                        std::span<const Channel> channels);
+  /// Notes a void attribute page, which takes no room but its entry.
+  void write_void_page(const PageSummary& summary);
 
   /// A page that is not compressed yet.
   struct Page {
-    std::uint32_t id = 0;
     PageSummary summary;
     std::vector<std::byte> payload;
   };
@@ -102,8 +117,17 @@ class ContainerWriter {
 
   /// Writes a page whose payload is already in its stored form, such as one of another container.
   /// @param raw_bytes  size of the decoded payload
-  void write_stored_page(std::uint32_t page, const PageSummary& summary, Coding coding,
-                         std::uint32_t raw_bytes, std::span<const std::byte> stored);
+  void write_stored_page(const PageSummary& summary, Coding coding, std::uint32_t raw_bytes,
+                         std::span<const std::byte> stored);
+
+  /// Keeps a page for the tail. Pages are kept in the order of the directory, after all others of
+  /// their type, at most kMaxTailPages - 1 of them.
+  /// @param summary  of a node page, whose rank was reserved, or of a page of another type that
+  ///                 stands behind them
+  void keep_page(const PageSummary& summary, std::span<const std::byte> payload);
+  /// Keeps a page for the tail whose payload is already in its stored form.
+  void keep_stored_page(const PageSummary& summary, Coding coding, std::uint32_t raw_bytes,
+                        std::span<const std::byte> stored);
 
   /// Waits until all pages are in the file.
   /// @throws what went wrong while write_pages() was under way
@@ -124,13 +148,13 @@ class ContainerWriter {
  private:
   void find_pages(const std::filesystem::path& partial);
   void begin_page();
-  void write_content_page(std::uint32_t page, const PageSummary& summary,
-                          std::span<const std::byte> payload,
-                          std::span<const PackedColumn> columns);
+  void require_content(const PageSummary& summary) const;
   void append(const PageImage& image);
   void append_page(const PageImage& image);
+  PageImage& kept_page(const PageSummary& summary);
+  void place_tail(std::uint64_t offset);
   void write_directory(std::span<const std::byte> directory);
-  void complete(Superblock& superblock, std::span<const std::byte> directory) const;
+  void complete(Superblock& superblock, const Meta& meta) const;
   [[nodiscard]] std::vector<DirectoryEntry> decode_directory(std::span<const std::byte> directory,
                                                              std::uint64_t file_bytes) const;
   [[nodiscard]] Block commit_record(Superblock& superblock, std::span<const std::byte> directory,
@@ -140,10 +164,12 @@ class ContainerWriter {
   OutputFile file_;
   EntryTable entries_;  ///< guards itself: pages are reserved while others are written
   PageImages encoder_;
+  const InputFile* source_;          ///< WriterOptions::source
   std::uint64_t end_ = kBlockBytes;  ///< where the next page goes
   bool finished_ = false;
   PageImage image_;                ///< of write_page(), kept between calls
   std::vector<PageImage> images_;  ///< of write_pages(), kept between calls
+  std::vector<PageImage> tail_;    ///< pages that finish() writes
   std::future<void> writing_;      ///< write_pages() under way; last, so that its end is awaited
                                    ///< before the other members go
 };

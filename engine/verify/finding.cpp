@@ -71,7 +71,9 @@ std::string code_of(const Finding& finding) {
 std::string line_of(const Finding& finding) {
   const std::string cause =
       finding.cause == Cause::unknown ? "" : fmt::format("; {}", name_of(finding.cause));
-  return fmt::format("offset {}: {} ({}){}", finding.offset, finding.text, finding.rule, cause);
+  const std::string file = finding.file.empty() ? "" : finding.file + ": ";
+  return fmt::format("{}offset {}: {} ({}){}", file, finding.offset, finding.text, finding.rule,
+                     cause);
 }
 
 std::string hex(std::uint64_t value) {

@@ -68,6 +68,7 @@ struct Finding {
   std::uint64_t bytes = 0;            ///< length of the faulty part from `offset` on; 0: not known
   unsigned bit = 0;                   ///< the flipped bit at `offset`, for Cause::bit_flip
   std::optional<std::uint32_t> page;  ///< the page that the fault lies in; empty outside pages
+  std::string file;                   ///< a part of the file, by its path; empty: the file itself
   std::string rule;                   ///< anchor, e.g. "spec/container.md#page-payload"
   std::string text;                   ///< what is wrong, in words
   std::string expected;               ///< the right value; empty where the text says it

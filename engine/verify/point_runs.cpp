@@ -31,19 +31,21 @@ void TreeReport::superblock(const char* clause, const std::string& text) const {
 
 void TreeReport::page(std::uint32_t page, std::uint64_t from_header, const char* clause,
                       const std::string& text) const {
+  const std::uint32_t part = container_.page_range(page).part, number = container_.own_number(page);
   findings_.add({.cause = Cause::writer,
                  .level = 3,
                  .offset = container_.entry(page).offset + from_header,
-                 .page = page,
+                 .page = number,
+                 .file = part == 0 ? "" : container_.file(part).path().string(),
                  .rule = clause,
-                 .text = fmt::format("page {}: {}", page, text)});
+                 .text = fmt::format("page {}: {}", number, text)});
 }
 
 std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
                                                             std::size_t count) {
   // Copy the points from their pages.
   block_.clear();
-  const std::uint64_t per_page = container_.superblock().points_per_page;
+  const std::uint64_t per_page = points_per_page(container_.header());
   for (std::uint64_t at = first; at < first + count;) {
     const std::uint32_t page = container_.point_pages()[at / per_page];
     if (damaged_[page]) return std::nullopt;
@@ -51,7 +53,7 @@ std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
       count_ = container_.read_page(page, payload_, decoder_).record_count;
       page_ = page;
     }
-    const PointPage points(payload_.data(), count_);
+    const PointPage points(payload_.data(), count_, container_.header().point_bytes);
     for (auto i = static_cast<std::uint32_t>(at % per_page); i < count_ && at < first + count;
          ++i, ++at) {
       block_.push_back(points[i]);
@@ -64,9 +66,9 @@ std::optional<std::span<const PointRecord>> PointRuns::take(std::uint64_t first,
 
 void PointRuns::finish() const {
   const Superblock& s = container_.superblock();
-  if (next_ != s.points)
+  if (taken_ != s.points)
     report_.superblock(kCounts,
-                       fmt::format("the leaves hold {} of the {} points", next_, s.points));
+                       fmt::format("the leaves hold {} of the {} points", taken_, s.points));
   compare("area", s.area, area_);
   for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], flux_[c]);
   if (s.bounds_low != low_ || s.bounds_high != high_) {
@@ -88,11 +90,12 @@ void PointRuns::add(std::uint64_t number, const PointRecord& point) {
   const double area = 2.0 * static_cast<double>(point.radius) * static_cast<double>(point.radius);
   area_ += area;
   for (std::size_t k = 0; k < 3; ++k) {
-    low_[k] = next_ == 0 ? at[k] : std::min(low_[k], at[k]);
-    high_[k] = next_ == 0 ? at[k] : std::max(high_[k], at[k]);
-    flux_[k] += area * static_cast<double>(decode_half(point.radiance[k]));
+    low_[k] = taken_ == 0 ? at[k] : std::min(low_[k], at[k]);
+    high_[k] = taken_ == 0 ? at[k] : std::max(high_[k], at[k]);
+    flux_[k] += area * (static_cast<double>(decode_half(point.radiance[k])) +
+                        static_cast<double>(decode_half(point.emission[k])));
   }
-  next_ = number + 1;
+  ++taken_;
 }
 
 /// Reports a total of the superblock that differs from that of the points by more than rounding.

@@ -71,9 +71,9 @@ class PointRuns {
   std::uint32_t page_ = kNoPage;  ///< the page decoded in payload_
   std::uint32_t count_ = 0;       ///< points in payload_
   std::vector<PointRecord> block_;
-  MortonKey last_{};        ///< key of the last point taken
-  std::uint64_t next_ = 0;  ///< number after the last point taken
-  double area_ = 0;         ///< sum over the points taken, scene units squared
+  MortonKey last_{};         ///< key of the last point taken
+  std::uint64_t taken_ = 0;  ///< points taken
+  double area_ = 0;          ///< sum over the points taken, scene units squared
   std::array<double, 3> flux_{};
   std::array<double, 3> low_{};
   std::array<double, 3> high_{};

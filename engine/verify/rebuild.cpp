@@ -40,13 +40,28 @@ std::vector<std::byte> content_of(const GroupView& group) {
   return content;
 }
 
+/// Returns content_of() a group of a container, with the numbers of points in one file.
+std::vector<std::byte> content_of(const GroupView& group, const ContainerReader& container) {
+  std::vector<std::byte> content = content_of(group);
+  if (container.parts().empty()) return content;
+  for (int i = 0; i < group.size(); ++i) {
+    ChildRef ref = group.child(i);
+    if (ref.interior) continue;
+    ref.first_point = container.without_gaps(ref.first_point);
+    set_reference(content, i, ref);
+  }
+  return content;
+}
+
 /// Reads the groups of a stored tree in post-order, children before parents.
 class StoredGroups {
  public:
   StoredGroups(const ContainerReader& container, std::size_t cached_pages)
-      : pages_(container, cached_pages) {
+      : container_(container),
+        node_pages_(container.node_pages()),
+        pages_(container, cached_pages) {
     const Superblock& s = container.superblock();
-    if (s.points > 0) descend(s.root_page, s.root_slot);
+    if (s.points > 0) descend(node_pages_[s.root_page], s.root_slot);
   }
 
   struct Group {
@@ -60,7 +75,7 @@ class StoredGroups {
     while (!path_.back().children.empty()) {
       const ChildRef child = path_.back().children.back();
       path_.back().children.pop_back();
-      descend(child.page, child.slot);
+      descend(node_pages_[child.page], child.slot);
     }
     Group group = std::move(path_.back().group);
     path_.pop_back();
@@ -76,13 +91,15 @@ class StoredGroups {
   void descend(std::uint32_t page, std::uint16_t slot) {
     const NodePages::Place place = pages_.page(page);
     const GroupView view = place.nodes[slot];
-    Open open{.group = {page, slot, content_of(view)}, .children = {}};
+    Open open{.group = {page, slot, content_of(view, container_)}, .children = {}};
     for (int i = view.size(); i-- > 0;) {
       if (view.child(i).interior) open.children.push_back(view.child(i));
     }
     path_.push_back(std::move(open));
   }
 
+  const ContainerReader& container_;
+  PageNumbers::Range node_pages_;
   NodePages pages_;
   std::vector<Open> path_;
 };
@@ -132,7 +149,8 @@ class Comparison : public GroupSink {
 
   void differ(const std::optional<StoredGroups::Group>& stored) {
     if (differing_++ == 0)
-      first_ = stored.value_or(StoredGroups::Group{.page = container_.superblock().root_page});
+      first_ = stored.value_or(
+          StoredGroups::Group{.page = container_.node_pages()[container_.superblock().root_page]});
   }
 
   const ContainerReader& container_;

@@ -1,25 +1,24 @@
 // Builds a new file from the pages whose checksums hold (spec/recovery.md#salvage).
 //
 // Points carry over page by page, and the octree is built again from them. Channel values belong to
-// points by rank alone: the k-th attribute page of a group holds the values of the k-th point page.
-// The ranks are the file's, so they are known only where no page is missing from the count; a page
-// whose content is lost keeps its rank:
+// points by rank: the attribute page of rank k of a group holds the values of the point page of
+// rank k. Every page tells its rank:
 //
 //   rank               0        1        2        3
 //   point pages     [ kept ] [ lost ] [ kept ] [ kept ]  ->  points of ranks 0, 2, 3
-//   attribute pages [ kept ] [ kept ] [ lost ] [ kept ]  ->  values of 0 and 3, zeros for rank 2
+//   attribute pages [ kept ] [ kept ] [ lost ] [ kept ]  ->  values of 0 and 3, unknown for rank 2
 #include "engine/verify/salvage.h"
 
 #include <algorithm>
 #include <map>
 #include <optional>
-#include <set>
 #include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/base/memory_budget.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
 #include "engine/parallel/thread_pool.h"
@@ -38,7 +37,7 @@ constexpr std::uint64_t kPageBytes = 320;
 constexpr std::uint64_t kPagesOpen =
     80;  // pages that the build holds: one for each level, and some
 
-/// A page whose number is known.
+/// A page that the file has or had.
 struct Known {
   const PageSite* site = nullptr;  ///< an intact copy of the page; null when it is lost
   MortonKey first_key, last_key;   ///< keys of the first and last point of an intact point page
@@ -61,7 +60,7 @@ class KeptPoints : public PointStream {
         count_ = site.entry.record_count;
         at_ = 0;
       }
-      const PointPage points(page_.payload().data(), count_);
+      const PointPage points(page_.payload().data(), count_, page_.point_bytes());
       while (at_ < count_ && filled < out.size()) out[filled++] = points[at_++];
     }
     return filled;
@@ -90,7 +89,7 @@ class Salvage {
     find_meta();
     for (const auto& [group, columns] : survey_.columns) by_group_[group];
     find_sound_pages();
-    rank_pages();
+    choose_pages();
     if (points_.empty())
       refuse("spec/recovery.md#survey", "no point page is intact, so there is nothing to salvage");
     // Write them as a new file.
@@ -110,19 +109,24 @@ class Salvage {
       refuse("spec/recovery.md#survey",
              "neither the header nor a superblock is whole, so no page can be shown to belong to "
              "this file");
+    if ((survey_.header->feature_incompat & kPartsFeature) != 0)
+      refuse(
+          "spec/recovery.md#salvage",
+          "a scene of parts has no points of its own: salvage the part that is damaged, or build "
+          "the scene again from its parts");
     if (survey_.header->feature_ro_compat != 0)
       refuse("spec/versions.md#features",
              "the file uses a feature that forbids repairing it: use the program that wrote it");
     const std::uint64_t page = std::uint64_t{1} << survey_.header->page_shift;
-    const std::uint64_t least = kBaseBytes + kPageBytes * survey_.sites.size() + kPagesOpen * page;
-    if (options_.memory_bytes < least) {
-      throw LimitError(fmt::format(
-          "the memory cap is too small to salvage this file: the least that works is {}M",
-          (least >> 20) + 1));
-    }
+    MemoryBudget budget(options_.memory_bytes, "the salvage of this file", "memory_bytes");
+    budget.charge("the program", kBaseBytes);
+    budget.charge("the list of pages",
+                  kPageBytes * (survey_.sites.size() + survey_.void_pages.size()));
+    budget.charge("open pages", kPagesOpen * page);
+    budget.require();
   }
 
-  using Sites = std::map<std::uint32_t, Known>;  ///< by page number
+  using Sites = std::map<std::uint32_t, Known>;  ///< by rank
 
   /// Returns the map for pages of this kind; null for pages that a salvage does not keep.
   Sites* kind_of(const DirectoryEntry& entry) {
@@ -131,8 +135,8 @@ class Salvage {
     return wanted ? &attribute_sites_[entry.group] : nullptr;
   }
 
-  /// Finds an intact copy of every page. Where several sites have one page number, the first intact
-  /// one counts. A page that is not in its place may lie elsewhere, as after a swap of two pages.
+  /// Finds an intact copy of every page. Where several sites have one rank, the first intact one
+  /// counts. A page that is not in its place may lie elsewhere, as after a swap of two pages.
   void find_sound_pages() {
     // Check all pages where they should lie.
     progress_.begin("check pages", survey_.sites.size(), "pages");
@@ -146,12 +150,12 @@ class Salvage {
     // Search the whole file for the lost ones. What the directory says of a page, other than its
     // place, must hold for the copy too.
     moved_ = find_pages(file_, *survey_.header, progress_);
-    std::map<std::uint32_t, const DirectoryEntry*> listed;
+    std::map<std::uint64_t, const DirectoryEntry*> listed;
     for (const PageSite& site : survey_.sites) {
-      if (site.listed) listed[site.page] = &site.entry;
+      if (site.listed) listed[site.identity()] = &site.entry;
     }
     for (const PageSite& site : moved_) {
-      const auto said = listed.find(site.page);
+      const auto said = listed.find(site.identity());
       DirectoryEntry here = site.entry;
       if (said != listed.end()) here.offset = said->second->offset;
       if (said == listed.end() || here == *said->second) consider(site);
@@ -163,45 +167,40 @@ class Salvage {
   bool consider(const PageSite& site) {
     Sites* const kind = kind_of(site.entry);
     if (kind == nullptr) return true;
-    Known& known = (*kind)[site.page];
+    Known& known = (*kind)[site.rank];
     if (known.site != nullptr) return true;
     if (page_->check(site, 3, flips_)) return false;
     known.site = &site;
     if (site.entry.type == PageType::point) {
-      const PointPage points(page_->payload().data(), site.entry.record_count);
+      const PointPage points(page_->payload().data(), site.entry.record_count,
+                             survey_.header->point_bytes);
       known.first_key = points[0].key;
       known.last_key = points[site.entry.record_count - 1].key;
     }
     return true;
   }
 
-  /// Gives each kept page its rank among the pages of its kind.
-  void rank_pages() {
-    // Count the pages that the file had. Where even their number is unknown, ranks mean nothing.
-    const std::optional<Superblock>& s = survey_.superblock;
-    const std::uint64_t per_page = points_per_page(*survey_.header);
-    const std::uint64_t pages = s ? (s->points + per_page - 1) / per_page : point_sites_.size();
-    const bool all_known = s ? point_sites_.size() == pages : no_number_is_missing();
-    // Rank the point pages, and drop those whose keys lie before the page in front.
-    std::uint64_t k = 0;
+  /// Chooses the pages to keep: point pages whose keys do not lie before the page in front, and the
+  /// attribute pages next to them.
+  void choose_pages() {
     MortonKey last_key;
-    for (const auto& [number, page] : point_sites_) {
-      const std::uint64_t rank = k++;
+    for (const auto& [rank, page] : point_sites_) {
       if (page.site == nullptr || page.first_key < last_key) continue;
       last_key = page.last_key;
       points_[rank] = page.site;
     }
+    const std::optional<Superblock>& s = survey_.superblock;
+    const std::uint64_t pages = s ? s->point_pages : point_sites_.size();
     report_.point_pages_before = pages;
     report_.point_pages = points_.size();
     if (s) report_.points_before = s->points;
-    // Rank the attribute pages, and keep those that fit a kept point page.
+    for (const PageSite& page : survey_.void_pages) {  // no damage can reach these
+      if (by_group_.contains(page.entry.group) && points_.contains(page.rank))
+        ++report_.attribute_pages;
+    }
     for (auto& [group, kept] : by_group_) {
       report_.attribute_pages_before += pages;
-      const auto found = attribute_sites_.find(group);
-      if (!all_known || found == attribute_sites_.end() || found->second.size() != pages) continue;
-      k = 0;
-      for (const auto& [number, page] : found->second) {
-        const std::uint64_t rank = k++;
+      for (const auto& [rank, page] : attribute_sites_[group]) {
         const auto beside = points_.find(rank);
         if (page.site == nullptr || beside == points_.end()) continue;
         if (page.site->entry.record_count != beside->second->entry.record_count) continue;
@@ -211,20 +210,12 @@ class Salvage {
     }
   }
 
-  /// Returns whether the page numbers that a scan found have no gap, so that it found every page up
-  /// to the greatest number.
-  [[nodiscard]] bool no_number_is_missing() const {
-    std::set<std::uint32_t> numbers;
-    for (const PageSite& site : survey_.sites) numbers.insert(site.page);
-    return !numbers.empty() && *numbers.rbegin() == numbers.size() - 1;
-  }
-
   /// Reads the meta page once more, because this time a flipped bit in it can be turned back.
   void find_meta() {
     for (const PageSite& site : survey_.sites) {
       if (site.entry.type != PageType::meta || page_->check(site, 3, flips_)) continue;
       try {
-        survey_.meta = decode_meta(page_->payload());
+        survey_.meta = decode_meta(page_->payload(), survey_.header->point_bytes);
         survey_.columns = columns_by_group(survey_.meta);
         report_.meta = true;
       } catch (const FormatError&) {  // the meta page is lost
@@ -238,7 +229,8 @@ class Salvage {
     ContainerWriter writer(target, {.page_shift = survey_.header->page_shift,
                                     .codec = codec(),
                                     .uuid = new_uuid(),
-                                    .frame = survey_.header->frame});
+                                    .frame = survey_.header->frame,
+                                    .point_bytes = survey_.header->point_bytes});
     // Write the points and their octree, then the channels.
     BuildOptions tree;
     if (before) tree.leaf_points = std::max(1U, before->leaf_points);
@@ -265,28 +257,26 @@ class Salvage {
 
   /// Writes the attribute pages of one group. Its kept pages are as long as the old point pages, of
   /// which some are lost, so their columns move to pages of the new length.
-  /// @param kept    attribute pages by rank; ranks that are missing become zeros
+  /// @param kept    attribute pages by rank; values of ranks that are missing are not known
   /// @param points  in the new file
-  void write_channels(ContainerWriter& writer, std::uint16_t group,
+  void write_channels(ContainerWriter& writer, std::uint8_t group,
                       const std::map<std::uint64_t, const PageSite*>& kept, std::uint64_t points) {
     const std::vector<PackedColumn>& columns = survey_.columns.at(group);
     auto beside = points_.begin();
     const auto next_page = [&](std::span<std::byte> payload) {
       const auto& [rank, site] = *beside++;
-      std::ranges::fill(payload, std::byte{0});
+      const std::size_t bytes = group_point_bytes(survey_.meta.channels, group);
+      fill_void(survey_.meta.channels, group, payload.first(bytes * site->entry.record_count));
       const auto found = kept.find(rank);
       if (found != kept.end() && !page_->check(*found->second, 3, flips_))
         std::ranges::copy(page_->payload(), payload.begin());
       return site->entry.record_count;
     };
-    ChannelPager pager(columns, (std::size_t{1} << survey_.header->page_shift) - kPageHeaderBytes,
-                       next_page);
+    ChannelPager pager(columns, payload_limit(survey_.header->page_shift), next_page);
     const std::uint32_t full = points_per_page(writer.header());
     for (std::uint64_t left = points; left > 0;) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
-      writer.write_page(writer.reserve_page(),
-                        {.type = PageType::attribute, .group = group, .record_count = count},
-                        pager.next(count), columns);
+      writer.write_attributes(group, pager.next(count), count, survey_.meta.channels);
       left -= count;
     }
   }
@@ -315,10 +305,10 @@ class Salvage {
   Survey survey_;
   std::optional<SurveyedPage> page_;
   std::vector<PageSite> moved_;                      ///< pages that a scan of the file found
-  Sites point_sites_;                                ///< point pages whose numbers are known
-  std::map<std::uint16_t, Sites> attribute_sites_;   ///< attribute pages, by group
+  Sites point_sites_;                                ///< point pages
+  std::map<std::uint8_t, Sites> attribute_sites_;    ///< attribute pages, by group
   std::map<std::uint64_t, const PageSite*> points_;  ///< kept point pages, by rank
-  std::map<std::uint16_t, std::map<std::uint64_t, const PageSite*>>
+  std::map<std::uint8_t, std::map<std::uint64_t, const PageSite*>>
       by_group_;  ///< kept attribute pages, by group and rank
   SalvageReport report_;
 };

@@ -1,9 +1,9 @@
 // Surveys a file from both ends, past whatever is broken on the way (spec/recovery.md#survey).
 // Every structure can be found in two ways, so that the loss of one costs little:
 //
-//   | header | page | page | ... | meta page | directory pages | superblock A | superblock B |
-//       ^______repeated by both superblocks____________________________/               /
-//                                  directory offset and page count <------------------/
+//   | header | page | page | ... | directory pages | coarse pages, meta | superblock A | B |
+//       ^______repeated by both superblocks________________________________/           /
+//                                  directory offset and page counts <-----------------/
 //              ^      ^            page headers, found sector by sector, repeat the directory
 //
 // The survey tries the way of every reader first. Where that fails, it collects what is left: the
@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -62,9 +63,7 @@ class Surveyor {
     look_at_superblocks();
     if (!open()) {
       if (survey_.superblock) look_at_directory();
-      const bool all_listed =
-          survey_.superblock && survey_.sites.size() == survey_.superblock->page_count;
-      if (!structure_only && !all_listed) scan();
+      if (!structure_only && !listed_all_) scan();
       if (no_superblock_) report_end();
       std::ranges::sort(survey_.sites, {}, [](const PageSite& site) { return site.entry.offset; });
       read_meta();
@@ -107,7 +106,8 @@ class Surveyor {
 
   Diagnosis diagnose_header(const FormatError& error, std::span<std::byte> bytes) {
     const std::string code = code_of(finding_of(error, 0));
-    if (code == "header-version" || code == "header-features") return {Cause::newer};
+    if (code == "header-version" || code == "header-draft" || code == "header-features")
+      return {Cause::newer};
     if (code == "header-length") return {Cause::truncated};
     Diagnosis diagnosis = diagnose_sealed(
         bytes, [&] { static_cast<void>(decode_file_header(bytes)); }, flips_);
@@ -221,7 +221,8 @@ class Surveyor {
   bool open() {
     if (!survey_.superblock || survey_.superblock->file_bytes != file_.size()) return false;
     try {
-      survey_.container = std::make_unique<ContainerReader>(file_.path());
+      survey_.container =
+          std::make_unique<ContainerReader>(file_.path(), ContainerReader::OpenParts::no);
     } catch (const FormatError& error) {
       survey_.refusal = finding_of(error, 1);
       survey_.refusal->cause = Cause::writer;
@@ -230,7 +231,7 @@ class Surveyor {
     const ContainerReader& container = *survey_.container;
     survey_.sites.reserve(container.page_count());
     for (std::uint32_t page = 0; page < container.page_count(); ++page)
-      list(page, container.entry(page));
+      list({container.entry(page), container.rank(page), page, true});
     std::ranges::sort(survey_.sites, {}, [](const PageSite& site) { return site.entry.offset; });
     survey_.meta = container.meta();
     survey_.columns = columns_by_group(survey_.meta);
@@ -238,29 +239,33 @@ class Surveyor {
   }
 
   /// Adds a page that the directory lists.
-  void list(std::uint32_t page, const DirectoryEntry& entry) {
-    survey_.sites.push_back({entry, page, true});
-    if (page >= listed_.size()) listed_.resize(std::size_t{page} + 1);
-    listed_[page] = true;
+  void list(const PageSite& site) {
+    (site.entry.is_void() ? survey_.void_pages : survey_.sites).push_back(site);
+    if (!site.entry.is_void()) listed_.insert(site.identity());
   }
 
   /// Reads what is left of the directory, page by page, and reports its damaged pages.
   void look_at_directory() {
     const Superblock& s = *survey_.superblock;
     std::vector<std::byte> entries;
+    bool lost = false;
+    listed_all_ = false;
     for (std::uint32_t i = 0; i < s.directory_pages; ++i) {
       const std::uint64_t offset = directory_page_offset(s, i);
       const std::size_t bytes = directory_page_entry_bytes(s, i);
       if (offset + kPageHeaderBytes + bytes > file_.size())
         break;  // the file is too short, which was reported before
+      listed_all_ = i + 1 == s.directory_pages;
       entries.resize(bytes);
       try {
         read_directory_page(file_, s, i, entries);
         list_entries(i, entries);
       } catch (const FormatError& error) {
         add(error, 1, diagnose_directory_page(offset, bytes), offset);
+        lost = true;
       }
     }
+    listed_all_ &= !lost && !bad_entries_;
   }
 
   Diagnosis diagnose_directory_page(std::uint64_t offset, std::size_t bytes) {
@@ -280,15 +285,21 @@ class Surveyor {
     }
   }
 
-  /// Lists the pages of one directory page.
+  /// Lists the pages of one directory page, but for those between node pages and meta page: their
+  /// ranks follow from the directory as a whole, and scan() finds them.
   void list_entries(std::uint32_t directory_page, std::span<const std::byte> bytes) {
     const Superblock& s = *survey_.superblock;
+    const PageNumbers numbers(s, {});
     const std::uint32_t first = directory_page * directory_entries_per_page(s.header);
     for (std::uint32_t i = 0; i * kDirectoryEntryBytes < bytes.size(); ++i) {
+      const std::uint32_t page = first + i;
+      if (numbers.others().contains(page)) continue;
       try {
-        list(first + i, decode_directory_entry(bytes.subspan(i * kDirectoryEntryBytes), s.header,
-                                               s.file_bytes));
+        const DirectoryEntry entry =
+            decode_directory_entry(bytes.subspan(i * kDirectoryEntryBytes), s.header, s.file_bytes);
+        list({entry, rank_of(numbers, {}, page), page, true});
       } catch (const FormatError&) {  // Survey::refusal reports the entry
+        bad_entries_ = true;
       }
     }
   }
@@ -297,10 +308,12 @@ class Surveyor {
   void scan() {
     for_each_page(file_, *survey_.header, progress_,
                   [&](const PageHeader& header, std::uint64_t offset) {
-                    if (header.type == PageType::directory) {
-                      directory_end_ = offset + kPageHeaderBytes + header.stored_bytes;
-                    } else if (header.page_id >= listed_.size() || !listed_[header.page_id]) {
-                      survey_.sites.push_back({entry_of(header, offset), header.page_id});
+                    const PageSite site{entry_of(header, offset), header.rank};
+                    pages_end_ = offset + kPageHeaderBytes + header.stored_bytes;
+                    has_directory_ |= header.type == PageType::directory;
+                    has_meta_ |= header.type == PageType::meta;
+                    if (header.type != PageType::directory && !listed_.contains(site.identity())) {
+                      survey_.sites.push_back(site);
                     }
                   });
   }
@@ -312,14 +325,17 @@ class Surveyor {
                     .offset = file_.size(),
                     .rule = "spec/container.md#superblock-magic",
                     .text = "no superblock at the end: the file is unfinished or truncated"};
-    if (directory_end_ > 0) {
-      const std::uint64_t length = round_up(directory_end_, kBlockBytes) + 2 * kBlockBytes;
-      finding.cause = file_.size() < length ? Cause::truncated : Cause::unknown;
+    if (has_directory_) {
+      // The meta page is the last one before the superblocks.
+      const std::uint64_t length = round_up(pages_end_, kBlockBytes) + 2 * kBlockBytes;
+      const Block last = read_block((file_.size() - 1) / kBlockBytes * kBlockBytes);
+      finding.cause = file_.size() < length ? Cause::truncated
+                      : last == Block{}     ? Cause::zeroed
+                      : !has_meta_          ? Cause::truncated
+                                            : Cause::unknown;
       finding.text = "no superblock at the end, although the file has a directory";
       finding.expected = fmt::format("at least {}", length);
       finding.actual = std::to_string(file_.size());
-      Block last = read_block((file_.size() - 1) / kBlockBytes * kBlockBytes);
-      if (finding.cause == Cause::unknown && last == Block{}) finding.cause = Cause::zeroed;
     }
     findings_.add(std::move(finding));
   }
@@ -331,7 +347,7 @@ class Surveyor {
       SurveyedPage page(file_, survey_);
       if (page.check(site, 3, flips_)) continue;
       try {
-        survey_.meta = decode_meta(page.payload());
+        survey_.meta = decode_meta(page.payload(), survey_.header->point_bytes);
         survey_.columns = columns_by_group(survey_.meta);
       } catch (const FormatError&) {  // the check of pages reports it
       }
@@ -343,9 +359,13 @@ class Surveyor {
   FlipBudget& flips_;
   Progress& progress_;
   Survey survey_;
-  std::vector<bool> listed_;         ///< by page number, whether the directory lists the page
-  bool no_superblock_ = false;       ///< there is no trace of a superblock
-  std::uint64_t directory_end_ = 0;  ///< end offset of the last directory page that a scan met
+  std::set<std::uint64_t> listed_;  ///< PageSite::identity() of pages that the directory lists
+  bool listed_all_ = false;         ///< every entry of the directory was read
+  bool bad_entries_ = false;        ///< an entry breaks a rule
+  bool no_superblock_ = false;      ///< there is no trace of a superblock
+  bool has_directory_ = false;      ///< a scan met a directory page
+  bool has_meta_ = false;           ///< a scan met a meta page
+  std::uint64_t pages_end_ = 0;     ///< end offset of the last page that a scan met
 };
 
 }  // namespace
@@ -359,7 +379,7 @@ std::vector<PageSite> find_pages(const InputFile& file, const FileHeader& header
                                  Progress& progress) {
   std::vector<PageSite> sites;
   for_each_page(file, header, progress, [&](const PageHeader& page, std::uint64_t offset) {
-    if (page.type != PageType::directory) sites.push_back({entry_of(page, offset), page.page_id});
+    if (page.type != PageType::directory) sites.push_back({entry_of(page, offset), page.rank});
   });
   return sites;
 }

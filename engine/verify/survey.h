@@ -20,10 +20,15 @@ namespace ptc {
 /// A page of the file and where it lies, according to the directory or to its own header.
 struct PageSite {
   DirectoryEntry entry;
-  std::uint32_t page = 0;  ///< page number
-  bool listed = false;     ///< the directory lists the page; otherwise its header was found by scan
-  bool sound = true;       ///< false once a fault was found in the page
+  std::uint32_t rank = 0;        ///< among the pages of its type and group
+  std::uint32_t page = kNoPage;  ///< page number; kNoPage when it is not known
+  bool listed = false;  ///< the directory lists the page; otherwise its header was found by scan
+  bool sound = true;    ///< false once a fault was found in the page
 
+  /// Returns what identifies the page in its file: type, group and rank.
+  [[nodiscard]] std::uint64_t identity() const noexcept {
+    return static_cast<std::uint64_t>(entry.type) << 40 | std::uint64_t{entry.group} << 32 | rank;
+  }
   /// Returns the file offset after the last byte of the stored payload.
   [[nodiscard]] std::uint64_t end() const noexcept {
     return entry.offset + kPageHeaderBytes + entry.stored_bytes;
@@ -31,15 +36,16 @@ struct PageSite {
 };
 
 /// Everything that a survey could establish about a file.
-/// Memory: 48 bytes for each page, and what ContainerReader takes.
+/// Memory: 112 bytes for each page, and what ContainerReader takes.
 struct Survey {
   std::optional<FileHeader> header;      ///< from the file's start, or repeated by a superblock
   std::optional<Superblock> superblock;  ///< an intact copy, wherever it lies
   std::unique_ptr<ContainerReader> container;  ///< null unless the file opens like any sound file
-  std::vector<PageSite> sites;                 ///< all but directory pages, ascending by offset
-  GroupColumns columns;                        ///< columns of the channel groups, from `meta`
-  Meta meta;                                   ///< content of the meta page; empty when it is lost
-  std::optional<Finding> refusal;  ///< why `container` is null although all before it is intact
+  std::vector<PageSite> sites;       ///< all but directory and void pages, ascending by offset
+  std::vector<PageSite> void_pages;  ///< pages without bytes that the directory lists
+  GroupColumns columns;              ///< columns of the channel groups, from `meta`
+  Meta meta;                         ///< content of the meta page; empty when it is lost
+  std::optional<Finding> refusal;    ///< why `container` is null although all before it is intact
 };
 
 /// Examines header, superblocks, length and directory, and adds their faults to `findings`. Pages

@@ -18,6 +18,7 @@
 #include "format/bytes.h"
 #include "format/checksum.h"
 #include "format/node_page.h"
+#include "format/parts_page.h"
 #include "format/point_page.h"
 
 namespace ptc {
@@ -27,7 +28,7 @@ constexpr char kPayload[] = "spec/container.md#page-payload";
 constexpr char kAgreement[] = "spec/container.md#page-agreement";
 constexpr char kPageKeys[] = "spec/container.md#page-keys";
 constexpr char kPageLevel[] = "spec/container.md#page-level";
-constexpr char kValues[] = "spec/points.md#attribute-pages";
+constexpr char kAttributePages[] = "spec/points.md#attribute-pages";
 
 constexpr std::size_t kPayloadHashAt = 48;  // offset of the payload's checksum in the page header
 
@@ -48,34 +49,30 @@ void check_groups(const PageHeader& header, const NodePage& nodes) {
     last = std::max(last, nodes[slot].cell().high);
   }
   if (least != header.level)
-    throw FormatError(22, kPageLevel, "the level is not the lowest level of its groups");
+    throw FormatError(24, kPageLevel, "the level is not the lowest level of its groups");
   check_keys(header, first, last, "groups");
 }
 
-/// Checks that the halves and floats of a channel group are finite, which is when not all bits of
-/// the exponent are set.
-/// @param column  the first column of the group
-void check_values(const PageHeader& header, const Meta& meta, const std::byte* column) {
-  const auto check = [&]<class T>(T infinity, std::size_t count, const std::string& name) {
-    for (std::size_t i = 0; i < count; ++i) {
-      if ((load<T>(column, i * sizeof(T)) & infinity) != infinity) continue;
-      throw FormatError(0, kValues,
-                        fmt::format("the value of channel {} for point {} is not finite", name,
-                                    i % header.record_count));
-    }
-  };
-  for (const Channel& channel : meta.channels) {
-    if (channel.group != header.group) continue;
-    const std::size_t count = std::size_t{channel.components} * header.record_count;
-    if (channel.type == ChannelType::half) check(std::uint16_t{0x7c00}, count, channel.name);
-    if (channel.type == ChannelType::f32) check(std::uint32_t{0x7f800000}, count, channel.name);
-    column += count * channel_bytes(channel.type);
+/// Returns the name of a page for messages, such as "node page 3".
+std::string page_name(PageType type, std::uint8_t group, std::uint32_t rank) {
+  switch (type) {
+    case PageType::node:
+      return fmt::format("node page {}", rank);
+    case PageType::point:
+      return fmt::format("point page {}", rank);
+    case PageType::attribute:
+      return fmt::format("page {} of channel group {}", rank, group);
+    case PageType::meta:
+      return "the meta page";
+    default:
+      return fmt::format("page {} of type {}", rank, static_cast<unsigned>(type));
   }
 }
 
 /// Returns the finding that reports an error at an offset within a page.
 Finding finding_in(const PageSite& site, int level, const FormatError& error) {
-  return finding_of(error.rebased(site.entry.offset, "").in_page(site.page), level);
+  const FormatError placed = error.rebased(site.entry.offset, "");
+  return finding_of(site.page == kNoPage ? placed : placed.in_page(site.page), level);
 }
 
 }  // namespace
@@ -107,11 +104,13 @@ std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, Flip
   if (level < 3 || !has_content()) return std::nullopt;
   // Decode the payload, and check its content.
   payload_.resize(std::max<std::size_t>(payload_.size(), header_.raw_bytes));
-  PageRules rules{.columns = &survey_.columns};
+  PageRules rules{.point_bytes = survey_.header->point_bytes, .columns = &survey_.columns};
   try {
     check_channels();
     if (survey_.container) {
-      rules.entries = survey_.container->entries();
+      const PageNumbers::Range nodes =
+          survey_.container->has_parts() ? PageNumbers::Range{} : survey_.container->node_pages();
+      rules.node_pages = survey_.container->entries().subspan(nodes.first, nodes.count);
       rules.points = survey_.container->superblock().points;
     }
     decode_payload(header_, stored(), rules, payload_, decoder_);
@@ -153,16 +152,18 @@ std::optional<Finding> SurveyedPage::check_header(const PageSite& site, FlipBudg
 }
 
 std::optional<Finding> SurveyedPage::check_agreement(const PageSite& site) const {
-  if (header_.page_id == site.page && entry_of(header_, site.entry.offset) == site.entry)
-    return std::nullopt;
+  const DirectoryEntry& said = site.entry;
+  const bool same =
+      header_.type == said.type && header_.group == said.group && header_.rank == site.rank;
+  if (same && entry_of(header_, said.offset) == said) return std::nullopt;
   Finding finding =
       finding_in(site, 1, {0, kAgreement, "the page header is not what the directory says"});
-  finding.cause = header_.page_id != site.page ? Cause::swapped : Cause::stale;
+  finding.cause = same ? Cause::stale : Cause::swapped;
   finding.bytes = kPageHeaderBytes + header_.stored_bytes;
-  finding.expected = header_.page_id != site.page ? fmt::format("page {}", site.page)
-                                                  : "payload " + hex(site.entry.payload_xxh3);
-  finding.actual = header_.page_id != site.page ? fmt::format("page {}", header_.page_id)
-                                                : "payload " + hex(header_.payload_xxh3);
+  finding.expected =
+      same ? "payload " + hex(said.payload_xxh3) : page_name(said.type, said.group, site.rank);
+  finding.actual = same ? "payload " + hex(header_.payload_xxh3)
+                        : page_name(header_.type, header_.group, header_.rank);
   return finding;
 }
 
@@ -189,8 +190,10 @@ bool SurveyedPage::repaired(const Finding& finding, std::uint64_t page_offset) {
   return true;
 }
 
-/// Returns whether the payload can be checked: values of channels whose types are lost cannot.
+/// Returns whether the payload can be checked: values of channels whose types are lost cannot, nor
+/// can pages of a later version.
 bool SurveyedPage::has_content() const {
+  if (is_skippable(header_.type)) return false;
   return header_.type != PageType::attribute || survey_.columns.contains(header_.group);
 }
 
@@ -201,17 +204,23 @@ void SurveyedPage::check_channels() const {
   if (header_.raw_bytes ==
       header_.record_count * group_point_bytes(survey_.meta.channels, header_.group))
     return;
-  throw FormatError(16, kValues, "the payload does not have the size that its channels need");
+  throw FormatError(16, kAttributePages,
+                    "the payload does not have the size that its channels need");
 }
 
 void SurveyedPage::check_content() const {
   const std::byte* const data = payload_.data();
   if (header_.type == PageType::point) {
-    const PointPage points(data, header_.record_count);
+    const PointPage points(data, header_.record_count, survey_.header->point_bytes);
     check_keys(header_, points[0].key.high, points[points.size() - 1].key.high, "points");
   }
+  if (header_.type == PageType::parts) {
+    const auto records = std::span<const std::byte>(payload_).first(header_.raw_bytes);
+    const PartRecord first = decode_part(records.first(kPartBytes));
+    const PartRecord last = decode_part(records.last(kPartBytes));
+    check_keys(header_, first.first_key.high, last.last_key.high, "parts");
+  }
   if (header_.type == PageType::node) check_groups(header_, NodePage(data, header_.record_count));
-  if (header_.type == PageType::attribute) check_values(header_, survey_.meta, data);
 }
 
 }  // namespace ptc

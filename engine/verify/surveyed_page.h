@@ -29,6 +29,8 @@ class SurveyedPage {
 
   /// Returns the header of the page that check() last passed without a finding.
   [[nodiscard]] const PageHeader& header() const noexcept { return header_; }
+  /// Returns the bytes of a point in this file.
+  [[nodiscard]] std::uint8_t point_bytes() const noexcept { return survey_.header->point_bytes; }
   /// Returns the decoded payload of the page that check() last passed at level 3.
   [[nodiscard]] std::span<const std::byte> payload() const noexcept {
     return std::span(payload_).first(header_.raw_bytes);

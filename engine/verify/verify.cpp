@@ -17,13 +17,14 @@
 #include <memory>
 #include <utility>
 
-#include <fmt/format.h>
-
-#include "engine/base/error.h"
+#include "engine/base/memory_budget.h"
 #include "engine/parallel/thread_pool.h"
+#include "engine/store/commit.h"
 #include "engine/verify/rebuild.h"
 #include "engine/verify/surveyed_page.h"
 #include "engine/verify/verify_tree.h"
+#include "format/parts_page.h"
+#include "format/point_page.h"
 
 namespace ptc {
 namespace {
@@ -60,6 +61,7 @@ class FileCheck {
         explain_refusal();
       }
       if (options_.level >= VerifyLevel::payload && survey_.container) check_padding();
+      if (options_.level >= VerifyLevel::directory && survey_.container) check_parts(progress);
       if (options_.level >= VerifyLevel::content && survey_.container) check_tree(progress);
       if (options_.level >= VerifyLevel::rebuild && report_.tree_checked) rebuild(progress);
     } catch (const StopVerifying&) {  // the first damage was found, and no more was asked for
@@ -90,16 +92,14 @@ class FileCheck {
     const std::uint64_t page = std::uint64_t{1} << s.header.page_shift;
     const std::uint64_t groups =
         survey_.container ? s.node_groups : 0;  // a superblock alone proves no number of groups
-    const std::uint64_t fixed = kBaseBytes + 100 * survey_.sites.size() + groups / 8 +
-                                3 * page * executor_.threads() + 100 * s.leaf_points;
-    const std::uint64_t least = fixed + kMinCachedPages * page;
-    if (options_.memory_bytes < least) {
-      throw LimitError(
-          fmt::format("the memory cap is too small for this file: the least that works is {}M",
-                      (least >> 20) + 1));
-    }
-    cached_pages_ = static_cast<std::size_t>(
-        std::min<std::uint64_t>(kMaxCachedPages, (options_.memory_bytes - fixed) / page));
+    MemoryBudget budget(options_.memory_bytes, "this file", "memory_bytes");
+    budget.charge("the program", kBaseBytes);
+    budget.charge("the list of pages", 100 * survey_.sites.size());
+    budget.charge("groups of nodes", groups / 8);
+    budget.charge("threads", 3 * page * executor_.threads());
+    budget.charge("a leaf", 100 * std::uint64_t{s.leaf_points});
+    const std::uint64_t left = budget.rest("node pages", kMinCachedPages * page);
+    cached_pages_ = static_cast<std::size_t>(std::min<std::uint64_t>(kMaxCachedPages, left / page));
   }
 
   /// Reports why readers refuse the file, unless the same rule was found broken in a page or in the
@@ -150,20 +150,24 @@ class FileCheck {
 
   /// Checks the bytes between the pages of a container that opens.
   void check_padding() {
-    std::uint64_t from = kBlockBytes;
-    for (const PageSite& site : survey_.sites) {
-      check_zero({from, site.entry.offset});
-      from = site.end();
-    }
-    const Superblock& s = *survey_.superblock;
-    check_zero({from, s.directory_offset});
     // Opening the file checked the directory pages, but not the padding after the last of them.
+    const Superblock& s = *survey_.superblock;
     const std::uint32_t full = directory_entries_per_page(s.header);
     const std::uint64_t entries = s.page_count - (s.directory_pages - 1) * std::uint64_t{full};
     const std::uint64_t last =
         s.directory_offset + (std::uint64_t{s.directory_pages - 1} << s.header.page_shift);
-    check_zero(
-        {last + kPageHeaderBytes + entries * kDirectoryEntryBytes, s.file_bytes - 2 * kBlockBytes});
+    const std::uint64_t entries_end = last + kPageHeaderBytes + entries * kDirectoryEntryBytes;
+    // Check the gaps before the directory, and those of the tail behind it.
+    std::uint64_t from = kBlockBytes;
+    for (const PageSite& site : survey_.sites) {
+      if (from <= s.directory_offset && site.entry.offset >= s.tail_offset) {
+        check_zero({from, s.directory_offset});
+        from = entries_end;
+      }
+      check_zero({from, site.entry.offset});
+      from = site.end();
+    }
+    check_zero({from, s.file_bytes - 2 * kBlockBytes});
   }
 
   /// Reports the bytes of a gap that are not zero, from the first to the last, as one finding.
@@ -188,23 +192,121 @@ class FileCheck {
     findings_.add(std::move(finding));
   }
 
+  /// Says whether a file can be checked as a part: it is a file, and no scene of parts.
+  static bool is_part(const std::filesystem::path& file) {
+    if (!std::filesystem::is_regular_file(file)) return false;
+    try {
+      return (read_file_header(InputFile(file)).feature_incompat & kPartsFeature) == 0;
+    } catch (const FormatError&) {  // its own check reports it
+      return true;
+    }
+  }
+
+  /// Checks that references of the scene's own node pages lead to what the parts have.
+  void check_top() {
+    const ContainerReader& scene = *survey_.container;
+    std::vector<std::byte> payload(scene.page_payload_limit());
+    PageDecoder decoder;
+    for (PageSite& site : survey_.sites) {
+      if (site.entry.type != PageType::node || !site.sound) continue;
+      try {
+        static_cast<void>(scene.read_page(scene.number_of(site.page), payload, decoder));
+      } catch (const FormatError& error) {
+        site.sound = false;
+        Finding finding = finding_of(error, 3);
+        finding.cause = Cause::writer;
+        findings_.add(std::move(finding));
+      }
+    }
+  }
+
+  /// Checks that the keys of the parts' first and last points are whole those of the scene's
+  /// record.
+  void check_keys(const std::vector<PartRecord>& records) {
+    std::vector<std::byte> payload(survey_.container->page_payload_limit());
+    PageDecoder decoder;
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      const ContainerReader& part = *survey_.container->parts()[i];
+      const auto point = [&](std::size_t rank, bool last) {
+        const PageHeader page = part.read_page(part.point_pages()[rank], payload, decoder);
+        const PointPage points(payload.data(), page.record_count, part.header().point_bytes);
+        return points[last ? page.record_count - 1 : 0].key;
+      };
+      if (point(0, false) == records[i].first_key &&
+          point(part.point_pages().size() - 1, true) == records[i].last_key)
+        continue;
+      findings_.add({.cause = Cause::writer,
+                     .level = 3,
+                     .file = part.path().string(),
+                     .rule = "spec/parts.md#parts-file",
+                     .text = "its points have other keys than the scene says"});
+    }
+  }
+
+  /// Checks each part of a scene of parts as a file of its own, and then the scene with them.
+  void check_parts(Progress& progress) {
+    if (!survey_.container->has_parts()) return;
+    const auto refuse = [&](const FormatError& error, const std::filesystem::path& file) {
+      Finding finding = finding_of(error, 1);
+      finding.cause = Cause::writer;
+      if (file != file_.path()) finding.file = file.string();
+      findings_.add(std::move(finding));
+    };
+    std::uint64_t points = 0;
+    const std::uint64_t before = findings_.damage();
+    try {
+      const PartList list = survey_.container->read_parts();
+      for (const PartRecord& part : list.parts()) {
+        const std::filesystem::path file = file_.path().parent_path() / part.name;
+        if (!is_part(file)) continue;  // opening the scene reports it
+        VerifyReport found = FileCheck(file, options_).run(progress);
+        for (Finding& finding : found.findings) {
+          finding.file = file.string();
+          findings_.add(std::move(finding));
+        }
+        report_.pages = report_.pages.value_or(0) + found.pages.value_or(0);
+        points += found.points.value_or(0);
+      }
+      // Open the scene with its parts, unless what is wrong with them was found already.
+      if (findings_.damage() == before) {
+        survey_.container = std::make_unique<ContainerReader>(file_.path());
+        if (options_.level >= VerifyLevel::content) {
+          check_keys(list.parts());
+          check_top();
+        }
+      }
+    } catch (const FormatError& error) {
+      refuse(error, error.file().empty() ? file_.path() : std::filesystem::path(error.file()));
+    }
+    if (options_.level >= VerifyLevel::content) report_.points = points;
+  }
+
   /// Walks the tree, excluding damaged pages, and takes over what it counted.
   void check_tree(Progress& progress) {
+    // Without its parts a scene has no tree to walk.
+    if (survey_.container->has_parts() && survey_.container->parts().empty()) return;
     std::vector<bool> damaged(survey_.container->page_count());
-    for (const PageSite& site : survey_.sites) damaged[site.page] = !site.sound;
+    for (const PageSite& site : survey_.sites) {
+      if (!site.sound) damaged[survey_.container->number_of(site.page)] = true;
+    }
     progress.begin("check tree", survey_.superblock->points, "points");
     const TreeCounts tree =
         verify_tree(*survey_.container, damaged, cached_pages_, findings_, progress);
     progress.end();
+    if (survey_.container->parts().empty()) count_points();
+    report_.nodes = tree.nodes;
+    report_.groups = tree.groups;
+    report_.levels = tree.levels;
+    report_.tree_checked = tree.complete;
+  }
+
+  /// Counts the points of sound pages.
+  void count_points() {
     report_.points = 0;
     for (const PageSite& site : survey_.sites) {
       if (site.sound && site.entry.type == PageType::point)
         *report_.points += site.entry.record_count;
     }
-    report_.nodes = tree.nodes;
-    report_.groups = tree.groups;
-    report_.levels = tree.levels;
-    report_.tree_checked = tree.complete;
   }
 
   void rebuild(Progress& progress) {

@@ -28,9 +28,10 @@ struct Fault {
 ///             at most 1 + 2^-8 times that
 ///   area      2^-9 of itself
 ///   facing    half a step of 1 / 65535 of the area, along each axis
-///   radiance  1 / 256 of its greatest component, along each axis that faces at all
+///   greatest  at least the exact one, at most 1 + 2^-8 times that
+///   radiance, emission  1 / 256 of the greatest component, along each axis that faces at all
 ///   cone      axis within 0.018 rad; angle at least that of the exact cone about the stored axis,
-///             its cosine at most a step of 1 / 32767 below that
+///             at most 10^-3 rad and a step of 1 / 32767 of the cosine wider
 ///
 /// plus what a different order of summation moves: 2^-8 lattice units for positions, a relative
 /// 1e-6 for everything else.

@@ -29,10 +29,12 @@
 namespace ptc {
 namespace {
 
+constexpr char kTop[] = "spec/parts.md#parts-top";
 constexpr char kLevel[] = "spec/nodes.md#node-level";
 constexpr char kCell[] = "spec/nodes.md#node-cell";
 constexpr char kChildren[] = "spec/nodes.md#node-children";
 constexpr char kLeaf[] = "spec/nodes.md#node-leaf";
+constexpr char kEmission[] = "spec/nodes.md#node-emission";
 constexpr char kReferences[] = "spec/nodes.md#references";
 constexpr char kCounts[] = "spec/container.md#superblock-counts";
 constexpr char kRoot[] = "spec/container.md#superblock-root";
@@ -88,6 +90,7 @@ class ReachedGroups {
   /// Reports the groups that were not reached, with one finding for each page.
   void report_rest(const TreeReport& report) const {
     for (const std::uint32_t page : container_.node_pages()) {
+      if (!container_.is_own(page)) continue;  // the top leads to some groups of a part
       const auto first = bits_.begin() + static_cast<std::ptrdiff_t>(first_[page]);
       const auto last = first + container_.entry(page).record_count;
       const auto missed = std::find(first, last, false);
@@ -110,7 +113,9 @@ class TreeWalk {
  public:
   TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged,
            std::size_t cached_pages, Findings& findings, Progress& progress)
-      : superblock_(container.superblock()),
+      : container_(container),
+        superblock_(container.superblock()),
+        node_pages_(container.node_pages()),
         damaged_(damaged),
         report_(container, findings),
         progress_(progress),
@@ -119,9 +124,14 @@ class TreeWalk {
         points_(container, damaged, report_) {}
 
   TreeCounts run() {
-    // Walk the tree.
+    // Count the groups of parts, whether the top leads to them or not. Then walk the tree.
+    for (const auto& part : container_.parts()) {
+      counts_.groups += part->superblock().node_groups;
+      counts_.nodes += part->superblock().nodes;
+      counts_.levels = std::max(counts_.levels, int{part->superblock().levels});
+    }
     if (superblock_.points > 0) {
-      enter(superblock_.root_page, superblock_.root_slot);
+      enter(node_pages_[superblock_.root_page], superblock_.root_slot);
       while (!path_.empty()) step();
     }
     // Compare the totals with the superblock's, unless a part was skipped.
@@ -143,7 +153,21 @@ class TreeWalk {
   }
 
   void fault(const OpenGroup& open, const char* clause, const std::string& text) const {
-    report_.page(open.page, open.from_header, clause, open.place + text);
+    report_.page(open.page, open.from_header, at_seam_ ? kTop : clause, open.place + text);
+  }
+
+  /// Says whether what hangs below a group is a seam: the group is of the top of a scene of parts.
+  [[nodiscard]] bool is_top(const OpenGroup& open) const {
+    return !container_.parts().empty() && container_.is_own(open.page);
+  }
+
+  /// Says whether the leaf that is visited is the first below a group of the top.
+  [[nodiscard]] bool begins_seam() const {
+    for (std::size_t i = path_.size(); i-- > 0;) {
+      if (is_top(path_[i])) return true;
+      if (path_[i].next > 0) return false;
+    }
+    return false;
   }
 
   /// Skips the next child and everything below it.
@@ -169,7 +193,7 @@ class TreeWalk {
     }
     const ChildRef& ref = open.group.children[open.next].ref;
     if (ref.interior) {
-      enter(ref.page, ref.slot);
+      enter(node_pages_[ref.page], ref.slot);
     } else {
       visit_leaf(open, ref);
     }
@@ -179,19 +203,27 @@ class TreeWalk {
   void enter(std::uint32_t page, std::uint16_t slot) {
     if (damaged_[page]) return pass_over();
     OpenGroup open = open_group(pages_, page, slot);
-    if (!reached_.reach(page, slot)) {
-      fault(open, kReferences, "it is the child of two nodes");
-      return pass_over();
+    at_seam_ = !path_.empty() && is_top(path_.back()) && !is_top(open);
+    const bool fits = check_place(open, slot);
+    at_seam_ = false;
+    if (!fits) return pass_over();
+    if (container_.is_own(page)) {
+      ++counts_.groups;
+      counts_.nodes += open.group.children.size();
+      counts_.levels = std::max(counts_.levels, open.group.level + 1);
     }
-    if (path_.empty()) {
-      check_root(open);
-    } else if (!check_inside(open, path_.back())) {
-      return pass_over();
-    }
-    ++counts_.groups;
-    counts_.nodes += open.group.children.size();
-    counts_.levels = std::max(counts_.levels, open.group.level + 1);
     path_.push_back(std::move(open));
+  }
+
+  /// Checks the place of a group in the tree. @return false when the walk cannot enter it
+  bool check_place(const OpenGroup& open, std::uint16_t slot) {
+    if (!reached_.reach(open.page, slot)) {
+      fault(open, kReferences, "it is the child of two nodes");
+      return false;
+    }
+    if (!path_.empty()) return check_inside(open, path_.back());
+    check_root(open);
+    return true;
   }
 
   void check_root(const OpenGroup& open) const {
@@ -245,15 +277,18 @@ class TreeWalk {
     const auto child_fault = [&](const char* clause, const std::string& text) {
       fault(open, clause, fmt::format("child {}: {}", open.next, text));
     };
+    at_seam_ = begins_seam();
     // Check that its points follow those of the leaf before, and are not too many.
     if (ref.first_point != next_point_ && !(resume_ && ref.first_point > next_point_)) {
       child_fault(kLeaf, fmt::format("its points begin with number {}, but the next point is "
                                      "number {}",
                                      ref.first_point, next_point_));
+      at_seam_ = false;
       return pass_over();
     }
+    at_seam_ = is_top(open);
     resume_ = false;
-    next_point_ = ref.first_point + ref.point_count;
+    next_point_ = container_.next_point(ref.first_point + ref.point_count);
     if (ref.point_count > superblock_.leaf_points) {
       child_fault(kLeaf, fmt::format("it has {} points, but a leaf has at most {}", ref.point_count,
                                      superblock_.leaf_points));
@@ -261,13 +296,17 @@ class TreeWalk {
     // Read them, and check that they lie in one octant of the group's cell.
     const auto points = points_.take(ref.first_point, ref.point_count);
     progress_.advance(ref.point_count);
-    if (!points) return pass_over();
+    if (!points) {
+      at_seam_ = false;
+      return pass_over();
+    }
     const auto outside = [&](const PointRecord& point) { return !contains(open.group, point.key); };
     if (std::ranges::any_of(*points, outside)) {
       child_fault(kCell, "its points lie outside the cell");
     } else {
       check_one_octant(open, *points);
     }
+    at_seam_ = false;
     // Check the stored bounds point by point, then the whole summary.
     const NodeSummary& stored = open.group.children[open.next].node;
     const double unit = superblock_.header.frame.unit();
@@ -306,6 +345,13 @@ class TreeWalk {
     path_.pop_back();
     if (!open.complete) return leave_incomplete();
     const std::size_t count = open.group.children.size();
+    const bool emits = std::any_of(open.exact.begin(), open.exact.begin() + count,
+                                   [](const NodeSummary& node) { return node.emits; });
+    if (emits != emits_light(open.group)) {
+      fault(open, kEmission,
+            emits ? "a point below it emits light, but it says otherwise"
+                  : "it has columns of emission, but no point below it emits light");
+    }
     if (count > 1 && open.points <= superblock_.leaf_points) {
       fault(open, kLeaf, fmt::format("it splits {} points, which fit into one leaf", open.points));
     }
@@ -315,7 +361,9 @@ class TreeWalk {
     close_child(path_.back(), summarise_nodes(std::span(parts).first(count)), open.points, true);
   }
 
+  const ContainerReader& container_;
   const Superblock& superblock_;
+  PageNumbers::Range node_pages_;
   const std::vector<bool>& damaged_;
   TreeReport report_;
   Progress& progress_;
@@ -324,6 +372,7 @@ class TreeWalk {
   PointRuns points_;
   std::vector<OpenGroup> path_;  ///< open groups from the root, at most 63 because levels ascend
   TreeCounts counts_;
+  bool at_seam_ = false;  ///< what is checked lies between the top of a scene and what is below it
   std::uint64_t next_point_ = 0;  ///< number of the point that the next leaf begins with
   bool resume_ =
       false;  ///< something was skipped, so that the next leaf may begin at a later point

@@ -25,9 +25,9 @@ struct Desk {
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file{std::tmpfile(), std::fclose};
   double now = 1000;
 
-  std::unique_ptr<Progress> progress(bool terminal) {
+  std::unique_ptr<Progress> progress(ReportStyle style) {
     REQUIRE(file != nullptr);
-    return make_progress(fileno(file.get()), terminal, [this] { return now; });
+    return make_progress(fileno(file.get()), style, [this] { return now; });
   }
 
   // Returns what was written since the last call.
@@ -46,10 +46,18 @@ struct Desk {
 
 }  // namespace
 
-TEST_CASE("progress: a note is a line of its own, even on a terminal", "[base][progress]") {
-  for (const bool terminal : {false, true}) {
+TEST_CASE("progress: a note shows the control characters of a name as text", "[base][progress]") {
+  for (const ReportStyle style : {ReportStyle::lines, ReportStyle::bar}) {
     Desk desk;
-    const auto progress = desk.progress(terminal);
+    desk.progress(style)->note("sky\x1b[2J\xff.exr has changed");
+    CHECK_THAT(desk.take(), Catch::EndsWith(": sky\\x1b[2J\\xff.exr has changed\n"));
+  }
+}
+
+TEST_CASE("progress: a note is a line of its own, even on a terminal", "[base][progress]") {
+  for (const ReportStyle style : {ReportStyle::lines, ReportStyle::bar}) {
+    Desk desk;
+    const auto progress = desk.progress(style);
     progress->note("12.0 GB of temporary files");
     CHECK(desk.take() ==
           std::string(program_invocation_short_name) + ": 12.0 GB of temporary files\n");
@@ -139,7 +147,7 @@ TEST_CASE("progress: a bar fits the columns it is given", "[base][progress]") {
 TEST_CASE("progress: without a terminal a stage prints its start, its end and a line every 10 s",
           "[base][progress]") {
   Desk desk;
-  const auto progress = desk.progress(false);
+  const auto progress = desk.progress(ReportStyle::lines);
   progress->begin("sort", 1000, "points");
   CHECK(desk.take() == "sort: 1.00 K points\n");
   desk.now += 9.9;
@@ -162,18 +170,21 @@ TEST_CASE("progress: without a terminal a stage prints its start, its end and a 
   CHECK(desk.take().empty());
 
   progress->begin("read", 0, "points");  // counts start again
-  CHECK(desk.take() == "read: points\n");
+  CHECK(desk.take() == "read\n");
   desk.now += 2;
   progress->advance(4);
   progress->begin("build", 0, "nodes");  // ends the previous stage
-  CHECK(desk.take() == "read: 4 points in 2.0 s, 2/s\nbuild: nodes\n");
+  CHECK(desk.take() == "read: 4 points in 2.0 s, 2/s\nbuild\n");
+  desk.now += 0.5;
+  progress->end();  // a stage that counted nothing has a time and no rate
+  CHECK(desk.take() == "build: 0.5 s\n");
 }
 
 TEST_CASE("progress: the bar on a terminal is redrawn at most 10 times a second",
           "[base][progress]") {
   Desk desk;
   {
-    const auto progress = desk.progress(true);
+    const auto progress = desk.progress(ReportStyle::bar);
     progress->begin("sort", 100, "points");
     desk.now += 0.09;
     progress->advance(1);
@@ -199,9 +210,30 @@ TEST_CASE("progress: the bar on a terminal is redrawn at most 10 times a second"
   CHECK(desk.take() == "\n");  // left in the middle of a stage
 }
 
+TEST_CASE("progress: a passing bar leaves notes and nothing else on the terminal",
+          "[base][progress]") {
+  Desk desk;
+  {
+    const auto progress = desk.progress(ReportStyle::passing_bar);
+    progress->begin("sort", 100, "points");
+    desk.now += 1;
+    progress->advance(50);
+    CHECK(
+        desk.take() ==
+        "\rsort [################................]  50 % 50 of 100 points, 50/s, 0:01 left\x1b[K");
+    progress->end();
+    CHECK(desk.take() == "\r\x1b[K");
+    progress->begin("build", 0, "nodes");
+    progress->note("more");
+    CHECK(desk.take() == std::string("\r\x1b[K") + program_invocation_short_name + ": more\n");
+    progress->begin("build", 0, "nodes");
+  }
+  CHECK(desk.take() == "\r\x1b[K");  // left in the middle of a stage
+}
+
 TEST_CASE("progress: advances from many threads add up", "[base][progress]") {
   Desk desk;
-  const auto progress = desk.progress(true);
+  const auto progress = desk.progress(ReportStyle::bar);
   progress->begin("sort", 0, "points");
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t)
@@ -215,7 +247,8 @@ TEST_CASE("progress: advances from many threads add up", "[base][progress]") {
 }
 
 TEST_CASE("progress: a report that cannot be written stops nothing", "[base][progress]") {
-  const auto progress = make_progress(-1, false, [now = 0.0]() mutable { return now += 20; });
+  const auto progress =
+      make_progress(-1, ReportStyle::lines, [now = 0.0]() mutable { return now += 20; });
   CHECK_NOTHROW(progress->begin("sort", 1, "points"));
   CHECK_NOTHROW(progress->advance(1));
   CHECK_NOTHROW(progress->end());
@@ -227,4 +260,5 @@ TEST_CASE("progress: the base class is silent", "[base][progress]") {
   CHECK_NOTHROW(progress.advance(1));
   CHECK_NOTHROW(progress.end());
   CHECK(make_stderr_progress() != nullptr);
+  CHECK(make_stderr_bar() != nullptr);
 }

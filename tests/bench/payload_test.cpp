@@ -120,11 +120,11 @@ TEST_CASE("payload: larger payloads are more exact for a corner of three colours
   }
 }
 
-TEST_CASE("payload: the cube and 22 bytes of bounds are as large as a child of spec/nodes.md",
+TEST_CASE("payload: the cube and 24 bytes of bounds are as large as a child of spec/nodes.md",
           "[bench][payload]") {
   const auto cube = std::ranges::find(payloads(), std::string("cube"), &Payload::name);
   REQUIRE(cube != payloads().end());
-  const std::size_t two_children =
-      round_to_slot(group_content_bytes(4)) - round_to_slot(group_content_bytes(2));
-  CHECK(2 * (cube->stored_bytes() + 22) == two_children);
+  const std::size_t four_children =
+      round_to_slot(group_content_bytes(8, false)) - round_to_slot(group_content_bytes(4, false));
+  CHECK(4 * (cube->stored_bytes() + 24) == four_children);
 }

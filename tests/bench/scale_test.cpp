@@ -97,7 +97,7 @@ void spoil(const std::filesystem::path& ply) {
 
 /// Writes a PLY of two points with a column of values.
 std::filesystem::path write_values(const std::filesystem::path& target, float second) {
-  PlyWriter writer(target, 2, {{.name = "light"}});
+  PlyWriter writer(target, 2, false, {{.name = "light"}});
   const std::vector<Surfel> surfels(
       2, Surfel{.position = {1, 2, 3}, .normal = {0, 0, 1}, .radius = 1});
   const std::vector<float> values{1, second};

@@ -63,6 +63,10 @@ class BadInput(ProgramTest):
             os.remove(self.here / ("pipe" + ending))
             directory.rmdir()
 
+    def test_standard_input_is_refused_as_such(self):
+        for kind in ("cloud", "mesh", "container"):
+            self.refuse(kind, "-", "standard input is not read yet; give a file")
+
     def test_empty_files(self):
         for kind, ending in (("cloud", ".ply"), ("cloud", ".xyz"), ("mesh", ".obj"),
                              ("mesh", ".gltf"), ("container", ".ptcx"), ("sky", ".exr"),

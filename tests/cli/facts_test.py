@@ -1,13 +1,16 @@
 """The facts that the programs report, which do not depend on threads or memory."""
 
+import gzip
 import json
 import math
 import re
 import struct
+import subprocess
+import sys
 import unittest
 from pathlib import Path
 
-from programs import CORE, SMALL_PICTURE, ProgramTest, ball, read_ply, run, write_ply
+from programs import CORE, SMALL_PICTURE, ProgramTest, ball, read_ply, run, run_on_terminal, write_ply
 
 VECTORS = Path(__file__).resolve().parents[2] / "spec/vectors"
 
@@ -29,6 +32,30 @@ class Facts(ProgramTest):
             self.assertAlmostEqual(low, -1, places=2)
             self.assertAlmostEqual(high, 1, places=2)
 
+    def test_ptcinfo_prints_what_a_reader_of_its_summary_asks_for(self):
+        scene = self.here / "o.ptcx"
+        self.succeed("ptcbuild", self.mesh, "--spacing", "0.05", "--sun", "30,60", "--sun", "60,30", "--point=0,2,0,1,1,1",
+                     "-o", scene)
+        told = self.succeed("ptcinfo", scene).stdout
+        facts = json.loads(self.succeed("ptcinfo", scene, "--json").stdout)
+        for line in (f"pages     {facts['pages']} of 65.5 KB", 'inputs    "box.obj"', "spacing   0.05 scene units between surfels of meshes",
+                     "lights    2 suns, 1 point light, no sky", "rounded   position by at most 0.001 of the point's radius, the radius by "
+                     "1/512 of it, normals by 0.0021 rad, radiance by 1/256 of it"):
+            self.assertIn(f"\n  {line}\n", told)
+        bounds = re.search(r"\n  bounds    (\S+) (\S+) (\S+) to (\S+) (\S+) (\S+)\n", told).groups()
+        exact = facts["bounds"]["low"] + facts["bounds"]["high"]
+        for text, value in zip(bounds, exact):
+            self.assertAlmostEqual(float(text), value, delta=1e-6)
+            self.assertLessEqual(len(text.lstrip("-").replace(".", "").lstrip("0")), 7, text)
+        self.succeed("ptcbuild", self.mesh, "--points", "1k", "-o", scene)
+        self.assertIn("lights    1 sun, 0 point lights, a sky\n", self.succeed("ptcinfo", scene).stdout)
+        far = self.here / "far.ply"
+        write_ply(far, [(point[0] + 4.5e6, *point[1:]) for point in ball(100)])
+        self.succeed("ptcbuild", far, "-o", scene)
+        self.assertRegex(self.succeed("ptcinfo", scene).stdout, r"\n  bounds    4499999\.\d{4,6} -0\.\d+ ")
+        for vector in VECTORS.glob("good/*.ptcx"):
+            self.assertIn("\n  bounds    ", self.succeed("ptcinfo", vector, "--memory", "1G").stdout)
+
     def test_ptcinfo_under_a_cap_that_does_not_hold_the_directory_is_refused(self):
         def least_and_pages(points):
             scene = self.here / "scene.ptcx"
@@ -46,7 +73,7 @@ class Facts(ProgramTest):
         few, few_pages = least_and_pages("100")
         many, many_pages = least_and_pages("20k")
         self.assertGreater(many_pages, few_pages + 50)
-        self.assertEqual(many - few, 100 * (many_pages - few_pages))  # bytes of a page while the file opens
+        self.assertEqual(many - few, 120 * (many_pages - few_pages))  # bytes of a page while the file opens
 
     def test_texts_of_a_file_cannot_command_the_terminal(self):
         vector = Path(__file__).resolve().parents[2] / "spec/vectors/good/texts.ptcx"
@@ -56,7 +83,7 @@ class Facts(ProgramTest):
 
     def test_every_program_tells_machines(self):
         picture = ["-o", self.here / "o.png", *SMALL_PICTURE]
-        common = {"seconds", "peak_resident_bytes"}
+        common = {"seconds", "memory_bytes", "peak_resident_bytes", "cpu_seconds"}
         for command, keys in (
                 (["ptcbuild", self.mesh, "--points", "1k", "-o", self.here / "o.ptcx"],
                  {"points", "nodes", "bytes", "pages", "sort"}),
@@ -147,6 +174,22 @@ class Facts(ProgramTest):
             self.assertNotIn("\r", text)
             self.assertEqual(self.succeed(*command).stderr, "")
 
+    def test_a_stage_that_counts_nothing_has_no_count_and_no_rate(self):
+        text = self.succeed("ptcbuild", self.mesh, "--points", "3k", "-o", self.here / "o.ptcx", "--progress").stderr
+        self.assertRegex(text, r"^read\nread: [0-9.]+ s\nsample and light\n")
+
+    def test_a_terminal_shows_a_bar_that_goes_and_a_quiet_one_nothing(self):
+        command = ["ptcshade", self.box, "-o", self.here / "o.ply", "--solid-angle", "0.001", "--parallax", "0.02",
+                   "--resolution", "64", "--threads", "1"]
+        code, shown = run_on_terminal(*command)
+        self.assertEqual(code, 0, shown)
+        self.assertIn("\rshade [#", shown)
+        self.assertTrue(shown.endswith("\r\x1b[K"), shown)
+        self.assertNotIn("\n", shown)
+        self.assertEqual(run_on_terminal(*command, "--quiet"), (0, ""))
+        code, shown = run_on_terminal(*command, "--progress")
+        self.assertRegex(shown, r"\rshade: [^\r]* points in [^\r]*\x1b\[K\r\n$")
+
     def test_a_check_against_rays_is_reported(self):
         facts = json.loads(self.succeed("ptcshade", self.scene, "-o", self.here / "o.ply", "--check", "20",
                                         "--check-rays", "64", "--json").stdout)
@@ -192,6 +235,20 @@ class Facts(ProgramTest):
         self.assertFalse(json.loads(self.succeed(*below, "--json").stdout)["tuning"]["met"])
         self.assertIn("below the floor", self.succeed(*below).stdout)
 
+    def test_an_error_that_is_measured_and_not_confirmed_is_called_so(self):
+        command = ["ptcshade", self.box, "-o", self.here / "o.ply", "--error"]
+        floor = json.loads(self.succeed(*command, "0.001%", "--json").stdout)["tuning"]["measured"]["relative"]
+        for factor in (1.02, 1.05, 1.1, 1.2):
+            tuning = json.loads(self.succeed(*command, factor * floor, "--json").stdout)["tuning"]
+            if not tuning["met"] and tuning["measured"]["relative"] <= tuning["asked"]:
+                break
+        else:
+            self.fail("no error between the floor and what is confirmed was found")
+        told = self.succeed(*command, factor * floor).stdout
+        self.assertIn("% asked cannot be confirmed: the finest setting (", told)
+        self.assertIn(f") has {100 * tuning['measured']['relative']:.2f} % at {tuning['pilots']} pilot receivers, but ", told)
+        self.assertNotIn("floor", told)
+
     def test_estimates_are_written_and_what_they_are_worth_is_told(self):
         out = self.here / "o.ply"
         command = ["ptcshade", self.box, "-o", out, "--error", "10%", "--estimate", "--check", "100"]
@@ -207,8 +264,10 @@ class Facts(ProgramTest):
 
     def test_pictures_are_written_in_every_layer(self):
         layers = [f"--layer={name}={self.here}/{name}.png" for name in ("direct", "indirect", "occlusion", "albedo")]
-        self.succeed("ptcrender", self.box, "--mesh", self.mesh, "-o", self.here / "o.exr",
-                     "-o", self.here / "o.png", *layers, *SMALL_PICTURE)
+        told = self.succeed("ptcrender", self.box, "--mesh", self.mesh, "-o", self.here / "o.exr",
+                            "-o", self.here / "o.png", *layers, *SMALL_PICTURE).stdout
+        written = ("o.exr", "o.png", "direct.png", "indirect.png", "occlusion.png", "albedo.png")
+        self.assertTrue(told.startswith(", ".join(f"{self.here}/{name}" for name in written) + ": "), told)
         self.assertEqual((self.here / "o.exr").read_bytes()[:4], b"\x76\x2f\x31\x01")
         for name in ("o", "direct", "indirect", "occlusion", "albedo"):
             png = (self.here / (name + ".png")).read_bytes()
@@ -251,6 +310,20 @@ class Verify(ProgramTest):
         facts = json.loads(run("ptcverify", path, "--level", "3", "--json").stdout.splitlines()[-1])
         self.assertEqual((facts["points"], facts["damaged_pages"]), (0, 1))
 
+    def test_another_kind_of_file_is_called_so_and_not_damaged(self):
+        for level in (0, 1, 3):
+            self.assertEqual(self.fail_with(1, "ptcverify", self.cloud, "--level", level),
+                             f"ptcverify: {self.cloud}: not a PTCX file (spec/container.md#header-magic)\n")
+        packed = self.here / "scene.gz"
+        packed.write_bytes(gzip.compress(self.scene.read_bytes()))
+        self.assertIn(": not a PTCX file: it is a gzip file (", self.fail_with(1, "ptcverify", packed))
+        path, kept = self.here / "wrong.ptcx", self.here / "kept.ptcx"
+        path.write_bytes(b"noise---" * 512 + self.scene.read_bytes()[4096:])
+        result = run("ptcverify", path, "--salvage", kept)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("at level 3: its beginning is overwritten; keep the undamaged part with --salvage\n", result.stderr)
+        self.succeed("ptcverify", kept)
+
     def test_a_flipped_byte_is_named_by_offset_and_rule(self):
         whole = self.scene.read_bytes()
         path = self.here / "flipped.ptcx"
@@ -265,9 +338,11 @@ class Verify(ProgramTest):
         whole = self.scene.read_bytes()
         path = self.here / "wrong.ptcx"
         newer = (VECTORS / "bad/container-header-version.ptcx").read_bytes()
+        directory, tail = (struct.unpack_from("<Q", whole, len(whole) - 4096 + field)[0] for field in (136, 200))
         for code, content, cause in ((0, whole, None), (1, whole[:5000] + b"x" + whole[5001:], None),
                                      (1, whole + b"more", "appended"), (1, whole.replace(b"\n", b"\r\n"), "text-mode"),
-                                     (4, newer, "newer"), (6, whole[:-9], "truncated"), (6, whole[:20000], "unfinished")):
+                                     (4, newer, "newer"), (6, whole[:-9], "truncated"), (6, whole[:tail], "truncated"),
+                                     (6, whole[:directory], "unfinished")):
             path.write_bytes(content)
             result = run("ptcverify", path, "--json")
             self.assertEqual(result.returncode, code, (cause, result.stdout, result.stderr))
@@ -317,7 +392,7 @@ class Verify(ProgramTest):
         for byte in (64, 65):  # bytes of the first page, which holds points
             whole[4096 + byte] ^= 0xff
         broken.write_bytes(whole)
-        number, count = struct.unpack_from("<I", whole, 4096 + 8)[0], struct.unpack_from("<I", whole, 4096 + 24)[0]
+        number, count = (struct.unpack_from("<I", whole, 4096 + field)[0] for field in (8, 20))  # rank, record_count
         points = json.loads(self.succeed("ptcinfo", scene, "--json").stdout)["points"]
         message = self.fail_with(1, "ptcshade", broken, "-o", out)
         why = f"broken.ptcx: offset 4160: page {number}: payload's checksum is wrong"
@@ -371,6 +446,25 @@ class Determinism(ProgramTest):
                 data = (self.here / name).read_bytes()
                 first = first or data
                 self.assertEqual(data, first, options)
+
+    def test_the_page_of_the_demo_is_made_of_the_facts_of_its_programs(self):
+        scene, cap = self.here / "scene.ptcx", ["--memory", "200M"]
+        picture = ["ptcrender", scene, "--mesh", self.mesh, *SMALL_PICTURE, "-o", self.here / "o.png"]
+        runs = {"build": ["ptcbuild", self.mesh, "--points", "3k", *cap, "-o", scene], "verify": ["ptcverify", scene],
+                "shade": ["ptcshade", scene, *cap, "-o", self.here / "o.ply"], "render": picture + cap,
+                "check": [*picture, "--check", "20", "--check-rays", "16"]}
+        for name, command in runs.items():
+            (self.here / f"{name}.json").write_text(self.succeed(*command, "--json").stdout)
+        summary = Path(__file__).resolve().parents[2] / "tools/demo_summary.py"
+        page = subprocess.run([sys.executable, summary, self.here], capture_output=True, text=True, check=True,
+                              timeout=60).stdout
+        rows = {row[0]: row[1:] for row in re.findall(r"^\| (\w+) \| ([0-9.]+) \| ([0-9.]+) \| (\d+) \| (\d+) \|$", page,
+                                                      re.MULTILINE)}
+        self.assertEqual({name: row[3] for name, row in rows.items()},
+                         {"build": "200", "verify": "2048", "shade": "200", "render": "200"})
+        peak = json.loads((self.here / "build.json").read_text())["peak_resident_bytes"]
+        self.assertEqual(rows["build"][2], f"{peak / 2**20:.0f}")
+        self.assertRegex(page, r"\n\| the mesh \| 0\.\d+ \|")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The machine refuses: exit 3, and nothing half written stays."""
 
+import json
 import os
 import resource
 import signal
@@ -90,6 +91,16 @@ class SystemFailure(ProgramTest):
         self.assertEqual((self.here / "o.ptcx").read_bytes(), whole)
         self.assertEqual(os.listdir(self.here), ["o.ptcx"])
 
+    def test_a_build_that_was_killed_in_its_sort_says_that_it_starts_again(self):
+        command = ["ptcbuild", "--city", "2M", "--memory", "128M", "-o", self.here / "o.ptcx", "--resume"]
+        process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
+        while not (self.here / "o.ptcx.resume").exists():
+            time.sleep(0.001)
+        process.kill()
+        process.wait(60)
+        self.assertIn("had not finished its sort: it starts again", self.succeed(*command).stderr)
+
     def test_two_builds_do_not_go_on_with_the_same_files(self):
         command = [str(BIN / "ptcbuild"), "--city", "2M", "--resume", "-o", str(self.here / "o.ptcx")]
         first = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -124,6 +135,68 @@ class SystemFailure(ProgramTest):
         self.succeed(*command)
         self.assertEqual(os.listdir(self.here), ["o.ptcx"])
 
+    def build_to_kill(self):
+        """Kills a build that can go on, once it has written pages, and returns its command."""
+        command = ["ptcbuild", "--city", "2M", "--memory", "128M", "-o", self.here / "o.ptcx", "--resume", "--checkpoint", "100k"]
+        process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
+        while not (self.here / "o.ptcx.resume-at").exists():
+            time.sleep(0.001)
+        process.kill()
+        self.assertEqual(process.wait(60), -signal.SIGKILL)
+        return command
+
+    def test_pages_on_the_disk_that_are_not_what_was_written_are_refused(self):
+        command = self.build_to_kill()
+        with open(self.here / "o.ptcx.resume-pages", "r+b") as file:
+            file.seek(4096 + 1000)  # in the first page's payload
+            byte = file.read(1)[0]
+            file.seek(4096 + 1000)
+            file.write(bytes([byte ^ 1]))
+        message = self.fail_with(1, *command)
+        self.assertRegex(message, r"o\.ptcx\.resume-pages: .*a page's checksum is wrong; to start again, remove ")
+        self.assertFalse((self.here / "o.ptcx").exists())
+
+    def test_a_spill_file_that_is_gone_is_named(self):
+        command = self.build_to_kill()
+        spill, = self.here.glob("o.ptcx.resume-spill-*")
+        spill.unlink()
+        message = self.fail_with(1, *command)
+        self.assertRegex(message, r"o\.ptcx\.resume-spill-\S+ is missing .*; to start again, remove ")
+
+    def test_a_build_through_a_link_writes_the_file_behind_it(self):
+        for resume in ([], ["--resume"]):
+            (self.here / "real").mkdir(exist_ok=True)
+            link = self.here / "link.ptcx"
+            link.symlink_to("real/o.ptcx")  # which does not exist yet
+            self.succeed("ptcbuild", self.cloud, *resume, "-o", link)
+            self.assertTrue(link.is_symlink())
+            self.assertEqual(os.listdir(self.here / "real"), ["o.ptcx"])
+            (self.here / "real" / "o.ptcx").unlink()
+            link.unlink()
+
+    def test_of_two_appends_at_once_none_loses_points(self):
+        self.succeed("ptcbuild", self.cloud, "-o", self.here / "s.ptcx")
+        points = lambda: json.loads(run("ptcinfo", "--json", self.here / "s.ptcx").stdout)["points"]
+        before = points()
+        command = [str(BIN / "ptcbuild"), str(self.cloud), "--append", str(self.here / "s.ptcx"), "-o", str(self.here / "s.ptcx")]
+        both = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) for _ in range(8)]
+        told = [process.communicate(timeout=60)[1] for process in both]
+        done = sum(process.returncode == 0 for process in both)
+        self.assertGreater(done, 0)
+        self.assertEqual(points(), before * (1 + done))
+        for process, text in zip(both, told):
+            if process.returncode != 0:
+                self.assertEqual(process.returncode, 1, text)
+                self.assertIn("another program replaced this file in the meantime", text)
+        self.assertEqual(sum(".tmp-" in name for name in os.listdir(self.here)), 0)
+
+    def test_threads_that_cannot_be_started_are_an_error(self):
+        limited = run("ptcbuild", "--city", "100k", "--threads", "200", "--memory", "20G", "-o", self.here / "o.ptcx",
+                      preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000)))
+        self.assertEqual(limited.returncode, 3, limited.stderr)
+        self.assertRegex(limited.stderr, r"starting 199 threads, of which the system allows \d+")
+
     def test_what_is_left_of_another_build_is_refused(self):
         command = ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx", "--resume"]
         self.succeed(*command)
@@ -143,7 +216,7 @@ class SystemFailure(ProgramTest):
         write_ply(self.here / "large.ply", ball(60000))
         self.succeed("ptcbuild", self.here / "large.ply", "-o", self.here / "large.ptcx")
         before = sorted(os.listdir(self.here))
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU, signal.SIGPIPE):
             command = [str(BIN / "ptcshade"), self.here / "large.ptcx", "-o", self.here / "o.ptcx"]
             process = subprocess.Popen(command, stderr=subprocess.PIPE)
             deadline = time.monotonic() + 60

@@ -86,6 +86,14 @@ class GuideTest(unittest.TestCase):
                 self.assertIn(without_numbers(message), without_numbers(printed))
         return count
 
+    def write_broken(self, path):
+        """Writes a container one of whose pages of points is damaged."""
+        subprocess.run([BIN / "ptcbuild", self.here / "statue.ply", "--points", "20k", "-o", path, "--quiet"], check=True,
+                       timeout=120)
+        data = bytearray(path.read_bytes())
+        data[100000] ^= 0xFF
+        path.write_bytes(data)
+
     def test_every_program_has_a_page(self):
         guide = "".join(page.read_text() for page in GUIDE.glob("*.md"))
         used = {line.split()[0] for line, _ in commands(guide)}
@@ -97,6 +105,19 @@ class GuideTest(unittest.TestCase):
         for page in GUIDE.glob("*.md"):
             if page.name != "README.md":
                 self.assertIn(f"]({page.name})", index)
+
+    def test_the_extents_of_the_files_are_those_that_the_guide_states(self):
+        stated = dict(re.findall(r"^\| `(\S+)` \| (.*) \|$", (GUIDE / "README.md").read_text(), re.M))
+        for mesh, low, high in (("statue.ply", "-1.4 0.1 -1.4", "1.4 0.9 1.4"), ("room.obj", "0 0 0", "1 1 1"),
+                                ("scan.ply", "-1 -1 -1", "1 1 1")):
+            for number in {*low.split(), *high.split()}:
+                self.assertRegex(stated[mesh], rf" {re.escape(number)}\b")
+            made = subprocess.run([str(BIN / "ptcbuild"), mesh, "--points", "20k", "-o", "o.ptcx"], cwd=self.here)
+            self.assertEqual(made.returncode, 0)
+            told = subprocess.run([str(BIN / "ptcinfo"), "o.ptcx"], cwd=self.here, capture_output=True, text=True).stdout
+            found = [float(word) for word in re.search(r"bounds +(.*)\n", told)[1].replace(" to", "").split()]
+            for value, wanted in zip(found, map(float, f"{low} {high}".split())):
+                self.assertAlmostEqual(value, wanted, delta=0.05)
 
     def test_a_page_that_is_wrong_is_noticed(self):
         with self.assertRaises(AssertionError):
@@ -111,7 +132,8 @@ class GuideTest(unittest.TestCase):
         text = (ROOT / "README.md").read_text()
         text = re.sub(r"\b\d+M\b(?= --memory)|(?<=--points )\d+M", "20k", text)
         text = text.replace("ptcrender ", "ptcrender --size 96x54 ")
-        self.assertGreater(self.run_page(text, mesh="statue.ply"), 5)
+        self.write_broken(self.here / "broken.ptcx")
+        self.assertGreater(self.run_page(text, mesh="statue.ply"), 9)
 
 
 def add_page(page):

@@ -59,6 +59,15 @@ class Measure(ProgramTest):
             self.assertTrue(done.stderr.startswith("measure.sh: "))
             self.assertFalse((self.here / "results").exists())
 
+    def test_a_name_or_a_value_that_is_missing_is_a_usage_error(self):
+        for arguments, text in ((["--only", "no-such-result", self.mesh], "there is no result 'no-such-result'"),
+                                (["--only", "", self.mesh, "--only"], "--only needs a value"),
+                                (["--bin"], "--bin needs a value"), ([self.mesh, "--work"], "--work needs a value"),
+                                ([self.mesh, "--results"], "--results needs a value")):
+            done = subprocess.run([SCRIPT, *arguments], capture_output=True, text=True, timeout=60)
+            self.assertEqual((done.returncode, done.stdout), (2, ""), arguments)
+            self.assertIn("measure.sh: " + text, done.stderr)
+
 
 if __name__ == "__main__":
     unittest.main()

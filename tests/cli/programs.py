@@ -6,6 +6,7 @@ between them; they need the standard library only.
 
 import math
 import os
+import pty
 import random
 import struct
 import subprocess
@@ -24,6 +25,22 @@ def run(program, *arguments, **options):
     """Runs a program to its end. Returns its exit code, standard output and standard error."""
     command = [str(BIN / program), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=250, **options)
+
+
+def run_on_terminal(program, *arguments):
+    """Runs a program whose standard error is a terminal. Returns its exit code and what it wrote there."""
+    ours, theirs = pty.openpty()
+    command = [str(BIN / program), *map(str, arguments)]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=theirs)
+    os.close(theirs)
+    written = b""
+    try:
+        while block := os.read(ours, 65536):
+            written += block
+    except OSError:  # the program has closed the terminal
+        pass
+    os.close(ours)
+    return child.wait(timeout=250), written.decode()
 
 
 def write_ply(path, points, names=CORE):

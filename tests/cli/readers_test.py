@@ -22,21 +22,25 @@ from vectors_tree import Surfel, scatter
 from vectors_verify import four_points
 
 DRAFTS = (
-    good.one_point, good.two_pages, good.root_first, good.pages_by_any_number, good.texts, good.max_shifts,
-    good.with_lz4, good.frames_by_hand, lambda: good.packed(reader.LZ4), lambda: good.packed(reader.ZSTD),
+    good.one_point, good.two_pages, good.root_first, good.nodes_by_any_rank, good.texts, good.max_shifts,
+    good.lamps, good.void_pages, good.facts, good.later_pages, lambda: good.tail_of(0), lambda: good.tail_of(1),
+    lambda: Draft(scatter(20, 5), channels=good.schema()), good.with_lz4, good.frames_by_hand, lambda: good.packed(reader.LZ4), lambda: good.packed(reader.ZSTD),
     lambda: Draft(scatter(20, 5), channels=good.CHANNELS, text=(("a", "b"),)),
     lambda: Draft([Surfel((5, 6, 7), radius=0.5)] * 20, leaf_points=1),
     lambda: Draft(four_points(), leaf_points=1))
-HEADER = {"type": 16, "codec": 8, "filter": 8, "page_id": 32, "stored_bytes": 32, "raw_bytes": 32, "group": 16,
-          "level": 16, "record_count": 32, "reserved": 32, "first_key": 64, "last_key": 64}
-ENTRY = {"offset": 64, "stored_bytes": 32, "raw_bytes": 32, "type": 16, "group": 16, "record_count": 32}
-SUPER = {"file_bytes": 64, "page_count": 32, "directory_pages": 32, "directory_offset": 64, "meta_page": 32,
-         "root_page": 32, "root_slot": 16, "levels": 16, "leaf_points": 32, "points_per_page": 32,
-         "reserved": 32, "points": 64, "nodes": 64, "node_groups": 64}
+HEADER = {"type": 8, "codec": 8, "filter": 8, "rank": 32, "stored_bytes": 32, "raw_bytes": 32, "group": 8,
+          "level": 8, "record_count": 32, "first_key": 64, "last_key": 64, "payload_xxh3": 64}
+ENTRY = {"offset": 64, "stored_bytes": 32, "raw_bytes": 32, "payload_xxh3": 64, "first_key": 64, "type": 8, "group": 8,
+         "level": 8, "record_count": 32}
+SUPER = {"file_bytes": 64, "page_count": 32, "directory_pages": 32, "directory_offset": 64, "point_pages": 32,
+         "node_pages": 32, "root_page": 32, "root_slot": 16, "levels": 16, "attribute_groups": 16, "reserved": 16,
+         "leaf_points": 32, "points": 64, "nodes": 64, "node_groups": 64, "tail_offset": 64, "tail_pages": 16}
+HEAD = {"point_bytes": 8, "page_shift": 8, "compat": 64, "ro_compat": 64, "minor": 16}
 NUMBERS = ("origin", "edge", "bounds_low", "bounds_high", "area", "flux")
 
 # Values of summaries are recomputed by one of the two, before it compares totals.
-SUMS = {"nodes-node-mean", "nodes-node-sphere", "nodes-node-slab", "nodes-node-sums", "nodes-node-cone"}
+SUMS = {"nodes-node-mean", "nodes-node-sphere", "nodes-node-slab", "nodes-node-greatest", "nodes-node-sums",
+        "nodes-node-emission", "nodes-node-cone"}
 
 
 def draw(choice, bits):
@@ -52,9 +56,9 @@ def draw_double(choice):
 
 
 def change(choice, draft):
-    """Changes one number of a page's payload, a header, an entry, both, the superblock or the directory."""
+    """Changes one number of a page's payload, a header, an entry, both, the superblock or the file header."""
     page = choice.choice(draft.pages)
-    what = choice.randrange(8)
+    what = choice.randrange(9)
     if what < 3:
         content = bytearray(page.payload if page.stored is None else page.stored)
         at, size = choice.randrange(len(content)), choice.choice((1, 2, 4, 8))
@@ -65,13 +69,14 @@ def change(choice, draft):
             page.payload = content
         else:
             page.stored = bytes(content)
-    elif what == 7:
+    elif what == 8:
         name = choice.choice(NUMBERS)
         one = name in ("edge", "area")
         draft.super[name] = draw_double(choice) if one else [draw_double(choice) for _ in range(3)]
     else:
         fields, *places = ((HEADER, page.header), (ENTRY, page.entry), (SUPER, draft.super),
-                           ({k: ENTRY[k] for k in ENTRY if k != "offset"}, page.entry, page.header))[what - 3]
+                           ({k: ENTRY[k] for k in ENTRY if k != "offset"}, page.entry, page.header),
+                           (HEAD, draft.head))[what - 3]
         name = choice.choice(list(fields))
         value = draw(choice, fields[name])
         for place in places:
@@ -85,7 +90,7 @@ def write_far(path):
     for i, page in enumerate(draft.pages[1:], 1):
         page.entry["offset"] = draft.offset(i) + (1 << 32)
     plain = reader.unpack_superblock(draft.to_bytes()[-reader.BLOCK:])
-    draft.super.update(file_bytes=plain.file_bytes + (1 << 32), directory_offset=plain.directory_offset + (1 << 32))
+    draft.super.update({name: getattr(plain, name) + (1 << 32) for name in ("file_bytes", "directory_offset", "tail_offset")})
     whole = draft.to_bytes()
     with open(path, "wb") as file:
         file.write(whole[:hole])
@@ -99,7 +104,7 @@ class Readers(ProgramTest):
         write_far(path)
         container = reader.open_container(path)
         self.assertEqual([p.x for p in container.points()], [[1]])
-        self.assertEqual(len(container.groups(container.node_pages[0])[0]), 1)
+        self.assertEqual(len(container.groups(0)[0]), 1)
         container.close()
         facts = json.loads(self.succeed("ptcinfo", path, "--json").stdout)
         self.assertEqual((facts["points"], facts["bytes"]["file"]), (1, path.stat().st_size))

@@ -44,8 +44,18 @@ class Usage(ProgramTest):
 
     def test_usage_errors_are_told_in_the_words_of_the_help(self):
         out = ["-o", self.here / "o.ptcx"]
-        for arguments, text in ((["ptcinfo", self.scene, "--no-such"], "unknown option or argument: --no-such"),
-                                (["ptcinfo", self.scene, "x"], "unknown option or argument: x"),
+        for arguments, text in ((["ptcinfo", self.scene, "--no-such"], "unknown option: --no-such"),
+                                (["ptcinfo", self.scene, "--no-such=1"], "unknown option: --no-such"),
+                                (["ptcbuild", self.mesh, "--pionts", "9", *out], "unknown option: --pionts; did you mean --points?"),
+                                (["ptcbuild", self.mesh, "--ponits=9", *out], "unknown option: --ponits; did you mean --points?"),
+                                (["ptcshade", self.scene, "--erorr", "2%", *out], "unknown option: --erorr; did you mean --error?"),
+                                (["ptcinfo", self.scene, "-jsn"], "unknown option: -jsn; did you mean --json?"),
+                                (["ptcinfo", self.scene, "--jqqq"], "unknown option: --jqqq"),
+                                (["ptcinfo", self.scene, "x"], "takes one FILE, so 'x' is one argument too many"),
+                                (["ptcinfo", self.scene, "--", "x"], "takes one FILE, so 'x' is one argument too many"),
+                                (["ptcverify", "a", "x", "y"], "takes one FILE, so 'x' is one argument too many"),
+                                (["ptcshade", "a", "x", *out], "takes one SCENE, so 'x' is one argument too many"),
+                                (["ptcconvert", "a", "b.ply", "x"], "takes one INPUT and one OUTPUT, so 'x' is one argument too many"),
                                 (["ptcbuild", self.mesh, "--city", "9", *out], "INPUT cannot be combined with --city"),
                                 (["ptcbuild", self.mesh, *out, "--points"], "--points needs a value: COUNT"),
                                 (["ptcbuild", self.mesh, *out, "--leaf", "1", "--leaf", "2"], "--leaf is given more than once"),
@@ -153,7 +163,7 @@ class Usage(ProgramTest):
         lights = [f"--point=1.234567{i},2.345678{i},3.456789{i},1,2,3" for i in range(100)]
         build = ["ptcbuild", self.mesh, *lights, "-o", self.here / "o.ptcx"]
         message = self.fail_with(2, *build, "--page-size", "4K", "--points", "100G")
-        self.assertRegex(message, r"record of lights, inputs and channels takes \d+ bytes.*--page-size")
+        self.assertRegex(message, r"record of lights, inputs and channels takes up to \d+ bytes.*--page-size")
         self.succeed(*build, "--points", "1k")
         message = self.fail_with(2, "ptcconvert", self.here / "o.ptcx", self.here / "small.ptcx", "--page-size", "4K")
         self.assertRegex(message, r"--page-size")
@@ -189,11 +199,33 @@ class Usage(ProgramTest):
         self.succeed("ptcconvert", self.here / "o.PTCX", self.here / "p.PLY")
         self.succeed("ptcverify", self.scene, "--map", self.here / "map.SVG")
 
+    def test_each_picture_has_a_file_of_its_own(self):
+        picture = self.here / "a.png"
+        self.succeed("ptcrender", self.scene, *SMALL_PICTURE, "-o", self.here / "sky.png")
+        (self.here / "link.png").symlink_to("a.png")
+        for names in (["-o", picture, "-o", picture], ["-o", picture, "--layer", f"occlusion={picture}"],
+                      ["-o", picture, "--layer", f"albedo={self.here / 'link.png'}"]):
+            self.assertIn("is the name of two pictures", self.fail_with(2, "ptcrender", self.scene, *SMALL_PICTURE, *names))
+        sky = self.here / "sky.png"
+        before = sky.read_bytes()
+        self.assertIn("is read by this run", self.fail_with(2, "ptcrender", self.scene, *SMALL_PICTURE, "--sky", sky, "-o", sky))
+        self.assertEqual(sky.read_bytes(), before)
+
     def test_names_of_outputs_must_tell_their_kind(self):
         for program, operands in (("ptcbuild", [self.mesh, "-o"]), ("ptcshade", [self.scene, "-o"]),
                                   ("ptcrender", [self.scene, "-o"]), ("ptcconvert", [self.scene])):
             for name in ("out", "out.txt", ".png", "out.ptcx.bak"):
                 self.assertIn("must end in", self.fail_with(2, program, *operands, self.here / name))
+
+    def test_settings_of_a_light_need_that_light(self):
+        for program, operands in (("ptcbuild", [self.mesh, "-o", self.here / "o.ptcx"]),
+                                  ("ptcrender", [self.scene, "-o", self.here / "o.png"])):
+            for option, value, light in (("--sun-colour", "1,0,0", "--sun"), ("--sun-size", "2", "--sun"),
+                                         ("--sky-scale", "2", "--sky")):
+                message = self.fail_with(2, program, *operands, option, value, "--point", "0,9,0,1,1,1")
+                self.assertIn(f"{option} requires {light}\n", message)
+        message = self.fail_with(2, "ptcshade", self.scene, "-o", self.here / "o.ply", "--sky-scale", "2")
+        self.assertIn("--sky-scale requires --sky\n", message)
 
     def test_inputs_and_city_exclude_each_other_and_one_is_needed(self):
         self.fail_with(2, "ptcbuild", self.mesh, "--city", "1k", "-o", self.here / "o.ptcx")

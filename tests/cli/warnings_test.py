@@ -1,4 +1,4 @@
-"""Whatever mesh readers leave out is one line on stderr of every program that reads a mesh."""
+"""Whatever mesh readers leave out, and every option without effect, is one line on stderr."""
 
 import unittest
 
@@ -31,6 +31,24 @@ class Warnings(ProgramTest):
         for command in self.commands():
             whole = [self.mesh if word == self.bare else word for word in command]
             self.assertEqual(self.succeed(*whole).stderr, "")
+
+    def test_an_option_that_the_input_leaves_without_effect_is_one_line(self):
+        out = self.here / "out.ptcx"
+        for command, said in (
+                (["ptcbuild", self.cloud, "--backdrop", "--points", "1M", "-o", out], "--points, --backdrop have no effect, because no input is a mesh"),
+                (["ptcbuild", self.cloud, "--spacing", "0.1", "-o", out], "--spacing has no effect, because no input is a mesh"),
+                (["ptcbuild", "--city", "1k", "--points", "9k", "-o", out], "--points has no effect, because no input is a mesh"),
+                (["ptcconvert", self.cloud, out, "--points", "9"], "--points has no effect, because the input is no mesh"),
+                (["ptcconvert", self.scene, out, "--points", "9"], "--points has no effect, because the input is no mesh"),
+                (["ptcconvert", self.scene, self.here / "out.ply", "--profile", "raw"], "--profile has no effect, because the output is no container"),
+                (["ptcshade", self.scene, "--count", "601", "-o", self.here / "out.ply"], "--count is more than there are points: all 600 are shaded")):
+            self.assertEqual(self.succeed(*command).stderr, f"{command[0]}: {said}\n")
+            self.assertEqual(self.succeed(*command, "--quiet").stderr, "")
+        for command in (["ptcbuild", self.cloud, self.mesh, "--backdrop", "--points", "1k", "-o", out],
+                        ["ptcbuild", self.cloud, "--sun", "30,60", "--camera", "0,0,3,0,0,0", "-o", out],
+                        ["ptcconvert", self.mesh, out, "--points", "1k", "--profile", "raw"],
+                        ["ptcshade", self.scene, "--count", "600", "-o", self.here / "out.ply"]):
+            self.assertEqual(self.succeed(*command).stderr, "")
 
     def test_names_in_a_file_cannot_command_the_terminal(self):
         self.bare.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl \x1b[2Jred\nf 1 2 3\n")

@@ -98,17 +98,19 @@ TEST_CASE("digest: it is XXH3-128 over 16 bytes per page, in page order", "[form
   std::vector<std::byte> all;
   CHECK(digest.value() == xxh3_128(all));
   for (std::uint32_t i = 0; i < 300; ++i) {
-    DirectoryEntry entry{4096ull * i,
-                         i,
-                         i + 1,
-                         0x1234567890abcdefull * i,
-                         PageType::point,
-                         static_cast<std::uint16_t>(i % 3),
-                         i * 7};
-    if (i % 2 != 0) entry.type = PageType::attribute;
+    DirectoryEntry entry;
+    entry.offset = 4096ull * i;
+    entry.stored_bytes = i;
+    entry.raw_bytes = i + 1;
+    entry.payload_xxh3 = 0x1234567890abcdefull * i;
+    entry.first_key = i;
+    entry.record_count = i * 7;
+    entry.type = i % 2 != 0 ? PageType::attribute : PageType{200};
+    entry.group = static_cast<std::uint8_t>(i % 3);
+    entry.level = static_cast<std::uint8_t>(i % 5);
     std::array<std::byte, 16> record{};
-    test::put(record, 0, static_cast<std::uint16_t>(entry.type));
-    test::put(record, 2, entry.group);
+    test::put(record, 0, static_cast<std::uint8_t>(entry.type));
+    test::put(record, 1, entry.group);
     test::put(record, 4, entry.record_count);
     test::put(record, 8, entry.payload_xxh3);
     all.insert(all.end(), record.begin(), record.end());

@@ -21,7 +21,8 @@ constexpr char kPacked[] = "spec/points.md#packed-columns";
 
 /// Points along a Z-curve whose coordinates end in `zeros` zero bits, other numbers within `spread`
 /// bits.
-Bytes point_payload(std::uint32_t count, unsigned zeros, unsigned spread, std::uint64_t seed) {
+Bytes point_payload(std::uint32_t count, unsigned zeros, unsigned spread, std::uint64_t seed,
+                    std::uint8_t point_bytes = kPointBytes) {
   Random random(seed);
   std::vector<PointRecord> points(count);
   for (PointRecord& point : points) {
@@ -30,13 +31,15 @@ Bytes point_payload(std::uint32_t count, unsigned zeros, unsigned spread, std::u
     point.key = encode_morton(q);
     point.radius = static_cast<float>(random.unit());
     for (auto& n : point.normal) n = static_cast<std::int16_t>(random.bits());
-    for (auto& c : point.radiance)
-      c = static_cast<std::uint16_t>(random.below(std::uint64_t{1} << spread) % 0x7c00);
+    for (Half3* const light : {&point.radiance, &point.emission}) {
+      for (auto& c : *light)
+        c = static_cast<std::uint16_t>(random.below(std::uint64_t{1} << spread) % 0x7c00);
+    }
     for (auto& c : point.albedo)
       c = static_cast<std::uint8_t>(random.below(std::uint64_t{1} << spread));
   }
   std::ranges::sort(points, {}, &PointRecord::key);
-  return encode_point_page(points);
+  return encode_point_page(points, point_bytes);
 }
 
 Bytes pack(const Bytes& payload, std::uint32_t count, std::span<const PackedColumn> columns) {
@@ -61,37 +64,92 @@ Bytes bytes_of(std::initializer_list<int> values) {
 
 TEST_CASE("packed columns: points of every kind survive packing and unpacking",
           "[format][packed]") {
-  for (const std::uint32_t count : {1u, 2u, 7u, 120u, 1920u}) {
-    for (const unsigned zeros : {0u, 1u, 13u, 30u, 31u, 32u, 41u}) {
-      for (const unsigned spread : {0u, 4u, 16u}) {
-        const Bytes payload = point_payload(count, zeros, spread, count + zeros + spread);
-        const Bytes packed = pack(payload, count, packed_point_columns());
-        Bytes back(payload.size(), std::byte{0xee});
-        unpack_columns(packed, count, packed_point_columns(), back);
-        CHECK(back == payload);
+  for (const std::uint8_t point_bytes : {kPointBytes, kEmittingPointBytes}) {
+    const auto columns = packed_point_columns(point_bytes);
+    for (const std::uint32_t count : {1u, 2u, 7u, 120u, 1920u}) {
+      for (const unsigned zeros : {0u, 1u, 13u, 30u, 31u, 32u, 41u}) {
+        for (const unsigned spread : {0u, 4u, 16u}) {
+          const Bytes payload =
+              point_payload(count, zeros, spread, count + zeros + spread, point_bytes);
+          const Bytes packed = pack(payload, count, columns);
+          Bytes back(payload.size(), std::byte{0xee});
+          unpack_columns(packed, count, columns, back);
+          CHECK(back == payload);
+        }
       }
     }
   }
 }
 
+TEST_CASE("packed columns: those of emission follow the others, green first", "[format][packed]") {
+  PointRecord point;
+  point.emission = {0x1234, 0x1200, 0x1230};
+  const Bytes payload = encode_point_page(std::vector{point}, kEmittingPointBytes);
+  const Bytes packed = pack(payload, 1, packed_point_columns(kEmittingPointBytes));
+  const Bytes plain = pack(encode_point_page(std::vector{point}, kPointBytes), 1,
+                           packed_point_columns(kPointBytes));
+  REQUIRE(packed.size() == plain.size() + 30);
+  CHECK(std::ranges::equal(std::span(packed).first(plain.size()), plain));
+  CHECK(Bytes(packed.end() - 30, packed.end()) ==
+        bytes_of({9, 0, 0,    0x12, 0, 0, 0, 0, 0, 0,     // 0x1200
+                  2, 0, 0x34, 0,    0, 0, 0, 0, 0, 0,     // red less green: 0x34
+                  4, 0, 0x30, 0,    0, 0, 0, 0, 0, 0}));  // blue less green: 0x30
+}
+
 TEST_CASE("packed columns: channels of every type survive packing and unpacking",
           "[format][packed]") {
-  const std::vector<Channel> channels{{"a", ChannelType::u8, 3, 1},
-                                      {"b", ChannelType::f32, 2, 1},
-                                      {"c", ChannelType::u16, 1, 2},
-                                      {"d", ChannelType::half, 16, 3}};
+  const std::vector<Channel> channels{
+      {"a", ChannelType::u8, 3, 1},   {"b", ChannelType::f32, 2, 1},
+      {"c", ChannelType::u16, 1, 2},  {"d", ChannelType::half, 16, 3},
+      {"e", ChannelType::u64, 2, 4},  {"f", ChannelType::i8, 3, 4},
+      {"g", ChannelType::i64, 1, 5},  {"h", ChannelType::f64, 3, 5},
+      {"i", ChannelType::u32, 1, 6},  {"j", ChannelType::i16, 5, 6},
+      {"k", ChannelType::i32, 2, 255}};
   Random random(5);
-  for (const std::uint16_t group : {std::uint16_t{1}, std::uint16_t{2}, std::uint16_t{3}}) {
+  for (const std::uint8_t group : channel_groups(channels)) {
     const std::vector<PackedColumn> columns = packed_group_columns(channels, group);
     for (const std::uint32_t count : {1u, 3u, 1000u}) {
-      Bytes payload(count * group_point_bytes(channels, group));
-      for (std::byte& b : payload) b = static_cast<std::byte>(random.bits());
-      Bytes back(payload.size());
-      unpack_columns(pack(payload, count, columns), count, columns, back);
-      CHECK(back == payload);
+      // Values of any bits, and values that neighbours share all but the lowest bits of.
+      for (const std::uint64_t most : {~std::uint64_t{0}, std::uint64_t{3}}) {
+        Bytes payload(count * group_point_bytes(channels, group));
+        for (std::byte& b : payload) b = static_cast<std::byte>(random.bits() & most);
+        Bytes back(payload.size());
+        unpack_columns(pack(payload, count, columns), count, columns, back);
+        CHECK(back == payload);
+      }
     }
   }
-  CHECK(packed_group_columns(channels, 4).empty());
+  CHECK(packed_group_columns(channels, 7).empty());
+}
+
+TEST_CASE("packed columns: differences of 64 bits wrap around", "[format][packed]") {
+  const std::vector<PackedColumn> u64{{.before = 0, .bits = 64}};
+  Bytes payload(24);
+  put(payload, 0, std::uint64_t{1});
+  put(payload, 8, ~std::uint64_t{0});  // -2, zigzag 3
+  put(payload, 16, std::uint64_t{1} << 63 | 1);
+  const Bytes packed = pack(payload, 3, u64);
+  REQUIRE(packed.size() == 10 + 8 * 3);
+  CHECK(get<std::uint64_t>(packed, 2) == 1);
+  CHECK(packed[11] == std::byte{3});
+  Bytes back(24);
+  unpack_columns(packed, 3, u64, back);
+  CHECK(back == payload);
+  // A column that takes no plane, and a shift of all bits but one.
+  put(payload, 8, std::uint64_t{1} << 63);
+  put(payload, 0, std::uint64_t{0});
+  put(payload, 16, std::uint64_t{0});
+  const Bytes few = pack(payload, 3, u64);
+  CHECK(few[0] == std::byte{63});
+  CHECK(few.size() == 10 + 3);
+  unpack_columns(few, 3, u64, back);
+  CHECK(back == payload);
+  Bytes wrong = few;
+  wrong[0] = std::byte{64};
+  CHECK(clause_of([&] { unpack_columns(wrong, 3, u64, back); }) == kPacked);
+  wrong = few;
+  wrong[1] = std::byte{9};
+  CHECK(clause_of([&] { unpack_columns(wrong, 3, u64, back); }) == kPacked);
 }
 
 TEST_CASE("packed columns: the bytes are those of the specification", "[format][packed]") {
@@ -114,10 +172,10 @@ TEST_CASE("packed columns: the bytes are those of the specification", "[format][
 TEST_CASE("packed columns: bytes that are no packed columns are refused", "[format][packed]") {
   const std::uint32_t count = 50;
   const Bytes payload = point_payload(count, 3, 8, 1);
-  const Bytes packed = pack(payload, count, packed_point_columns());
+  const Bytes packed = pack(payload, count, packed_point_columns(kPointBytes));
   const auto unpack = [&](const Bytes& bytes) {
     Bytes out(payload.size());
-    return clause_of([&] { unpack_columns(bytes, count, packed_point_columns(), out); });
+    return clause_of([&] { unpack_columns(bytes, count, packed_point_columns(kPointBytes), out); });
   };
   CHECK(unpack(packed) == "none");
   for (std::size_t n = 0; n < packed.size(); ++n) {
@@ -141,11 +199,12 @@ TEST_CASE("packed columns: bytes that are no packed columns are refused", "[form
 
 TEST_CASE("packed columns: a payload of the wrong size is the caller's mistake",
           "[format][packed]") {
-  Bytes payload = point_payload(9, 0, 8, 1), packed = pack(payload, 9, packed_point_columns());
+  Bytes payload = point_payload(9, 0, 8, 1),
+        packed = pack(payload, 9, packed_point_columns(kPointBytes));
   for (const std::uint32_t count : {0u, 8u, 10u}) {
-    CHECK_THROWS_AS(pack_columns(payload, count, packed_point_columns(), packed),
+    CHECK_THROWS_AS(pack_columns(payload, count, packed_point_columns(kPointBytes), packed),
                     std::invalid_argument);
-    CHECK_THROWS_AS(unpack_columns(packed, count, packed_point_columns(), payload),
+    CHECK_THROWS_AS(unpack_columns(packed, count, packed_point_columns(kPointBytes), payload),
                     std::invalid_argument);
   }
 }
@@ -157,7 +216,7 @@ TEST_CASE("codec: columns are packed where that is shorter, and unpack to the sa
     PageDecoder decoder;
     for (const std::uint32_t count : {1u, 60u, 1920u}) {
       const Bytes payload = point_payload(count, 20, 4, count);
-      const PayloadColumns columns{count, packed_point_columns()};
+      const PayloadColumns columns{count, packed_point_columns(kPointBytes)};
       Bytes stored, plain;
       const Coding coding = encoder.encode(payload, stored, columns);
       CHECK(coding.filter == (count < 60 ? Filter::none : Filter::columns));
@@ -170,7 +229,8 @@ TEST_CASE("codec: columns are packed where that is shorter, and unpack to the sa
   }
   Bytes stored;
   CHECK(PageEncoder(Codec::raw)
-            .encode(point_payload(60, 20, 4, 1), stored, {60, packed_point_columns()}) == Coding{});
+            .encode(point_payload(60, 20, 4, 1), stored, {60, packed_point_columns(kPointBytes)}) ==
+        Coding{});
 }
 
 TEST_CASE("codec: LZ4 blocks of the wrong size or shape are refused", "[format][codec]") {

@@ -220,3 +220,58 @@ TEST_CASE("octahedral: every pattern decodes to a unit vector, and axes are exac
   CHECK(encode_octahedral({0, 0, 0}) == encode_octahedral(up));
   CHECK(encode_octahedral8({0, 0, 0}) == encode_octahedral8(up));
 }
+
+TEST_CASE("octahedral: decoding is the nearest rounding of integers, as the spec defines it",
+          "[format][scalar]") {
+  unsigned wrong = 0;
+  const auto check = [&](int u, int v, int q, const std::array<double, 3>& n) {
+    // The equations of spec/README.md#types.
+    int a = std::max(u, -q), b = std::max(v, -q);
+    const int c = q - std::abs(a) - std::abs(b);
+    if (c < 0) {
+      const int old_a = a, old_b = b;
+      a = (q - std::abs(old_b)) * (old_a < 0 ? -1 : 1);
+      b = (q - std::abs(old_a)) * (old_b < 0 ? -1 : 1);
+    }
+    const std::int64_t sum = std::int64_t{a} * a + std::int64_t{b} * b + std::int64_t{c} * c;
+    const double length = std::sqrt(static_cast<double>(sum));
+    wrong += n != std::array{a / length, b / length, c / length};
+  };
+  constexpr std::array kEdges{-32768, -32767, -32766, -16384, -16383, -1,
+                              0,      1,      16383,  16384,  32766,  32767};
+  for (int u = -32768; u < 32768; ++u) {
+    for (const int v : kEdges) {
+      const auto su = static_cast<std::int16_t>(u), sv = static_cast<std::int16_t>(v);
+      check(u, v, 32767, decode_octahedral_f64(su, sv));
+      check(v, u, 32767, decode_octahedral_f64(sv, su));
+    }
+  }
+  CHECK(wrong == 0);
+  for (unsigned bits = 0; bits < 0x10000; ++bits) {
+    const int u = static_cast<std::int8_t>(bits & 0xff), v = static_cast<std::int8_t>(bits >> 8);
+    const std::array<double, 3> exact = detail::unfold_octahedron(u, v, 127);
+    check(u, v, 127, exact);
+    const std::array<float, 3> stored = decode_octahedral8(static_cast<std::uint16_t>(bits));
+    for (std::size_t k = 0; k < 3; ++k) wrong += stored[k] != static_cast<float>(exact[k]);
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("octahedral: on the fold a direction lies in the plane of the walls",
+          "[format][scalar]") {
+  unsigned wrong = 0;
+  for (int u = -32767; u <= 32767; ++u) {
+    for (const int sign : {-1, 1}) {
+      const auto v = static_cast<std::int16_t>(sign * (32767 - std::abs(u)));
+      const auto n = decode_octahedral_f64(static_cast<std::int16_t>(u), v);
+      wrong += n[2] != 0 || std::signbit(n[2]);
+      // A step outside of the fold looks down, a step inside up.
+      const auto beyond = static_cast<std::int16_t>(v + (v < 0 ? -1 : 1));
+      const auto within = static_cast<std::int16_t>(v - (v < 0 ? -1 : 1));
+      wrong += !(decode_octahedral_f64(static_cast<std::int16_t>(u), beyond)[2] < 0) &&
+               std::abs(u) != 0;  // -32768 stands for -32767
+      wrong += v != 0 && !(decode_octahedral_f64(static_cast<std::int16_t>(u), within)[2] > 0);
+    }
+  }
+  CHECK(wrong == 0);
+}

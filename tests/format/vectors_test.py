@@ -1,11 +1,12 @@
 """The second reader on the vectors and on damaged files.
 
 vectors_test.py SOURCE_DIR TEMP_DIR: good files are valid and hold what good.txt says, every other one
-is refused by the rule in its name, the vectors are what spec/vectors.py writes, and no flipped bit of two small files goes
-unseen.
+is refused by the rule in its name, a scene of parts has the points and the tree of the same scene in one file, the
+vectors are what spec/vectors.py writes, and no flipped bit of three small files goes unseen.
 """
 
 import os
+import re
 import shutil
 import sys
 
@@ -19,7 +20,11 @@ import verifier  # noqa: E402
 
 # Rules about the values of summaries, which reader.py does not recompute.
 UNCHECKED = {"nodes-node-mean", "nodes-node-sphere", "nodes-node-slab", "nodes-node-sums",
-             "nodes-node-cone"}
+             "nodes-node-greatest", "nodes-node-emission", "nodes-node-cone"}
+# Folders of vectors, and those of the parts that scenes among them name.
+FOLDERS = ("good", "good/parts", "bad", "bad/parts", "verify", "verify/parts")
+# Parts that are damaged themselves, with the rule that they break.
+BROKEN_PARTS = {"damaged.ptcx": "container-page-payload", "padded.ptcx": "container-padding"}
 faults = []
 
 
@@ -62,11 +67,13 @@ def check_content():
 
 def check_verdicts():
     count = 0
-    for kind in ("good", "bad", "verify"):
+    for kind in FOLDERS:
         folder = os.path.join(SPEC, "vectors", kind)
         for name in files(folder):
             rule = name.split(".")[0]
             expected = "valid" if kind == "good" or rule in UNCHECKED else rule
+            if kind.endswith("parts"):
+                expected = BROKEN_PARTS.get(name, "valid")
             found = verdict(os.path.join(folder, name))
             if found != expected:
                 faults.append(f"{kind}/{name}: {found}")
@@ -74,11 +81,93 @@ def check_verdicts():
     return count
 
 
+def tree(container):
+    """Returns cell, level and summaries of every group and the runs of leaves, children before their parents."""
+    out, s = [], container.superblock
+    path = [(s.root_page, s.root_slot, False)]
+    while path:
+        page, slot, is_open = path.pop()
+        groups, payload = container.groups(page)
+        group = groups[slot]
+        if is_open:
+            runs = [(child.first, child.count) for child in group.children]
+            sums = [reader.summary(payload, group, i) for i in range(len(runs))]
+            out.append((group.cell, group.level, runs, sums))
+            continue
+        if len(out) + len(path) > 8 * s.node_groups:
+            return [f"{container.path}: the walk does not end"]
+        path.append((page, slot, True))
+        path.extend((c.page, c.slot, False) for c in reversed(group.children) if c.interior)
+    return out
+
+
+def points(container):
+    """Returns every column of all points."""
+    rows = []
+    for page in container.points():
+        light = (*page.radiance, *page.albedo, *page.emission)
+        rows.extend(zip(page.keys, page.radius, page.normal, *light))
+    return rows
+
+
+def check_parts(scene, one):
+    """Compares a scene of parts with the same scene in one file, to the last bit."""
+    containers = [reader.open_container(os.path.join(SPEC, "vectors", "good", name)) for name in (scene, one)]
+    for what in (points, tree):
+        found = [what(container) for container in containers]
+        if found[0] != found[1] or not found[0]:
+            faults.append(f"good/{scene} and good/{one} differ in their {what.__name__}")
+    for container in containers:
+        container.close()
+
+
+def check_refused_when_loaded():
+    """Opening a bad file and loading all its pages is enough to find its fault."""
+    folder = os.path.join(SPEC, "vectors", "bad")
+    for name in files(folder):
+        found = "valid"
+        try:
+            container = reader.open_container(os.path.join(folder, name))
+            container.load(range(container.superblock.page_count))
+            points(container)
+            for rank in range(container.all_node_pages):
+                container.groups(rank)
+        except reader.Broken as error:
+            found = "-".join(error.clause.removeprefix("spec/").split(".md#"))
+        if found != name.split(".")[0]:
+            faults.append(f"bad/{name}: loading it says {found}")
+
+
+def check_broken_part():
+    """A part that is broken or missing is named by its own path."""
+    for name, part in (("container-page-payload.of-a-part", "damaged"), ("parts-parts-file", "missing")):
+        folder = os.path.join(SPEC, "vectors", "bad")
+        try:
+            verifier.verify(os.path.join(folder, name + ".ptcx"))
+        except reader.Broken as error:
+            if error.file != os.path.join(folder, "parts", part + ".ptcx"):
+                faults.append(f"bad/{name}.ptcx: the error names {error.file}")
+
+
+def check_file_by_hand():
+    """Compares the bytes that overview.md shows with those of the file that it speaks of. @return the number of lines"""
+    with open(os.path.join(SPEC, "overview.md"), encoding="utf-8") as file:
+        section = file.read().split("## A file by hand")[1]
+    with open(os.path.join(SPEC, "vectors", "good", "one-point.ptcx"), "rb") as file:
+        data = file.read()
+    lines = re.findall(r"^ *(\d+)  ((?:[0-9a-f]{2} )*[0-9a-f]{2})  +\S", section, re.MULTILINE)
+    for at, shown in lines:
+        expected = bytes.fromhex(shown)
+        if data[int(at):int(at) + len(expected)] != expected:
+            faults.append(f"overview.md: the bytes at {at} are not those of one-point.ptcx")
+    return len(lines)
+
+
 def check_written_again():
     """Writes the vectors again. Compressed pages depend on the version of zstd, so zstd.ptcx is not compared here."""
     shutil.rmtree(TEMP, ignore_errors=True)
     vectors.write_all(TEMP)
-    for kind in ("good", "bad", "verify"):
+    for kind in FOLDERS:
         old, new = (os.path.join(d, kind) for d in (os.path.join(SPEC, "vectors"), TEMP))
         missing = set(files(old)) ^ set(files(new))
         if missing - {"zstd.ptcx"}:
@@ -93,7 +182,7 @@ def check_flipped_bits(name):
     """Flips one bit of every byte that is not zero, and of one byte in each 64 that are."""
     with open(os.path.join(SPEC, "vectors", "good", name), "rb") as file:
         whole = file.read()
-    path = os.path.join(TEMP, "flipped.ptcx")
+    path = os.path.join(TEMP, "good", "flipped.ptcx")  # next to the folder of parts
     flipped = 0
     for at in range(len(whole)):
         if whole[at] == 0 and at % 64 != 63:
@@ -127,8 +216,13 @@ def check_without_zstd():
 os.makedirs(TEMP, exist_ok=True)
 checked = check_verdicts()
 check_content()
+if check_file_by_hand() < 80:
+    faults.append("overview.md: the file by hand has lost lines")
+check_parts("two-parts.ptcx", "two-parts-as-one-file.ptcx")
+check_broken_part()
+check_refused_when_loaded()
 check_written_again()
 check_without_zstd()
-bits = check_flipped_bits("one-point.ptcx") + check_flipped_bits("zstd-frame-by-hand.ptcx")
+bits = sum(map(check_flipped_bits, ("one-point.ptcx", "zstd-frame-by-hand.ptcx", "one-part.ptcx")))
 print("\n".join(faults) if faults else f"{checked} verdicts right, {bits} flipped bits found")
 sys.exit(1 if faults or checked < 100 or bits < 1000 else 0)

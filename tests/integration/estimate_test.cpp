@@ -111,7 +111,7 @@ TEST_CASE("estimate: its channels exist when requested and change no other chann
     picture.samples = 1;
     picture.size = {{64, 48}};
     Progress silent;
-    const std::vector<PictureTarget> targets{{scene.dir / "a.exr", ""}};
+    const std::vector<PictureTarget> targets{{scene.dir / "a.exr"}};
     const LightingReport report = render_picture(picture, targets, silent);
     CHECK(report.estimate.has_value() == estimate);
     CHECK(names(scene.dir / "a.exr", "occlusion_error.V") == estimate);
@@ -135,7 +135,7 @@ TEST_CASE("estimate: neither threads nor the cap change any byte", "[integration
     request.run = picture.run = {.memory_bytes = mebibytes << 20, .threads = threads};
     shade(scene, request, (name + ".ptcx").c_str());
     Progress silent;
-    const std::vector<PictureTarget> targets{{scene.dir / (name + ".exr"), ""}};
+    const std::vector<PictureTarget> targets{{scene.dir / (name + ".exr")}};
     render_picture(picture, targets, silent);
   };
   run(1, 1024, "one");
@@ -156,7 +156,7 @@ TEST_CASE("estimate: a run without rays is refused, a run without receivers is n
   picture.size = {{16, 12}};
   Progress silent;
   CHECK_THROWS_WITH(
-      render_picture(picture, std::vector<PictureTarget>{{scene.dir / "a.exr", ""}}, silent),
+      render_picture(picture, std::vector<PictureTarget>{{scene.dir / "a.exr"}}, silent),
       Catch::Contains("`error` or `check`"));
   picture.error = 0.1;
   CHECK_THROWS_WITH(

@@ -24,8 +24,7 @@ std::vector<std::uint64_t> pages_of(const std::filesystem::path& path) {
   const ContainerReader container(path);
   std::vector<std::uint64_t> pages;
   for (std::uint32_t page = 0; page < container.page_count(); ++page) {
-    if (page != container.superblock().meta_page)
-      pages.push_back(container.entry(page).payload_xxh3);
+    if (page != container.meta_page()) pages.push_back(container.entry(page).payload_xxh3);
   }
   return pages;
 }
@@ -216,16 +215,16 @@ TEST_CASE("pipeline: a picture has the layers it promises, with and without a me
   request.samples = 1;
   request.size = {{64, 48}};
   const std::vector<PictureTarget> targets{
-      {dir / "a.exr", ""}, {dir / "a.png", "beauty"}, {dir / "o.png", "occlusion"}};
+      {dir / "a.exr"}, {dir / "a.png", "beauty"}, {dir / "o.png", "occlusion"}};
   render_picture(request, targets, silent);
   const Image with_mesh = read_image(dir / "a.exr");
   CHECK(with_mesh.width == 64);
   CHECK(with_mesh.height == 48);
   request.meshes.clear();
-  const std::vector<PictureTarget> splatted{{dir / "b.exr", ""}};
+  const std::vector<PictureTarget> splatted{{dir / "b.exr"}};
   render_picture(request, splatted, silent);
   const Image with_surfels = read_image(dir / "b.exr");
-  // Both show the same view of the same scene: most pixels agree closely.
+  // The mesh and its surfels are seen from the same place: most pixels agree closely.
   std::size_t close = 0;
   for (std::size_t i = 0; i < with_mesh.pixels.size(); ++i) {
     close += std::abs(with_mesh.pixels[i].g - with_surfels.pixels[i].g) < 0.1F;
@@ -287,12 +286,19 @@ TEST_CASE("pipeline: a request that is out of range is refused with the name of 
   CHECK(build([](BuildRequest& r) { r.tree.levels_per_stream = 0; }) == "tree.levels_per_stream");
   CHECK(build([](BuildRequest& r) { r.checkpoint_points = 0; }) == "checkpoint_points");
   CHECK(build([](BuildRequest& r) { r.run.memory_bytes = 1 << 20; }) == "run.memory_bytes");
+  const auto dark = [](const glm::vec3& up) { return LightRig{.sky = {.up = up}}; };
+  CHECK(build([&](BuildRequest& r) { r.lights = dark(glm::vec3(0)); }) == "lights");
+  CHECK(build([](BuildRequest& r) { r.sampling.camera = Camera{.position = glm::dvec3(NAN)}; }) ==
+        "sampling.camera");
   const auto shade = [&](auto&& spoil, const char* target = "o.ply") {
     ShadeRequest request{{.scene = scene}};
     spoil(request);
     return field_of([&] { shade_container(request, dir / target, silent); });
   };
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  CHECK(shade([](ShadeRequest& r) { r.check = {.receivers = 10, .rays = 0}; }) == "check.rays");
+  CHECK(shade([](ShadeRequest& r) { r.sky = Sky{.up = glm::vec3(0)}; }) == "sky");
+  CHECK(shade([](ShadeRequest& r) { r.sky = Sky{.radiance = glm::vec3(-1)}; }) == "sky");
   CHECK(shade([](ShadeRequest& r) { r.gather.resolution = 20; }) == "gather.resolution");
   CHECK(shade([](ShadeRequest& r) { r.gather.resolution = 80; }) == "gather.resolution");
   CHECK(shade([](ShadeRequest& r) { r.gather.solid_angle = 0; }) == "gather.solid_angle");
@@ -317,5 +323,126 @@ TEST_CASE("pipeline: a request that is out of range is refused with the name of 
   CHECK(render([](RenderRequest& r) { r.size = {{65537, 1}}; }, {{dir / "o.png"}}) == "size");
   CHECK(render([](RenderRequest&) {}, {{dir / "o.jpg"}}) == "targets");
   CHECK(render([](RenderRequest&) {}, {}) == "targets");
+  CHECK(render([](RenderRequest&) {}, {{dir / "o.png", "depth"}}) == "targets");
+  CHECK(render([&](RenderRequest& r) { r.lights = dark(glm::vec3(0)); }, {{dir / "o.png"}}) ==
+        "lights");
+  CHECK(render([](RenderRequest& r) { r.camera = Camera{.position = glm::dvec3(NAN)}; },
+               {{dir / "o.png"}}) == "camera");
+  const auto recode = [&](std::uint8_t page_shift) {
+    return field_of([&] {
+      recode_container(ContainerReader(scene), dir / "o.ptcx", {.page_shift = page_shift}, silent);
+    });
+  };
+  for (const int shift : {0, 5, 11, 21, 64, 255})
+    CHECK(recode(static_cast<std::uint8_t>(shift)) == "page_shift");
   CHECK(std::filesystem::directory_iterator(dir.path())->path() == scene);
+}
+
+TEST_CASE("pipeline: meshes too far from each other are refused with the name of their field",
+          "[integration][request]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "scene.ptcx", small_scene(0.1), {}, 12, Codec::zstd);
+  std::ofstream(dir / "near.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  std::ofstream(dir / "far.obj") << "v 4e18 0 0\nv 5e18 0 0\nv 4e18 1e18 0\nf 1 2 3\n";
+  Progress silent;
+  const auto field_of = [](const auto& run) -> std::string {
+    try {
+      run();
+    } catch (const RequestError& error) {
+      return error.field();
+    }
+    return "none";
+  };
+  const BuildRequest build{.inputs = {dir / "near.obj", dir / "far.obj"}};
+  CHECK(field_of([&] { build_container(build, dir / "o.ptcx", silent); }) == "inputs");
+  RenderRequest render{{.scene = dir / "scene.ptcx"}};
+  render.meshes = build.inputs;
+  render.size = {8, 8};
+  const std::vector<PictureTarget> target{{dir / "o.png"}};
+  CHECK(field_of([&] { render_picture(render, target, silent); }) == "meshes");
+}
+
+TEST_CASE("pipeline: receivers are a container whatever the name of the file is",
+          "[integration][shade]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "scene.ptcx", small_scene(0.1), {}, 12, Codec::zstd);
+  std::filesystem::copy_file(dir / "scene.ptcx", dir / "scene.part");
+  ShadeRequest request{{.scene = dir / "scene.ptcx"}};
+  request.receivers = dir / "scene.part";
+  Progress silent;
+  CHECK(shade_container(request, dir / "o.ply", silent).receivers > 0);
+}
+
+namespace {
+
+/// Collects the names of the stages of a run.
+class Stages : public Progress {
+ public:
+  void begin(const std::string& stage, std::uint64_t /*total*/,
+             const std::string& /*unit*/) override {
+    names.push_back(stage);
+  }
+  std::vector<std::string> names;
+};
+
+/// A mesh of two triangles, and a rig whose record grows with the name of its sky picture.
+struct LongRecord {
+  LongRecord() {
+    std::ofstream(dir / "mesh.obj") << "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 4 3 2 1\n";
+  }
+
+  /// Builds with pages of 4 KiB. @return the field that was refused; empty for a build
+  std::string build(std::size_t name_bytes) {
+    BuildRequest request{.inputs = {dir / "mesh.obj"}, .page_shift = 12};
+    std::string picture(name_bytes, 'n');
+    picture.front() = '/';
+    request.lights = LightRig{.sky = {.map_path = picture}};
+    request.sampling.count = 50;
+    request.sampling.lights = {.sun_rays = 1, .area_rays = 0, .sky_rays = 1};
+    stages.names.clear();
+    try {
+      build_container(request, target(), stages);
+    } catch (const RequestError& error) {
+      return error.field();
+    }
+    return {};
+  }
+
+  [[nodiscard]] std::filesystem::path target() const { return dir / "o.ptcx"; }
+
+  TemporaryDirectory dir;
+  Stages stages;
+};
+
+}  // namespace
+
+TEST_CASE("pipeline: a record that may not fit a page with its spacing is refused before sampling",
+          "[integration][request]") {
+  LongRecord record;
+  std::size_t refused = 0;
+  for (std::size_t bytes = 3000; bytes < 4096; bytes += 8) {
+    const std::string field = record.build(bytes);
+    if (field.empty()) continue;
+    CHECK(field == "page_shift");
+    CHECK(record.stages.names == std::vector<std::string>{"read"});
+    ++refused;
+  }
+  CHECK(refused > 8);
+  CHECK(refused < 100);
+}
+
+TEST_CASE("pipeline: a record without room for shaded channels is refused before any light",
+          "[integration][request]") {
+  LongRecord record;
+  std::size_t bytes = 3000;
+  while (record.build(bytes + 8).empty()) bytes += 8;
+  REQUIRE(record.build(bytes).empty());
+  ShadeRequest request{{.scene = record.target(), .bounces = 2}};
+  request.sky = Sky{};
+  Stages stages;
+  CHECK_THROWS_AS(shade_container(request, record.dir / "shaded.ptcx", stages), DataError);
+  CHECK_THROWS_WITH(shade_container(request, record.dir / "shaded.ptcx", stages),
+                    Catch::Contains("o.ptcx") && Catch::Contains("to larger pages"));
+  CHECK(stages.names.empty());
+  CHECK_NOTHROW(shade_container(request, record.dir / "shaded.ply", stages));
 }

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/points.h"
 #include "engine/ptc.h"
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
@@ -56,10 +57,19 @@ void write_pairs(const std::filesystem::path& path, std::size_t count) {
   }
 }
 
-enum class Kind { city, cloud, pairs };
+/// Writes points of which every third emits light.
+void write_lamps(const std::filesystem::path& path, std::size_t count) {
+  std::vector<Surfel> surfels = random_surfels(count, 5);
+  for (std::size_t i = 0; i < count; i += 3) surfels[i].emission = {3, 2, 1};
+  PlyWriter writer(path, count, true, {});
+  writer.write(surfels, {});
+  writer.finish();
+}
 
-/// A city, or a cloud of the same size whose radii are estimated or known, with temporary files in
-/// two directories.
+enum class Kind { city, cloud, pairs, lamps };
+
+/// A city, or a cloud of the same size whose radii are estimated or known or whose points emit
+/// light, with temporary files in two directories.
 struct Place {
   TemporaryDirectory dir;
   BuildRequest request;
@@ -74,7 +84,9 @@ struct Place {
     if (kind == Kind::cloud) write_cloud(dir / "c.xyz", 300'000);
     if (kind == Kind::pairs) write_pairs(dir / "c.xyz", 300'000);
     if (kind == Kind::city) request.city_points = 300'000;
-    if (kind != Kind::city) request.inputs = {dir / "c.xyz"};
+    if (kind == Kind::lamps) write_lamps(dir / "c.ply", 300'000);
+    if (kind == Kind::cloud || kind == Kind::pairs) request.inputs = {dir / "c.xyz"};
+    if (kind == Kind::lamps) request.inputs = {dir / "c.ply"};
     request.run = {.memory_bytes = std::uint64_t{200} << 20,
                    .threads = 2,
                    .temp_dirs = {dir / "t1", dir / "t2"}};
@@ -101,7 +113,7 @@ struct Place {
 
 TEST_CASE("resume: a build that is interrupted anywhere continues to the same bytes",
           "[integration][resume]") {
-  for (const Kind kind : {Kind::city, Kind::cloud, Kind::pairs}) {
+  for (const Kind kind : {Kind::city, Kind::cloud, Kind::pairs, Kind::lamps}) {
     Place place(kind);
     const std::uint64_t passes =
         (kind == Kind::city ? 1 : 2) * place.points;  // points reported before the sorted ones

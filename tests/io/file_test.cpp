@@ -143,6 +143,30 @@ TEST_CASE("output file: a write that fails leaves the old file, whichever write 
   }
 }
 
+TEST_CASE("output file: what another program put in the place of its source is kept",
+          "[io][file]") {
+  const test::TemporaryDirectory scratch;
+  const auto target = scratch.file("out", "old");
+  std::filesystem::create_symlink("out", scratch.path() / "link");
+  for (const char* name : {"out", "link"}) {
+    const InputFile source(scratch.path() / name);
+    OutputFile other(target);
+    other.append(bytes_of("other"));
+    other.publish(&source);
+    // The file is created after the source was replaced, which must not hide that it was.
+    OutputFile late(target);
+    CHECK_THROWS_WITH(late.publish(&source),
+                      target.string() +
+                          ": another program replaced this file in the meantime; "
+                          "run this again");
+    CHECK(slurp(target) == "other");
+    OutputFile elsewhere(scratch.path() / "new");
+    elsewhere.append(bytes_of("new"));
+    elsewhere.publish(&source);
+    CHECK(slurp(scratch.path() / "new") == "new");
+  }
+}
+
 TEST_CASE("output file: directories and devices are refused as targets", "[io][file]") {
   const test::TemporaryDirectory scratch;
   CHECK(error_of([&] { OutputFile file(scratch.path()); }) == EISDIR);

@@ -253,6 +253,57 @@ TEST_CASE("gltf: images that share a file or a bufferView are one picture", "[io
   CHECK(materials[2].texture == materials[3].texture);
 }
 
+TEST_CASE("gltf: a file that has the name of a picture inside is another picture", "[io][gltf]") {
+  const Files files;
+  write_png(files.scratch.path() / "red.png", {1, 1, {glm::vec3(1, 0, 0)}});
+  write_png(files.scratch.path() / "green.png", {1, 1, {glm::vec3(0, 1, 0)}});
+  std::filesystem::rename(files.scratch.path() / "red.png", files.scratch.path() / "image 0");
+  const std::string green = slurp(files.scratch.path() / "green.png");
+  Json json = document();
+  json["images"] = {{{"uri", "data:image/png;base64," + base64(green)}}, {{"uri", "image%200"}}};
+  const Json triangle = json["meshes"][0]["primitives"][0];
+  json["meshes"][0]["primitives"] = {triangle, triangle};
+  for (std::size_t i = 0; i < 2; ++i) {
+    json["textures"].push_back({{"source", i}});
+    json["materials"].push_back({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", i}}}}}});
+    json["meshes"][0]["primitives"][i]["material"] = i;
+  }
+  files.scratch.file("a.gltf", json.dump());
+  // Read it by a name without a directory.
+  const std::filesystem::path here = std::filesystem::current_path();
+  std::filesystem::current_path(files.scratch.path());
+  const std::vector<Material> materials = read_mesh("a.gltf").mesh.materials;
+  std::filesystem::current_path(here);
+  REQUIRE(materials.size() == 2);
+  REQUIRE(materials[0].texture);
+  REQUIRE(materials[1].texture);
+  CHECK(materials[0].texture->at(0, 0) == glm::vec3(0, 1, 0));
+  CHECK(materials[1].texture->at(0, 0) == glm::vec3(1, 0, 0));
+}
+
+TEST_CASE("gltf: each texture and camera that is left out is counted once", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  const Json triangle = json["meshes"][0]["primitives"][0];
+  json["meshes"][0]["primitives"] = Json::array();
+  json["nodes"][0]["children"] = Json::array();
+  for (std::size_t i = 0; i < 12; ++i) {  // two uses of six textures and of six cameras
+    const Json texture{{"index", i % 6}};
+    json["materials"].push_back({{"pbrMetallicRoughness", {{"baseColorTexture", texture}}}});
+    json["meshes"][0]["primitives"].push_back(triangle);
+    json["meshes"][0]["primitives"][i]["material"] = i;
+    json["nodes"].push_back({{"camera", i % 6}});
+    json["nodes"][0]["children"].push_back(i + 1);
+    if (i % 2 == 0) continue;
+    json["textures"].push_back(Json::object());
+    json["cameras"].push_back({{"perspective", {{"yfov", 0}}}});
+  }
+  const std::vector<std::string> warnings = files.read(json).warnings;
+  REQUIRE(warnings.size() == 2);
+  CHECK_THAT(warnings[0], Catch::StartsWith("6 textures") && Catch::EndsWith("and 2 more"));
+  CHECK_THAT(warnings[1], Catch::StartsWith("6 cameras") && Catch::EndsWith("and 2 more"));
+}
+
 // This would take five minutes if the mean were computed for each material.
 TEST_CASE("gltf: 30,000 materials that emit by one texture compute its mean once", "[io][gltf]") {
   const Files files;

@@ -27,11 +27,12 @@ TEST_CASE("mesh warnings: each kind is one line with a count and its first four 
         "more");
 }
 
-TEST_CASE("mesh warnings: a part that is already listed is not listed again", "[io][mesh]") {
+TEST_CASE("mesh warnings: parts of one text are counted one by one", "[io][mesh]") {
   MeshWarnings warnings;
-  for (int i = 0; i < 9; ++i) warnings.add(kCameraLeftOut, "camera 0");
+  for (int i = 0; i < 5; ++i) warnings.add(kEmissionAveraged, "material ''");
   CHECK(warnings.lines() ==
-        Lines{"a camera is left out because it has no direction or no field of view: camera 0"});
+        Lines{"5 emission textures are replaced by their means: material ''; material ''; "
+              "material ''; material ''; and 1 more"});
 }
 
 TEST_CASE("mesh warnings: a part is printed as one line of at most some 300 printable bytes",

@@ -31,7 +31,7 @@ TEST_CASE("build: a container returns its points in order", "[build]") {
     std::size_t at = 0;
     for (const std::uint32_t page : reader.point_pages()) {
       const PageHeader header = reader.read_page(page, payload, decoder);
-      const PointPage points(payload.data(), header.record_count);
+      const PointPage points(payload.data(), header.record_count, kPointBytes);
       for (std::uint32_t i = 0; i < points.size(); ++i, ++at) {
         const PointRecord got = points[i];
         const PointRecord& want = scene.records[at];
@@ -44,6 +44,18 @@ TEST_CASE("build: a container returns its points in order", "[build]") {
     }
     CHECK(at == 3000);
   }
+}
+
+TEST_CASE("build: a container without room for emission refuses points that emit light",
+          "[build]") {
+  const TemporaryDirectory dir;
+  std::vector<Surfel> surfels = random_surfels(500, 7);
+  surfels[123].emission = {0, 1, 0};
+  SortedScene scene = sort_scene(surfels);
+  ContainerWriter writer(dir / "a.ptcx", {.page_shift = 12, .frame = scene.frame});
+  VectorStream stream(std::move(scene.records));
+  Progress silent;
+  CHECK_THROWS_AS(build_pages(stream, writer, {}, ThreadPool(), silent), std::invalid_argument);
 }
 
 TEST_CASE("build: the block size of the stream changes no byte of the container", "[build]") {

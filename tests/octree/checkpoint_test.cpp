@@ -172,10 +172,14 @@ TEST_CASE("checkpoint: an unfinished container that was changed is refused",
   other.uuid[0] = std::byte{1};
   CHECK_THROWS_WITH(open(other, saved.writer),
                     Catch::Contains("no unfinished container of this scene"));
-  CHECK_THROWS_WITH(open(options, {saved.writer.pages, saved.writer.end - 512}),
-                    Catch::Contains("last page is cut"));
-  CHECK_THROWS_WITH(open(options, {saved.writer.pages / 2, saved.writer.end}),
-                    Catch::Contains("was not written"));
+  WriterState state = saved.writer;
+  state.end -= 512;
+  CHECK_THROWS_WITH(open(options, state), Catch::Contains("last page is cut"));
+  for (std::uint32_t WriterState::*pages : {&WriterState::point_pages, &WriterState::node_pages}) {
+    state = saved.writer;
+    state.*pages /= 2;
+    CHECK_THROWS_WITH(open(options, state), Catch::Contains("was not written"));
+  }
   std::filesystem::resize_file(dir / "pages", saved.writer.end - 1);
   CHECK_THROWS_WITH(open(options, saved.writer), Catch::Contains("shorter than it was"));
 }

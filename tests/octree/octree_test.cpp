@@ -314,11 +314,11 @@ TEST_CASE("octree: the slab of a plane is thin, that of opposite normals as thic
 TEST_CASE("octree: cones contain every normal to the last bit", "[build][octree]") {
   const SortedScene scene = sort_scene(random_surfels(20'000, 5));
   const auto holds = [](const NodeSummary& node, const PointRecord& p) {
-    const std::array<float, 3> n = decode_octahedral(p.normal[0], p.normal[1]);
+    const std::array<double, 3> n = decode_octahedral_f64(p.normal[0], p.normal[1]);
     double dot = 0, nn = 0, aa = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      dot += static_cast<double>(n[k]) * static_cast<double>(node.cone_axis[k]);
-      nn += static_cast<double>(n[k]) * static_cast<double>(n[k]);
+      dot += n[k] * static_cast<double>(node.cone_axis[k]);
+      nn += n[k] * n[k];
       aa += static_cast<double>(node.cone_axis[k]) * static_cast<double>(node.cone_axis[k]);
     }
     return dot / std::sqrt(nn * aa) >= static_cast<double>(node.cone_cos);

@@ -1,19 +1,17 @@
 """Installs the library into an empty directory, builds the examples against it as strangers would (by CMake and by
 pkg-config, shared and static), and runs them.
-
-Environment: PTC_BUILD, a build directory with everything in it; PTC_CMAKE, the program cmake.
 """
 
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(os.environ["PTC_BUILD"])
-CMAKE = os.environ["PTC_CMAKE"]
+from commands import BUILD, CMAKE, ROOT, run
+
 EXAMPLES = ["read_points", "write_points", "build_and_shade"]
 LISTS = """cmake_minimum_required(VERSION 3.25)
 project(examples LANGUAGES CXX)
@@ -23,14 +21,6 @@ foreach(example {examples})
   target_link_libraries(${{example}} PRIVATE {targets})
 endforeach()
 """
-
-
-def run(*command, **options):
-    done = subprocess.run([str(part) for part in command], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          **options)
-    if done.returncode != 0:
-        raise AssertionError(f"{command}: {done.returncode}\n{done.stdout}")
-    return done.stdout
 
 
 def needed(file):
@@ -44,13 +34,18 @@ class Package(unittest.TestCase):
     def setUpClass(cls):
         cls.directory = tempfile.TemporaryDirectory()
         cls.work = pathlib.Path(cls.directory.name)
+        # What a build that was stopped leaves is not installed.
+        partial = BUILD / "share/bash-completion/completions/ptcbuild.partial"
+        partial.touch()
         # Installed in one place and used in another: nothing may know where it was put.
         run(CMAKE, "--install", BUILD, "--prefix", cls.work / "staged")
         cls.prefix = cls.work / "prefix"
         shutil.move(cls.work / "staged", cls.prefix)
+        partial.unlink()
         cls.libraries = next(cls.prefix.rglob("libptc.so")).parent
-        cls.environment = dict(os.environ, PKG_CONFIG_PATH=str(cls.libraries / "pkgconfig"),
-                               LD_LIBRARY_PATH=str(cls.libraries), CMAKE_PREFIX_PATH=str(cls.prefix))
+        # Without LD_LIBRARY_PATH: CMake writes the directory of libptc into a program, and libptc finds libptc-store.
+        cls.environment = dict(os.environ, PKG_CONFIG_PATH=str(cls.libraries / "pkgconfig"), CMAKE_PREFIX_PATH=str(cls.prefix))
+        cls.environment.pop("LD_LIBRARY_PATH", None)
 
     @classmethod
     def tearDownClass(cls):
@@ -66,10 +61,12 @@ class Package(unittest.TestCase):
         run(CMAKE, "--build", build, "-j2", env=self.environment)
         return build
 
-    def pkg_config(self, name, package, options=()):
-        flags = run("pkg-config", "--cflags", "--libs", *options, package, env=self.environment).split()
-        program = self.work / f"{name}-{len(options)}"
-        run("c++", "-std=c++20", ROOT / f"tools/examples/{name}.cpp", "-o", program, *flags, env=self.environment)
+    def pkg_config(self, name, package, *options, environment=None):
+        """Builds an example with the flags of pkg-config."""
+        environment = environment or self.environment
+        flags = run("pkg-config", "--cflags", "--libs", *options, package, env=environment).split()
+        program = self.work / "-".join([name, package, *options])
+        run("c++", "-std=c++20", ROOT / f"tools/examples/{name}.cpp", "-o", program, *flags, env=environment)
         return program
 
     def try_examples(self, programs):
@@ -98,12 +95,60 @@ class Package(unittest.TestCase):
         self.assertFalse(any(name.startswith("libptc") for name in needed(build / "write_points")))
         self.try_examples(build)
 
+    def test_libptc_finds_the_library_next_to_it(self):
+        self.assertIn("[$ORIGIN]", run("readelf", "-d", self.libraries / "libptc.so"))
+
     def test_examples_build_with_pkg_config(self):
         for name in EXAMPLES:
             self.pkg_config(name, "ptc")
         program = self.pkg_config("read_points", "ptc-store")
         self.assertIn("libptc-store", needed(program))
         self.assertNotIn("libptc", needed(program))
+
+    def test_examples_build_with_pkg_config_against_static_libraries_alone(self):
+        prefix = self.work / "archives"
+        shutil.copytree(self.prefix, prefix, symlinks=True)
+        for library in prefix.rglob("*.so*"):
+            library.unlink()
+        packages = next(prefix.rglob("ptc.pc")).parent
+        environment = dict(self.environment, PKG_CONFIG_PATH=str(packages))
+        programs = self.work / "archived"
+        programs.mkdir()
+        for name in EXAMPLES:
+            program = self.pkg_config(name, "ptc", "--static", environment=environment)
+            self.assertFalse(any(other.startswith("libptc") for other in needed(program)))
+            program.rename(programs / name)
+        self.try_examples(programs)
+        reader = self.pkg_config("read_points", "ptc-store", "--static", environment=environment)
+        self.assertFalse(any(other.startswith("libptc") for other in needed(reader)))
+
+    def test_pkg_config_asks_for_no_package_that_only_the_libraries_need(self):
+        for package, others in (("ptc-store", set()), ("ptc", {"glm"})):
+            folder = self.work / f"{package}-alone"
+            folder.mkdir()
+            for own in (self.libraries / "pkgconfig").glob("*.pc"):
+                shutil.copy(own, folder)
+            for name in others:
+                (folder / f"{name}.pc").write_text(f"Name: {name}\nDescription: {name}\nVersion: 1\n")
+            environment = dict(self.environment, PKG_CONFIG_PATH="", PKG_CONFIG_LIBDIR=str(folder))
+            flags = run("pkg-config", "--cflags", package, env=environment).split()
+            self.assertEqual(len({flag for flag in flags if flag.startswith("-I")}), 1, flags)
+
+    def test_the_library_passes_glm_on_to_what_includes_its_headers(self):
+        for name, target in (("ptcTargets.cmake", "ptc::ptc"), ("ptcStaticTargets.cmake", "ptc::ptc-static")):
+            text = next(self.prefix.rglob(name)).read_text()
+            links = re.search(rf'set_target_properties\({target} .*?INTERFACE_LINK_LIBRARIES "([^"]*)"', text, re.DOTALL)
+            self.assertIn("glm::glm", links[1].split(";"), target)
+        self.assertIn("glm", run("pkg-config", "--print-requires", "ptc", env=self.environment).split())
+        self.assertNotIn("glm", run("pkg-config", "--print-requires", "ptc-store", env=self.environment).split())
+
+    def test_programs_in_the_documents_compile(self):
+        flags = run("pkg-config", "--cflags", "ptc", env=self.environment).split()
+        for document in ("README.md", "spec/guide/library.md"):
+            blocks = re.findall(r"^```cpp\n(.*?)^```$", (ROOT / document).read_text(), re.MULTILINE | re.DOTALL)
+            self.assertGreater(len(blocks), 0, document)
+            for block in blocks:
+                run("c++", "-std=c++20", "-fsyntax-only", *flags, "-x", "c++", "-", input=block)
 
     def test_a_reader_of_containers_needs_zstd_lz4_and_xxhash_and_nothing_else(self):
         system = {"libstdc++", "libm", "libgcc_s", "libc", "ld-linux-x86-64", "ld-linux-aarch64"}
@@ -128,6 +173,13 @@ class Package(unittest.TestCase):
         for header in headers:
             self.assertNotIn('#include "engine/', (include / header).read_text(), header)
             self.assertNotIn('#include "format/', (include / header).read_text(), header)
+
+    def test_each_program_has_its_manual_page_and_completions_and_nothing_else_is_there(self):
+        programs = {path.name for path in (self.prefix / "bin").iterdir()}
+        share = self.prefix / "share"
+        for folder, name in (("man/man1", "{}.1.gz"), ("bash-completion/completions", "{}"),
+                             ("zsh/site-functions", "_{}"), ("fish/vendor_completions.d", "{}.fish")):
+            self.assertEqual({path.name for path in (share / folder).iterdir()}, {name.format(one) for one in programs})
 
     def test_a_file_is_known_by_its_first_bytes(self):
         magic = next(self.prefix.rglob("ptcx.magic"))

@@ -11,6 +11,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/base/error.h"
+
 using namespace ptc;
 
 namespace {
@@ -168,4 +170,9 @@ TEST_CASE("executor: the caller sees everything that the bodies wrote", "[base][
       all = all && values[i] == 20 * static_cast<int>(i);
     CHECK(all);
   }
+}
+
+TEST_CASE("thread pool: more threads than any machine has are refused", "[parallel]") {
+  CHECK_THROWS_AS(ThreadPool(ThreadPool::kMaxThreads + 1), RequestError);
+  CHECK_THROWS_AS(ThreadPool(~0U), RequestError);
 }

@@ -124,3 +124,20 @@ TEST_CASE("camera: a camera with non-finite numbers is not written", "[scene][ca
   camera.position.y = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_AS(to_json(camera), RequestError);
 }
+
+TEST_CASE("camera: one that shows nothing is refused", "[scene][camera]") {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  const auto refuses = [](auto&& spoil) {
+    Camera camera;
+    spoil(camera);
+    CHECK_THROWS_AS(check_camera(camera, "camera"), RequestError);
+  };
+  CHECK_NOTHROW(check_camera(Camera{}, "camera"));
+  refuses([](Camera& c) { c.position.x = kNaN; });
+  refuses([](Camera& c) { c.look_at.z = kNaN; });
+  refuses([](Camera& c) { c.up = glm::vec3(0); });
+  refuses([](Camera& c) { c.up.x = kNaN; });
+  refuses([](Camera& c) { c.vertical_fov = 0; });
+  refuses([](Camera& c) { c.vertical_fov = 7; });
+  refuses([](Camera& c) { c.width = 0; });
+}

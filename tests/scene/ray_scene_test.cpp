@@ -4,6 +4,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 
 #include <catch2/catch.hpp>
@@ -256,4 +257,30 @@ TEST_CASE("ray scene: invalid rays miss", "[scene][rays]") {
   CHECK(!scene.occluded({0, 1, 0}, {0, 0, 0}, 0, kFar));
   CHECK(!scene.occluded({0, kFar, 0}, {0, -1, 0}, 0, kFar));
   CHECK(!scene.occluded({0, 1, 0}, {0, -1, 0}, 5, 1));
+}
+
+TEST_CASE("ray scene: numbers of a mesh that no light can use are refused", "[scene][rays]") {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  Random random(3);
+  const Mesh whole = [&] {
+    Mesh mesh = soup(random, 2);
+    mesh.normals.assign(mesh.positions.size(), glm::vec3(0, 1, 0));
+    return mesh;
+  }();
+  REQUIRE(!whole.materials.empty());
+  CHECK_NOTHROW(check_mesh(whole));
+  const auto refuses = [&](auto&& spoil) {
+    Mesh mesh = whole;
+    spoil(mesh);
+    CHECK_THROWS_AS(check_mesh(mesh), RequestError);
+  };
+  refuses([](Mesh& m) { m.origin.x = kNaN; });
+  refuses([](Mesh& m) { m.normals.back().y = kNaN; });
+  refuses([](Mesh& m) { m.materials.front().albedo.g = -1; });
+  refuses([](Mesh& m) { m.materials.front().albedo.g = kNaN; });
+  refuses([](Mesh& m) { m.materials.front().emission.b = -1; });
+  refuses([](Mesh& m) { m.materials.front().emission.b = std::numeric_limits<float>::infinity(); });
+  refuses([](Mesh& m) {
+    m.materials.front().texture = std::make_shared<Image>(Image{.width = 2000, .height = 20000});
+  });
 }

@@ -227,7 +227,7 @@ TEST_CASE("sampler: a given spacing gives as many surfels as its square fits int
   for (const Surfel& s : surfels) CHECK(s.radius == Approx(0.05 * std::sqrt(0.5)).epsilon(0.35));
 }
 
-TEST_CASE("sampler: radiance is emission plus albedo over pi times irradiance",
+TEST_CASE("sampler: radiance is albedo over pi times irradiance, and emission stays apart",
           "[scene][sampler]") {
   Mesh mesh = ground(1);
   mesh.materials[0].albedo = {0.5f, 0.25f, 1};
@@ -239,9 +239,10 @@ TEST_CASE("sampler: radiance is emission plus albedo over pi times irradiance",
   options.count = 500;
   const float sun = 2 * std::sqrt(0.5f);
   for (const Surfel& s : sample(mesh, options, rig)) {
-    CHECK(s.radiance.x == Approx(7 + 0.5 / kPi * (sun + kPi)).epsilon(1e-4));
+    CHECK(s.radiance.x == Approx(0.5 / kPi * (sun + kPi)).epsilon(1e-4));
     CHECK(s.radiance.y == Approx(0.25 / kPi * (sun + kPi)).epsilon(1e-4));
     CHECK(s.radiance.z == Approx(1 / kPi * sun).epsilon(1e-4));
+    CHECK(s.emission == glm::vec3(7, 0, 0));
   }
 }
 
@@ -254,15 +255,16 @@ TEST_CASE("sampler: emitters keep their power, and surfaces next to them stay da
   add_quad(mesh, {1, 0, 1}, {0.5f, 0, 0}, {0, 0, -2}, 1);  // in one plane with the ground
   double power = 0;
   for (const Surfel& s : sample(mesh, 5000)) {
-    CHECK((s.radiance == glm::vec3(0) || s.radiance == glm::vec3(10)));
-    CHECK((s.radiance.x > 0) == (s.position.x > 1));
-    power += 2 * static_cast<double>(s.radius * s.radius * s.radiance.x);
+    CHECK(s.radiance == glm::vec3(0));  // nothing lights the surfels, and emission stays apart
+    CHECK((s.emission == glm::vec3(0) || s.emission == glm::vec3(10)));
+    CHECK((s.emission.x > 0) == (s.position.x > 1));
+    power += 2 * static_cast<double>(s.radius * s.radius * s.emission.x);
   }
   CHECK(power == Approx(10).epsilon(0.01));
   // An emitter smaller than a surfel is not lost either: a surfel takes its power.
   power = 0;
   for (const Surfel& s : sample(mesh, 8)) {
-    power += 2 * static_cast<double>(s.radius * s.radius * s.radiance.x);
+    power += 2 * static_cast<double>(s.radius * s.radius * s.emission.x);
   }
   CHECK(power == Approx(10).epsilon(0.3));
 }
@@ -302,8 +304,10 @@ TEST_CASE("sampler: a double-sided material gives two surfels back to back, each
     CHECK(surfels[i].position == surfels[i + 1].position);
     CHECK(surfels[i].normal == -surfels[i + 1].normal);
     CHECK(surfels[i].radius == surfels[i + 1].radius);
-    CHECK(surfels[i].radiance == glm::vec3(5));       // the front emits
-    CHECK(surfels[i + 1].radiance.x == Approx(0.5));  // the back reflects
+    CHECK(surfels[i].emission == glm::vec3(5));  // the front emits, and no light reaches it
+    CHECK(surfels[i].radiance == glm::vec3(0));
+    CHECK(surfels[i + 1].emission == glm::vec3(0));  // the back reflects
+    CHECK(surfels[i + 1].radiance.x == Approx(0.5));
   }
 }
 
@@ -408,24 +412,33 @@ TEST_CASE("sampler: the spacing for n surfels is the root of area over n", "[sce
   CHECK_THROWS_AS(spacing_for(mesh, 0), RequestError);
 }
 
-TEST_CASE("sampler: invalid options are refused", "[scene][sampler]") {
+TEST_CASE("sampler: invalid options are refused with the name of the one to change",
+          "[scene][sampler]") {
   const Mesh mesh = cube();
-  const auto refuses = [&](auto&& spoil) {
+  const auto refused = [&](auto&& spoil) -> std::string {
     SamplingOptions options;
     options.camera.emplace();
     spoil(options);
-    CHECK_THROWS_AS(sample(mesh, options), RequestError);
+    try {
+      static_cast<void>(sample(mesh, options));
+    } catch (const RequestError& error) {
+      CHECK_THAT(error.what(), Catch::Contains("`" + error.field() + "`"));
+      return error.field();
+    }
+    return "none";
   };
-  refuses([](SamplingOptions& o) { o.count = 0; });
-  refuses([](SamplingOptions& o) { o.spacing = -1; });
-  refuses([](SamplingOptions& o) { o.spacing = 1e-6; });
-  refuses([](SamplingOptions& o) { o.spacing = 1e-300; });
-  refuses([](SamplingOptions& o) { o.count = 1'000'000'000'000; });
-  refuses([](SamplingOptions& o) { o.spacing = std::numeric_limits<double>::quiet_NaN(); });
-  refuses([](SamplingOptions& o) { o.pixels_per_surfel = 0; });
-  refuses([](SamplingOptions& o) { o.finest = 0; });
-  refuses([](SamplingOptions& o) { o.finest = 1.5f; });
-  refuses([](SamplingOptions& o) { o.camera->height = 0; });
+  using Options = SamplingOptions;
+  CHECK(refused([](Options& o) { o.count = 0; }) == "sampling.count");
+  CHECK(refused([](Options& o) { o.count = 1'000'000'000'000; }) == "sampling.count");
+  CHECK(refused([](Options& o) { o.spacing = -1; }) == "sampling.spacing");
+  CHECK(refused([](Options& o) { o.spacing = 1e-6; }) == "sampling.spacing");
+  CHECK(refused([](Options& o) { o.spacing = 1e-300; }) == "sampling.spacing");
+  CHECK(refused([](Options& o) { o.spacing = NAN; }) == "sampling.spacing");
+  CHECK(refused([](Options& o) { o.pixels_per_surfel = 0; }) == "sampling.pixels_per_surfel");
+  CHECK(refused([](Options& o) { o.finest = 0; }) == "sampling.finest");
+  CHECK(refused([](Options& o) { o.finest = 1.5f; }) == "sampling.finest");
+  CHECK(refused([](Options& o) { o.camera->height = 0; }) == "sampling.camera");
+  CHECK(refused([](Options& o) { o.camera->look_at.y = NAN; }) == "sampling.camera");
 }
 
 TEST_CASE("sampler: a spacing larger than any mesh gives one surfel or none", "[scene][sampler]") {

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/parallel/thread_pool.h"
+#include "engine/shade/reference/brute_force.h"
 #include "format/error.h"
 #include "tests/shade/gather_scene.h"
 
@@ -34,10 +35,15 @@ struct Damaged {
     break_pages({});
   }
 
+  [[nodiscard]] std::uint32_t root_page() const {
+    return scene.container->node_pages()[scene.container->superblock().root_page];
+  }
+
+  /// Returns all node pages but the root's.
   [[nodiscard]] std::vector<std::uint32_t> node_pages() const {
     std::vector<std::uint32_t> pages;
     for (const std::uint32_t page : scene.container->node_pages()) {
-      if (page != scene.container->superblock().root_page) pages.push_back(page);
+      if (page != root_page()) pages.push_back(page);
     }
     return pages;
   }
@@ -156,6 +162,40 @@ TEST_CASE("damage: stand-ins change no receiver by more than its bound", "[shade
   CHECK(tight > damaged.scene.receivers.size() / 7 * trials.size() / 2);
 }
 
+TEST_CASE("damage: stand-ins for points that emit light shine as these did",
+          "[shade][damage][emission]") {
+  std::vector<Surfel> surfels = small_scene(kSpacing);
+  const std::size_t dark = surfels.size();
+  add_rectangle(surfels, {-1.5, -1.5, 1.6}, {0, 3, 0}, {3, 0, 0}, kSpacing, glm::vec3(0));
+  for (std::size_t i = dark; i < surfels.size(); ++i) surfels[i].emission = {0, 8, 1};
+  Damaged damaged(surfels, {});
+  add_floor_receivers(damaged.scene.receivers, kSpacing);
+  std::vector<std::uint32_t> lamps;
+  for (const std::uint32_t page : damaged.scene.container->point_pages()) {
+    std::vector<Surfel> points;
+    append_surfels(*damaged.scene.container, {page, 1}, points);
+    if (std::ranges::all_of(points, [](const Surfel& s) { return s.emission.g == 8; }))
+      lamps.push_back(page);
+  }
+  REQUIRE(lamps.size() > 5);
+  damaged.break_pages(lamps);
+  LostPages lost(*damaged.broken);
+  double found = 0, expected = 0, wrong = 0;
+  std::size_t stood_in = 0;
+  for (const Pair& pair : damaged.shade_alone(7, lost)) {
+    if (pair.bound == 0) CHECK(same(pair.found, pair.expected));
+    stood_in += pair.bound > 0;
+    found += static_cast<double>(pair.found.irradiance.g);
+    expected += static_cast<double>(pair.expected.irradiance.g);
+    wrong += std::abs(static_cast<double>(pair.found.irradiance.g - pair.expected.irradiance.g));
+  }
+  CHECK(stood_in > 50);
+  CHECK(lost.list().size() > 5);
+  INFO(found / expected << " of the light, off by " << wrong / expected);
+  CHECK(found == Approx(expected).epsilon(0.01));
+  CHECK(wrong < 0.01 * expected);
+}
+
 TEST_CASE("damage: the worst possible stand-in comes near its bound", "[shade][damage]") {
   // Two piles of equal discs in one leaf: their summed area fills its sphere, and they themselves
   // cover little.
@@ -188,7 +228,7 @@ TEST_CASE("damage: the worst possible stand-in comes near its bound", "[shade][d
 TEST_CASE("damage: neither threads nor the cap change the stand-ins", "[shade][damage]") {
   Damaged damaged;
   const auto points = damaged.scene.container->point_pages();
-  damaged.break_pages({points[10], points[30], damaged.node_pages().back()});
+  damaged.break_pages({points[10], points[30], damaged.node_pages().front()});
   std::optional<Damaged::Run> first;
   for (const unsigned threads : {1U, 3U}) {
     for (const std::uint64_t cap :
@@ -209,7 +249,7 @@ TEST_CASE("damage: neither threads nor the cap change the stand-ins", "[shade][d
 
 TEST_CASE("damage: nothing can stand in for a lost root", "[shade][damage]") {
   Damaged damaged;
-  damaged.break_pages({damaged.scene.container->superblock().root_page});
+  damaged.break_pages({damaged.root_page()});
   LostPages lost(*damaged.broken);
   CHECK_THROWS_AS(damaged.shade(&lost), FormatError);
 }

@@ -3,12 +3,14 @@
 #include <numbers>
 
 #include <catch2/catch.hpp>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <hwy/targets.h>
 
 #include "engine/parallel/thread_pool.h"
 #include "engine/shade/reference/brute_force.h"
+#include "engine/shade/reference/plain_gather.h"
 #include "tests/shade/gather_scene.h"
 
 using namespace ptc;
@@ -202,6 +204,56 @@ TEST_CASE(
   CHECK(e.occlusion_rms <= 0.02);
   CHECK(e.irradiance_rms <= 0.05);
   CHECK(e.occlusion_mean > 0.1);  // the scene does occlude
+}
+
+TEST_CASE("gather: light that surfels emit counts as light that they reflect",
+          "[shade][gather][emission]") {
+  // Half of the light of every other surfel, and all light of the balls, is their own.
+  std::vector<Surfel> reflecting = small_scene(0.04);
+  for (Surfel& s : reflecting) s.radiance = glm::round(s.radiance * 64.0F) / 64.0F;
+  std::vector<Surfel> emitting = reflecting;
+  for (std::size_t i = 0; i < emitting.size(); ++i) {
+    Surfel& s = emitting[i];
+    const bool ball = s.position.y < 1.4 && s.position.z > 0.05;
+    if (!ball && i % 2 == 1) continue;
+    s.emission = s.radiance * (ball ? 1.0F : 0.5F);
+    s.radiance -= s.emission;
+  }
+  Scene one(reflecting), other(emitting);
+  REQUIRE(one.container->header().point_bytes == kPointBytes);
+  REQUIRE(other.container->header().point_bytes == kEmittingPointBytes);
+  add_floor_receivers(one.receivers, 0.04);
+  other.receivers = one.receivers;
+
+  // Means of clusters are rounded twice, to 1/256 each.
+  const std::vector<Shading> ours = other.shade();
+  const Errors e = compare(ours, one.shade());
+  CHECK(e.occlusion_rms == 0);
+  CHECK(e.irradiance_rms < 2.0 / 256);
+  const SceneView view(*other.container);
+  PageCache cache(*other.container, {.memory_bytes = 64U << 20, .threads = 2});
+  PlainGather plain(view, cache, {});
+  Gather alone(view, cache, {});
+  const DirectionGrid grid(GatherOptions().resolution, {});
+  std::vector<Shading> plainly, singly;
+  for (std::size_t i = 0; i < one.receivers.size(); i += 23) {
+    plainly.push_back(plain.shade(one.receivers[i], grid));
+    alone.shade({&one.receivers[i], 1}, {&singly.emplace_back(), 1}, grid);
+  }
+  CHECK(compare(singly, plainly).irradiance_rms < 2e-3);
+
+  // Surfels themselves have the same light to the bit.
+  const std::vector<Surfel> first = load_surfels(*one.container, 1'000'000),
+                            second = load_surfels(*other.container, 1'000'000);
+  std::vector<Shading> drawn(20), drawn_other(20);
+  const std::span<const Receiver> few = std::span(one.receivers).first(20);
+  shade_brute_force(first, few, drawn, grid, Sides::both, ThreadPool(1));
+  shade_brute_force(second, few, drawn_other, grid, Sides::both, ThreadPool(1));
+  const DiscRays rays(first, Sides::both, {}), rays_other(second, Sides::both, {});
+  for (std::size_t i = 0; i < few.size(); ++i) {
+    CHECK(drawn[i].irradiance == drawn_other[i].irradiance);
+    CHECK(rays.trace(few[i], 400, i).irradiance == rays_other.trace(few[i], 400, i).irradiance);
+  }
 }
 
 TEST_CASE("gather: every instruction set of the machine gives the same shading",

@@ -359,6 +359,25 @@ TEST_CASE("external sort: records that one directory cannot take go to the other
       std::system_error);
 }
 
+TEST_CASE("external sort: add() fails soon after the disk is full, not when the input ends",
+          "[sort][external]") {
+  const TemporaryDirectory directory;
+  const std::vector<PointRecord> input = make_records(Keys::surface, 200000);  // 8 MB
+  for (const unsigned threads : {1u, 2u}) {
+    const ThreadPool executor(threads);
+    const FileSizeLimit limit(kMiB);
+    ExternalSorter sorter({kMiB, {directory.path()}}, executor, sample_of(input, 1000));
+    std::size_t added = 0;
+    CHECK_THROWS_AS(
+        [&] {
+          for (; added < input.size(); added += 1000)
+            sorter.add(std::span(input).subspan(added, 1000));
+        }(),
+        std::system_error);
+    CHECK(added < input.size() / 2);
+  }
+}
+
 TEST_CASE("external sort: a stream that failed does not look like one that ended",
           "[sort][external]") {
   const TemporaryDirectory directory;

@@ -11,6 +11,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "format/checksum.h"
 #include "format/error.h"
 #include "tests/store/forge.h"
 #include "tests/store/sample.h"
@@ -20,7 +21,7 @@ using namespace ptc::test;
 
 namespace {
 
-/// The smallest scene has one page of points, one of nodes, and the meta page.
+/// The smallest scene has one page of points, one of nodes in the tail, and the meta page.
 SampleOptions tiny() {
   SampleOptions options;
   options.points = 3;
@@ -71,15 +72,16 @@ std::vector<bool> ignorable(const std::filesystem::path& path) {
     std::fill(may.begin() + static_cast<std::ptrdiff_t>(from),
               may.begin() + static_cast<std::ptrdiff_t>(to), true);
   };
-  std::uint64_t last = 0;
+  std::uint64_t body = 0, tail = 0;
   for (const DirectoryEntry& entry : parts.entries) {
     const std::uint64_t end = entry.offset + 64 + entry.stored_bytes;
     allow(end, round_up(end, kSectorBytes));
-    last = std::max(last, end);
+    (entry.offset < parts.superblock.directory_offset ? body : tail) = end;
   }
   const std::uint64_t directory = parts.superblock.directory_offset;
-  allow(last, directory);
-  allow(directory + 64 + parts.directory[0].stored_bytes, may.size());  // and the two superblocks
+  allow(body, directory);
+  allow(directory + 64 + parts.directory[0].stored_bytes, parts.superblock.tail_offset);
+  allow(tail, may.size());  // and the two superblocks
   return may;
 }
 
@@ -186,6 +188,31 @@ TEST_CASE("reader: one whole superblock is enough, and none is refused", "[store
   CHECK((walk(path) == content));
   for (std::size_t at = a; at < file.bytes().size(); ++at) file.put(at, std::byte{0});
   CHECK_THAT(refusal(path).value_or(""), Catch::Contains("unfinished or truncated"));
+}
+
+TEST_CASE("reader: a whole superblock that breaks a rule is refused whatever the other holds",
+          "[store][damage]") {
+  const TemporaryDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, tiny());
+  Patient file(path);
+  const std::size_t b = file.bytes().size() - kBlockBytes;
+  const std::size_t a = b - kBlockBytes;
+  const auto break_rule = [&](std::size_t block) {
+    std::vector<std::byte> sealed(
+        file.bytes().begin() + static_cast<std::ptrdiff_t>(block),
+        file.bytes().begin() + static_cast<std::ptrdiff_t>(block + kBlockBytes - 8));
+    sealed[400] = std::byte{1};  // a reserved byte
+    file.put(block + 400, sealed[400]);
+    const std::uint64_t hash = xxh3_64(sealed, 0x5250555358435450);
+    for (std::size_t i = 0; i < 8; ++i)
+      file.put(block + kBlockBytes - 8 + i, static_cast<std::byte>(hash >> (8 * i)));
+  };
+  break_rule(b);
+  CHECK_THAT(refusal(path).value_or(""), Catch::Contains("the two superblocks differ"));
+  file.flip(a + 200);  // now B alone is whole
+  const std::string offset = "offset " + std::to_string(b + 400);
+  CHECK_THAT(refusal(path).value_or(""), Catch::Contains(offset + ": reserved byte is not zero"));
 }
 
 TEST_CASE("reader: files that are not containers are refused", "[store][damage]") {

@@ -48,6 +48,10 @@ Forgery::Forgery(const std::filesystem::path& path) {
     const auto entry = all.subspan(at + kPageHeaderBytes + i % per_page * kDirectoryEntryBytes);
     entries.push_back(decode_directory_entry(entry, header, file.size()));
     const DirectoryEntry& it = entries.back();
+    if (it.is_void()) {
+      pages.emplace_back();
+      continue;
+    }
     const auto stored = all.subspan(it.offset + kPageHeaderBytes, it.stored_bytes);
     pages.push_back({it.offset,
                      decode_page_header(all.subspan(it.offset), header),
@@ -60,6 +64,7 @@ std::vector<std::byte> Forgery::bytes() const {
   put(file, 0, encode_file_header(header));
   std::vector<DirectoryEntry> listed = entries;
   for (std::size_t i = 0; i < pages.size(); ++i) {
+    if (i < listed.size() && listed[i].is_void()) continue;
     PageHeader head = pages[i].header;
     if (rehash_payloads) {
       head.payload_xxh3 = xxh3_64(pages[i].stored);
@@ -83,6 +88,7 @@ std::vector<std::byte> Forgery::bytes() const {
   if (rehash_directory) {
     first.content_xxh3 = content_digest(listed);
     first.directory_xxh3 = xxh3_64(all);
+    first.tail.assign(listed.end() - static_cast<std::ptrdiff_t>(first.tail.size()), listed.end());
   }
   Superblock second = first;
   if (last_word) last_word(first, second);

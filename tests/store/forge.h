@@ -28,7 +28,7 @@ struct Forgery {
   bool rehash_payloads = true;        ///< header and entry take the hash of `stored`
   bool rehash_directory_pages =
       true;                      ///< headers of directory pages take the hash of their entries
-  bool rehash_directory = true;  ///< superblock takes the hash and digest of the entries
+  bool rehash_directory = true;  ///< superblock takes hash, digest and tail from the entries
   /// Changes both superblocks before they are sealed; may be empty.
   std::function<void(Superblock& first, Superblock& second)> last_word;
 

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "format/error.h"
+#include "format/point_page.h"
 #include "tests/store/forge.h"
 #include "tests/store/sample.h"
 
@@ -19,9 +20,9 @@ void check_pages(const ContainerReader& reader, const Sample& sample) {
   std::vector<std::byte> buffer(reader.page_payload_limit());
   std::vector<std::byte> stored;
   for (std::uint32_t page = 0; page < sample.pages.size(); ++page) {
-    const auto& [facts, payload] = sample.pages[page];
+    const auto& [facts, payload, is_void] = sample.pages[page];
     const PageHeader header = reader.read_page(page, buffer, decoder);
-    REQUIRE(header.page_id == page);
+    REQUIRE(header.rank == facts.rank);
     REQUIRE(header.type == facts.type);
     REQUIRE(header.group == facts.group);
     REQUIRE(header.level == facts.level);
@@ -30,10 +31,17 @@ void check_pages(const ContainerReader& reader, const Sample& sample) {
     REQUIRE(header.last_key == facts.last_key);
     REQUIRE(header.raw_bytes == payload.size());
     REQUIRE(std::equal(payload.begin(), payload.end(), buffer.begin()));
+    REQUIRE(reader.entry(page).is_void() == is_void);
     REQUIRE(reader.read_stored_page(page, stored).coding == header.coding);
+    REQUIRE(reader.read_page_header(page).rank == facts.rank);
+    if (is_void) {
+      REQUIRE(stored.empty());
+      continue;
+    }
     std::vector<std::byte> decoded(header.raw_bytes);
-    const auto columns =
-        facts.type == PageType::point ? packed_point_columns() : std::span<const PackedColumn>();
+    const auto columns = facts.type == PageType::point
+                             ? packed_point_columns(reader.header().point_bytes)
+                             : std::span<const PackedColumn>();
     decoder.decode(header.coding, stored, decoded, {facts.record_count, columns});
     REQUIRE((decoded == payload));
   }
@@ -74,6 +82,77 @@ TEST_CASE("container: pages are read back under every codec and page size", "[st
       check_index(reader, sample);
       check_pages(reader, sample);
     }
+  }
+}
+
+TEST_CASE("container: points that emit light are read back with their emission",
+          "[store][reader]") {
+  const TemporaryDirectory scratch;
+  SampleOptions options;
+  options.writer.point_bytes = kEmittingPointBytes;
+  options.points = 5000;
+  const Sample sample = write_sample(scratch / "a.ptcx", options);
+  const ContainerReader reader(scratch / "a.ptcx");
+  CHECK(reader.header().point_bytes == 40);
+  check_pages(reader, sample);
+  const std::vector<PointRecord> points = sample_points(options.points);
+  PageDecoder decoder;
+  std::vector<std::byte> payload(reader.page_payload_limit());
+  const PageHeader page = reader.read_page(0, payload, decoder);
+  const PointPage first(payload.data(), page.record_count, reader.header().point_bytes);
+  for (std::uint32_t i = 0; i < first.size(); ++i) {
+    REQUIRE(first[i].radiance == points[i].radiance);
+    REQUIRE(first[i].emission == points[i].emission);
+  }
+}
+
+TEST_CASE("container: a void page takes nothing but its entry and reads as unknown values",
+          "[store][reader][void]") {
+  const TemporaryDirectory scratch;
+  SampleOptions options;
+  options.points = 5000;
+  write_sample(scratch / "full.ptcx", options);
+  options.void_every = 2;
+  const Sample sample = write_sample(scratch / "a.ptcx", options);
+  const ContainerReader reader(scratch / "a.ptcx");
+  const ContainerReader full(scratch / "full.ptcx");
+  check_index(reader, sample);
+  check_pages(reader, sample);
+  // The files differ by the bytes of the void pages.
+  std::uint64_t saved = 0;
+  for (const std::uint32_t page : reader.attribute_pages(2)) {
+    const bool is_void = reader.entry(page).is_void();
+    CHECK(is_void == (reader.read_page_header(page).rank % 2 == 0));
+    CHECK((reader.page_range(page).bytes == 0) == is_void);
+    if (is_void) saved += round_up(full.page_range(page).bytes, kSectorBytes);
+  }
+  CHECK(saved > 0);
+  CHECK(reader.superblock().file_bytes < full.superblock().file_bytes - saved);
+  // Group 1 has a half without a value and a byte that has none to say so.
+  PageDecoder decoder;
+  std::vector<std::byte> payload(reader.page_payload_limit(), std::byte{0xff});
+  const std::uint32_t first = reader.attribute_pages(1)[0];
+  const std::uint32_t count = reader.read_page(first, payload, decoder).record_count;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    REQUIRE(payload[2 * i] == std::byte{0});
+    REQUIRE(payload[2 * i + 1] == std::byte{0x7e});
+    REQUIRE(payload[2 * count + i] == std::byte{0});
+  }
+}
+
+TEST_CASE("container: pages of a later version's types are passed over", "[store][reader][later]") {
+  const TemporaryDirectory scratch;
+  SampleOptions options;
+  options.later = {PageType{128}, PageType{128}, PageType{200}, PageType{255}, PageType{255}};
+  for (const std::size_t tail_pages : {0U, 2U, 8U, 63U}) {
+    options.tail_pages = tail_pages;
+    const Sample sample = write_sample(scratch / "a.ptcx", options);
+    const ContainerReader reader(scratch / "a.ptcx");
+    check_index(reader, sample);
+    check_pages(reader, sample);
+    CHECK(reader.page_count() == sample.pages.size() + 1);
+    CHECK(reader.entry(reader.meta_page() - 5).type == PageType{128});
+    CHECK(reader.meta().channels == sample.meta.channels);
   }
 }
 
@@ -152,6 +231,7 @@ TEST_CASE("forgery: taking a container apart and putting it together gives the s
   for (const std::uint32_t points : {0u, 1u, 500u, 20000u}) {
     SampleOptions options;
     options.points = points;
+    options.void_every = points == 500 ? 3 : 0;
     write_sample(scratch / "a.ptcx", options);
     CHECK((Forgery(scratch / "a.ptcx").bytes() == read_file(scratch / "a.ptcx")));
   }

@@ -26,7 +26,7 @@ struct Plan {
   std::vector<ChildRef> children;
 };
 
-NodeChild sample_child(const ChildRef& ref, const MortonKey& cell, int level) {
+NodeChild sample_child(const ChildRef& ref, const MortonKey& cell, int level, bool emits) {
   NodeChild child;
   child.ref = ref;
   const LatticePoint corner = decode_morton(cell);
@@ -39,6 +39,8 @@ NodeChild sample_child(const ChildRef& ref, const MortonKey& cell, int level) {
   child.node.facing = {0.25, 0, 0.5, 0, 0, 0.25};
   child.node.flux[2] = {1, 2, 3};
   child.node.cone_axis = {0, 0, 1};
+  child.node.emits = emits;
+  if (emits) child.node.power[5] = {4, 0, 2};
   return child;
 }
 
@@ -48,7 +50,8 @@ class Tree {
       : writer_(writer),
         points_(points),
         sample_(sample),
-        limit_((std::size_t{1} << writer.header().page_shift) - kPageHeaderBytes) {}
+        limit_(payload_limit(writer.header().page_shift)),
+        emits_(writer.header().point_bytes == kEmittingPointBytes) {}
 
   /// Builds the tree from the leaves up: every eight groups of a tier become children of one above.
   void write(std::uint32_t leaf_points) {
@@ -92,27 +95,25 @@ class Tree {
   std::vector<ChildRef> write_tier(const std::vector<Plan>& tier, int level) {
     std::vector<ChildRef> refs;
     NodePageEncoder encoder(limit_);
-    Facts facts{PageType::node, 0, static_cast<std::uint16_t>(level), 0, 0, 0};
-    std::uint32_t page = writer_.reserve_page();
-    const auto flush = [&] {
-      sample_.pages.resize(std::max<std::size_t>(sample_.pages.size(), page + 1));
-      sample_.pages[page] = {facts, encoder.take()};
-    };
+    Facts facts{.type = PageType::node,
+                .rank = writer_.reserve_page(PageType::node),
+                .level = static_cast<std::uint8_t>(level)};
+    const auto flush = [&] { sample_.pages.push_back({facts, encoder.take()}); };
     for (const Plan& plan : tier) {
-      if (!encoder.fits(plan.children.size())) {
+      if (!encoder.fits(plan.children.size(), emits_)) {
         flush();
-        page = writer_.reserve_page();
+        facts.rank = writer_.reserve_page(PageType::node);
         facts.record_count = 0;
       }
       NodeGroup group;
       group.level = level;
       group.cell = cell_of(points_[plan.first].key, level);
       for (const ChildRef& ref : plan.children) {
-        group.children.push_back(sample_child(ref, group.cell, level));
+        group.children.push_back(sample_child(ref, group.cell, level, emits_));
       }
       ChildRef ref;
       ref.interior = true;
-      ref.page = page;
+      ref.page = facts.rank;
       ref.slot = encoder.add(group);
       refs.push_back(ref);
       facts.last_key = group.cell.high;
@@ -128,6 +129,7 @@ class Tree {
   const std::vector<PointRecord>& points_;
   Sample& sample_;
   std::size_t limit_;
+  bool emits_;
 };
 
 std::vector<std::byte> noise(std::size_t bytes, std::uint32_t seed) {
@@ -138,27 +140,44 @@ std::vector<std::byte> noise(std::size_t bytes, std::uint32_t seed) {
   return out;
 }
 
+/// Plans the point pages and, group by group, the attribute pages.
 void plan_pages(ContainerWriter& writer, const SampleOptions& options,
                 const std::vector<PointRecord>& points, Sample& sample) {
   const std::uint32_t full = points_per_page(writer.header());
   for (std::size_t first = 0; first < points.size(); first += full) {
     const auto part =
         std::span(points).subspan(first, std::min<std::size_t>(full, points.size() - first));
-    Facts facts{PageType::point,
-                0,
-                0xffff,
-                static_cast<std::uint32_t>(part.size()),
-                part.front().key.high,
-                part.back().key.high};
-    static_cast<void>(writer.reserve_page());
-    sample.pages.push_back({facts, encode_point_page(part)});
-    facts.type = PageType::attribute;
-    for (unsigned group = 1; group <= options.attribute_groups; ++group) {
-      facts.group = static_cast<std::uint16_t>(group);
-      const std::uint32_t page = writer.reserve_page();
-      sample.pages.push_back(
-          {facts, noise(part.size() * group_point_bytes(sample.meta.channels, facts.group), page)});
+    sample.pages.push_back({{.type = PageType::point,
+                             .rank = writer.reserve_page(PageType::point),
+                             .record_count = static_cast<std::uint32_t>(part.size()),
+                             .first_key = part.front().key.high,
+                             .last_key = part.back().key.high},
+                            encode_point_page(part, writer.header().point_bytes)});
+  }
+  const std::size_t point_pages = sample.pages.size();
+  for (std::uint8_t group = 1; group <= options.attribute_groups; ++group) {
+    const std::size_t bytes = group_point_bytes(sample.meta.channels, group);
+    for (std::size_t k = 0; k < point_pages; ++k) {
+      const Facts facts{.type = PageType::attribute,
+                        .group = group,
+                        .rank = writer.reserve_page(PageType::attribute, group),
+                        .record_count = sample.pages[k].facts.record_count};
+      const bool is_void = options.void_every != 0 && facts.rank % options.void_every == 0;
+      auto payload = noise(facts.record_count * bytes, facts.rank * 256 + group);
+      if (is_void) fill_void(sample.meta.channels, group, payload);
+      sample.pages.push_back({facts, std::move(payload), is_void});
     }
+  }
+}
+
+/// Plans pages of types that a later version may have.
+void plan_later(ContainerWriter& writer, const SampleOptions& options, Sample& sample) {
+  for (std::size_t i = 0; i < options.later.size(); ++i) {
+    const PageType type = options.later[i];
+    const auto count = static_cast<std::uint32_t>(i + 1);
+    sample.pages.push_back(
+        {{.type = type, .rank = writer.reserve_page(type), .record_count = 7 * count},
+         noise(count * 33, count)});
   }
 }
 
@@ -176,6 +195,7 @@ std::vector<PointRecord> sample_points(std::uint32_t count) {
     for (auto& channel : point.radiance) {
       channel = encode_half(static_cast<float>(random() % 256) / 16.0f);
     }
+    point.emission = {encode_half(static_cast<float>(random() % 16)), 0, encode_half(1)};
     point.albedo = {10, 20, static_cast<std::uint8_t>(random() & 0xff)};
   }
   std::ranges::sort(points, {}, &PointRecord::key);
@@ -183,11 +203,12 @@ std::vector<PointRecord> sample_points(std::uint32_t count) {
 }
 
 void write_unfinished(ContainerWriter& writer, const SampleOptions& options, Sample& sample) {
-  for (std::uint16_t group = 1; group <= options.attribute_groups; ++group) {
+  for (std::uint8_t group = 1; group <= options.attribute_groups; ++group) {
     const std::string g = std::to_string(group);
-    sample.meta.channels.push_back({"a" + g, ChannelType::half, 1, group});
     sample.meta.channels.push_back(
-        {"b" + g, ChannelType::u8, static_cast<std::uint8_t>(group), group});
+        {.name = "a" + g, .type = ChannelType::half, .group = group, .no_value = 0x7e00});
+    sample.meta.channels.push_back(
+        {.name = "b" + g, .type = ChannelType::u8, .components = group, .group = group});
   }
   sample.meta.text["title"] = "sample";
   const std::vector<PointRecord> points = sample_points(options.points);
@@ -199,11 +220,24 @@ void write_unfinished(ContainerWriter& writer, const SampleOptions& options, Sam
   superblock.area = 3;
   superblock.flux = {1, 2, 3};
   if (!points.empty()) Tree(writer, points, sample).write(options.leaf_points);
-  // Write from the last page to the first, so that numbers and places in the file disagree.
-  for (std::size_t page = sample.pages.size(); page-- > 0;) {
+  plan_later(writer, options, sample);
+  // Write from the last page to the first, so that numbers and places in the file disagree; those
+  // of the tail lie in their order.
+  const auto in_tail =
+      static_cast<std::size_t>(std::ranges::count_if(sample.pages, [](const Sample::Page& page) {
+        return page.facts.type != PageType::point && page.facts.type != PageType::attribute;
+      }));
+  const std::size_t body = sample.pages.size() - std::min(in_tail, options.tail_pages);
+  for (std::size_t page = body; page-- > 0;) {
     const Sample::Page& it = sample.pages[page];
-    writer.write_page(static_cast<std::uint32_t>(page), it.facts, it.payload);
+    if (it.is_void) {
+      writer.write_void_page(it.facts);
+    } else {
+      writer.write_page(it.facts, it.payload);
+    }
   }
+  for (const Sample::Page& it : std::span(sample.pages).subspan(body))
+    writer.keep_page(it.facts, it.payload);
 }
 
 Sample write_sample(const std::filesystem::path& target, const SampleOptions& options) {
@@ -230,8 +264,8 @@ void write_file(const std::filesystem::path& path, std::span<const std::byte> by
   if (!out) throw std::runtime_error("cannot write " + path.string());
 }
 
-std::vector<std::byte> walk(const std::filesystem::path& path) {
-  const ContainerReader reader(path);
+std::vector<std::byte> walk(const std::filesystem::path& path, ContainerReader::OpenParts parts) {
+  const ContainerReader reader(path, parts);
   PageDecoder decoder;
   std::vector<std::byte> all;
   std::vector<std::byte> buffer(reader.page_payload_limit());

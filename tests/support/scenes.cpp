@@ -42,7 +42,12 @@ SortedScene sort_scene(const std::vector<Surfel>& surfels) {
 void write_scene(const std::filesystem::path& target, const std::vector<Surfel>& surfels,
                  const BuildOptions& options, std::uint8_t page_shift, Codec codec) {
   SortedScene scene = sort_scene(surfels);
-  ContainerWriter writer(target, {.page_shift = page_shift, .codec = codec, .frame = scene.frame});
+  const bool emits = std::ranges::any_of(
+      surfels, [](const Surfel& surfel) { return surfel.emission != glm::vec3(0); });
+  ContainerWriter writer(target, {.page_shift = page_shift,
+                                  .codec = codec,
+                                  .frame = scene.frame,
+                                  .point_bytes = emits ? kEmittingPointBytes : kPointBytes});
   VectorStream stream(std::move(scene.records));
   Progress silent;
   const Superblock superblock = build_pages(stream, writer, options, ThreadPool(), silent);

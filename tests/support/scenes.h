@@ -36,7 +36,7 @@ struct SortedScene {
 };
 [[nodiscard]] SortedScene sort_scene(const std::vector<Surfel>& surfels);
 
-/// Writes the surfels to a container.
+/// Writes the surfels to a container, whose points have emission when a surfel emits light.
 void write_scene(const std::filesystem::path& target, const std::vector<Surfel>& surfels,
                  const BuildOptions& options = {}, std::uint8_t page_shift = 12,
                  Codec codec = Codec::zstd);

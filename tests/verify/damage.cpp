@@ -38,6 +38,7 @@ OpenContainer::OpenContainer(const std::filesystem::path& path) : bytes_(read_fi
   if (superblock_.directory_pages != 1) throw std::invalid_argument("more than one directory page");
   for (std::uint32_t page = 0; page < container.page_count(); ++page) {
     entries_.push_back(container.entry(page));
+    if (entries_.back().is_void()) throw std::invalid_argument("a void page");
     headers_.push_back(decode_page_header(
         std::span(bytes_).subspan(entries_.back().offset, kPageHeaderBytes), container.header()));
     if (headers_.back().coding.codec != Codec::raw)
@@ -62,9 +63,8 @@ void OpenContainer::write(const std::filesystem::path& target) {
     PageHeader& header = headers_[page];
     DirectoryEntry& entry = entries_[page];
     header.payload_xxh3 = entry.payload_xxh3 = xxh3_64(payload(page));
-    entry.type = header.type;
-    entry.group = header.group;
-    entry.record_count = header.record_count;
+    header.stored_bytes = entry.stored_bytes;
+    entry = entry_of(header, entry.offset);
     encode_page_header(header, uuid, header_at(entry.offset));
     encode_directory_entry(
         entry, directory.subspan(page * kDirectoryEntryBytes).first<kDirectoryEntryBytes>());
@@ -75,6 +75,8 @@ void OpenContainer::write(const std::filesystem::path& target) {
   header.payload_xxh3 = superblock_.directory_xxh3 = xxh3_64(directory);
   encode_page_header(header, uuid, header_at(superblock_.directory_offset));
   superblock_.content_xxh3 = digest.value();
+  const auto tail = std::span(entries_).last(superblock_.tail.size());
+  superblock_.tail.assign(tail.begin(), tail.end());
   const Block block = encode_superblock(superblock_);
   for (const std::size_t back : {2 * kBlockBytes, kBlockBytes}) {
     std::ranges::copy(block, bytes_.end() - static_cast<std::ptrdiff_t>(back));

@@ -110,7 +110,7 @@ TEST_CASE("diagnosis: typical faults of copies and transfers are distinguished",
     const VerifyReport report =
         cut(static_cast<std::ptrdiff_t>(subject.superblock.directory_offset));
     check_one(report, Cause::unfinished, "superblock-magic");
-    CHECK(report.pages == subject.entries.size());  // found by their headers
+    CHECK(report.pages == subject.entries.size() - subject.superblock.tail.size());  // by headers
   }
   SECTION("bytes follow") {
     const VerifyReport report =
@@ -135,10 +135,13 @@ TEST_CASE("diagnosis: typical faults of copies and transfers are distinguished",
   }
   SECTION("a newer version") {
     FileHeader header = subject.superblock.header;
-    header.feature_incompat = 1;
-    const Block block = encode_file_header(header);
-    check_one(subject.after([&](Bytes& b) { std::ranges::copy(block, b.begin()); }), Cause::newer,
-              "header-features");
+    for (const auto& [features, code] : {std::pair{kReleaseFeature | 1U << 2, "header-features"},
+                                         {kReleaseFeature * 0, "header-draft"}}) {
+      header.feature_incompat = features;
+      const Block block = encode_file_header(header);
+      check_one(subject.after([&](Bytes& b) { std::ranges::copy(block, b.begin()); }), Cause::newer,
+                code);
+    }
   }
   SECTION("zeros") {
     const auto zero = [&](std::ptrdiff_t from, std::ptrdiff_t bytes) {
@@ -173,7 +176,7 @@ TEST_CASE("diagnosis: misplaced pages are distinguished from pages of other file
       copy_page(subject.whole, subject.at(one), b, subject.at(one + 1), subject.sectors(one));
     });
     check_one(report, Cause::swapped, "page-agreement");
-    CHECK(report.findings[0].actual == "page " + std::to_string(one));
+    CHECK(report.findings[0].actual == "point page " + std::to_string(one));
   }
   SECTION("the page of another file") {
     const VerifyReport report = subject.after([&](Bytes& b) {
@@ -202,13 +205,26 @@ TEST_CASE("diagnosis: intact parts are checked past lost ones", "[verify]") {
     CHECK(report.damaged_pages == 1);
   }
   SECTION("without directory and superblocks, by the headers of the pages") {
-    const VerifyReport report = subject.after([&](Bytes& b) {
+    const VerifyReport cut = subject.after([&](Bytes& b) {
       b.resize(subject.superblock.directory_offset);
       payload_of(b, 9) ^= std::byte{1};
     });
-    CHECK(report.damage == 2);
-    CHECK(report.pages == pages);
-    CHECK(report.damaged_pages == 1);
+    CHECK(cut.damage == 2);
+    CHECK(cut.pages == pages - subject.superblock.tail.size());
+    CHECK(cut.damaged_pages == 1);
+    // The tail lies behind the directory.
+    const VerifyReport zeroed = subject.after([&](Bytes& b) {
+      const auto zero = [&](std::uint64_t from, std::uint64_t to) {
+        std::fill(b.begin() + static_cast<std::ptrdiff_t>(from),
+                  b.begin() + static_cast<std::ptrdiff_t>(to), std::byte{0});
+      };
+      zero(subject.superblock.directory_offset, subject.superblock.tail_offset);
+      zero(b.size() - 2 * kBlockBytes, b.size());
+      payload_of(b, 9) ^= std::byte{1};
+      payload_of(b, pages - 2) ^= std::byte{1};
+    });
+    CHECK(zeroed.pages == pages);
+    CHECK(zeroed.damaged_pages == 2);
   }
   SECTION("without one directory page of several") {
     REQUIRE(subject.superblock.directory_pages > 1);
@@ -229,7 +245,7 @@ TEST_CASE("diagnosis: packed channels whose names are lost do not crash the chec
              path = directory / "a.ptcx";
   Bytes bytes = read_file(good);
   const ContainerReader container(good);
-  const auto at = container.entry(container.superblock().meta_page).offset + kPageHeaderBytes;
+  const auto at = container.entry(container.meta_page()).offset + kPageHeaderBytes;
   bytes[at] ^= std::byte{0xff};
   bytes[at + 1] ^= std::byte{0xff};
   write_file(path, bytes);

@@ -47,11 +47,8 @@ void write_numbered(const std::filesystem::path& path) {
     const std::size_t count = std::min<std::size_t>(full, kPoints - first);
     std::vector<std::uint16_t> numbers(count);
     for (std::size_t i = 0; i < count; ++i) numbers[i] = static_cast<std::uint16_t>(first + i + 1);
-    writer.write_page(writer.reserve_page(),
-                      {.type = PageType::attribute,
-                       .group = 1,
-                       .record_count = static_cast<std::uint32_t>(count)},
-                      std::as_bytes(std::span(numbers)));
+    writer.write_attributes(1, std::as_bytes(std::span(numbers)), static_cast<std::uint32_t>(count),
+                            meta.channels);
   }
   writer.finish(meta, superblock);
 }
@@ -69,6 +66,7 @@ struct Patient {
   std::vector<DirectoryEntry> entries;
   Superblock superblock;
   std::vector<std::uint32_t> points, nodes, attributes;
+  std::size_t points_per_page = 0;
 
   Patient() {
     write_numbered(path);
@@ -76,6 +74,7 @@ struct Patient {
     const ContainerReader container(path);
     entries.assign(container.entries().begin(), container.entries().end());
     superblock = container.superblock();
+    points_per_page = ptc::points_per_page(container.header());
     points.assign(container.point_pages().begin(), container.point_pages().end());
     nodes.assign(container.node_pages().begin(), container.node_pages().end());
     attributes.assign(container.attribute_pages(1).begin(), container.attribute_pages(1).end());
@@ -121,7 +120,7 @@ struct Patient {
   [[nodiscard]] std::vector<std::size_t> all_but(std::size_t lost_page = ~std::size_t{0}) const {
     std::vector<std::size_t> numbers;
     for (std::size_t i = 0; i < kPoints; ++i) {
-      if (i / superblock.points_per_page != lost_page) numbers.push_back(i);
+      if (i / points_per_page != lost_page) numbers.push_back(i);
     }
     return numbers;
   }
@@ -216,13 +215,12 @@ TEST_CASE("salvage: a lost page costs only its own content", "[verify][salvage]"
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but());
     for (std::size_t i = 0; i < kPoints; ++i) {
-      if (kept.channel[i] != (i / patient.superblock.points_per_page == 4 ? 0 : i + 1))
-        FAIL("point " << i);
+      if (kept.channel[i] != (i / patient.points_per_page == 4 ? 0 : i + 1)) FAIL("point " << i);
     }
     CHECK(kept.report.attribute_pages + 1 == kept.report.attribute_pages_before);
   }
   SECTION("their names") {
-    patient.damage([&](Bytes& b) { patient.spoil(b, patient.superblock.meta_page); });
+    patient.damage([&](Bytes& b) { patient.spoil(b, patient.superblock.page_count - 1); });
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but());
     CHECK(kept.channel.empty());
@@ -238,8 +236,24 @@ TEST_CASE("salvage: the written part of an unfinished file is kept", "[verify][s
                round_up(kPageHeaderBytes + patient.entries[page].stored_bytes, kSectorBytes));
     });
   };
-  SECTION("all but directory and superblocks") {
+  const auto without_ends = [&](Bytes& b) {  // directory and superblocks
+    const auto at = [&](std::uint64_t offset) {
+      return b.begin() + static_cast<std::ptrdiff_t>(offset);
+    };
+    std::fill(at(patient.superblock.directory_offset), at(patient.superblock.tail_offset),
+              std::byte{0});
+    b.resize(b.size() - 2 * kBlockBytes);
+  };
+  SECTION("all but directory, coarse nodes, meta page and superblocks") {
     patient.damage([&](Bytes& b) { b.resize(patient.superblock.directory_offset); });
+    const Kept kept = patient.salvage();
+    CHECK(kept.points == patient.all_but());
+    CHECK(kept.channel.empty());
+    CHECK_FALSE(kept.report.meta);
+    CHECK_FALSE(kept.report.points_before);
+  }
+  SECTION("all but directory and superblocks") {
+    patient.damage(without_ends);
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but());
     check_beside(kept);
@@ -250,30 +264,28 @@ TEST_CASE("salvage: the written part of an unfinished file is kept", "[verify][s
   }
   SECTION("a point page spoiled besides") {
     patient.damage([&](Bytes& b) {
-      b.resize(patient.superblock.directory_offset);
+      without_ends(b);
       patient.spoil(b, patient.points[2]);
     });
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but(2));
     check_beside(kept);
   }
-  SECTION(
-      "a point page that does not even tell its number: no channel can be told from the next "
-      "page's") {
+  SECTION("a point page that does not even tell its rank: those of the others place channels") {
     patient.damage([&](Bytes& b) {
-      b.resize(patient.superblock.directory_offset);
+      without_ends(b);
       std::fill_n(
           b.begin() + static_cast<std::ptrdiff_t>(patient.entries[patient.points[2]].offset),
           kPageHeaderBytes, std::byte{0});
     });
     const Kept kept = patient.salvage();
     CHECK(kept.points == patient.all_but(2));
-    CHECK(std::ranges::count(kept.channel, 0U) == static_cast<std::ptrdiff_t>(kept.points.size()));
+    check_beside(kept);
   }
   SECTION("the first point pages") {
     cut_behind(patient.points[4]);
     const Kept kept = patient.salvage();
-    CHECK(kept.points.size() == 5 * patient.superblock.points_per_page);
+    CHECK(kept.points.size() == 5 * patient.points_per_page);
     CHECK(std::ranges::is_sorted(kept.points));
     CHECK_FALSE(kept.report.meta);
   }
@@ -295,9 +307,13 @@ TEST_CASE("salvage: without any whole page of points nothing is written", "[veri
   patient.damage([](Bytes&) {});
   CHECK_THROWS_AS(salvage_container(patient.path, patient.path, {}, silent), RequestError);
   CHECK(read_file(patient.path) == patient.whole);
-  CHECK_THROWS_AS(
-      salvage_container(patient.path, patient.target, {.memory_bytes = 1 << 20}, silent),
-      LimitError);
+  try {
+    salvage_container(patient.path, patient.target, {.memory_bytes = 1 << 20}, silent);
+    FAIL("the cap was not refused");
+  } catch (const LimitError& error) {
+    CHECK(error.field() == "memory_bytes");
+    CHECK_THAT(error.what(), Catch::Contains("32M for the program"));
+  }
   CHECK_FALSE(std::filesystem::exists(patient.target));
 }
 

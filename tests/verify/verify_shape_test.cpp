@@ -32,7 +32,7 @@ void write_flat_tree(const std::filesystem::path& target, const SortedScene& sce
   superblock.nodes = runs.size();
   superblock.node_groups = 1;
   superblock.levels = static_cast<std::uint16_t>(level + 1);
-  superblock.root_page = 1;
+  superblock.root_page = 0;
   superblock.bounds_low = superblock.bounds_high = scene.frame.to_position(decode_morton(first));
   for (const PointRecord& point : scene.records) {
     const std::array<double, 3> position = scene.frame.to_position(decode_morton(point.key));
@@ -44,17 +44,17 @@ void write_flat_tree(const std::filesystem::path& target, const SortedScene& sce
       superblock.flux[k] += area * static_cast<double>(decode_half(point.radiance[k]));
     }
   }
-  writer.write_page(writer.reserve_page(),
-                    {.type = PageType::point,
+  writer.write_page({.type = PageType::point,
+                     .rank = writer.reserve_page(PageType::point),
                      .record_count = static_cast<std::uint32_t>(scene.records.size()),
                      .first_key = first.high,
                      .last_key = scene.records.back().key.high},
-                    encode_point_page(scene.records));
+                    encode_point_page(scene.records, kPointBytes));
   NodePageEncoder page(4032);
   page.add(group);
-  writer.write_page(writer.reserve_page(),
-                    {.type = PageType::node,
-                     .level = static_cast<std::uint16_t>(level),
+  writer.write_page({.type = PageType::node,
+                     .rank = writer.reserve_page(PageType::node),
+                     .level = static_cast<std::uint8_t>(level),
                      .record_count = 1,
                      .first_key = group.cell.high,
                      .last_key = group.cell.high},

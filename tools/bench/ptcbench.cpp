@@ -113,20 +113,20 @@ ptc::Outcome run(const Experiment& experiment, const Arguments& arguments,
   if (experiment.check) experiment.check();
   std::filesystem::create_directories(arguments.directory);
   if (!arguments.results.empty()) std::filesystem::create_directories(arguments.results);
-  const auto named = [&](Report report) {
+  nlohmann::ordered_json written;  // facts of the report whose files are there
+  const auto write = [&](Report report) {
     if (!arguments.name.empty()) report.name = arguments.name;
+    if (nlohmann::ordered_json facts = facts_of(report); facts != written) {
+      write_files(arguments.directory, report);
+      written = std::move(facts);
+    }
     return report;
   };
   // Measure
   const std::filesystem::path work =
       run_options.temp_dirs.empty() ? arguments.directory : ptc::roomiest(run_options.temp_dirs);
-  const Report report = named(experiment.run(
-      {.work = work,
-       .run = run_options,
-       .progress = progress,
-       .publish = [&](const Report& so_far) { write_files(arguments.directory, named(so_far)); }}));
-  // Write the files
-  write_files(arguments.directory, report);
+  const Report report = write(
+      experiment.run({.work = work, .run = run_options, .progress = progress, .publish = write}));
   if (!arguments.results.empty()) write_results(arguments.results, report, circumstances);
   return {facts_of(report), text_of(report)};
 }
@@ -138,11 +138,11 @@ int main(int argc, char** argv) {
   ptc::Command command("ptcbench", kPurpose, kExamples);
   Arguments arguments;
   std::list<std::pair<Experiment, Declaration>> all;
-  for (const auto make :
-       {make_accuracy_experiment, make_build_experiment, make_cache_experiment,
-        make_demo_experiment, make_error_experiment, make_growth_experiment,
-        make_instructions_experiment, make_model_experiment, make_mutations_experiment,
-        make_scale_experiment, make_sort_experiment, make_verify_experiment}) {
+  for (const auto make : {make_accuracy_experiment, make_build_experiment, make_cache_experiment,
+                          make_demo_experiment, make_error_experiment, make_growth_experiment,
+                          make_instructions_experiment, make_model_experiment,
+                          make_mutations_experiment, make_remote_experiment, make_scale_experiment,
+                          make_sort_experiment, make_verify_experiment}) {
     const Experiment experiment = make();
     CLI::App* const app = command.app().add_subcommand(experiment.name, experiment.purpose);
     auto& [kept, declaration] = all.emplace_back(experiment, Declaration(*app));

@@ -12,6 +12,12 @@ set(PTC_LAYERS parallel io scene sort octree verify cache shade pipeline)
 set(PTC_STORE_HEADERS engine/store/reader.h engine/store/writer.h engine/store/point_scan.h engine/store/container_points.h)
 set(PTC_HEADERS ${PTC_STORE_HEADERS} engine/ptc.h)
 
+# Before 1.0 each minor version may break what the one before it promised, as SameMinorVersion says below.
+set(PTC_SOVERSION ${PROJECT_VERSION_MAJOR})
+if(PROJECT_VERSION_MAJOR EQUAL 0)
+  set(PTC_SOVERSION 0.${PROJECT_VERSION_MINOR})
+endif()
+
 # ptc_add_library(<name> EXPORT <target> LAYERS <layers> LINK <libs>) makes lib<name>.so and lib<name>.a of the
 # objects of layers; others know them as ptc::<target> and ptc::<target>-static.
 function(ptc_add_library name)
@@ -25,7 +31,7 @@ function(ptc_add_library name)
     set(target ${name}_${suffix})
     add_library(${target} ${kind} ${objects})
     set_target_properties(${target} PROPERTIES OUTPUT_NAME ${name} VERSION ${PROJECT_VERSION}
-      SOVERSION ${PROJECT_VERSION_MAJOR} LINKER_LANGUAGE CXX EXPORT_NAME ${ARG_EXPORT})
+      SOVERSION ${PTC_SOVERSION} LINKER_LANGUAGE CXX EXPORT_NAME ${ARG_EXPORT})
     target_compile_features(${target} INTERFACE cxx_std_20)
     target_include_directories(${target} INTERFACE $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
       $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
@@ -52,8 +58,10 @@ ptc_add_library(ptc-store EXPORT store LAYERS ${PTC_STORE_LAYERS}
   LINK zstd::libzstd_shared PkgConfig::lz4 PkgConfig::xxhash Threads::Threads)
 ptc_add_library(ptc EXPORT ptc LAYERS ${PTC_LAYERS}
   LINK TBB::tbb embree OpenEXR::OpenEXR ZLIB::ZLIB fmt::fmt PkgConfig::hwy PkgConfig::uring PkgConfig::stb Threads::Threads)
-target_link_libraries(ptc_shared PUBLIC ptc-store_shared)
-target_link_libraries(ptc_static PUBLIC ptc-store_static)
+foreach(kind shared static)  # the headers of ptc::ptc include those of GLM
+  target_link_libraries(ptc_${kind} PUBLIC ptc-store_${kind} INTERFACE glm::glm)
+endforeach()
+set_target_properties(ptc_shared PROPERTIES INSTALL_RPATH $ORIGIN)  # libptc-store lies next to libptc, under any prefix
 
 install(TARGETS ptc_shared ptc-store_shared EXPORT ptcTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libptc NAMELINK_COMPONENT libptc-dev)
@@ -69,6 +77,10 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/tools/install/ptcConfig.cmak
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/ptcConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/ptcConfig.cmake ${PROJECT_BINARY_DIR}/ptcConfigVersion.cmake
   DESTINATION ${package} COMPONENT libptc-dev)
+# The names of libraries, not of their pkg-config packages: a program that links the shared library needs none of these.
+pkg_check_modules(private REQUIRED QUIET OpenEXR fmt libhwy liburing stb zlib tbb)
+list(TRANSFORM private_LIBRARIES PREPEND -l)
+list(JOIN private_LIBRARIES " " PTC_PRIVATE_LIBS)
 file(RELATIVE_PATH PTC_PREFIX_FROM_PC /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
 foreach(library ptc ptc-store)
   configure_file(${PROJECT_SOURCE_DIR}/tools/install/${library}.pc.in ${PROJECT_BINARY_DIR}/${library}.pc @ONLY)
@@ -76,10 +88,22 @@ foreach(library ptc ptc-store)
 endforeach()
 
 if(PTC_TOOLS)
-  install(TARGETS ptcbuild ptcshade ptcrender ptcconvert ptcinfo ptcverify RUNTIME COMPONENT ptcx-tools)
-  install(DIRECTORY ${PROJECT_BINARY_DIR}/share/ DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT ptcx-tools
-    PATTERN "*ptcbench*" EXCLUDE PATTERN "man" EXCLUDE)
-  foreach(program ptcbuild ptcshade ptcrender ptcconvert ptcinfo ptcverify)
+  install(TARGETS ${PTC_PROGRAMS} RUNTIME COMPONENT ptcx-tools)
+  # Debian's zsh looks into site-functions below /usr/local, but into vendor-completions below /usr. The prefix is known
+  # when the files are installed or packed.
+  install(CODE [[
+    set(PTC_ZSH site-functions)
+    if(CMAKE_INSTALL_PREFIX MATCHES "/usr$")
+      set(PTC_ZSH vendor-completions)
+    endif()]] COMPONENT ptcx-tools)
+  foreach(program IN LISTS PTC_PROGRAMS)
+    install(FILES ${PROJECT_BINARY_DIR}/share/zsh/site-functions/_${program}
+      DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/\${PTC_ZSH} COMPONENT ptcx-tools)
+    foreach(completion bash-completion/completions/${program} fish/vendor_completions.d/${program}.fish)
+      get_filename_component(directory ${completion} DIRECTORY)
+      install(FILES ${PROJECT_BINARY_DIR}/share/${completion} DESTINATION ${CMAKE_INSTALL_DATADIR}/${directory}
+        COMPONENT ptcx-tools)
+    endforeach()
     set(page ${PROJECT_BINARY_DIR}/share/man/man1/${program}.1)
     add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/${program}.1.gz
       COMMAND ${PTC_GZIP} -9nc ${page} > ${PROJECT_BINARY_DIR}/${program}.1.gz DEPENDS ptc_manuals ${page} VERBATIM)

@@ -1,7 +1,7 @@
 # The layers that each layer may include, in one place: ptc_add_layer() links a layer by this table,
 # and tests/layers.py checks every #include "..." of the tree against it.
 set(PTC_LAYERS_format "")
-set(PTC_LAYERS_engine/base "")
+set(PTC_LAYERS_engine/base "format")
 set(PTC_LAYERS_engine/parallel "engine/base")
 set(PTC_LAYERS_engine/io/file "format;engine/base")
 set(PTC_LAYERS_engine/io "format;engine/base;engine/io/file")

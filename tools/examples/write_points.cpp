@@ -9,6 +9,7 @@
 #include <ptc/io/cloud/record.h>
 #include <ptc/octree/build_pages.h>
 #include <ptc/parallel/thread_pool.h>
+#include <ptc/sort/external_sort.h>
 
 namespace {
 

@@ -37,7 +37,7 @@ bool is_property_name(const std::string& name) {
 }
 
 // Returns the header, or throws when a name cannot be a property or occurs twice.
-std::string make_header(std::uint64_t count, const std::vector<PointColumn>& columns) {
+std::string make_header(std::uint64_t count, bool emits, const std::vector<PointColumn>& columns) {
   std::string text =
       "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(count) + "\n";
   std::set<std::string> seen;
@@ -53,6 +53,9 @@ std::string make_header(std::uint64_t count, const std::vector<PointColumn>& col
                            "red", "green", "blue"}) {
     add("float", name);
   }
+  for (const char* name : {"emission_r", "emission_g", "emission_b"}) {
+    if (emits) add("float", name);
+  }
   for (const PointColumn& column : columns) {
     for (const std::string& name : names_of(column)) add("float", name);
   }
@@ -62,9 +65,10 @@ std::string make_header(std::uint64_t count, const std::vector<PointColumn>& col
 }  // namespace
 
 std::vector<PointColumn> ply_columns(std::span<const Channel> channels) {
-  std::set<std::string> taken{"x",        "y",          "z",          "nx",        "ny",
-                              "nz",       "radius",     "red",        "green",     "blue",
-                              "radiance", "radiance_r", "radiance_g", "radiance_b"};
+  std::set<std::string> taken{"x",          "y",          "z",          "nx",         "ny",
+                              "nz",         "radius",     "red",        "green",      "blue",
+                              "radiance",   "radiance_r", "radiance_g", "radiance_b", "emission",
+                              "emission_r", "emission_g", "emission_b"};
   std::vector<PointColumn> columns;
   for (const Channel& channel : channels) {
     PointColumn column{.name = channel.name,
@@ -84,10 +88,11 @@ std::vector<PointColumn> ply_columns(std::span<const Channel> channels) {
   return columns;
 }
 
-PlyWriter::PlyWriter(const std::filesystem::path& target, std::uint64_t count,
+PlyWriter::PlyWriter(const std::filesystem::path& target, std::uint64_t count, bool emits,
                      std::vector<PointColumn> columns)
     : columns_(std::move(columns)),
-      header_(make_header(count, columns_)),
+      header_(make_header(count, emits, columns_)),
+      emits_(emits),
       announced_(count),
       out_(target) {
   for (const PointColumn& column : columns_) values_per_point_ += column.components;
@@ -108,6 +113,7 @@ void PlyWriter::write(std::span<const Surfel> surfels, std::span<const float> va
     out_.put(&surfel.radius, sizeof surfel.radius);
     out_.put(&surfel.radiance, sizeof surfel.radiance);
     out_.put(&surfel.albedo, sizeof surfel.albedo);
+    if (emits_) out_.put(&surfel.emission, sizeof surfel.emission);
     out_.put(values.data() + i * values_per_point_, values_per_point_ * sizeof(float));
   }
 }

@@ -12,9 +12,6 @@
 #include <limits>
 #include <utility>
 
-#include <glm/common.hpp>
-#include <glm/vector_relational.hpp>
-
 #include "engine/base/error.h"
 #include "engine/io/cloud/ply.h"
 #include "engine/io/cloud/surfel_check.h"
@@ -32,6 +29,7 @@ struct Layout {
   std::optional<Triple> normal;
   std::optional<std::size_t> radius;
   std::optional<Triple> radiance;
+  std::optional<Triple> emission;
   std::optional<Triple> albedo;
   std::array<double, 3> albedo_most{};  // stored value that stands for 1; 0 for linear floats
 };
@@ -93,6 +91,7 @@ Layout find_layout(const PlyElement& vertex, const std::filesystem::path& path) 
   layout.normal = first({{"nx", "ny", "nz"}, {"normal_x", "normal_y", "normal_z"}});
   layout.radius = vertex.find_any({"radius", "scalar_radius"});
   layout.radiance = first({{"radiance_r", "radiance_g", "radiance_b"}});
+  layout.emission = first({{"emission_r", "emission_g", "emission_b"}});
   layout.albedo =
       first({{"red", "green", "blue"}, {"diffuse_red", "diffuse_green", "diffuse_blue"}});
   for (std::size_t i = 0; layout.albedo && i < 3; ++i) {
@@ -115,8 +114,12 @@ class PlySource : public PointSource {
   }
 
   [[nodiscard]] PointFileInfo info() const {
-    return {vertex_->count, layout_.normal.has_value(), layout_.radius.has_value(),
-            layout_.radiance.has_value(), layout_.albedo.has_value()};
+    return {vertex_->count,
+            layout_.normal.has_value(),
+            layout_.radius.has_value(),
+            layout_.radiance.has_value(),
+            layout_.emission.has_value(),
+            layout_.albedo.has_value()};
   }
 
   std::size_t next(std::span<Surfel> out) override {
@@ -167,6 +170,7 @@ class PlySource : public PointSource {
     if (layout_.normal) raw.normal = gather(record_, *layout_.normal);
     if (layout_.radius) raw.radius = record_.scalars[*layout_.radius];
     if (layout_.radiance) raw.radiance = gather(record_, *layout_.radiance);
+    if (layout_.emission) raw.emission = gather(record_, *layout_.emission);
     for (std::size_t i = 0; layout_.albedo && i < 3; ++i) {
       raw.albedo[static_cast<int>(i)] =
           albedo_of(record_.scalars[(*layout_.albedo)[i]], layout_.albedo_most[i]);
@@ -209,12 +213,13 @@ std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out) 
   constexpr double kMaxFloat = std::numeric_limits<float>::max();
   // Check the numbers against the ranges that records can hold.
   if (!all_finite(raw.position)) return "the position is not finite";
-  if (glm::any(glm::greaterThan(glm::abs(raw.position), glm::dvec3(kMaxCoordinate))))
-    return "the position is beyond 2^999";
+  if (!fits_coordinates(raw.position)) return "the position is beyond 2^999";
   if (!(raw.radius >= 0 && raw.radius <= kMaxFloat))
     return "the radius is negative, not a number or beyond the range of float";
   if (!all_within(raw.radiance, kMaxFloat))
     return "the radiance is negative, not a number or beyond the range of float";
+  if (!all_within(raw.emission, kMaxFloat))
+    return "the emission is negative, not a number or beyond the range of float";
   if (!all_within(raw.albedo, 1)) return "the colour is out of range";
 
   // Convert them.
@@ -222,6 +227,7 @@ std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out) 
   out.normal = glm::vec3(0);
   out.radius = static_cast<float>(raw.radius);
   out.radiance = glm::vec3(raw.radiance);
+  out.emission = glm::vec3(raw.emission);
   out.albedo = glm::vec3(raw.albedo);
   if (!has_normals) return {};
 

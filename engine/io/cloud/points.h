@@ -23,6 +23,7 @@ struct PointFileInfo {
   bool has_normals = false;            ///< otherwise normals are 0, and nothing can light a surfel
   bool has_radius = false;             ///< otherwise radii are 0
   bool has_radiance = false;           ///< otherwise radiance is 0
+  bool has_emission = false;           ///< otherwise emission is 0
   bool has_albedo = false;             ///< the file has colours; otherwise albedo is 0.5
 };
 
@@ -36,16 +37,17 @@ struct PointFile {
 ///
 /// PLY files, ascii or binary, may be compressed (.ply.gz). These properties of `vertex` are read:
 /// x y z; nx ny nz or normal_x normal_y normal_z; radius or scalar_radius; radiance_r radiance_g
-/// radiance_b; red green blue or diffuse_red diffuse_green diffuse_blue. The last six are the
-/// albedo: integers are sRGB (8 bits; 16 for short types), floats are linear in [0, 1]. All other
-/// properties are skipped.
+/// radiance_b; emission_r emission_g emission_b; red green blue or diffuse_red diffuse_green
+/// diffuse_blue. The last six are the albedo: integers are sRGB (8 bits; 16 for short types),
+/// floats are linear in [0, 1]. All other properties are skipped.
 ///
 /// XYZ text files (.xyz .xyzn .asc .txt) have lines "x y z [nx ny nz [radius [r g b]]]", where r g
 /// b is the linear radiance, and comments that begin with #. All lines have as many values as the
 /// first.
 ///
 /// Every surfel is checked: the position is finite and within kMaxCoordinate, the normal has a
-/// non-zero finite length (it is normalised), radius and radiance are finite and not negative, and
+/// non-zero finite length (it is normalised), radius, radiance and emission are finite and not
+/// negative, and
 /// the albedo is in [0, 1]. A PLY file that ends early, counts more records than it can hold, or
 /// goes on after its last element is refused.
 /// @throws DataError that names the file, the offset (binary) or line (text) and the point;
@@ -70,15 +72,16 @@ struct PointColumn {
 [[nodiscard]] std::vector<PointColumn> ply_columns(std::span<const Channel> channels);
 
 /// Writes a binary little-endian PLY file: x y z (double), nx ny nz, radius, radiance_rgb, albedo
-/// as red green blue (float), then the columns (float). The file replaces its target when finish()
-/// returns.
+/// as red green blue, emission_rgb where points may emit light (float), then the columns (float).
+/// The file replaces its target when finish() returns.
 class PlyWriter {
  public:
   /// Begins a file.
   /// @param count  exact number of points that will follow
+  /// @param emits  whether emission is written
   /// @throws std::system_error; std::invalid_argument when the name of a column cannot name a
   ///         property or occurs twice
-  PlyWriter(const std::filesystem::path& target, std::uint64_t count,
+  PlyWriter(const std::filesystem::path& target, std::uint64_t count, bool emits,
             std::vector<PointColumn> columns);
   /// Writes the next points.
   /// @param values  values of the columns, surfels.size() x sum of components, point by point
@@ -92,6 +95,7 @@ class PlyWriter {
  private:
   std::vector<PointColumn> columns_;
   std::string header_;       ///< made before the file, so that a bad column leaves no file
+  bool emits_;               ///< emission is written
   std::uint64_t announced_;  ///< points of the header
   std::uint64_t written_ = 0;
   std::size_t values_per_point_ = 0;

@@ -17,6 +17,7 @@ PointRecord to_record(const Surfel& surfel, const Frame& frame) noexcept {
   for (int c = 0; c < 3; ++c) {
     const auto k = static_cast<std::size_t>(c);
     record.radiance[k] = encode_half(surfel.radiance[c]);
+    record.emission[k] = encode_half(surfel.emission[c]);
     record.albedo[k] =
         static_cast<std::uint8_t>(std::lround(std::clamp(surfel.albedo[c], 0.0F, 1.0F) * 255));
   }
@@ -32,7 +33,8 @@ Surfel to_surfel(const PointRecord& record, const Frame& frame) noexcept {
     surfel.position[c] = position[k];
     surfel.normal[c] = normal[k];
     surfel.radiance[c] = decode_half(record.radiance[k]);
-    surfel.albedo[c] = static_cast<float>(record.albedo[k]) * (1.0F / 255);
+    surfel.emission[c] = decode_half(record.emission[k]);
+    surfel.albedo[c] = static_cast<float>(record.albedo[k]) / 255;
   }
   surfel.radius = record.radius;
   return surfel;

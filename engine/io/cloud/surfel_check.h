@@ -15,6 +15,7 @@ struct RawSurfel {
   glm::dvec3 normal{0};
   double radius = 0;
   glm::dvec3 radiance{0};
+  glm::dvec3 emission{0};
   glm::dvec3 albedo{0.5};
 };
 

@@ -1,7 +1,8 @@
 // Positioned file access over POSIX calls, and the registry of temporary names for signal handlers.
 //
 // A temporary file must disappear when the process ends, whether by an exception (destructors) or
-// by a signal (a handler that walks the registry). The handler may run in any thread at any time:
+// by a signal that a user or the system sends to end it (a handler that walks the registry). The
+// handler may run in any thread at any time:
 //
 //   create_temporary()            handler
 //   block fatal signals           block fatal signals
@@ -15,6 +16,7 @@
 #include "engine/io/file/file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -84,7 +86,7 @@ void write_whole(int fd, const std::filesystem::path& path, std::uint64_t offset
   }
 }
 
-constexpr std::array kFatalSignals = {SIGINT, SIGTERM, SIGHUP};
+constexpr std::array kFatalSignals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU};
 std::atomic_flag registry_lock = ATOMIC_FLAG_INIT;
 
 // An absolute name that a fatal signal removes.
@@ -240,6 +242,14 @@ InputFile::InputFile(InputFile&& other) noexcept
       fd_(std::exchange(other.fd_, -1)),
       size_(std::exchange(other.size_, 0)) {}
 
+bool InputFile::is_named(const std::filesystem::path& path) const {
+  struct stat own {
+  }, named{};
+  if (::fstat(fd_, &own) != 0) fail(errno, "fstat", path_);
+  return ::stat(path.c_str(), &named) == 0 && own.st_dev == named.st_dev &&
+         own.st_ino == named.st_ino;
+}
+
 void InputFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {
   read_whole(fd_, path_, offset, out);
 }
@@ -248,9 +258,26 @@ void InputFile::read_ahead(std::uint64_t offset, std::uint64_t bytes) const noex
   ::posix_fadvise(fd_, static_cast<off_t>(offset), static_cast<off_t>(bytes), POSIX_FADV_WILLNEED);
 }
 
-OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
+std::filesystem::path behind_links(const std::filesystem::path& path) {
+  constexpr int kMaxLinks = 40;  // as many as the system follows
+  std::filesystem::path end = path;
+  for (int links = 0; links <= kMaxLinks; ++links) {
+    struct stat status {};
+    const bool exists = ::lstat(end.c_str(), &status) == 0;
+    if (!exists && errno != ENOENT && errno != ENOTDIR) fail(errno, "lstat", end);
+    if (!exists || !S_ISLNK(status.st_mode)) return end;
+    end = end.parent_path() / std::filesystem::read_symlink(end);
+  }
+  fail(ELOOP, "readlink", path);
+}
+
+bool same_name(const std::filesystem::path& a, const std::filesystem::path& b) {
+  return std::filesystem::weakly_canonical(behind_links(a)) ==
+         std::filesystem::weakly_canonical(behind_links(b));
+}
+
+OutputFile::OutputFile(const std::filesystem::path& target) : target_(behind_links(target)) {
   const std::optional<mode_t> old = mode_of(target);
-  if (old && std::filesystem::is_symlink(target)) target_ = std::filesystem::canonical(target);
   do {
     temporary_ = temporary_name(target_);
     fd_ = create_temporary(this, temporary_);
@@ -260,7 +287,7 @@ OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
 }
 
 OutputFile::OutputFile(const std::filesystem::path& target, const std::filesystem::path& partial)
-    : target_(target), temporary_(partial), stays_(true) {
+    : target_(behind_links(target)), temporary_(partial), stays_(true) {
   const std::optional<mode_t> old = mode_of(target);
   fd_ = open_retrying(partial, O_RDWR | O_CREAT, 0666);
   if (fd_ < 0) fail(errno, "open", partial);
@@ -296,11 +323,21 @@ void OutputFile::sync() {
   if (retrying([&] { return ::fdatasync(fd_); }) != 0) fail(errno, "fdatasync", temporary_);
 }
 
-void OutputFile::publish() {
+void OutputFile::publish(const InputFile* source) {
   if (retrying([&] { return ::fsync(fd_); }) != 0) fail(errno, "fsync", temporary_);
   // Ignore EINTR: the file is closed all the same, and its content is on stable storage.
   if (::close(std::exchange(fd_, -1)) != 0 && errno != EINTR) fail(errno, "close", temporary_);
+  // Hold a lock on the file that is replaced, so that of two programs only one can pass the check.
+  const bool replaces = source != nullptr && same_name(source->path(), target_);
+  const int held = replaces ? source->descriptor() : -1;
+  if (held >= 0 && retrying([&] { return ::flock(held, LOCK_EX); }) != 0)
+    fail(errno, "flock", target_);
+  if (held >= 0 && !source->is_named(target_)) {
+    throw DataError(target_.string() +
+                    ": another program replaced this file in the meantime; run this again");
+  }
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(errno, "rename", target_);
+  if (held >= 0) ::flock(held, LOCK_UN);
   published_ = true;
   forget_temporary(this);
   sync_directory(target_);

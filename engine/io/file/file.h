@@ -40,6 +40,9 @@ class InputFile {
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
   /// Returns the descriptor, which this object owns and closes.
   [[nodiscard]] int descriptor() const noexcept { return fd_; }
+  /// Says whether a path names this file, and not one that has replaced it.
+  /// @throws std::system_error
+  [[nodiscard]] bool is_named(const std::filesystem::path& path) const;
   /// Fills `out` with the bytes of the file from `offset` on.
   /// @throws DataError when the file ends before `out` is full; std::system_error when a read fails
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
@@ -61,7 +64,7 @@ class InputFile {
 /// file gets the permissions of the old one.
 class OutputFile {
  public:
-  /// Creates the temporary file.
+  /// Creates the temporary file. A symbolic link is followed, also to a file that does not exist.
   /// @throws std::system_error; a target that is a directory is refused with EISDIR, any other
   ///         target that is not a regular file with EINVAL
   explicit OutputFile(const std::filesystem::path& target);
@@ -97,8 +100,11 @@ class OutputFile {
   void sync();
   /// Flushes the file to stable storage, renames it over the target and flushes the directory. The
   /// file is closed afterwards.
-  /// @throws std::system_error; the target is unchanged unless only the last step failed
-  void publish();
+  /// @param source  the file that the new one was made from, or null; when it was opened under the
+  ///                name of the target, the target must still be this file
+  /// @throws std::system_error, and DataError when another file has taken the place of `source`;
+  ///         the target is unchanged unless only the last step failed
+  void publish(const InputFile* source = nullptr);
 
  private:
   std::filesystem::path target_;
@@ -123,6 +129,15 @@ class TemporaryName {
  private:
   std::filesystem::path path_;
 };
+
+/// Returns the path at the end of a chain of symbolic links, where a file need not exist.
+/// @throws std::system_error (ELOOP) for links that lead in a circle
+[[nodiscard]] std::filesystem::path behind_links(const std::filesystem::path& path);
+
+/// Says whether two paths lead to one name of a file, which need not exist. What the name stands
+/// for does not count, so the answer stays the same while other programs replace the file.
+/// @throws std::system_error
+[[nodiscard]] bool same_name(const std::filesystem::path& a, const std::filesystem::path& b);
 
 /// Returns the directory of a file: its parent path, or "." when the path has none.
 [[nodiscard]] std::filesystem::path directory_of(const std::filesystem::path& file);

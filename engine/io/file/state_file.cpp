@@ -10,7 +10,9 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <system_error>
+#include <thread>
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
@@ -20,8 +22,10 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x4554'4154'5358'5450;  // "PTXSTATE"
-constexpr std::uint64_t kVersion = 3;  // of the file; also the seed of its checksum
+constexpr std::uint64_t kVersion = 4;  // of the file; also the seed of its checksum
 constexpr std::size_t kHeadBytes = 32;
+constexpr int kLockTries = 10;
+constexpr std::chrono::milliseconds kLockWait(30);
 
 }  // namespace
 
@@ -107,8 +111,12 @@ FileLock::FileLock(const std::filesystem::path& path) {
   while (true) {
     fd_ = open_retrying(path, O_RDWR | O_CREAT, 0666);
     if (fd_ < 0) fail("open");
-    while (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
-      if (errno != EINTR) fail("flock");
+    // A program that was killed may hold its lock for a moment longer, until the system has freed
+    // it.
+    for (int tries = 0; ::flock(fd_, LOCK_EX | LOCK_NB) != 0;) {
+      if (errno == EINTR) continue;
+      if (errno != EWOULDBLOCK || ++tries > kLockTries) fail("flock");
+      std::this_thread::sleep_for(kLockWait);
     }
     struct stat held {
     }, named{};

@@ -58,7 +58,7 @@ class StateReader {
   /// Checks that no bytes are left.
   void end() const;
   /// Checks a rule of the caller. @param text  what is wrong when it does not hold
-  void require(bool holds, const char* text) const {
+  void require(bool holds, const std::string& text) const {
     if (!holds) fail(text);
   }
 

@@ -155,10 +155,10 @@ std::vector<std::string> channel_names(const ExrLayer& layer) {
 }
 
 void check_layers(unsigned width, unsigned height, const std::vector<ExrLayer>& layers) {
-  const std::uint64_t count = std::uint64_t{width} * height;
-  if (count == 0 || width > kMaxImageSide || height > kMaxImageSide || count > kMaxImagePixels) {
+  if (!is_image_size(width, height)) {
     throw std::invalid_argument("write_exr: the size is out of range");
   }
+  const std::uint64_t count = std::uint64_t{width} * height;
   if (layers.empty()) throw std::invalid_argument("write_exr: there is no layer");
   std::set<std::string> seen;
   for (const ExrLayer& layer : layers) {

@@ -168,8 +168,7 @@ class HeaderWalk {
   void check_sizes() const {
     const auto [width, height] = window_;
     if (width < 1 || height < 1) fail("the picture has no pixels");
-    if (width > kMaxImageSide || height > kMaxImageSide ||
-        static_cast<std::uint64_t>(width * height) > kMaxImagePixels) {
+    if (!is_image_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height))) {
       fail("the picture has more pixels than this program accepts");
     }
     if (static_cast<std::uint64_t>(width * height) > max_pixels_) {

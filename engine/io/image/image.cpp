@@ -55,9 +55,7 @@ void check_size(int width, int height, std::size_t file_bytes, std::uint64_t max
   const auto w = static_cast<std::uint64_t>(width);
   const auto h = static_cast<std::uint64_t>(height);
   const std::string size = std::to_string(w) + " x " + std::to_string(h) + " pixels";
-  if (w > kMaxImageSide || h > kMaxImageSide || w * h > kMaxImagePixels) {
-    refuse(name, size + " are more than this program accepts");
-  }
+  if (!is_image_size(w, h)) refuse(name, size + " are more than this program accepts");
   if (w * h > max_pixels) {
     refuse(name,
            size + " are more than the " + std::to_string(max_pixels) + " that may still be loaded");
@@ -165,8 +163,7 @@ Image read_image(const std::filesystem::path& path, std::uint64_t max_pixels) {
 
 void write_png(const std::filesystem::path& target, const Image& image) {
   const std::size_t count = std::size_t{image.width} * image.height;
-  if (count == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide ||
-      count > kMaxImagePixels || image.pixels.size() != count) {
+  if (!is_image_size(image.width, image.height) || image.pixels.size() != count) {
     throw std::invalid_argument("write_png: the number of pixels does not match the size");
   }
   std::vector<std::uint8_t> stored;

@@ -17,6 +17,12 @@ inline constexpr unsigned kMaxImageSide = 1U << 16;
 /// The greatest number of pixels of a picture that is read or written.
 inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 
+/// Says whether a picture of this size is read and written: one with pixels, within both limits.
+[[nodiscard]] constexpr bool is_image_size(std::uint64_t width, std::uint64_t height) noexcept {
+  return width > 0 && height > 0 && width <= kMaxImageSide && height <= kMaxImageSide &&
+         width * height <= kMaxImagePixels;
+}
+
 /// A picture of linear RGB values, row by row from the top.
 struct Image {
   unsigned width = 0;             ///< pixels

@@ -233,8 +233,15 @@ std::string GltfDocument::file_name(const std::string& uri) {
   return name;
 }
 
+// Returns the content of a file that the document names.
+std::vector<std::byte> GltfDocument::read_part(const std::filesystem::path& name) const {
+  const std::filesystem::path part = path_.parent_path() / name;
+  if (!std::filesystem::is_regular_file(part)) fail("its file " + part.string() + " is missing");
+  return read_file(part);
+}
+
 std::vector<std::byte> GltfDocument::fetch(const std::string& uri) const {
-  if (!uri.starts_with("data:")) return read_file(path_.parent_path() / file_name(uri));
+  if (!uri.starts_with("data:")) return read_part(file_name(uri));
   const std::size_t comma = uri.find(";base64,");
   if (comma == std::string::npos) fail("a data URI is not base64");
   auto bytes = decode_base64(std::string_view(uri).substr(comma + 8));
@@ -261,8 +268,10 @@ std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
   if (!loaded) {
     if (has_uri) {
       loaded = fetch(text);
+    } else if (index == 0) {
+      loaded = std::move(binary_chunk_);
     } else {
-      loaded = index == 0 ? binary_chunk_ : std::vector<std::byte>();
+      loaded.emplace();
     }
     bytes_read_ += loaded->size();
   }

@@ -81,6 +81,7 @@ class GltfDocument {
   void parse(std::span<const std::byte> text);
   void read_chunks(std::span<const std::byte> file);
   std::span<const std::byte> buffer(std::uint64_t index);
+  [[nodiscard]] std::vector<std::byte> read_part(const std::filesystem::path& name) const;
 
   std::filesystem::path path_;
   Json root_;

@@ -24,8 +24,6 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kMaxMaterials = 65536;
-
 glm::vec3 flat_normal(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
   const glm::dvec3 a(mesh.positions[triangle[0]]);
   const glm::dvec3 cross = glm::cross(glm::dvec3(mesh.positions[triangle[1]]) - a,
@@ -122,14 +120,14 @@ MeshFile read_mesh(const std::filesystem::path& path) {
                   ": not a mesh: the name ends in none of .obj .ply .off .gltf .glb .stl");
 }
 
-void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
+void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, const char* field) {
   // Refuse what cannot be joined.
   const double determinant = glm::determinant(glm::dmat3(transform));
   if (!is_finite(transform) || determinant == 0 || !std::isfinite(determinant)) {
     throw std::invalid_argument("append_mesh: the transform is not finite and invertible");
   }
   if (mesh.materials.size() + other.materials.size() > kMaxMaterials) {
-    throw RequestError("inputs", "the meshes have more than 65,536 materials together");
+    throw RequestError(field, "the meshes have more than 65,536 materials together");
   }
 
   // Transform a copy, and give both meshes the same attributes.
@@ -147,7 +145,7 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform) {
   // Append it, with the indices of its vertices and materials moved.
   const std::size_t base = mesh.positions.size();
   if (added.positions.size() > 0xffffffffU - base) {
-    throw RequestError("inputs", "the meshes have 2^32 vertices or more together");
+    throw RequestError(field, "the meshes have 2^32 vertices or more together");
   }
   const std::size_t material_base = mesh.materials.size();
   mesh.positions.insert(mesh.positions.end(), added.positions.begin(), added.positions.end());

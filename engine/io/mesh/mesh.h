@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -26,6 +27,9 @@ struct Material {
   glm::vec3 emission{0};                 ///< radiance of the front side, RGB, W / (m^2 sr)
   bool double_sided = false;             ///< the back reflects as the front does (glTF)
 };
+
+/// The maximum number of materials of a mesh.
+inline constexpr std::size_t kMaxMaterials = 65536;
 
 /// Triangles with shared vertices. Positions are relative to `origin`, so that coordinates of ten
 /// million metres keep millimetres.
@@ -81,8 +85,10 @@ struct MeshFile {
 /// coordinates, the other gets flat normals or (0, 0). A transform that mirrors also reverses the
 /// triangles, so that fronts stay fronts.
 /// @param transform  affine map of world positions
+/// @param field      the member of the request that the meshes come from, for RequestError
 /// @throws std::invalid_argument when the transform is not finite and invertible; RequestError when
 ///         the two have more than 65,536 materials or 2^32 vertices together
-void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform);
+void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform,
+                 const char* field = "inputs");
 
 }  // namespace ptc

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -367,8 +368,10 @@ class GltfMesh {
     if (!texture) document_.fail("a texture has no index");
     const auto source = document_.unsigned_at(document_.at("textures", *texture), "source");
     if (!source) {
-      warnings_.add(kTextureLeftOut,
-                    "texture " + std::to_string(*texture) + ": it has no supported source");
+      if (textures_left_out_.insert(*texture).second) {
+        warnings_.add(kTextureLeftOut,
+                      "texture " + std::to_string(*texture) + ": it has no supported source");
+      }
       return nullptr;
     }
     const auto [at, is_new] = images_.try_emplace(*source);
@@ -380,17 +383,20 @@ class GltfMesh {
   std::shared_ptr<const Image> load_image(std::uint64_t source) {
     const Json& image = document_.at("images", source);
     const auto uri = image.find("uri");
-    const auto label = [](std::uint64_t index) { return "image " + std::to_string(index); };
+    const std::string label = "image " + std::to_string(source);
     if (uri != image.end() && uri->is_string()) {
       const std::string text = uri->get<std::string>();
       if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text));
-      return textures_.decode(label(source), document_.fetch(text), document_.bytes_read());
+      return textures_.decode(label, document_.fetch(text), document_.bytes_read());
     }
     const auto view = document_.unsigned_at(image, "bufferView");
     if (!view) document_.fail("an image has neither uri nor bufferView");
-    const std::uint64_t first = image_of_view_.try_emplace(*view, source).first->second;
-    const std::span<const std::byte> bytes = document_.view(*view);
-    return textures_.decode(label(first), bytes, document_.bytes_read());
+    const auto [at, is_new] = image_of_view_.try_emplace(*view);
+    if (is_new) {
+      const std::span<const std::byte> bytes = document_.view(*view);
+      at->second = textures_.decode(label, bytes, document_.bytes_read());
+    }
+    return at->second;
   }
 
   // Adds a perspective camera, which looks along -z with y up (section 3.10).
@@ -404,7 +410,7 @@ class GltfMesh {
                     2 * std::atan(std::tan(vertical / 2) * aspect));
     if (camera) {
       cameras_.push_back(*camera);
-    } else {
+    } else if (cameras_left_out_.insert(index).second) {
       warnings_.add(kCameraLeftOut, "camera " + std::to_string(index));
     }
   }
@@ -414,12 +420,14 @@ class GltfMesh {
   std::vector<MeshCamera> cameras_;
   MeshWarnings warnings_;
   TextureLoader textures_;
-  std::map<std::uint64_t, GltfMaterial> materials_;               // by index in the file
-  std::map<std::uint64_t, std::shared_ptr<const Image>> images_;  // by index in the file
-  std::map<std::uint64_t, std::uint64_t> image_of_view_;          // first image of each bufferView
+  std::map<std::uint64_t, GltfMaterial> materials_;                      // by index in the file
+  std::map<std::uint64_t, std::shared_ptr<const Image>> images_;         // by index in the file
+  std::map<std::uint64_t, std::shared_ptr<const Image>> image_of_view_;  // by index of bufferView
   std::map<std::shared_ptr<const Image>, glm::dvec3> means_;
-  std::vector<bool> visited_;  // per node
-  bool has_uvs_ = false;       // some primitive has texture coordinates
+  std::set<std::uint64_t> textures_left_out_;  // indices in the file
+  std::set<std::uint64_t> cameras_left_out_;   // indices in the file
+  std::vector<bool> visited_;                  // per node
+  bool has_uvs_ = false;                       // some primitive has texture coordinates
 };
 
 }  // namespace

@@ -81,16 +81,13 @@ std::shared_ptr<const Image> TextureLoader::load(const std::string& name) {
 std::shared_ptr<const Image> TextureLoader::decode(const std::string& name,
                                                    std::span<const std::byte> bytes,
                                                    std::uint64_t mesh_bytes) {
-  const auto known = loaded_.find(name);
-  if (known != loaded_.end()) return known->second;
   mesh_bytes_ = std::max(mesh_bytes_, mesh_bytes);
-  std::shared_ptr<const Image> image;
   try {
-    image = keep(decode_image(bytes, name, pixels_left()));
+    return keep(decode_image(bytes, name, pixels_left()));
   } catch (const DataError& error) {
     warnings_.add(kTextureLeftOut, error.what());
+    return nullptr;
   }
-  return loaded_[name] = std::move(image);
 }
 
 }  // namespace ptc

@@ -18,7 +18,6 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/vector_relational.hpp>
 
 #include "engine/base/error.h"
 
@@ -29,7 +28,6 @@ using Corner = MeshSoup::Corner;
 using Triangle = std::array<Corner, 3>;
 
 constexpr std::uint32_t kNone = MeshSoup::kNone;
-constexpr std::size_t kMaxMaterials = 65536;
 constexpr std::size_t kMaxCorners = std::size_t{1} << 28;
 // The greatest distance from the centre along an axis. Beyond it, squares of distances leave the
 // range of float.
@@ -69,7 +67,7 @@ glm::dvec3 checked_origin(const MeshSoup& soup, const std::filesystem::path& pat
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
       refuse(path, "vertex " + std::to_string(i) + ": the position is not finite");
     }
-    if (glm::any(glm::greaterThan(glm::abs(p), glm::dvec3(kMaxCoordinate)))) {
+    if (!fits_coordinates(p)) {
       refuse(path, "vertex " + std::to_string(i) + ": the position is beyond 2^999");
     }
     bounds.add(p);

@@ -107,7 +107,7 @@ TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
 [[nodiscard]] std::string reason_for(const std::string& name, const std::filesystem::path& path,
                                      const std::exception& error);
 
-/// Loads the textures of a mesh, each of them once. A texture that cannot be loaded becomes a
+/// Loads the textures of a mesh, each file once. A texture that cannot be loaded becomes a
 /// warning and a null pointer.
 ///
 /// All textures of a mesh together may have `free_pixels` pixels plus 256 for each byte of the
@@ -125,8 +125,9 @@ class TextureLoader {
   /// Returns the texture in a file, or null after a warning.
   /// @param name  path relative to the directory, with / or \ between its parts
   [[nodiscard]] std::shared_ptr<const Image> load(const std::string& name);
-  /// Returns the texture in bytes of the mesh's own files, or null after a warning. A later call
-  /// with the same name returns the same texture.
+  /// Decodes a texture in bytes of the mesh's own files, or returns null after a warning. Unlike
+  /// load(), each call makes a texture of its own.
+  /// @param name        name of the texture, for the warning
   /// @param mesh_bytes  size of these files as far as they were read, bytes
   [[nodiscard]] std::shared_ptr<const Image> decode(const std::string& name,
                                                     std::span<const std::byte> bytes,

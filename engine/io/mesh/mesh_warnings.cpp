@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "engine/io/text/text.h"
+#include "format/text.h"
 
 namespace ptc {
 namespace {
@@ -30,10 +30,8 @@ std::string shown(std::string_view part) {
 void MeshWarnings::add(const WarningKind& kind, std::string_view part) {
   auto at = std::ranges::find(kinds_, &kind, &Parts::kind);
   if (at == kinds_.end()) at = kinds_.insert(kinds_.end(), Parts{&kind});
-  std::string text = shown(part);
-  if (std::ranges::find(at->first, text) != at->first.end()) return;
   ++at->count;
-  if (at->first.size() < kParts) at->first.push_back(std::move(text));
+  if (at->first.size() < kParts) at->first.push_back(shown(part));
 }
 
 std::vector<std::string> MeshWarnings::lines() const {

@@ -44,10 +44,10 @@ inline constexpr WarningKind kCameraLeftOut{
 /// Memory: the first 4 parts of each kind; further parts are only counted.
 class MeshWarnings {
  public:
-  /// Adds a part to a kind of warning.
+  /// Adds a part to a kind of warning. Each call counts, so a reader adds a part once, however
+  /// often the file uses it.
   /// @param kind  one of the constants above
-  /// @param part  name of the part, and the reason if it is known; a part that is already among the
-  ///              first four of its kind is ignored
+  /// @param part  name of the part, and the reason if it is known
   void add(const WarningKind& kind, std::string_view part);
 
   /// Returns a sentence for each kind, in the order of their first parts: what happens, to how many

@@ -1,4 +1,4 @@
-// Words of a line, numbers that do not depend on the locale, and printable text.
+// Words of a line, and numbers that do not depend on the locale.
 #include "engine/io/text/text.h"
 
 #include <algorithm>
@@ -6,10 +6,6 @@
 #include <charconv>
 #include <limits>
 #include <system_error>
-
-#include <fmt/format.h>
-
-#include "format/text.h"
 
 namespace ptc {
 namespace {
@@ -70,17 +66,6 @@ std::string lower_extension(const std::filesystem::path& path) {
   std::ranges::transform(extension, extension.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
-}
-
-std::string printable(std::string_view text) {
-  const bool utf8 = is_utf8(text);
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool plain = (byte >= 0x20 && byte < 0x7f) || (byte >= 0x80 && utf8) || c == '\n';
-    out += plain ? std::string(1, c) : fmt::format("\\x{:02x}", byte);
-  }
-  return out;
 }
 
 }  // namespace ptc

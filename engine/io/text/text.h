@@ -1,4 +1,4 @@
-// Words and numbers in lines of text, endings of file names, and text that is fit for a terminal.
+// Words and numbers in lines of text, and endings of file names.
 #pragma once
 
 #include <cstdint>
@@ -33,9 +33,5 @@ class Words {
 
 /// Returns the extension of a file name in lower case with its dot, or an empty string.
 [[nodiscard]] std::string lower_extension(const std::filesystem::path& path);
-
-/// Returns a text that may hold bytes of a file in a form that is fit for a terminal. Control
-/// characters other than '\n' become \xNN; so do all bytes beyond ASCII when the text is not UTF-8.
-[[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace ptc

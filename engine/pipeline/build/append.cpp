@@ -13,8 +13,8 @@ namespace {
 /// so only a scene whose first 16 pages are all raw counts as raw.
 Codec codec_of(const ContainerReader& scene) {
   constexpr std::size_t kPages = 16;
-  const auto pages = scene.point_pages();
-  for (const std::uint32_t page : pages.first(std::min(pages.size(), kPages))) {
+  const PageNumbers::Range pages = scene.point_pages();
+  for (const std::uint32_t page : pages.subrange(0, std::min(pages.size(), kPages))) {
     if (const Codec codec = scene.read_page_header(page).coding.codec; codec != Codec::raw)
       return codec;
   }

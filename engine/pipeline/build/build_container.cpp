@@ -27,7 +27,6 @@
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
-#include "engine/io/text/text.h"
 #include "engine/octree/merge.h"
 #include "engine/octree/radius.h"
 #include "engine/parallel/thread_pool.h"
@@ -36,6 +35,8 @@
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/resume.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/sort/external_sort.h"
+#include "engine/sort/point_streams.h"
 #include "engine/sort/spill.h"
 #include "engine/store/container_points.h"
 #include "engine/store/reader.h"
@@ -43,6 +44,7 @@
 #include "format/error.h"
 #include "format/node_page.h"
 #include "format/point_page.h"
+#include "format/text.h"
 
 namespace ptc {
 namespace {
@@ -51,6 +53,9 @@ namespace {
 // in it and in its copies.
 constexpr std::uint64_t kCheckpointBytes = 8 << 20;
 constexpr std::uint64_t kOpenPages = 48;
+// Bytes of the meta page that are kept for the spacing, which is known only once the meshes are
+// sampled: its key, its sizes, and at most 24 characters of a double.
+constexpr std::size_t kSpacingBytes = 64;
 
 std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Frame& frame) {
   std::vector<MortonKey> keys;
@@ -59,7 +64,8 @@ std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Fram
   return keys;
 }
 
-Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double spacing) {
+/// Returns the record of the inputs and the request, without the spacing of the surfels.
+Meta make_meta(const BuildRequest& request, const BuildInputs& inputs) {
   Meta meta;
   std::string names;
   for (const auto& input : request.inputs) {
@@ -71,7 +77,6 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs, double sp
   meta.text[kLightsKey] = lights_record(inputs.lights);
   if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
   if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
-  if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;
 }
@@ -110,7 +115,10 @@ struct SortedPoints {
 class Build {
  public:
   Build(const BuildRequest& request, const std::filesystem::path& target, Progress& progress)
-      : request_(request), target_(target), progress_(progress), executor_(request.run.threads) {}
+      : request_(request),
+        target_(behind_links(target)),
+        progress_(progress),
+        executor_(request.run.threads) {}
 
   BuildReport run() {
     // Check the request, open the scene and what an interrupted build left
@@ -118,6 +126,9 @@ class Build {
     if (!request_.append.empty()) open_scene();
     if (request_.resume) resumption_ = std::make_unique<Resumption>(request_, target_);
     if (resumption_ && resumption_->plan() && was_published()) return std::move(report_);
+    if (resumption_ && resumption_->sort_unfinished()) {
+      progress_.note("the interrupted build had not finished its sort: it starts again");
+    }
 
     // Sort the points, or reopen the sorted ones, and build the container
     const bool goes_on = resumption_ && resumption_->plan();
@@ -139,15 +150,18 @@ class Build {
 
  private:
   void check_request() const {
-    const auto require = [](bool holds, const char* field, const char* range) {
-      if (!holds) throw RequestError(field, fmt::format("`{}` is not {}", field, range));
-    };
-    require(request_.page_shift >= 12 && request_.page_shift <= 20, "page_shift",
-            "the logarithm of 4 KiB to 1 MiB, 12 to 20");
-    require(request_.tree.leaf_points >= 1 && request_.tree.leaf_points <= kMaxLeafPoints,
-            "tree.leaf_points", "1 to 65535");
-    require(request_.tree.levels_per_stream >= 1, "tree.levels_per_stream", "1 or more");
-    require(request_.checkpoint_points >= 1, "checkpoint_points", "1 or more");
+    check_page_shift(request_.page_shift);
+    require_request(request_.tree.leaf_points >= 1 && request_.tree.leaf_points <= kMaxLeafPoints,
+                    "tree.leaf_points", "`tree.leaf_points` is not 1 to 65535");
+    require_request(request_.tree.levels_per_stream >= 1, "tree.levels_per_stream",
+                    "`tree.levels_per_stream` is not 1 or more");
+    require_request(request_.checkpoint_points >= 1, "checkpoint_points",
+                    "`checkpoint_points` is not 1 or more");
+    require_request(request_.city_points == 0 || (!request_.mesh && request_.inputs.empty()),
+                    "city_points",
+                    "`city_points` excludes files and meshes: the city is a scene of its own");
+    if (has_meshes() || request_.sampling.camera) check_sampling(request_.sampling);
+    if (request_.lights) check_lights(*request_.lights);
   }
 
   /// Opens the container that the points are appended to, and takes over its lights.
@@ -188,8 +202,10 @@ class Build {
   }
 
   /// Returns the record for the meta page.
-  [[nodiscard]] Meta record(const BuildInputs& inputs, double spacing) const {
-    Meta meta = make_meta(request_, inputs, spacing);
+  /// @param meta     from make_meta()
+  /// @param spacing  between the surfels on meshes, scene units; 0: not known, or no meshes
+  [[nodiscard]] Meta record(Meta meta, double spacing) const {
+    if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
     if (scene_) meta = extended_meta(scene_->meta(), meta);
     std::string& names = meta.text[kInputsKey];
     names = shortened(names, request_.page_shift);
@@ -198,8 +214,11 @@ class Build {
 
   /// Estimates the number of pages of points and nodes. In a city there are some 4 pages of nodes
   /// for each 10 of points; 5 are assumed.
-  [[nodiscard]] std::uint64_t pages_of(std::uint64_t points) const {
-    return points / points_per_page({.page_shift = request_.page_shift}) * 3 / 2;
+  /// @param emits  whether a point may emit light, so that fewer fit a page
+  [[nodiscard]] std::uint64_t pages_of(std::uint64_t points, bool emits) const {
+    const FileHeader header{.page_shift = request_.page_shift,
+                            .point_bytes = BuildPlan{.emits = emits}.point_bytes()};
+    return points / points_per_page(header) * 3 / 2;
   }
 
   [[nodiscard]] MemoryBudget build_budget() const {
@@ -210,8 +229,10 @@ class Build {
   /// place.
   /// @param budget    already charged with the inputs
   /// @param expected  number of points that will come; 0 when it is not known
-  [[nodiscard]] SortOptions sort_options(MemoryBudget budget, std::uint64_t expected) const {
-    const std::uint64_t pages = pages_of(expected + scene_points());
+  /// @param emits     whether a point may emit light
+  [[nodiscard]] SortOptions sort_options(MemoryBudget budget, std::uint64_t expected,
+                                         bool emits) const {
+    const std::uint64_t pages = pages_of(expected + scene_points(), emits);
     budget.charge("pages that are written",
                   ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()));
     if (scene_) {
@@ -226,7 +247,8 @@ class Build {
                                             ? budget.rest("the output's directory", directory_bytes)
                                             : budget.rest("the sort", kMinSortBytes),
                         .temp_dirs = temp_dirs(request_.run, target_),
-                        .expected = expected};
+                        .expected = expected,
+                        .emits = emits};
     if (resumption_) options.kept_files = resumption_->spills();
     return options;
   }
@@ -237,9 +259,12 @@ class Build {
     BuildInputs inputs = read_inputs(request_, report_.seconds, progress_);
     if (inputs.bounds.empty() && !scene_)
       throw DataError("the input has no points and no triangles");
-    check_meta(record(inputs, 1e-300), request_.page_shift);
-    SortedPoints points{
-        .plan = {.frame = frame_of(inputs.bounds), .estimate_radii = inputs.clouds.estimate_radii}};
+    const Meta meta = make_meta(request_, inputs);
+    check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);
+    SortedPoints points{.plan = {.frame = frame_of(inputs.bounds),
+                                 .estimate_radii = inputs.clouds.estimate_radii,
+                                 .emits = inputs.emitters || inputs.clouds.emits ||
+                                          (scene_ && scene_->header().point_bytes != kPointBytes)}};
     const Frame& frame = points.plan.frame;
 
     // Charge the inputs to the memory cap
@@ -257,7 +282,7 @@ class Build {
     const bool by_spacing = inputs.lit && request_.sampling.spacing > 0;
     const std::uint64_t expected =
         by_spacing ? 0 : known + (inputs.lit ? request_.sampling.count : 0);
-    const SortOptions options = sort_options(std::move(budget), expected);
+    const SortOptions options = sort_options(std::move(budget), expected, points.plan.emits);
     points.sorter =
         std::make_unique<ExternalSorter>(options, executor_, keys_of(inputs.sample, frame));
     tell_space(expected, points.sorter->expected_spill(), options.temp_dirs);
@@ -269,7 +294,8 @@ class Build {
                         known, "points");
       spacing = feed_inputs(inputs, request_, frame, *points.sorter, executor_, progress_);
     }
-    points.plan.meta = record(inputs, spacing);
+    points.plan.meta = record(meta, spacing);
+    check_meta(points.plan.meta, request_.page_shift, points.plan.point_bytes());
     points.plan.uuid = content_uuid(*points.sorter, frame, request_, points.plan.meta,
                                     scene_ ? scene_->header().uuid : Uuid{});
     if (resumption_) resumption_->keep(points.plan, *points.sorter);
@@ -299,9 +325,15 @@ class Build {
     SortedPoints points{.plan = *resumption_->plan()};
     StateReader state = resumption_->sorter_state();
     std::uint64_t spilled = 0;
-    for (const auto& file : resumption_->spills()) spilled += std::filesystem::file_size(file);
-    points.sorter = std::make_unique<ExternalSorter>(
-        sort_options(build_budget(), spilled / kSpilledBytes), executor_, state);
+    for (const auto& file : resumption_->spills()) {
+      std::error_code missing;  // taking up the sort names a file that is gone
+      const std::uintmax_t bytes = std::filesystem::file_size(file, missing);
+      if (!missing) spilled += bytes;
+    }
+    const bool emits = points.plan.emits;
+    const std::uint64_t expected = spilled / (emits ? kEmittingBytes : kSpilledBytes);
+    points.sorter = std::make_unique<ExternalSorter>(sort_options(build_budget(), expected, emits),
+                                                     executor_, state);
     state.end();
     if (const auto& checkpoint = resumption_->checkpoint())
       report_.resumed_points = checkpoint->place.points;
@@ -339,8 +371,10 @@ class Build {
     WriterOptions options{.page_shift = request_.page_shift,
                           .codec = codec_of(request_.profile),
                           .uuid = plan.uuid,
-                          .frame = plan.frame};
+                          .frame = plan.frame,
+                          .point_bytes = plan.point_bytes()};
     if (resumption_) options.partial = resumption_->partial();
+    if (scene_) options.source = &scene_->file();
     const Checkpoint* const from =
         resumption_ && resumption_->checkpoint() ? &*resumption_->checkpoint() : nullptr;
     ContainerWriter writer =
@@ -400,7 +434,7 @@ class Build {
   static std::uint64_t first_of_all(std::uint64_t /*point*/) { return 0; }
 
   BuildRequest request_;
-  const std::filesystem::path& target_;
+  const std::filesystem::path target_;  ///< behind symbolic links
   Progress& progress_;
   const ThreadPool executor_;
   BuildReport report_;

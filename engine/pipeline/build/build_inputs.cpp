@@ -153,6 +153,8 @@ void Clouds::measure(const std::filesystem::path& path, Progress& progress) {
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = file.source->next(block)) {
     for (std::size_t i = 0; i < count; ++i) bounds.add(block[i].position);
+    emits |= std::any_of(block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count),
+                         [](const Surfel& s) { return s.emission != glm::vec3(0); });
     for (std::size_t i = 0; i < count; i += 64) sample.push_back(block[i].position);
     thin(sample);
     cloud.points += count;

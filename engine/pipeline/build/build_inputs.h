@@ -31,6 +31,7 @@ struct Clouds {
   std::vector<glm::dvec3> sample;  ///< positions of an even share of the points, scene units
   std::uint64_t points = 0;        ///< in all files
   bool estimate_radii = false;     ///< one of the files gives no radii
+  bool emits = false;              ///< a point emits light
 
   /// Reads a cloud to its end and adds it to the others.
   /// @throws DataError when the points have no normals or the file breaks its format

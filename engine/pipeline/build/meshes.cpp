@@ -5,7 +5,6 @@
 
 #include "engine/base/surfel.h"
 #include "engine/io/cloud/points.h"
-#include "engine/io/text/text.h"
 #include "engine/scene/ray_scene.h"
 
 namespace ptc {
@@ -13,7 +12,9 @@ namespace {
 
 /// Appends a box of 12 triangles whose front sides face outwards.
 /// @param low, high  opposite corners, scene units
-void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Material& material) {
+/// @param field      as for append_mesh()
+void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Material& material,
+             const char* field) {
   Mesh box;
   box.origin = low;
   box.materials.push_back(material);
@@ -29,11 +30,11 @@ void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Ma
     box.triangles.push_back({q[0], q[2], q[3]});
     box.material_of.insert(box.material_of.end(), 2, 0);
   }
-  append_mesh(mesh, box, glm::dmat4(1));
+  append_mesh(mesh, box, glm::dmat4(1), field);
 }
 
 /// Appends a ground below the mesh and a red wall to its left.
-void add_backdrop(Mesh& mesh) {
+void add_backdrop(Mesh& mesh, const char* field) {
   const Bounds bounds = mesh.bounds();
   const glm::dvec3 extent = bounds.high - bounds.low;
   const double size = std::max({extent.x, extent.y, extent.z});
@@ -42,23 +43,25 @@ void add_backdrop(Mesh& mesh) {
   const double wall = bounds.low.x - 0.15 * size;
   add_box(mesh, {middle.x - 1.6 * size, floor - 0.04 * size, middle.z - 1.6 * size},
           {middle.x + 1.6 * size, floor, middle.z + 1.6 * size},
-          {.name = "ground", .albedo = glm::vec3(0.6F)});
+          {.name = "ground", .albedo = glm::vec3(0.6F)}, field);
   add_box(mesh, {wall - 0.05 * size, floor, middle.z - 0.8 * size},
           {wall, floor + 0.9 * size, middle.z + 0.8 * size},
-          {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)});
+          {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)}, field);
 }
 
 }  // namespace
 
 Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
-                 Progress& progress, std::vector<MeshCamera>* cameras) {
+                 Progress& progress, std::vector<MeshCamera>* cameras, const char* field) {
   // The first mesh is taken over, so that a single one is never copied
   Mesh mesh;
-  const auto join = [&mesh]<class M>(M&& other) {
+  bool joined = false;
+  const auto join = [&]<class M>(M&& other) {
     if (mesh.triangles.empty()) {
       mesh = std::forward<M>(other);
     } else {
-      append_mesh(mesh, other, glm::dmat4(1));
+      append_mesh(mesh, other, glm::dmat4(1), field);
+      joined = true;
     }
   };
 
@@ -67,7 +70,7 @@ Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* a
     if (is_point_file(input)) continue;
     MeshFile file = read_mesh(input);
     for (const std::string& warning : file.warnings) {
-      progress.note(printable(input.string()) + ": " + warning);
+      progress.note(input.string() + ": " + warning);
     }
     if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
     join(std::move(file.mesh));
@@ -78,7 +81,8 @@ Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* a
     check_mesh(*also);
     join(*also);
   }
-  if (backdrop && !mesh.triangles.empty()) add_backdrop(mesh);
+  if (joined) check_mesh(mesh, field);  // meshes may lie too far from each other
+  if (backdrop && !mesh.triangles.empty()) add_backdrop(mesh, field);
   return mesh;
 }
 

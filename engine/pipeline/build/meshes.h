@@ -15,10 +15,12 @@ namespace ptc {
 /// @param progress  gets the warnings of each file as notes that begin with its name
 /// @param cameras   gets the cameras of the files, in their order; may be null
 /// @return          the joined mesh; without triangles when there is none to read
+/// @param field     the member of the request that names the inputs, for errors
 /// @throws DataError for a file that breaks its format; RequestError when check_mesh() refuses
-///         `also`; std::system_error
+///         `also` or the joined mesh, or append_mesh() refuses to join them; std::system_error
 [[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also,
                                bool backdrop, Progress& progress,
-                               std::vector<MeshCamera>* cameras = nullptr);
+                               std::vector<MeshCamera>* cameras = nullptr,
+                               const char* field = "inputs");
 
 }  // namespace ptc

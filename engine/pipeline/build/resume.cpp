@@ -107,7 +107,8 @@ void put_plan(const BuildPlan& plan, StateWriter& state) {
   state.put(plan.frame.origin);
   state.put(plan.frame.edge);
   state.put_bytes(plan.uuid);
-  state.put_bytes(encode_meta(plan.meta));
+  state.put(static_cast<std::uint8_t>(plan.emits));
+  state.put_bytes(encode_meta(plan.meta, plan.point_bytes()));
   state.put(static_cast<std::uint8_t>(plan.estimate_radii));
 }
 
@@ -118,7 +119,8 @@ BuildPlan get_plan(StateReader& state) {
   const std::span<const std::byte> uuid = state.get_bytes();
   state.require(uuid.size() == plan.uuid.size(), "the container's UUID has another length");
   std::ranges::copy(uuid, plan.uuid.begin());
-  plan.meta = decode_meta(state.get_bytes());
+  plan.emits = state.get<std::uint8_t>() != 0;
+  plan.meta = decode_meta(state.get_bytes(), plan.point_bytes());
   plan.estimate_radii = state.get<std::uint8_t>() != 0;
   return plan;
 }
@@ -178,6 +180,7 @@ void Resumption::load_manifest() {
   state.end();
   if (sorted.empty()) {  // the build was killed before the end of its sort
     std::ranges::for_each(spills, remove_file);
+    sort_unfinished_ = true;
     return;
   }
 
@@ -198,7 +201,8 @@ void Resumption::load_checkpoint() {
   Checkpoint& checkpoint = checkpoint_.emplace();
   checkpoint.place.points = state.get<std::uint64_t>();
   checkpoint.place.last_key = {state.get<std::uint64_t>(), state.get<std::uint64_t>()};
-  checkpoint.writer = {state.get<std::uint32_t>(), state.get<std::uint64_t>()};
+  checkpoint.writer = {state.get<std::uint32_t>(), state.get<std::uint32_t>(),
+                       state.get<std::uint64_t>()};
   const std::span<const std::byte> build = state.get_bytes();
   checkpoint.build.assign(build.begin(), build.end());
   state.end();
@@ -240,7 +244,8 @@ void Resumption::save(const Checkpoint& checkpoint) const {
   state.put(checkpoint.place.points);
   state.put(checkpoint.place.last_key.high);
   state.put(checkpoint.place.last_key.low);
-  state.put(checkpoint.writer.pages);
+  state.put(checkpoint.writer.point_pages);
+  state.put(checkpoint.writer.node_pages);
   state.put(checkpoint.writer.end);
   state.put_bytes(checkpoint.build);
   write_state(at_, state.take());

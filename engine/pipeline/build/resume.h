@@ -39,6 +39,12 @@ struct BuildPlan {
   Uuid uuid{};
   Meta meta;
   bool estimate_radii = false;  ///< at least one input gives no radii
+  bool emits = false;           ///< at least one point may emit light
+
+  /// Returns the bytes of a point in the container.
+  [[nodiscard]] std::uint8_t point_bytes() const noexcept {
+    return emits ? kEmittingPointBytes : kPointBytes;
+  }
 };
 
 /// A moment of a build from which another process can continue it.
@@ -72,6 +78,8 @@ class Resumption {
 
   /// The plan of the interrupted build; empty when the points must be sorted from the beginning.
   [[nodiscard]] const std::optional<BuildPlan>& plan() const noexcept { return plan_; }
+  /// Returns whether an interrupted build was found that had not finished its sort.
+  [[nodiscard]] bool sort_unfinished() const noexcept { return sort_unfinished_; }
   /// Returns the state from which an ExternalSorter reopens the spill files. @pre plan()
   [[nodiscard]] StateReader sorter_state() const { return {sorter_, manifest_.string()}; }
   /// The checkpoint to continue from; empty when the build starts at the first sorted point.
@@ -99,6 +107,7 @@ class Resumption {
   std::vector<std::filesystem::path> spills_;
   std::string request_;
   std::vector<std::byte> sorter_;
+  bool sort_unfinished_ = false;
   std::optional<BuildPlan> plan_;
   std::optional<Checkpoint> checkpoint_;
   std::uint64_t id_ = 0;  ///< hash of the plan and the sorter's state; checkpoints record it

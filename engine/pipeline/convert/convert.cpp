@@ -42,12 +42,6 @@ namespace {
 
 constexpr std::size_t kTextBytes = std::size_t{1} << 20;  // text that is collected for one write
 
-std::vector<std::uint16_t> groups_of(const ContainerReader& container) {
-  std::set<std::uint16_t> groups;
-  for (const Channel& channel : container.meta().channels) groups.insert(channel.group);
-  return {groups.begin(), groups.end()};
-}
-
 float load_value(ChannelType type, const std::byte* at) {
   const auto load = [at]<class T>(T value) {
     std::memcpy(&value, at, sizeof value);
@@ -62,8 +56,22 @@ float load_value(ChannelType type, const std::byte* at) {
       return decode_half(load(std::uint16_t{}));
     case ChannelType::f32:
       return load(float{});
+    case ChannelType::u32:
+      return static_cast<float>(load(std::uint32_t{}));
+    case ChannelType::u64:
+      return static_cast<float>(load(std::uint64_t{}));
+    case ChannelType::i8:
+      return static_cast<float>(load(std::int8_t{}));
+    case ChannelType::i16:
+      return static_cast<float>(load(std::int16_t{}));
+    case ChannelType::i32:
+      return static_cast<float>(load(std::int32_t{}));
+    case ChannelType::i64:
+      return static_cast<float>(load(std::int64_t{}));
+    case ChannelType::f64:
+      return static_cast<float>(load(double{}));
   }
-  return 0;
+  return 0;  // a type of a later version
 }
 
 /// Writes the values of `channels`, all of one group, into rows of `stride` floats, one row for
@@ -73,7 +81,7 @@ float load_value(ChannelType type, const std::byte* at) {
 void spread_columns(std::span<const Channel> channels, const std::byte* payload, std::size_t count,
                     float* rows, std::size_t stride) {
   for (const Channel& channel : channels) {
-    const std::size_t width = channel_bytes(channel.type);
+    const std::size_t width = channel.component_bytes();
     for (std::size_t c = 0; c < channel.components; ++c, ++rows) {
       for (std::size_t i = 0; i < count; ++i, payload += width) {
         rows[i * stride] = load_value(channel.type, payload);
@@ -111,7 +119,7 @@ class PageCursor {
     std::span<const Channel> rest = container_.meta().channels;
     float* place = values.data();
     while (!rest.empty()) {  // the format orders channels by group
-      const std::uint16_t group = rest.front().group;
+      const std::uint8_t group = rest.front().group;
       const auto last =
           std::ranges::find_if(rest, [&](const Channel& c) { return c.group != group; });
       const auto channels = rest.first(static_cast<std::size_t>(last - rest.begin()));
@@ -147,20 +155,34 @@ Uuid derived_uuid(const ContainerReader& container, Profile profile, std::uint8_
   return uuid_of(text);
 }
 
-/// Copies all pages but the meta page, with their numbers and in the order in which they lie in the
-/// file.
+/// Copies all pages but the meta page, with their ranks and in the order in which they lie in the
+/// file; those of the tail last, into the tail.
 void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progress& progress) {
-  std::vector<std::uint32_t> order(container.page_count());
+  // Order the pages, and reserve their ranks
+  const std::uint32_t tail =
+      container.page_count() - static_cast<std::uint32_t>(container.superblock().tail.size());
+  std::vector<std::uint32_t> order(container.meta_page());
   std::iota(order.begin(), order.end(), 0U);
-  std::erase(order, container.superblock().meta_page);
-  for (std::size_t i = 0; i < order.size(); ++i) static_cast<void>(writer.reserve_page());
-  std::ranges::sort(order, {}, [&](std::uint32_t page) { return container.entry(page).offset; });
+  for (const std::uint32_t page : order) {
+    const DirectoryEntry& entry = container.entry(page);
+    static_cast<void>(writer.reserve_page(entry.type, entry.group));
+  }
+  std::ranges::sort(order, {}, [&](std::uint32_t page) {
+    return std::pair(page >= tail, container.entry(page).offset);
+  });
+  // Decode them, and write them again
   PageDecoder decoder;
   std::vector<std::byte> payload(container.page_payload_limit());
   for (const std::uint32_t page : order) {
     const PageHeader header = container.read_page(page, payload, decoder);
-    writer.write_page(page, summary_of(header), std::span(payload).first(header.raw_bytes),
-                      container.attribute_columns(header.group));
+    const auto content = std::span<const std::byte>(payload).first(header.raw_bytes);
+    if (container.entry(page).is_void()) {
+      writer.write_void_page(summary_of(header));
+    } else if (page >= tail) {
+      writer.keep_page(summary_of(header), content);
+    } else {
+      writer.write_page(summary_of(header), content, container.attribute_columns(header.group));
+    }
     if (header.type == PageType::point) progress.advance(header.record_count);
   }
 }
@@ -168,21 +190,18 @@ void copy_pages(const ContainerReader& container, ContainerWriter& writer, Progr
 /// Writes the channels of a container again, on pages as long as those of the writer.
 void repage_channels(const ContainerReader& container, ContainerWriter& writer) {
   const std::uint32_t full = points_per_page(writer.header());
-  for (const std::uint16_t group : groups_of(container)) {
+  for (const std::uint8_t group : container.groups()) {
     PageDecoder decoder;
-    auto pages = container.attribute_pages(group);
+    const PageNumbers::Range pages = container.attribute_pages(group);
+    std::size_t read = 0;
     const auto next_page = [&](std::span<std::byte> payload) {
-      const std::uint32_t page = pages.front();
-      pages = pages.subspan(1);
-      return container.read_page(page, payload, decoder).record_count;
+      return container.read_page(pages[read++], payload, decoder).record_count;
     };
     ChannelPager pager(container.attribute_columns(group), container.page_payload_limit(),
                        next_page);
     for (std::uint64_t left = container.superblock().points; left > 0;) {
       const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(full, left));
-      writer.write_page(writer.reserve_page(),
-                        {.type = PageType::attribute, .group = group, .record_count = count},
-                        pager.next(count), container.attribute_columns(group));
+      writer.write_attributes(group, pager.next(count), count, container.meta().channels);
       left -= count;
     }
   }
@@ -205,7 +224,9 @@ Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writ
 
 void write_ply(const ContainerReader& container, const std::filesystem::path& target,
                Progress& progress) {
-  PlyWriter writer(target, container.superblock().points, ply_columns(container.meta().channels));
+  PlyWriter writer(target, container.superblock().points,
+                   container.header().point_bytes != kPointBytes,
+                   ply_columns(container.meta().channels));
   PageCursor cursor(container);
   while (cursor.next()) {
     writer.write(cursor.surfels, cursor.values);
@@ -241,7 +262,7 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   Meta meta = container.meta();
   const bool round =
       is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
-  check_meta(meta, page_shift);
+  check_meta(meta, page_shift, from.point_bytes);
 
   // Check the memory cap
   const ThreadPool executor(options.run.threads);
@@ -254,14 +275,14 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
                 ContainerWriter::memory_bytes(pages, page_shift, executor.threads()));
   budget.require();
 
-  // Copy the pages where they can keep their numbers, build them again elsewhere. finish() gives
-  // the meta page the last number: where it had another one, the other pages cannot keep theirs
+  // Copy the pages where they stay as they are, build them again elsewhere
   ContainerWriter writer(target, {.page_shift = page_shift,
                                   .codec = codec_of(options.profile),
                                   .uuid = derived_uuid(container, options.profile, page_shift),
-                                  .frame = from.frame});
-  const bool same_pages = page_shift == from.page_shift && !round &&
-                          container.superblock().meta_page == container.page_count() - 1;
+                                  .frame = from.frame,
+                                  .point_bytes = from.point_bytes,
+                                  .source = &container.file()});
+  const bool same_pages = page_shift == from.page_shift && !round && container.parts().empty();
   Superblock superblock = container.superblock();
   if (same_pages) {
     copy_pages(container, writer, progress);

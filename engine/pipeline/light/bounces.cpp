@@ -129,8 +129,9 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
     const auto write = [&](const std::filesystem::path& path) {
       Shader shader(lit ? *lit : scene, shade, executor);
       BouncedPoints points(scene, shader, options.lift, progress);
-      ContainerWriter writer(
-          path, {.page_shift = scene.header().page_shift, .frame = scene.header().frame});
+      ContainerWriter writer(path, {.page_shift = scene.header().page_shift,
+                                    .frame = scene.header().frame,
+                                    .point_bytes = scene.header().point_bytes});
       Progress silent;
       const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
       writer.finish({}, build_pages(points, writer, tree, executor, silent));

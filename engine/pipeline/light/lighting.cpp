@@ -10,8 +10,6 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/pipeline/budgets.h"
@@ -23,20 +21,24 @@ namespace {
 /// @throws RequestError when a setting of the gather, the error asked for or the lift is out of
 ///         range
 void check_ranges(const LightingRequest& request) {
-  const auto require = [](bool holds, const char* field, const char* range) {
-    if (!holds) throw RequestError(field, fmt::format("`{}` is not {}", field, range));
-  };
+  constexpr unsigned kMaxRays = 1 << 24, kMaxBounces = 1000;
   const auto is_positive = [](float value) { return std::isfinite(value) && value > 0; };
   const GatherOptions& gather = request.gather;
-  require(is_positive(gather.solid_angle), "gather.solid_angle", "above 0 and finite");
-  require(std::isfinite(gather.parallax) && gather.parallax >= 0, "gather.parallax",
-          "0 or more and finite");
-  require(is_positive(gather.inflation), "gather.inflation", "above 0 and finite");
-  require(gather.resolution >= 16 && gather.resolution <= 64 && gather.resolution % 16 == 0,
-          "gather.resolution", "16, 32, 48 or 64");
-  require(!request.error || (*request.error > 0 && *request.error <= 1), "error",
-          "above 0 and at most 1");
-  require(std::isfinite(request.lift) && request.lift >= 0, "lift", "0 or more and finite");
+  require_request(is_positive(gather.solid_angle), "gather.solid_angle",
+                  "`gather.solid_angle` is not above 0 and finite");
+  require_request(std::isfinite(gather.parallax) && gather.parallax >= 0, "gather.parallax",
+                  "`gather.parallax` is not 0 or more and finite");
+  require_request(is_positive(gather.inflation), "gather.inflation",
+                  "`gather.inflation` is not above 0 and finite");
+  require_request(gather.resolution >= 16 && gather.resolution <= 64 && gather.resolution % 16 == 0,
+                  "gather.resolution", "`gather.resolution` is not 16, 32, 48 or 64");
+  require_request(!request.error || (*request.error > 0 && *request.error <= 1), "error",
+                  "`error` is not above 0 and at most 1");
+  require_request(request.check.rays >= 1 && request.check.rays <= kMaxRays, "check.rays",
+                  "`check.rays` is not 1 to 16777216");
+  require_request(request.bounces <= kMaxBounces, "bounces", "`bounces` is above 1000");
+  require_request(std::isfinite(request.lift) && request.lift >= 0, "lift",
+                  "`lift` is not 0 or more and finite");
 }
 
 /// @throws RequestError when parts of the request exclude each other

@@ -24,7 +24,7 @@ namespace ptc {
 /// more memory than rendering it does.
 struct CheckRequest {
   unsigned receivers = 0;  ///< maximum of receivers to compare, spread over all; 0: no check
-  unsigned rays = 4096;    ///< cosine-distributed rays for each receiver
+  unsigned rays = 4096;    ///< cosine-distributed rays for each receiver, 1 or more
 };
 
 /// The errors that a check found, and the time that it took.

@@ -1,10 +1,12 @@
 // The layers of a picture while it is rendered, and the files they are written to.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -15,10 +17,14 @@
 
 namespace ptc {
 
+/// The layers that a .png can show; `occlusion` is white where nothing covers.
+inline constexpr std::array<std::string_view, 5> kPictureLayers{"beauty", "direct", "indirect",
+                                                                "occlusion", "albedo"};
+
 /// A picture file and the layer that it shows.
 struct PictureTarget {
   std::filesystem::path path;  ///< an .exr gets all layers, a .png one of them
-  /// Layer of a .png: beauty, direct, indirect, occlusion (white: uncovered) or albedo.
+  /// Layer of a .png, one of kPictureLayers.
   std::string layer = "beauty";
 };
 

@@ -66,21 +66,32 @@ unsigned side_of(unsigned samples) {
 
 /// @throws RequestError when a picture of this camera has no pixels or too many
 void check_size(const Camera& camera) {
-  const std::uint64_t pixels = std::uint64_t{camera.width} * camera.height;
-  const unsigned longer = std::max(camera.width, camera.height);
-  if (pixels > 0 && pixels <= kMaxImagePixels && longer <= kMaxImageSide) return;
+  if (is_image_size(camera.width, camera.height)) return;
   throw RequestError("size",
                      fmt::format("`size` is {} x {}: a picture has 1 to {} pixels along each "
                                  "side, and at most {} in all",
                                  camera.width, camera.height, kMaxImageSide, kMaxImagePixels));
 }
 
+/// Says whether a box and the bounds of a scene's points have a place in common.
+bool overlap(const Bounds& box, const Superblock& scene) {
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    if (box.high[k] < scene.bounds_low[axis] || box.low[k] > scene.bounds_high[axis]) return false;
+  }
+  return true;
+}
+
 /// Loads the meshes and finds the camera.
 void load_subject(Subject& subject, const RenderRequest& request, const ContainerReader& scene,
                   Progress& progress) {
   std::vector<MeshCamera> cameras;
-  subject.mesh =
-      load_meshes(request.meshes, request.mesh.get(), request.backdrop, progress, &cameras);
+  subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, progress,
+                             &cameras, "meshes");
+  if (!subject.mesh.triangles.empty() && !overlap(subject.mesh.bounds(), scene.superblock())) {
+    progress.note(
+        "the meshes lie outside of the scene: is this the container that was built from them?");
+  }
   subject.camera = request.camera ? *request.camera
                                   : default_camera(scene, cameras, request.backdrop, request.size);
   if (request.size) {
@@ -253,8 +264,27 @@ class TileRenderer {
   std::vector<Receiver> receivers_;
 };
 
+/// Checks that every picture has a file of its own, which is none that the run reads.
+/// @throws RequestError
+void check_names(const RenderRequest& request, std::span<const PictureTarget> targets,
+                 const std::string& sky_picture) {
+  std::vector<std::filesystem::path> taken = request.meshes;
+  taken.push_back(request.scene);
+  if (!sky_picture.empty()) taken.emplace_back(sky_picture);
+  const std::size_t read = taken.size();
+  for (const PictureTarget& target : targets) {
+    for (std::size_t i = 0; i < taken.size(); ++i) {
+      if (!same_name(target.path, taken[i])) continue;
+      throw RequestError(
+          "targets", target.path.string() + (i < read ? " is read by this run: choose another name"
+                                                      : " is the name of two pictures"));
+    }
+    taken.push_back(target.path);
+  }
+}
+
 /// @throws RequestError when there is no target, when the ending of one is neither .exr nor .png,
-///         or when estimates have no .exr to go to
+///         when a layer is unknown, or when estimates have no .exr to go to
 void check_targets(std::span<const PictureTarget> targets, bool estimate) {
   if (targets.empty()) throw RequestError("targets", "no picture to write is named");
   bool exr = false;
@@ -263,6 +293,9 @@ void check_targets(std::span<const PictureTarget> targets, bool estimate) {
     if (ending != ".exr" && ending != ".png") {
       throw RequestError("targets", "the name of a picture must end in .exr or .png, but is " +
                                         target.path.string());
+    }
+    if (std::ranges::find(kPictureLayers, target.layer) == kPictureLayers.end()) {
+      throw RequestError("targets", "a picture has no layer '" + target.layer + "' for a .png");
     }
     exr |= ending == ".exr";
   }
@@ -279,10 +312,13 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   // Open the scene and load what the camera sees
   LightingReport report;
   check_targets(targets, request.estimate);
+  if (request.lights) check_lights(*request.lights);
+  if (request.camera) check_camera(*request.camera, "camera");
   Subject subject{.side = side_of(request.samples)};
   Lighting lighting(request, report, progress);
   const LightRig lights =
       request.lights ? *request.lights : recorded_lights(lighting.scene(), progress);
+  check_names(request, targets, lights.sky.map_path);
   load_subject(subject, request, lighting.scene(), progress);
   const bool sees_mesh = !subject.mesh.triangles.empty();
   if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);

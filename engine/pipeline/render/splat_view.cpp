@@ -68,9 +68,9 @@ class SurfelView : public PrimaryView {
     const CameraAxes axes = axes_of(camera);
     axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
     focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
-    const std::span<const std::uint32_t> pages = scene.point_pages();
+    const PageNumbers::Range pages = scene.point_pages();
     for (std::size_t first = 0; first < pages.size(); first += kPagesAtOnce) {
-      draw(scene, pages.subspan(first, std::min(kPagesAtOnce, pages.size() - first)), lost,
+      draw(scene, pages.subrange(first, std::min(kPagesAtOnce, pages.size() - first)), lost,
            executor, progress);
     }
   }
@@ -110,12 +110,12 @@ class SurfelView : public PrimaryView {
   }
 
   /// Draws the discs of some pages. The result depends on the order of the points alone.
-  void draw(const ContainerReader& scene, std::span<const std::uint32_t> pages, LostPages* lost,
+  void draw(const ContainerReader& scene, PageNumbers::Range pages, LostPages* lost,
             const Executor& executor, Progress& progress) {
     // Project the pages in parallel
     std::vector<std::vector<Projected>> discs(pages.size());
     executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
-      PointScan scan(scene, pages.subspan(i, 1), noted_in(lost));
+      PointScan scan(scene, pages.subrange(i, 1), noted_in(lost));
       scan.next();
       progress.advance(scan.count());
       if (!scan.whole()) return;
@@ -140,12 +140,13 @@ class SurfelView : public PrimaryView {
 
   /// Appends the disc of a surfel, if the picture may show it.
   void project(const Surfel& surfel, std::vector<Projected>& discs) const {
+    const glm::vec3 light = surfel.outgoing();
     Projected disc{
         .centre = scale_.way(position_, surfel.position) * axes_,  // v * M is transpose(M) * v
         .normal = surfel.normal * axes_,
         .radius = scale_.radius(surfel.radius),
         .payload = {
-            .radiance = encode_rgbe({surfel.radiance.r, surfel.radiance.g, surfel.radiance.b}),
+            .radiance = encode_rgbe({light.r, light.g, light.b}),
             .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
             .radius = encode_ufloat16(surfel.radius)}};
     if (!(disc.radius > 0) || disc.centre.z + disc.radius <= 0) return;

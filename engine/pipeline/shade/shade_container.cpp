@@ -20,6 +20,7 @@
 #include "engine/io/text/text.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/pipeline/temporary_container.h"
@@ -46,13 +47,15 @@ class PointCursor {
               LostPages* lost = nullptr)
       : container_(container), wanted_(wanted), scan_(container, noted_in(lost)) {
     if (from == 0) return;
-    const std::uint64_t points = all_points();
-    const std::uint64_t passed =
-        (from * points + wanted - 1) / wanted;  // they hold `from` selected
-    share_ = passed * wanted - from * points;
-    scan_.skip(static_cast<std::size_t>(passed / container.superblock().points_per_page));
-    if (scan_.next())
-      at_ = static_cast<std::uint32_t>(passed % container.superblock().points_per_page);
+    // The products of two numbers of points take up to 128 bits; share_ is below `wanted`
+    __extension__ typedef unsigned __int128 Wide;
+    const Wide before = Wide{from} * all_points();
+    const auto passed =
+        static_cast<std::uint64_t>((before + wanted - 1) / wanted);  // they hold `from` selected
+    share_ = static_cast<std::uint64_t>(Wide{passed} * wanted - before);
+    std::uint64_t left = passed;
+    for (; left > 0 && left >= scan_.next_count(); scan_.skip(1)) left -= scan_.next_count();
+    if (scan_.next()) at_ = static_cast<std::uint32_t>(left);
   }
 
   /// Fills `out` from the front. @return the number of points, 0 at the end
@@ -131,7 +134,7 @@ struct OpenReceivers {
                                                const std::filesystem::path& target,
                                                Progress& progress) {
     if (request.receivers.empty()) return nullptr;
-    if (lower_extension(request.receivers) == ".ptcx") {
+    if (is_container(request.receivers)) {
       return std::make_unique<ContainerReader>(request.receivers);
     }
     const BuildRequest build{.inputs = {request.receivers},
@@ -210,9 +213,11 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   // Open the scene and the receivers
   LightingReport report;
   check_target(request, target);
+  if (request.sky) check_sky(*request.sky, "sky");
   Lighting lighting(request, report, progress);
   const OpenReceivers receivers(request, target, lighting, progress);
   check_count(receivers, target);
+  check_shaded_sink(target, receivers.container, request.estimate);
   const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene(), progress).sky;
 
   // Divide the memory, shade earlier bounces, choose the settings

@@ -51,7 +51,8 @@ struct ShadeRequest : LightingRequest {
 /// @return          what the run did, cost and, if asked for, how exact it was
 /// @throws RequestError when the request contradicts itself or a setting is out of range;
 ///         LimitError when the memory cap is too small: the text names the least that works;
-///         DataError, FormatError for damaged input; std::system_error. A run that throws leaves
+///         DataError, FormatError for damaged input, and for a container whose pages have no room
+///         for the record of the shading; std::system_error. A run that throws leaves
 ///         the target as it was, unless it throws in the check, which comes last
 /// Memory: at most RunOptions::memory_bytes.
 LightingReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,

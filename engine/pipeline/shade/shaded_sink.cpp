@@ -9,14 +9,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstring>
 #include <numbers>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/text/text.h"
-#include "engine/pipeline/scene_record.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -24,7 +26,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint16_t kGroup = 1;  // group of the channels that shading adds
+constexpr std::uint8_t kGroup = 1;  // group of the channels that shading adds
 
 /// The channels that shading adds to a point.
 struct ShadedChannels {
@@ -32,15 +34,24 @@ struct ShadedChannels {
   static constexpr std::size_t kFloats = kPlain + 2;  // with both estimates
 
   static std::vector<Channel> channels(bool estimates) {
-    std::vector<Channel> channels{{"occlusion", ChannelType::half, 1, kGroup},
-                                  {"bent_normal", ChannelType::half, 3, kGroup},
-                                  {"irradiance", ChannelType::half, 3, kGroup},
-                                  {"sky", ChannelType::half, 3, kGroup},
-                                  {"indirect", ChannelType::half, 3, kGroup}};
+    std::vector<Channel> channels{
+        number("occlusion", "1"),
+        {.name = "bent_normal", .components = 3, .role = ChannelRole::direction, .unit = "1"},
+        colour("irradiance", "W/m^2"),
+        colour("sky", "W/m^2"),
+        colour("indirect", "W/(m^2 sr)")};
     if (!estimates) return channels;
-    channels.push_back({"occlusion_error", ChannelType::half, 1, kGroup});
-    channels.push_back({"irradiance_error", ChannelType::half, 1, kGroup});
+    channels.push_back(number("occlusion_error", "1"));
+    channels.push_back(number("irradiance_error", "W/m^2"));
     return channels;
+  }
+  static Channel number(const char* name, const char* unit) { return {.name = name, .unit = unit}; }
+  static Channel colour(const char* name, const char* unit) {
+    return {.name = name,
+            .components = 3,
+            .role = ChannelRole::colour,
+            .colour_space = ColourSpace::rec709,
+            .unit = unit};
   }
   static std::size_t count(bool estimates) { return estimates ? kFloats : kPlain; }
 };
@@ -68,12 +79,23 @@ ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEst
           estimate.irradiance};
 }
 
+/// Returns the record of a container with the channels of its shading, in place of those of an
+/// earlier one.
+Meta shaded_meta(const ContainerReader& from, const std::string& settings, bool estimates) {
+  Meta meta = from.meta();
+  std::erase_if(meta.channels, [](const Channel& c) { return c.group == kGroup; });
+  const std::vector<Channel> added = ShadedChannels::channels(estimates);
+  meta.channels.insert(meta.channels.begin(), added.begin(), added.end());
+  meta.text["shading"] = settings;
+  return meta;
+}
+
 /// A cloud with the channels as columns.
 class PlySink : public ShadedSink {
  public:
-  PlySink(const std::filesystem::path& target, std::uint64_t count, bool estimates)
+  PlySink(const std::filesystem::path& target, std::uint64_t count, bool emits, bool estimates)
       : floats_(ShadedChannels::count(estimates)),
-        writer_(target, count, ply_columns(ShadedChannels::channels(estimates))) {}
+        writer_(target, count, emits, ply_columns(ShadedChannels::channels(estimates))) {}
   void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
              std::span<const ErrorEstimate> estimates) override {
     std::vector<float> values;
@@ -100,22 +122,13 @@ class ContainerSink : public ShadedSink {
                 const std::string& settings, bool estimates)
       : from_(from),
         floats_(ShadedChannels::count(estimates)),
-        meta_(from.meta()),
+        meta_(shaded_meta(from, settings, estimates)),
         writer_(target, {.page_shift = from.header().page_shift,
                          .uuid = uuid_for(from, settings),
-                         .frame = from.header().frame}) {
-    std::erase_if(meta_.channels, [](const Channel& c) { return c.group == kGroup; });
-    const std::vector<Channel> added = ShadedChannels::channels(estimates);
-    for (const Channel& channel : added) {
-      if (std::ranges::find(meta_.channels, channel.name, &Channel::name) == meta_.channels.end())
-        continue;
-      throw DataError(from.path().string() + ": its channel " + channel.name +
-                      " has the name of a channel that shading adds: name a .ply as output");
-    }
-    meta_.channels.insert(meta_.channels.begin(), added.begin(), added.end());
-    meta_.text["shading"] = settings;
-    check_meta(meta_, from.header().page_shift);
-    columns_ = packed_group_columns(meta_.channels, kGroup);
+                         .frame = from.header().frame,
+                         .point_bytes = from.header().point_bytes,
+                         .source = &from.file()}) {
+    assert(settings.size() <= kMaxSettingsBytes);
     copy_pages();
   }
 
@@ -142,21 +155,28 @@ class ContainerSink : public ShadedSink {
 
   [[nodiscard]] std::size_t page_points() const {
     const std::uint64_t left = from_.superblock().points - written_;
-    return static_cast<std::size_t>(
-        std::min<std::uint64_t>(from_.superblock().points_per_page, left));
+    return static_cast<std::size_t>(std::min<std::uint64_t>(points_per_page(from_.header()), left));
   }
 
-  /// Copies all pages but the meta page and the channels of an earlier shading. Point and node
-  /// pages precede all others, so they keep their numbers and references to them stay valid.
+  /// Copies all pages but the meta page and the channels of an earlier shading, with their ranks.
   void copy_pages() {
     std::vector<std::byte> stored;
-    for (std::uint32_t page = 0; page < from_.page_count(); ++page) {
+    const std::size_t tail = from_.page_count() - from_.superblock().tail.size();
+    for (std::uint32_t page = 0; page < from_.meta_page(); ++page) {
       const DirectoryEntry& entry = from_.entry(page);
-      const bool earlier = entry.type == PageType::attribute && entry.group == kGroup;
-      if (entry.type == PageType::meta || earlier) continue;
+      if (entry.type == PageType::attribute && entry.group == kGroup) continue;
+      const std::uint32_t rank = writer_.reserve_page(entry.type, entry.group);
+      if (entry.is_void()) {
+        writer_.write_void_page({.type = entry.type,
+                                 .group = entry.group,
+                                 .rank = rank,
+                                 .record_count = entry.record_count});
+        continue;
+      }
       const PageHeader header = from_.read_stored_page(page, stored);
-      writer_.write_stored_page(writer_.reserve_page(), summary_of(header), header.coding,
-                                header.raw_bytes, stored);
+      const auto write =
+          page < tail ? &ContainerWriter::write_stored_page : &ContainerWriter::keep_stored_page;
+      (writer_.*write)(summary_of(header), header.coding, header.raw_bytes, stored);
     }
   }
 
@@ -170,11 +190,7 @@ class ContainerSink : public ShadedSink {
         std::memcpy(payload.data() + 2 * (c * count + i), &half, 2);
       }
     }
-    writer_.write_page(writer_.reserve_page(),
-                       {.type = PageType::attribute,
-                        .group = kGroup,
-                        .record_count = static_cast<std::uint32_t>(count)},
-                       payload, columns_);
+    writer_.write_attributes(kGroup, payload, static_cast<std::uint32_t>(count), meta_.channels);
     written_ += count;
     values_.clear();
   }
@@ -182,7 +198,6 @@ class ContainerSink : public ShadedSink {
   const ContainerReader& from_;
   std::size_t floats_;  // values of one point
   Meta meta_;
-  std::vector<PackedColumn> columns_;
   ContainerWriter writer_;
   std::vector<ShadedValues> values_;
   std::uint64_t written_ = 0;
@@ -198,11 +213,42 @@ std::uint64_t sink_bytes(const std::filesystem::path& target,
                                        receivers.header().page_shift, 1);
 }
 
+void check_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
+                       bool estimates) {
+  if (lower_extension(target) == ".ply") return;
+  const std::string file = receivers.path().string();
+  if (!receivers.parts().empty()) {
+    throw DataError(file +
+                    ": a scene of parts cannot be written with its shading: make it one file first "
+                    "with ptcconvert, or name a .ply as output");
+  }
+  for (const Channel& added : ShadedChannels::channels(estimates)) {
+    const auto clashes = [&](const Channel& c) {
+      return c.group != kGroup && c.name == added.name;
+    };
+    if (std::ranges::none_of(receivers.meta().channels, clashes)) continue;
+    throw DataError(file + ": its channel " + added.name +
+                    " has the name of a channel that shading adds: name a .ply as output");
+  }
+  const std::string settings(kMaxSettingsBytes, ' ');
+  const std::size_t bytes =
+      encode_meta(shaded_meta(receivers, settings, estimates), receivers.header().point_bytes)
+          .size();
+  const std::size_t most = payload_limit(receivers.header().page_shift);
+  if (bytes <= most) return;
+  throw DataError(fmt::format(
+      "{}: with the shaded channels, the record of lights, inputs and channels takes up to {} "
+      "bytes, but a page of this container holds {}: convert it to larger pages first, or name a "
+      ".ply as output",
+      file, bytes, most));
+}
+
 std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
                                              const ContainerReader& receivers, std::uint64_t points,
                                              const std::string& settings, bool estimates) {
   if (lower_extension(target) == ".ply")
-    return std::make_unique<PlySink>(target, points, estimates);
+    return std::make_unique<PlySink>(target, points, receivers.header().point_bytes != kPointBytes,
+                                     estimates);
   return std::make_unique<ContainerSink>(target, receivers, settings, estimates);
 }
 

@@ -1,6 +1,7 @@
 // The files that shaded points are written to: a cloud, or a copy of a container with new channels.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -13,6 +14,9 @@
 #include "engine/store/reader.h"
 
 namespace ptc {
+
+/// The maximum length of the text by which a shaded container records its settings.
+inline constexpr std::size_t kMaxSettingsBytes = 240;
 
 /// A file to which shaded points are written in their order. It is published by finish(); without
 /// that, nothing is left under its name.
@@ -29,14 +33,24 @@ class ShadedSink {
   virtual void finish() = 0;
 };
 
+/// Checks that the points of a container can be shaded into a target: a copy of the container has
+/// room for the names and the record of the shading. A .ply takes all points. It is called before
+/// work begins.
+/// @param estimates  points come with estimated errors
+/// @throws DataError when a channel of the receivers has the name of one that shading adds, or the
+///         record does not fit a page of the receivers
+void check_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
+                       bool estimates);
+
 /// Makes a sink for a .ply or a .ptcx, by the ending of the target.
 /// @param receivers  container of the points that are shaded; a .ptcx copies its pages, so it must
 ///                   outlive the sink
 /// @param points     number of points that will be written
-/// @param settings   the settings of the shading, for the record of a .ptcx
+/// @param settings   the settings of the shading, for the record of a .ptcx; at most
+///                   kMaxSettingsBytes
 /// @param estimates  points come with estimated errors
-/// @throws DataError when a channel of the receivers has the name of one that shading adds;
-///         RequestError when the record does not fit a page; std::system_error
+/// @pre check_shaded_sink()
+/// @throws std::system_error
 [[nodiscard]] std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
                                                            const ContainerReader& receivers,
                                                            std::uint64_t points,

@@ -23,10 +23,8 @@
 #include <limits>
 #include <utility>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/base/error.h"
 #include "engine/scene/sampling/directions.h"
 #include "engine/scene/step_off.h"
 
@@ -41,45 +39,12 @@ bool is_finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-bool is_light(const glm::vec3& v) {
-  return is_finite(v) && v.x >= 0 && v.y >= 0 && v.z >= 0;
-}
-
-// Returns the unit vector along v. @throws RequestError when it has no direction
-glm::vec3 checked_direction(const glm::vec3& v) {
-  const glm::vec3 unit = glm::normalize(v);
-  if (!is_finite(unit))
-    throw RequestError("lights", "a direction of the lights is zero or not finite");
-  return unit;
-}
-
 // Returns the rig with its directions normalised.
 // @throws RequestError when a number makes no sense
 LightRig checked(LightRig rig) {
-  const auto require = [](bool holds, const char* what) {
-    if (!holds) throw RequestError("lights", what);
-  };
-  // Check suns and point lights.
-  for (Sun& sun : rig.suns) {
-    sun.to_sun = checked_direction(sun.to_sun);
-    require(is_light(sun.irradiance), "the irradiance of a sun is negative or not finite");
-    require(sun.angular_radius >= 0 && sun.angular_radius < 1.58f,
-            "the radius of a sun is not between 0 and a quarter turn");
-  }
-  for (const PointLight& point : rig.points) {
-    require(is_light(point.intensity), "the intensity of a point light is negative or not finite");
-    const glm::dvec3 away = glm::abs(point.position);
-    require(
-        away.x <= kMaxLightDistance && away.y <= kMaxLightDistance && away.z <= kMaxLightDistance,
-        "a coordinate of a point light is not finite, or beyond 1e150");
-  }
-  // Check the sky and its map.
-  rig.sky.up = checked_direction(rig.sky.up);
-  require(is_light(rig.sky.radiance), "the radiance of the sky is negative or not finite");
-  if (const Image* map = rig.sky.map.get()) {
-    require(map->pixels.size() == std::size_t{map->width} * map->height,
-            "the picture of the sky has another number of pixels than its size says");
-  }
+  check_lights(rig);
+  for (Sun& sun : rig.suns) sun.to_sun = glm::normalize(sun.to_sun);
+  rig.sky.up = glm::normalize(rig.sky.up);
   return rig;
 }
 

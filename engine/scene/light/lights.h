@@ -71,6 +71,16 @@ struct LightRig {
   Sky sky;
 };
 
+/// Checks the numbers of a sky.
+/// @param field  the member of the request that holds the sky, for the error
+/// @throws RequestError when `up` has no direction, the radiance is negative or not finite, or the
+///         map has another number of pixels than its size says
+void check_sky(const Sky& sky, const char* field);
+/// Checks the numbers of all lights; the error names the member `lights`.
+/// @throws RequestError when a direction is zero, or a number is negative, not finite or out of
+///         range
+void check_lights(const LightRig& rig);
+
 /// Returns the lights for a scene that brings none of its own: a sun and a bluish sky.
 [[nodiscard]] LightRig default_rig();
 

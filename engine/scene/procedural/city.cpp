@@ -1,8 +1,8 @@
 // The city as a stream of surfels, and as a mesh.
 //
-// Both come from the facets of build_block(), one block at a time, so the size of the city takes
-// memory only as a mesh. Points lie in rows along u, each in the middle of its cell but for a
-// jitter of a quarter cell:
+// The stream and the mesh come from the facets of build_block(), one block at a time, so the size
+// of the city takes memory only as a mesh. Points lie in rows along u, each in the middle of its
+// cell but for a jitter of a quarter cell:
 //
 //       v                                  v
 //       ^  +-----+-----+-----+             ^  +

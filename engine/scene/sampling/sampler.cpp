@@ -62,26 +62,15 @@ glm::vec3 finite_or_black(const glm::vec3& c) {
 
 // Returns the options with a spacing. @throws RequestError when an option makes no sense
 SamplingOptions resolved(const Mesh& mesh, SamplingOptions options) {
-  // Find the spacing.
-  const auto require = [](bool holds, const char* field, const char* what) {
-    if (!holds) throw RequestError(field, what);
-  };
-  require(options.spacing >= 0 && std::isfinite(options.spacing), "sampling.spacing",
-          "`sampling.spacing` is negative or not finite");
-  if (options.spacing == 0) options.spacing = spacing_for(mesh, options.count);
+  check_sampling(options);
+  const bool by_count = options.spacing == 0;
+  if (by_count) options.spacing = spacing_for(mesh, options.count);
   // Limit the number of surfels, because memory grows with it, if slowly.
   const double side = spacing_for(mesh, 1);
-  require(side == 0 || side / options.spacing <= kMaxAcross, "sampling.spacing",
-          "`sampling.spacing` is too small for a mesh of this size");
-  // Check what belongs to the camera.
-  if (options.camera) {
-    require(options.pixels_per_surfel > 0 && std::isfinite(options.pixels_per_surfel),
-            "sampling.pixels_per_surfel", "`sampling.pixels_per_surfel` is not positive");
-    require(options.finest > 0 && options.finest <= 1, "sampling.finest",
-            "`sampling.finest` is not above 0 and at most 1");
-    require(options.camera->width > 0 && options.camera->height > 0, "sampling.camera",
-            "the `sampling.camera` has no pixels");
-  }
+  require_request(side == 0 || side / options.spacing <= kMaxAcross,
+                  by_count ? "sampling.count" : "sampling.spacing",
+                  by_count ? "`sampling.count` is more than 9 * 10^10"
+                           : "`sampling.spacing` is too small for a mesh of this size");
   return options;
 }
 
@@ -288,10 +277,12 @@ std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
     Surfel surfel = place(group, nearest, clusters[i]);
     const glm::vec3 emission =
         finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
-    surfel.radiance = emission + front.value_or(glm::vec3(0));
+    surfel.emission = emission;
+    surfel.radiance = front.value_or(glm::vec3(0));
     surfels.push_back(surfel);
     if (sides == 1) continue;
     surfel.normal = -surfel.normal;
+    surfel.emission = glm::vec3(0);
     surfel.radiance = back.value_or(glm::vec3(0));
     surfels.push_back(surfel);
   }
@@ -303,8 +294,26 @@ std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
 
 }  // namespace
 
+void check_sampling(const SamplingOptions& options) {
+  require_request(options.spacing >= 0 && std::isfinite(options.spacing), "sampling.spacing",
+                  "`sampling.spacing` is negative or not finite");
+  require_request(options.spacing > 0 || options.count > 0, "sampling.count",
+                  "`sampling.count` is 0");
+  constexpr unsigned kMaxRays = 1 << 16;
+  const LightSampling& lights = options.lights;
+  require_request(std::max({lights.sun_rays, lights.area_rays, lights.sky_rays}) <= kMaxRays,
+                  "sampling.lights.area_rays",
+                  "`sampling.lights.area_rays` or another number of rays is above 65536");
+  if (!options.camera) return;
+  require_request(options.pixels_per_surfel > 0 && std::isfinite(options.pixels_per_surfel),
+                  "sampling.pixels_per_surfel", "`sampling.pixels_per_surfel` is not positive");
+  require_request(options.finest > 0 && options.finest <= 1, "sampling.finest",
+                  "`sampling.finest` is not above 0 and at most 1");
+  check_camera(*options.camera, "sampling.camera");
+}
+
 double spacing_for(const Mesh& mesh, std::uint64_t count) {
-  if (count == 0) throw RequestError("sampling.count", "`sampling.count` is 0");
+  require_request(count > 0, "sampling.count", "`sampling.count` is 0");
   double area = 0;
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& c = mesh.triangles[i];

@@ -27,6 +27,10 @@ struct SamplingOptions {
   LightSampling lights;         ///< shadow rays for each surfel
 };
 
+/// Checks everything about the options that does not depend on the mesh.
+/// @throws RequestError when count, spacing or a number of the camera makes no sense
+void check_sampling(const SamplingOptions& options);
+
 /// Returns the spacing that gives about `count` surfels on the mesh: sqrt(area / count), where both
 /// sides of double-sided materials count. It is 0 for a mesh without area.
 /// @throws RequestError when count is 0

@@ -31,8 +31,8 @@ namespace ptc {
 /// Reports whether a place sees nothing but backs of one-sided triangles: it lies inside a solid,
 /// or on a face that touches another.
 ///
-/// Of 8 cosine rays from a buried place none escapes, and at most one meets a front, which is that
-/// of a second solid sunk into the same one. The result is deterministic in `seed`.
+/// The test sends 8 cosine rays: none may escape, and at most one may meet a front, which belongs
+/// to a second solid that is sunk into the same one. The result is deterministic in `seed`.
 /// @param position  scene units
 /// @param normal  unit, on the side that is asked about
 [[nodiscard]] bool is_buried(const RayScene& scene, const glm::dvec3& position,

@@ -79,7 +79,7 @@ void Gather::place(std::span<const Receiver> from) {
 // nodes in it may change at most.
 void Gather::shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited,
                         std::size_t depth, float bound) {
-  const ReceiverCell bounds(cell, SceneScale::kLatticeUnit);
+  const ReceiverCell bounds(cell);
   if (cell.size() == 1) {
     const DirectionBuffer& drawn = collect(bounds, inherited, leaf_, nullptr, depth, bound);
     resolve(cell, drawn, depth, bound);
@@ -226,6 +226,7 @@ template <class Flush>
 void Gather::look_at_run(const ChildRef& leaf_node, const CellTest& test, CellOutput& out,
                          const Flush& flush) {
   const std::uint32_t per_page = scene_.view().points_per_page();
+  const bool emits = scene_.view().point_bytes() != kPointBytes;
   std::uint64_t first = leaf_node.first_point;
   for (const std::uint64_t end = first + leaf_node.point_count; first < end;) {
     const auto slot = static_cast<std::uint32_t>(first % per_page);
@@ -235,7 +236,7 @@ void Gather::look_at_run(const ChildRef& leaf_node, const CellTest& test, CellOu
     const PageGuard page = scene_.points(first);
     if (queue_.full()) flush();
     const int before = queue_.size;
-    gather_page_surfels(page.payload(), page.record_count(), slot, number, test, out);
+    gather_page_surfels(page.payload(), page.record_count(), emits, slot, number, test, out);
     counts_.surfels += static_cast<unsigned>(queue_.size - before);
     first += number;
   }

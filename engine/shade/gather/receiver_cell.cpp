@@ -7,6 +7,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/shade/scene_scale.h"
+
 namespace ptc {
 
 MortonKey receiver_key(const Frame& frame, const glm::dvec3& position, unsigned variant) {
@@ -24,7 +26,7 @@ MortonKey receiver_key(const Frame& frame, const glm::dvec3& position, unsigned 
   return encode_morton(q);
 }
 
-ReceiverCell::ReceiverCell(std::span<const PlacedReceiver> receivers, double unit) {
+ReceiverCell::ReceiverCell(std::span<const PlacedReceiver> receivers) {
   if (receivers.size() == 1) {
     centre = receivers[0].position;
     axis = receivers[0].normal;
@@ -54,8 +56,8 @@ ReceiverCell::ReceiverCell(std::span<const PlacedReceiver> receivers, double uni
     cone_cos = std::min(cone_cos, glm::dot(axis, r.normal));
     lowest = std::min(lowest, glm::dot(d, glm::dvec3(r.normal)));
   }
-  radius = static_cast<float>(std::sqrt(farthest) * unit);
-  depth = static_cast<float>(-lowest * unit);
+  radius = static_cast<float>(std::sqrt(farthest) * SceneScale::kLatticeUnit);
+  depth = static_cast<float>(-lowest * SceneScale::kLatticeUnit);
   cone_cos = std::max(cone_cos, -1.0F);
   cone_sin = std::sqrt(std::max(0.0F, 1 - cone_cos * cone_cos));
   has_horizon = cone_cos > 0.1F;

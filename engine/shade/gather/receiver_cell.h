@@ -47,7 +47,7 @@ struct ReceiverCell {
   /// Bounds the receivers.
   /// @param receivers  at least one
   /// @param unit       the lattice unit, expressed in the unit that lengths are wanted in
-  ReceiverCell(std::span<const PlacedReceiver> receivers, double unit);
+  ReceiverCell(std::span<const PlacedReceiver> receivers);
 };
 
 }  // namespace ptc

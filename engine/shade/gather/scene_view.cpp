@@ -5,6 +5,7 @@
 #include <array>
 
 #include "format/error.h"
+#include "format/point_page.h"
 
 namespace ptc {
 
@@ -15,7 +16,7 @@ SceneView::SceneView(const ContainerReader& container, LostPages* lost)
       scale_(frame_),
       points_(container.superblock().points),
       groups_(container.superblock().node_groups),
-      points_per_page_(container.superblock().points_per_page) {
+      points_per_page_(ptc::points_per_page(container.header())) {
   const Superblock& superblock = container.superblock();
   root_.interior = superblock.root_page != kNoPage;
   root_.page = superblock.root_page;
@@ -28,7 +29,7 @@ void SceneView::fail(const char* clause, const char* text) const {
 }
 
 PinnedGroup SceneReader::group(std::uint32_t page, std::uint16_t slot) {
-  PageGuard guard = pages_.pin(page);
+  PageGuard guard = pages_.pin(view_.node_page(page));
   const NodePage nodes(guard.payload(), guard.record_count());
   if (slot >= nodes.size()) {
     view_.fail("spec/nodes.md#references", "a node refers to a group that its page does not hold");
@@ -52,7 +53,7 @@ unsigned SceneReader::lost_children(std::uint32_t page, std::uint16_t slot) {
 }
 
 bool SceneReader::is_lost(const ChildRef& child) {
-  if (child.interior) return view_.lost()->contains(child.page, pages_);
+  if (child.interior) return view_.lost()->contains(view_.node_page(child.page), pages_);
   const std::uint64_t end = child.first_point + child.point_count,
                       per_page = view_.points_per_page();
   for (std::uint64_t point = child.first_point; point < end;

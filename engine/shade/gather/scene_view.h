@@ -41,6 +41,14 @@ class SceneView {
   [[nodiscard]] std::uint32_t point_page(std::uint64_t point) const {
     return container_->point_pages()[static_cast<std::size_t>(point / points_per_page_)];
   }
+  /// Returns the page of the node page of a rank.
+  [[nodiscard]] std::uint32_t node_page(std::uint32_t rank) const noexcept {
+    return container_->node_pages()[rank];
+  }
+  /// Returns the bytes of a point on its page.
+  [[nodiscard]] std::uint8_t point_bytes() const noexcept {
+    return container_->header().point_bytes;
+  }
   /// Throws a FormatError that names the file, and as the place its superblock, whose counts the
   /// tree contradicts.
   [[noreturn]] void fail(const char* clause, const char* text) const;
@@ -79,6 +87,7 @@ class SceneReader {
   /// Returns the view that the constructor was given.
   [[nodiscard]] const SceneView& view() const noexcept { return view_; }
   /// Returns a group.
+  /// @param page  rank of its node page
   /// @throws FormatError when the reference leads to no group, or the page is damaged
   [[nodiscard]] PinnedGroup group(std::uint32_t page, std::uint16_t slot);
   /// Returns which children of a group need a lost page: bit i for child i.

@@ -31,16 +31,6 @@ using VF = hn::VFromD<F>;
 using VU = hn::VFromD<U>;
 using MF = hn::Mask<F>;
 
-/// Depth of the rim of the shallow paraboloid that stands for a disc, over the disc's radius. It
-/// divides coplanar overlapping discs half way between their centres (spec/shading.md#surfels):
-///
-///     nearness
-///        ^    _-~-_ _-~-_
-///        |  -      X      -       X is half way between the centres, where both discs are
-///        |-       - -       -     equally near
-///        +---------------------
-constexpr float kBump = 0.01F;
-
 /// The pixels of a cube as they are drawn on from one viewpoint.
 template <bool kColoured>
 class Canvas {

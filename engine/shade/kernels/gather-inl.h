@@ -79,25 +79,26 @@ HWY_INLINE Vec scaled(const Vec& v, VF by) {
   return {hn::Mul(v.x, by), hn::Mul(v.y, by), hn::Mul(v.z, by)};
 }
 
-/// Unfolds a point of the square [-1, 1]^2 into a unit vector: the octahedral map, whose scalar
-/// twin is in format/scalar.h.
+/// Unfolds a point of the square [-q, q]^2 into a unit vector: the octahedral map, whose scalar
+/// twin is in format/scalar.h. The coordinates are whole numbers, so the fold is exact.
 ///
-///     +-----+-----+       The inner diamond |u| + |v| <= 1 is the upper half of the octahedron
+///     +-----+-----+       The inner diamond |u| + |v| <= q is the upper half of the octahedron
 ///     | L / | \ L |       seen from above; the four corner triangles L are the faces of the lower
 ///     | /   |   \ |       half, folded outwards. The point on the octahedron is normalised.
 ///     +-----+-----+ u
 ///     | \   |   / |
 ///     | L \ | / L |
 ///     +-----+-----+
-HWY_INLINE Vec unfold(VF u, VF v) {
+/// @param u, v  whole numbers, -q to q
+HWY_INLINE Vec unfold(VF u, VF v, float q) {
   const F f;
-  const auto one = hn::Set(f, 1.0F);
-  const auto z = hn::Sub(one, hn::Add(hn::Abs(u), hn::Abs(v)));
+  const auto edge = hn::Set(f, q);
+  const auto z = hn::Sub(edge, hn::Add(hn::Abs(u), hn::Abs(v)));
   const auto lower = hn::Lt(z, hn::Zero(f));
-  const auto x = hn::IfThenElse(lower, hn::CopySign(hn::Sub(one, hn::Abs(v)), u), u);
-  const auto y = hn::IfThenElse(lower, hn::CopySign(hn::Sub(one, hn::Abs(u)), v), v);
+  const auto x = hn::IfThenElse(lower, hn::CopySign(hn::Sub(edge, hn::Abs(v)), u), u);
+  const auto y = hn::IfThenElse(lower, hn::CopySign(hn::Sub(edge, hn::Abs(u)), v), v);
   const Vec n{x, y, z};
-  return scaled(n, hn::Div(one, hn::Sqrt(dot(n, n))));
+  return scaled(n, hn::Div(hn::Set(f, 1.0F), hn::Sqrt(dot(n, n))));
 }
 
 /// Packs colours as encode_rgbe() does, except that a component that rounds up to 256 stays 255.
@@ -121,6 +122,16 @@ HWY_INLINE VU pack_rgbe(VF r, VF g, VF b) {
              hn::Or(hn::ShiftLeft<16>(byte(b)), hn::ShiftLeft<24>(hn::BitCast(u, exponent))));
   // Take black below 2^-100: nothing there is bright enough to see, and the scale would overflow.
   return hn::IfThenElseZero(hn::RebindMask(u, hn::Gt(greatest, hn::Set(f, 0x1p-100F))), packed);
+}
+
+/// Adds colours.
+HWY_INLINE VU sum_rgbe(VU a, VU b) {
+  const F f;
+  const UnpackedRgbe<F> x = unpack_rgbe(f, a), y = unpack_rgbe(f, b);
+  const auto sum = [&](int k) {
+    return hn::MulAdd(x.byte[k], x.scale, hn::Mul(y.byte[k], y.scale));
+  };
+  return pack_rgbe(sum(0), sum(1), sum(2));
 }
 
 /// Returns the mask of bits, the first lane in bit 0.

@@ -34,6 +34,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/shade/kernels/gather_kernels.h"
+#include "engine/shade/outgoing.h"
 
 // This file is compiled once per instruction set.
 #undef HWY_TARGET_INCLUDE
@@ -42,12 +43,15 @@
 #include <hwy/highway.h>
 
 #include "engine/shade/kernels/gather-inl.h"
+#include "format/node_layout.h"
+#include "format/scalar.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
 constexpr float kMaxStoredArea = 0x1.ffp127F;  // the greatest finite ufloat16
+constexpr float kPerFacingStep = 1.0F / static_cast<float>(kFacingSteps);
 
 /// A vector of clusters relative to a cell's centre, in edges of the frame.
 struct Clusters {
@@ -158,14 +162,13 @@ HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test
   const auto cosine = hn::Mul(
       hn::ConvertTo(f, hn::PromoteTo(i, hn::LoadU(I16(), reinterpret_cast<const std::int16_t*>(
                                                              group.cone_cos() + 2 * first)))),
-      hn::Set(f, 1.0F / 32767));
+      hn::Set(f, 1.0F / static_cast<float>(kCosSteps)));
   const auto packed = hn::BitCast(i, load_u16(group.cone_axis() + 2 * first));
   const auto coordinate = [&](auto bits) {
-    return hn::Max(hn::Mul(hn::ConvertTo(f, hn::ShiftRight<24>(bits)), hn::Set(f, 1.0F / 127)),
-                   hn::Set(f, -1.0F));
+    return hn::Max(hn::ConvertTo(f, hn::ShiftRight<24>(bits)), hn::Set(f, -127.0F));
   };
   const Vec axis =
-      unfold(coordinate(hn::ShiftLeft<24>(packed)), coordinate(hn::ShiftLeft<16>(packed)));
+      unfold(coordinate(hn::ShiftLeft<24>(packed)), coordinate(hn::ShiftLeft<16>(packed)), 127);
   // Compare the angles.
   const auto reach = hn::Add(radius, hn::Set(f, test.cell.radius));
   const auto clear = hn::NegMulAdd(reach, reach, distance2);
@@ -174,6 +177,32 @@ HWY_INLINE MF faces_away(const GroupView& group, int first, const CellTest& test
   const auto least = hn::MulAdd(sine, hn::Sqrt(hn::Max(clear, hn::Zero(f))), reach);
   return hn::And(hn::And(hn::Gt(cosine, hn::Set(f, 0.05F)), hn::Gt(clear, hn::Zero(f))),
                  hn::Gt(dot(axis, to), least));
+}
+
+/// Returns the radiance of clusters as RGBE: that of the fronts over what they are spread over.
+/// Backs dim a cluster that is not flat, but only half of them count, since most are hidden; a flat
+/// disc has a black back.
+/// @param cube        as of draw_clusters()
+/// @param along_axis  direction from the cluster to the receiver
+/// @param weight      share of the area that looks at the receiver, of each of three faces
+/// @param front       sum of `weight`
+/// @param projected   projected area over the area
+template <class Cube>
+HWY_INLINE VU colour_of(const Cube& cube, const VF (&along_axis)[3], const VF (&weight)[3],
+                        VF front, MF flat, VF projected) {
+  const F f;
+  const auto zero = hn::Zero(f), one = hn::Set(f, 1.0F);
+  const auto over =
+      hn::IfThenElse(flat, front, hn::Max(front, hn::Mul(hn::Set(f, kDark), projected)));
+  const auto mix = hn::IfThenElse(hn::Gt(over, zero), hn::Div(one, over), zero);
+  VF light[3] = {zero, zero, zero};
+  for (int k = 0; k < 3; ++k) {
+    const UnpackedRgbe<F> radiance = unpack_rgbe(f, cube.radiance(k, hn::Lt(along_axis[k], zero)));
+    const auto scale = hn::Mul(radiance.scale, hn::Mul(weight[k], mix));
+    for (int channel = 0; channel < 3; ++channel)
+      light[channel] = hn::MulAdd(radiance.byte[channel], scale, light[channel]);
+  }
+  return pack_rgbe(light[0], light[1], light[2]);
 }
 
 /// Appends clusters as discs (spec/shading.md#splats).
@@ -231,23 +260,8 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
       hn::Mul(hn::IfThenElse(flat, one, hn::Set(f, kSolid)), hn::Mul(c.radius, c.radius));
   const auto radius2 = hn::IfThenElse(hn::Lt(wanted, most), wanted, most);
 
-  // Find its radiance: that of the fronts over what they are spread over. Backs dim a cluster that
-  // is not flat, but only half of them count, since most are hidden; a flat disc has a black back.
-  VU colour = hn::Zero(U());
-  if (test.bleeding) {
-    const auto over =
-        hn::IfThenElse(flat, front, hn::Max(front, hn::Mul(hn::Set(f, kDark), projected)));
-    const auto mix = hn::IfThenElse(hn::Gt(over, zero), hn::Div(one, over), zero);
-    VF light[3] = {zero, zero, zero};
-    for (int k = 0; k < 3; ++k) {
-      const UnpackedRgbe<F> radiance =
-          unpack_rgbe(f, cube.radiance(k, hn::Lt(along_axis[k], zero)));
-      const auto scale = hn::Mul(radiance.scale, hn::Mul(weight[k], mix));
-      for (int channel = 0; channel < 3; ++channel)
-        light[channel] = hn::MulAdd(radiance.byte[channel], scale, light[channel]);
-    }
-    colour = pack_rgbe(light[0], light[1], light[2]);
-  }
+  const VU colour =
+      test.bleeding ? colour_of(cube, along_axis, weight, front, flat, projected) : hn::Zero(U());
   push(queue, mask, c.to, disc_normal, hn::Sqrt(radius2), colour);
 }
 
@@ -276,27 +290,24 @@ class GroupLanes {
   /// Finds the step of position codes: the edge of the group's cell over 2^16.
   GroupLanes(const GroupView& group, const CellTest& test)
       : group_(group), corner_(decode_morton(group.cell())), test_(test) {
-    const int level = group.level();
-    const double edge = level < kLatticeBits
-                            ? static_cast<double>(std::uint64_t{1} << (kLatticeBits - level))
-                            : 1.0;
-    step_ = static_cast<float>(edge * test.unit / 65536);
+    step_ = static_cast<float>(cell_edge(group.level()) * SceneScale::kLatticeUnit / kMeanSteps);
   }
 
   /// Loads a vector of children, from number `first` on.
   HWY_INLINE Clusters load(int first) {
     const F f;
     const int at = 2 * first;
-    const auto step = hn::Set(f, step_), unit = hn::Set(f, static_cast<float>(test_.unit));
+    const auto step = hn::Set(f, step_),
+               unit = hn::Set(f, static_cast<float>(SceneScale::kLatticeUnit));
     // Bound the radius by what encloses discs that are as large as they may be.
     const auto most = hn::Set(f, 2 * SceneScale::kMaxRadius);
     const auto offset = [&](std::size_t k, double centre) {
-      return hn::Set(f,
-                     static_cast<float>((static_cast<double>(corner_[k]) - centre) * test_.unit));
+      return hn::Set(f, static_cast<float>((static_cast<double>(corner_[k]) - centre) *
+                                           SceneScale::kLatticeUnit));
     };
     const glm::dvec3& centre = test_.cell.centre;
     for (int k = 0; k < 6; ++k) {
-      share_[k] = hn::Mul(to_float(load_u16(group_.facing(k) + at)), hn::Set(f, 1.0F / 65535));
+      share_[k] = hn::Mul(to_float(load_u16(group_.facing(k) + at)), hn::Set(f, kPerFacingStep));
     }
     Clusters c{
         .to = {hn::MulAdd(step, to_float(load_u16(group_.mean_x() + at)), offset(0, centre.x)),
@@ -326,12 +337,22 @@ class GroupLanes {
       return hn::IfThenElse(negative, lanes.share_[2 * axis + 1], lanes.share_[2 * axis]);
     }
     HWY_INLINE VU radiance(int axis, MF negative) const {
+      const GroupView& group = lanes.group_;
+      const VU reflected =
+          of_face(group.radiance(2 * axis), group.radiance(2 * axis + 1), negative);
+      if (!group.emits()) return reflected;
+      return sum_rgbe(reflected,
+                      of_face(group.emission(2 * axis), group.emission(2 * axis + 1), negative));
+    }
+
+   private:
+    /// Returns the colours of the children's faces towards an axis or its opposite.
+    HWY_INLINE VU of_face(const std::byte* positive, const std::byte* opposite, MF negative) const {
       const U u;
-      const auto load = [&](int k) {
-        return hn::LoadU(
-            u, reinterpret_cast<const std::uint32_t*>(lanes.group_.radiance(k) + 4 * first));
+      const auto load = [&](const std::byte* column) {
+        return hn::LoadU(u, reinterpret_cast<const std::uint32_t*>(column + 4 * first));
       };
-      return hn::IfThenElse(hn::RebindMask(u, negative), load(2 * axis + 1), load(2 * axis));
+      return hn::IfThenElse(hn::RebindMask(u, negative), load(opposite), load(positive));
     }
   };
 
@@ -381,11 +402,10 @@ class PayloadLanes {
 ClusterPayload payload_of(const GroupView& group, int i, bool closed) {
   ClusterPayload payload;
   for (int k = 0; k < 6; ++k) {
-    std::memcpy(&payload.rgbe[k], group.radiance(k) + 4 * std::ptrdiff_t{i},
-                sizeof payload.rgbe[k]);
-    payload.share[k] = static_cast<float>(GroupView::u16_at(group.facing(k), i)) * (1.0F / 65535);
+    payload.rgbe[k] = outgoing_rgbe(group, k, i);
+    payload.share[k] = static_cast<float>(GroupView::u16_at(group.facing(k), i)) * kPerFacingStep;
   }
-  payload.area = std::bit_cast<float>(std::uint32_t{GroupView::u16_at(group.area(), i)} << 15);
+  payload.area = decode_ufloat16(GroupView::u16_at(group.area(), i));
   const std::uint64_t reference = group.reference(i);
   payload.reference[0] = static_cast<std::uint32_t>(reference);
   payload.reference[1] = static_cast<std::uint32_t>(reference >> 32);

@@ -36,10 +36,9 @@ namespace ptc {
 
 /// A receiver cell with the limits of its gather. Lengths are in edges of the frame.
 struct CellTest {
-  ReceiverCell cell;                       ///< its radius and depth in edges of the frame
-  double unit = SceneScale::kLatticeUnit;  ///< lattice unit, edges of the frame
-  SceneScale::Factors lengths{1, 1};       ///< convert lengths from scene units to edges
-  SceneScale::Factors areas{1, 1};         ///< convert areas from scene units to edges
+  ReceiverCell cell;                  ///< its radius and depth in edges of the frame
+  SceneScale::Factors lengths{1, 1};  ///< convert lengths from scene units to edges
+  SceneScale::Factors areas{1, 1};    ///< convert areas from scene units to edges
   float limit = 0;            ///< a cluster of radius r at distance d is small when r^2 < limit d^2
   float shared_from = 0;      ///< distance from which the cell settles things for all receivers
   float inflation = 1;        ///< GatherOptions::inflation
@@ -78,11 +77,13 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
 /// Looks at surfels of a point page.
 /// @param payload  of the page; up to 64 bytes past its end may be read
 /// @param count    number of points on the page
+/// @param emits    whether the page has the columns of emission
 /// @param first    index of the first surfel to look at
 /// @param number   how many surfels to look at, at most 8
 /// @param out      its queue has room for 8 discs
-void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                         unsigned number, const CellTest& test, CellOutput& out);
+void gather_page_surfels(const std::byte* payload, std::uint32_t count, bool emits,
+                         std::uint32_t first, unsigned number, const CellTest& test,
+                         CellOutput& out);
 
 /// Looks at surfels that the enclosing cell left, from index `from` on, until the queue is full.
 /// @param move  is added to positions: the enclosing cell's centre relative to this one's

@@ -108,8 +108,7 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
 /// @param low     lower 32 bits of the coordinates
 /// @param high10  upper 10 bits of the coordinates
 /// @param centre  lattice units
-/// @param unit    lattice unit, expressed in the unit that the coordinates are wanted in
-HWY_INLINE VF relative(VU low, VU high10, double centre, double unit) {
+HWY_INLINE VF relative(VU low, VU high10, double centre) {
   const F f;
   const I i;
   const U u;
@@ -123,13 +122,14 @@ HWY_INLINE VF relative(VU low, VU high10, double centre, double unit) {
       hn::Sub(hn::BitCast(i, lower), hn::Set(i, static_cast<std::int32_t>(integer & 0xffff)));
   const auto rest = hn::Sub(hn::ConvertTo(f, dl), hn::Set(f, static_cast<float>(centre - whole)));
   const auto units = hn::MulAdd(hn::ConvertTo(f, dh), hn::Set(f, 65536.0F), rest);
-  return hn::Mul(units, hn::Set(f, static_cast<float>(unit)));
+  return hn::Mul(units, hn::Set(f, static_cast<float>(SceneScale::kLatticeUnit)));
 }
 
 }  // namespace
 
-void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                         unsigned number, const CellTest& test, CellOutput& out) {
+void gather_page_surfels(const std::byte* payload, std::uint32_t count, bool emits,
+                         std::uint32_t first, unsigned number, const CellTest& test,
+                         CellOutput& out) {
   const F f;
   const I i;
   const U u;
@@ -148,15 +148,14 @@ void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uin
     const auto coordinate = [&](std::size_t bytes_before) {
       const auto bits = hn::LoadU(
           I16(), reinterpret_cast<const std::int16_t*>(payload + bytes_before * n + 2 * k));
-      return hn::Max(hn::Mul(hn::ConvertTo(f, hn::PromoteTo(i, bits)), hn::Set(f, 1.0F / 32767)),
-                     hn::Set(f, -1.0F));
+      return hn::Max(hn::ConvertTo(f, hn::PromoteTo(i, bits)), hn::Set(f, -32767.0F));
     };
     // Decode the surfels; their radiance only when it is needed.
     const Surfels s{
-        .to = {relative(word(0), hn::And(high, ten), centre.x, test.unit),
-               relative(word(4), hn::And(hn::ShiftRight<10>(high), ten), centre.y, test.unit),
-               relative(word(8), hn::And(hn::ShiftRight<20>(high), ten), centre.z, test.unit)},
-        .normal = unfold(coordinate(20), coordinate(22)),
+        .to = {relative(word(0), hn::And(high, ten), centre.x),
+               relative(word(4), hn::And(hn::ShiftRight<10>(high), ten), centre.y),
+               relative(word(8), hn::And(hn::ShiftRight<20>(high), ten), centre.z)},
+        .normal = unfold(coordinate(20), coordinate(22), 32767),
         .radius = hn::Min(hn::Mul(hn::Mul(hn::BitCast(f, word(16)), hn::Set(f, test.lengths[0])),
                                   hn::Set(f, test.lengths[1])),
                           hn::Set(f, SceneScale::kMaxRadius))};
@@ -166,7 +165,12 @@ void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uin
     };
     settle(
         test, s, hn::FirstN(f, number - from),
-        [&] { return pack_rgbe(half(24), half(26), half(28)); }, out);
+        [&] {
+          if (!emits) return pack_rgbe(half(24), half(26), half(28));
+          return pack_rgbe(hn::Add(half(24), half(34)), hn::Add(half(26), half(36)),
+                           hn::Add(half(28), half(38)));
+        },
+        out);
   }
 }
 
@@ -199,10 +203,11 @@ namespace ptc {
 HWY_EXPORT(gather_page_surfels);
 HWY_EXPORT(gather_surfels);
 
-void gather_page_surfels(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                         unsigned number, const CellTest& test, CellOutput& out) {
+void gather_page_surfels(const std::byte* payload, std::uint32_t count, bool emits,
+                         std::uint32_t first, unsigned number, const CellTest& test,
+                         CellOutput& out) {
   if (out.left) out.left->surfels.make_room(number);
-  HWY_DYNAMIC_DISPATCH(gather_page_surfels)(payload, count, first, number, test, out);
+  HWY_DYNAMIC_DISPATCH(gather_page_surfels)(payload, count, emits, first, number, test, out);
 }
 
 std::size_t gather_surfels(const NearSurfels& near, std::size_t from, const glm::vec3& move,

@@ -108,20 +108,36 @@ struct FaceView {
   }
 };
 
+/// Adds up the light of a group of pixels: the colour of what covers them, and the sky elsewhere.
+/// @param at       index of the first pixel in its face
+/// @param weight   weight of each pixel
+/// @param covered  weight of each covered pixel, else 0
+HWY_INLINE void add_light(const FaceView& face, std::size_t at, VW weight, VW covered,
+                          LaneSums& sums) {
+  const W f;
+  const auto resolution = static_cast<std::size_t>(face.cube.resolution);
+  if (face.rgbe) {
+    const UnpackedRgbe<W> rgbe = unpack_rgbe(f, hn::LoadU(WU(), face.rgbe + at));
+    const auto scale = hn::Mul(rgbe.scale, covered);
+    for (int k = 0; k < 3; ++k) sums.light[k] = hn::MulAdd(rgbe.byte[k], scale, sums.light[k]);
+  }
+  for (std::size_t k = 0; face.sky && k < 3; ++k) {
+    const auto sky = hn::LoadU(f, face.sky + k * resolution * resolution + at);
+    sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), sky, sums.sky[k]);
+  }
+}
+
 /// Adds up a row of pixels.
 /// @tparam kMoves  whether borders move
 /// @param last     whether no further row is above the horizon
 /// @param down     weights that pass to this row from the row before; is overwritten with those
-/// that
-///                 pass to the next row
+///                 that pass to the next row
 template <bool kMoves>
 HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTRICT down,
                         LaneSums& sums) {
   const W f;
   const auto zero = hn::Zero(f);
   const CubeGeometry& cube = face.cube;
-  const std::size_t plane =
-      static_cast<std::size_t>(cube.resolution) * static_cast<std::size_t>(cube.resolution);
   const float row = face.cosine(cube.centre[y]);
   const float half_step = 1 / static_cast<float>(cube.resolution),
               edge = cube.centre[y] + half_step;
@@ -156,20 +172,12 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
           hn::Add(own, hn::Add(hn::Sub(right, from_left), hn::Sub(below, hn::LoadU(f, down + x))));
       hn::StoreU(below, f, down + x);
     }
-    // Add up what covers, its colour, and the sky elsewhere.
+    // Add up what covers, and the light.
     const auto empty = hn::Eq(near, zero);
     const auto covered = hn::IfThenZeroElse(empty, weight);
     sums.total = hn::Add(sums.total, own);
     sums.covered = hn::Add(sums.covered, covered);
-    if (face.rgbe) {
-      const UnpackedRgbe<W> rgbe = unpack_rgbe(f, hn::LoadU(WU(), face.rgbe + at));
-      const auto scale = hn::Mul(rgbe.scale, covered);
-      for (int k = 0; k < 3; ++k) sums.light[k] = hn::MulAdd(rgbe.byte[k], scale, sums.light[k]);
-    }
-    for (std::size_t k = 0; face.sky && k < 3; ++k) {
-      sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), hn::LoadU(f, face.sky + k * plane + at),
-                               sums.sky[k]);
-    }
+    add_light(face, at, weight, covered, sums);
     // Add up the uncovered directions; what a row shares is multiplied once, at its end.
     const auto direction =
         hn::IfThenElseZero(empty, hn::Mul(own, hn::LoadU(f, cube.inverse_length + at)));

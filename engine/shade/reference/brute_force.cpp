@@ -26,7 +26,7 @@ std::vector<Surfel> load_surfels(const ContainerReader& container, std::uint64_t
   return surfels;
 }
 
-void append_surfels(const ContainerReader& container, std::span<const std::uint32_t> pages,
+void append_surfels(const ContainerReader& container, PageNumbers::Range pages,
                     std::vector<Surfel>& surfels) {
   PointScan scan(container, pages);
   while (scan.next()) {
@@ -47,7 +47,8 @@ void shade_brute_force(std::span<const Surfel> surfels, std::span<const Receiver
     for (const Surfel& s : surfels) {
       const glm::vec3 to(s.position - receivers[i].position);
       if (glm::dot(to, receivers[i].normal) + s.radius <= 0 || !(s.radius > 0)) continue;
-      queue.push(to, s.normal, s.radius, encode_rgbe({s.radiance.r, s.radiance.g, s.radiance.b}));
+      const glm::vec3 light = s.outgoing();
+      queue.push(to, s.normal, s.radius, encode_rgbe({light.r, light.g, light.b}));
       if (!queue.full()) continue;
       buffer.draw(grid, queue, sides);
       queue.size = 0;

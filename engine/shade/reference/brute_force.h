@@ -25,8 +25,7 @@
 namespace ptc {
 
 /// Reads and decodes all surfels of a container.
-/// @param limit  maximum number of points, so that a reference run on a city does not exhaust
-/// memory
+/// @param limit  maximum number of points, so that a reference run on a city keeps within memory
 /// @throws RequestError above that number; FormatError when a page is damaged
 [[nodiscard]] std::vector<Surfel> load_surfels(const ContainerReader& container,
                                                std::uint64_t limit);
@@ -34,7 +33,7 @@ namespace ptc {
 /// Appends the surfels of some point pages of a container.
 /// @param pages  numbers of point pages
 /// @throws FormatError when a page is damaged
-void append_surfels(const ContainerReader& container, std::span<const std::uint32_t> pages,
+void append_surfels(const ContainerReader& container, PageNumbers::Range pages,
                     std::vector<Surfel>& surfels);
 
 /// Shades receivers without a hierarchy: every surfel is drawn as an exact disc for every receiver.
@@ -85,11 +84,13 @@ class DiscRays {
   /// @param rays  number of rays, rounded down to a square number
   [[nodiscard]] Shading trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const;
 
+  /// Returns the side of the largest square grid of at most this many rays.
+  [[nodiscard]] static unsigned side_of(std::size_t rays) noexcept;
+
   /// Lets the rays of a receiver meet these discs, as one of several parts of a scene. The nearest
   /// disc of all parts does not depend on how the discs are divided, as long as all parts have the
   /// same Space. After the last part, sum() gives the result that trace() has for the whole scene.
-  /// @param hits  one for each ray, a square number; is replaced where a disc of this part is
-  /// nearer
+  /// @param hits  one for each ray, a square number; replaced where a disc of this part is nearer
   void meet(const Receiver& receiver, std::uint64_t seed, std::span<DiscHit> hits) const;
   /// Sums up what the rays of a receiver have met.
   /// @param seed  that of meet()

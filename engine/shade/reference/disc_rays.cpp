@@ -6,9 +6,8 @@
 //
 //     1. Find the nearest flat disc, at t. No paraboloid is deeper than kBump r below its disc, so
 //        whatever wins lies between t and t + kBump r of that disc.
-//     2. Trace that short stretch again. A filter looks at every disc there and rejects it, after
-//     it
-//        has noted the one of least bumped depth.
+//     2. Trace that short stretch again. A filter looks at every disc there, notes the one of least
+//        bumped depth, and rejects each.
 //
 // The filter also lets rays through backs that are clear. All lengths are in edges of the scene's
 // frame, as in the gather.
@@ -17,17 +16,15 @@
 #include <numbers>
 #include <stdexcept>
 
-#include <embree3/rtcore.h>
 #include <glm/geometric.hpp>
 
+#include "engine/base/embree.h"
 #include "engine/base/numbers.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/scene_scale.h"
 
 namespace ptc {
 namespace {
-
-constexpr float kBump = 0.01F;  // depth of the paraboloid's rim over the radius, as draw_discs()
 
 /// A stream of uniform numbers in [0, 1): SplitMix64.
 class Uniform {
@@ -59,13 +56,8 @@ struct DiscRays::Impl {
   Sides sides;
   std::function<glm::vec3(const glm::vec3&)> sky;
   Space space;
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
-
-  ~Impl() {
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-  }
+  Owned<RTCDevice, rtcReleaseDevice> device{rtcNewDevice(nullptr)};
+  Owned<RTCScene, rtcReleaseScene> scene{device == nullptr ? nullptr : rtcNewScene(device)};
 
   /// Returns the centre of a disc relative to the origin, in edges of the frame.
   [[nodiscard]] glm::vec3 centre(unsigned i) const {
@@ -142,7 +134,7 @@ struct DiscRays::Impl {
       context.best_disc = ray.hit.primID;
     }
     const Surfel& disc = surfels[context.best_disc];
-    met = {context.best, glm::dot(along, disc.normal) < 0 ? disc.radiance : glm::vec3(0)};
+    met = {context.best, glm::dot(along, disc.normal) < 0 ? disc.outgoing() : glm::vec3(0)};
   }
 };
 
@@ -164,15 +156,14 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
                     SceneScale(frame_around({low.x, low.y, low.z}, {high.x, high.y, high.z}))};
   }
   // Make the buffers: four floats of a disc's centre and radius, three of its normal.
-  impl_->device = rtcNewDevice(nullptr);
-  if (!impl_->device) throw std::runtime_error("Embree: no device");
-  impl_->scene = rtcNewScene(impl_->device);
-  RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
+  check_device(impl_->device);
+  const Owned<RTCGeometry, rtcReleaseGeometry> geometry(
+      rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT));
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 16, surfels.size()));
   auto* normals = static_cast<float*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_NORMAL, 0, RTC_FORMAT_FLOAT3, 12, surfels.size()));
-  if (surfels.size() > 0 && (!vertices || !normals)) throw std::bad_alloc();
+  check_device(impl_->device);
   // Fill them, and build the tree.
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     const glm::vec3 c = impl_->centre(static_cast<unsigned>(i));
@@ -185,8 +176,8 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
   rtcSetGeometryIntersectFilterFunction(geometry, &Impl::filter);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(impl_->scene, geometry);
-  rtcReleaseGeometry(geometry);
   rtcCommitScene(impl_->scene);
+  check_device(impl_->device);
 }
 
 DiscRays::~DiscRays() = default;
@@ -213,12 +204,11 @@ void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const B
   }
 }
 
-/// Returns the side of the largest square grid of at most that many rays.
-unsigned side_of(std::size_t rays) {
+}  // namespace
+
+unsigned DiscRays::side_of(std::size_t rays) noexcept {
   return static_cast<unsigned>(std::sqrt(static_cast<double>(rays)));
 }
-
-}  // namespace
 
 void DiscRays::meet(const Receiver& receiver, std::uint64_t seed, std::span<DiscHit> hits) const {
   const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, receiver.position);

@@ -22,6 +22,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/io/cloud/record.h"
+#include "engine/shade/outgoing.h"
 #include "format/node_layout.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -81,9 +82,7 @@ Front front_of(const GroupView& group, int i, const Cluster& c, const glm::vec3&
   Front front;
   for (int axis = 0; axis < 3; ++axis) {
     const int face = 2 * axis + (toward[axis] < 0 ? 1 : 0);
-    std::uint32_t rgbe = 0;
-    std::memcpy(&rgbe, group.radiance(face) + 4 * std::ptrdiff_t{i}, sizeof rgbe);
-    const std::array<float, 3> colour = decode_rgbe(rgbe);
+    const std::array<float, 3> colour = decode_rgbe(outgoing_rgbe(group, face, i));
     const float weight = std::abs(toward[axis]) * c.facing[static_cast<std::size_t>(face)];
     front.radiance += weight * glm::vec3(colour[0], colour[1], colour[2]);
     front.area += weight;
@@ -191,7 +190,7 @@ void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
   const std::uint32_t per_page = scene_.view().points_per_page();
   for (std::uint64_t k = run.first_point; k < run.first_point + run.point_count; ++k) {
     const PageGuard page = scene_.points(k);
-    const PointPage points(page.payload(), page.record_count());
+    const PointPage points(page.payload(), page.record_count(), scene_.view().point_bytes());
     const Surfel surfel =
         to_surfel(points[static_cast<std::uint32_t>(k % per_page)], scene_.view().frame());
     const glm::vec3 to(surfel.position - receiver.position);
@@ -199,7 +198,7 @@ void PlainGather::visit_points(const ChildRef& run, const Receiver& receiver) {
         height_of_top(to, receiver.normal, surfel.radius, surfel.normal, 0) <= 0)
       continue;
     ++counts_.surfels;
-    queue_.push(to, surfel.normal, surfel.radius, pack(surfel.radiance));
+    queue_.push(to, surfel.normal, surfel.radius, pack(surfel.outgoing()));
     if (!queue_.full()) continue;
     buffer_.draw(*grid_, queue_, options_.sides);
     queue_.size = 0;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/point_page.h"
+
 namespace ptc {
 namespace {
 
@@ -18,7 +20,7 @@ StreamedRays::StreamedRays(const ContainerReader& scene, Sides sides,
     : scene_(scene), sides_(sides), sky_(std::move(sky)) {
   const std::uint64_t for_hits = std::min<std::uint64_t>(memory_bytes / 4, std::uint64_t{64} << 20);
   hit_count_ = static_cast<std::size_t>(for_hits / sizeof(DiscHit));
-  const std::uint64_t page_bytes = kSurfelBytes * std::max(1U, scene.superblock().points_per_page);
+  const std::uint64_t page_bytes = kSurfelBytes * points_per_page(scene.header());
   pages_of_part_ =
       static_cast<std::size_t>(std::max<std::uint64_t>(1, (memory_bytes - for_hits) / page_bytes));
   parts_ = (scene.point_pages().size() + pages_of_part_ - 1) / pages_of_part_;
@@ -29,11 +31,11 @@ void StreamedRays::load(std::size_t part) {
   // Read the pages of the part, after the tree of the last one is gone.
   if (rays_ && loaded_ == part) return;
   rays_.reset();
-  const auto pages = scene_.point_pages().subspan(
+  const PageNumbers::Range pages = scene_.point_pages().subrange(
       part * pages_of_part_,
       std::min(pages_of_part_, scene_.point_pages().size() - part * pages_of_part_));
   surfels_.clear();
-  surfels_.reserve(pages.size() * scene_.superblock().points_per_page);
+  surfels_.reserve(pages.size() * points_per_page(scene_.header()));
   append_surfels(scene_, pages, surfels_);
   // Build its tree in the frame of the whole scene, the same for every part.
   const Superblock& whole = scene_.superblock();
@@ -47,7 +49,7 @@ void StreamedRays::load(std::size_t part) {
 void StreamedRays::trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
                          std::span<Shading> results, const Executor& executor, Progress& progress) {
   // Find how many receivers have room for their rays at once.
-  const auto side = static_cast<std::size_t>(std::sqrt(static_cast<double>(rays)));
+  const std::size_t side = DiscRays::side_of(rays);
   const std::size_t rays_of_each = side * side;
   const std::size_t batch = std::clamp<std::size_t>(hit_count_ / rays_of_each, 1,
                                                     std::max<std::size_t>(1, receivers.size()));

@@ -30,8 +30,7 @@ class StreamedRays {
   /// Loads the first part.
   /// @param scene         must outlive this
   /// @param sides         which sides of surfels stop rays
-  /// @param sky           radiance that arrives from a direction (unit); empty where there is no
-  /// sky
+  /// @param sky           radiance that arrives from a direction (unit); empty without a sky
   /// @param memory_bytes  cap, at least kMinBytes
   StreamedRays(const ContainerReader& scene, Sides sides,
                std::function<glm::vec3(const glm::vec3&)> sky, std::uint64_t memory_bytes);

@@ -22,8 +22,7 @@ struct Picture {
 /// versions of cairo give equal bytes. A PNG has two pixels for each unit. The file is published
 /// whole or not at all.
 /// @throws std::system_error; std::invalid_argument when the ending is neither .svg nor .png, a
-/// text
-///         is not UTF-8, or the picture is larger than 16000 units
+///         text is not UTF-8, or the picture is larger than 16000 units
 void write_picture(const std::filesystem::path& target, const Picture& picture);
 
 }  // namespace ptc

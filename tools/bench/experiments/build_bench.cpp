@@ -21,6 +21,7 @@
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "engine/verify/verify.h"
+#include "tools/bench/experiments/bench_run.h"
 #include "tools/bench/experiments/stored_bytes.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
@@ -46,17 +47,9 @@ struct Built {
 };
 
 /// Runs all builds that were asked for.
-class BuildRun {
+class BuildRun : BenchRun<BuildBenchOptions, BuildRow> {
  public:
-  BuildRun(const BuildBenchOptions& options, const std::filesystem::path& work,
-           const RunOptions& run, Progress& progress,
-           const std::function<void(const std::vector<BuildRow>&)>& report)
-      : options_(options),
-        work_(work),
-        run_(run),
-        executor_(run.threads),
-        progress_(progress),
-        report_(report) {}
+  using BenchRun::BenchRun;
 
   std::vector<BuildRow> measure() {
     for (const std::uint64_t points : options_.points) {
@@ -126,7 +119,7 @@ class BuildRun {
     const Built& moved = methods.begin()->second.second;
     add_row(panel, "floor", input, floor).moved_bytes =
         input.file.bytes() + 2 * moved.spilled + moved.file_bytes;
-    if (report_) report_(rows_);
+    report();
   }
 
   BuildRow& add_row(const std::string& panel, const std::string& method, const Input& input,
@@ -138,7 +131,7 @@ class BuildRun {
                                        .wall = spread_of(times.wall),
                                        .cpu = spread_of(times.cpu),
                                        .input_bytes = input.file.bytes(),
-                                       .resident_bytes = times.resident});
+                                       .resident_bytes = times.peak});
   }
 
   /// Builds a container at target_ under a cap.
@@ -193,15 +186,9 @@ class BuildRun {
     built.stored = stored_bytes(ContainerReader(target_));
   }
 
-  const BuildBenchOptions& options_;
-  std::filesystem::path work_;
   WorkFile file_{work_, ".ptcx"};
   const std::filesystem::path& target_ = file_.path();
-  RunOptions run_;
-  ThreadPool executor_;
-  Progress& progress_;
-  const std::function<void(const std::vector<BuildRow>&)>& report_;
-  std::vector<BuildRow> rows_;
+  ThreadPool executor_{run_.threads};
   std::map<std::pair<std::uint64_t, std::string>, std::array<std::uint64_t, 2>> contents_;
 };
 

@@ -44,7 +44,7 @@ struct BuildRow {
   Spread cpu;                      ///< seconds, user and system, all threads
   std::uint64_t moved_bytes = 0;   ///< read and written by all passes together
   std::uint64_t input_bytes = 0;
-  std::uint64_t resident_bytes = 0;  ///< maximum during a run, less those before it
+  std::uint64_t resident_bytes = 0;  ///< maximum of the whole program during a run
   std::uint64_t nodes = 0;
   double bytes_per_point = 0, bytes_per_node = 0;  ///< StoredBytes
 };

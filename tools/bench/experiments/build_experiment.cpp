@@ -14,7 +14,8 @@ constexpr char kReading[] =
     "fast is LZ4. The floor is the time in which the same disk moves the bytes of the first "
     "profile without any work on them: the input is read, the spilled bytes are written and read, "
     "and as many bytes as the container has are written. Floor / build is that time as a share of "
-    "the build's. Moved bytes are read or written. Peak memory is what a run adds to the program. "
+    "the build's. Moved bytes are read or written. Peak memory is the maximum of resident memory "
+    "of the whole program during a run. "
     "Containers were verified, and are the same under every cap.";
 
 /// Nanoseconds per point.
@@ -58,10 +59,6 @@ Columns<BuildRow> columns_of(const std::vector<BuildRow>& rows) {
           {"bytes_per_node", {"stored bytes/node", "{:.2f}"}, of_build(&R::bytes_per_node)},
           {"floor_share", percent("floor / build %", "{:.0f}"),
            [&rows](const R& r) { return floor_share(rows, r); }}};
-}
-
-double mebibytes(std::uint64_t bytes) {
-  return static_cast<double>(bytes) / kMebi;
 }
 
 /// Makes a panel with a line for each method, over points or, for the panel "cap", over the cap.

@@ -26,6 +26,7 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/run.h"
 #include "engine/shade/shader.h"
+#include "tools/bench/experiments/bench_run.h"
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/growth.h"
 #include "tools/bench/references/timed_runs.h"
@@ -135,8 +136,7 @@ class HitRun {
   static constexpr std::size_t kLookups = 4'000'000;
 
   /// @param slots  slots of a reader's own level: kPages, so that it finds every page there, or 1,
-  /// so
-  ///               that it finds none
+  ///               so that it finds none
   HitRun(const ContainerReader& container, const std::string& method, Replacement replacement,
          std::uint32_t slots, unsigned threads)
       : method_(method),
@@ -222,17 +222,9 @@ class HitRun {
 };
 
 /// Runs all panels that were asked for.
-class CacheRun {
+class CacheRun : BenchRun<CacheBenchOptions, CacheRow> {
  public:
-  CacheRun(const CacheBenchOptions& options, const std::filesystem::path& work,
-           const RunOptions& run, Progress& progress,
-           const std::function<void(const std::vector<CacheRow>&)>& report)
-      : options_(options),
-        work_(work),
-        run_(run),
-        threads_(ThreadPool(run.threads).threads()),
-        progress_(progress),
-        report_(report) {}
+  using BenchRun::BenchRun;
 
   std::vector<CacheRow> measure() {
     {
@@ -262,10 +254,6 @@ class CacheRun {
   }
 
  private:
-  [[nodiscard]] bool wants(const char* panel) const {
-    return std::ranges::find(options_.panels, panel) != options_.panels.end();
-  }
-
   [[nodiscard]] BenchScene make_scene(int levels_per_stream, std::uint8_t page_shift) {
     require_room({&work_, 1}, build_disk_bytes(options_.points),
                  fmt::format("{} surfels", options_.points));
@@ -280,7 +268,7 @@ class CacheRun {
 
   void add(CacheRow row) {
     rows_.push_back(std::move(row));
-    if (report_) report_(rows_);
+    report();
   }
 
   void measure_hits(const ContainerReader& container) {
@@ -366,13 +354,7 @@ class CacheRun {
     }
   }
 
-  const CacheBenchOptions& options_;
-  const std::filesystem::path& work_;
-  const RunOptions& run_;
-  unsigned threads_;
-  Progress& progress_;
-  const std::function<void(const std::vector<CacheRow>&)>& report_;
-  std::vector<CacheRow> rows_;
+  unsigned threads_ = ThreadPool(run_.threads).threads();
 };
 
 }  // namespace

@@ -116,12 +116,8 @@ Report report_of(const std::vector<CacheRow>& rows, unsigned runs) {
 Experiment make_cache_experiment() {
   const auto options = std::make_shared<CacheBenchOptions>();
   const auto declare = [options](Declaration& d) {
-    add_count(d.command(), "--points", options->points, "Points of the city")->default_str("6M");
-    d.quick("--points", options->points, 1'000'000);
-    add_count(d.command(), "--receivers", options->receivers,
-              "Receivers among these points, in blocks of neighbours")
-        ->default_str("65536");
-    d.quick("--receivers", options->receivers, 8'192);
+    d.city_points(options->points, "6M", 1'000'000);
+    d.block_receivers(options->receivers, "65536", 8'192);
     d.words("--panel", options->panels, "Measure only this part; repeatable");
     d.repeats(options->repeats, 2);
     d.quick(options->caps, {1, 0.29, 0.09});

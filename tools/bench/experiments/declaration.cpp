@@ -12,18 +12,11 @@
 namespace ptc::bench {
 namespace {
 
-/// The words as "one|two|three".
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : "|") + word;
-  return text;
-}
-
 /// Refuses any word but these.
 CLI::Validator one_of(const std::vector<std::string>& known) {
   const auto check = [known](const std::string& text) {
     const bool found = std::ranges::find(known, text) != known.end();
-    return found ? std::string() : "expects " + joined(known) + ", not '" + text + "'";
+    return found ? std::string() : "expects " + join(known, "|") + ", not '" + text + "'";
   };
   return {check, ""};
 }
@@ -75,11 +68,24 @@ void Declaration::scenes(SceneList& scenes) {
   quick("scenes", scenes.texts_, {scenes.texts_.front()});
 }
 
+void Declaration::count(const char* name, std::uint64_t& value, const char* description,
+                        const char* shown, std::uint64_t less) {
+  add_count(*command_, name, value, description)->default_str(shown);
+  quick(name, value, less);
+}
+
 void Declaration::points(std::uint64_t& points, const char* shown, std::uint64_t less) {
-  add_count(*command_, "--points", points,
-            "Surfels wanted of a mesh or the city; k, M, G count by 1000")
-      ->default_str(shown);
-  quick("--points", points, less);
+  count("--points", points, "Surfels wanted of a mesh or the city; k, M, G count by 1000", shown,
+        less);
+}
+
+void Declaration::city_points(std::uint64_t& points, const char* shown, std::uint64_t less) {
+  count("--points", points, "Points of the city", shown, less);
+}
+
+void Declaration::block_receivers(std::uint64_t& receivers, const char* shown, std::uint64_t less) {
+  count("--receivers", receivers, "Receivers among these points, in blocks of neighbours", shown,
+        less);
 }
 
 void Declaration::points(std::vector<std::uint64_t>& points, const std::string& description,
@@ -102,7 +108,7 @@ void Declaration::repeats(unsigned& repeats, unsigned less) {
 
 CLI::Option* Declaration::words(const char* name, std::vector<std::string>& chosen,
                                 const char* description) {
-  const std::string text = std::string(description) + " (" + joined(chosen) + ")";
+  const std::string text = std::string(description) + " (" + join(chosen, "|") + ")";
   return offer(command_->add_option(name, chosen, text), chosen)
       ->type_name("NAME")
       ->allow_extra_args(false)

@@ -69,6 +69,14 @@ class Declaration {
   /// @param less  the values of --quick
   void points(std::vector<std::uint64_t>& points, const std::string& description,
               std::vector<std::uint64_t> less);
+  /// Declares --points of the city.
+  /// @param shown  the default as the help shows it
+  /// @param less   the value of --quick
+  void city_points(std::uint64_t& points, const char* shown, std::uint64_t less);
+  /// Declares --receivers, the number of receivers in blocks of neighbours.
+  /// @param shown  the default as the help shows it
+  /// @param less   the value of --quick
+  void block_receivers(std::uint64_t& receivers, const char* shown, std::uint64_t less);
   /// Declares --checked, the number of receivers whose error is measured.
   /// @param less  the value of --quick
   void checked(unsigned& checked, unsigned less);
@@ -94,6 +102,9 @@ class Declaration {
   CLI::Option* words(const char* name, std::vector<std::string>& chosen, const char* description);
 
  private:
+  void count(const char* name, std::uint64_t& value, const char* description, const char* shown,
+             std::uint64_t less);
+
   CLI::App* command_;
   std::vector<std::function<void()>> quick_;
 };

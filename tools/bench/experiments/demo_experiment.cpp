@@ -24,7 +24,8 @@ namespace {
 constexpr char kReading[] =
     "The work of ptcbuild, ptcverify, ptcshade and ptcrender on a scene under one memory cap, done "
     "by one process: reading the inputs, everything between, and writing the outputs. Peak memory "
-    "is what a stage adds to the program. Gather CPU is the time of the gather alone. Errors are "
+    "is the maximum of resident memory of the whole program during a stage. Gather CPU is the time "
+    "of the gather alone. Errors are "
     "the root mean square (RMS) and the mean (bias) of the difference between some of the "
     "picture's receivers and rays, at the same surfels and at the mesh, without the error of the "
     "rays themselves; those of irradiance are shares of its mean.";
@@ -54,8 +55,8 @@ struct DemoRow {
   std::string scene, stage;
   std::uint64_t memory_bytes = 0;
   unsigned threads = 0;
-  Spread wall, cpu;  ///< seconds
-  std::uint64_t resident_bytes = 0;
+  Spread wall, cpu;                  ///< seconds
+  std::uint64_t resident_bytes = 0;  ///< maximum of the whole program during a run
   std::uint64_t points = 0, nodes = 0, file_bytes = 0;
   std::optional<LightingReport> shaded;
 };
@@ -212,7 +213,7 @@ class DemoRun {
             .threads = ThreadPool(bench_.run.threads).threads(),
             .wall = spread_of(times_[stage].wall),
             .cpu = spread_of(times_[stage].cpu),
-            .resident_bytes = times_[stage].resident,
+            .resident_bytes = times_[stage].peak,
             .points = built_.points,
             .nodes = built_.nodes,
             .file_bytes = built_.file_bytes,

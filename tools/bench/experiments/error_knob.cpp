@@ -7,6 +7,7 @@
 #include "engine/pipeline/run.h"
 #include "engine/shade/lift.h"
 #include "engine/shade/reference/brute_force.h"
+#include "format/point_page.h"
 #include "tools/bench/experiments/work_file.h"
 
 namespace ptc::bench {
@@ -38,8 +39,8 @@ ErrorRow row_of(const std::string& scene, const char* set, const LightingReport&
 /// Whole blocks of the scene's points, evenly spread, so that locality is that of shading all
 /// points.
 std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, float lift) {
-  const std::span<const std::uint32_t> pages = container.point_pages();
-  const std::size_t per_page = std::max(1U, container.superblock().points_per_page);
+  const PageNumbers::Range pages = container.point_pages();
+  const std::size_t per_page = points_per_page(container.header());
   const std::size_t pages_of_block = (Shader::kBlock + per_page - 1) / per_page;
   const std::size_t count =
       std::min<std::size_t>(wanted, std::max<std::size_t>(1, pages.size() / pages_of_block));
@@ -48,7 +49,7 @@ std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, 
     const std::size_t first = (pages.size() - std::min(pages.size(), pages_of_block)) * i /
                               std::max<std::size_t>(1, count - 1);
     std::vector<Surfel> surfels;
-    append_surfels(container, pages.subspan(first, std::min(pages_of_block, pages.size() - first)),
+    append_surfels(container, pages.subrange(first, std::min(pages_of_block, pages.size() - first)),
                    surfels);
     surfels.resize(std::min(surfels.size(), Shader::kBlock));
     for (const Surfel& s : surfels)

@@ -48,6 +48,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_instructions_experiment();
 [[nodiscard]] Experiment make_model_experiment();
 [[nodiscard]] Experiment make_mutations_experiment();
+[[nodiscard]] Experiment make_remote_experiment();
 [[nodiscard]] Experiment make_scale_experiment();
 [[nodiscard]] Experiment make_sort_experiment();
 [[nodiscard]] Experiment make_verify_experiment();

@@ -24,6 +24,7 @@
 #include "engine/shade/shader.h"
 #include "engine/sort/spill.h"
 #include "tools/bench/experiments/accuracy.h"
+#include "tools/bench/experiments/bench_run.h"
 #include "tools/bench/references/methods.h"
 #include "tools/bench/references/reference.h"
 #include "tools/bench/references/timed_runs.h"
@@ -121,18 +122,9 @@ class Truth {
 };
 
 /// Runs all panels that were asked for.
-class GrowthRun {
+class GrowthRun : BenchRun<GrowthOptions, GrowthRow> {
  public:
-  using Report = std::function<void(const std::vector<GrowthRow>&)>;
-
-  GrowthRun(const GrowthOptions& options, const std::filesystem::path& work, const RunOptions& run,
-            Progress& progress, const Report& report)
-      : options_(options),
-        work_(work),
-        run_(run),
-        executor_(run.threads),
-        progress_(progress),
-        report_(report) {}
+  using BenchRun::BenchRun;
 
   std::vector<GrowthRow> measure() {
     if (wants("surfels")) {
@@ -147,15 +139,11 @@ class GrowthRun {
   }
 
  private:
-  [[nodiscard]] bool wants(const char* panel) const {
-    return std::ranges::find(options_.panels, panel) != options_.panels.end();
-  }
-
   /// Runs a part, and reports all rows so far.
   template <class... Arguments>
   void tell(void (GrowthRun::*part)(Arguments...), Arguments... arguments) {
     (this->*part)(arguments...);
-    if (report_) report_(rows_);
+    report();
   }
 
   [[nodiscard]] bool in_reach(std::uint64_t points) const { return points <= options_.ray_reach; }
@@ -258,13 +246,7 @@ class GrowthRun {
     }
   }
 
-  const GrowthOptions& options_;
-  const std::filesystem::path& work_;
-  const RunOptions& run_;
-  ThreadPool executor_;
-  Progress& progress_;
-  const Report& report_;
-  std::vector<GrowthRow> rows_;
+  ThreadPool executor_{run_.threads};
 };
 
 }  // namespace

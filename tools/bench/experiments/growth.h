@@ -58,8 +58,7 @@ struct GrowthRow {
 
 /// Measures everything that was asked for in one process; the variants of a panel take turns.
 /// @param work    directory for the containers, one after another, which have no names there once
-/// they
-///                are open
+///                they are open
 /// @param report  called with all rows so far, whenever there are more
 /// @throws std::system_error (ENOSPC) before a build when `work` has no room for it; as BenchScene
 [[nodiscard]] std::vector<GrowthRow> measure_growth(

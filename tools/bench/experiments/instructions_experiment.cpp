@@ -129,12 +129,8 @@ Report measure(const InstructionOptions& options, const Bench& bench) {
 Experiment make_instructions_experiment() {
   const auto options = std::make_shared<InstructionOptions>();
   const auto declare = [options](Declaration& d) {
-    add_count(d.command(), "--points", options->points, "Points of the city")->default_str("2M");
-    d.quick("--points", options->points, 50'000);
-    add_count(d.command(), "--receivers", options->receivers,
-              "Receivers among these points, in blocks of neighbours")
-        ->default_str("20k");
-    d.quick("--receivers", options->receivers, 8'192);
+    d.city_points(options->points, "2M", 50'000);
+    d.block_receivers(options->receivers, "20k", 8'192);
     d.checked(options->checked, 100);
     d.repeats(options->repeats, 2);
     d.quick(options->reference_rays, 1024);

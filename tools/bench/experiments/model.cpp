@@ -29,8 +29,9 @@ std::unique_ptr<ContainerReader> with_leaves(const ContainerReader& from, std::u
                                              const std::filesystem::path& work) {
   return make_temporary_container(work, [&](const std::filesystem::path& path) {
     ContainerPoints points(from);
-    ContainerWriter writer(path,
-                           {.page_shift = from.header().page_shift, .frame = from.header().frame});
+    ContainerWriter writer(path, {.page_shift = from.header().page_shift,
+                                  .frame = from.header().frame,
+                                  .point_bytes = from.header().point_bytes});
     Progress silent;
     const Superblock superblock =
         build_pages(points, writer, {.leaf_points = leaf_points}, ThreadPool(), silent);

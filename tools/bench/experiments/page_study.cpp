@@ -54,20 +54,21 @@ double moved(const PointRecord& from, const PointRecord& to, const Frame& frame)
 /// Encodes the points, rounded or as they are, page by page.
 PointPayloads point_payloads(const ContainerReader& container, bool rounded) {
   const Frame& frame = container.header().frame;
+  const std::uint8_t point_bytes = container.header().point_bytes;
   ContainerPoints originals(container), points(container);
   const ThreadPool executor(1);
   const std::unique_ptr<PointStream> rounding =
       rounded ? round_points(points, frame.unit(), executor) : nullptr;
   PointPayloads out;
-  std::vector<PointRecord> from(container.superblock().points_per_page), to(from.size());
+  std::vector<PointRecord> from(points_per_page(container.header())), to(from.size());
   while (const std::size_t count =
              originals.next(from)) {  // both streams return one page at a time
     const std::size_t same = rounding ? rounding->next(to) : points.next(to);
     if (same != count) throw std::logic_error("point_payloads: streams differ");
     for (std::size_t i = 0; i < count; ++i)
       out.moved = std::max(out.moved, moved(from[i], to[i], frame));
-    out.pages.push_back({encode_point_page(std::span(to).first(count)),
-                         {static_cast<std::uint32_t>(count), packed_point_columns()}});
+    out.pages.push_back({encode_point_page(std::span(to).first(count), point_bytes),
+                         {static_cast<std::uint32_t>(count), packed_point_columns(point_bytes)}});
   }
   return out;
 }

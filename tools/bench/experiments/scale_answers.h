@@ -28,8 +28,7 @@ void require_same(const ScaleAnswers& first, const ScaleAnswers& now);
 /// Returns a digest of the points of a binary PLY as PlyWriter writes it.
 /// @param points  number of points that it must hold
 /// @throws DataError naming file, point and property when a value is not finite, or the file when
-/// the
-///         number of points differs; std::system_error
+///         the number of points differs; std::system_error
 /// Memory: the size of the file.
 [[nodiscard]] std::uint64_t digest_of_values(const std::filesystem::path& ply,
                                              std::uint64_t points);

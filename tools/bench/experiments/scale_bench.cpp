@@ -17,6 +17,7 @@
 #include "engine/pipeline/build/build_space.h"
 #include "engine/sort/spill.h"
 #include "engine/verify/verify.h"
+#include "tools/bench/experiments/bench_run.h"
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/scale_answers.h"
 #include "tools/bench/experiments/stored_bytes.h"
@@ -55,15 +56,12 @@ struct SizeRuns {
 };
 
 /// Runs all sizes that were asked for.
-class ScaleRun {
+class ScaleRun : BenchRun<ScaleOptions, ScaleRow> {
  public:
-  ScaleRun(const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run,
-           Progress& progress, const std::function<void(const std::vector<ScaleRow>&)>& report)
-      : options_(options), work_(work), run_(run), progress_(progress), report_(report) {
-    run_.temp_dirs = {work_};
-  }
+  using BenchRun::BenchRun;
 
   std::vector<ScaleRow> measure() {
+    run_.temp_dirs = {work_};
     tell_space(options_.points.back());
     for (const std::uint64_t points : options_.points) {
       SizeRuns runs;
@@ -76,7 +74,7 @@ class ScaleRun {
       }
       progress_.end();
       add_rows(runs);
-      if (report_) report_(rows_);
+      report();
     }
     return std::move(rows_);
   }
@@ -197,14 +195,8 @@ class ScaleRun {
         2 * runs.answers.points * sizeof(PointRecord);
   }
 
-  const ScaleOptions& options_;
-  std::filesystem::path work_;
   WorkFile scene_file_{work_, ".ptcx"}, lit_file_{work_, ".ply"};
   const std::filesystem::path &scene_ = scene_file_.path(), &lit_ = lit_file_.path();
-  RunOptions run_;
-  Progress& progress_;
-  const std::function<void(const std::vector<ScaleRow>&)>& report_;
-  std::vector<ScaleRow> rows_;
 };
 
 }  // namespace

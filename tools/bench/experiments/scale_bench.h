@@ -62,8 +62,8 @@ struct ScaleRow {
 /// @param work    directory for the files, which are gone at the end
 /// @param report  called with all rows so far, whenever there are more
 /// @throws std::system_error (ENOSPC) before anything is built when there is no room for the
-/// largest
-///         size; DataError when an answer is wrong; as build_container() and shade_container()
+///         largest size; DataError when an answer is wrong; as build_container() and
+///         shade_container()
 [[nodiscard]] std::vector<ScaleRow> measure_scale(
     const ScaleOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const std::function<void(const std::vector<ScaleRow>&)>& report = {});

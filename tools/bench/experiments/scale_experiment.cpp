@@ -41,10 +41,6 @@ double floor_share(const std::vector<ScaleRow>& rows, const ScaleRow& row) {
   return found == rows.end() ? kNone : found->wall.median / row.wall.median;
 }
 
-double mebibytes(std::uint64_t bytes) {
-  return static_cast<double>(bytes) / kMebi;
-}
-
 Columns<ScaleRow> columns_of(const std::vector<ScaleRow>& rows) {
   using R = ScaleRow;
   const auto only = [](const char* stage, auto member) {

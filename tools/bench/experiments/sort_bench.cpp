@@ -18,6 +18,8 @@
 #include "engine/base/numbers.h"
 #include "engine/io/file/disk_space.h"
 #include "engine/parallel/thread_pool.h"
+#include "engine/sort/radix_sort.h"
+#include "tools/bench/experiments/bench_run.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
 
@@ -102,16 +104,9 @@ bool by_key(const PointRecord& a, const PointRecord& b) noexcept {
 }
 
 /// Runs all sorts that were asked for.
-class SortRun {
+class SortRun : BenchRun<SortBenchOptions, SortRow> {
  public:
-  SortRun(const SortBenchOptions& options, const std::filesystem::path& work, const RunOptions& run,
-          Progress& progress, const std::function<void(const std::vector<SortRow>&)>& report)
-      : options_(options),
-        work_(work),
-        run_(run),
-        executor_(run.threads),
-        progress_(progress),
-        report_(report) {}
+  using BenchRun::BenchRun;
 
   std::vector<SortRow> measure() {
     for (const std::string& panel : options_.panels) {
@@ -119,7 +114,7 @@ class SortRun {
         if (panel == "memory" && points > options_.memory_points) continue;
         for (const std::string& order : options_.orders) {
           panel == "memory" ? in_memory(order, points) : on_disk(order, points);
-          if (report_) report_(rows_);
+          report();
         }
       }
     }
@@ -258,13 +253,7 @@ class SortRun {
     return sorter.statistics().spilled_bytes;
   }
 
-  const SortBenchOptions& options_;
-  std::filesystem::path work_;
-  RunOptions run_;
-  ThreadPool executor_;
-  Progress& progress_;
-  const std::function<void(const std::vector<SortRow>&)>& report_;
-  std::vector<SortRow> rows_;
+  ThreadPool executor_{run_.threads};
 };
 
 }  // namespace

@@ -155,8 +155,7 @@ Report measure(const VerifyBenchOptions& options, const Bench& bench) {
 Experiment make_verify_experiment() {
   const auto options = std::make_shared<VerifyBenchOptions>();
   const auto declare = [options](Declaration& d) {
-    add_count(d.command(), "--points", options->points, "Points of the city")->default_str("20M");
-    d.quick("--points", options->points, 200'000);
+    d.city_points(options->points, "20M", 200'000);
     d.repeats(options->repeats, 3);
   };
   return {

@@ -54,8 +54,9 @@ std::uint64_t TimedRuns::begin() {
 }
 
 void TimedRuns::end(std::uint64_t resident_before) {
-  const std::uint64_t peak = peak_resident_bytes();
-  resident = std::max(resident, peak - std::min(peak, resident_before));
+  const std::uint64_t now = peak_resident_bytes();
+  resident = std::max(resident, now - std::min(now, resident_before));
+  peak = std::max(peak, now);
 }
 
 }  // namespace ptc::bench

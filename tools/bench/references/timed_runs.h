@@ -52,7 +52,8 @@ struct Costs {
 
 /// Times of the runs of one method, and the maximum of memory that one of them took.
 struct TimedRuns : Costs {
-  std::uint64_t resident = 0;  ///< maximum of bytes during a run, less those before it
+  std::uint64_t resident = 0;  ///< maximum of resident bytes during a run, less those before it
+  std::uint64_t peak = 0;      ///< maximum of resident bytes of the whole program during a run
 
   /// Calls body(), and records its time and memory.
   template <class Body>

@@ -46,6 +46,11 @@ template <class T>
 /// Units in which tables show shares and bytes.
 inline constexpr double kPercent = 0.01, kMebi = 1048576, kGiga = 1e9;
 
+/// Bytes in MiB.
+[[nodiscard]] inline double mebibytes(std::uint64_t bytes) {
+  return static_cast<double>(bytes) / kMebi;
+}
+
 /// How people see a column, in text and in Markdown.
 struct Shown {
   std::string heading;        ///< heading with unit; empty: the column is only in JSON and CSV

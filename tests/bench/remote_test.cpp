@@ -1,0 +1,69 @@
+#include "tools/bench/experiments/remote.h"
+
+#include <catch2/catch.hpp>
+
+#include "engine/ptc.h"
+#include "engine/store/reader.h"
+#include "tests/support/temporary_directory.h"
+
+using namespace ptc;
+using namespace ptc::bench;
+
+namespace {
+
+std::filesystem::path city(const test::TemporaryDirectory& scratch, std::uint64_t points) {
+  const std::filesystem::path path = scratch.path() / "city.ptcx";
+  Progress silent;
+  static_cast<void>(build_container({.city_points = points}, path, silent));
+  return path;
+}
+
+}  // namespace
+
+// The table of `ptcbench remote` has the counts for 200 million points, which are lower: there the
+// coarse nodes that this view takes fill fewer levels.
+TEST_CASE("remote: a view of a whole city takes few requests and few bytes", "[bench][remote]") {
+  const test::TemporaryDirectory scratch;
+  const InputFile file(city(scratch, 4'000'000));
+  FileRanges ranges(file);
+  CountingRanges source(ranges);
+  PartialReader scene(source);
+  CHECK(source.requests() == 1);
+  CHECK(source.bytes() <= 300'000);
+  REQUIRE(scene.superblock().node_pages > 500);
+
+  ViewChoice choice(scene, views_of(scene.superblock()).front());
+  const std::size_t coarse = choice.choose(500);
+  CHECK((coarse >= 500 && coarse < 508));
+  CHECK(source.requests() <= 3);
+  CHECK(source.bytes() <= 300'000);
+
+  const std::uint64_t requests = source.requests(), bytes = source.bytes();
+  const std::size_t fine = choice.choose(10'000);
+  CHECK((fine >= 10'000 && fine < 10'008));
+  CHECK(source.requests() - requests <= 15);
+  CHECK(source.bytes() - bytes <= 1'300'000);
+}
+
+TEST_CASE("remote: a view of as many nodes as there are divides them all", "[bench][remote]") {
+  const test::TemporaryDirectory scratch;
+  const InputFile file(city(scratch, 100'000));
+  FileRanges ranges(file);
+  PartialReader scene(ranges);
+  ViewChoice choice(scene, views_of(scene.superblock()).front());
+  // Every node is a leaf or divided, and each but the root's stands in a group.
+  CHECK(choice.choose(1'000'000) == scene.superblock().nodes - scene.superblock().node_groups + 1);
+}
+
+TEST_CASE("remote: what lies behind the eye is neither loaded nor counted", "[bench][remote]") {
+  const test::TemporaryDirectory scratch;
+  const InputFile file(city(scratch, 100'000));
+  FileRanges ranges(file);
+  CountingRanges inside(ranges), everywhere(ranges);
+  PartialReader less(inside), all(everywhere);
+  ConeView view = views_of(less.superblock()).back();
+  const std::size_t seen = ViewChoice(less, view).choose(1'000'000);
+  view.half_angle = 4;
+  CHECK(seen < ViewChoice(all, view).choose(1'000'000) / 2);
+  CHECK(inside.bytes() < everywhere.bytes());
+}
