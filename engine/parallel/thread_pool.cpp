@@ -82,8 +82,8 @@ void require_threads(unsigned threads) {
     const std::size_t count = started.size();
     join();
     throw std::system_error(error.code(), "starting " + std::to_string(threads) +
-                                              " threads, of which the system allows " +
-                                              std::to_string(count));
+                                              " threads, of which only " + std::to_string(count) +
+                                              " fit the memory or the limit that the system sets");
   }
   join();
 }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/base/background.h"
 #include "engine/sort/radix_sort.h"
 
 namespace ptc {
@@ -93,9 +94,8 @@ BucketStream::BucketStream(BucketLoader loader, std::span<PointRecord> memory,
   const auto block = [&](std::size_t k) { return memory.subspan(k * quarter, quarter); };
   scratch_ = block(0);  // begins on a page boundary: a range that is partitioned again is written
                         // to disk from here
-  reading_ = std::async(std::launch::async, [this, out = block(1)] {
-    return loader_.read(out, [this] { return scratch_; });
-  });
+  reading_ = in_background(
+      [this, out = block(1)] { return loader_.read(out, [this] { return scratch_; }); });
   advance(block(2));
   current_ = block(3);
 }
@@ -110,15 +110,14 @@ void BucketStream::advance(std::span<PointRecord> free) {
     if (!read.sorted && !read.records.empty()) radix_sort(read.records, scratch_, executor_);
     return read;
   };
-  sorting_ = std::async(executor_.threads() == 1 ? std::launch::deferred : std::launch::async, sort)
-                 .share();
+  sorting_ = executor_.threads() == 1 ? std::async(std::launch::deferred, sort).share()
+                                      : in_background(sort).share();
   if (read.records.empty()) return;
   const auto scratch = [this, sorting = sorting_] {
     sorting.wait();
     return scratch_;
   };
-  reading_ =
-      std::async(std::launch::async, [this, free, scratch] { return loader_.read(free, scratch); });
+  reading_ = in_background([this, free, scratch] { return loader_.read(free, scratch); });
 }
 
 std::span<const PointRecord> BucketStream::next_block() {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/base/background.h"
 #include "engine/io/file/disk_space.h"
 #include "engine/sort/bucket_stream.h"
 #include "engine/sort/point_streams.h"
@@ -156,19 +157,20 @@ void ExternalSorter::spill() {
   // The first run is whole where it was not known that more would come.
   const bool whole_run = filling_.size() > part_records();
   const auto grouped = std::as_writable_bytes(whole_run ? scratch() : part(2 + turn_));
-  const auto group = [this, records, grouped, free = writing_[turn_]] {
+  auto group = [this, records, grouped, free = writing_[turn_]] {
     if (free.valid()) free.get();
     return partition_->group_run(records, ranges_of(records), grouped, executor_);
   };
   const bool at_once = whole_run || executor_.threads() == 1;
-  grouping_ = std::async(at_once ? std::launch::deferred : std::launch::async, group).share();
+  grouping_ = at_once ? std::async(std::launch::deferred, std::move(group)).share()
+                      : in_background(std::move(group)).share();
   if (at_once) grouping_.get();
   // Direct writes leave the processor free: another thread, even if the executor has only one.
-  writing_[turn_] = std::async(std::launch::async, [this, grouped, grouping = grouping_,
-                                                    before = writing_[1 - turn_]] {
-                      if (before.valid()) before.get();
-                      partition_->write_run(grouped, grouping.get());
-                    }).share();
+  writing_[turn_] =
+      in_background([this, grouped, grouping = grouping_, before = writing_[1 - turn_]] {
+        if (before.valid()) before.get();
+        partition_->write_run(grouped, grouping.get());
+      }).share();
   if (whole_run) writing_[1 - turn_] = writing_[turn_];
   turn_ = 1 - turn_;
   filling_ = whole_run || filling_.data() != part(0).data() ? part(0) : part(1);

@@ -6,6 +6,8 @@
 #include <future>
 #include <vector>
 
+#include "engine/base/background.h"
+
 namespace ptc {
 
 void for_each_transfer(std::size_t count,
@@ -16,7 +18,7 @@ void for_each_transfer(std::size_t count,
   };
   std::vector<std::future<void>> others;
   for (std::size_t worker = 1; worker < std::min(kTransfers, count); ++worker) {
-    others.push_back(std::async(std::launch::async, work, worker));
+    others.push_back(in_background([&work, worker] { work(worker); }));
   }
   work(0);
   for (auto& other : others) other.get();

@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/base/background.h"
 #include "engine/base/error.h"
 #include "engine/store/commit.h"
 #include "engine/store/structure.h"
@@ -195,7 +196,7 @@ void ContainerWriter::write_pages(std::vector<Page> pages, const Executor& execu
     for (const PageImage& image : std::span(images_).first(pages.size())) append_page(image);
   };
   if (executor.threads() == 1) return write();
-  writing_ = std::async(std::launch::async, std::move(write));
+  writing_ = in_background(std::move(write));
 }
 
 void ContainerWriter::write_stored_page(const PageSummary& summary, Coding coding,

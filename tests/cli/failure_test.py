@@ -195,7 +195,7 @@ class SystemFailure(ProgramTest):
         limited = run("ptcbuild", "--city", "100k", "--threads", "200", "--memory", "20G", "-o", self.here / "o.ptcx",
                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000)))
         self.assertEqual(limited.returncode, 3, limited.stderr)
-        self.assertRegex(limited.stderr, r"starting 199 threads, of which the system allows \d+")
+        self.assertRegex(limited.stderr, r"starting 199 threads, of which only \d+ fit the memory or the limit")
 
     def test_what_is_left_of_another_build_is_refused(self):
         command = ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx", "--resume"]

@@ -1,5 +1,5 @@
 // A library that is preloaded into a program under test: it interferes with the program's calls on
-// files below one directory, or with its allocations, and reports what it did. Environment
+// files below one directory, with its allocations or threads, and reports what it did. Environment
 // variables, set by harness.py, say what to do:
 //
 //   PTC_FAULTS_DIR     the directory
@@ -27,6 +27,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include <pthread.h>
+
 // The C library's own allocator, found without a search that would allocate.
 extern "C" void* __libc_malloc(std::size_t);
 extern "C" void* __libc_calloc(std::size_t, std::size_t);
@@ -35,7 +37,7 @@ extern "C" void* __libc_memalign(std::size_t, std::size_t);
 
 namespace {
 
-enum class How { nothing, error, interrupt, cut, none, stop, kill, memory };
+enum class How { nothing, error, interrupt, cut, none, stop, kill, memory, thread };
 
 struct Known {
   const char* name;
@@ -52,6 +54,7 @@ constexpr Known kHows[] = {
     {"stop", How::stop, 0},      // SIGSTOP before the call
     {"kill", How::kill, 0},      // SIGKILL before the call
     {"memory", How::memory, 0},  // an allocation or a mapping of memory fails, from main() on
+    {"thread", How::thread, 0},  // a thread cannot be started
 };
 
 enum class Kind { open, create, read, write, sync, close, name, other };
@@ -134,6 +137,7 @@ bool can_happen(Kind kind) {
   switch (how) {
     case How::nothing:
     case How::memory:
+    case How::thread:
       return false;
     case How::error:
       if (error_number == EMFILE) return kind == Kind::open || kind == Kind::create;
@@ -175,6 +179,17 @@ bool allocation_fails() {
   if (how != How::memory || !in_main || !counted_in()) return false;
   if (!on || calls == at) report("hit malloc\n");
   errno = ENOMEM;
+  return true;
+}
+
+// oneTBB ends a program in which it cannot start a thread: those of its own are not counted.
+bool thread_fails(const void* caller) {
+  if (how != How::thread || !in_main) return false;
+  Dl_info library;
+  if (::dladdr(caller, &library) != 0 && std::strstr(library.dli_fname, "libtbb") != nullptr)
+    return false;
+  if (!counted_in()) return false;
+  if (!on || calls == at) report("hit pthread_create\n");
   return true;
 }
 
@@ -398,6 +413,13 @@ void* mmap(void* where, std::size_t bytes, int protection, int flags, int fd,
   const bool fails = fd < 0 ? allocation_fails() : strikes("mmap", Kind::other, path_of(fd));
   if (fails) return MAP_FAILED;
   return real(where, bytes, protection, flags, fd, offset);
+}
+
+int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*run)(void*),
+                   void* argument) noexcept {
+  static const auto real = next_of(&::pthread_create, "pthread_create");
+  if (thread_fails(__builtin_return_address(0))) return EAGAIN;
+  return real(thread, attributes, run, argument);
 }
 
 void* malloc(std::size_t bytes) noexcept {

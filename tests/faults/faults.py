@@ -1,10 +1,11 @@
-"""Programs under faults: calls and allocations that fail, crashes, full disks, inputs that change.
+"""Programs under faults: calls, allocations and threads that fail, crashes, full disks, inputs that change.
 
 faults.py [--all] [--scenario NAME]... PART...; see README.md. Environment: harness.py.
 """
 
 import argparse
 import random
+import re
 import sys
 from collections import Counter
 
@@ -89,9 +90,26 @@ def fail_allocations(place, arguments, tally):
     print(f"  {place.scenario}: {count} allocations; exit codes of {codes.total()} runs: {dict(codes)}", flush=True)
 
 
-PARTS = {"calls": fail_calls, "memory": fail_allocations, "power": crashes.replay, "kill": crashes.kill,
+def fail_threads(place, arguments, tally):
+    """Lets every start of a thread fail, once and from then on: the result does not change where it can be had."""
+    count = place.run(how="thread").calls
+    codes = Counter()
+    for on in (False, True):
+        for at in arguments.steps(count, place.most(arguments, 8, 8)):
+            run = place.run(how="thread", at=at, on=on)
+            codes[run.code] += 1
+            wrong = place.complaints(run)
+            if run.code not in (0, 3) or (run.code == 3 and not re.search(r"starting \d+ threads", run.errors)):
+                wrong.append("neither done nor exit 3 for want of threads")
+            for text in wrong:
+                tally.fail(f"{place.scenario}: thread {at} of {count}{' and on' if on else ''}:"
+                           f" {text}; exit {run.code}: {run.errors.strip()[:300]}")
+    print(f"  {place.scenario}: {count} threads; exit codes of {codes.total()} runs: {dict(codes)}", flush=True)
+
+
+PARTS = {"calls": fail_calls, "memory": fail_allocations, "threads": fail_threads, "power": crashes.replay, "kill": crashes.kill,
          "disk": surroundings.fill, "change": surroundings.disturb}
-PRELOADED = {"calls", "memory", "power", "change"}
+PRELOADED = {"calls", "memory", "threads", "power", "change"}
 
 
 def main():

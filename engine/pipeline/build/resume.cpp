@@ -18,6 +18,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/base/background.h"
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
 #include "format/checksum.h"
@@ -273,7 +274,7 @@ CheckpointSaver::~CheckpointSaver() {
 void CheckpointSaver::save(const BuildPlace& place, std::vector<std::byte> build) {
   if (saving_.valid()) saving_.get();
   Checkpoint checkpoint{place, writer_.state(), std::move(build)};
-  saving_ = std::async(std::launch::async, [this, checkpoint = std::move(checkpoint)] {
+  saving_ = in_background([this, checkpoint = std::move(checkpoint)] {
     writer_.sync();
     resumption_.save(checkpoint);
     sorter_.discard_before(first_needed_(checkpoint.place.points));

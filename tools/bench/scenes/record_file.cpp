@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <random>
 
+#include "engine/base/background.h"
 #include "engine/io/cloud/record.h"
 #include "engine/scene/procedural/city.h"
 
@@ -74,9 +75,8 @@ void RecordWriter::flush() {
   const std::size_t slot = next_ % writing_.size();
   const std::span<const std::byte> block(buffers_.data() + slot * kBlockBytes,
                                          direct_blocks(filled_ * sizeof(PointRecord)));
-  writing_[slot] = std::async(std::launch::async, [this, block, at = next_ * kBlockBytes] {
-    file_.file_->write_at(at, block);
-  });
+  writing_[slot] =
+      in_background([this, block, at = next_ * kBlockBytes] { file_.file_->write_at(at, block); });
   file_.records_ += filled_;
   ++next_;
   filled_ = 0;
@@ -100,7 +100,7 @@ void RecordReader::read_ahead() {
   const std::uint64_t block = ahead_++;
   if (block >= blocks_of(file_)) return;
   const std::size_t slot = block % reading_.size();
-  reading_[slot] = std::async(std::launch::async, [this, block, slot] {
+  reading_[slot] = in_background([this, block, slot] {
     file_.file_->read_at(block * kBlockBytes,
                          {buffers_.data() + slot * kBlockBytes, file_.block_bytes(block)});
   });
