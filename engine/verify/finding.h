@@ -103,6 +103,12 @@ class Findings {
   /// @throws StopVerifying after the first damage when the constructor was given `fail_fast`
   void add(Finding finding);
 
+  /// Counts findings that another check found and did not keep.
+  void count(std::uint64_t damage, std::uint64_t warnings) noexcept {
+    damage_ += damage;
+    warnings_ += warnings;
+  }
+
   [[nodiscard]] const std::vector<Finding>& kept() const noexcept { return kept_; }
   /// Returns the number of findings of Severity::damage, including those not kept.
   [[nodiscard]] std::uint64_t damage() const noexcept { return damage_; }

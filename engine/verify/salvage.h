@@ -36,8 +36,9 @@ struct SalvageReport {
 /// Writes a new container from every point page and attribute page whose checksums hold, or hold
 /// after one bit is flipped back (spec/recovery.md#salvage). The octree is built again from the
 /// points, with the leaf size of the superblock, or the default where none is left. Lost channel
-/// values become 0.
-/// @throws RequestError when the target is the file itself
+/// values become their `no_value`, or 0. Of a scene of parts one file is made, from those of its
+/// parts that are there.
+/// @throws RequestError when the target is the file itself or one of its parts
 /// @throws FormatError when neither the header nor a superblock is intact, when a feature of the
 ///         file forbids it, or when no point is left
 /// @throws LimitError naming the smallest cap that works; std::system_error

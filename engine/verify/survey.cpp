@@ -241,7 +241,6 @@ class Surveyor {
   /// Adds a page that the directory lists.
   void list(const PageSite& site) {
     (site.entry.is_void() ? survey_.void_pages : survey_.sites).push_back(site);
-    if (!site.entry.is_void()) listed_.insert(site.identity());
   }
 
   /// Reads what is left of the directory, page by page, and reports its damaged pages.
@@ -265,7 +264,7 @@ class Surveyor {
         lost = true;
       }
     }
-    listed_all_ &= !lost && !bad_entries_;
+    listed_all_ &= !lost && !bad_entries_ && PageNumbers(s, {}).others().count == 0;
   }
 
   Diagnosis diagnose_directory_page(std::uint64_t offset, std::size_t bytes) {
@@ -306,13 +305,15 @@ class Surveyor {
 
   /// Adds the pages that the directory does not list, found by their headers.
   void scan() {
+    std::set<std::uint64_t> listed;
+    for (const PageSite& site : survey_.sites) listed.insert(site.identity());
     for_each_page(file_, *survey_.header, progress_,
                   [&](const PageHeader& header, std::uint64_t offset) {
                     const PageSite site{entry_of(header, offset), header.rank};
                     pages_end_ = offset + kPageHeaderBytes + header.stored_bytes;
                     has_directory_ |= header.type == PageType::directory;
                     has_meta_ |= header.type == PageType::meta;
-                    if (header.type != PageType::directory && !listed_.contains(site.identity())) {
+                    if (header.type != PageType::directory && !listed.contains(site.identity())) {
                       survey_.sites.push_back(site);
                     }
                   });
@@ -359,13 +360,12 @@ class Surveyor {
   FlipBudget& flips_;
   Progress& progress_;
   Survey survey_;
-  std::set<std::uint64_t> listed_;  ///< PageSite::identity() of pages that the directory lists
-  bool listed_all_ = false;         ///< every entry of the directory was read
-  bool bad_entries_ = false;        ///< an entry breaks a rule
-  bool no_superblock_ = false;      ///< there is no trace of a superblock
-  bool has_directory_ = false;      ///< a scan met a directory page
-  bool has_meta_ = false;           ///< a scan met a meta page
-  std::uint64_t pages_end_ = 0;     ///< end offset of the last page that a scan met
+  bool listed_all_ = false;      ///< every entry of the directory was read
+  bool bad_entries_ = false;     ///< an entry breaks a rule
+  bool no_superblock_ = false;   ///< there is no trace of a superblock
+  bool has_directory_ = false;   ///< a scan met a directory page
+  bool has_meta_ = false;        ///< a scan met a meta page
+  std::uint64_t pages_end_ = 0;  ///< end offset of the last page that a scan met
 };
 
 }  // namespace

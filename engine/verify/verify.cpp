@@ -77,7 +77,8 @@ class FileCheck {
     report_.file_bytes = file_.size();
     if (report_.pages) {
       report_.damaged_pages =
-          static_cast<std::uint64_t>(std::ranges::count(survey_.sites, false, &PageSite::sound));
+          static_cast<std::uint64_t>(std::ranges::count(survey_.sites, false, &PageSite::sound)) +
+          damaged_in_parts_;
     }
     report_.superblock = survey_.superblock;
     report_.sites = std::move(survey_.sites);
@@ -196,7 +197,7 @@ class FileCheck {
   static bool is_part(const std::filesystem::path& file) {
     if (!std::filesystem::is_regular_file(file)) return false;
     try {
-      return (read_file_header(InputFile(file)).feature_incompat & kPartsFeature) == 0;
+      return !read_file_header(InputFile(file)).has_parts();
     } catch (const FormatError&) {  // its own check reports it
       return true;
     }
@@ -243,15 +244,23 @@ class FileCheck {
     }
   }
 
+  /// Takes over what the check of a part found.
+  void add_part(const std::filesystem::path& file, VerifyReport& found) {
+    report_.pages = report_.pages.value_or(0) + found.pages.value_or(0);
+    damaged_in_parts_ += found.damaged_pages.value_or(0);
+    const auto kept_damage = static_cast<std::uint64_t>(
+        std::ranges::count(found.findings, Severity::damage, &Finding::severity));
+    findings_.count(found.damage - kept_damage,
+                    found.warnings - (found.findings.size() - kept_damage));
+    for (Finding& finding : found.findings) {
+      finding.file = file.string();
+      findings_.add(std::move(finding));
+    }
+  }
+
   /// Checks each part of a scene of parts as a file of its own, and then the scene with them.
   void check_parts(Progress& progress) {
-    if (!survey_.container->has_parts()) return;
-    const auto refuse = [&](const FormatError& error, const std::filesystem::path& file) {
-      Finding finding = finding_of(error, 1);
-      finding.cause = Cause::writer;
-      if (file != file_.path()) finding.file = file.string();
-      findings_.add(std::move(finding));
-    };
+    if (!survey_.header->has_parts()) return;
     std::uint64_t points = 0;
     const std::uint64_t before = findings_.damage();
     try {
@@ -260,11 +269,7 @@ class FileCheck {
         const std::filesystem::path file = file_.path().parent_path() / part.name;
         if (!is_part(file)) continue;  // opening the scene reports it
         VerifyReport found = FileCheck(file, options_).run(progress);
-        for (Finding& finding : found.findings) {
-          finding.file = file.string();
-          findings_.add(std::move(finding));
-        }
-        report_.pages = report_.pages.value_or(0) + found.pages.value_or(0);
+        add_part(file, found);
         points += found.points.value_or(0);
       }
       // Open the scene with its parts, unless what is wrong with them was found already.
@@ -276,7 +281,10 @@ class FileCheck {
         }
       }
     } catch (const FormatError& error) {
-      refuse(error, error.file().empty() ? file_.path() : std::filesystem::path(error.file()));
+      Finding finding = finding_of(error, 1);
+      finding.cause = Cause::writer;
+      if (error.file() != file_.path()) finding.file = error.file();
+      findings_.add(std::move(finding));
     }
     if (options_.level >= VerifyLevel::content) report_.points = points;
   }
@@ -284,7 +292,7 @@ class FileCheck {
   /// Walks the tree, excluding damaged pages, and takes over what it counted.
   void check_tree(Progress& progress) {
     // Without its parts a scene has no tree to walk.
-    if (survey_.container->has_parts() && survey_.container->parts().empty()) return;
+    if (survey_.header->has_parts() && survey_.container->parts().empty()) return;
     std::vector<bool> damaged(survey_.container->page_count());
     for (const PageSite& site : survey_.sites) {
       if (!site.sound) damaged[survey_.container->number_of(site.page)] = true;
@@ -327,6 +335,7 @@ class FileCheck {
   Survey survey_;
   VerifyReport report_;
   std::size_t cached_pages_ = kMinCachedPages;
+  std::uint64_t damaged_in_parts_ = 0;  ///< pages
 };
 
 }  // namespace

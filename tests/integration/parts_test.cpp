@@ -1,15 +1,19 @@
 // Scenes of parts give the answers of one file.
 #include "tests/support/parts.h"
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 
 #include <catch2/catch.hpp>
 
+#include "engine/base/error.h"
 #include "engine/ptc.h"
 #include "engine/store/container_points.h"
+#include "engine/verify/salvage.h"
 #include "engine/verify/verify.h"
 #include "format/error.h"
+#include "format/point_page.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -113,6 +117,91 @@ TEST_CASE("parts: a verification of a scene checks its parts and the tree over t
   REQUIRE(damaged.damage == 1);
   CHECK(damaged.findings.front().file == part.string());
   CHECK(damaged.findings.front().rule == "spec/container.md#page-payload");
+  CHECK(damaged.damaged_pages == 1);
+
+  // Faults of a part that are not kept are counted all the same.
+  bytes = bytes_of(part);
+  bytes[4096 + 64 + 1000] ^= 1;
+  bytes[4096 + 64 + 2000] ^= 1;
+  std::ofstream(part, std::ios::binary)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const VerifyReport few = verify_container(files.scene, {.keep_findings = 1}, silent);
+  const VerifyReport all = verify_container(files.scene, {}, silent);
+  CHECK(all.damage >= 2);
+  CHECK(few.damage == all.damage);
+  CHECK(few.findings.size() == 1);
+}
+
+TEST_CASE("parts: a salvage of a scene makes one file of what is whole in its parts",
+          "[integration][parts]") {
+  const Both files;
+  Progress silent;
+  const std::filesystem::path kept = files.dir.path() / "kept.ptcx";
+  const auto part = [&](int i) {
+    return files.dir.path() / "parts" / (std::to_string(i) + ".ptcx");
+  };
+  const auto change = [](const std::filesystem::path& path, std::size_t at, std::size_t bytes) {
+    std::vector<char> content = bytes_of(path);
+    std::fill_n(content.begin() + static_cast<std::ptrdiff_t>(at), bytes, '\x55');
+    std::ofstream(path, std::ios::binary)
+        .write(content.data(), static_cast<std::streamsize>(content.size()));
+  };
+  const std::uint64_t points = ContainerReader(files.whole).superblock().points;
+  const std::uint64_t of_part = ContainerReader(part(1)).superblock().points;
+  const std::uint64_t last = ContainerReader(part(2)).superblock().points;
+  const std::uint64_t page = points_per_page(ContainerReader(part(1)).header());
+  const auto pages = [&](std::uint64_t count) { return (count + page - 1) / page; };
+
+  // Of a whole scene everything is kept, and the tree is that of one file.
+  SalvageReport report = salvage_container(files.scene, kept, {}, silent);
+  CHECK(report.points == points);
+  CHECK(report.points_before == points);
+  CHECK(report.point_pages == report.point_pages_before);
+  CHECK(report.area_share == Approx(1));
+  const auto digest = [&](const std::filesystem::path& path) {
+    return verify_container(path, {.level = VerifyLevel::rebuild}, silent).tree_digest;
+  };
+  CHECK(digest(kept) == digest(files.whole));
+
+  // A damaged page of a part costs its points; a part with no superblock costs nothing.
+  change(part(1), 4096 + 64, 100);
+  change(part(0), static_cast<std::size_t>(std::filesystem::file_size(part(0))) - 8192, 8192);
+  report = salvage_container(files.scene, kept, {}, silent);
+  CHECK(report.points == points - page);
+  CHECK(report.point_pages + 1 == report.point_pages_before);
+  CHECK(verify_container(kept, {}, silent).sound());
+
+  // So does the end of the scene's own file, but that it said how many points there were.
+  const std::vector<char> scene = bytes_of(files.scene);
+  change(files.scene, scene.size() - 8192, 8192);
+  report = salvage_container(files.scene, kept, {}, silent);
+  CHECK(report.points == points - page);
+  CHECK_FALSE(report.points_before);
+  std::ofstream(files.scene, std::ios::binary)
+      .write(scene.data(), static_cast<std::streamsize>(scene.size()));
+
+  // A part that is missing, or another file of that name, costs its points.
+  std::filesystem::remove(part(2));
+  report = salvage_container(files.scene, kept, {}, silent);
+  CHECK(report.points == points - page - last);
+  CHECK(report.point_pages_before == report.point_pages + 1 + pages(last));
+  std::filesystem::copy_file(files.whole, part(2));
+  CHECK(salvage_container(files.scene, kept, {}, silent).points == points - page - last);
+  CHECK_THROWS_AS(salvage_container(files.scene, part(1), {}, silent), RequestError);
+  CHECK(ContainerReader(part(0).parent_path() / "1.ptcx").superblock().points == of_part);
+}
+
+TEST_CASE("parts: a salvage keeps the channels of the parts", "[integration][parts]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  const std::filesystem::path scene = PTC_SOURCE_DIR "/spec/vectors/good/three-parts.ptcx";
+  const SalvageReport report = salvage_container(scene, dir / "kept.ptcx", {}, silent);
+  CHECK(report.attribute_pages == 4);
+  CHECK(report.attribute_pages_before == 4);
+  REQUIRE(ContainerReader(dir / "kept.ptcx").meta().channels.size() == 1);
+  container_to_ply(ContainerReader(scene), dir / "scene.ply", silent);
+  container_to_ply(ContainerReader(dir / "kept.ptcx"), dir / "kept.ply", silent);
+  CHECK(bytes_of(dir / "kept.ply") == bytes_of(dir / "scene.ply"));
 }
 
 TEST_CASE("parts: a part that is missing, replaced or nested is refused by its name",
