@@ -101,6 +101,9 @@ struct FileHeader {
   std::uint8_t page_shift = 16;            ///< page size is 2^page_shift bytes, 12 to 20
   std::uint8_t point_bytes = kPointBytes;  ///< or kEmittingPointBytes when points may emit light
   Frame frame;                             ///< the lattice on which all points lie
+
+  /// Says whether the file is a scene of parts.
+  [[nodiscard]] bool has_parts() const noexcept { return (feature_incompat & kPartsFeature) != 0; }
 };
 
 /// The page header: 64 bytes in front of every page's payload.

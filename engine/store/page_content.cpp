@@ -5,12 +5,15 @@
 #include <limits>
 #include <string>
 
+#include "format/checksum.h"
 #include "format/node_page.h"
 #include "format/point_page.h"
 
 namespace ptc {
 namespace {
 
+constexpr char kAgreement[] = "spec/container.md#page-agreement";
+constexpr char kPayload[] = "spec/container.md#page-payload";
 constexpr char kReferences[] = "spec/nodes.md#references";
 constexpr char kTop[] = "spec/parts.md#parts-top";
 
@@ -62,6 +65,19 @@ GroupColumns columns_by_group(const Meta& meta) {
     columns.try_emplace(channel.group, packed_group_columns(meta.channels, channel.group));
   }
   return columns;
+}
+
+PageHeader decode_agreed_header(std::span<const std::byte> image, const FileHeader& file,
+                                const DirectoryEntry& entry, std::optional<std::uint32_t> rank) {
+  const PageHeader found = decode_page_header(image.first(kPageHeaderBytes), file);
+  if (found.rank != rank.value_or(found.rank) || entry_of(found, entry.offset) != entry)
+    throw FormatError(0, kAgreement, "the page header is not what the directory says");
+  return found;
+}
+
+void check_payload(std::span<const std::byte> image, const PageHeader& page) {
+  if (xxh3_64(image.subspan(kPageHeaderBytes)) != page.payload_xxh3)
+    throw FormatError(kPageHeaderBytes, kPayload, "payload's checksum is wrong");
 }
 
 void decode_payload(const PageHeader& page, std::span<const std::byte> stored,

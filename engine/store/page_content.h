@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,18 @@ namespace ptc {
 using GroupColumns = std::map<std::uint8_t, std::vector<PackedColumn>>;
 /// Returns the columns of all groups of a schema.
 [[nodiscard]] GroupColumns columns_by_group(const Meta& meta);
+
+/// Decodes the header at the front of a page's image, and compares it with the page's entry.
+/// @param rank  the page's rank; empty where it is not known
+/// @throws FormatError with the offset in the image
+[[nodiscard]] PageHeader decode_agreed_header(std::span<const std::byte> image,
+                                              const FileHeader& file, const DirectoryEntry& entry,
+                                              std::optional<std::uint32_t> rank);
+
+/// Compares the checksum of a page's payload with the one in its header.
+/// @param image  header and stored payload
+/// @throws FormatError with the offset in the image
+void check_payload(std::span<const std::byte> image, const PageHeader& page);
 
 /// What the payloads of a file are checked against.
 struct PageRules {

@@ -17,8 +17,6 @@ namespace {
 constexpr char kMagic[] = "spec/container.md#superblock-magic";
 constexpr char kLength[] = "spec/container.md#superblock-length";
 constexpr char kListing[] = "spec/container.md#directory-listing";
-constexpr char kAgreement[] = "spec/container.md#page-agreement";
-constexpr char kPayload[] = "spec/container.md#page-payload";
 constexpr char kAttributePages[] = "spec/points.md#attribute-pages";
 
 // A request costs about as much as the transfer of this many bytes: 2 ms at 8 MB/s.
@@ -100,8 +98,7 @@ void PartialReader::check_entry(std::uint32_t page, const DirectoryEntry& entry)
                           : page == numbers_.meta() ? PageType::meta
                           : other                   ? entry.type
                                                     : PageType::attribute;
-  const bool parts =
-      entry.type == PageType::parts && (header().feature_incompat & kPartsFeature) != 0;
+  const bool parts = entry.type == PageType::parts && header().has_parts();
   const bool fits = other ? parts || is_skippable(entry.type) : entry.type == wanted;
   if (!fits) throw FormatError(0, kListing, "an entry is of another type than its place");
   if (!point && wanted != PageType::attribute) return;
@@ -223,17 +220,12 @@ void PartialReader::load(std::span<const std::uint32_t> pages) {
 void PartialReader::take_page(std::uint32_t page, std::span<const std::byte> image) {
   const DirectoryEntry& entry = entries_.at(page);
   in_source(source_, entry.offset, [&] {
-    const PageHeader found = decode_page_header(image.first(kPageHeaderBytes), header());
-    const bool ranked = !numbers_.others().contains(page);
-    if ((ranked && found.rank != rank_of(numbers_, {}, page)) ||
-        entry_of(found, entry.offset) != entry) {
-      throw FormatError(0, kAgreement, "the page header is not what the directory says");
-    }
-    const auto stored = image.subspan(kPageHeaderBytes);
-    if (xxh3_64(stored) != found.payload_xxh3)
-      throw FormatError(kPageHeaderBytes, kPayload, "payload's checksum is wrong");
+    std::optional<std::uint32_t> rank;
+    if (!numbers_.others().contains(page)) rank = rank_of(numbers_, {}, page);
+    const PageHeader found = decode_agreed_header(image, header(), entry, rank);
+    check_payload(image, found);
     Loaded loaded{std::vector<std::byte>(found.raw_bytes), found.record_count};
-    decode_payload(found, stored,
+    decode_payload(found, image.subspan(kPageHeaderBytes),
                    {.point_bytes = header().point_bytes,
                     .node_pages = {},
                     .points = superblock_.points,
@@ -242,8 +234,7 @@ void PartialReader::take_page(std::uint32_t page, std::span<const std::byte> ima
     if (found.type == PageType::node) {
       try {
         // Where a scene has parts, references may lead into them.
-        const bool parts = (header().feature_incompat & kPartsFeature) != 0;
-        const std::uint32_t pages = parts ? kNoPage : superblock_.node_pages;
+        const std::uint32_t pages = header().has_parts() ? kNoPage : superblock_.node_pages;
         static_cast<void>(NodePage(loaded.payload, found.record_count, pages, superblock_.points,
                                    header().point_bytes != kPointBytes));
       } catch (const FormatError& error) {

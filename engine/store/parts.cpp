@@ -118,8 +118,7 @@ void ContainerReader::open_part(const PartRecord& record) {
   };
   try {
     // Look at the header first: a scene that names itself would open itself without end.
-    if ((read_file_header(InputFile(name)).feature_incompat & kPartsFeature) != 0)
-      refuse("it is a scene of parts itself");
+    if (read_file_header(InputFile(name)).has_parts()) refuse("it is a scene of parts itself");
     parts_.push_back(std::make_unique<const ContainerReader>(name));
   } catch (const std::system_error& error) {
     if (std::filesystem::is_regular_file(name)) throw;
@@ -140,7 +139,8 @@ void ContainerReader::join_parts() {
   for (const auto& part : parts_) {
     const Superblock& s = part->superblock();
     const PartPlace& at = places_.back();
-    places_.push_back({at.first_point + s.points, at.first_point_page + s.point_pages,
+    const std::uint32_t point_page = at.first_point_page + s.point_pages;
+    places_.push_back({at.first_point + s.points, point_page * points_per_page(header_), point_page,
                        at.first_node_page + s.node_pages});
   }
   // Gather the entries.
@@ -179,22 +179,19 @@ std::uint32_t ContainerReader::number_of(std::uint32_t own) const {
 }
 
 std::uint64_t ContainerReader::next_point(std::uint64_t end) const {
-  const std::uint64_t per_page = points_per_page(header_);
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const std::uint64_t points = places_[i + 1].first_point - places_[i].first_point;
-    if (end == places_[i].first_point_page * per_page + points)
-      return places_[i + 1].first_point_page * per_page;
-  }
-  return end;
+  if (parts_.empty()) return end;
+  const auto behind = std::ranges::lower_bound(places_, end, {}, &PartPlace::first_number);
+  if (behind == places_.begin() || behind == places_.end()) return end;
+  const PartPlace& part = *(behind - 1);
+  const std::uint64_t points = behind->first_point - part.first_point;
+  return end == part.first_number + points ? behind->first_number : end;
 }
 
 std::uint64_t ContainerReader::without_gaps(std::uint64_t point) const {
   if (parts_.empty()) return point;
-  const auto rank = static_cast<std::uint32_t>(point / points_per_page(header_));
   const PartPlace& place =
-      *(std::ranges::upper_bound(places_, rank, {}, &PartPlace::first_point_page) - 1);
-  return point - std::uint64_t{place.first_point_page} * points_per_page(header_) +
-         place.first_point;
+      *(std::ranges::upper_bound(places_, point, {}, &PartPlace::first_number) - 1);
+  return point - place.first_number + place.first_point;
 }
 
 /// Returns where a page lies among the parts, or nothing when it is the scene's own.
@@ -217,12 +214,11 @@ std::optional<ContainerReader::PartPage> ContainerReader::part_page(std::uint32_
 void ContainerReader::renumber(std::span<std::byte> payload, std::uint32_t groups,
                                std::size_t part) const {
   const PartPlace& place = places_[part];
-  const std::uint64_t first = std::uint64_t{place.first_point_page} * points_per_page(header_);
   change_references(payload, groups, [&](ChildRef ref) {
     if (ref.interior) {
       ref.page += place.first_node_page;
     } else {
-      ref.first_point += first;
+      ref.first_point += place.first_number;
     }
     return ref;
   });
@@ -237,8 +233,7 @@ void ContainerReader::renumber_top(std::span<std::byte> payload, std::uint32_t g
     const PartPlace& place = *(behind - 1);
     if (behind == places_.end() || ref.first_point + ref.point_count > behind->first_point)
       throw FormatError(0, kTop, "a leaf has points of two parts");
-    ref.first_point +=
-        std::uint64_t{place.first_point_page} * points_per_page(header_) - place.first_point;
+    ref.first_point += place.first_number - place.first_point;
     return ref;
   });
 }

@@ -15,9 +15,6 @@
 namespace ptc {
 namespace {
 
-constexpr char kAgreement[] = "spec/container.md#page-agreement";
-constexpr char kPayload[] = "spec/container.md#page-payload";
-
 // An open container keeps the decoded entries. While it opens, it reads the encoded ones into a
 // vector whose capacity doubles as it grows, so that this takes up to twice their bytes.
 static_assert(ContainerReader::kPageBytes == sizeof(DirectoryEntry));
@@ -35,7 +32,7 @@ ContainerReader::ContainerReader(const std::filesystem::path& path, OpenParts pa
   meta_ = read_meta();
   columns_ = columns_by_group(meta_);
   at_offset(file_, 0, [&] { verify_attributes(superblock_, entries_, meta_); });
-  if (has_parts() && parts == OpenParts::yes) open_parts();
+  if (header_.has_parts() && parts == OpenParts::yes) open_parts();
 }
 
 std::size_t ContainerReader::page_payload_limit() const noexcept {
@@ -54,23 +51,11 @@ std::span<const PackedColumn> ContainerReader::attribute_columns(std::uint8_t gr
   return found->second;
 }
 
-// The header at the front of a page's image, which the directory must agree with.
-PageHeader ContainerReader::agreed_header(std::uint32_t page,
-                                          std::span<const std::byte> image) const {
-  const PageHeader found = decode_page_header(image.first(kPageHeaderBytes), header_);
-  if (found.rank != rank(page) || entry_of(found, entries_[page].offset) != entries_[page]) {
-    throw FormatError(0, kAgreement, "the page header is not what the directory says");
-  }
-  return found;
-}
-
 // The header of a whole image, whose payload must have the checksum that the header states.
 PageHeader ContainerReader::checked_header(std::uint32_t page,
                                            std::span<const std::byte> image) const {
-  const PageHeader found = agreed_header(page, image);
-  if (xxh3_64(image.subspan(kPageHeaderBytes)) != found.payload_xxh3) {
-    throw FormatError(kPageHeaderBytes, kPayload, "payload's checksum is wrong");
-  }
+  const PageHeader found = decode_agreed_header(image, header_, entries_[page], rank(page));
+  check_payload(image, found);
   return found;
 }
 
@@ -114,7 +99,7 @@ PageHeader ContainerReader::decode_page(std::uint32_t page, std::span<const std:
     const PageHeader found = checked_header(page, image);
     // References of a scene that has not opened its parts may lead into these.
     const PageNumbers::Range nodes =
-        has_parts() && parts_.empty() ? PageNumbers::Range{} : node_pages();
+        header_.has_parts() && parts_.empty() ? PageNumbers::Range{} : node_pages();
     decode_payload(found, image.subspan(kPageHeaderBytes),
                    {.point_bytes = header_.point_bytes,
                     .node_pages = std::span(entries_).subspan(nodes.first, nodes.count),
@@ -146,7 +131,8 @@ PageHeader ContainerReader::read_page_header(std::uint32_t page) const {
     return parts_[at->part]->read_page_header(at->page);
   std::array<std::byte, kPageHeaderBytes> image;
   file_.read_at(where.offset, image);
-  return at_page(file_, where.offset, page, [&] { return agreed_header(page, image); });
+  return at_page(file_, where.offset, page,
+                 [&] { return decode_agreed_header(image, header_, where, rank(page)); });
 }
 
 PageHeader ContainerReader::read_stored_page(std::uint32_t page,

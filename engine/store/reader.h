@@ -75,12 +75,8 @@ class ContainerReader {
   /// The largest payload that a page of this file may have: the page size less its header, bytes.
   [[nodiscard]] std::size_t page_payload_limit() const noexcept;
 
-  /// Says whether the container is a scene of parts.
-  [[nodiscard]] bool has_parts() const noexcept {
-    return (header_.feature_incompat & kPartsFeature) != 0;
-  }
   /// Reads what a scene of parts says of its parts. It need not have opened them.
-  /// @pre has_parts()
+  /// @pre header().has_parts()
   [[nodiscard]] PartList read_parts() const;
   /// Says whether a page lies in the container's own file, and not in a part.
   [[nodiscard]] bool is_own(std::uint32_t page) const { return !part_page(page); }
@@ -166,13 +162,12 @@ class ContainerReader {
   };
   /// Where a part begins.
   struct PartPlace {
-    std::uint64_t first_point = 0;       ///< in the scene's numbers, which have no gaps
+    std::uint64_t first_point = 0;       ///< number of points in the parts before it
+    std::uint64_t first_number = 0;      ///< of its first point, by which the gaps before it count
     std::uint32_t first_point_page = 0;  ///< rank
     std::uint32_t first_node_page = 0;   ///< rank
   };
 
-  [[nodiscard]] PageHeader agreed_header(std::uint32_t page,
-                                         std::span<const std::byte> image) const;
   [[nodiscard]] PageHeader checked_header(std::uint32_t page,
                                           std::span<const std::byte> image) const;
   [[nodiscard]] PageHeader void_header(std::uint32_t page) const;

@@ -70,8 +70,7 @@ void verify_listing(const Superblock& superblock, std::span<const DirectoryEntry
       wanted = PageType::node;
     } else if (page >= places.others().first) {
       if (page == places.meta()) continue;  // verify_meta_page() looks at it
-      const bool parts = entry.type == PageType::parts &&
-                         (superblock.header.feature_incompat & kPartsFeature) != 0;
+      const bool parts = entry.type == PageType::parts && superblock.header.has_parts();
       const bool ordered = page == places.others().first || entries[page - 1].type <= entry.type;
       if ((parts || is_skippable(entry.type)) && ordered) continue;
       blame.entry(page, kListing, "has no place behind the node pages");
@@ -131,8 +130,8 @@ void verify_counts(const Superblock& superblock, std::span<const DirectoryEntry>
                                   ", the directory has " + std::to_string(found));
   };
   const PageNumbers places = places_of(superblock);
-  // Those of a scene of parts are checked once its parts are open.
-  if ((superblock.header.feature_incompat & kPartsFeature) == 0) {
+  // Points and groups of a scene of parts are compared once its parts are open.
+  if (!superblock.header.has_parts()) {
     same("points", superblock.points, count_records(entries, places.points()));
     same("node groups", superblock.node_groups, count_records(entries, places.nodes()));
   }

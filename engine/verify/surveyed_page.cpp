@@ -109,7 +109,7 @@ std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, Flip
     check_channels();
     if (survey_.container) {
       const PageNumbers::Range nodes =
-          survey_.container->has_parts() ? PageNumbers::Range{} : survey_.container->node_pages();
+          survey_.header->has_parts() ? PageNumbers::Range{} : survey_.container->node_pages();
       rules.node_pages = survey_.container->entries().subspan(nodes.first, nodes.count);
       rules.points = survey_.container->superblock().points;
     }

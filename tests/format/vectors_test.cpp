@@ -76,7 +76,7 @@ void walk_page(std::span<const std::byte> page, const FileHeader& file, Walk& wa
       break;
     case PageType::node: {
       // References of a scene of parts lead into files that a decoder does not know.
-      const bool parts = (file.feature_incompat & kPartsFeature) != 0;
+      const bool parts = file.has_parts();
       const NodePage nodes(payload, header.record_count,
                            parts ? kNoPage : walk.superblock.node_pages, walk.superblock.points,
                            file.point_bytes != kPointBytes);

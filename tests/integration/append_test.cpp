@@ -9,11 +9,9 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/record.h"
 #include "engine/octree/merge.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/ptc.h"
-#include "engine/store/container_points.h"
 #include "engine/verify/verify.h"
 #include "format/error.h"
 #include "tests/store/forge.h"
@@ -35,18 +33,6 @@ void write_cloud(const std::filesystem::path& path, const std::vector<Surfel>& s
     out << p.x << ' ' << p.y << ' ' << p.z << ' ' << s.normal.x << ' ' << s.normal.y << ' '
         << s.normal.z << ' ' << s.radius << '\n';
   }
-}
-
-std::vector<Surfel> points_of(const std::filesystem::path& path) {
-  const ContainerReader scene(path);
-  ContainerPoints points(scene);
-  std::vector<PointRecord> block(4096);
-  std::vector<Surfel> surfels;
-  while (const std::size_t count = points.next(block)) {
-    for (const PointRecord& r : std::span(block).first(count))
-      surfels.push_back(to_surfel(r, scene.header().frame));
-  }
-  return surfels;
 }
 
 /// Sorts surfels by radius and normal, so that equal sets can be compared one by one.

@@ -6,10 +6,8 @@
 #include <catch2/catch.hpp>
 
 #include "engine/io/cloud/points.h"
-#include "engine/io/cloud/record.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/ptc.h"
-#include "engine/store/container_points.h"
 #include "engine/verify/salvage.h"
 #include "engine/verify/verify.h"
 #include "format/point_page.h"
@@ -54,18 +52,6 @@ Mesh lit_floor() {
   add({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, 0);
   add({-0.5F, 2, -0.5F}, {1, 0, 0}, {0, 0, 1}, 1);
   return mesh;
-}
-
-std::vector<Surfel> points_of(const std::filesystem::path& path) {
-  const ContainerReader scene(path);
-  ContainerPoints points(scene);
-  std::vector<PointRecord> block(4096);
-  std::vector<Surfel> surfels;
-  while (const std::size_t count = points.next(block)) {
-    for (const PointRecord& r : std::span(block).first(count))
-      surfels.push_back(to_surfel(r, scene.header().frame));
-  }
-  return surfels;
 }
 
 /// Returns emission and radiance of all points, in the order of the container.

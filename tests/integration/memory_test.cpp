@@ -45,6 +45,17 @@ class EndAtPartition final : public Progress {
   }
 };
 
+/// Builds until the cap is checked and the points are to be sorted.
+void begin_build(const BuildRequest& request, const std::filesystem::path& target) {
+  EndAtPartition until_begun;
+  try {
+    build_container(request, target, until_begun);
+  } catch (const EndAtPartition::Begun&) {
+  } catch (const std::system_error& error) {  // more temporary space than this disk has
+    CHECK(error.code() == std::errc::no_space_on_device);
+  }
+}
+
 }  // namespace
 
 TEST_CASE(
@@ -58,14 +69,7 @@ TEST_CASE(
       request.city_points = points;
       request.page_shift = page_shift;
       request.run = {.memory_bytes = bytes, .threads = threads};
-      EndAtPartition until_begun;
-      try {
-        build_container(request, dir / "o.ptcx", until_begun);
-      } catch (const EndAtPartition::Begun&) {
-      } catch (const std::system_error&
-                   error) {  // the points need more temporary space than this disk has
-        CHECK(error.code() == std::errc::no_space_on_device);
-      }
+      begin_build(request, dir / "o.ptcx");
     });
   };
   const std::uint64_t least = building(100, 12, 1);
@@ -94,14 +98,7 @@ TEST_CASE("memory: the cap of a build covers the directory of points that emit l
       request.sampling.count = points;
       request.page_shift = 12;
       request.run = {.memory_bytes = bytes, .threads = 1};
-      EndAtPartition until_begun;
-      try {
-        build_container(request, dir / "o.ptcx", until_begun);
-      } catch (const EndAtPartition::Begun&) {
-      } catch (const std::system_error&
-                   error) {  // the points need more temporary space than this disk has
-        CHECK(error.code() == std::errc::no_space_on_device);
-      }
+      begin_build(request, dir / "o.ptcx");
     });
   };
   const std::uint64_t points = 60'000'000;

@@ -65,13 +65,6 @@ std::string broken_rule(RangeSource& source) {
   return "none";
 }
 
-/// "container-page-magic.variant.ptcx" shows spec/container.md#page-magic.
-std::string rule_of(const std::filesystem::path& path) {
-  const std::string name = path.filename().string();
-  const std::size_t dash = name.find('-');
-  return "spec/" + name.substr(0, dash) + ".md#" + name.substr(dash + 1, name.find('.') - dash - 1);
-}
-
 /// Says whether a partial reader may leave out a rule (spec/README.md#conformance), or what breaks
 /// it: the header, the directory as a whole, and other files.
 bool may_leave_out(const std::string& rule, const std::string& variant) {

@@ -248,6 +248,12 @@ Sample write_sample(const std::filesystem::path& target, const SampleOptions& op
   return sample;
 }
 
+std::string rule_of(const std::filesystem::path& path) {
+  const std::string name = path.filename().string();
+  const std::size_t dash = name.find('-');
+  return "spec/" + name.substr(0, dash) + ".md#" + name.substr(dash + 1, name.find('.') - dash - 1);
+}
+
 std::vector<std::byte> read_file(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   const std::vector<char> text((std::istreambuf_iterator<char>(in)), {});

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/store/reader.h"
@@ -48,6 +49,10 @@ Sample write_sample(const std::filesystem::path& target, const SampleOptions& op
 
 /// Writes everything that write_sample() writes before it calls finish().
 void write_unfinished(ContainerWriter& writer, const SampleOptions& options, Sample& sample);
+
+/// Returns the rule that a bad vector breaks, by its name: "container-page-magic.variant.ptcx"
+/// shows spec/container.md#page-magic.
+[[nodiscard]] std::string rule_of(const std::filesystem::path& path);
 
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path);
 void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);

@@ -41,13 +41,6 @@ std::vector<std::filesystem::path> vectors(const std::filesystem::path& director
   return found;
 }
 
-/// "container-page-magic.variant.ptcx" shows spec/container.md#page-magic.
-std::string rule_of(const std::filesystem::path& path) {
-  const std::string name = path.filename().string();
-  const std::size_t dash = name.find('-');
-  return "spec/" + name.substr(0, dash) + ".md#" + name.substr(dash + 1, name.find('.') - dash - 1);
-}
-
 }  // namespace
 
 TEST_CASE("vectors: every good vector is read whole", "[store][vectors]") {

@@ -11,6 +11,8 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/parallel/thread_pool.h"
+#include "engine/store/container_points.h"
+#include "engine/store/reader.h"
 #include "engine/store/writer.h"
 
 namespace ptc::test {
@@ -18,6 +20,18 @@ namespace ptc::test {
 std::vector<char> bytes_of(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<Surfel> points_of(const std::filesystem::path& path) {
+  const ContainerReader scene(path);
+  ContainerPoints points(scene);
+  std::vector<PointRecord> block(4096);
+  std::vector<Surfel> surfels;
+  while (const std::size_t count = points.next(block)) {
+    for (const PointRecord& r : std::span(block).first(count))
+      surfels.push_back(to_surfel(r, scene.header().frame));
+  }
+  return surfels;
 }
 
 std::size_t VectorStream::next(std::span<PointRecord> out) {

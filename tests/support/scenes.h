@@ -16,6 +16,9 @@ namespace ptc::test {
 /// Returns all bytes of a file; none when the file does not exist.
 [[nodiscard]] std::vector<char> bytes_of(const std::filesystem::path& path);
 
+/// Returns the points of a container as surfels, in their order.
+[[nodiscard]] std::vector<Surfel> points_of(const std::filesystem::path& path);
+
 /// A stream of the records of a vector, at most `block` at a time.
 class VectorStream : public PointStream {
  public:

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "engine/io/file/disk_space.h"
-#include "engine/store/reader.h"
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/growth.h"
 #include "tools/bench/experiments/remote.h"
@@ -70,12 +69,10 @@ std::vector<RemoteRow> rows_of(const std::filesystem::path& container,
     row.directory = directory_bytes(s.header, s.page_count);
     rows.push_back(std::move(row));
   };
-  {
-    CountingRanges source(ranges);
-    const PartialReader scene(source);
-    add(scene.superblock(), source, {.view = "opened", .rounds = 1});
-  }
-  for (const ConeView& view : views_of(ContainerReader(container).superblock())) {
+  CountingRanges opening(ranges);
+  const PartialReader opened(opening);
+  add(opened.superblock(), opening, {.view = "opened", .rounds = 1});
+  for (const ConeView& view : views_of(opened.superblock())) {
     CountingRanges source(ranges);
     PartialReader scene(source);
     ViewChoice choice(scene, view);
