@@ -107,14 +107,12 @@ void check_zero(std::span<const std::byte> block, std::size_t first, std::size_t
   }
 }
 
-// Checks the entry of a page that is not in the file (spec/points.md#void-pages).
-void check_void(const DirectoryEntry& entry) {
-  if (entry.type == PageType::attribute && entry.offset == 0 && entry.stored_bytes == 0 &&
-      entry.payload_xxh3 == 0) {
-    return;
-  }
-  throw FormatError(entry_field::kRawBytes.at, "spec/container.md#page-length",
-                    "a page without content is no void attribute page");
+// "bit 3" or "bits 3, 5".
+std::string bits_text(std::uint64_t bits) {
+  std::string text = std::has_single_bit(bits) ? "bit" : "bits";
+  for (const char* between = " "; bits != 0; bits &= bits - 1, between = ", ")
+    text += between + std::to_string(std::countr_zero(bits));
+  return text;
 }
 
 }  // namespace
@@ -194,7 +192,9 @@ FileHeader decode_file_header(std::span<const std::byte> bytes) {
   }
   if ((header.feature_incompat & ~kKnownIncompat) != 0) {
     throw FormatError(field::kIncompat.at, "spec/container.md#header-features",
-                      "file needs a feature that this program does not know");
+                      "file needs a feature that this program does not know: " +
+                          bits_text(header.feature_incompat & ~kKnownIncompat) +
+                          " of feature_incompat");
   }
 
   // Read and check everything else.
@@ -223,6 +223,13 @@ FileHeader decode_repeated_header(std::span<const std::byte> superblock) {
   std::ranges::copy(superblock.subspan(8, field::kHash.at - 8), block.begin() + 8);
   field::kHash.put(block.data(), xxh3_64(std::span(block).first(field::kHash.at), kHeaderSeed));
   return decode_file_header(block);
+}
+
+void check_copyable(const FileHeader& header) {
+  if (header.feature_ro_compat == 0) return;
+  throw FormatError(field::kReadOnly.at, "spec/versions.md#features",
+                    "only a program that knows " + bits_text(header.feature_ro_compat) +
+                        " of feature_ro_compat may copy, extend or repair this file");
 }
 
 void encode_directory_entry(const DirectoryEntry& entry,
@@ -267,10 +274,7 @@ DirectoryEntry decode_directory_entry(std::span<const std::byte> bytes, const Fi
                       "reserved field is not zero");
   }
   check_page_facts(entry, file);
-  if (entry.is_void()) {
-    check_void(entry);
-    return entry;
-  }
+  if (entry.is_void()) return entry;
 
   // Check that the page lies between the header and the superblocks.
   constexpr char kExtent[] = "spec/container.md#directory-extent";

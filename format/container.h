@@ -135,7 +135,10 @@ struct DirectoryEntry {
   friend bool operator==(const DirectoryEntry&, const DirectoryEntry&) = default;
 
   /// Returns whether the page is not in the file: an attribute page without any known value.
-  [[nodiscard]] bool is_void() const noexcept { return raw_bytes == 0; }
+  [[nodiscard]] bool is_void() const noexcept {
+    return type == PageType::attribute && offset == 0 && stored_bytes == 0 && raw_bytes == 0 &&
+           payload_xxh3 == 0;
+  }
 };
 
 /// Returns the directory entry of a page that has this header and starts at `offset`.
@@ -254,6 +257,10 @@ using Block = std::array<std::byte, kBlockBytes>;
 /// @param bytes  the first 4096 bytes, or fewer when the file is shorter
 /// @throws FormatError for a wrong magic, checksum, version, limit or unknown incompatible feature
 [[nodiscard]] FileHeader decode_file_header(std::span<const std::byte> bytes);
+/// Refuses a file with an unknown bit in feature_ro_compat: its pages may be read, but not copied
+/// into another file, appended to or repaired.
+/// @throws FormatError naming the bits (spec/versions.md#features)
+void check_copyable(const FileHeader& header);
 /// Decodes the copy of the file header in a superblock, for files whose own header is lost.
 /// @param superblock  at least 120 bytes of a superblock whose checksum is right
 /// @throws FormatError as decode_file_header()

@@ -111,7 +111,7 @@ void check_page_facts(const DirectoryEntry& facts, const FileHeader& file) {
     throw FormatError(0, "spec/container.md#page-type", "unknown page type");
   constexpr char kLength[] = "spec/container.md#page-length";
   if (!facts.is_void()) {
-    if (facts.raw_bytes > payload_limit(file.page_shift)) {
+    if (facts.raw_bytes == 0 || facts.raw_bytes > payload_limit(file.page_shift)) {
       throw FormatError(0, kLength, "raw_bytes is not 1 to page size - 64");
     }
     if (facts.stored_bytes == 0 || facts.stored_bytes > facts.raw_bytes) {

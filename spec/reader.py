@@ -269,7 +269,7 @@ Entry = namedtuple("Entry", "offset stored_bytes raw_bytes payload_xxh3 first_ke
 
 
 def is_void(entry):
-    return entry.raw_bytes == 0
+    return entry.type == ATTRIBUTE and not (entry.offset or entry.stored_bytes or entry.raw_bytes or entry.payload_xxh3)
 
 
 def entry_of(page, offset):
@@ -297,8 +297,6 @@ def decode_entry(header, bytes_, file_bytes, at):
             "directory lists itself")
     require(reserved == 0, at + 39, "spec/container.md#page-fields", "reserved field is not zero")
     if is_void(entry):
-        require(entry.type == ATTRIBUTE and not (entry.offset or entry.stored_bytes or entry.payload_xxh3),
-                at, "spec/container.md#page-length", "a page without content is no void attribute page")
         check_kind(at, entry.type, entry.group, entry.record_count, entry.level, entry.first_key)
         return entry
     check_facts(header, at, entry.type, entry.group, entry.stored_bytes, entry.raw_bytes,

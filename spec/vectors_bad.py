@@ -9,7 +9,8 @@ import struct
 import reader as r
 from vectors import (UUID, Draft, Page, channel, encode_meta, frame_of, literal_block,
                      pack_columns)
-from vectors_good import CHANNELS, changed, one_point, packed, rle_block, zero_point
+from vectors_good import (CHANNELS, changed, later_pages, one_point, packed, rle_block, void_pages,
+                          zero_point)
 from vectors_tree import Surfel, scatter
 
 NAN = float("nan")
@@ -55,6 +56,7 @@ def bad_page():
         draft.pages[number].header.update(both or {})
         draft.pages[number].entry.update(both or {})
         return draft
+    nothing = {"offset": 0, "stored_bytes": 0, "raw_bytes": 0, "payload_xxh3": 0}
     other = one_point()
     other.pages[0].uuid = UUID[::-1]
     fields = one_point()
@@ -66,6 +68,7 @@ def bad_page():
     yield "container-page-checksum.other-file", other
     yield "container-page-type", page(both={"type": 7})
     yield "container-page-type.zero", page(both={"type": 0})
+    yield "container-page-type.void", changed(one_point(), lambda d: d.pages[0].entry.update(nothing, type=7))
     yield "container-page-codec", page(codec=3)
     yield "container-page-codec.directory", changed(
         one_point(), lambda d: d.directory.update(codec=1, stored_bytes=119))
@@ -79,6 +82,12 @@ def bad_page():
     yield "container-page-length.above", page(both={"raw_bytes": 0xFFFFFFFF})
     yield "container-page-length.zero", page(both={"raw_bytes": 0, "stored_bytes": 0})
     yield "container-page-length.raw", page(codec=2)
+    yield "container-page-length.void-point", changed(one_point(), lambda d: d.pages[0].entry.update(nothing))
+    yield "container-page-length.void-later", changed(later_pages(), lambda d: d.pages[-2].entry.update(nothing))
+    yield "container-page-length.void-with-offset", changed(
+        void_pages(), lambda d: d.pages[4].entry.update(offset=4096))
+    yield "container-page-length.void-with-hash", changed(
+        void_pages(), lambda d: d.pages[4].entry.update(payload_xxh3=1))
     yield "container-page-fields", page(both={"group": 1})
     yield "container-page-fields.count", page(both={"record_count": 2})
     yield "container-page-fields.no-records", page(both={"record_count": 0})

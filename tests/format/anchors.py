@@ -60,14 +60,13 @@ def check_vectors(spec, errors):
 
 
 def check_versions(spec, text):
-    """Yields faults: released versions without frozen vectors, and frozen vectors without a released version."""
+    """Yields faults: released versions without a list of frozen vectors, and lists without a released version."""
     history = text.split("## How the format may change")[0]
     released = {version for version, body in re.findall(r"^## ([0-9.]+)\n(.*?)(?=^## |\Z)", history, re.M | re.S)
                 if "Not released yet" not in body}
-    frozen = os.path.join(spec, "vectors", "frozen")
-    found = set(os.listdir(frozen)) if os.path.exists(frozen) else set()
-    for version in sorted(released ^ found):
-        yield f"spec/versions.md and vectors/frozen do not agree on {version}"
+    lists = (re.fullmatch(r"frozen-(.+)\.txt", name) for name in os.listdir(os.path.join(spec, "vectors")))
+    for version in sorted(released ^ {found[1] for found in lists if found}):
+        yield f"spec/versions.md and vectors/frozen-{version}.txt do not agree"
 
 
 def check_security(root, text):

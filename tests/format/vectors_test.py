@@ -2,9 +2,10 @@
 
 vectors_test.py SOURCE_DIR TEMP_DIR: good files are valid and hold what good.txt says, every other one
 is refused by the rule in its name, a scene of parts has the points and the tree of the same scene in one file, the
-vectors are what spec/vectors.py writes, and no flipped bit of three small files goes unseen.
+vectors are what spec/vectors.py writes and what was frozen, and no flipped bit of three small files goes unseen.
 """
 
+import hashlib
 import os
 import re
 import shutil
@@ -54,15 +55,34 @@ def found_in(folder, name):
 
 
 def check_content():
-    """Compares what the reader finds with good.txt, for the current vectors and those of each released version."""
+    """Compares what the reader finds with good.txt."""
+    with open(os.path.join(SPEC, "vectors", "good.txt"), encoding="utf-8") as file:
+        expected = set(file)
+    good = os.path.join(SPEC, "vectors", "good")
+    found = {found_in(good, name) for name in files(good)}
+    faults.extend(f"good.txt: {line}" for line in expected ^ found)
+
+
+def check_frozen():
+    """Compares every vector with the hash by which a released version froze it."""
     root = os.path.join(SPEC, "vectors")
-    frozen = os.path.join(root, "frozen")
-    for folder in [root, *(e.path for e in os.scandir(frozen))] if os.path.exists(frozen) else [root]:
-        with open(os.path.join(folder, "good.txt"), encoding="utf-8") as file:
-            expected = set(file)
-        good = os.path.join(folder, "good")
-        found = {found_in(good, name) for name in files(good)}
-        faults.extend(f"{folder}/good.txt: {line}" for line in expected ^ found)
+    hashes = {}
+    for name in sorted(os.listdir(root)):
+        if not re.fullmatch(r"frozen-\d+\.\d+\.txt", name):
+            continue
+        with open(os.path.join(root, name), encoding="utf-8") as file:
+            for line in file:
+                wanted, path = line.rstrip("\n").split("  ")
+                if path in hashes:
+                    faults.append(f"{name}: {path} is frozen twice")
+                hashes[path] = wanted
+    there = {f"{folder}/{name}" for folder in FOLDERS for name in files(os.path.join(root, folder))} | {"xxh3.txt"}
+    faults.extend(f"{path} is not frozen" for path in sorted(there - set(hashes)))
+    faults.extend(f"{path} is frozen, and gone" for path in sorted(set(hashes) - there))
+    for path in sorted(there & set(hashes)):
+        with open(os.path.join(root, path), "rb") as file:
+            if hashlib.sha256(file.read()).hexdigest() != hashes[path]:
+                faults.append(f"{path} is not what was frozen")
 
 
 def check_verdicts():
@@ -216,6 +236,7 @@ def check_without_zstd():
 os.makedirs(TEMP, exist_ok=True)
 checked = check_verdicts()
 check_content()
+check_frozen()
 if check_file_by_hand() < 80:
     faults.append("overview.md: the file by hand has lost lines")
 check_parts("two-parts.ptcx", "two-parts-as-one-file.ptcx")

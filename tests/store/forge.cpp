@@ -48,7 +48,7 @@ Forgery::Forgery(const std::filesystem::path& path) {
     const auto entry = all.subspan(at + kPageHeaderBytes + i % per_page * kDirectoryEntryBytes);
     entries.push_back(decode_directory_entry(entry, header, file.size()));
     const DirectoryEntry& it = entries.back();
-    if (it.is_void()) {
+    if (it.raw_bytes == 0) {
       pages.emplace_back();
       continue;
     }
@@ -64,7 +64,7 @@ std::vector<std::byte> Forgery::bytes() const {
   put(file, 0, encode_file_header(header));
   std::vector<DirectoryEntry> listed = entries;
   for (std::size_t i = 0; i < pages.size(); ++i) {
-    if (i < listed.size() && listed[i].is_void()) continue;
+    if (i < listed.size() && listed[i].raw_bytes == 0) continue;
     PageHeader head = pages[i].header;
     if (rehash_payloads) {
       head.payload_xxh3 = xxh3_64(pages[i].stored);
