@@ -37,14 +37,6 @@
 namespace ptc {
 namespace {
 
-/// Returns kUnsupported for a version or feature that this program lacks, kInvalidData for damage.
-ExitCode exit_code_of(const FormatError& error) {
-  for (const char* rule : {"#header-version", "#header-draft", "#header-features"}) {
-    if (error.clause().ends_with(rule)) return kUnsupported;
-  }
-  return kInvalidData;
-}
-
 /// Refuses an output that cannot be written, before long work begins.
 /// @throws std::system_error
 void check_output(const std::filesystem::path& path) {
@@ -193,6 +185,14 @@ std::string exit_codes_with(const std::string& own) {
 [[maybe_unused]] const std::new_handler before_main = std::set_new_handler(end_without_memory);
 
 }  // namespace
+
+ExitCode exit_code_of(const FormatError& error) {
+  for (const char* rule :
+       {"#header-version", "#header-draft", "#header-features", "versions.md#features"}) {
+    if (error.clause().ends_with(rule)) return kUnsupported;
+  }
+  return kInvalidData;
+}
 
 void check_input(const std::filesystem::path& path) {
   if (path == "-") throw DataError("-: standard input is not read yet; give a file");

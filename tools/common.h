@@ -13,6 +13,7 @@
 
 #include "engine/base/progress.h"
 #include "engine/ptc.h"
+#include "format/error.h"
 #include "tools/man_page.h"
 
 namespace ptc {
@@ -28,6 +29,8 @@ enum ExitCode : int {
   kUnfinished = 6,   ///< ptcverify: the file is unfinished or truncated
   kInternal = 7,     ///< a defect of the program: a precondition of the engine was broken
 };
+/// Returns kUnsupported for a version or feature that this program lacks, kInvalidData for damage.
+[[nodiscard]] ExitCode exit_code_of(const FormatError& error);
 
 /// The result of a program.
 struct Outcome {

@@ -216,7 +216,7 @@ void add_salvage(const std::filesystem::path& file, const std::filesystem::path&
   } catch (const ptc::FormatError& error) {
     outcome.facts["salvage"] = nullptr;
     outcome.summary += fmt::format("ptcverify: {}\n", ptc::printable(error.what()));
-    if (outcome.exit_code == ptc::kDone) outcome.exit_code = ptc::kInvalidData;
+    if (outcome.exit_code == ptc::kDone) outcome.exit_code = ptc::exit_code_of(error);
   }
 }
 

@@ -26,6 +26,7 @@
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
 #include "engine/parallel/thread_pool.h"
+#include "engine/store/commit.h"
 #include "engine/store/writer.h"
 #include "engine/verify/surveyed_page.h"
 #include "format/bytes.h"
@@ -66,12 +67,16 @@ class Remains {
   /// @param flips, progress  must outlive this
   Remains(const std::filesystem::path& path, FlipBudget& flips, Progress& progress)
       : file_(path), flips_(flips), progress_(progress) {
-    Findings ignored(0, false);
-    survey_ = survey_file(file_, ignored, flips_, false, progress_);
+    Findings findings(1, false);
+    survey_ = survey_file(file_, findings, flips_, false, progress_);
+    newer_ = !findings.kept().empty() && findings.kept().front().cause == Cause::newer;
     if (survey_.header) page_.emplace(file_, survey_, true);
   }
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return file_.path(); }
+  [[nodiscard]] const InputFile& file() const noexcept { return file_; }
+  /// Says whether the file is of a version, or has a feature, that this program does not read.
+  [[nodiscard]] bool newer() const noexcept { return newer_; }
   [[nodiscard]] const Survey& survey() const noexcept { return survey_; }
   [[nodiscard]] const KnownPages& point_pages() const noexcept { return point_pages_; }
   /// Returns the intact attribute page of a group and rank; null when it is lost.
@@ -172,6 +177,7 @@ class Remains {
   FlipBudget& flips_;
   Progress& progress_;
   Survey survey_;
+  bool newer_ = false;
   std::optional<SurveyedPage> page_;
   std::vector<PageSite> moved_;  ///< pages that a scan of the file found
   KnownPages point_pages_;
@@ -257,13 +263,13 @@ class Salvage {
 
   /// Refuses a file without an identity, and one with a feature that forbids repair.
   void require_identity() const {
-    if (!file_.survey().header)
+    if (!file_.survey().header) {
+      if (file_.newer()) static_cast<void>(read_file_header(file_.file()));  // says what it needs
       refuse("spec/recovery.md#survey",
              "neither the header nor a superblock is whole, so no page can be shown to belong to "
              "this file");
-    if (header().feature_ro_compat != 0)
-      refuse("spec/versions.md#features",
-             "the file uses a feature that forbids repairing it: use the program that wrote it");
+    }
+    at_offset(file_.file(), 0, [&] { check_copyable(header()); });
   }
 
   /// Surveys the parts that are named by intact records, as far as they are there.

@@ -5,6 +5,7 @@
 
 #include "engine/base/error.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/store/commit.h"
 
 namespace ptc {
 namespace {
@@ -24,10 +25,7 @@ Codec codec_of(const ContainerReader& scene) {
 }  // namespace
 
 void check_extensible(const ContainerReader& scene) {
-  if (scene.header().feature_ro_compat != 0) {
-    throw DataError(scene.path().string() +
-                    ": the file uses a feature that forbids appending to it");
-  }
+  at_offset(scene.file(), 0, [&] { check_copyable(scene.header()); });
   const std::vector<Channel>& channels = scene.meta().channels;
   if (channels.empty()) return;
   throw DataError(scene.path().string() + ": the appended points would have no " +

@@ -32,6 +32,7 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/store/commit.h"
 #include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
@@ -256,6 +257,7 @@ void write_xyz(const ContainerReader& container, const std::filesystem::path& ta
 
 Superblock write_container(const ContainerReader& container, const std::filesystem::path& target,
                            const RecodeOptions& options, Progress& progress) {
+  at_offset(container.file(), 0, [&] { check_copyable(container.header()); });
   // Complete the record: rounding is noted once
   const FileHeader& from = container.header();
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
@@ -288,8 +290,8 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
     copy_pages(container, writer, progress);
   } else {
     superblock = rebuild_pages(container, writer, round, executor, progress);
+    superblock.writer.clear();
   }
-  superblock.writer.clear();
   return writer.finish(meta, superblock);
 }
 

@@ -19,6 +19,7 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/text/text.h"
+#include "engine/store/commit.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -216,6 +217,7 @@ std::uint64_t sink_bytes(const std::filesystem::path& target,
 void check_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
                        bool estimates) {
   if (lower_extension(target) == ".ply") return;
+  at_offset(receivers.file(), 0, [&] { check_copyable(receivers.header()); });
   const std::string file = receivers.path().string();
   if (!receivers.parts().empty()) {
     throw DataError(file +
