@@ -69,27 +69,27 @@ measure() {
 }
 
 once=(--repeats 1)
-measure accuracy accuracy fractal window city "$mesh+backdrop" --points 1M --checked 400 -- \
+measure accuracy accuracy fractal window city "$mesh+backdrop" --quick --points 1M --checked 400 --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 --reference-rays 64 --set points --method ptcx --method embree-mesh "${once[@]}"
-measure build build --points 20M --points 200M --panel points --memory 1G -- --points 20k --panel points "${once[@]}"
+measure build build --points 20M --points 60M --panel points --memory 1G -- --points 20k --panel points "${once[@]}"
 measure build-cap build --points 20M --panel cap -- --points 200k --panel cap --cap 96M "${once[@]}"
-measure cache cache --points 6M --receivers 16384 -- --points 20k --receivers 4096 --panel hits --panel receivers "${once[@]}"
-measure cache-threads cache --panel threads --receivers 65536 -- \
+measure cache cache --quick --points 6M --receivers 16384 --repeats 5 -- --points 20k --receivers 4096 --panel hits --panel receivers "${once[@]}"
+measure cache-threads cache --panel threads --receivers 16384 -- \
   --panel threads --points 20k --receivers 4096 "${once[@]}"
 measure demo demo "$mesh+backdrop" --memory 256M -- "$mesh+backdrop" --points 5k --checked 20 "${once[@]}"
 measure demo-city demo city --points 20M --receivers 100k --memory 256M --stage build --stage verify --stage shade -- \
   city --points 5k --receivers 1k --stage build --stage verify --stage shade "${once[@]}"
-measure error error fractal window city "$mesh+backdrop" --points 200k --checked 500 -- \
+measure error error fractal window city "$mesh+backdrop" --points 200k --checked 300 --check-rays 4096 -- \
   "$mesh+backdrop" --points 2k --checked 20 --check-rays 256
-measure growth growth --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \
+measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \
   --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
 measure growth-cap growth --points 6M --panel cap -- --points 8k --checked 10 --panel cap "${once[@]}"
 measure instructions instructions -- --points 10k --receivers 4096 --checked 10 "${once[@]}"
-measure model model fractal window city "$mesh+backdrop" --points 100k -- \
+measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
 measure mutations mutations -- --every 10007
 measure remote remote -- --points 20k
-measure scale scale --points 2M --points 20M --points 60M --memory 1G -- --points 20k --points 40k --receivers 100 "${once[@]}"
+measure scale scale --points 2M --points 6M --points 20M --memory 1G -- --points 20k --points 40k --receivers 100 "${once[@]}"
 measure scale-1700m scale --points 20M --points 200M --points 1700M --repeats 1 --memory 2G -- \
   --points 20k --receivers 100 "${once[@]}"
 measure sort sort --points 4M --points 20M --memory 1G -- --points 20k "${once[@]}"
