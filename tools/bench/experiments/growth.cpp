@@ -206,7 +206,8 @@ class GrowthRun : BenchRun<GrowthOptions, GrowthRow> {
     std::vector<double> at;
     for (const float solid_angle : options_.solid_angles) {
       settings.push_back({.solid_angle = solid_angle});
-      at.push_back(static_cast<double>(solid_angle));
+      // The decimal that was meant: the float as a double would be 0.0099999998
+      at.push_back(std::stod(fmt::format("{}", solid_angle)));
     }
     measure_settings(scene, "solid-angle", at, settings);
   }
