@@ -83,7 +83,6 @@ measure error error fractal window city "$mesh+backdrop" --points 200k --checked
   "$mesh+backdrop" --points 2k --checked 20 --check-rays 256
 measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \
   --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
-measure growth-cap growth --points 6M --panel cap -- --points 8k --checked 10 --panel cap "${once[@]}"
 measure instructions instructions -- --points 10k --receivers 4096 --checked 10 "${once[@]}"
 measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
