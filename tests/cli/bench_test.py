@@ -112,7 +112,7 @@ class Bench(ProgramTest):
         rows = json.loads((charts / "growth.json").read_text())["rows"]
         self.assertEqual(json.loads(printed.stdout)["rows"], rows)
         panels = {name: [r for r in rows if r["panel"] == name] for name in ("surfels", "solid-angle", "depth", "cap")}
-        self.assertEqual([len(panel) for panel in panels.values()], [2, 3, 3, 6])
+        self.assertEqual([len(panel) for panel in panels.values()], [2, 5, 5, 6])
         self.assertTrue(all(r["us_per_receiver"] > 0 and r["e_rms"] is not None for r in rows))
         self.assertEqual(len({r["e_rms"] for r in panels["cap"]}), 1)
         self.assertEqual([r["threads"] for r in panels["cap"]], [1, 1, 1, 2, 2, 2])
