@@ -7,6 +7,8 @@
 #include "engine/parallel/thread_pool.h"            // IWYU pragma: export
 #include "engine/pipeline/build/build_container.h"  // IWYU pragma: export
 #include "engine/pipeline/convert/convert.h"        // IWYU pragma: export
+#include "engine/pipeline/convert/point_files.h"    // IWYU pragma: export
+#include "engine/pipeline/point_input.h"            // IWYU pragma: export
 #include "engine/pipeline/render/render_picture.h"  // IWYU pragma: export
 #include "engine/pipeline/shade/shade_container.h"  // IWYU pragma: export
 #include "engine/sort/external_sort.h"              // IWYU pragma: export

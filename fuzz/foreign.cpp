@@ -73,19 +73,26 @@ void read_cloud(const Path& path) {
   PointFile file = open_points(path);
   std::vector<Surfel> block(64);
   std::uint64_t points = 0;
+  std::size_t row_bytes = 0;
+  for (const Channel& channel : file.info.channels) {
+    require(!channel.name.empty() && channel.name.size() <= 31 && channel.components >= 1 &&
+            channel.components <= 16);
+    row_bytes += channel.components * channel.component_bytes();
+  }
   while (const std::size_t count = file.source->next(block)) {
     points += count;
+    require(file.source->attributes().size() == count * row_bytes);
     for (std::size_t i = 0; i < count; ++i) {
       const Surfel& s = block[i];
       require(is_finite(s.position) && std::isfinite(s.radius) && s.radius >= 0 &&
               is_finite(s.radiance) && is_finite(s.emission));
       require(std::min({s.emission.x, s.emission.y, s.emission.z}) >= 0 &&
               (file.info.has_emission || s.emission == glm::vec3(0)));
-      require(file.info.has_normals ? is_unit(s.normal) : s.normal == glm::vec3(0));
+      require((file.info.has_normals && is_unit(s.normal)) || s.normal == glm::vec3(0));
       require(is_finite(s.albedo) && std::min({s.albedo.x, s.albedo.y, s.albedo.z}) >= 0);
     }
   }
-  require(!file.info.count || *file.info.count == points);
+  require(!file.info.count || *file.info.count == points + file.source->left_out());
 }
 
 // A reader under test.
@@ -94,7 +101,7 @@ struct Reader {
   void (*read)(const Path&);     // reads the file and checks the result
   const char* beside = nullptr;  // name of the second file, which follows behind a zero byte
 };
-constexpr std::array<Reader, 15> kReaders{{{"a.obj", read_mesh_file, "a.mtl"},
+constexpr std::array<Reader, 16> kReaders{{{"a.obj", read_mesh_file, "a.mtl"},
                                            {"a.ply", read_mesh_file},
                                            {"a.off", read_mesh_file},
                                            {"a.stl", read_mesh_file},
@@ -108,7 +115,8 @@ constexpr std::array<Reader, 15> kReaders{{{"a.obj", read_mesh_file, "a.mtl"},
                                            {"a.ply.gz", read_cloud},
                                            {"a.exr", read_picture},
                                            {"a.png", read_picture},
-                                           {"a.tga", read_picture}}};
+                                           {"a.tga", read_picture},
+                                           {"a.cloud", read_cloud}}};  // of any format
 
 }  // namespace
 

@@ -1,17 +1,19 @@
 // Property, for any well-formed values: what a writer here has written, its reader returns, and
 // what the builder has built, the verifier accepts.
 //
-// The first byte picks the writer: container, PLY, packed columns and codecs, node page, or EXR.
-// Each take_...() function makes well-formed values of the bytes that follow; each target writes
-// them, reads them back and compares.
+// The first byte picks the writer: container, PLY and the other formats of points, packed columns
+// and codecs, node page, or EXR. Each take_...() function makes well-formed values of the bytes
+// that follow; each target writes them, reads them back and compares.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <sstream>
 #include <utility>
 #include <vector>
 
+#include "engine/io/cloud/point_writer.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/image/image.h"
 #include "engine/octree/build_pages.h"
@@ -263,6 +265,53 @@ void container(ByteSource& from) {
   compare(reader, points, *meta, attributes, later);
 }
 
+// Makes the text `las.header`: any bytes, or an object with numbers where they belong.
+std::string take_las_header(ByteSource& from) {
+  if (from.take() % 2 == 0) return from.text(60, "{}[]:,\"scale019.e-", 18);
+  std::ostringstream text;
+  const auto triple = [&](const char* name) {
+    text << '"' << name << "\":[" << from.number<double>() << ',' << from.number<double>() << ','
+         << from.number<double>() << ']';
+  };
+  text << '{';
+  triple("scale");
+  text << ',';
+  triple("offset");
+  text << ",\"day\":" << from.take<std::uint32_t>() << ",\"system_id\":\"\u00e9\"}";
+  return text.str();
+}
+
+// Writes surfels with any attributes and texts in every format. A PLY of them is read back.
+void write_everywhere(ByteSource& from, const Meta& meta, const std::vector<Surfel>& surfels,
+                      bool emits) {
+  // Make attributes and texts
+  PointWriteInfo info{.count = surfels.size(), .channels = meta.channels, .text = meta.text};
+  for (const Surfel& surfel : surfels) info.bounds.add(surfel.position);
+  info.has_normals = info.has_radius = info.has_radiance = info.has_albedo = true;
+  info.emits = emits;
+  std::size_t row_bytes = 0;
+  for (const Channel& channel : info.channels)
+    row_bytes += channel.component_bytes() * channel.components;
+  const Bytes rows = take_bytes(from, surfels.size() * row_bytes);
+  if (from.take() % 2 == 0) info.text["las.header"] = take_las_header(from);
+  if (from.take() % 2 == 0) info.text["las.vlrs"] = from.text(200, "AB/+=aQc", 8);
+
+  // Write them
+  const auto path = fuzz::MemoryFile::directory() / "b.ply";
+  for (const OutputFormat format :
+       {OutputFormat::bgeo, OutputFormat::las, OutputFormat::pcd, OutputFormat::ptc,
+        OutputFormat::usda, OutputFormat::usdc, OutputFormat::xyz, OutputFormat::ply}) {
+    static_cast<void>(losses(format, info));
+    const auto writer = create_points(path, format, info);
+    writer->write(surfels, rows);
+    writer->finish();
+  }
+  std::vector<Surfel> back(surfels.size() + 1);
+  require(open_points(path).source->next(back) == surfels.size());
+  for (std::size_t i = 0; i < surfels.size(); ++i)
+    require(back[i].position == surfels[i].position && back[i].albedo == surfels[i].albedo);
+}
+
 void ply(ByteSource& from) {
   // Make surfels, and columns of any channels.
   const bool emits = from.take() % 2 == 0;
@@ -295,6 +344,7 @@ void ply(ByteSource& from) {
     require(a.position == b.position && a.normal == b.normal && a.radius == b.radius &&
             a.radiance == b.radiance && a.albedo == b.albedo && a.emission == b.emission);
   }
+  write_everywhere(from, *meta, surfels, emits);
 }
 
 void codec(ByteSource& from) {

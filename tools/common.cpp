@@ -315,7 +315,9 @@ void Command::check_files() const {
   for (const auto* path : inputs_) {
     if (!path->empty()) check_input(*path);
   }
-  for (const auto* paths : input_lists_) std::ranges::for_each(*paths, check_input);
+  for (const auto* paths : input_lists_) {
+    std::ranges::for_each(*paths, check_input);
+  }
   for (const auto* path : outputs_) {
     if (!path->empty()) check_output(*path);
   }

@@ -91,9 +91,11 @@ measure remote remote -- --points 20k
 measure scale scale --points 2M --points 6M --points 20M --memory 1G -- --points 20k --points 40k --receivers 100 "${once[@]}"
 measure scale-1700m scale --points 20M --points 200M --points 1700M --repeats 1 --memory 2G -- \
   --points 20k --receivers 100 "${once[@]}"
+measure scan scan "$mesh" --points 1M --threads 1 -- "$mesh" --points 20k "${once[@]}"
 measure sort sort --points 4M --points 20M --memory 1G -- --points 20k "${once[@]}"
 measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
   --points 20k --panel disk --order city "${once[@]}"
+measure specks specks "$mesh" city -- "$mesh" --points 5k --checked 50
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 
 [[ -n $list || -n $known ]] || usage "there is no result '$only'. --list prints the names"

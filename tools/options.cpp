@@ -1,6 +1,8 @@
 // Codecs, page sizes, lighting and expert settings from the command line.
 #include "tools/options.h"
 
+#include <algorithm>
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,8 +18,92 @@ std::vector<std::string> mesh_endings() {
 
 std::vector<std::string> input_endings() {
   std::vector<std::string> endings = mesh_endings();
-  for (const char* cloud : {".xyz", ".xyzn", ".asc", ".txt"}) endings.emplace_back(cloud);
+  for (std::string& cloud : cloud_endings()) {
+    if (std::ranges::find(endings, cloud) == endings.end()) endings.push_back(std::move(cloud));
+  }
   return endings;
+}
+
+std::vector<std::string> cloud_endings() {
+  return {".las", ".laz", ".e57", ".ply", ".ply.gz", ".pcd",  ".xyz", ".xyzn", ".asc",
+          ".txt", ".csv", ".pts", ".ptx", ".ptc",    ".bgeo", ".geo", ".pdb"};
+}
+
+std::vector<std::string> point_output_endings() {
+  return {".las", ".ply", ".xyz", ".pcd", ".ptc", ".bgeo", ".usda", ".usdc"};
+}
+
+CLI::Option* add_original_order(CLI::App& app, bool& original_order,
+                                const std::string& description) {
+  return app.add_flag("--original-order", original_order, description);
+}
+
+CLI::Option* add_colour_from(CLI::App& app, std::string& channel) {
+  return app
+      .add_option("--colour-from", channel,
+                  "Channel that viewers show as colour, such as occlusion or indirect\n"
+                  "Formats with a colour for each point get it in place of the points' own colour, "
+                  "which is kept in a .ptcx alone. One component is a grey, white for occlusion 0; "
+                  "three are light, which is compressed to what a screen shows.")
+      ->type_name("CHANNEL");
+}
+
+void add_selection(CLI::App& app, Selection& selection) {
+  constexpr char kGroup[] = "Selection";
+  app.add_option_function<std::string>(
+         "--bbox",
+         [&selection](const std::string& text) {
+           const std::vector<double> n =
+               parse_numbers("--bbox", text, {6}, "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX");
+           selection.box = Bounds{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+           for (int axis = 0; axis < 3; ++axis) {
+             if (selection.box->low[axis] > selection.box->high[axis])
+               refuse("--bbox", text, "minima that are not above the maxima");
+           }
+         },
+         "Box from which points are taken, in scene units\n"
+         "Points on its faces are taken, too. Of a container only the pages are read that may hold "
+         "such points.")
+      ->type_name("BOX")
+      ->group(kGroup);
+  app.add_option_function<std::string>(
+         "--class",
+         [&selection](const std::string& text) {
+           for (const std::string& word : split(text, ',')) {
+             const auto number = parse_number<std::uint64_t>(word);
+             if (!number) refuse("--class", text, "whole numbers separated by commas");
+             selection.classes.push_back(*number);
+           }
+         },
+         "Classes that are taken, such as 2 for ground or 2,6\n"
+         "They are values of the channel classification, which LAS has for each point.")
+      ->type_name("LIST")
+      ->group(kGroup);
+  add_integer(app, "--every", selection.every, 1, std::uint64_t{1} << 48,
+              "Take the first of every N points\n"
+              "It counts the points that meet all other conditions.")
+      ->group(kGroup);
+  app.add_option_function<std::string>(
+         "--channels",
+         [&selection](const std::string& text) { selection.channels = split(text, ','); },
+         "Names of the channels to keep, separated by commas\n"
+         "The other ones are left out. Position, normal, radius, colour and light are no channels, "
+         "and stay.")
+      ->type_name("LIST")
+      ->group(kGroup);
+}
+
+CLI::Option* add_level(CLI::App& app, Selection& selection) {
+  return app
+      .add_option_function<unsigned>(
+          "--level", [&selection](unsigned level) { selection.level = level; },
+          "Level of the octree whose clusters stand for the points\n"
+          "Level 1 has at most eight, and each further level up to eight times as many as the one "
+          "above it; leaves above the level stand for themselves. Clusters have a normal, a radius "
+          "and radiance, but no channels.")
+      ->type_name("N")
+      ->check(whole_in_range(1, 62))
+      ->group("Selection");
 }
 
 void note_unused(const CLI::App& app, const std::vector<std::string>& options,
@@ -116,6 +202,79 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift) {
   add_number(app, "--lift", lift, 0, 100, "Height of receivers above their surfel, in its radii")
       ->type_name("RADII")
       ->group(kExpertGroup);
+}
+
+void add_surroundings(CLI::App& app, Surroundings& around) {
+  constexpr char kGroup[] = "Occlusion";
+  CLI::Option* sphere =
+      app.add_flag(
+             "--sphere", around.sphere,
+             "Let all directions count alike, whatever the normal\n"
+             "By default those above the surface count, by their cosine to the normal. Over the "
+             "sphere the occlusion of an open plane is 0.5, and normals do not matter.")
+          ->group(kGroup);
+  app.add_option_function<double>(
+         "--cone",
+         [&around](double degrees) { around.cone = static_cast<float>(degrees * kPiDouble / 180); },
+         "Half angle of the cone in which directions count\n"
+         "Its axis is the normal; 90 degrees are the hemisphere.")
+      ->type_name("DEGREES")
+      ->check(in_range(1, 90))
+      ->default_str("90")
+      ->excludes(sphere)
+      ->group(kGroup);
+  CLI::Option* distance =
+      app.add_option(
+             "--distance", around.distance,
+             "Distance from which on surfaces cover nothing, in scene units\n"
+             "Closed rooms, which are dark otherwise, then show their corners. The light of "
+             "surfaces counts from any distance.")
+          ->type_name("LENGTH")
+          ->check(in_range(1e-30, 1e30))
+          ->default_str("")
+          ->group(kGroup);
+  add_integer(app, "--falloff", around.falloff, 0, 8,
+              "How covering decreases with the distance\n"
+              "A surface at the distance d covers the share (1 - d / LENGTH)^N of its direction; 0 "
+              "covers all of it up to LENGTH.")
+      ->needs(distance)
+      ->group(kGroup);
+}
+
+void add_preset(CLI::App& app, Preset& preset) {
+  add_choice<Preset>(
+      app, "--preset", preset,
+      {{"scan", Preset::scan}, {"interior", Preset::interior}, {"film", Preset::film}},
+      "Settings for a kind of scene: scan, interior or film\n"
+      "scan: occlusion and sky alone, with an error of 5 % (--bounces 0 --error 5%). interior: "
+      "surfaces cover up to a tenth of the diagonal of the scene, so that closed rooms show their "
+      "corners (--distance). film: an error of 2 % (--error 2%). Other options win over those of "
+      "a preset.")
+      ->default_str("")
+      ->group("Occlusion");
+}
+
+void apply_preset(const CLI::App& app, Preset preset, LightingRequest& request) {
+  constexpr float kDiagonals = 0.1F;
+  const auto given = [&](std::initializer_list<const char*> options) {
+    return std::ranges::any_of(options, [&](const char* o) { return app.count(o) > 0; });
+  };
+  const bool has_quality =
+      given({"--error", "--solid-angle", "--parallax", "--inflation", "--resolution"});
+  switch (preset) {
+    case Preset::scan:
+      if (!given({"--bounces"})) request.bounces = 0;
+      if (!has_quality) request.error = 0.05;
+      break;
+    case Preset::interior:
+      if (!given({"--distance"})) request.gather.around.diagonals = kDiagonals;
+      break;
+    case Preset::film:
+      if (!has_quality) request.error = 0.02;
+      break;
+    case Preset::none:
+      break;
+  }
 }
 
 void add_error_option(CLI::App& app, std::optional<double>& error) {

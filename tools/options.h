@@ -16,8 +16,12 @@ namespace ptc {
 
 /// Endings of meshes that can be read, for shells to propose.
 [[nodiscard]] std::vector<std::string> mesh_endings();
+/// Endings of clouds that can be read, for shells to propose.
+[[nodiscard]] std::vector<std::string> cloud_endings();
 /// Endings of meshes and clouds that can be read, for shells to propose.
 [[nodiscard]] std::vector<std::string> input_endings();
+/// Endings of files of points that can be written, containers not among them.
+[[nodiscard]] std::vector<std::string> point_output_endings();
 
 /// Notes which of these options were given, though the input leaves them without effect.
 /// @param because  the rest of the note: "--points has no effect, because no input is a mesh"
@@ -26,6 +30,18 @@ void note_unused(const CLI::App& app, const std::vector<std::string>& options,
 
 /// Declares --points COUNT, from 1.
 CLI::Option* add_points(CLI::App& app, std::uint64_t& count);
+/// Declares --original-order.
+CLI::Option* add_original_order(CLI::App& app, bool& original_order,
+                                const std::string& description);
+/// Declares --colour-from CHANNEL.
+CLI::Option* add_colour_from(CLI::App& app, std::string& channel);
+
+/// Declares --bbox, --class, --every and --channels, which choose points and channels of clouds and
+/// containers.
+void add_selection(CLI::App& app, Selection& selection);
+/// Declares --level N, which takes clusters of a container in place of its points.
+CLI::Option* add_level(CLI::App& app, Selection& selection);
+
 /// Declares --profile raw|exact|fast|compact.
 CLI::Option* add_profile(CLI::App& app, Profile& profile);
 /// Declares --page-size SIZE, a power of two from 4K to 1M; `page_shift` is its logarithm.
@@ -38,6 +54,16 @@ CLI::Option* add_bounces(CLI::App& app, unsigned& bounces);
 
 /// Declares --solid-angle, --parallax, --inflation, --resolution, --sides and --lift.
 void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift);
+
+/// Declares --sphere, --cone, --distance and --falloff.
+void add_surroundings(CLI::App& app, Surroundings& around);
+
+/// A name for settings that suit a kind of scene.
+enum class Preset { none, scan, interior, film };
+/// Declares --preset scan|interior|film.
+void add_preset(CLI::App& app, Preset& preset);
+/// Sets what a preset stands for, except where an option says otherwise. @pre the app is parsed
+void apply_preset(const CLI::App& app, Preset preset, LightingRequest& request);
 
 /// Declares --error SHARE, which stands for the settings of the gather that trade time for error
 /// and excludes them. @pre add_gather_options() was called

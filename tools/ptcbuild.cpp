@@ -5,10 +5,11 @@
 
 #include <fmt/format.h>
 
-#include "engine/io/cloud/points.h"
 #include "engine/pipeline/build/append.h"
+#include "engine/pipeline/scene_record.h"
 #include "format/node_page.h"
 #include "tools/common.h"
+#include "tools/inputs.h"
 #include "tools/options.h"
 #include "tools/report.h"
 #include "tools/scene_options.h"
@@ -20,8 +21,9 @@ constexpr char kPurpose[] =
     "Builds a lit PTCX container from meshes and point clouds.\n"
     "Meshes are sampled into surfels: small discs with a position, a normal, a radius, a colour "
     "and the light that they reflect. Suns, point lights, the sky and emissive triangles light "
-    "them by shadow rays. Clouds keep their points and the light that they come with; a missing "
-    "radius is estimated from the neighbours.\n"
+    "them by shadow rays. Clouds keep their points, everything that is recorded of each point, and "
+    "the light that they come with; without light they get a white sky. Missing normals and radii "
+    "are estimated from the neighbours.\n"
     "\n"
     "All points are sorted along the Z-curve within the cap on memory, and an octree is built over "
     "them. What does not fit in memory goes through temporary files in the directory of the "
@@ -36,6 +38,12 @@ constexpr char kExamples[] =
     "  ptcbuild sponza.obj --points 20M --sun 30,60,4 --sky 0.5,0.6,0.8 -o sponza.ptcx\n"
     "  # Build a large cloud on two disks; the same command goes on after an interruption\n"
     "  ptcbuild huge.ply --resume --memory 512M --temp . --temp /scratch -o huge.ptcx\n"
+    "  # Build the tiles of a scan, or what another program writes\n"
+    "  ptcbuild tiles/ -o scan.ptcx\n"
+    "  pdal translate in.copc.laz stdout.las | ptcbuild - -o scan.ptcx\n"
+    "  # Join containers, or take a part of one\n"
+    "  ptcbuild north.ptcx south.ptcx -o town.ptcx\n"
+    "  ptcbuild town.ptcx --bbox 0,0,0,100,100,50 -o square.ptcx\n"
     "  # Add a cloud to a container\n"
     "  ptcbuild annex.ply --append scan.ptcx -o scan.ptcx\n"
     "  # Build a procedural city that is larger than memory\n"
@@ -48,16 +56,44 @@ struct Arguments {
   ptc::LightArguments lights;
   ptc::CameraArguments camera;
   bool no_default_lights = false;
+  std::string format;  ///< of standard input
 };
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   CLI::App& app = command.app();
   ptc::BuildRequest& request = arguments.request;
-  CLI::Option* inputs = command.add_inputs(
-      "INPUT", request.inputs, ptc::input_endings(),
-      "Mesh (OBJ, PLY, OFF, glTF, GLB, STL) or cloud (PLY, XYZ)\n"
-      "OBJ, PLY and OFF may be compressed by gzip; the name then ends in .gz. A PLY without faces "
-      "is a cloud. The names of XYZ clouds end in .xyz, .xyzn, .asc or .txt.");
+  CLI::Option* inputs = ptc::offer(
+      app.add_option(
+          "INPUT", request.inputs,
+          "Mesh, cloud, container, directory, pattern, @list, or - for standard input\n"
+          "Meshes: OBJ, PLY, OFF, glTF, GLB, STL. Clouds: LAS, LAZ, COPC, E57, PLY, PCD, XYZ, PTS, "
+          "PTX, Pixar's .ptc, Houdini's .bgeo and .geo, Maya's .pdb. The bytes of a file tell its "
+          "format; only text goes by its ending, too. OBJ, PLY, OFF and text may be compressed by "
+          "gzip; the name then ends in .gz. A PLY without faces is a cloud. A directory stands for "
+          "all meshes and clouds in it, @FILE for the files that its lines name."),
+      ptc::input_endings());
+  inputs->type_name("FILE")->group(ptc::kFilesGroup);
+  app.add_option("--format", arguments.format,
+                 "Format of standard input, as an ending: las, ply, xyz, ...\n"
+                 "Only text needs it: other formats are told by their bytes.")
+      ->type_name("FORMAT")
+      ->group(ptc::kFilesGroup);
+  app.add_flag("--remove-duplicates", request.remove_duplicates,
+               "Keep one of the points that lie at the same place\n"
+               "A note says how many were left out.")
+      ->group(ptc::kFilesGroup);
+  ptc::offer(app.add_option("--up", request.up,
+                            "Axis that points up: x, y or z [default: as the files say, else y]\n"
+                            "LAS, LAZ, E57, PTX, PTS and PCD say z."),
+             {"x", "y", "z"})
+      ->type_name("AXIS")
+      ->check(CLI::IsMember({"x", "y", "z"}))
+      ->group(ptc::kFilesGroup);
+  ptc::add_original_order(
+      app, request.original_order,
+      "Record the order of the inputs\n"
+      "ptcconvert and ptcshade can then write points in the order in which they came.")
+      ->group(ptc::kFilesGroup);
   command.add_output("-o,--output", arguments.output, {".ptcx"}, "Container to write (.ptcx)");
   command.add_input(
       "--append", request.append, {".ptcx"},
@@ -158,7 +194,7 @@ void adopt_settings(Arguments& arguments, ptc::Command& command) {
 /// Notes options that are for meshes when no input is a mesh.
 void note_options_of_meshes(const Arguments& arguments, const CLI::App& app,
                             ptc::Progress& progress) {
-  if (!std::ranges::all_of(arguments.request.inputs, ptc::is_point_file)) return;
+  if (!std::ranges::all_of(arguments.request.inputs, ptc::holds_points)) return;
   ptc::note_unused(app,
                    {"--points", "--spacing", "--backdrop", "--pixels-per-surfel", "--finest",
                     "--sun-rays", "--sky-rays", "--area-rays"},
@@ -173,9 +209,16 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
     throw CLI::RequiredError("INPUT or --city");
   }
   request.run = command.run_options();
+  const ptc::InputFiles inputs(request.inputs, arguments.format, request.run, arguments.output);
+  request.inputs = inputs.paths();
+  request.input_names = inputs.names();
   request.sampling.camera = arguments.camera.camera();
   if (arguments.lights.given() || arguments.no_default_lights)
     request.lights = arguments.lights.rig();
+  if (request.lights) {
+    request.lights->sky.up = request.up.empty() ? ptc::up_of_files(request.inputs)
+                                                : ptc::up_of({{ptc::kUpKey, request.up}});
+  }
   if (request.city_points > 0 && arguments.lights.given())
     throw CLI::ExcludesError("--city", "lights: the city has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);
@@ -202,6 +245,7 @@ int main(int argc, char** argv) {
   ptc::Command command("ptcbuild", kPurpose, kExamples);
   Arguments arguments;
   declare_scene(command, arguments);
+  ptc::add_selection(command.app(), arguments.request.selection);
   declare_sampling(command.app(), arguments);
   declare_lights(command.app(), arguments);
   declare_container(command.app(), arguments.request);

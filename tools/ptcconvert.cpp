@@ -1,29 +1,43 @@
 // ptcconvert: converts between containers, clouds and meshes.
 //
 //   input        output
-//   container    .ply, .xyz    container_to_ply(), container_to_xyz()
-//   container    .ptcx         recode_container()
-//   cloud, mesh  .ptcx         build_container()
+//   container    .las, .ply, ...    container_to_points()
+//   container    .ptcx              recode_container(), or build_container() of a selection
+//   cloud        .las, .ply, ...    cloud_to_points()
+//   cloud, mesh  .ptcx              build_container()
 #include <fmt/format.h>
 
 #include "engine/io/cloud/points.h"
-#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/convert/convert.h"
+#include "engine/pipeline/convert/point_files.h"
 #include "engine/pipeline/run.h"
 #include "tools/common.h"
+#include "tools/inputs.h"
 #include "tools/options.h"
 #include "tools/report.h"
+#include "tools/values.h"
 
 namespace {
 
 constexpr char kPurpose[] =
     "Converts containers, clouds and meshes into one another.\n"
-    "The ending of OUTPUT says what to write. A container becomes a .ply with all its channels, an "
-    ".xyz with its points, or a .ptcx in another profile or page size. A cloud or a mesh becomes a "
-    ".ptcx as ptcbuild makes it, with the default light.";
+    "The ending of OUTPUT says what to write: LAS, PLY, XYZ, PCD, Pixar's .ptc, Houdini's .bgeo, "
+    "USD "
+    "or a container. Points keep everything that is recorded of them, as far as the format can "
+    "hold "
+    "it; --dry-run says what it cannot. A container becomes a container in another profile or page "
+    "size. A cloud or a mesh becomes a container as ptcbuild makes it, with the default light.";
 constexpr char kExamples[] =
     "  # Write all points and channels as a cloud\n"
     "  ptcconvert lit.ptcx lit.ply\n"
+    "  # Write them as LAS, in the order in which they came, after a look at what would be lost\n"
+    "  ptcconvert lit.ptcx lit.las --original-order --dry-run\n"
+    "  ptcconvert lit.ptcx lit.las --original-order\n"
+    "  # Convert a cloud\n"
+    "  ptcconvert scan.laz scan.ply\n"
+    "  # Take the ground within a box out of a container, and the whole scene at a coarse level\n"
+    "  ptcconvert scan.ptcx ground.las --class 2 --bbox 0,0,0,100,100,50\n"
+    "  ptcconvert scan.ptcx coarse.ply --level 6\n"
     "  # Make a container of a cloud that is larger than memory\n"
     "  ptcconvert scan.xyz scan.ptcx --memory 512M --temp /scratch\n"
     "  # Store a container in fewer bytes\n"
@@ -31,11 +45,14 @@ constexpr char kExamples[] =
 
 /// What the command line says.
 struct Arguments {
-  std::filesystem::path input;
+  std::filesystem::path input;  ///< an argument, later the file that it stands for
   std::filesystem::path output;
   ptc::Profile profile = ptc::Profile::exact;
   std::uint8_t page_shift = 16;
   bool page_size_given = false;
+  ptc::PointFileOptions points;
+  bool dry_run = false;
+  std::string format;  ///< of standard input
   ptc::SamplingOptions sampling;
 };
 
@@ -44,6 +61,8 @@ ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
                          ptc::Progress& progress) {
   ptc::BuildRequest request;
   request.inputs = {arguments.input};
+  request.original_order = arguments.points.original_order;
+  request.selection = arguments.points.selection;
   request.sampling = arguments.sampling;
   request.profile = arguments.profile;
   request.page_shift = arguments.page_shift;
@@ -61,6 +80,25 @@ void note_unused_options(const Arguments& arguments, const CLI::App& app, ptc::P
     ptc::note_unused(app, {"--points"}, "the input is no mesh", progress);
   if (!ptc::has_ending(arguments.output, ".ptcx"))
     ptc::note_unused(app, {"--profile", "--page-size"}, "the output is no container", progress);
+  if (ptc::has_ending(arguments.output, ".ptcx"))
+    ptc::note_unused(app, {"--colour-from", "--dry-run"}, "the output is a container", progress);
+}
+
+/// Says what the format of the output cannot hold of the points.
+ptc::Outcome tell_losses(const Arguments& arguments, ptc::Progress& progress) {
+  const ptc::PointWriteInfo info =
+      ptc::is_container(arguments.input)
+          ? ptc::describe_points(ptc::ContainerReader(arguments.input), arguments.points)
+          : ptc::describe_points(arguments.input, arguments.points, progress);
+  const auto format = ptc::output_format(arguments.output);
+  const std::vector<std::string> losses =
+      format ? ptc::losses(*format, info) : std::vector<std::string>();
+  std::string text = fmt::format("{}: {} points, {} channels; {}\n", arguments.output.string(),
+                                 info.count, info.channels.size(),
+                                 losses.empty() ? "nothing would be lost" : "not kept as it is:");
+  for (const std::string& loss : losses) text += "  " + loss + "\n";
+  return {{{"output", arguments.output.string()}, {"points", info.count}, {"losses", losses}},
+          text};
 }
 
 /// Chooses the conversion by the contents of the input and the ending of the output.
@@ -69,21 +107,21 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
   const bool to_container = ptc::has_ending(arguments.output, ".ptcx");
   if (!ptc::is_container(arguments.input)) {
     if (to_container) return build(arguments, run, progress);
-    throw CLI::ValidationError("OUTPUT", "clouds and meshes are converted to .ptcx only, not to '" +
-                                             arguments.output.string() + "'");
+    if (ptc::is_point_file(arguments.input))
+      return ptc::cloud_to_points(arguments.input, arguments.output, arguments.points, progress);
+    throw CLI::ValidationError(
+        "OUTPUT", "a mesh is converted to .ptcx only, not to '" + arguments.output.string() + "'");
   }
+  const ptc::Selection& selection = arguments.points.selection;
+  if (to_container && !(selection.takes_all() && !selection.channels))
+    return build(arguments, run, progress);
   const ptc::ContainerReader container(arguments.input);
   if (to_container) {
     ptc::RecodeOptions options{.profile = arguments.profile, .run = run};
     if (arguments.page_size_given) options.page_shift = arguments.page_shift;
     return ptc::recode_container(container, arguments.output, options, progress);
   }
-  ptc::MemoryBudget budget = ptc::budget_of(run.memory_bytes, "this conversion");
-  ptc::charge_directory(budget, container);
-  budget.require();
-  const auto to_cloud =
-      ptc::has_ending(arguments.output, ".ply") ? ptc::container_to_ply : ptc::container_to_xyz;
-  return to_cloud(container, arguments.output, progress);
+  return ptc::container_to_points(container, arguments.output, arguments.points, progress);
 }
 
 }  // namespace
@@ -93,16 +131,45 @@ int main(int argc, char** argv) {
   Arguments arguments;
   std::vector<std::string> endings = ptc::input_endings();
   endings.insert(endings.begin(), ".ptcx");
-  command.add_input("INPUT", arguments.input, endings, "Container, cloud or mesh to read")
-      ->required();
-  command.add_output("OUTPUT", arguments.output, {".ptcx", ".ply", ".xyz"},
-                     "File to write (.ptcx, .ply or .xyz)");
+  std::vector<std::string> outputs = ptc::point_output_endings();
+  outputs.insert(outputs.begin(), ".ptcx");
+  CLI::App& app = command.app();
+  ptc::offer(app.add_option("INPUT", arguments.input,
+                            "Container, cloud or mesh to read, or - for standard input"),
+             endings)
+      ->type_name("FILE")
+      ->required()
+      ->group(ptc::kFilesGroup);
+  command.add_output("OUTPUT", arguments.output, outputs,
+                     "File to write (.ptcx, .las, .ply, .xyz, .pcd, .ptc, .bgeo, .usda, .usdc)");
+  app.add_option("--format", arguments.format, "Format of standard input, as an ending: las, xyz")
+      ->type_name("FORMAT")
+      ->group(ptc::kFilesGroup);
+  ptc::add_original_order(app, arguments.points.original_order,
+                          "Write points in the order of the inputs of the container\n"
+                          "The container must record it. A cloud that becomes a container gets the "
+                          "record.")
+      ->group(ptc::kFilesGroup);
+  ptc::add_colour_from(app, arguments.points.colour_from)->group(ptc::kFilesGroup);
+  app.add_flag("--dry-run", arguments.dry_run,
+               "Write nothing; say what the format cannot hold of the points")
+      ->group(ptc::kFilesGroup);
+  ptc::add_selection(app, arguments.points.selection);
+  ptc::add_level(app, arguments.points.selection);
   ptc::add_points(command.app(), arguments.sampling.count);
   ptc::add_profile(command.app(), arguments.profile)->group("Container");
   const CLI::Option* page_size =
       ptc::add_page_size(command.app(), arguments.page_shift)->group("Container");
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
+    const ptc::InputFiles inputs({arguments.input}, arguments.format, command.run_options(),
+                                 arguments.output);
+    if (inputs.paths().size() != 1)
+      throw CLI::ValidationError("INPUT", "stands for more than one file: ptcbuild joins files");
+    arguments.input = inputs.paths().front();
+    arguments.points.run = command.run_options();
     arguments.page_size_given = page_size->count() > 0;
+    if (arguments.dry_run && !ptc::has_ending(arguments.output, ".ptcx"))
+      return tell_losses(arguments, progress);
     note_unused_options(arguments, command.app(), progress);
     const ptc::ConvertReport report = convert(arguments, command.run_options(), progress);
     const std::uint64_t bytes = std::filesystem::file_size(arguments.output);

@@ -19,7 +19,9 @@
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
 #include "engine/octree/rounding.h"
+#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
+#include "engine/pipeline/render/thumbnail.h"
 #include "engine/pipeline/run.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/store/commit.h"
@@ -40,6 +42,8 @@ constexpr char kPurpose[] =
 constexpr char kExamples[] =
     "  # Print a summary\n"
     "  ptcinfo scene.ptcx\n"
+    "  # Draw a small picture of it\n"
+    "  ptcinfo scene.ptcx --thumbnail scene.png\n"
     "  # Read one figure in a script\n"
     "  ptcinfo scene.ptcx --json | python3 -c 'import json,sys; "
     "print(json.load(sys.stdin)[\"points\"])'\n";
@@ -239,6 +243,17 @@ std::string record_text(const ordered_json& record) {
     const double length = std::strtod(spacing->get<std::string>().c_str(), nullptr);
     text += fmt::format("  spacing   {:.4g} scene units between surfels of meshes\n", length);
   }
+  if (const auto crs = record.find("crs"); crs != record.end()) {
+    // The name is the first text in quotes of a WKT; "EPSG:n" has none
+    const std::string all = crs->get<std::string>();
+    const std::size_t from = all.find('"'), to = all.find('"', from + 1);
+    const bool is_wkt = from != std::string::npos && to != std::string::npos;
+    text += "  crs       " +
+            quoted(ordered_json(is_wkt ? all.substr(from + 1, to - from - 1) : all)) + "\n";
+  }
+  const auto unit = record.find("metres_per_unit"), up = record.find(ptc::kUpKey);
+  if (unit != record.end()) text += "  unit      " + unit->get<std::string>() + " m\n";
+  if (up != record.end()) text += "  up        " + up->get<std::string>() + "\n";
   if (const auto lights = record.find(ptc::kLightsKey); lights != record.end()) {
     text += "  lights    " + lights_text(*lights, record.contains(ptc::kEmittersKey)) + "\n";
   }
@@ -293,11 +308,20 @@ std::string summary_of(const ordered_json& facts) {
 int main(int argc, char** argv) {
   ptc::Command command("ptcinfo", kPurpose, kExamples);
   std::filesystem::path file;
+  std::filesystem::path thumbnail;
   command.add_input("FILE", file, {".ptcx"}, "Container to look at")->required();
+  command
+      .add_output("--thumbnail", thumbnail, {".png"},
+                  "Picture to write, 480 x 270 pixels\n"
+                  "It takes a moment for a scene of any size: of more than two million points "
+                  "the coarse levels of the octree alone are drawn.")
+      ->required(false);
   return command.run(argc, argv, [&](ptc::Progress&) -> ptc::Outcome {
     require_memory(file, command.run_options());
     const ptc::ContainerReader container(file);
     const ordered_json facts = facts_of(container);
+    if (!thumbnail.empty())
+      ptc::write_thumbnail(container, thumbnail, ptc::ThreadPool(command.run_options().threads));
     return {facts, summary_of(facts)};
   });
 }

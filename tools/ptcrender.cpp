@@ -5,7 +5,6 @@
 #include <span>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/points.h"
 #include "tools/common.h"
 #include "tools/option_text.h"
 #include "tools/options.h"
@@ -120,7 +119,7 @@ void declare_lights(CLI::App& app, Arguments& arguments) {
 /// Refuses clouds, which would be ignored in silence: the camera would see the surfels instead.
 void refuse_clouds(const std::vector<std::filesystem::path>& meshes) {
   for (const std::filesystem::path& path : meshes) {
-    if (!ptc::is_point_file(path)) continue;
+    if (!ptc::holds_points(path)) continue;
     throw ptc::DataError(path.string() + ": offset 0: this is a cloud; --mesh takes a mesh");
   }
 }
@@ -133,6 +132,9 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   request.camera = arguments.camera.camera();
   request.size = arguments.camera.size();
   if (arguments.lights.given()) request.lights = arguments.lights.rig();
+  const glm::vec3 up = ptc::up_of_files({request.scene});
+  if (request.lights) request.lights->sky.up = up;
+  if (request.camera) request.camera->up = up;
   std::vector<ptc::PictureTarget> targets = arguments.layers;
   for (const auto& output : arguments.outputs) targets.push_back({.path = output});
   const ptc::LightingReport report = ptc::render_picture(request, targets, progress);
@@ -154,6 +156,9 @@ int main(int argc, char** argv) {
   declare_scene(command, arguments);
   declare_picture(command.app(), arguments);
   declare_lights(command.app(), arguments);
+  ptc::Preset preset = ptc::Preset::none;
+  ptc::add_preset(command.app(), preset);
+  ptc::add_surroundings(command.app(), arguments.request.gather.around);
   ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
   ptc::add_error_option(command.app(), arguments.request.error);
   ptc::add_check_options(command.app(), arguments.request.check);
@@ -161,6 +166,7 @@ int main(int argc, char** argv) {
   ptc::add_tolerate_damage(command.app(), arguments.request.tolerate_damage);
   ptc::add_back_end(command.app(), arguments.request.back_end);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
+    ptc::apply_preset(command.app(), preset, arguments.request);
     return render(arguments, command.run_options(), progress);
   });
 }

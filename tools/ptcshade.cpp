@@ -10,7 +10,7 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Computes occlusion and indirect light at the points of a container.\n"
+    "Computes occlusion and indirect light at the points of a container or a cloud.\n"
     "The light is gathered from the surfels of the container: clusters of the octree stand for "
     "surfels that are far away. The receivers are the points of the container or those of another "
     "file.\n"
@@ -18,12 +18,18 @@ constexpr char kPurpose[] =
     "The output has the channels occlusion (0 to 1), bent_normal (the mean direction in which a "
     "point is not covered), irradiance (from surfaces, in W/m^2), sky (irradiance from the sky) "
     "and indirect (reflected light: albedo / pi times the sum of irradiance and sky). A .ptcx "
-    "output is a container with these channels; in a .ply they are columns.";
+    "output is a container with these channels; files of other formats have them beside everything "
+    "that the input records of a point. A cloud or mesh in place of the container is built first, "
+    "into a temporary file; the points of a cloud are written in the order in which they came.";
 constexpr char kExamples[] =
     "  # Shade every point of a container\n"
     "  ptcshade dragon.ptcx -o lit.ptcx\n"
+    "  # Shade a scan, and look at it in another program\n"
+    "  ptcshade scan.laz --colour-from occlusion -o scan.las\n"
     "  # Shade a scene that is larger than memory, and show progress\n"
     "  ptcshade city.ptcx --memory 1G --threads 8 --progress -o lit.ptcx\n"
+    "  # Show the corners of a closed room: only what is nearer than 2 units covers\n"
+    "  ptcshade room.ptcx --distance 2 -o lit.ptcx\n"
     "  # Let light bounce four times\n"
     "  ptcshade room.ptcx --bounces 4 -o lit.ptcx\n"
     "  # Meet an error of 2 %, and measure the error at 1000 points\n"
@@ -39,21 +45,38 @@ int main(int argc, char** argv) {
   ptc::ShadeRequest request;
   std::filesystem::path output;
   ptc::LightArguments lights;
+  std::vector<std::string> scene_endings = ptc::input_endings();
+  std::vector<std::string> receiver_endings = ptc::cloud_endings();
+  std::vector<std::string> output_endings = ptc::point_output_endings();
+  for (auto* endings : {&scene_endings, &receiver_endings, &output_endings})
+    endings->insert(endings->begin(), ".ptcx");
   command
-      .add_input("SCENE", request.scene, {".ptcx"},
-                 "Container whose surfels cast shadows and light")
+      .add_input("SCENE", request.scene, scene_endings,
+                 "Container, cloud or mesh whose surfels cast shadows and light")
       ->required();
-  command.add_output("-o,--output", output, {".ptcx", ".ply"}, "File to write (.ptcx or .ply)");
-  command.add_input("--receivers", request.receivers, {".ptcx", ".ply", ".ply.gz", ".xyz"},
+  command.add_output("-o,--output", output, output_endings,
+                     "File to write: .ptcx, or a file of points\n"
+                     "Files of points: .las, .ply, .xyz, .pcd, .ptc, .bgeo, .usda, .usdc.");
+  command.add_input("--receivers", request.receivers, receiver_endings,
                     "Cloud or container to shade [default: the points of SCENE]");
   ptc::add_count(app, "--count", request.count,
-                 "Shade only COUNT points, evenly spread, into a .ply [default: all]")
+                 "Shade COUNT points, evenly spread [default: all]\n"
+                 "They go into a file of points.")
       ->group(ptc::kFilesGroup);
+  ptc::add_original_order(app, request.original_order,
+                          "Write points in the order of the inputs of the container\n"
+                          "The container must record it: ptcbuild --original-order.")
+      ->group(ptc::kFilesGroup);
+  ptc::add_colour_from(app, request.colour_from)->group(ptc::kFilesGroup);
   lights.declare_sky(app);
   app.get_option("--sky")->description(
-      "Sky: colour, grey level or latitude-longitude picture [default: as built]\n"
-      "+y is up: it is the upper edge of the picture.");
+      "Sky: colour, grey level or picture [default: as built]\n"
+      "The picture has latitudes and longitudes; its upper edge is up: +y, or what the scene "
+      "says.");
   ptc::add_bounces(app, request.bounces)->group("Lights");
+  ptc::Preset preset = ptc::Preset::none;
+  ptc::add_preset(app, preset);
+  ptc::add_surroundings(app, request.gather.around);
   ptc::add_gather_options(app, request.gather, request.lift);
   ptc::add_error_option(app, request.error);
   ptc::add_check_options(app, request.check);
@@ -63,7 +86,9 @@ int main(int argc, char** argv) {
 
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     request.run = command.run_options();
+    ptc::apply_preset(app, preset, request);
     if (lights.sky_given()) request.sky = lights.sky();
+    if (request.sky) request.sky->up = ptc::up_of_files({request.scene});
     const ptc::LightingReport report = ptc::shade_container(request, output, progress);
     const bool all_left = !report.damage || report.damage->points == 0;
     if (request.count > report.receivers && all_left) {

@@ -10,11 +10,15 @@
 #include "tools/scene_options.h"
 
 #include <cmath>
+#include <map>
 #include <memory>
+#include <string>
 
 #include <glm/trigonometric.hpp>
 
 #include "engine/io/image/image.h"
+#include "engine/pipeline/point_input.h"
+#include "engine/pipeline/scene_record.h"
 #include "tools/common.h"
 #include "tools/values.h"
 
@@ -142,6 +146,15 @@ Sky LightArguments::sky() const {
   sky.map_path = sky_;
   sky.map = std::make_shared<const Image>(read_image(sky_));
   return sky;
+}
+
+glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files) {
+  for (const std::filesystem::path& file : files) {
+    if (!holds_points(file)) continue;
+    const std::map<std::string, std::string> text = open_point_input(file).info.text;
+    if (text.contains(kUpKey)) return up_of(text);
+  }
+  return {0, 1, 0};
 }
 
 void add_light_sampling(CLI::App& app, LightSampling& sampling) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,6 +44,11 @@ class LightArguments {
   std::optional<glm::vec3> sky_radiance_;  ///< empty: `sky_` is a picture
   float sky_scale_ = 1;
 };
+
+/// Returns the direction that points up in the first of these files that says so, a container or a
+/// cloud; +y when none does.
+/// @throws DataError, FormatError, std::system_error when a file cannot be read
+[[nodiscard]] glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files);
 
 /// Declares --sun-rays, --sky-rays and --area-rays.
 void add_light_sampling(CLI::App& app, LightSampling& sampling);

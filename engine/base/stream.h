@@ -20,6 +20,13 @@ class PointSource {
   /// @return the number of surfels in `out`; 0 at the end
   /// @throws DataError that names the file and the offset (binary) or line (text) of the bad point
   virtual std::size_t next(std::span<Surfel> out) = 0;
+  /// Returns the attributes of the surfels that next() returned last: one row for each of them, the
+  /// values of all channels of the source in their order, little-endian, without padding. Empty
+  /// when the source has no channels. Valid until the next call of next().
+  [[nodiscard]] virtual std::span<const std::byte> attributes() const noexcept { return {}; }
+  /// Returns the number of records that next() left out so far because they name no place, such as
+  /// the directions of a scan from which no echo came.
+  [[nodiscard]] virtual std::uint64_t left_out() const noexcept { return 0; }
 };
 
 /// Yields point records by ascending key, one block after another.

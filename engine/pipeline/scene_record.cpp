@@ -11,6 +11,13 @@
 
 namespace ptc {
 
+glm::vec3 up_of(const std::map<std::string, std::string>& text) {
+  const auto found = text.find(kUpKey);
+  if (found != text.end() && found->second == "x") return {1, 0, 0};
+  if (found != text.end() && found->second == "z") return {0, 0, 1};
+  return {0, 1, 0};
+}
+
 LightRig recorded_lights(const ContainerReader& container, Progress& progress) {
   const auto& text = container.meta().text;
   const auto found = text.find(kLightsKey);
@@ -58,6 +65,10 @@ void check_meta(const Meta& meta, std::uint8_t page_shift, std::uint8_t point_by
 
 bool lit_by_emitters(const ContainerReader& container) {
   return container.meta().text.contains(kEmittersKey);
+}
+
+bool sky_is_gathered(const ContainerReader& container) {
+  return container.meta().text.contains(kSkyLightKey);
 }
 
 double surfel_spacing(const ContainerReader& container) {

@@ -4,7 +4,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
+
+#include <glm/vec3.hpp>
 
 #include "engine/base/progress.h"
 #include "engine/scene/light/lights.h"
@@ -14,10 +17,17 @@ namespace ptc {
 
 inline constexpr const char* kLightsKey = "lights";      ///< to_json() of the LightRig
 inline constexpr const char* kEmittersKey = "emitters";  ///< "baked": emitters lit the surfels
+/// "gathered": the radiance of the surfels leaves out the light of the sky.
+inline constexpr const char* kSkyLightKey = "sky_light";
 inline constexpr const char* kCameraKey = "camera";      ///< to_json() of the Camera
 inline constexpr const char* kSpacingKey = "spacing";    ///< between surfels on meshes, scene units
 inline constexpr const char* kInputsKey = "inputs";      ///< file names, separated by spaces
 inline constexpr const char* kRoundingKey = "rounding";  ///< kRounding when points were rounded
+inline constexpr const char* kUpKey = "up";              ///< x, y or z; y when it is absent
+
+/// Returns the unit vector along the axis that points up, by the texts of a container or of a file
+/// of points: +y when they do not name it.
+[[nodiscard]] glm::vec3 up_of(const std::map<std::string, std::string>& text);
 
 /// Returns the lights that a container was built with, and loads the picture of their sky; no
 /// lights when the container records none.
@@ -45,6 +55,10 @@ void check_meta(const Meta& meta, std::uint8_t page_shift, std::uint8_t point_by
 /// Returns true when emissive triangles lit the surfels, so that the radiance of the surfels around
 /// an emitter includes the light that it gave them.
 [[nodiscard]] bool lit_by_emitters(const ContainerReader& container);
+
+/// Returns true when the radiance of the surfels leaves out the light of the sky, so that a picture
+/// of them adds what the gather finds of it.
+[[nodiscard]] bool sky_is_gathered(const ContainerReader& container);
 
 /// Returns the distance between neighbouring surfels in scene units: the recorded one or, without a
 /// record, the square root of area over points; 0 for a container without points.

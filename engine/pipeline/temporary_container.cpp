@@ -10,11 +10,15 @@
 
 namespace ptc {
 
+std::filesystem::path temporary_container_path(const std::filesystem::path& directory) {
+  static std::atomic<unsigned> made = 0;
+  return directory / fmt::format(".ptcx-{}-{}.ptcx", getpid(), ++made);
+}
+
 std::unique_ptr<ContainerReader> make_temporary_container(
     const std::filesystem::path& directory,
     const std::function<void(const std::filesystem::path&)>& write) {
-  static std::atomic<unsigned> made = 0;
-  const std::filesystem::path path = directory / fmt::format(".ptcx-{}-{}.ptcx", getpid(), ++made);
+  const std::filesystem::path path = temporary_container_path(directory);
   const TemporaryName name(path);  // first, because write() may fail when the file already exists
   write(path);
   return std::make_unique<ContainerReader>(path);

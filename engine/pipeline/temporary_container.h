@@ -9,6 +9,10 @@
 
 namespace ptc {
 
+/// Returns a path for a temporary container, another one for each call and process.
+[[nodiscard]] std::filesystem::path temporary_container_path(
+    const std::filesystem::path& directory);
+
 /// Writes a container, opens it and removes its name. Its space is freed when the reader is
 /// destroyed, or when the process ends, however it ends.
 /// @param directory  where the file lies

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include <glm/vec3.hpp>
 
@@ -35,6 +36,30 @@ enum class Sides {
   front,  ///< the back is transparent: exact and faster where no back side is ever seen
 };
 
+/// The part of its surroundings that a receiver's occlusion is about
+/// (spec/shading.md#surroundings).
+struct Surroundings {
+  /// All directions count alike, whatever the normal; otherwise those above it, by their cosine.
+  bool sphere = false;
+  /// Half angle of the cone about the normal in which directions count, rad; pi / 2 is the
+  /// hemisphere. A sphere ignores it.
+  float cone = 1.5707964F;
+  /// Distance from which on surfaces cover nothing, scene units; infinite: none.
+  float distance = std::numeric_limits<float>::infinity();
+  /// The same as a share of the diagonal of the scene's bounds; 0: `distance` holds. Requests take
+  /// it; for a gather it must be 0.
+  float diagonals = 0;
+  /// A surface at a distance d covers the share (1 - d / distance)^falloff of its direction: at 0
+  /// all of it up to `distance`.
+  unsigned falloff = 1;
+
+  /// Says whether this is the whole hemisphere at any distance.
+  [[nodiscard]] bool is_plain() const noexcept {
+    return !sphere && cone >= 1.5707963F && diagonals == 0 &&
+           distance == std::numeric_limits<float>::infinity();
+  }
+};
+
 /// The settings of a gather: how closely it approximates exact discs (spec/shading.md#gather).
 struct GatherOptions {
   /// Solid angle below which a cluster is drawn instead of being opened, sr: that of its bounding
@@ -47,6 +72,7 @@ struct GatherOptions {
   float inflation = 2;
   unsigned resolution = 32;   ///< direction pixels along a cube edge, 16 to 64, a multiple of 16
   Sides sides = Sides::both;  ///< sides of surfels that stop light
+  Surroundings around;        ///< what occlusion, bent normal and sky are about
   bool bleeding = true;       ///< false leaves out the light from surfaces, which takes less time
 };
 

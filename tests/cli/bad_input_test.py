@@ -57,15 +57,16 @@ class BadInput(ProgramTest):
             self.refuse(kind, self.here / "none" / ("none" + ending))
             directory = self.here / ("directory" + ending)
             directory.mkdir()
-            self.refuse(kind, directory, "Is a directory")
+            self.refuse(kind, directory, "Is a directory", "the directory holds no mesh and no cloud")
             os.mkfifo(self.here / ("pipe" + ending))
             self.refuse(kind, self.here / ("pipe" + ending), "Is not a regular file")
             os.remove(self.here / ("pipe" + ending))
             directory.rmdir()
 
     def test_standard_input_is_refused_as_such(self):
-        for kind in ("cloud", "mesh", "container"):
-            self.refuse(kind, "-", "standard input is not read yet; give a file")
+        for arguments in (["ptcinfo", "-"], ["ptcverify", "-"], ["ptcshade", "-", "-o", self.here / "o.ply"],
+                          ["ptcrender", "-", "-o", self.here / "o.png"]):
+            self.assertIn("standard input is not read yet; give a file", self.fail_with(1, *arguments))
 
     def test_empty_files(self):
         for kind, ending in (("cloud", ".ply"), ("cloud", ".xyz"), ("mesh", ".obj"),
@@ -130,7 +131,7 @@ class BadInput(ProgramTest):
 
     def test_points_with_impossible_numbers(self):
         good = ball(50)
-        for name, value in (("x", math.nan), ("z", math.inf), ("y", -1e302), ("nx", math.nan), ("radius", -1.0),
+        for name, value in (("z", math.inf), ("y", -1e302), ("nx", math.nan), ("radius", -1.0),
                             ("radius", math.nan), ("radius", math.inf), ("radiance_g", -0.5),
                             ("radiance_b", math.nan)):
             for place in (0, 49):
@@ -139,15 +140,21 @@ class BadInput(ProgramTest):
                 path = self.here / "bad.ply"
                 write_ply(path, points)
                 self.refuse("cloud", path, f"point {place}")
-        points = [list(p) for p in good]
+
+    def test_points_without_a_place_or_a_normal_are_no_errors(self):
+        points = [list(p) for p in ball(50)]
+        points[7][CORE.index("x")] = math.nan
         points[20][3:6] = [0, 0, 0]
+        path = self.here / "gaps.ply"
         write_ply(path, points)
-        self.refuse("cloud", path, "normal")
+        said = self.succeed("ptcbuild", path, "-o", self.here / "gaps.ptcx").stderr
+        self.assertIn("1 records name no place and are left out", said)
+        self.assertIn("the normals of 1 points are estimated", said)
 
     def test_lines_with_impossible_numbers(self):
         path = self.here / "bad.xyz"
         good = "0 0 0 0 1 0 0.1 1 1 1\n"
-        for bad in ("nan 0 0 0 1 0 0.1 1 1 1", "0 0 0 0 0 0 0.1 1 1 1", "0 0 0 0 1 0 -0.1 1 1 1",
+        for bad in ("inf 0 0 0 1 0 0.1 1 1 1", "0 0 0 0 1 0 -0.1 1 1 1",
                     "0 0 0 0 1 0 0.1 1 -1 1", "0 0 0 0 1 0 0.1 1 1", "0 0 0 0 1 zero 0.1 1 1 1"):
             path.write_text(good * 3 + bad + "\n" + good)
             self.refuse("cloud", path, "line 4")

@@ -134,6 +134,33 @@ class Bench(ProgramTest):
         self.assertTrue(all(row["decode_ns"] if row["axis"] == "pages" else row["us_per_receiver"] for row in rows))
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["model-box.png", "model-box.svg", "model-scenes.csv", "model.csv", "model.json"])
 
+    def test_normals_of_clouds_are_compared_with_the_mesh(self):
+        charts = self.here / "charts"
+        printed = self.succeed("ptcbench", "scan", "fractal", self.mesh, "--points", "40k", "--repeats", "1", "-o", charts, "--json")
+        rows = json.loads((charts / "scan.json").read_text())["rows"]
+        self.assertEqual(json.loads(printed.stdout)["rows"], rows)
+        self.assertEqual([(r["noise"], r["method"]) for r in rows], 2 * [(0, "ptcx"), (0.5, "ptcx")])
+        for row in rows:
+            self.assertEqual(row["points"], 40000)
+            self.assertLessEqual(row["median_degrees"], row["p95_degrees"])
+            self.assertGreater(row["points_per_cpu_second"], 0)
+        for clean, noisy in (rows[:2], rows[2:]):
+            self.assertLess(clean["median_degrees"], noisy["median_degrees"])
+        self.assertLess(rows[2]["flipped"], 0.01)  # the ball is closed
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["scan.csv", "scan.json", "scan.png", "scan.svg"])
+
+    def test_occlusion_of_scans_is_compared_with_the_mesh(self):
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "specks", self.mesh, "--points", "20k", "--checked", "300", "-o", charts)
+        rows = json.loads((charts / "specks.json").read_text())["rows"]
+        self.assertEqual([r["cloud"] for r in rows], ["clean", "noise of half a spacing", "density 10 to 1", "200 holes"])
+        for row in rows:  # a ball: nothing is covered
+            self.assertLess(row["rms"], 0.05)
+            self.assertLess(row["picture_rms"], 0.1)  # most of it at the silhouette
+            self.assertEqual(row["checked"], 300)
+        self.assertLess(rows[0]["holes"], 0.001)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["specks.csv", "specks.json"])
+
     def test_sorts_of_every_order_are_right_and_leave_their_files_alone(self):
         charts = self.here / "charts"
         printed = self.succeed("ptcbench", "sort", "--points", "40k", "--repeats", "1", "--memory", "1M", "--threads", "2", "-o", charts,

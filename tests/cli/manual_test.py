@@ -201,7 +201,7 @@ class Completions(unittest.TestCase):
             (Path(here) / "folder").mkdir()
             for program, words, expected in (
                     ("ptcinfo", [""], ["a b.ptcx"]),
-                    ("ptcshade", ["-o", ""], ["a b.ptcx", "cloud.ply"]),
+                    ("ptcshade", ["-o", ""], ["a b.ptcx", "cloud.ply", "cloud.xyz"]),
                     ("ptcshade", ["--receivers", "c"], ["cloud.ply", "cloud.xyz"]),
                     ("ptcbuild", ["-o", "x.ptcx", ""], ["cloud.ply", "cloud.xyz", "mesh.ply.gz"]),
                     ("ptcrender", ["--output", "=", ""], ["picture.png"]),

@@ -60,7 +60,8 @@ def read_ply(path):
     for line in data[:end].decode().splitlines():
         words = line.split()
         if words[0] == "property":
-            code += {"double": "d", "float": "f"}[words[1]]
+            code += {"double": "d", "float": "f", "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i",
+                     "uint": "I"}[words[1]]
             names.append(words[2])
         elif words[0] == "element":
             count = int(words[2])

@@ -124,8 +124,8 @@ class RoundTrip(ProgramTest):
         facts = json.loads(self.succeed("ptcinfo", self.here / "a.ptcx", "--json").stdout)
         self.assertGreater(min(facts["flux"]), 0)
 
-    def test_a_cloud_becomes_no_cloud(self):
-        self.fail_with(2, "ptcconvert", self.cloud, self.here / "a.xyz")
+    def test_a_mesh_becomes_no_cloud(self):
+        self.fail_with(2, "ptcconvert", self.mesh, self.here / "a.xyz")
 
 
 if __name__ == "__main__":

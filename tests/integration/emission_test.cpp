@@ -139,7 +139,7 @@ TEST_CASE("emission: a cloud keeps it through a build, a conversion to PLY and a
   const auto light = light_of(dir / "a.ptcx");
   CHECK(std::ranges::count(light, std::pair(kLamp, glm::vec3(0.25F))) == 3000);
   CHECK(std::ranges::count(light, std::pair(glm::vec3(0), glm::vec3(0.25F))) == 6000);
-  container_to_ply(ContainerReader(dir / "a.ptcx"), dir / "b.ply", silent);
+  container_to_points(ContainerReader(dir / "a.ptcx"), dir / "b.ply", {}, silent);
   build.inputs = {dir / "b.ply"};
   build_container(build, dir / "b.ptcx", silent);
   check_sound(dir / "b.ptcx");

@@ -199,8 +199,8 @@ TEST_CASE("parts: a salvage keeps the channels of the parts", "[integration][par
   CHECK(report.attribute_pages == 4);
   CHECK(report.attribute_pages_before == 4);
   REQUIRE(ContainerReader(dir / "kept.ptcx").meta().channels.size() == 1);
-  container_to_ply(ContainerReader(scene), dir / "scene.ply", silent);
-  container_to_ply(ContainerReader(dir / "kept.ptcx"), dir / "kept.ply", silent);
+  container_to_points(ContainerReader(scene), dir / "scene.ply", {}, silent);
+  container_to_points(ContainerReader(dir / "kept.ptcx"), dir / "kept.ply", {}, silent);
   CHECK(bytes_of(dir / "kept.ply") == bytes_of(dir / "scene.ply"));
 }
 

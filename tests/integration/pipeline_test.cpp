@@ -65,7 +65,7 @@ TEST_CASE("pipeline: neither threads nor the cap change any byte of a container"
   CHECK(bytes_of(dir / "one.ptcx") != bytes_of(dir / "other.ptcx"));
 }
 
-TEST_CASE("pipeline: only meshes without any light get the default sun and sky",
+TEST_CASE("pipeline: meshes without any light get the default sun and sky, clouds a white sky",
           "[integration][build]") {
   const TemporaryDirectory dir;
   const auto lights_of = [&](const std::filesystem::path& input,
@@ -84,7 +84,9 @@ TEST_CASE("pipeline: only meshes without any light get the default sun and sky",
       << "mtllib lamp.mtl\nusemtl lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   CHECK(lights_of(dir / "lamp.obj", {}) == to_json(LightRig{}));
   std::ofstream(dir / "cloud.xyz") << "0 0 0 0 1 0\n1 0 0 0 1 0\n";
-  CHECK(lights_of(dir / "cloud.xyz", {}) == to_json(LightRig{}));
+  CHECK(lights_of(dir / "cloud.xyz", {}) == to_json(cloud_rig({0, 1, 0})));
+  std::ofstream(dir / "lit.xyz") << "0 0 0 0 1 0 1 1 1 1\n1 0 0 0 1 0 1 1 1 1\n";
+  CHECK(lights_of(dir / "lit.xyz", {}) == to_json(LightRig{}));
 }
 
 TEST_CASE("pipeline: a mesh in memory gives the same container as its file",
@@ -245,17 +247,15 @@ TEST_CASE("pipeline: a cap that is too small is refused with the minimum that wo
   CHECK_NOTHROW(build_container(request, dir / "a.ptcx", silent));
 }
 
-TEST_CASE("pipeline: clouds without normals and inputs without points are refused by name",
-          "[integration]") {
+TEST_CASE("pipeline: inputs without points are refused", "[integration]") {
   const TemporaryDirectory dir;
   Progress silent;
-  std::ofstream(dir / "bare.ply")
-      << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-         "property float z\nend_header\n0 0 0\n";
+  std::ofstream(dir / "none.ply")
+      << "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
+         "property float z\nend_header\n";
   BuildRequest request;
-  request.inputs = {dir / "bare.ply"};
-  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent),
-                    Catch::Contains("bare.ply") && Catch::Contains("normals"));
+  request.inputs = {dir / "none.ply"};
+  CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent), Catch::Contains("no points"));
   CHECK_FALSE(std::filesystem::exists(dir / "a.ptcx"));
 }
 

@@ -8,7 +8,8 @@
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
-#include "tests/io/files.h"
+#include "engine/io/text/text.h"
+#include "tests/io/clouds.h"
 
 using namespace ptc;
 using Catch::Matchers::Contains;
@@ -218,13 +219,11 @@ TEST_CASE("ply: a point that breaks a rule is reported with its place", "[io][po
   const std::string normals =
       std::string(kXyz) + "property float nx\nproperty float ny\nproperty float nz\n";
   const std::string with_radius = std::string(kXyz) + "property float radius\n";
-  CHECK(fault(scratch, one_point(normals, "0 0 0 0 0 0")) ==
-        "line 13: point 0: the normal has zero length");
   CHECK_THAT(fault(scratch, one_point(normals, "0 0 0 nan 0 1")),
              EndsWith("the normal is not finite"));
   CHECK_THAT(fault(scratch, one_point(normals, "0 0 0 0 inf 1")),
              EndsWith("the normal is not finite"));
-  for (const char* p : {"nan 0 0", "0 inf 0", "0 0 -inf", "0 1e999 0"}) {
+  for (const char* p : {"0 inf 0", "0 0 -inf", "0 1e999 0"}) {
     CHECK_THAT(fault(scratch, one_point(kXyz, p)), EndsWith("point 0: the position is not finite"));
   }
   for (const char* r : {"-1", "nan", "inf", "1e39"}) {
@@ -269,8 +268,10 @@ TEST_CASE("ply: headers that break a rule are refused by line", "[io][points]") 
   CHECK(refused(good + "element face -1\n") == "line 7: an element needs a name and a count");
   CHECK(refused("ply\nformat ascii 1.0\nproperty float x\n") ==
         "line 3: a property precedes the first element");
-  CHECK(refused(good + "property list uchar int i\nend_header\n0 0 0 0\n") ==
-        "PLY vertices that have a list are not supported");
+  CHECK(refused(good + "property int64 a\n") ==
+        "line 7: a property has the type int64, which PLY has not");
+  CHECK(refused(good + "property list uchar uint64 a\n") ==
+        "line 7: a property has the type uint64, which PLY has not");
   CHECK(refused(good + "property float nx\nend_header\n0 0 0 0\n") ==
         "the PLY vertices do not have all of nx, ny and nz");
   CHECK(refused("ply\nformat ascii 1.0\nend_header\n") == "the PLY file has no vertices");
@@ -412,6 +413,162 @@ TEST_CASE("ply: a line of text must have exactly the values of its element", "[i
   }
   CHECK(fault(scratch, one_point(kXyz, "+1 .5 2.e1")).empty());
   CHECK(fault(scratch, one_point(kXyz, "1e-999 -0 \t 3 \r")).empty());
+}
+
+TEST_CASE("ply: a point without a place is left out and counted", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const std::string data =
+      header("binary_little_endian", "element vertex 5\n" + std::string(kXyz) +
+                                         "property int id\nelement end 1\nproperty uchar c\n");
+  const auto point = [](float x, float y, float z, int id) {
+    return raw(x) + raw(y) + raw(z) + raw(id);
+  };
+  const float nan = std::nanf("");
+  const std::string bytes = data + point(nan, 0, 0, 1) + point(1, 2, 3, 2) + point(0, nan, 0, 3) +
+                            point(4, 5, 6, 4) + point(0, 0, nan, 5) + "c";
+  for (std::size_t block = 1; block <= 6; ++block) {
+    const Cloud cloud = read_cloud(scratch.file("a.ply", bytes), block);
+    REQUIRE(cloud.surfels.size() == 2);
+    CHECK(cloud.left_out == 3);
+    CHECK(cloud.info.count == 5);
+    CHECK(cloud.surfels[1].position == glm::dvec3(4, 5, 6));
+    CHECK(cloud.value(0, "id") == 2);
+    CHECK(cloud.value(1, "id") == 4);
+  }
+  CHECK(fault(scratch, bytes + "x") ==
+        "offset " + std::to_string(bytes.size()) + ": the file has more data than its header says");
+}
+
+TEST_CASE("ply: a normal of zero length is unknown", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const std::string normals =
+      std::string(kXyz) + "property float nx\nproperty float ny\nproperty float nz\n";
+  const Cloud cloud = read_cloud(scratch.file("a.ply", one_point(normals, "1 2 3 0 0 0")));
+  CHECK(cloud.info.has_normals);
+  CHECK(cloud.surfels.at(0).normal == glm::vec3(0));
+  CHECK(cloud.surfels.at(0).position == glm::dvec3(1, 2, 3));
+}
+
+TEST_CASE("ply: properties beyond the surfel become channels of their types", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const std::string properties =
+      "property char a\nproperty uchar b\nproperty short c\nproperty ushort d\n"
+      "property int e\nproperty uint f\nproperty float g\nproperty double h\n" +
+      std::string(kXyz) +
+      "property float scalar_Intensity\nproperty uchar Classification\n"
+      "property double GpsTime\nproperty float f_dc_0\nproperty float quality\n";
+  const std::string text = one_point(
+      properties, "-128 255 -32768 65535 -2147483648 4294967295 0.1 0.1 1 2 3 0.5 6 1e9 -2 7");
+  std::string records[2];
+  for (const bool big : {false, true}) {
+    records[big] = header(big ? "binary_big_endian" : "binary_little_endian",
+                          "element vertex 1\n" + properties) +
+                   stored(std::int8_t{-128}, big) + stored(std::uint8_t{255}, big) +
+                   stored(std::int16_t{-32768}, big) + stored(std::uint16_t{65535}, big) +
+                   stored(std::int32_t{-2147483647 - 1}, big) + stored(4294967295U, big) +
+                   stored(0.1F, big) + stored(0.1, big) + stored(1.0F, big) + stored(2.0F, big) +
+                   stored(3.0F, big) + stored(0.5F, big) + stored(std::uint8_t{6}, big) +
+                   stored(1e9, big) + stored(-2.0F, big) + stored(7.0F, big);
+  }
+  for (const std::string& bytes : {text, records[0], records[1]}) {
+    const Cloud cloud = read_cloud(scratch.file("a.ply", bytes));
+    CHECK(cloud.names() == "a b c d e f g h intensity classification gps_time f_dc_0 quality");
+    const std::vector<ChannelType> types = {ChannelType::i8,  ChannelType::u8,  ChannelType::i16,
+                                            ChannelType::u16, ChannelType::i32, ChannelType::u32,
+                                            ChannelType::f32, ChannelType::f64};
+    for (std::size_t i = 0; i < types.size(); ++i) CHECK(cloud.info.channels[i].type == types[i]);
+    CHECK(cloud.value(0, "a") == -128);
+    CHECK(cloud.value(0, "b") == 255);
+    CHECK(cloud.value(0, "c") == -32768);
+    CHECK(cloud.value(0, "d") == 65535);
+    CHECK(cloud.value(0, "e") == -2147483648.0);
+    CHECK(cloud.value(0, "f") == 4294967295.0);
+    CHECK(cloud.value(0, "g") == static_cast<double>(0.1F));
+    CHECK(cloud.value(0, "h") == 0.1);
+    CHECK(cloud.value(0, "intensity") == 0.5);
+    CHECK(cloud.value(0, "classification") == 6);
+    CHECK(cloud.channel("classification").role == ChannelRole::label);
+    CHECK(cloud.value(0, "gps_time") == 1e9);
+    CHECK(cloud.channel("gps_time").role == ChannelRole::time);
+    CHECK(cloud.channel("gps_time").unit == "s");
+    CHECK(cloud.value(0, "f_dc_0") == -2);
+    CHECK(cloud.value(0, "quality") == 7);
+    CHECK(cloud.surfels.at(0).position == glm::dvec3(1, 2, 3));
+    CHECK(cloud.info.notes.empty());
+  }
+}
+
+TEST_CASE("ply: text keeps the digits of positions that are declared as float", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const Cloud cloud = read_cloud(scratch.file("a.ply", one_point(kXyz, "1234567.891 0.1 -0.3")));
+  CHECK(cloud.surfels.at(0).position == glm::dvec3(1234567.891, 0.1, -0.3));
+}
+
+TEST_CASE("ply: integer colours are kept in a channel with the bits of the file", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const auto read = [&](const std::string& type, const std::string& names, const char* values) {
+    std::string properties(kXyz);
+    Words words(names);
+    for (std::string_view name = words.next(); !name.empty(); name = words.next()) {
+      properties += "property " + type + " " + std::string(name) + "\n";
+    }
+    return read_cloud(scratch.file("a.ply", one_point(properties, std::string("0 0 0 ") + values)));
+  };
+  for (const char* names :
+       {"red green blue alpha", "diffuse_red diffuse_green diffuse_blue alpha", "r g b alpha"}) {
+    const Cloud cloud = read("uchar", names, "255 1 0 77");
+    CHECK(cloud.names() == "rgb alpha");
+    CHECK(cloud.info.has_albedo);
+    const Channel& rgb = cloud.channel("rgb");
+    CHECK((rgb.type == ChannelType::u8 && rgb.components == 3));
+    CHECK((rgb.role == ChannelRole::colour && rgb.colour_space == ColourSpace::srgb));
+    CHECK(cloud.value(0, "rgb", 0) == 255);
+    CHECK(cloud.value(0, "rgb", 1) == 1);
+    CHECK(cloud.value(0, "rgb", 2) == 0);
+    CHECK(cloud.value(0, "alpha") == 77);
+    CHECK(cloud.surfels[0].albedo.x == 1);
+    CHECK(static_cast<double>(cloud.surfels[0].albedo.y) == Approx(1 / 255.0 / 12.92));
+  }
+  CHECK(read("ushort", "red green blue", "65535 1 0").channel("rgb").type == ChannelType::u16);
+  // Floats lose nothing as albedo; r, g and b of floats may be anything.
+  CHECK(read("float", "red green blue", "1 0.5 0").names().empty());
+  const Cloud other = read("float", "r g b", "1.5 -2 0");
+  CHECK(other.names() == "r g b");
+  CHECK_FALSE(other.info.has_albedo);
+  // Colours of several types cannot be one channel.
+  const Cloud mixed = read_cloud(scratch.file(
+      "b.ply", one_point(std::string(kXyz) +
+                             "property uchar red\nproperty uchar green\nproperty char blue\n",
+                         "0 0 0 255 0 127")));
+  CHECK(mixed.names() == "red green blue");
+  CHECK(mixed.info.has_albedo);
+  CHECK(mixed.surfels[0].albedo.x == 1);
+}
+
+TEST_CASE("ply: lists of vertices and other elements are left out with a note", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const std::string elements = "element vertex 2\nproperty uchar a\nproperty list uchar short l\n" +
+                               std::string(kXyz) +
+                               "property int b\nelement edge 1\nproperty int v\nelement face 1\n"
+                               "property list uchar int i\nelement none 0\nproperty int v\n";
+  const std::string text = header("ascii", elements) + "1 2 7 8 1 2 3 -4\n5 0 6 7 8 -9\n0\n1 0\n";
+  const std::string binary = header("binary_little_endian", elements) + "\x01\x02" +
+                             raw<std::int16_t>(7) + raw<std::int16_t>(8) + raw(1.0F) + raw(2.0F) +
+                             raw(3.0F) + raw(-4) + "\x05" + std::string(1, '\0') + raw(6.0F) +
+                             raw(7.0F) + raw(8.0F) + raw(-9) + raw(0) + "\x01" + raw(0);
+  for (const std::string& bytes : {text, binary}) {
+    const Cloud cloud = read_cloud(scratch.file("a.ply", bytes));
+    CHECK(cloud.notes() ==
+          "The property 'l' is a list and is left out.\n"
+          "The element 'edge' with 1 records is left out.");
+    CHECK(cloud.names() == "a b");
+    REQUIRE(cloud.surfels.size() == 2);
+    CHECK(cloud.surfels[0].position == glm::dvec3(1, 2, 3));
+    CHECK(cloud.surfels[1].position == glm::dvec3(6, 7, 8));
+    CHECK(cloud.value(0, "b") == -4);
+    CHECK(cloud.value(1, "a") == 5);
+    CHECK(cloud.value(1, "b") == -9);
+  }
 }
 
 TEST_CASE("points: a file counts as a cloud by its ending and its header", "[io][points]") {

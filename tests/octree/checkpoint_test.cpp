@@ -6,7 +6,6 @@
 
 #include "engine/base/error.h"
 #include "engine/octree/build_pages.h"
-#include "engine/octree/radius.h"
 #include "engine/octree/rounding.h"
 #include "engine/parallel/thread_pool.h"
 #include "format/error.h"
@@ -25,7 +24,7 @@ struct Saved {
   std::vector<std::byte> state;
 };
 
-/// Rounded points with radii, and builds of them under any profile.
+/// Rounded points, and builds of them under any profile.
 struct Setting {
   std::uint8_t page_shift = 12;
   BuildOptions tree;
@@ -45,13 +44,10 @@ class Rebuild {
     ContainerWriter writer =
         from ? ContainerWriter(target, options, from->writer) : ContainerWriter(target, options);
     const std::uint64_t first = from ? from->place.points : 0;
-    const auto begin = scene_.records.begin() + static_cast<std::ptrdiff_t>(first_for_radii(first));
+    const auto begin = scene_.records.begin() + static_cast<std::ptrdiff_t>(first);
     VectorStream points({begin, scene_.records.end()});
-    const double unit = scene_.frame.unit();
-    RadiusCounts counts;
-    const auto radii = estimate_radii(points, unit, counts, first);
-    const auto rounded =
-        round_points(*radii, unit, executor_, from ? from->place.last_key : MortonKey{});
+    const auto rounded = round_points(points, scene_.frame.unit(), executor_,
+                                      from ? from->place.last_key : MortonKey{});
     Checkpoints checkpoints{.interval = 1,
                             .save = [&](const BuildPlace& place, std::vector<std::byte> state) {
                               saved.push_back({place, writer.state(), std::move(state)});
@@ -71,12 +67,13 @@ class Rebuild {
   ThreadPool executor_;
 };
 
-SortedScene scene_without_radii() {
+/// Returns points that rounding moves, and single ones between them that it must leave.
+SortedScene rounded_scene() {
   SortedScene scene = sort_scene(random_surfels(kPoints, 3));
   for (std::size_t i = 0; i < 3000; ++i)
     scene.records[100'000 + i].key = scene.records[100'000].key;  // split by rank
   std::ranges::stable_sort(scene.records, {}, &PointRecord::key);
-  for (PointRecord& record : scene.records) record.radius = 0;
+  for (PointRecord& record : scene.records) record.radius = 0.01F;
   // After a point that is not rounded comes one that must not move in front of it: the previous key
   // matters in every block.
   for (std::size_t i = 2; i < kPoints; i += 2) {
@@ -95,7 +92,7 @@ SortedScene scene_without_radii() {
 TEST_CASE("checkpoint: a build continued from any checkpoint gives the same bytes",
           "[build][checkpoint]") {
   const TemporaryDirectory dir;
-  const SortedScene scene = scene_without_radii();
+  const SortedScene scene = rounded_scene();
   for (const Setting& setting :
        {Setting{}, Setting{.page_shift = 16, .tree = {.leaf_points = 5, .levels_per_stream = 63}},
         Setting{.page_shift = 13, .tree = {.leaf_points = 60'000}, .threads = 1}}) {
@@ -124,7 +121,7 @@ TEST_CASE("checkpoint: a build continued from any checkpoint gives the same byte
 
 TEST_CASE("checkpoint: every prefix of a state is refused", "[build][checkpoint]") {
   const TemporaryDirectory dir;
-  const SortedScene scene = scene_without_radii();
+  const SortedScene scene = rounded_scene();
   Rebuild first(scene, {});
   CHECK_THROWS(first.run(dir / "a.ptcx", dir / "pages", {}, 1));
   const Saved& saved = first.saved.front();
@@ -159,7 +156,7 @@ TEST_CASE("checkpoint: every prefix of a state is refused", "[build][checkpoint]
 TEST_CASE("checkpoint: an unfinished container that was changed is refused",
           "[build][checkpoint]") {
   const TemporaryDirectory dir;
-  const SortedScene scene = scene_without_radii();
+  const SortedScene scene = rounded_scene();
   Rebuild first(scene, {});
   CHECK_THROWS(first.run(dir / "a.ptcx", dir / "pages", {}, 2));
   const Saved saved = first.saved.back();

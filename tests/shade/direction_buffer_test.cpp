@@ -1,5 +1,6 @@
 #include "engine/shade/gather/direction_buffer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -60,6 +61,40 @@ TEST_CASE(
   for (int i = 0; i < 300; ++i) {
     const glm::vec3 n = random_direction(bits);
     CHECK(buffer.resolve(grid, n).sky.r == Approx(kPi + 2 * kPi / 3 * n.z).margin(0.002 * kPi));
+  }
+}
+
+TEST_CASE("direction buffer: surroundings weigh directions and distances by their formulas",
+          "[shade][buffer]") {
+  // A plane at the height 1 covers (1 - 1 / D)^2 of the hemisphere up to the distance D with a
+  // linear falloff, and 1 - 1 / D^2 without one; a disc of a half angle of 45 degrees covers sin^2
+  // 45 / sin^2 A of a cone of half angle A.
+  const DirectionGrid grid(64, [](const glm::vec3&) { return glm::vec3(1, 2, 3); });
+  const auto shade = [&](float radius, const glm::vec3& n, const PixelWeights& weights) {
+    DirectionBuffer buffer(64);
+    draw_disc(grid, buffer, {0, 0, 1}, {0, 0, -1}, radius, encode_rgbe({1, 1, 1}), Sides::both);
+    return buffer.resolve(grid, n, {}, &weights);
+  };
+  const glm::vec3 up(0, 0, 1);
+  for (const float distance : {1.5F, 2.0F, 5.0F}) {
+    const float inverse = 1 / distance;
+    const Shading linear = shade(1e4F, up, {.per_distance = inverse, .falloff = 1});
+    CHECK(linear.occlusion == Approx((1 - inverse) * (1 - inverse)).margin(0.004));
+    CHECK(linear.sky.g == Approx(2 * kPi * (1 - linear.occlusion)).epsilon(1e-4));
+    CHECK(linear.irradiance.r == Approx(kPi).epsilon(0.01));  // light comes from any distance
+    const Shading hard = shade(1e4F, up, {.per_distance = inverse});
+    CHECK(hard.occlusion == Approx(1 - inverse * inverse).margin(0.006));
+  }
+  for (const float degrees : {45.0F, 60.0F, 90.0F}) {
+    const float sine = std::sin(degrees * kPi / 180);
+    const float cosine = std::cos(degrees * kPi / 180);
+    CHECK(shade(1, up, {.cone_cos = std::max(0.0F, cosine)}).occlusion ==
+          Approx(0.5F / (sine * sine)).margin(0.02));
+  }
+  for (const glm::vec3& n : {up, -up, glm::vec3(1, 0, 0)}) {
+    CHECK(shade(1e4F, n, {.sphere = true}).occlusion == Approx(0.5).margin(0.004));
+    CHECK(shade(1, n, {.sphere = true}).occlusion ==
+          Approx((1 - std::sqrt(0.5F)) / 2).margin(0.002));
   }
 }
 

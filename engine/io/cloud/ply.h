@@ -72,9 +72,19 @@ class PlyReader {
   /// Returns the element of this name, or null.
   [[nodiscard]] const PlyElement* find(std::string_view element) const;
 
+  /// Returns the encoding of the records.
+  [[nodiscard]] PlyEncoding encoding() const noexcept { return encoding_; }
+
   /// Reads the next record of the file, which must belong to `element`.
   /// @throws DataError when the file ends or a line (ascii) does not have the values that it should
   void read(const PlyElement& element, PlyRecord& record);
+  /// Returns the bytes of the next binary record, as the file has them, and sets record.place only.
+  /// The bytes are valid until the next call.
+  /// @param element  that of the record; it has no list
+  [[nodiscard]] const std::byte* read_bytes(const PlyElement& element, PlyRecord& record) {
+    record.place = stream_.offset();
+    return stream_.take(element.fixed_bytes).data();
+  }
   /// Skips all records of an element, none of which was read yet.
   void skip(const PlyElement& element);
   /// Checks that nothing follows the records: no byte (binary) or no word (ascii).

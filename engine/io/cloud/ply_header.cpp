@@ -158,6 +158,9 @@ void PlyReader::add_property(std::string_view line) {
     word = words.next();
   }
   const std::optional<PlyType> type = type_named(word);
+  if (!type && (word == "int64" || word == "uint64")) {
+    stream_.fail_at_line("a property has the type " + std::string(word) + ", which PLY has not");
+  }
   if (!type) stream_.fail_at_line("a property has an unknown type");
   property.type = *type;
   property.name = words.next();

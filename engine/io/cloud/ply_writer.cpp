@@ -1,33 +1,73 @@
 // Writes clouds to PLY, and finds names for their columns.
+//
+// A record has the values of the surfel and then those of the columns, each in the type that PLY
+// has for it:
+//
+//   u8 u16 u32   uchar ushort uint          half f32   float
+//   i8 i16 i32   char  short  int           u64 i64 f64   double
 #include <algorithm>
 #include <cctype>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
+#include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/file/buffered_output.h"
 
 namespace ptc {
 namespace {
 
-// Returns what each component of a column appends to its name.
-std::vector<std::string> suffixes(const PointColumn& column) {
-  if (column.components == 1) return {""};
-  if (column.components == 3) {
-    return column.vector ? std::vector<std::string>{"_x", "_y", "_z"}
-                         : std::vector<std::string>{"_r", "_g", "_b"};
-  }
-  std::vector<std::string> numbers;
-  for (unsigned i = 0; i < column.components; ++i)
-    numbers.push_back(std::string(1, '_').append(std::to_string(i)));
-  return numbers;
+// The quantities of a surfel that a file holds.
+struct SurfelParts {
+  bool normal, radius, radiance, albedo, emission;
+};
+
+constexpr std::string_view kSurfelNames[] = {
+    "x",          "y",          "z",   "nx",    "ny",   "nz",         "radius",     "radiance_r",
+    "radiance_g", "radiance_b", "red", "green", "blue", "emission_r", "emission_g", "emission_b"};
+
+// Returns the names that no column may have. Those of the colours without their ends are among
+// them, because a column of three components would repeat a property.
+std::set<std::string> taken_names() {
+  std::set<std::string> taken(std::begin(kSurfelNames), std::end(kSurfelNames));
+  taken.insert("radiance");
+  taken.insert("emission");
+  return taken;
 }
 
-std::vector<std::string> names_of(const PointColumn& column) {
-  std::vector<std::string> names;
-  for (const std::string& suffix : suffixes(column)) names.push_back(column.name + suffix);
-  return names;
+ChannelType ply_type(ChannelType type) {
+  switch (type) {
+    case ChannelType::half:
+      return ChannelType::f32;
+    case ChannelType::u64:
+    case ChannelType::i64:
+      return ChannelType::f64;
+    default:
+      return type;
+  }
+}
+
+const char* type_name(ChannelType type) {
+  switch (ply_type(type)) {
+    case ChannelType::u8:
+      return "uchar";
+    case ChannelType::i8:
+      return "char";
+    case ChannelType::u16:
+      return "ushort";
+    case ChannelType::i16:
+      return "short";
+    case ChannelType::u32:
+      return "uint";
+    case ChannelType::i32:
+      return "int";
+    case ChannelType::f32:
+      return "float";
+    default:
+      return "double";
+  }
 }
 
 bool is_property_name(const std::string& name) {
@@ -36,54 +76,116 @@ bool is_property_name(const std::string& name) {
   });
 }
 
-// Returns the header, or throws when a name cannot be a property or occurs twice.
-std::string make_header(std::uint64_t count, bool emits, const std::vector<PointColumn>& columns) {
-  std::string text =
-      "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(count) + "\n";
-  std::set<std::string> seen;
-  const auto add = [&](const char* type, const std::string& name) {
+// A header in the making, which knows the names of its properties.
+class Header {
+ public:
+  explicit Header(std::uint64_t count)
+      : text_("ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(count) +
+              "\n") {}
+
+  void add(const char* type, const std::string& name) {
     if (!is_property_name(name))
       throw std::invalid_argument("PlyWriter: not a property name: " + name);
-    if (!seen.insert(name).second)
+    if (!names_.insert(name).second)
       throw std::invalid_argument("PlyWriter: two properties have the name " + name);
-    text += std::string("property ") + type + " " + name + "\n";
-  };
-  for (const char* name : {"x", "y", "z"}) add("double", name);
-  for (const char* name : {"nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b",
-                           "red", "green", "blue"}) {
-    add("float", name);
+    text_ += std::string("property ") + type + " " + name + "\n";
   }
-  for (const char* name : {"emission_r", "emission_g", "emission_b"}) {
-    if (emits) add("float", name);
+  void add_surfel(const SurfelParts& parts) {
+    const auto add_if = [this](bool wanted, std::initializer_list<const char*> names) {
+      for (const char* name : names) {
+        if (wanted) add("float", name);
+      }
+    };
+    for (const char* name : {"x", "y", "z"}) add("double", name);
+    add_if(parts.normal, {"nx", "ny", "nz"});
+    add_if(parts.radius, {"radius"});
+    add_if(parts.radiance, {"radiance_r", "radiance_g", "radiance_b"});
+    add_if(parts.albedo, {"red", "green", "blue"});
+    add_if(parts.emission, {"emission_r", "emission_g", "emission_b"});
   }
+  [[nodiscard]] std::string finish() && { return std::move(text_) + "end_header\n"; }
+
+ private:
+  std::string text_;
+  std::set<std::string> names_;
+};
+
+// Returns the header, or throws when a name cannot be a property or occurs twice.
+std::string make_header(std::uint64_t count, bool emits, const std::vector<PointColumn>& columns) {
+  Header header(count);
+  header.add_surfel({true, true, true, true, emits});
   for (const PointColumn& column : columns) {
-    for (const std::string& name : names_of(column)) add("float", name);
+    for (const std::string& name : part_names(column.name, column.components, column.vector))
+      header.add("float", name);
   }
-  return text + "end_header\n";
+  return std::move(header).finish();
 }
+
+void put_surfel(BufferedOutput& out, const SurfelParts& parts, const Surfel& surfel) {
+  out.put(&surfel.position, sizeof surfel.position);
+  if (parts.normal) out.put(&surfel.normal, sizeof surfel.normal);
+  if (parts.radius) out.put(&surfel.radius, sizeof surfel.radius);
+  if (parts.radiance) out.put(&surfel.radiance, sizeof surfel.radiance);
+  if (parts.albedo) out.put(&surfel.albedo, sizeof surfel.albedo);
+  if (parts.emission) out.put(&surfel.emission, sizeof surfel.emission);
+}
+
+// A PLY whose columns are channels, each in a type of its own.
+class PlyChannelWriter : public CheckedWriter {
+ public:
+  PlyChannelWriter(const std::filesystem::path& target, const PointWriteInfo& info)
+      : CheckedWriter(info.count, row_bytes(info.channels)),
+        parts_{info.has_normals, info.has_radius, info.has_radiance, info.has_albedo, info.emits},
+        channels_(row_channels(info.channels, taken_names())),
+        out_(target) {
+    Header header(info.count);
+    header.add_surfel(parts_);
+    for (const RowChannel& row : channels_) {
+      for (const std::string& name : row.parts) header.add(type_name(row.channel.type), name);
+    }
+    const std::string text = std::move(header).finish();
+    out_.put(text.data(), text.size());
+  }
+
+ private:
+  void put(const Surfel& surfel, const std::byte* row) override {
+    put_surfel(out_, parts_, surfel);
+    for (const RowChannel& channel : channels_) {
+      const ChannelType from = channel.channel.type, to = ply_type(from);
+      for (std::size_t i = 0; i < channel.channel.components; ++i) {
+        std::byte number[8];
+        const std::byte* const end = store_number(from, channel.at(row, i), to, number);
+        out_.put(number, static_cast<std::size_t>(end - number));
+      }
+    }
+  }
+  void end() override { out_.publish(); }
+
+  SurfelParts parts_;
+  std::vector<RowChannel> channels_;
+  BufferedOutput out_;
+};
 
 }  // namespace
 
+std::unique_ptr<PointWriter> create_ply(const std::filesystem::path& target,
+                                        const PointWriteInfo& info) {
+  return std::make_unique<PlyChannelWriter>(target, info);
+}
+
+std::vector<std::string> ply_losses(const PointWriteInfo& info) {
+  std::vector<std::string> sentences;
+  add_rounded_channels(sentences, info, 53);
+  add_unscaled_channels(sentences, info);
+  add_lost_crs(sentences, info);
+  return sentences;
+}
+
 std::vector<PointColumn> ply_columns(std::span<const Channel> channels) {
-  std::set<std::string> taken{"x",          "y",          "z",          "nx",         "ny",
-                              "nz",         "radius",     "red",        "green",      "blue",
-                              "radiance",   "radiance_r", "radiance_g", "radiance_b", "emission",
-                              "emission_r", "emission_g", "emission_b"};
   std::vector<PointColumn> columns;
-  for (const Channel& channel : channels) {
-    PointColumn column{.name = channel.name,
-                       .components = channel.components,
-                       .vector = channel.name.find("normal") != std::string::npos};
-    std::ranges::replace(column.name, '.', '_');
-    const auto is_taken = [&] {
-      return taken.contains(column.name) ||
-             std::ranges::any_of(names_of(column),
-                                 [&](const std::string& name) { return taken.contains(name); });
-    };
-    while (is_taken()) column.name += '_';
-    taken.insert(column.name);
-    for (const std::string& name : names_of(column)) taken.insert(name);
-    columns.push_back(column);
+  for (const RowChannel& row : row_channels(channels, taken_names())) {
+    columns.push_back(
+        {.name = row.name, .components = row.channel.components, .vector = has_axes(row.channel)});
   }
   return columns;
 }
@@ -107,13 +209,7 @@ void PlyWriter::write(std::span<const Surfel> surfels, std::span<const float> va
   written_ += surfels.size();
   if (written_ > announced_) return;  // finish() will refuse the file
   for (std::size_t i = 0; i < surfels.size(); ++i) {
-    const Surfel& surfel = surfels[i];
-    out_.put(&surfel.position, sizeof surfel.position);
-    out_.put(&surfel.normal, sizeof surfel.normal);
-    out_.put(&surfel.radius, sizeof surfel.radius);
-    out_.put(&surfel.radiance, sizeof surfel.radiance);
-    out_.put(&surfel.albedo, sizeof surfel.albedo);
-    if (emits_) out_.put(&surfel.emission, sizeof surfel.emission);
+    put_surfel(out_, {true, true, true, true, emits_}, surfels[i]);
     out_.put(values.data() + i * values_per_point_, values_per_point_ * sizeof(float));
   }
 }

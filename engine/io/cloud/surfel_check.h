@@ -23,7 +23,4 @@ struct RawSurfel {
 /// @return the rule that `raw` breaks, or an empty string when it breaks none
 [[nodiscard]] std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out);
 
-/// Opens an XYZ text file as open_points() describes.
-[[nodiscard]] PointFile open_xyz(const std::filesystem::path& path);
-
 }  // namespace ptc

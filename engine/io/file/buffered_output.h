@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -24,11 +25,18 @@ class BufferedOutput {
     buffer_.reserve(kBytes);
   }
 
+  /// Returns the path of the file that will be replaced, behind symbolic links.
+  [[nodiscard]] const std::filesystem::path& target() const noexcept { return file_.target(); }
   /// Appends bytes as they lie in memory.
   void put(const void* data, std::size_t bytes) {
     if (buffer_.size() + bytes > kBytes) flush();
     const auto* from = static_cast<const std::byte*>(data);
     buffer_.insert(buffer_.end(), from, from + bytes);
+  }
+  /// Writes bytes in the place of others that were appended before.
+  void put_at(std::uint64_t offset, const void* data, std::size_t bytes) {
+    flush();
+    file_.write_at(offset, {static_cast<const std::byte*>(data), bytes});
   }
   /// Writes what is left in the buffer and puts the file in the place of the target.
   void publish() {

@@ -116,8 +116,11 @@ MeshFile read_mesh(const std::filesystem::path& path) {
   if (unpacked == ".obj") return read_obj_mesh(path);
   if (extension == ".gltf" || extension == ".glb") return read_gltf_mesh(path);
   if (extension == ".stl") return read_stl_mesh(path);
-  throw DataError(path.string() +
-                  ": not a mesh: the name ends in none of .obj .ply .off .gltf .glb .stl");
+  throw DataError(
+      path.string() +
+      ": nothing that can be read: as a mesh its name would end in .obj, .ply, .off, .gltf, "
+      ".glb or .stl, and its content is that of no point cloud among PLY, LAS, LAZ, E57, "
+      "PCD, PTX, PTS, XYZ text, Pixar's PTC, Houdini's classic BGEO and Maya's PDB");
 }
 
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, const char* field) {

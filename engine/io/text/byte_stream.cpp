@@ -186,6 +186,12 @@ std::span<const std::byte> ByteStream::take(std::size_t count) {
   return bytes;
 }
 
+std::string_view ByteStream::peek(std::size_t count) {
+  while (end_ - begin_ < count && refill()) {
+  }
+  return {reinterpret_cast<const char*>(buffer_.data() + begin_), std::min(count, end_ - begin_)};
+}
+
 void ByteStream::skip(std::uint64_t count) {
   while (count > 0) {
     const std::uint64_t step = std::min<std::uint64_t>(count, kBufferBytes);

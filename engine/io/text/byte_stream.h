@@ -35,6 +35,8 @@ class ByteStream {
 
   /// Returns the path of the file.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return file_.path(); }
+  /// Says whether the file is decompressed on the way.
+  [[nodiscard]] bool compressed() const noexcept { return gunzip_ != nullptr; }
   /// Returns the offset of the next byte.
   [[nodiscard]] std::uint64_t offset() const noexcept { return base_ + begin_; }
   /// Returns the number of the line that next_line() read last, counted from 1.
@@ -49,6 +51,9 @@ class ByteStream {
   /// Returns the next `count` bytes, a view that is valid until the next call.
   /// @throws DataError when fewer are left or `count` is above kMaxBytesAtOnce
   [[nodiscard]] std::span<const std::byte> take(std::size_t count);
+  /// Returns up to `count` of the next bytes without going on: fewer only where the file ends. The
+  /// view is valid until the next call. `count` is at most 256 KiB.
+  [[nodiscard]] std::string_view peek(std::size_t count);
   /// Skips `count` bytes. @throws DataError when fewer are left
   void skip(std::uint64_t count);
   /// Says whether no byte is left; it may have to read to find out.

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "engine/base/error.h"
+#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/store/commit.h"
 
@@ -27,7 +28,7 @@ Codec codec_of(const ContainerReader& scene) {
 void check_extensible(const ContainerReader& scene) {
   at_offset(scene.file(), 0, [&] { check_copyable(scene.header()); });
   const std::vector<Channel>& channels = scene.meta().channels;
-  if (channels.empty()) return;
+  if (channels.empty() || channels.front().group >= kFirstInputGroup) return;
   throw DataError(scene.path().string() + ": the appended points would have no " +
                   channels.front().name +
                   ": append to the scene as it was before it was shaded, and shade the result");
@@ -52,6 +53,7 @@ void adopt_leaves(BuildRequest& request, const ContainerReader& scene) {
 
 Meta extended_meta(const Meta& scene, const Meta& added) {
   Meta meta = scene;
+  meta.channels = added.channels;
   for (const auto& [key, value] : added.text) {
     const auto [at, is_new] = meta.text.try_emplace(key, value);
     if (!is_new && key == kInputsKey) at->second += " " + value;

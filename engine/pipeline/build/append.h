@@ -7,8 +7,8 @@
 
 namespace ptc {
 
-/// Checks that points can be appended to a scene: it must have no channels, and no feature that
-/// forbids changes.
+/// Checks that points can be appended to a scene: it must have no channels of shading, and no
+/// feature that forbids changes.
 /// @throws DataError with the reason
 void check_extensible(const ContainerReader& scene);
 
@@ -22,7 +22,8 @@ void adopt_page_size(BuildRequest& request, const ContainerReader& scene);
 void adopt_leaves(BuildRequest& request, const ContainerReader& scene);
 
 /// Returns the record of a scene to which points were appended. Entries of the scene win; names of
-/// inputs are joined, and a spacing is kept only when both records have the same.
+/// inputs are joined, and a spacing is kept only when both records have the same. The channels are
+/// those of `added`, which has those of the scene among them.
 [[nodiscard]] Meta extended_meta(const Meta& scene, const Meta& added);
 
 }  // namespace ptc

@@ -3,13 +3,17 @@
 //   sort()    inputs --> ExternalSorter --> spill files, or memory
 //                              |
 //   build()                    v  sorted points, a chain of streams
-//             estimate_radii      only for inputs without radii
+//             complete_scan       only for inputs without normals or radii
 //                              v
 //             merge_points        only with `append`: with the points of the scene
+//                              v
+//             unique_points       only with `remove_duplicates`
 //                              v
 //             round_points        only in the profiles fast and compact
 //                              v
 //             build_pages         octree and pages; checkpoints with `resume`
+//                              v
+//             AttributeSorts      attribute pages, group by group, in the same order
 //                              v
 //             ContainerWriter::finish()
 //
@@ -20,21 +24,28 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/points.h"
 #include "engine/octree/merge.h"
-#include "engine/octree/radius.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/append.h"
+#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_inputs.h"
+#include "engine/pipeline/build/build_record.h"
+#include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/resume.h"
+#include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/scan/scan.h"
 #include "engine/sort/external_sort.h"
 #include "engine/sort/point_streams.h"
 #include "engine/sort/spill.h"
@@ -56,6 +67,8 @@ constexpr std::uint64_t kOpenPages = 48;
 // Bytes of the meta page that are kept for the spacing, which is known only once the meshes are
 // sampled: its key, its sizes, and at most 24 characters of a double.
 constexpr std::size_t kSpacingBytes = 64;
+// The least memory of the sort of a group of channels.
+constexpr std::uint64_t kMinAttributeSortBytes = std::uint64_t{16} << 20;
 
 std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Frame& frame) {
   std::vector<MortonKey> keys;
@@ -64,50 +77,11 @@ std::vector<MortonKey> keys_of(const std::vector<glm::dvec3>& places, const Fram
   return keys;
 }
 
-/// Returns the record of the inputs and the request, without the spacing of the surfels.
-Meta make_meta(const BuildRequest& request, const BuildInputs& inputs) {
-  Meta meta;
-  std::string names;
-  for (const auto& input : request.inputs) {
-    if (!names.empty()) names += ' ';
-    names += printable(input.filename().string());
-  }
-  if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
-  meta.text[kInputsKey] = names;
-  meta.text[kLightsKey] = lights_record(inputs.lights);
-  if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
-  if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
-  if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
-  return meta;
-}
-
-/// Cuts a list of names to what a quarter of a page holds.
-std::string shortened(const std::string& names, std::uint8_t page_shift) {
-  const std::size_t most = std::size_t{1} << page_shift >> 2;
-  if (names.size() <= most) return names;
-  const std::size_t end = names.rfind(' ', most);
-  return end == std::string::npos ? std::string("...") : names.substr(0, end) + " ...";
-}
-
-/// Returns the UUID of a container. Equal points, settings and record give an equal file, so they
-/// are all that the UUID is made of.
-/// @param scene  UUID of the container that the points are appended to; zeros when there is none
-Uuid content_uuid(const ExternalSorter& sorter, const Frame& frame, const BuildRequest& request,
-                  const Meta& meta, const Uuid& scene) {
-  std::string text = fmt::format(
-      "{:x} {:x} {} {} {} {} {} {} {} {}", sorter.digest()[0], sorter.digest()[1], frame.origin[0],
-      frame.origin[1], frame.origin[2], frame.edge, request.tree.leaf_points,
-      request.tree.levels_per_stream, request.page_shift, static_cast<int>(request.profile));
-  for (const auto& [key, value] : meta.text)
-    text.append("\n").append(key).append("=").append(value);
-  if (scene != Uuid{})
-    text.append("\n").append(reinterpret_cast<const char*>(scene.data()), scene.size());
-  return uuid_of(std::as_bytes(std::span(text)));
-}
-
 /// A sort that has taken all points, and what else the container is made with.
 struct SortedPoints {
   std::unique_ptr<ExternalSorter> sorter;
+  std::unique_ptr<AttributeSorts> attributes;
+  std::uint64_t memory_bytes = 0;  ///< of the sort of points, which are free when it has ended
   BuildPlan plan;
 };
 
@@ -144,7 +118,7 @@ class Build {
     // Complete the report, remove what was kept
     report_.sort = points.sorter->statistics();
     if (resumption_) resumption_->remove();
-    tell_lone_points();
+    tell_scan();
     return std::move(report_);
   }
 
@@ -155,6 +129,8 @@ class Build {
                     "tree.leaf_points", "`tree.leaf_points` is not 1 to 65535");
     require_request(request_.tree.levels_per_stream >= 1, "tree.levels_per_stream",
                     "`tree.levels_per_stream` is not 1 or more");
+    require_request(request_.selection.every >= 1, "selection.every",
+                    "`selection.every` is not 1 or more");
     require_request(request_.checkpoint_points >= 1, "checkpoint_points",
                     "`checkpoint_points` is not 1 or more");
     require_request(request_.city_points == 0 || (!request_.mesh && request_.inputs.empty()),
@@ -187,7 +163,7 @@ class Build {
   }
 
   [[nodiscard]] bool has_meshes() const {
-    return request_.mesh || !std::ranges::all_of(request_.inputs, is_point_file);
+    return request_.mesh || !std::ranges::all_of(request_.inputs, holds_points);
   }
 
   [[nodiscard]] std::uint64_t scene_points() const {
@@ -201,38 +177,39 @@ class Build {
                               : frame_around(low, high);
   }
 
-  /// Returns the record for the meta page.
-  /// @param meta     from make_meta()
-  /// @param spacing  between the surfels on meshes, scene units; 0: not known, or no meshes
-  [[nodiscard]] Meta record(Meta meta, double spacing) const {
-    if (spacing > 0) meta.text[kSpacingKey] = fmt::format("{}", spacing);
-    if (scene_) meta = extended_meta(scene_->meta(), meta);
-    std::string& names = meta.text[kInputsKey];
-    names = shortened(names, request_.page_shift);
-    return meta;
+  /// Returns the record for the meta page. @param spacing  as for complete_record()
+  [[nodiscard]] Meta record(const Meta& meta, double spacing) const {
+    return complete_record(meta, spacing, scene_ ? &scene_->meta() : nullptr, request_.page_shift);
   }
 
   /// Estimates the number of pages of points and nodes. In a city there are some 4 pages of nodes
   /// for each 10 of points; 5 are assumed.
-  /// @param emits  whether a point may emit light, so that fewer fit a page
-  [[nodiscard]] std::uint64_t pages_of(std::uint64_t points, bool emits) const {
+  /// @param emits   whether a point may emit light, so that fewer fit a page
+  /// @param groups  of channels, each of which has a page for every page of points
+  [[nodiscard]] std::uint64_t pages_of(std::uint64_t points, bool emits, std::size_t groups) const {
     const FileHeader header{.page_shift = request_.page_shift,
                             .point_bytes = BuildPlan{.emits = emits}.point_bytes()};
-    return points / points_per_page(header) * 3 / 2;
+    return points / points_per_page(header) * (3 + 2 * groups) / 2;
   }
 
   [[nodiscard]] MemoryBudget build_budget() const {
     return budget_of(request_.run.memory_bytes, "this scene's build");
   }
 
-  /// Gives the sort the memory that the cap leaves. When the sort is done, the directory takes its
-  /// place.
+  /// The settings of the sort of points, and of each of the sorts of attributes.
+  struct AllSortOptions {
+    SortOptions points, attributes;
+  };
+
+  /// Gives the sorts the memory that the cap leaves: kMinSortBytes to that of the points, and equal
+  /// shares of the rest to all of them. When they are done, the directory takes their place.
   /// @param budget    already charged with the inputs
   /// @param expected  number of points that will come; 0 when it is not known
   /// @param emits     whether a point may emit light
-  [[nodiscard]] SortOptions sort_options(MemoryBudget budget, std::uint64_t expected,
-                                         bool emits) const {
-    const std::uint64_t pages = pages_of(expected + scene_points(), emits);
+  /// @param groups    number of sorts of attributes
+  [[nodiscard]] AllSortOptions sort_options(MemoryBudget budget, std::uint64_t expected, bool emits,
+                                            std::size_t groups) const {
+    const std::uint64_t pages = pages_of(expected + scene_points(), emits, groups);
     budget.charge("pages that are written",
                   ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()));
     if (scene_) {
@@ -243,26 +220,37 @@ class Build {
       budget.charge("checkpoints", kCheckpointBytes + (kOpenPages << request_.page_shift));
     }
     const std::uint64_t directory_bytes = ContainerWriter::finish_bytes(pages);
-    SortOptions options{.memory_bytes = directory_bytes > kMinSortBytes
-                                            ? budget.rest("the output's directory", directory_bytes)
-                                            : budget.rest("the sort", kMinSortBytes),
-                        .temp_dirs = temp_dirs(request_.run, target_),
-                        .expected = expected,
-                        .emits = emits};
-    if (resumption_) options.kept_files = resumption_->spills();
-    return options;
+    const std::uint64_t least = kMinSortBytes + groups * kMinAttributeSortBytes;
+    const std::uint64_t memory = directory_bytes > least
+                                     ? budget.rest("the output's directory", directory_bytes)
+                                     : budget.rest("the sort", least);
+    const std::uint64_t share = (memory - kMinSortBytes) / (groups + 1);
+    const SortOptions options{.memory_bytes = memory - groups * share,
+                              .temp_dirs = temp_dirs(request_.run, target_),
+                              .expected = expected,
+                              .emits = emits};
+    AllSortOptions all{.points = options, .attributes = options};
+    all.attributes.memory_bytes = share;
+    if (resumption_) all.points.kept_files = resumption_->spills();
+    return all;
   }
 
   /// Feeds all inputs to a sort, which writes them to the disk when memory does not hold them.
   SortedPoints sort() {
     // Read and measure the inputs, choose the frame
-    BuildInputs inputs = read_inputs(request_, report_.seconds, progress_);
-    if (inputs.bounds.empty() && !scene_)
-      throw DataError("the input has no points and no triangles");
-    const Meta meta = make_meta(request_, inputs);
+    BuildInputs inputs = read_inputs(request_, scene_ ? &scene_->meta().channels : nullptr,
+                                     report_.seconds, progress_);
+    if (inputs.bounds.empty() && !scene_) {
+      std::string names;
+      for (const auto& input : request_.inputs) names += input.string() + ": ";
+      throw DataError(names + "the input has no points and no triangles");
+    }
+    Meta meta = make_meta(request_, inputs);
+    const bool marks = inputs.clouds.scan && !scene_ && add_marks(meta);
     check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);
     SortedPoints points{.plan = {.frame = frame_of(inputs.bounds),
-                                 .estimate_radii = inputs.clouds.estimate_radii,
+                                 .scan = inputs.clouds.scan,
+                                 .marks = marks,
                                  .emits = inputs.emitters || inputs.clouds.emits ||
                                           (scene_ && scene_->header().point_bytes != kPointBytes)}};
     const Frame& frame = points.plan.frame;
@@ -282,23 +270,33 @@ class Build {
     const bool by_spacing = inputs.lit && request_.sampling.spacing > 0;
     const std::uint64_t expected =
         by_spacing ? 0 : known + (inputs.lit ? request_.sampling.count : 0);
-    const SortOptions options = sort_options(std::move(budget), expected, points.plan.emits);
-    points.sorter =
-        std::make_unique<ExternalSorter>(options, executor_, keys_of(inputs.sample, frame));
-    tell_space(expected, points.sorter->expected_spill(), options.temp_dirs);
+    const std::size_t groups = inputs.attributes.groups();
+    const AllSortOptions options =
+        sort_options(std::move(budget), expected, points.plan.emits, groups);
+    const std::vector<MortonKey> sample = keys_of(inputs.sample, frame);
+    points.memory_bytes = options.points.memory_bytes;
+    points.sorter = std::make_unique<ExternalSorter>(options.points, executor_, sample);
+    if (resumption_) resumption_->add_spills(groups);
+    points.attributes = std::make_unique<AttributeSorts>(
+        inputs.attributes, options.attributes,
+        resumption_ ? resumption_->attribute_spills() : std::span<const std::filesystem::path>(),
+        executor_, sample);
+    tell_space(expected, points.sorter->expected_spill() + points.attributes->expected_spill(),
+               options.points.temp_dirs);
 
     // Feed the points, then plan the container: its record and its UUID depend on all of them
     double spacing = 0;
     {
       const Stage stage(report_.seconds, progress_, inputs.lit ? "sample and light" : "partition",
                         known, "points");
-      spacing = feed_inputs(inputs, request_, frame, *points.sorter, executor_, progress_);
+      spacing = feed_inputs(inputs, request_, frame, scene_points(), *points.sorter,
+                            *points.attributes, executor_, progress_);
     }
     points.plan.meta = record(meta, spacing);
     check_meta(points.plan.meta, request_.page_shift, points.plan.point_bytes());
-    points.plan.uuid = content_uuid(*points.sorter, frame, request_, points.plan.meta,
-                                    scene_ ? scene_->header().uuid : Uuid{});
-    if (resumption_) resumption_->keep(points.plan, *points.sorter);
+    points.plan.uuid = content_uuid(*points.sorter, *points.attributes, frame, request_,
+                                    points.plan.meta, scene_ ? scene_->header().uuid : Uuid{});
+    if (resumption_) resumption_->keep(points.plan, *points.sorter, *points.attributes);
     return points;
   }
 
@@ -310,14 +308,18 @@ class Build {
     if (spilled > 0) progress_.note(space_text(report_.space, temps, target_));
   }
 
-  /// Reports points whose radius could not be estimated. Points that an interrupted build had built
-  /// are not counted.
-  void tell_lone_points() const {
-    if (radius_counts_.without_radius == 0) return;
-    progress_.note(fmt::format(
-        "the input gives no radii, and those of {} points cannot be estimated, because all points "
-        "near them lie in the same place: their radius is 0, and they are not seen",
-        radius_counts_.without_radius));
+  /// Reports what was estimated for points that came without normals or radii.
+  void tell_scan() const {
+    if (scan_.normals > 0)
+      progress_.note(fmt::format("the normals of {} points are estimated", scan_.normals));
+    if (scan_.outliers > 0) {
+      progress_.note(fmt::format("{} points lie far from all others: the channel {} marks them",
+                                 scan_.outliers, kOutlierChannel));
+    }
+    if (scan_.alone > 0) {
+      progress_.note(fmt::format(
+          "{} points have no neighbours: their radius is 0, and they are not seen", scan_.alone));
+    }
   }
 
   /// Reopens the sorted points of an interrupted build.
@@ -332,8 +334,11 @@ class Build {
     }
     const bool emits = points.plan.emits;
     const std::uint64_t expected = spilled / (emits ? kEmittingBytes : kSpilledBytes);
-    points.sorter = std::make_unique<ExternalSorter>(sort_options(build_budget(), expected, emits),
-                                                     executor_, state);
+    const AllSortOptions options = sort_options(build_budget(), expected, emits,
+                                                channel_groups(points.plan.meta.channels).size());
+    points.memory_bytes = options.points.memory_bytes;
+    points.sorter = std::make_unique<ExternalSorter>(options.points, executor_, state);
+    points.attributes = std::make_unique<AttributeSorts>(options.attributes, executor_, state);
     state.end();
     if (const auto& checkpoint = resumption_->checkpoint())
       report_.resumed_points = checkpoint->place.points;
@@ -368,6 +373,41 @@ class Build {
     const BuildPlan& plan = points.plan;
     const std::uint64_t all = scene_points() + points.sorter->statistics().points;
     const Stage stage(report_.seconds, progress_, "sort and build", all, "points");
+    const Checkpoint* const from =
+        resumption_ && resumption_->checkpoint() ? &*resumption_->checkpoint() : nullptr;
+    ContainerWriter writer = from ? ContainerWriter(target_, writer_options(plan), from->writer)
+                                  : ContainerWriter(target_, writer_options(plan));
+    const BuildPlace place = from ? from->place : BuildPlace{};
+    progress_.advance(place.points);
+
+    // Find the first sorted point that is needed. A stage that looks at all points begins again,
+    // because a checkpoint records its place in the stream behind it alone
+    const bool whole = scene_ || plan.scan || request_.remove_duplicates;
+    const auto needed = whole ? first_of_all : first_for_itself;
+
+    // Chain the streams
+    std::optional<PointMarks> marks;
+    if (plan.marks) marks.emplace(roomiest_temp_dir(request_.run, target_));
+    StreamChain chain(points.sorter->finish(needed(place.points)));
+    if (plan.scan) complete(chain, points);
+    join(chain, plan.frame, [&] { return std::make_unique<ContainerPoints>(*scene_); });
+    if (marks) chain.add(marks->tap(chain.last()));
+    if (whole) pass_over(chain.last(), place.points);
+    if (is_rounded(request_.profile))
+      chain.add(round_points(chain.last(), plan.frame.unit(), executor_, place.last_key));
+
+    // Write all pages and publish the container
+    const Superblock superblock = build_from(chain.last(), writer, *points.sorter, needed);
+    write_attributes(plan, *points.attributes, superblock.points, writer);
+    if (marks) marks->write(superblock.points, plan.meta.channels, writer);
+    if (superblock.points < all) {
+      progress_.note(fmt::format("{} points lie where another one does and are left out",
+                                 all - superblock.points));
+    }
+    report_.superblock = writer.finish(plan.meta, superblock);
+  }
+
+  [[nodiscard]] WriterOptions writer_options(const BuildPlan& plan) const {
     WriterOptions options{.page_shift = request_.page_shift,
                           .codec = codec_of(request_.profile),
                           .uuid = plan.uuid,
@@ -375,42 +415,58 @@ class Build {
                           .point_bytes = plan.point_bytes()};
     if (resumption_) options.partial = resumption_->partial();
     if (scene_) options.source = &scene_->file();
-    const Checkpoint* const from =
-        resumption_ && resumption_->checkpoint() ? &*resumption_->checkpoint() : nullptr;
-    ContainerWriter writer =
-        from ? ContainerWriter(target_, options, from->writer) : ContainerWriter(target_, options);
-    const BuildPlace place = from ? from->place : BuildPlace{};
-    progress_.advance(place.points);
+    return options;
+  }
 
-    // Find the first sorted point that is needed. A build that appends merges again from the
-    // beginning, because a checkpoint records its place in the merged stream alone
-    const std::uint64_t first = scene_ ? 0 : place.points;
-    const auto needed = scene_                ? first_of_all
-                        : plan.estimate_radii ? first_for_radii
-                                              : first_for_itself;
+  /// Streams of which each but the first pulls its points from the one before.
+  class StreamChain {
+   public:
+    explicit StreamChain(std::unique_ptr<PointStream> first) { add(std::move(first)); }
+    void add(std::unique_ptr<PointStream> next) { streams_.push_back(std::move(next)); }
+    [[nodiscard]] PointStream& last() const { return *streams_.back(); }
 
-    // Chain the streams: estimate radii, merge with the scene, round
-    const std::unique_ptr<PointStream> sorted = points.sorter->finish(needed(first));
-    std::unique_ptr<PointStream> with_radii, old, moved, merged, rounded;
-    PointStream* stream = sorted.get();
-    if (plan.estimate_radii)
-      stream =
-          (with_radii = estimate_radii(*stream, plan.frame.unit(), radius_counts_, first)).get();
+   private:
+    std::vector<std::unique_ptr<PointStream>> streams_;
+  };
+
+  /// Adds the stage that estimates what the inputs do not give.
+  void complete(StreamChain& chain, const SortedPoints& points) {
+    ScanOptions scan = *points.plan.scan;
+    scan.memory_bytes = points.memory_bytes;
+    scan.temp_dirs = temp_dirs(request_.run, target_);
+    chain.add(marked_points(
+        complete_scan(chain.last(), points.plan.frame, scan, executor_, progress_, scan_)));
+  }
+
+  /// Adds the stages that merge sorted points with those of the scene and that drop duplicates.
+  /// @param open_scene  returns the stream of the scene's points, in the frame of the scene
+  void join(StreamChain& chain, const Frame& frame,
+            const std::function<std::unique_ptr<PointStream>()>& open_scene) const {
     if (scene_) {
-      old = std::make_unique<ContainerPoints>(*scene_);
-      moved = move_points(
-          *old, LatticeMove(scene_points() > 0 ? scene_->header().frame : plan.frame, plan.frame));
-      stream = (merged = merge_points(*moved, *stream)).get();
-      pass_over(*stream, place.points);
+      PointStream& added = chain.last();
+      chain.add(open_scene());
+      chain.add(move_points(chain.last(), scene_move(frame)));
+      chain.add(merge_points(chain.last(), added));
     }
-    if (is_rounded(request_.profile)) {
-      stream =
-          (rounded = round_points(*stream, plan.frame.unit(), executor_, place.last_key)).get();
-    }
+    if (request_.remove_duplicates) chain.add(unique_points(chain.last()));
+  }
 
-    // Write all pages and publish the container
-    report_.superblock =
-        writer.finish(plan.meta, build_from(*stream, writer, *points.sorter, needed));
+  /// Writes the pages of all groups of channels.
+  void write_attributes(const BuildPlan& plan, AttributeSorts& sorts, std::uint64_t points,
+                        ContainerWriter& writer) {
+    const AttributePlan attributes =
+        plan_of(scene_ ? &scene_->meta().channels : nullptr, plan.meta.channels);
+    for (std::size_t group = 0; group < sorts.size(); ++group) {
+      StreamChain chain(sorts.finish(group));
+      join(chain, plan.frame, [&] { return container_attributes(*scene_, attributes, group); });
+      write_attribute_pages(chain.last(), static_cast<std::uint8_t>(kFirstInputGroup + group),
+                            plan.meta.channels, points, writer);
+    }
+  }
+
+  /// Returns how the points of the scene move into the frame of the new container.
+  [[nodiscard]] LatticeMove scene_move(const Frame& frame) const {
+    return {scene_points() > 0 ? scene_->header().frame : frame, frame};
   }
 
   /// Builds the pages, from the checkpoint when there is one, and saves further checkpoints.
@@ -429,7 +485,7 @@ class Build {
     return build_pages(points, writer, request_.tree, executor_, progress_, checkpoints);
   }
 
-  // Each returns the first sorted point that is needed to continue at `point`, as first_for_radii()
+  // Each returns the first sorted point that is needed to continue at `point`
   static std::uint64_t first_for_itself(std::uint64_t point) { return point; }
   static std::uint64_t first_of_all(std::uint64_t /*point*/) { return 0; }
 
@@ -438,7 +494,7 @@ class Build {
   Progress& progress_;
   const ThreadPool executor_;
   BuildReport report_;
-  RadiusCounts radius_counts_;
+  ScanReport scan_;
   std::unique_ptr<ContainerReader> scene_;  ///< container that is appended to; null: none
   std::unique_ptr<Resumption> resumption_;
 };

@@ -27,6 +27,7 @@
 #include "engine/octree/rounding.h"
 #include "engine/pipeline/build/build_space.h"
 #include "engine/pipeline/run.h"
+#include "engine/pipeline/selection.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/sampling/sampler.h"
 #include "engine/sort/external_sort.h"
@@ -36,11 +37,13 @@ namespace ptc {
 /// Everything that the bytes of a container follow from, and the resources for building it.
 ///
 /// Surfels come from `inputs` and `mesh` together, or from `city_points`. Meshes are sampled and
-/// lit; clouds keep their own points, whose radiance is taken from the file or, without one there,
-/// from the colour.
+/// lit; clouds keep their own points and the light that their files give them.
 struct BuildRequest {
-  /// Mesh files and clouds, in any mixture. A cloud needs normals.
+  /// Mesh files, clouds and containers, in any mixture. Normals and radii that a cloud lacks are
+  /// estimated. Containers give their points with all channels, and without `lights` their lights.
   std::vector<std::filesystem::path> inputs;
+  /// What the container records as the names of the inputs; empty: their file names.
+  std::string input_names;
   /// A mesh in memory, added to those of `inputs`; null: none. Excludes `resume`.
   std::shared_ptr<const Mesh> mesh;
   /// Number of points of the procedural city, which is built in place of inputs; 0: no city.
@@ -51,9 +54,18 @@ struct BuildRequest {
   /// container records replace `lights`. Excludes `city_points`; it may be the target itself,
   /// except with `resume`.
   std::filesystem::path append;
-  bool backdrop = false;  ///< sets the meshes on a ground in front of a red wall
-  /// Lights of the meshes; clouds are lit already. Empty: default_rig(), or no lights at all when
-  /// one of the meshes emits light.
+  /// Records the place that each point had in its input, as the channel original_index, so that
+  /// points can be written in that order again.
+  bool original_order = false;
+  /// Which points of the clouds and containers among the inputs are taken, and which channels.
+  Selection selection;
+  /// The axis that points up, "x", "y" or "z"; empty: what the inputs say, else y.
+  std::string up;
+  bool remove_duplicates = false;  ///< of points at one position keeps the first
+  bool backdrop = false;           ///< sets the meshes on a ground in front of a red wall
+  /// Lights of the meshes, and the sky that lights what is shaded later. Empty: default_rig() for
+  /// meshes, but no lights at all when one of them emits light; cloud_rig() for clouds without
+  /// radiance alone.
   std::optional<LightRig> lights;
   SamplingOptions sampling;            ///< how densely meshes are sampled, and with how many rays
   BuildOptions tree;                   ///< the octree's leaves and the order of its pages

@@ -9,8 +9,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <utility>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
@@ -18,7 +21,9 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/point_input.h"
 #include "engine/pipeline/run.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/scene/procedural/city.h"
 
 namespace ptc {
@@ -73,43 +78,82 @@ std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
   return sample;
 }
 
-/// Feeds all points of a source to the sort. @return the number of points
-std::uint64_t feed(PointSource& source, const Frame& frame, ExternalSorter& sorter,
-                   const Executor& executor, Progress& progress) {
-  std::vector<Surfel> surfels(kBlock);
-  std::vector<PointRecord> records(kBlock);
-  std::uint64_t points = 0;
-  while (const std::size_t count = source.next(surfels)) {
-    executor.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) records[i] = to_record(surfels[i], frame);
-    });
-    sorter.add(std::span(records).first(count));
-    points += count;
-    progress.advance(count);
-  }
-  return points;
+/// Returns the number of a point's scanner among all of the inputs.
+/// @param row  the attributes of the point
+std::uint32_t scanner_of(const Clouds::Cloud& cloud, const std::byte* row) {
+  if (cloud.first_scanner == kNoScanner) return kNoScanner;
+  std::uint32_t own = 0;
+  std::memcpy(&own, row + cloud.scanner_offset, cloud.scanner_bytes);
+  return cloud.first_scanner + own;
 }
 
-/// A source that takes a point's colour as its radiance: a cloud with colours and without radiance
-/// was photographed as it glows.
-class Photographed : public PointSource {
+/// Marks a record whose normal is to be estimated.
+void mark_unknown_normal(PointRecord& record, std::uint32_t scanner) {
+  static_assert(sizeof record.normal == sizeof scanner);
+  std::memcpy(record.normal.data(), &scanner, sizeof scanner);
+  record.flags = kUnknownNormal;
+}
+
+/// Says whether a cloud was seen from above: it is far wider than high.
+bool is_aerial(const Bounds& bounds, const glm::dvec3& up) {
+  constexpr double kFlat = 0.3;  // height by width
+  const glm::dvec3 extent = bounds.high - bounds.low;
+  const double height = glm::dot(extent, up);
+  double width = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (up[axis] == 0) width = std::min(width, extent[axis]);
+  }
+  return height <= kFlat * width;
+}
+
+/// The sorts of a build, which take the points of one source after another.
+class Feeder {
  public:
-  explicit Photographed(std::unique_ptr<PointSource> source) : source_(std::move(source)) {}
-  std::size_t next(std::span<Surfel> out) override {
-    const std::size_t count = source_->next(out);
-    for (Surfel& s : out.first(count)) s.radiance = s.albedo;
-    return count;
+  /// @param first  number of the first point among all of the container
+  Feeder(const AttributePlan& plan, const Frame& frame, std::uint64_t first, ExternalSorter& sorter,
+         AttributeSorts& attributes, const Executor& executor, Progress& progress)
+      : plan_(plan),
+        frame_(frame),
+        sorter_(sorter),
+        attributes_(attributes),
+        executor_(executor),
+        progress_(progress),
+        points_(first) {}
+
+  /// Feeds all points of a source. @return the number of points
+  /// @param cloud  what is known of the source; the default: it has no channels
+  std::uint64_t feed(PointSource& source, const Clouds::Cloud& cloud = {}) {
+    const std::uint64_t before = points_;
+    while (const std::size_t count = source.next(surfels_)) {
+      const std::span<const std::byte> rows = source.attributes();
+      const std::size_t row_bytes = rows.size() / count;
+      executor_.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          records_[i] = to_record(surfels_[i], frame_);
+          if (surfels_[i].normal == glm::vec3(0))
+            mark_unknown_normal(records_[i], scanner_of(cloud, rows.data() + i * row_bytes));
+        }
+      });
+      const auto block = std::span<const PointRecord>(records_).first(count);
+      sorter_.add(block);
+      attributes_.add(plan_, block, cloud.input, rows, points_);
+      points_ += count;
+      progress_.advance(count);
+    }
+    return points_ - before;
   }
 
  private:
-  std::unique_ptr<PointSource> source_;
+  const AttributePlan& plan_;
+  const Frame& frame_;
+  ExternalSorter& sorter_;
+  AttributeSorts& attributes_;
+  const Executor& executor_;
+  Progress& progress_;
+  std::vector<Surfel> surfels_ = std::vector<Surfel>(kBlock);
+  std::vector<PointRecord> records_ = std::vector<PointRecord>(kBlock);
+  std::uint64_t points_;  ///< number of the next point
 };
-
-std::unique_ptr<PointSource> open_lit(const std::filesystem::path& path) {
-  PointFile file = open_points(path);
-  if (file.info.has_radiance || !file.info.has_albedo) return std::move(file.source);
-  return std::make_unique<Photographed>(std::move(file.source));
-}
 
 BuildInputs lay_city(std::uint64_t points) {
   const Bounds bounds = city_bounds(points);
@@ -121,18 +165,41 @@ bool has_emitters(const Mesh& mesh) {
                              [](const Material& m) { return m.emission != glm::vec3(0); });
 }
 
-BuildInputs read_files(const BuildRequest& request, Progress& progress) {
+BuildInputs read_files(const BuildRequest& request, const std::vector<Channel>* scene,
+                       Progress& progress) {
   BuildInputs inputs;
+  if (scene) inputs.attributes.add_input(*scene);
   for (const auto& input : request.inputs) {
-    if (is_point_file(input)) inputs.clouds.measure(input, progress);
+    if (!holds_points(input)) continue;
+    inputs.clouds.measure(input, request.selection, inputs.attributes, progress);
+  }
+  if (!request.up.empty()) inputs.clouds.text[kUpKey] = request.up;
+  const bool indexed =
+      scene && std::ranges::find(*scene, kOriginalIndex, &Channel::name) != scene->end();
+  if (request.original_order || indexed) inputs.attributes.add_original_index();
+  if (inputs.clouds.scan) {
+    inputs.clouds.scan->scanners = inputs.clouds.scanners;
+    inputs.clouds.scan->up = glm::dvec3(up_of(inputs.clouds.text));
+    inputs.clouds.scan->aerial = inputs.clouds.text.contains(kUpKey) &&
+                                 is_aerial(inputs.clouds.bounds, inputs.clouds.scan->up);
   }
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
   Mesh mesh = load_meshes(request.inputs, request.mesh.get(), request.backdrop, progress);
-  if (request.lights) inputs.lights = *request.lights;
+  if (request.lights) {
+    inputs.lights = *request.lights;
+  } else if (const std::string& lights = inputs.clouds.text[kLightsKey]; !lights.empty()) {
+    inputs.lights = light_rig_from_json(lights);
+  } else if (inputs.clouds.unlit) {
+    inputs.lights = cloud_rig(up_of(inputs.clouds.text));
+  }
   if (mesh.triangles.empty()) return inputs;
   inputs.emitters = has_emitters(mesh);
-  if (!request.lights && !inputs.emitters) inputs.lights = default_rig();
+  if (!request.lights && !inputs.clouds.text[kLightsKey].empty()) {
+    static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(request.inputs.front())));
+  } else if (!request.lights && !inputs.emitters) {
+    inputs.lights = default_rig();
+  }
   inputs.bounds.add(mesh.bounds());
   const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
   inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
@@ -143,16 +210,25 @@ BuildInputs read_files(const BuildRequest& request, Progress& progress) {
 
 }  // namespace
 
-void Clouds::measure(const std::filesystem::path& path, Progress& progress) {
-  PointFile file = open_points(path);
-  if (!file.info.has_normals) {
-    throw DataError(path.string() + ": the points have no normals (nx ny nz); estimate them first");
-  }
-  estimate_radii |= !file.info.has_radius;
+void Clouds::measure(const std::filesystem::path& path, const Selection& selection,
+                     AttributePlan& attributes, Progress& progress) {
+  PointFile file = open_point_input(path, selection);
+  // Note what the file says of all its points
+  const std::string name = path.filename().string();
+  for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
+  text.insert(file.info.text.begin(), file.info.text.end());
+  unlit |= !file.info.has_radiance;
   Cloud& cloud = files.emplace_back(Cloud{path});
+  if (!file.info.channels.empty()) cloud.input = attributes.add_input(file.info.channels);
+  note_scan(file.info, cloud);
+  // Read its points
+  bool lacks_normals = false;
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = file.source->next(block)) {
-    for (std::size_t i = 0; i < count; ++i) bounds.add(block[i].position);
+    for (std::size_t i = 0; i < count; ++i) {
+      bounds.add(block[i].position);
+      lacks_normals |= block[i].normal == glm::vec3(0);
+    }
     emits |= std::any_of(block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count),
                          [](const Surfel& s) { return s.emission != glm::vec3(0); });
     for (std::size_t i = 0; i < count; i += 64) sample.push_back(block[i].position);
@@ -161,28 +237,52 @@ void Clouds::measure(const std::filesystem::path& path, Progress& progress) {
     progress.advance(count);
   }
   points += cloud.points;
+  if (lacks_normals && !scan) scan.emplace().radii = false;
+  if (const std::uint64_t lost = file.source->left_out()) {
+    progress.note(fmt::format("{}: {} records name no place and are left out", name, lost));
+  }
 }
 
-BuildInputs read_inputs(const BuildRequest& request, StageSeconds& seconds, Progress& progress) {
+/// Notes what of the points of a cloud must be estimated, and where its scanners stood.
+void Clouds::note_scan(const PointFileInfo& info, Cloud& cloud) {
+  if (!info.has_normals || !info.has_radius) {
+    if (!scan) scan.emplace().radii = false;
+    scan->radii |= !info.has_radius;
+  }
+  if (info.scanners.empty()) return;
+  cloud.first_scanner = static_cast<std::uint32_t>(scanners.size());
+  scanners.insert(scanners.end(), info.scanners.begin(), info.scanners.end());
+  for (const Channel& channel : info.channels) {
+    if (channel.name == "scan") {
+      cloud.scanner_bytes = std::min(channel.component_bytes(), sizeof(std::uint32_t));
+      return;
+    }
+    cloud.scanner_offset += channel.component_bytes() * channel.components;
+  }
+}
+
+BuildInputs read_inputs(const BuildRequest& request, const std::vector<Channel>* scene,
+                        StageSeconds& seconds, Progress& progress) {
   if (request.city_points > 0) return lay_city(request.city_points);
   const Stage stage(seconds, progress, "read", 0, "points");
-  return read_files(request, progress);
+  return read_files(request, scene, progress);
 }
 
 double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
-                   ExternalSorter& sorter, const Executor& executor, Progress& progress) {
-  if (request.city_points > 0)
-    feed(*make_city(request.city_points), frame, sorter, executor, progress);
-  for (const auto& [path, points] : inputs.clouds.files) {
-    if (feed(*open_lit(path), frame, sorter, executor, progress) == points) continue;
-    throw DataError(path.string() + ": the file changed while it was read");
+                   std::uint64_t first, ExternalSorter& sorter, AttributeSorts& attributes,
+                   const Executor& executor, Progress& progress) {
+  Feeder feeder(inputs.attributes, frame, first, sorter, attributes, executor, progress);
+  if (request.city_points > 0) feeder.feed(*make_city(request.city_points));
+  for (const Clouds::Cloud& cloud : inputs.clouds.files) {
+    if (feeder.feed(*open_point_input(cloud.path, request.selection).source, cloud) == cloud.points)
+      continue;
+    throw DataError(cloud.path.string() + ": the file changed while it was read");
   }
   double spacing = 0;
   if (const LitMesh* lit = inputs.lit.get()) {
     spacing = request.sampling.spacing > 0 ? request.sampling.spacing
                                            : spacing_for(lit->mesh, request.sampling.count);
-    feed(*sample_mesh(lit->light, lit->rays, request.sampling, executor), frame, sorter, executor,
-         progress);
+    feeder.feed(*sample_mesh(lit->light, lit->rays, request.sampling, executor));
   }
   inputs.lit.reset();
   return spacing;

@@ -4,15 +4,21 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
+#include "engine/io/cloud/points.h"
 #include "engine/io/mesh/mesh.h"
+#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/scan/scan.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
@@ -25,17 +31,34 @@ struct Clouds {
   struct Cloud {
     std::filesystem::path path;
     std::uint64_t points = 0;
+    std::size_t input = AttributePlan::kNoInput;  ///< its number in the plan of the channels
+    std::uint32_t first_scanner = kNoScanner;     ///< the number of the first of its scanners
+    /// Where the number of its scanner lies in the row of a point, and its bytes; 0 bytes when all
+    /// points are of the first.
+    std::size_t scanner_offset = 0, scanner_bytes = 0;
   };
   std::vector<Cloud> files;
   Bounds bounds;                   ///< of all points, scene units
   std::vector<glm::dvec3> sample;  ///< positions of an even share of the points, scene units
   std::uint64_t points = 0;        ///< in all files
-  bool estimate_radii = false;     ///< one of the files gives no radii
-  bool emits = false;              ///< a point emits light
+  /// How the points are completed, without the resources; empty when all have normals and radii.
+  std::optional<ScanOptions> scan;
+  bool unlit = false;                ///< one of the files gives no radiance
+  bool emits = false;                ///< a point emits light
+  std::vector<glm::dvec3> scanners;  ///< of all files, scene units
+  /// Facts about the files under the keys of spec/points.md#texts; the first file that has one
+  /// wins.
+  std::map<std::string, std::string> text;
 
   /// Reads a cloud to its end and adds it to the others.
-  /// @throws DataError when the points have no normals or the file breaks its format
-  void measure(const std::filesystem::path& path, Progress& progress);
+  /// @param attributes  gets the channels of the cloud
+  /// @throws DataError when the file breaks its format; RequestError, FormatError as
+  ///         open_point_input()
+  void measure(const std::filesystem::path& path, const Selection& selection,
+               AttributePlan& attributes, Progress& progress);
+
+ private:
+  void note_scan(const PointFileInfo& info, Cloud& cloud);
 };
 
 /// The joined meshes of a request, ready for rays and light. It is destroyed before the sort needs
@@ -53,23 +76,29 @@ struct BuildInputs {
   Bounds bounds;                   ///< of all inputs, scene units; empty when they have no points
   std::vector<glm::dvec3> sample;  ///< positions for the sort's splitters, scene units
   Clouds clouds;
+  AttributePlan attributes;  ///< the channels of the scene that is appended to, and of the clouds
   LightRig lights;
   bool emitters = false;         ///< at least one material emits light
   std::unique_ptr<LitMesh> lit;  ///< null when the inputs have no triangles
 };
 
 /// Reads the meshes and measures the clouds of a request.
+/// @param scene    channels of the container that the inputs are appended to, which become input 0
+///                 of the plan; null: there is none
 /// @param seconds  gets a row for the stage "read", except for a city
 /// @throws DataError, std::system_error
-[[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, StageSeconds& seconds,
+[[nodiscard]] BuildInputs read_inputs(const BuildRequest& request,
+                                      const std::vector<Channel>* scene, StageSeconds& seconds,
                                       Progress& progress);
 
-/// Feeds the surfels of all inputs to the sort. Meshes are sampled and lit on the way, and freed
-/// afterwards.
+/// Feeds the surfels of all inputs to the sort, and what is recorded of them beyond that to the
+/// sorts of attributes. Meshes are sampled and lit on the way, and freed afterwards.
+/// @param first  number of points that the container has before these
 /// @return  distance between neighbouring surfels on the meshes, scene units; 0 without meshes
 /// @throws DataError when a cloud changed since it was measured; std::system_error
 double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
-                   ExternalSorter& sorter, const Executor& executor, Progress& progress);
+                   std::uint64_t first, ExternalSorter& sorter, AttributeSorts& attributes,
+                   const Executor& executor, Progress& progress);
 
 /// Returns the coordinates of a point as the array that Frame takes.
 [[nodiscard]] inline std::array<double, 3> to_array(const glm::dvec3& p) {

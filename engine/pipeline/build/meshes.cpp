@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "engine/base/surfel.h"
-#include "engine/io/cloud/points.h"
+#include "engine/pipeline/point_input.h"
 #include "engine/scene/ray_scene.h"
 
 namespace ptc {
@@ -67,7 +67,7 @@ Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* a
 
   // Read the mesh files
   for (const std::filesystem::path& input : inputs) {
-    if (is_point_file(input)) continue;
+    if (holds_points(input)) continue;
     MeshFile file = read_mesh(input);
     for (const std::string& warning : file.warnings) {
       progress.note(input.string() + ": " + warning);

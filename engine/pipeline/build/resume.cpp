@@ -21,6 +21,7 @@
 #include "engine/base/background.h"
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
+#include "engine/pipeline/build/build_inputs.h"
 #include "format/checksum.h"
 
 namespace ptc {
@@ -38,6 +39,20 @@ const char* name_of(Profile profile) {
       return "compact";
   }
   return "unknown";
+}
+
+std::string text_of(const Selection& selection) {
+  std::string text = fmt::format("every {}", selection.every);
+  if (const auto& box = selection.box) {
+    text += fmt::format(" box {} {} {} {} {} {}", box->low.x, box->low.y, box->low.z, box->high.x,
+                        box->high.y, box->high.z);
+  }
+  for (const std::uint64_t number : selection.classes) text += fmt::format(" class {}", number);
+  if (selection.level) text += fmt::format(" level {}", *selection.level);
+  if (!selection.channels) return text;
+  text += " channels";
+  for (const std::string& name : *selection.channels) text += " " + name;
+  return text;
 }
 
 /// Returns a line "NAME: VALUE" for everything that the bytes of the container follow from. Names
@@ -61,6 +76,10 @@ std::string text_of(const BuildRequest& request) {
   // Record the settings of the surfels
   const SamplingOptions& sampling = request.sampling;
   line("`city_points`", request.city_points);
+  line("the selection", text_of(request.selection));
+  line("the axis that points up", request.up);
+  line("`original_order`", request.original_order);
+  line("`remove_duplicates`", request.remove_duplicates);
   line("`backdrop`", request.backdrop);
   line("the lights", request.lights ? to_json(*request.lights) : "of the scene");
   line("`sampling.count`", sampling.count);
@@ -104,13 +123,34 @@ void remove_file(const std::filesystem::path& path) noexcept {
   ::unlink(path.c_str());
 }
 
+/// Writes the absolute paths of files to a state.
+void put_files(std::span<const std::filesystem::path> files, StateWriter& state) {
+  state.put(std::uint64_t{files.size()});
+  for (const std::filesystem::path& file : files)
+    state.put_text(std::filesystem::absolute(file).string());
+}
+
+std::vector<std::filesystem::path> get_files(StateReader& state) {
+  std::vector<std::filesystem::path> files;
+  for (std::uint64_t count = state.get_count(1 << 20); count > 0; --count)
+    files.emplace_back(state.get_text());
+  return files;
+}
+
 void put_plan(const BuildPlan& plan, StateWriter& state) {
   state.put(plan.frame.origin);
   state.put(plan.frame.edge);
   state.put_bytes(plan.uuid);
   state.put(static_cast<std::uint8_t>(plan.emits));
   state.put_bytes(encode_meta(plan.meta, plan.point_bytes()));
-  state.put(static_cast<std::uint8_t>(plan.estimate_radii));
+  state.put(static_cast<std::uint8_t>(plan.marks));
+  state.put(static_cast<std::uint8_t>(plan.scan.has_value()));
+  if (!plan.scan) return;
+  state.put(static_cast<std::uint8_t>(plan.scan->radii));
+  state.put(static_cast<std::uint8_t>(plan.scan->aerial));
+  state.put(to_array(plan.scan->up));
+  state.put(std::uint64_t{plan.scan->scanners.size()});
+  for (const glm::dvec3& scanner : plan.scan->scanners) state.put(to_array(scanner));
 }
 
 BuildPlan get_plan(StateReader& state) {
@@ -122,7 +162,18 @@ BuildPlan get_plan(StateReader& state) {
   std::ranges::copy(uuid, plan.uuid.begin());
   plan.emits = state.get<std::uint8_t>() != 0;
   plan.meta = decode_meta(state.get_bytes(), plan.point_bytes());
-  plan.estimate_radii = state.get<std::uint8_t>() != 0;
+  plan.marks = state.get<std::uint8_t>() != 0;
+  if (state.get<std::uint8_t>() == 0) return plan;
+  const auto place = [&] {
+    const auto at = state.get<std::array<double, 3>>();
+    return glm::dvec3(at[0], at[1], at[2]);
+  };
+  ScanOptions& scan = plan.scan.emplace();
+  scan.radii = state.get<std::uint8_t>() != 0;
+  scan.aerial = state.get<std::uint8_t>() != 0;
+  scan.up = place();
+  for (std::uint64_t count = state.get_count(1 << 20); count > 0; --count)
+    scan.scanners.push_back(place());
   return plan;
 }
 
@@ -160,6 +211,7 @@ Resumption::Resumption(const BuildRequest& request, const std::filesystem::path&
 void Resumption::refuse(const DataError& error) const {
   std::vector<std::filesystem::path> files{manifest_, at_, pages_};
   files.insert(files.end(), spills_.begin(), spills_.end());
+  files.insert(files.end(), attribute_spills_.begin(), attribute_spills_.end());
   throw DataError(fmt::format("{}; to start again, remove {}", error.what(), names_text(files)));
 }
 
@@ -174,19 +226,20 @@ void Resumption::load_manifest() {
   }
 
   // Remove the spill files of a sort that did not end
-  std::vector<std::filesystem::path> spills;
-  for (std::uint64_t count = state.get_count(1 << 10); count > 0; --count)
-    spills.emplace_back(state.get_text());
+  std::vector<std::filesystem::path> spills = get_files(state);
+  std::vector<std::filesystem::path> attribute_spills = get_files(state);
   const std::span<const std::byte> sorted = state.get_bytes();
   state.end();
   if (sorted.empty()) {  // the build was killed before the end of its sort
     std::ranges::for_each(spills, remove_file);
+    std::ranges::for_each(attribute_spills, remove_file);
     sort_unfinished_ = true;
     return;
   }
 
   // Take over the plan and the state of the sorter
   spills_ = std::move(spills);
+  attribute_spills_ = std::move(attribute_spills);
   StateReader rest(sorted, manifest_.string());
   plan_ = get_plan(rest);
   const std::span<const std::byte> sorter = rest.get_bytes();
@@ -221,17 +274,28 @@ void Resumption::begin() {
 void Resumption::write_manifest(const std::vector<std::byte>& sorted) const {
   StateWriter state;
   state.put_text(request_);
-  state.put(std::uint64_t{spills_.size()});
-  for (const std::filesystem::path& spill : spills_)
-    state.put_text(std::filesystem::absolute(spill).string());
+  put_files(spills_, state);
+  put_files(attribute_spills_, state);
   state.put_bytes(sorted);
   write_state(manifest_, state.take());
 }
 
-void Resumption::keep(const BuildPlan& plan, ExternalSorter& sorter) {
+void Resumption::add_spills(std::size_t groups) {
+  if (groups == 0) return;
+  for (std::size_t group = 0; group < groups; ++group) {
+    for (const std::filesystem::path& spill : spills_) {
+      attribute_spills_.push_back(with_ending(spill, fmt::format("-{}", group).c_str()));
+      unsorted_.push_back(std::make_unique<TemporaryName>(attribute_spills_.back()));
+    }
+  }
+  write_manifest({});
+}
+
+void Resumption::keep(const BuildPlan& plan, ExternalSorter& sorter, AttributeSorts& attributes) {
   StateWriter sorted, state;
   put_plan(plan, sorted);
   sorter.keep(state);
+  attributes.keep(state);
   sorted.put_bytes(state.take());
   const std::vector<std::byte> bytes = sorted.take();
   write_manifest(bytes);
@@ -255,6 +319,7 @@ void Resumption::save(const Checkpoint& checkpoint) const {
 // The manifest goes last: if the removal is interrupted, it still names the files that are left.
 void Resumption::remove() noexcept {
   std::ranges::for_each(spills_, remove_file);
+  std::ranges::for_each(attribute_spills_, remove_file);
   remove_file(state_temporary(at_));
   remove_file(state_temporary(manifest_));
   remove_file(at_);

@@ -18,6 +18,7 @@
 #include <future>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,9 @@
 #include "engine/io/file/file.h"
 #include "engine/io/file/state_file.h"
 #include "engine/octree/build_pages.h"
+#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/scan/scan.h"
 #include "engine/sort/external_sort.h"
 #include "engine/store/writer.h"
 #include "format/schema.h"
@@ -38,8 +41,11 @@ struct BuildPlan {
   Frame frame;
   Uuid uuid{};
   Meta meta;
-  bool estimate_radii = false;  ///< at least one input gives no radii
-  bool emits = false;           ///< at least one point may emit light
+  /// How the scan is completed, without its resources; empty when all inputs give normals and
+  /// radii.
+  std::optional<ScanOptions> scan;
+  bool marks = false;  ///< the last channels are those of add_marks(), which the scan fills
+  bool emits = false;  ///< at least one point may emit light
 
   /// Returns the bytes of a point in the container.
   [[nodiscard]] std::uint8_t point_bytes() const noexcept {
@@ -71,16 +77,24 @@ class Resumption {
 
   /// The path of the unfinished container.
   [[nodiscard]] const std::filesystem::path& partial() const noexcept { return pages_; }
-  /// The paths of the spill files, for SortOptions::kept_files.
+  /// The paths of the spill files of the points, for SortOptions::kept_files.
   [[nodiscard]] const std::vector<std::filesystem::path>& spills() const noexcept {
     return spills_;
+  }
+  /// Names the spill files of the attributes. To be called before any of them is written.
+  /// @param groups  number of sorts of attributes
+  void add_spills(std::size_t groups);
+  /// The paths of the spill files of all sorts of attributes, as many for each as spills() has.
+  [[nodiscard]] std::span<const std::filesystem::path> attribute_spills() const noexcept {
+    return attribute_spills_;
   }
 
   /// The plan of the interrupted build; empty when the points must be sorted from the beginning.
   [[nodiscard]] const std::optional<BuildPlan>& plan() const noexcept { return plan_; }
   /// Returns whether an interrupted build was found that had not finished its sort.
   [[nodiscard]] bool sort_unfinished() const noexcept { return sort_unfinished_; }
-  /// Returns the state from which an ExternalSorter reopens the spill files. @pre plan()
+  /// Returns the state from which an ExternalSorter reopens the spill files of the points, and
+  /// AttributeSorts those of the attributes. @pre plan()
   [[nodiscard]] StateReader sorter_state() const { return {sorter_, manifest_.string()}; }
   /// The checkpoint to continue from; empty when the build starts at the first sorted point.
   [[nodiscard]] const std::optional<Checkpoint>& checkpoint() const noexcept { return checkpoint_; }
@@ -88,7 +102,7 @@ class Resumption {
   [[nodiscard]] StateReader build_state() const { return {checkpoint_->build, at_.string()}; }
 
   /// Makes all files outlive this object. To be called once, when all points have entered the sort.
-  void keep(const BuildPlan& plan, ExternalSorter& sorter);
+  void keep(const BuildPlan& plan, ExternalSorter& sorter, AttributeSorts& attributes);
   /// Replaces the checkpoint on the disk.
   void save(const Checkpoint& checkpoint) const;
   /// Refuses to continue from damaged files.
@@ -104,7 +118,7 @@ class Resumption {
   void write_manifest(const std::vector<std::byte>& sorted) const;
 
   std::filesystem::path manifest_, pages_, at_;
-  std::vector<std::filesystem::path> spills_;
+  std::vector<std::filesystem::path> spills_, attribute_spills_;
   std::string request_;
   std::vector<std::byte> sorter_;
   bool sort_unfinished_ = false;

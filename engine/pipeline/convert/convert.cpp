@@ -1,11 +1,3 @@
-// Conversions of containers, page by page or point by point.
-//
-// A container keeps the channels of a point on pages of their own, one column for each component; a
-// PLY keeps them in the row of the point. spread_columns() transposes one page:
-//
-//   attribute page (group)             rows of floats, one for each point
-//   a0 a1 a2 .. | b0 b1 b2 .. | ..     a0 b0 ..  a1 b1 ..  a2 b2 ..
-//
 // A container becomes another container in one of two ways. copy_pages() decodes and encodes each
 // page under its old number. rebuild_pages() streams the points through the octree builder, because
 // another page size or rounded points make other pages, and moves the channels to pages of the new
@@ -14,17 +6,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
-#include <iterator>
 #include <numeric>
-#include <set>
-#include <string>
 #include <vector>
 
-#include <fmt/format.h>
-
-#include "engine/io/cloud/points.h"
-#include "engine/io/cloud/record.h"
 #include "engine/io/file/file.h"
 #include "engine/io/text/text.h"
 #include "engine/octree/build_pages.h"
@@ -36,115 +20,9 @@
 #include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
-#include "format/scalar.h"
 
 namespace ptc {
 namespace {
-
-constexpr std::size_t kTextBytes = std::size_t{1} << 20;  // text that is collected for one write
-
-float load_value(ChannelType type, const std::byte* at) {
-  const auto load = [at]<class T>(T value) {
-    std::memcpy(&value, at, sizeof value);
-    return value;
-  };
-  switch (type) {
-    case ChannelType::u8:
-      return static_cast<float>(load(std::uint8_t{}));
-    case ChannelType::u16:
-      return static_cast<float>(load(std::uint16_t{}));
-    case ChannelType::half:
-      return decode_half(load(std::uint16_t{}));
-    case ChannelType::f32:
-      return load(float{});
-    case ChannelType::u32:
-      return static_cast<float>(load(std::uint32_t{}));
-    case ChannelType::u64:
-      return static_cast<float>(load(std::uint64_t{}));
-    case ChannelType::i8:
-      return static_cast<float>(load(std::int8_t{}));
-    case ChannelType::i16:
-      return static_cast<float>(load(std::int16_t{}));
-    case ChannelType::i32:
-      return static_cast<float>(load(std::int32_t{}));
-    case ChannelType::i64:
-      return static_cast<float>(load(std::int64_t{}));
-    case ChannelType::f64:
-      return static_cast<float>(load(double{}));
-  }
-  return 0;  // a type of a later version
-}
-
-/// Writes the values of `channels`, all of one group, into rows of `stride` floats, one row for
-/// each point.
-/// @param payload  the payload of an attribute page: one column of `count` values per component
-/// @param rows     where the first component goes in the first row
-void spread_columns(std::span<const Channel> channels, const std::byte* payload, std::size_t count,
-                    float* rows, std::size_t stride) {
-  for (const Channel& channel : channels) {
-    const std::size_t width = channel.component_bytes();
-    for (std::size_t c = 0; c < channel.components; ++c, ++rows) {
-      for (std::size_t i = 0; i < count; ++i, payload += width) {
-        rows[i * stride] = load_value(channel.type, payload);
-      }
-    }
-  }
-}
-
-/// A pass over the point pages of a container, together with the values of all channels.
-class PageCursor {
- public:
-  explicit PageCursor(const ContainerReader& container)
-      : container_(container), scan_(container), payload_(container.page_payload_limit()) {
-    for (const Channel& channel : container.meta().channels) floats_ += channel.components;
-  }
-
-  /// Reads the next page; false at the end.
-  bool next() {
-    if (!scan_.next()) return false;
-    const PointPage points = scan_.points();
-    surfels.clear();
-    for (std::uint32_t i = 0; i < points.size(); ++i) {
-      surfels.push_back(to_surfel(points[i], container_.header().frame));
-    }
-    read_channels(points.size());
-    return true;
-  }
-
-  std::vector<Surfel> surfels;  ///< points of the page that next() read
-  std::vector<float> values;    ///< their channels, point by point
-
- private:
-  void read_channels(std::uint32_t count) {
-    values.resize(count * floats_);
-    std::span<const Channel> rest = container_.meta().channels;
-    float* place = values.data();
-    while (!rest.empty()) {  // the format orders channels by group
-      const std::uint8_t group = rest.front().group;
-      const auto last =
-          std::ranges::find_if(rest, [&](const Channel& c) { return c.group != group; });
-      const auto channels = rest.first(static_cast<std::size_t>(last - rest.begin()));
-      const std::uint32_t page = container_.attribute_pages(group)[scan_.index()];
-      static_cast<void>(container_.read_page(page, payload_, decoder_));
-      spread_columns(channels, payload_.data(), count, place, floats_);
-      for (const Channel& channel : channels) place += channel.components;
-      rest = rest.subspan(channels.size());
-    }
-  }
-
-  const ContainerReader& container_;
-  PointScan scan_;
-  PageDecoder decoder_;
-  std::vector<std::byte> payload_;  ///< of the current attribute page
-  std::size_t floats_ = 0;          ///< values of one point in all channels
-};
-
-/// Appends a surfel as a line of numbers that read back to the same bits.
-void append_line(std::string& text, const Surfel& s) {
-  fmt::format_to(std::back_inserter(text), "{} {} {} {} {} {} {} {} {} {}\n", s.position.x,
-                 s.position.y, s.position.z, s.normal.x, s.normal.y, s.normal.z, s.radius,
-                 s.radiance.r, s.radiance.g, s.radiance.b);
-}
 
 /// Returns the UUID of the copy. It is another one than that of the original, whose pages must not
 /// pass for pages of the copy.
@@ -223,38 +101,6 @@ Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writ
   return superblock;
 }
 
-void write_ply(const ContainerReader& container, const std::filesystem::path& target,
-               Progress& progress) {
-  PlyWriter writer(target, container.superblock().points,
-                   container.header().point_bytes != kPointBytes,
-                   ply_columns(container.meta().channels));
-  PageCursor cursor(container);
-  while (cursor.next()) {
-    writer.write(cursor.surfels, cursor.values);
-    progress.advance(cursor.surfels.size());
-  }
-  writer.finish();
-}
-
-void write_xyz(const ContainerReader& container, const std::filesystem::path& target,
-               Progress& progress) {
-  OutputFile file(target);
-  std::string text = "# x y z nx ny nz radius radiance_r radiance_g radiance_b\n";
-  ContainerPoints points(container);
-  std::vector<PointRecord> block(4096);
-  while (const std::size_t count = points.next(block)) {
-    for (std::size_t i = 0; i < count; ++i) {
-      append_line(text, to_surfel(block[i], container.header().frame));
-    }
-    progress.advance(count);
-    if (text.size() < kTextBytes) continue;
-    file.append(std::as_bytes(std::span(text)));
-    text.clear();
-  }
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
-}
-
 Superblock write_container(const ContainerReader& container, const std::filesystem::path& target,
                            const RecodeOptions& options, Progress& progress) {
   at_offset(container.file(), 0, [&] { check_copyable(container.header()); });
@@ -305,26 +151,6 @@ bool is_container(const std::filesystem::path& path) {
   if (file.size() < magic.size()) return false;
   file.read_at(0, magic);
   return std::equal(magic.begin(), magic.end(), example.begin());
-}
-
-ConvertReport container_to_ply(const ContainerReader& container,
-                               const std::filesystem::path& target, Progress& progress) {
-  ConvertReport report{.points = container.superblock().points};
-  {
-    const Stage stage(report.seconds, progress, "convert", report.points, "points");
-    write_ply(container, target, progress);
-  }
-  return report;
-}
-
-ConvertReport container_to_xyz(const ContainerReader& container,
-                               const std::filesystem::path& target, Progress& progress) {
-  ConvertReport report{.points = container.superblock().points};
-  {
-    const Stage stage(report.seconds, progress, "convert", report.points, "points");
-    write_xyz(container, target, progress);
-  }
-  return report;
 }
 
 ConvertReport recode_container(const ContainerReader& container,

@@ -1,9 +1,8 @@
-// Converts containers: the entry points of the library that write a container as a .ply, as an .xyz
-// or as a container of another profile or page size.
+// Converts containers: the entry point of the library that writes a container in another profile or
+// page size. point_files.h has those for files of other formats.
 //
 //   const ptc::ContainerReader scene("dragon.ptcx");
 //   ptc::Progress silent;
-//   ptc::container_to_ply(scene, "dragon.ply", silent);
 //   ptc::recode_container(scene, "small.ptcx", {.profile = ptc::Profile::compact}, silent);
 #pragma once
 
@@ -34,27 +33,6 @@ struct ConvertReport {
   std::optional<Superblock> superblock;  ///< of the target when it is a container
   StageSeconds seconds;                  ///< wall time of each stage
 };
-
-/// Writes the points of a container as a binary PLY, with all its channels as columns
-/// (spec/points.md#ply).
-///
-/// Points keep their order. The target is published when it is complete; a conversion that throws
-/// leaves it as it was.
-/// @throws FormatError when the container is damaged; std::system_error
-/// Memory: the open container and a few pages, within kBufferBytes.
-ConvertReport container_to_ply(const ContainerReader& container,
-                               const std::filesystem::path& target, Progress& progress);
-
-/// Writes the points of a container as text: lines "x y z nx ny nz radius r g b" after one line of
-/// comment, where r g b is the radiance. Every number reads back to the same bits. Channels are
-/// left out.
-///
-/// Points keep their order. The target is published when it is complete; a conversion that throws
-/// leaves it as it was.
-/// @throws FormatError when the container is damaged; std::system_error
-/// Memory: the open container, a page and 1 MiB of text, within kBufferBytes.
-ConvertReport container_to_xyz(const ContainerReader& container,
-                               const std::filesystem::path& target, Progress& progress);
 
 /// Writes a container again: the same points, channels and record in another profile or page size.
 ///

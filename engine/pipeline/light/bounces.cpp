@@ -26,6 +26,7 @@ constexpr std::size_t kBatch = 16 * Shader::kBlock;  // points in memory at once
 /// their errors average out over them.
 GatherOptions coarser(const GatherOptions& gather) {
   GatherOptions coarse = gather;
+  coarse.around = {};
   coarse.solid_angle *= 3;
   coarse.parallax *= 2;
   coarse.resolution = std::max(16U, gather.resolution / 32 * 16);

@@ -7,6 +7,7 @@
 //   check()     rays                      surfels under rays; finish() has freed the cache
 #include "engine/pipeline/light/lighting.h"
 
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -32,6 +33,16 @@ void check_ranges(const LightingRequest& request) {
                   "`gather.inflation` is not above 0 and finite");
   require_request(gather.resolution >= 16 && gather.resolution <= 64 && gather.resolution % 16 == 0,
                   "gather.resolution", "`gather.resolution` is not 16, 32, 48 or 64");
+  const Surroundings& around = gather.around;
+  require_request(around.cone > 0 && around.cone <= 1.5707964F, "gather.around.cone",
+                  "`gather.around.cone` is not above 0 and at most pi / 2");
+  require_request(around.distance > 0, "gather.around.distance",
+                  "`gather.around.distance` is not above 0");
+  require_request(around.diagonals >= 0 && std::isfinite(around.diagonals),
+                  "gather.around.diagonals",
+                  "`gather.around.diagonals` is not 0 or more and finite");
+  require_request(around.falloff <= 8, "gather.around.falloff",
+                  "`gather.around.falloff` is above 8");
   require_request(!request.error || (*request.error > 0 && *request.error <= 1), "error",
                   "`error` is not above 0 and at most 1");
   require_request(request.check.rays >= 1 && request.check.rays <= kMaxRays, "check.rays",
@@ -48,6 +59,11 @@ void check_combination(const LightingRequest& request) {
     throw RequestError("estimate",
                        "`estimate` needs rays to compare with: ask for `error` or `check` as well");
   }
+  if (!request.gather.around.is_plain() && (request.estimate || request.check.receivers > 0)) {
+    throw RequestError("check",
+                       "`check` and `estimate` compare with rays over the hemisphere at any "
+                       "distance: leave out the limits of the occlusion");
+  }
   if (!request.tolerate_damage) return;
   if (request.bounces > 1) {
     throw RequestError("tolerate_damage",
@@ -59,6 +75,13 @@ void check_combination(const LightingRequest& request) {
                        "`tolerate_damage` excludes `error` and `check`: their rays read every "
                        "point. Salvage the scene first");
   }
+}
+
+/// Returns the length of the diagonal of a scene's bounds, scene units.
+double diagonal_of(const ContainerReader& scene) {
+  const Superblock& s = scene.superblock();
+  return std::hypot(s.bounds_high[0] - s.bounds_low[0], s.bounds_high[1] - s.bounds_low[1],
+                    s.bounds_high[2] - s.bounds_low[2]);
 }
 
 /// Sums up the damaged pages that a run met.
@@ -105,7 +128,13 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, unsigned variants,
       .sky = sky_function(sky),
       .lost = lost_.get(),
       .variants = variants};
-  options_.gather.bleeding = request_.bounces > 0;
+  if (Surroundings& around = options_.gather.around; around.diagonals > 0) {
+    around.distance = around.diagonals * static_cast<float>(diagonal_of(scene_));
+    around.diagonals = 0;
+  }
+  // Without light on any surface there is none to gather
+  const bool is_lit = scene_.superblock().flux != std::array<double, 3>{};
+  options_.gather.bleeding = request_.bounces > 0 && is_lit;
   bounced_ = bounce_light(
       scene_, {request_.bounces, options_, request_.lift, roomiest_temp_dir(request_.run, target)},
       executor_, report_, progress_);
@@ -122,7 +151,9 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
       const Stage stage(report_.seconds, progress_, "tune", 0, "receivers");
       report_.tuning = ptc::tune(lit(), options_, *request_.error, pilots, executor_, progress_,
                                  compared, traced);
+      const Surroundings around = options_.gather.around;
       options_.gather = report_.tuning->gather;
+      options_.gather.around = around;
     }
 
     // Fit the estimates; tune() has traced the pilots already

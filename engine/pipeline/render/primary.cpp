@@ -58,7 +58,8 @@ class MeshView : public PrimaryView {
 /// Returns a camera that sees everything from the front, the right and above, as near as all
 /// corners of the bounds allow. A backdrop is larger than what stands on it, so it is seen from
 /// half the distance and may leave the picture.
-Camera overview(const Superblock& superblock, bool backdrop,
+/// @param up  unit; the axis that points up
+Camera overview(const Superblock& superblock, const glm::dvec3& up, bool backdrop,
                 const std::optional<std::array<unsigned, 2>>& size) {
   // Look at the middle of the bounds
   const glm::dvec3 low(superblock.bounds_low[0], superblock.bounds_low[1],
@@ -71,7 +72,12 @@ Camera overview(const Superblock& superblock, bool backdrop,
     camera.height = (*size)[1];
   }
   camera.look_at = (low + high) * 0.5;
-  const glm::dvec3 away = glm::normalize(glm::dvec3(0.45, 0.35, 1));
+  // Stand on the side of +z when +y is up, of -y when +z is, of +y when +x is
+  const glm::dvec3 from(0.45, 0.35, 1);
+  const glm::dvec3 away = glm::normalize(up.z > 0   ? glm::dvec3(from.x, -from.z, from.y)
+                                         : up.x > 0 ? glm::dvec3(from.y, from.z, from.x)
+                                                    : from);
+  camera.up = glm::vec3(up);
   camera.position = camera.look_at + away;
 
   // Step back until every corner is in the picture, with a margin of 5 %
@@ -105,7 +111,7 @@ Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> 
   const auto& text = scene.meta().text;
   if (const auto recorded = text.find(kCameraKey); recorded != text.end())
     return camera_from_json(recorded->second);
-  if (cameras.empty()) return overview(scene.superblock(), backdrop, size);
+  if (cameras.empty()) return overview(scene.superblock(), up_of(text), backdrop, size);
   Camera camera;
   const MeshCamera& from = cameras.front();
   const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);

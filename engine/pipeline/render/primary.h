@@ -10,6 +10,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
+#include "engine/base/stream.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
@@ -64,6 +65,11 @@ class PrimaryView {
                                                         float lift, LostPages* lost,
                                                         const Executor& executor,
                                                         Progress& progress);
+
+/// Makes a view of other surfels in the frame of a scene, such as clusters of its octree.
+[[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene,
+                                                        PointSource& surfels, const Camera& camera,
+                                                        unsigned side, const Executor& executor);
 
 /// Returns the camera of a request that names none: the one recorded in the container or, without a
 /// record, the first one of the mesh files or, without that, one that sees everything from the

@@ -16,7 +16,6 @@
 // picture does not depend on the number of threads.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -24,9 +23,13 @@
 #include <glm/mat3x3.hpp>
 
 #include "engine/io/cloud/record.h"
+#include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/render/splat_holes.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/shade/lift.h"
 #include "engine/shade/scene_scale.h"
+#include "engine/store/attribute_rows.h"
 #include "engine/store/point_scan.h"
 #include "format/scalar.h"
 
@@ -36,48 +39,76 @@ namespace {
 constexpr std::size_t kPagesAtOnce = 64;
 constexpr unsigned kBandRows = 16;  // rows of samples that one thread draws
 
-/// The part of a surfel that a sample keeps.
-struct Payload {
-  std::uint32_t radiance = 0;  // rgbe
-  std::array<std::int16_t, 2> normal{};
-  std::uint16_t radius = 0;  // ufloat16
-  std::array<std::uint8_t, 3> albedo{};
-};
-
 /// A disc in front of the camera, in the camera's axes: x to the right, y down, z forward. Lengths
 /// are in edges of the frame.
 struct Projected {
   glm::vec3 centre{0}, normal{0};
   float radius = 0;
   unsigned x0 = 0, x1 = 0, y0 = 0, y1 = 0;  // samples that it may cover, [x0, x1) x [y0, y1)
-  Payload payload;
+  SplatPayload payload;
 };
 
-/// A view by a depth buffer that the constructor fills.
+/// A view by a depth buffer.
 class SurfelView : public PrimaryView {
  public:
-  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift,
-             LostPages* lost, const Executor& executor, Progress& progress)
+  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift)
       : position_(camera.position),
         frame_(scene.header().frame),
         scale_(frame_),
         width_(camera.width * side),
         height_(camera.height * side),
         lift_(lift),
+        sky_included_(!sky_is_gathered(scene)),
         samples_(std::size_t{width_} * height_) {
     const CameraAxes axes = axes_of(camera);
     axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
     focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
+  }
+
+  /// Draws the points of all pages of the scene.
+  void draw(const ContainerReader& scene, LostPages* lost, const Executor& executor,
+            Progress& progress) {
     const PageNumbers::Range pages = scene.point_pages();
+    const std::vector<std::uint8_t> rise_group = group_of_rise(scene);
     for (std::size_t first = 0; first < pages.size(); first += kPagesAtOnce) {
-      draw(scene, pages.subrange(first, std::min(kPagesAtOnce, pages.size() - first)), lost,
-           executor, progress);
+      const auto some = pages.subrange(first, std::min(kPagesAtOnce, pages.size() - first));
+      std::vector<std::vector<Projected>> discs(some.size());
+      executor.for_each(some.size(), [&](std::size_t i, unsigned) {
+        PointScan scan(scene, some.subrange(i, 1), noted_in(lost));
+        scan.next();
+        progress.advance(scan.count());
+        if (!scan.whole()) return;
+        AttributeRows attributes(scene, rise_group);
+        const RisePlace rise(attributes.channels());
+        const std::byte* row = attributes.read(first + i, scan.count()).data();
+        const PointPage points = scan.points();
+        for (std::uint32_t k = 0; k < points.size(); ++k, row += attributes.row_bytes())
+          project(to_surfel(points[k], frame_), rise.radii(row), discs[i]);
+      });
+      draw(discs, executor);
     }
   }
 
+  /// Draws the surfels of a source.
+  void draw(PointSource& source, const Executor& executor) {
+    std::vector<Surfel> block(1 << 14);
+    while (const std::size_t count = source.next(block)) {
+      std::vector<std::vector<Projected>> discs(1);
+      for (std::size_t i = 0; i < count; ++i) project(block[i], 0, discs[0]);
+      draw(discs, executor);
+    }
+  }
+
+  /// Closes the holes between the discs. To be called once, when all are drawn.
+  void finish(const Executor& executor) {
+    close_holes(
+        {.samples = samples_, .width = width_, .height = height_, .focal = focal_, .scale = scale_},
+        executor);
+  }
+
   [[nodiscard]] std::optional<PrimaryHit> at(unsigned x, unsigned y) const override {
-    const Sample& s = samples_[std::size_t{y} * width_ + x];
-    if (s.depth == std::numeric_limits<float>::infinity()) return std::nullopt;
+    const SplatSample& s = samples_[std::size_t{y} * width_ + x];
+    if (s.empty()) return std::nullopt;
     const glm::vec3 along = axes_ * ray(x, y);
     const std::array<float, 3> n = decode_octahedral(s.payload.normal[0], s.payload.normal[1]);
     const std::array<float, 3> radiance = decode_rgbe(s.payload.radiance);
@@ -87,9 +118,10 @@ class SurfelView : public PrimaryView {
     const double depth = scale_.scene_units(static_cast<double>(s.depth));
     PrimaryHit hit{.position = position_ + glm::dvec3(along) * depth,
                    .normal = normal,
-                   .lift = lift_height(decode_ufloat16(s.payload.radius), lift_, frame_),
+                   .lift = lift_height(decode_ufloat16(s.payload.radius),
+                                       std::max(lift_, 0.125F * s.payload.rise), frame_),
                    .offset_normal = normal,
-                   .sky_included = true};
+                   .sky_included = sky_included_};
     for (int c = 0; c < 3; ++c) {
       hit.albedo[c] = static_cast<float>(s.payload.albedo[static_cast<std::size_t>(c)]) / 255;
     }
@@ -98,39 +130,20 @@ class SurfelView : public PrimaryView {
   }
 
  private:
-  struct Sample {
-    float depth = std::numeric_limits<float>::infinity();  // t of t (x, y, 1), edges of the frame
-    Payload payload;
-  };
-
   /// Returns the ray of a sample in the camera's axes, with z = 1.
   [[nodiscard]] glm::vec3 ray(unsigned x, unsigned y) const {
     return {(static_cast<float>(x) + 0.5F - 0.5F * static_cast<float>(width_)) / focal_,
             (static_cast<float>(y) + 0.5F - 0.5F * static_cast<float>(height_)) / focal_, 1};
   }
 
-  /// Draws the discs of some pages. The result depends on the order of the points alone.
-  void draw(const ContainerReader& scene, PageNumbers::Range pages, LostPages* lost,
-            const Executor& executor, Progress& progress) {
-    // Project the pages in parallel
-    std::vector<std::vector<Projected>> discs(pages.size());
-    executor.for_each(pages.size(), [&](std::size_t i, unsigned) {
-      PointScan scan(scene, pages.subrange(i, 1), noted_in(lost));
-      scan.next();
-      progress.advance(scan.count());
-      if (!scan.whole()) return;
-      const PointPage points = scan.points();
-      for (std::uint32_t k = 0; k < points.size(); ++k) {
-        project(to_surfel(points[k], scene.header().frame), discs[i]);
-      }
-    });
-
-    // Draw bands of rows in parallel
+  /// Draws discs, band by band of rows in parallel. The result depends on the order of the discs
+  /// alone.
+  void draw(const std::vector<std::vector<Projected>>& discs, const Executor& executor) {
     executor.for_each((height_ + kBandRows - 1) / kBandRows, [&](std::size_t band, unsigned) {
       const auto first = static_cast<unsigned>(band) * kBandRows;
       const unsigned last = std::min(height_, first + kBandRows);
-      for (const auto& page : discs) {
-        for (const Projected& disc : page) {
+      for (const auto& some : discs) {
+        for (const Projected& disc : some) {
           if (disc.y0 < last && disc.y1 > first)
             cover(disc, std::max(disc.y0, first), std::min(disc.y1, last));
         }
@@ -138,8 +151,17 @@ class SurfelView : public PrimaryView {
     });
   }
 
+  /// Returns the group of the channel of rises; nothing where there is none.
+  static std::vector<std::uint8_t> group_of_rise(const ContainerReader& scene) {
+    for (const Channel& channel : scene.meta().channels) {
+      if (channel.name == kRiseChannel) return {channel.group};
+    }
+    return {};
+  }
+
   /// Appends the disc of a surfel, if the picture may show it.
-  void project(const Surfel& surfel, std::vector<Projected>& discs) const {
+  /// @param rise  radii by which a receiver on it must rise
+  void project(const Surfel& surfel, float rise, std::vector<Projected>& discs) const {
     const glm::vec3 light = surfel.outgoing();
     Projected disc{
         .centre = scale_.way(position_, surfel.position) * axes_,  // v * M is transpose(M) * v
@@ -148,11 +170,14 @@ class SurfelView : public PrimaryView {
         .payload = {
             .radiance = encode_rgbe({light.r, light.g, light.b}),
             .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
-            .radius = encode_ufloat16(surfel.radius)}};
+            .radius = encode_ufloat16(surfel.radius),
+            .albedo = {},
+            .rise = static_cast<std::uint8_t>(8 * rise)}};
     if (!(disc.radius > 0) || disc.centre.z + disc.radius <= 0) return;
     span(disc, 0, width_, disc.x0, disc.x1);
     span(disc, 1, height_, disc.y0, disc.y1);
     if (disc.x0 >= disc.x1 || disc.y0 >= disc.y1) return;
+    disc.payload.back = glm::dot(disc.normal, disc.centre) > 0;
     for (int c = 0; c < 3; ++c) {
       disc.payload.albedo[static_cast<std::size_t>(c)] =
           static_cast<std::uint8_t>(std::lround(surfel.albedo[c] * 255));
@@ -199,7 +224,7 @@ class SurfelView : public PrimaryView {
         if (!(t > 0 && distance < square)) continue;
         // Let the nearest centre win where coplanar discs overlap, as in the gather
         const float bumped = t + 0.01F / disc.radius * distance;
-        Sample& sample = samples_[std::size_t{y} * width_ + x];
+        SplatSample& sample = samples_[std::size_t{y} * width_ + x];
         if (bumped < sample.depth) sample = {bumped, disc.payload};
       }
     }
@@ -211,8 +236,9 @@ class SurfelView : public PrimaryView {
   glm::mat3 axes_{1};  // columns: right, down, forward
   unsigned width_, height_;
   float lift_;
-  float focal_ = 1;  // in samples
-  std::vector<Sample> samples_;
+  bool sky_included_;  // in the radiance of the surfels
+  float focal_ = 1;    // in samples
+  std::vector<SplatSample> samples_;
 };
 
 }  // namespace
@@ -220,7 +246,19 @@ class SurfelView : public PrimaryView {
 std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
                                           unsigned side, float lift, LostPages* lost,
                                           const Executor& executor, Progress& progress) {
-  return std::make_unique<SurfelView>(scene, camera, side, lift, lost, executor, progress);
+  auto view = std::make_unique<SurfelView>(scene, camera, side, lift);
+  view->draw(scene, lost, executor, progress);
+  view->finish(executor);
+  return view;
+}
+
+std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, PointSource& surfels,
+                                          const Camera& camera, unsigned side,
+                                          const Executor& executor) {
+  auto view = std::make_unique<SurfelView>(scene, camera, side, 0.0F);
+  view->draw(surfels, executor);
+  view->finish(executor);
+  return view;
 }
 
 }  // namespace ptc

@@ -16,15 +16,20 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/io/text/text.h"
 #include "engine/pipeline/budgets.h"
+#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/convert/convert.h"
+#include "engine/pipeline/convert/point_files.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/pipeline/temporary_container.h"
 #include "engine/shade/lift.h"
+#include "engine/store/attribute_rows.h"
 #include "engine/store/point_scan.h"
 
 namespace ptc {
@@ -45,7 +50,10 @@ class PointCursor {
   ///                errors
   PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0,
               LostPages* lost = nullptr)
-      : container_(container), wanted_(wanted), scan_(container, noted_in(lost)) {
+      : container_(container),
+        wanted_(wanted),
+        scan_(container, noted_in(lost)),
+        rows_(container, kFirstInputGroup) {
     if (from == 0) return;
     // The products of two numbers of points take up to 128 bits; share_ is below `wanted`
     __extension__ typedef unsigned __int128 Wide;
@@ -59,20 +67,30 @@ class PointCursor {
   }
 
   /// Fills `out` from the front. @return the number of points, 0 at the end
-  std::size_t next(std::span<Surfel> out) {
+  /// @param rows  gets the rows of their channels, without those of an earlier shading; may be null
+  std::size_t next(std::span<Surfel> out, std::vector<std::byte>* rows = nullptr) {
     std::size_t filled = 0;
+    if (rows) rows->clear();
     while (filled < out.size()) {
       if (at_ == scan_.count()) {
         pass_unwanted_pages();
         if (!scan_.next()) break;
         at_ = 0;
       }
+      if (rows && scan_.whole() && page_of_rows_ != scan_.index()) {
+        page_of_rows_ = scan_.index();
+        page_rows_ = rows_.read(scan_.index(), scan_.count());
+      }
       const PointPage points = scan_.points();
       for (; at_ < points.size() && filled < out.size(); ++at_) {
         share_ += wanted_;
         if (share_ < all_points()) continue;
         share_ -= all_points();
-        if (scan_.whole()) out[filled++] = to_surfel(points[at_], container_.header().frame);
+        if (!scan_.whole()) continue;
+        out[filled++] = to_surfel(points[at_], container_.header().frame);
+        if (!rows) continue;
+        const auto row = page_rows_.subspan(at_ * rows_.row_bytes(), rows_.row_bytes());
+        rows->insert(rows->end(), row.begin(), row.end());
       }
     }
     return filled;
@@ -96,6 +114,9 @@ class PointCursor {
   std::uint64_t share_ = 0;  // wanted_ for each point passed, less all_points() for each selected
   PointScan scan_;
   std::uint32_t at_ = 0;  // next point of the page
+  AttributeRows rows_;
+  std::span<const std::byte> page_rows_;        // of the page that follows
+  std::size_t page_of_rows_ = ~std::size_t{0};  // its index among the point pages
 };
 
 /// Returns the text by which a shaded container records its settings.
@@ -104,6 +125,11 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
       fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
                   g.solid_angle, g.parallax, g.inflation, g.resolution,
                   g.sides == Sides::both ? "both" : "front", request.lift);
+  const Surroundings& around = g.around;
+  if (around.sphere) text += " sphere";
+  if (around.cone < Surroundings{}.cone) text += fmt::format(" cone {}", around.cone);
+  if (around.distance < Surroundings{}.distance)
+    text += fmt::format(" distance {} falloff {}", around.distance, around.falloff);
   if (request.bounces != 1) text += fmt::format(" bounces {}", request.bounces);
   if (request.estimate) text += " estimates";
   return text;
@@ -156,11 +182,12 @@ struct OpenReceivers {
 };
 
 void check_target(const ShadeRequest& request, const std::filesystem::path& target) {
-  const std::string ending = lower_extension(target);
-  if (ending == ".ply") return;
-  if (ending != ".ptcx") {
-    throw RequestError(
-        "target", "the name of the output must end in .ptcx or .ply, but is " + target.string());
+  if (output_format(target)) return;
+  if (lower_extension(target) != ".ptcx") {
+    throw RequestError("target",
+                       "the name of the output must end in .ptcx or in that of a format of points, "
+                       "such as .las or .ply, but is " +
+                           target.string());
   }
   if (request.tolerate_damage && request.receivers.empty()) {
     throw RequestError("tolerate_damage",
@@ -170,25 +197,55 @@ void check_target(const ShadeRequest& request, const std::filesystem::path& targ
 }
 
 void check_count(const OpenReceivers& receivers, const std::filesystem::path& target) {
-  if (receivers.wanted == receivers.all() || lower_extension(target) == ".ply") return;
+  if (receivers.wanted == receivers.all() || output_format(target)) return;
   throw RequestError("count",
                      "`count` needs a .ply as output: a container holds all points of the "
                      "receivers. Name a .ply, or shade all points");
 }
 
+/// Puts receivers above the points of a container: at the lift of the run, and clear of the noise
+/// of scanned surfaces.
+class Lifting {
+ public:
+  Lifting(const ContainerReader& container, float lift)
+      : frame_(container.header().frame), lift_(lift), rise_(input_channels(container)) {}
+
+  /// @param rows  of the channels of the surfels, which PointCursor::next() gives
+  void place(std::span<const Surfel> surfels, std::span<const std::byte> rows,
+             std::span<Receiver> receivers) const {
+    const std::size_t row_bytes = surfels.empty() ? 0 : rows.size() / surfels.size();
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      const float rise = rise_.radii(rows.empty() ? nullptr : rows.data() + i * row_bytes);
+      receivers[i] = lifted(surfels[i], std::max(lift_, rise), frame_);
+    }
+  }
+
+ private:
+  /// Returns the channels of a row of PointCursor.
+  static std::vector<Channel> input_channels(const ContainerReader& container) {
+    std::vector<Channel> channels = container.meta().channels;
+    std::erase_if(channels, [](const Channel& c) { return c.group < kFirstInputGroup; });
+    return channels;
+  }
+
+  Frame frame_;
+  float lift_;
+  RisePlace rise_;
+};
+
 /// Returns runs of receivers that stand for all receivers, each from the middle of its stride.
 std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
   const PilotPlan plan = plan_pilots(receivers.points);
+  const Lifting lifting(receivers.container, lift);
   std::vector<Pilot> pilots(plan.count);
   std::vector<Surfel> surfels(plan.receivers);
+  std::vector<std::byte> rows;
   for (std::size_t i = 0; i < pilots.size(); ++i) {
     PointCursor cursor(receivers.container, receivers.points,
                        i * plan.stride + (plan.stride - plan.receivers) / 2);
-    const std::size_t count = cursor.next(surfels);
+    const std::size_t count = cursor.next(surfels, &rows);
     pilots[i].receivers.resize(count);
-    std::ranges::transform(
-        std::span(surfels).first(count), pilots[i].receivers.begin(),
-        [&](const Surfel& s) { return lifted(s, lift, receivers.container.header().frame); });
+    lifting.place(std::span(surfels).first(count), rows, pilots[i].receivers);
   }
   return pilots;
 }
@@ -196,20 +253,20 @@ std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
 /// Shades all receivers, batch by batch.
 void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, ShadedSink& sink) {
   PointCursor cursor = receivers.cursor();
-  const Frame& frame = receivers.container.header().frame;
+  const Lifting lifting(receivers.container, lift);
   std::vector<Surfel> surfels(kBatch);
   std::vector<Receiver> batch(kBatch);
-  while (const std::size_t count = cursor.next(surfels)) {
-    for (std::size_t i = 0; i < count; ++i) batch[i] = lifted(surfels[i], lift, frame);
+  std::vector<std::byte> rows;
+  while (const std::size_t count = cursor.next(surfels, &rows)) {
+    lifting.place(std::span(surfels).first(count), rows, batch);
     const LitReceivers lit = lighting.shade(std::span(batch).first(count));
-    sink.write(std::span(surfels).first(count), lit.shading, lit.estimates);
+    sink.write(std::span(surfels).first(count), rows, lit.shading, lit.estimates);
   }
 }
 
-}  // namespace
-
-LightingReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
-                               Progress& progress) {
+/// Shades the points of a container.
+LightingReport shade_points(const ShadeRequest& request, const std::filesystem::path& target,
+                            Progress& progress) {
   // Open the scene and the receivers
   LightingReport report;
   check_target(request, target);
@@ -228,9 +285,11 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   lighting.tune([&] { return pilots_of(receivers, request.lift); });
 
   // Shade all receivers into the target
-  const std::unique_ptr<ShadedSink> sink =
-      make_shaded_sink(target, receivers.container, receivers.points,
-                       settings_text(request, lighting.gather()), request.estimate);
+  const std::unique_ptr<ShadedSink> sink = make_shaded_sink(
+      target, receivers.container,
+      shaded_points(receivers.container, receivers.points,
+                    settings_text(request, lighting.gather()), request.colour_from),
+      request.estimate);
   {
     const Stage stage(report.seconds, progress, "shade", receivers.points, "points");
     shade_all(receivers, request.lift, lighting, *sink);
@@ -240,6 +299,43 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
 
   // Compare a sample of the receivers with rays
   lighting.check({.sky = sky, .paths = {.bounces = request.bounces}});
+  return report;
+}
+
+/// Shades into a temporary copy of the container, and writes its points in the order of the input.
+LightingReport shade_in_input_order(const ShadeRequest& request,
+                                    const std::filesystem::path& target, Progress& progress) {
+  LightingReport report;
+  const std::unique_ptr<ContainerReader> shaded = make_temporary_container(
+      roomiest_temp_dir(request.run, target),
+      [&](const std::filesystem::path& path) { report = shade_points(request, path, progress); });
+  const ConvertReport written = container_to_points(
+      *shaded, target,
+      {.original_order = true, .colour_from = request.colour_from, .run = request.run}, progress);
+  report.seconds.insert(report.seconds.end(), written.seconds.begin(), written.seconds.end());
+  return report;
+}
+
+}  // namespace
+
+LightingReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
+                               Progress& progress) {
+  if (is_container(request.scene)) {
+    return request.original_order ? shade_in_input_order(request, target, progress)
+                                  : shade_points(request, target, progress);
+  }
+  // Build a temporary container of a cloud or a mesh; points go out in the order in which they came
+  const bool in_order = output_format(target).has_value() && request.receivers.empty() &&
+                        request.count == 0 && is_point_file(request.scene);
+  ShadeRequest shading = request;
+  shading.scene = temporary_container_path(roomiest_temp_dir(request.run, target));
+  const TemporaryName scene(shading.scene);
+  const BuildReport built =
+      build_container({.inputs = {request.scene}, .original_order = in_order, .run = request.run},
+                      shading.scene, progress);
+  LightingReport report = in_order ? shade_in_input_order(shading, target, progress)
+                                   : shade_points(shading, target, progress);
+  report.seconds.insert(report.seconds.begin(), built.seconds.begin(), built.seconds.end());
   return report;
 }
 

@@ -2,7 +2,7 @@
 //
 //   scene.ptcx --------- surfels that occlude and emit ---.
 //                                                         +--> shade_container() --> target
-//   scene, other.ptcx or cloud --- receivers -------------'                          .ptcx or .ply
+//   scene, other.ptcx or cloud --- receivers -------------'              .ptcx, .las, .ply ...
 //
 //   ptc::ShadeRequest request;
 //   request.scene = "dragon.ptcx";
@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "engine/base/progress.h"
 #include "engine/pipeline/light/lighting.h"
@@ -29,6 +30,12 @@ struct ShadeRequest : LightingRequest {
   /// Number of points to shade, evenly spread over all in their order; 0: all points. Fewer than
   /// all need a .ply as target.
   std::uint64_t count = 0;
+  /// Writes a file of points in the order of the input, which the scene must know. A scene that is
+  /// a cloud is always written in its order.
+  bool original_order = false;
+  /// The channel that viewers shall show as colour in a file of points; empty: the albedo
+  /// (PointWriteInfo::colour_from).
+  std::string colour_from;
   /// Sky that lights the receivers; empty: the sky that the scene was built with.
   std::optional<Sky> sky;
 };
@@ -45,8 +52,11 @@ struct ShadeRequest : LightingRequest {
 ///   irradiance_error   1   estimated error, W / m^2, only with LightingRequest::estimate
 ///
 /// A .ptcx is a copy of the receivers' container with these channels, stored as halves; channels of
-/// an earlier shading are replaced. A .ply has one row for each point, with its surfel and these
-/// channels as columns. With `tolerate_damage` the scene's own points can only go to a .ply.
+/// an earlier shading are replaced. A file of points, such as a .las or .ply, has the points with
+/// all their channels and these. With `tolerate_damage` the scene's own points can only go to a
+/// file of points.
+///
+/// A scene that is a cloud or a mesh is built first, into a temporary container.
 /// @param progress  gets the stages, and notes about the scene's record
 /// @return          what the run did, cost and, if asked for, how exact it was
 /// @throws RequestError when the request contradicts itself or a setting is out of range;

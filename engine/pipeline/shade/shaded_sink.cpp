@@ -17,8 +17,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/points.h"
-#include "engine/io/text/text.h"
+#include "engine/io/cloud/point_writer.h"
+#include "engine/pipeline/convert/point_files.h"
 #include "engine/store/commit.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
@@ -29,35 +29,26 @@ namespace {
 
 constexpr std::uint8_t kGroup = 1;  // group of the channels that shading adds
 
-/// The channels that shading adds to a point.
-struct ShadedChannels {
-  static constexpr std::size_t kPlain = 1 + 3 + 3 + 3 + 3;
-  static constexpr std::size_t kFloats = kPlain + 2;  // with both estimates
+constexpr std::size_t kPlainFloats = 1 + 3 + 3 + 3 + 3;  // values of a point without estimates
+constexpr std::size_t kFloats = kPlainFloats + 2;        // and with both of them
 
-  static std::vector<Channel> channels(bool estimates) {
-    std::vector<Channel> channels{
-        number("occlusion", "1"),
-        {.name = "bent_normal", .components = 3, .role = ChannelRole::direction, .unit = "1"},
-        colour("irradiance", "W/m^2"),
-        colour("sky", "W/m^2"),
-        colour("indirect", "W/(m^2 sr)")};
-    if (!estimates) return channels;
-    channels.push_back(number("occlusion_error", "1"));
-    channels.push_back(number("irradiance_error", "W/m^2"));
-    return channels;
-  }
-  static Channel number(const char* name, const char* unit) { return {.name = name, .unit = unit}; }
-  static Channel colour(const char* name, const char* unit) {
-    return {.name = name,
-            .components = 3,
-            .role = ChannelRole::colour,
-            .colour_space = ColourSpace::rec709,
-            .unit = unit};
-  }
-  static std::size_t count(bool estimates) { return estimates ? kFloats : kPlain; }
-};
+std::size_t floats_of(bool estimates) noexcept {
+  return estimates ? kFloats : kPlainFloats;
+}
 
-using ShadedValues = std::array<float, ShadedChannels::kFloats>;
+Channel number(const char* name, const char* unit) {
+  return {.name = name, .unit = unit};
+}
+
+Channel colour(const char* name, const char* unit) {
+  return {.name = name,
+          .components = 3,
+          .role = ChannelRole::colour,
+          .colour_space = ColourSpace::rec709,
+          .unit = unit};
+}
+
+using ShadedValues = std::array<float, kFloats>;
 
 /// Returns the values of a shaded surfel in the order of the channels. The radiance that leaves is
 /// albedo / pi times the irradiance.
@@ -85,34 +76,46 @@ ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEst
 Meta shaded_meta(const ContainerReader& from, const std::string& settings, bool estimates) {
   Meta meta = from.meta();
   std::erase_if(meta.channels, [](const Channel& c) { return c.group == kGroup; });
-  const std::vector<Channel> added = ShadedChannels::channels(estimates);
+  const std::vector<Channel> added = shading_channels(estimates);
   meta.channels.insert(meta.channels.begin(), added.begin(), added.end());
   meta.text["shading"] = settings;
   return meta;
 }
 
-/// A cloud with the channels as columns.
-class PlySink : public ShadedSink {
+/// A file of points with the receivers' own channels, and those of shading as floats.
+class PointSink : public ShadedSink {
  public:
-  PlySink(const std::filesystem::path& target, std::uint64_t count, bool emits, bool estimates)
-      : floats_(ShadedChannels::count(estimates)),
-        writer_(target, count, emits, ply_columns(ShadedChannels::channels(estimates))) {}
-  void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
-             std::span<const ErrorEstimate> estimates) override {
-    std::vector<float> values;
-    values.reserve(surfels.size() * floats_);
+  PointSink(const std::filesystem::path& target, OutputFormat format, PointWriteInfo info,
+            bool estimates)
+      : floats_(floats_of(estimates)) {
+    for (Channel channel : shading_channels(estimates)) {
+      channel.type = ChannelType::f32;
+      info.channels.push_back(std::move(channel));
+    }
+    writer_ = create_points(target, format, info);
+  }
+
+  void write(std::span<const Surfel> surfels, std::span<const std::byte> rows,
+             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates) override {
+    const std::size_t row_bytes = rows.size() / surfels.size();
+    const std::size_t added = floats_ * sizeof(float);
+    joined_.resize(surfels.size() * (row_bytes + added));
+    std::byte* to = joined_.data();
     for (std::size_t i = 0; i < surfels.size(); ++i) {
       const ShadedValues v = values_of(shading[i], surfels[i].albedo,
                                        estimates.empty() ? ErrorEstimate{} : estimates[i]);
-      values.insert(values.end(), v.begin(), v.begin() + static_cast<std::ptrdiff_t>(floats_));
+      to = std::copy_n(rows.data() + i * row_bytes, row_bytes, to);
+      std::memcpy(to, v.data(), added);
+      to += added;
     }
-    writer_.write(surfels, values);
+    writer_->write(surfels, joined_);
   }
-  void finish() override { writer_.finish(); }
+  void finish() override { writer_->finish(); }
 
  private:
-  std::size_t floats_;  // values of one point
-  PlyWriter writer_;
+  std::size_t floats_;  // values that shading adds to a point
+  std::unique_ptr<PointWriter> writer_;
+  std::vector<std::byte> joined_;  // rows of a block
 };
 
 /// A copy of the receivers' container with one attribute page more for each point page. Channels of
@@ -122,7 +125,7 @@ class ContainerSink : public ShadedSink {
   ContainerSink(const std::filesystem::path& target, const ContainerReader& from,
                 const std::string& settings, bool estimates)
       : from_(from),
-        floats_(ShadedChannels::count(estimates)),
+        floats_(floats_of(estimates)),
         meta_(shaded_meta(from, settings, estimates)),
         writer_(target, {.page_shift = from.header().page_shift,
                          .uuid = uuid_for(from, settings),
@@ -133,8 +136,8 @@ class ContainerSink : public ShadedSink {
     copy_pages();
   }
 
-  void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
-             std::span<const ErrorEstimate> estimates) override {
+  void write(std::span<const Surfel> surfels, std::span<const std::byte> /*rows*/,
+             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates) override {
     for (std::size_t i = 0; i < surfels.size(); ++i) {
       values_.push_back(values_of(shading[i], surfels[i].albedo,
                                   estimates.empty() ? ErrorEstimate{} : estimates[i]));
@@ -206,9 +209,31 @@ class ContainerSink : public ShadedSink {
 
 }  // namespace
 
+std::vector<Channel> shading_channels(bool estimates) {
+  std::vector<Channel> channels{
+      number("occlusion", "1"),
+      {.name = "bent_normal", .components = 3, .role = ChannelRole::direction, .unit = "1"},
+      colour("irradiance", "W/m^2"),
+      colour("sky", "W/m^2"),
+      colour("indirect", "W/(m^2 sr)")};
+  if (!estimates) return channels;
+  channels.push_back(number("occlusion_error", "1"));
+  channels.push_back(number("irradiance_error", "W/m^2"));
+  return channels;
+}
+
+PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t points,
+                             const std::string& settings, const std::string& colour_from) {
+  PointWriteInfo info = describe_points(receivers, {.colour_from = colour_from});
+  info.count = points;
+  std::erase_if(info.channels, [](const Channel& c) { return c.group == kGroup; });
+  info.text["shading"] = settings;
+  return info;
+}
+
 std::uint64_t sink_bytes(const std::filesystem::path& target,
                          const ContainerReader& receivers) noexcept {
-  if (lower_extension(target) == ".ply") return 0;
+  if (output_format(target)) return 0;
   // There is at most one attribute page for each page
   return ContainerWriter::memory_bytes(2 * std::uint64_t{receivers.page_count()},
                                        receivers.header().page_shift, 1);
@@ -216,7 +241,7 @@ std::uint64_t sink_bytes(const std::filesystem::path& target,
 
 void check_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
                        bool estimates) {
-  if (lower_extension(target) == ".ply") return;
+  if (output_format(target)) return;
   at_offset(receivers.file(), 0, [&] { check_copyable(receivers.header()); });
   const std::string file = receivers.path().string();
   if (!receivers.parts().empty()) {
@@ -224,7 +249,7 @@ void check_shaded_sink(const std::filesystem::path& target, const ContainerReade
                     ": a scene of parts cannot be written with its shading: make it one file first "
                     "with ptcconvert, or name a .ply as output");
   }
-  for (const Channel& added : ShadedChannels::channels(estimates)) {
+  for (const Channel& added : shading_channels(estimates)) {
     const auto clashes = [&](const Channel& c) {
       return c.group != kGroup && c.name == added.name;
     };
@@ -246,12 +271,11 @@ void check_shaded_sink(const std::filesystem::path& target, const ContainerReade
 }
 
 std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
-                                             const ContainerReader& receivers, std::uint64_t points,
-                                             const std::string& settings, bool estimates) {
-  if (lower_extension(target) == ".ply")
-    return std::make_unique<PlySink>(target, points, receivers.header().point_bytes != kPointBytes,
-                                     estimates);
-  return std::make_unique<ContainerSink>(target, receivers, settings, estimates);
+                                             const ContainerReader& receivers,
+                                             const PointWriteInfo& info, bool estimates) {
+  if (const auto format = output_format(target))
+    return std::make_unique<PointSink>(target, *format, info, estimates);
+  return std::make_unique<ContainerSink>(target, receivers, info.text.at("shading"), estimates);
 }
 
 }  // namespace ptc

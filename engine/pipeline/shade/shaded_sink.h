@@ -7,8 +7,10 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "engine/base/surfel.h"
+#include "engine/io/cloud/point_writer.h"
 #include "engine/pipeline/quality/estimate.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
@@ -24,41 +26,52 @@ class ShadedSink {
  public:
   virtual ~ShadedSink() = default;
   /// Appends a block of points.
+  /// @param rows       of the receivers' own channels, one row for each surfel; used by files of
+  ///                   points
   /// @param shading    one result for each surfel
   /// @param estimates  one for each surfel; empty when the sink was made without estimates
   /// @throws std::system_error
-  virtual void write(std::span<const Surfel> surfels, std::span<const Shading> shading,
+  virtual void write(std::span<const Surfel> surfels, std::span<const std::byte> rows,
+                     std::span<const Shading> shading,
                      std::span<const ErrorEstimate> estimates) = 0;
   /// Completes and publishes the file. @throws std::system_error
   virtual void finish() = 0;
 };
 
+/// Returns the channels that shading adds to a point, all of group 1 and of type half.
+[[nodiscard]] std::vector<Channel> shading_channels(bool estimates);
+
+/// Describes shaded points for make_shaded_sink(): those of the receivers, their channels without
+/// those of an earlier shading, and the settings of the shading as a text.
+/// @param points       number of points that will be written
+/// @param settings     at most kMaxSettingsBytes
+/// @param colour_from  as PointWriteInfo::colour_from
+[[nodiscard]] PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t points,
+                                           const std::string& settings,
+                                           const std::string& colour_from);
+
 /// Checks that the points of a container can be shaded into a target: a copy of the container has
-/// room for the names and the record of the shading. A .ply takes all points. It is called before
-/// work begins.
+/// room for the names and the record of the shading. It is called before work begins.
 /// @param estimates  points come with estimated errors
 /// @throws DataError when a channel of the receivers has the name of one that shading adds, or the
 ///         record does not fit a page of the receivers
 void check_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
                        bool estimates);
 
-/// Makes a sink for a .ply or a .ptcx, by the ending of the target.
+/// Makes a sink for a file of points or a .ptcx, by the ending of the target.
 /// @param receivers  container of the points that are shaded; a .ptcx copies its pages, so it must
 ///                   outlive the sink
-/// @param points     number of points that will be written
-/// @param settings   the settings of the shading, for the record of a .ptcx; at most
-///                   kMaxSettingsBytes
+/// @param info       from shaded_points()
 /// @param estimates  points come with estimated errors
 /// @pre check_shaded_sink()
-/// @throws std::system_error
+/// @throws RequestError when the format cannot hold the points; std::system_error
 [[nodiscard]] std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
                                                            const ContainerReader& receivers,
-                                                           std::uint64_t points,
-                                                           const std::string& settings,
+                                                           const PointWriteInfo& info,
                                                            bool estimates);
 
 /// Returns the bytes of memory that a sink needs for the pages and the directory of a .ptcx; 0 for
-/// a .ply.
+/// a file of points.
 [[nodiscard]] std::uint64_t sink_bytes(const std::filesystem::path& target,
                                        const ContainerReader& receivers) noexcept;
 

@@ -70,4 +70,10 @@ LightRig default_rig() {
   return rig;
 }
 
+LightRig cloud_rig(const glm::vec3& up) {
+  LightRig rig;
+  rig.sky = {.radiance = glm::vec3(1), .up = up};
+  return rig;
+}
+
 }  // namespace ptc

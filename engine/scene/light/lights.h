@@ -84,6 +84,11 @@ void check_lights(const LightRig& rig);
 /// Returns the lights for a scene that brings none of its own: a sun and a bluish sky.
 [[nodiscard]] LightRig default_rig();
 
+/// Returns the lights of a cloud that gives no light of its own: a white sky, under which a surface
+/// that nothing covers has the colour of its albedo.
+/// @param up  unit; the direction that points upwards in the cloud
+[[nodiscard]] LightRig cloud_rig(const glm::vec3& up);
+
 /// Returns the JSON text of a rig for the record in a container. The map of the sky is named by its
 /// path:
 /// {"suns": [{"to_sun": [x, y, z], "irradiance": [r, g, b], "angular_radius": a}, ...],

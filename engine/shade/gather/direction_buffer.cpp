@@ -146,7 +146,8 @@ void DirectionBuffer::draw(const DirectionGrid& grid, const DiscQueue& discs, Si
 }
 
 Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& normal,
-                                 std::span<const glm::vec3> offsets) const noexcept {
+                                 std::span<const glm::vec3> offsets,
+                                 const PixelWeights* weights) const noexcept {
   // Turn the normal and the offsets into the axes of the cube, and sum over its pixels.
   const glm::mat3& rotation = grid.geometry_.rotation;
   ViewOffsets turned{};
@@ -157,7 +158,7 @@ Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& nor
   PixelSums sums;
   sum_pixels(grid.geometry_, {nearness_.data(), rgbe_.data()},
              grid.sky_.empty() ? nullptr : grid.sky_.data(), rotation * normal,
-             offsets.empty() ? nullptr : &turned, sums);
+             offsets.empty() ? nullptr : &turned, weights, sums);
   // Divide by the sum of all weights instead of pi, so that an empty cube gives exactly 0.
   Shading shading;
   shading.occlusion = sums.covered / sums.total;

@@ -96,8 +96,10 @@ class DirectionBuffer {
   /// @param normal   unit, in the world's axes
   /// @param offsets  where the receiver lies relative to each viewpoint, in the unit of the discs;
   ///                 viewpoints beyond the last offset are the receiver itself
+  /// @param weights  null: a hemisphere by its cosine
   [[nodiscard]] Shading resolve(const DirectionGrid& grid, const glm::vec3& normal,
-                                std::span<const glm::vec3> offsets = {}) const noexcept;
+                                std::span<const glm::vec3> offsets = {},
+                                const PixelWeights* weights = nullptr) const noexcept;
 
  private:
   std::vector<float> nearness_;      ///< CubePixels::nearness

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <limits>
 
 #include <glm/common.hpp>
@@ -43,6 +44,13 @@ Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& opt
       empty_(options.resolution, options.bleeding),
       leaf_(options.resolution, options.bleeding) {
   empty_.clear();
+  const Surroundings& around = options.around;
+  if (around.is_plain()) return;
+  weights_.emplace(PixelWeights{.sphere = around.sphere,
+                                .cone_cos = std::max(0.0F, std::cos(around.cone)),
+                                .falloff = around.falloff});
+  const double distance = view.scale().length(static_cast<double>(around.distance));
+  if (std::isfinite(distance)) weights_->per_distance = static_cast<float>(1 / distance);
 }
 
 void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> results,
@@ -79,7 +87,8 @@ void Gather::place(std::span<const Receiver> from) {
 // nodes in it may change at most.
 void Gather::shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited,
                         std::size_t depth, float bound) {
-  const ReceiverCell bounds(cell);
+  ReceiverCell bounds(cell);
+  if (options_.around.sphere) bounds.has_horizon = false;
   if (cell.size() == 1) {
     const DirectionBuffer& drawn = collect(bounds, inherited, leaf_, nullptr, depth, bound);
     resolve(cell, drawn, depth, bound);
@@ -117,8 +126,8 @@ void Gather::resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer
     for (std::size_t i = 0; i < depth; ++i) {
       offsets[i] = glm::vec3((receiver.position - levels_[i]->centre) * SceneScale::kLatticeUnit);
     }
-    results_[receiver.index] =
-        drawn.resolve(*grid_, receiver.normal, std::span(offsets).first(depth));
+    results_[receiver.index] = drawn.resolve(
+        *grid_, receiver.normal, std::span(offsets).first(depth), weights_ ? &*weights_ : nullptr);
   }
   counts_.receivers += cell.size();
   if (bound > 0) counts_.damage.add(cell.size(), std::min(1.0F, bound));

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -72,6 +73,7 @@ class Gather {
 
   SceneReader scene_;
   GatherOptions options_;
+  std::optional<PixelWeights> weights_;  ///< of GatherOptions::around, unless that is plain
   const DirectionGrid* grid_ = nullptr;  ///< of the current call
   GatherCounts counts_;
   std::vector<PlacedReceiver> receivers_;       ///< of the current call, along the Z-curve

@@ -102,11 +102,21 @@ struct FaceRows {
 void draw_discs(const CubeGeometry& cube, const CubePixels& pixels, const FaceRows& rows,
                 const DiscQueue& discs, Sides sides, unsigned viewpoint);
 
+/// Weights of pixels other than those of a hemisphere by its cosine (Surroundings).
+struct PixelWeights {
+  bool sphere = false;     ///< every pixel has its solid angle as its weight
+  float cone_cos = 0;      ///< pixels whose cosine to the normal is less do not count
+  float per_distance = 0;  ///< 1 over the distance from which on nothing covers; 0: no limit; in
+                           ///< the unit of the discs
+  unsigned falloff = 0;    ///< a thing at the distance d covers (1 - d per_distance)^falloff
+};
+
 /// Sums over the pixels above the horizon. The weight of a pixel is its solid angle times the
-/// cosine to the normal, sr.
+/// cosine to the normal, sr, or what PixelWeights say.
 struct PixelSums {
-  float total = 0;     ///< sum of the weights of all pixels, about pi
-  float covered = 0;   ///< sum of the weights of covered pixels
+  float total = 0;  ///< sum of the weights of all pixels, about pi
+  float covered =
+      0;  ///< sum of the weights of covered pixels, each times its share that is covered
   glm::vec3 light{0};  ///< sum of weight times radiance over covered pixels
   glm::vec3 sky{0};    ///< sum of weight times radiance of the sky over uncovered pixels
   glm::vec3 open{0};   ///< sum of weight times unit direction, in the axes of the cube, over
@@ -119,8 +129,10 @@ struct PixelSums {
 /// @param offsets  moves what was drawn from other viewpoints, to first order: where the nearer of
 ///                 two neighbouring pixels grows over the other, its light grows with it. Null
 ///                 moves nothing.
+/// @param weights  null: a hemisphere by its cosine. The light of surfaces counts at any distance
 /// Source: spec/shading.md#parallax
 void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
-                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums);
+                const glm::vec3& normal, const ViewOffsets* offsets, const PixelWeights* weights,
+                PixelSums& sums);
 
 }  // namespace ptc

@@ -76,19 +76,50 @@ struct LaneSums {
 struct FaceView {
   const CubeGeometry& cube;
   const float* nearness;
-  const std::uint32_t* rgbe;  ///< null without colours
-  const float* sky;           ///< 3 planes, or null
-  float nw, nu, nv;           ///< the receiver's normal, unit
+  const std::uint32_t* rgbe;    ///< null without colours
+  const float* sky;             ///< 3 planes, or null
+  float nw, nu, nv;             ///< the receiver's normal, unit
+  const PixelWeights* weights;  ///< null: a hemisphere by its cosine
   alignas(64) float offset_w[kViewpoints], offset_u[kViewpoints], offset_v[kViewpoints];
 
   /// Returns n . (1, 0, v), the part of n . (1, u, v) that a row of pixels shares.
   [[nodiscard]] float cosine(float v) const { return nw + nv * v; }
   /// Reports whether any direction of a row may lie above the horizon.
-  [[nodiscard]] bool sees(int y) const { return cosine(cube.centre[y]) + std::abs(nu) > 0; }
+  [[nodiscard]] bool sees(int y) const {
+    return (weights && weights->sphere) || cosine(cube.centre[y]) + std::abs(nu) > 0;
+  }
   /// Returns n . (1, u, v), 0 below the horizon. @param row  cosine(v)
   HWY_INLINE VW cosine(VW u, float row) const {
     const W f;
     return hn::Max(hn::Zero(f), hn::MulAdd(hn::Set(f, nu), u, hn::Set(f, row)));
+  }
+
+  /// Returns cosine(), or what PixelWeights put in its place.
+  /// @param inverse_length  1 / |(1, u, v)|
+  template <bool kShaped>
+  HWY_INLINE VW weigh(VW u, float row, VW inverse_length) const {
+    const W f;
+    if constexpr (kShaped) {
+      if (weights->sphere) return hn::Div(hn::Set(f, 1.0F), inverse_length);
+      const auto along = cosine(u, row);
+      const auto least = hn::Set(f, weights->cone_cos);
+      return hn::IfThenElseZero(hn::Ge(hn::Mul(along, inverse_length), least), along);
+    } else {
+      return cosine(u, row);
+    }
+  }
+
+  /// Returns the share of a pixel that what covers it covers; 0 where nothing does.
+  HWY_INLINE VW share_of(VW near, VW inverse_length) const {
+    const W f;
+    const auto one = hn::Set(f, 1.0F);
+    const auto limit = hn::Set(f, weights->per_distance);
+    // 1 - d / distance, where d = |(1, u, v)| / nearness
+    const auto left =
+        hn::Max(hn::Zero(f), hn::Sub(one, hn::Div(limit, hn::Mul(near, inverse_length))));
+    auto share = hn::IfThenElseZero(hn::Gt(left, hn::Zero(f)), one);
+    for (unsigned i = 0; i < weights->falloff; ++i) share = hn::Mul(share, left);
+    return hn::IfThenZeroElse(hn::Eq(near, hn::Zero(f)), share);
   }
 
   /// Returns how far the border between two pixels moves towards the second, in pixels: as the
@@ -110,9 +141,9 @@ struct FaceView {
 
 /// Adds up the light of a group of pixels: the colour of what covers them, and the sky elsewhere.
 /// @param at       index of the first pixel in its face
-/// @param weight   weight of each pixel
 /// @param covered  weight of each covered pixel, else 0
-HWY_INLINE void add_light(const FaceView& face, std::size_t at, VW weight, VW covered,
+/// @param open     weight of each pixel less the share of it that is covered
+HWY_INLINE void add_light(const FaceView& face, std::size_t at, VW covered, VW open,
                           LaneSums& sums) {
   const W f;
   const auto resolution = static_cast<std::size_t>(face.cube.resolution);
@@ -123,16 +154,17 @@ HWY_INLINE void add_light(const FaceView& face, std::size_t at, VW weight, VW co
   }
   for (std::size_t k = 0; face.sky && k < 3; ++k) {
     const auto sky = hn::LoadU(f, face.sky + k * resolution * resolution + at);
-    sums.sky[k] = hn::MulAdd(hn::Sub(weight, covered), sky, sums.sky[k]);
+    sums.sky[k] = hn::MulAdd(open, sky, sums.sky[k]);
   }
 }
 
 /// Adds up a row of pixels.
-/// @tparam kMoves  whether borders move
+/// @tparam kMoves   whether borders move
+/// @tparam kShaped  whether there are PixelWeights
 /// @param last     whether no further row is above the horizon
 /// @param down     weights that pass to this row from the row before; is overwritten with those
 ///                 that pass to the next row
-template <bool kMoves>
+template <bool kMoves, bool kShaped>
 HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTRICT down,
                         LaneSums& sums) {
   const W f;
@@ -151,22 +183,25 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
     const auto at = static_cast<std::size_t>(y * cube.resolution + x);
     const float* here = face.nearness + at;
     const auto near = hn::LoadU(f, here), pu = hn::LoadU(f, cube.centre + x);
-    const auto own = hn::Mul(face.cosine(pu, row), hn::LoadU(f, cube.weight + at));
+    const auto inverse_length = hn::LoadU(f, cube.inverse_length + at);
+    const auto own =
+        hn::Mul(face.weigh<kShaped>(pu, row, inverse_length), hn::LoadU(f, cube.weight + at));
     auto weight = own;
     // Move the borders to the right and to the next row.
     if constexpr (kMoves) {
       const auto u = hn::Add(pu, hn::Set(f, half_step));
-      const auto right = hn::Mul(face.shift_of(near, hn::LoadU(f, here + 1), u, face.offset_u),
-                                 hn::Mul(face.cosine(u, row), hn::LoadU(f, cube.edge_u + at)));
+      const auto right = hn::Mul(
+          face.shift_of(near, hn::LoadU(f, here + 1), u, face.offset_u),
+          hn::Mul(face.weigh<kShaped>(u, row, inverse_length), hn::LoadU(f, cube.edge_u + at)));
       const auto turned = hn::TableLookupLanes(right, one_up);
       const auto from_left = hn::IfThenElse(first_lane, carried, turned);
       carried = turned;
       auto below = zero;
       if (!last) {
-        below =
-            hn::Mul(face.shift_of(near, hn::LoadU(f, here + cube.resolution), hn::Set(f, edge),
-                                  face.offset_v),
-                    hn::Mul(face.cosine(pu, face.cosine(edge)), hn::LoadU(f, cube.edge_v + at)));
+        below = hn::Mul(face.shift_of(near, hn::LoadU(f, here + cube.resolution), hn::Set(f, edge),
+                                      face.offset_v),
+                        hn::Mul(face.weigh<kShaped>(pu, face.cosine(edge), inverse_length),
+                                hn::LoadU(f, cube.edge_v + at)));
       }
       weight =
           hn::Add(own, hn::Add(hn::Sub(right, from_left), hn::Sub(below, hn::LoadU(f, down + x))));
@@ -175,12 +210,19 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
     // Add up what covers, and the light.
     const auto empty = hn::Eq(near, zero);
     const auto covered = hn::IfThenZeroElse(empty, weight);
+    auto hidden = covered;
+    auto direction = hn::Mul(own, inverse_length);
+    if constexpr (kShaped) {
+      const auto share = face.share_of(near, inverse_length);
+      hidden = hn::Mul(covered, share);
+      direction = hn::NegMulAdd(share, direction, direction);
+    } else {
+      direction = hn::IfThenElseZero(empty, direction);
+    }
     sums.total = hn::Add(sums.total, own);
-    sums.covered = hn::Add(sums.covered, covered);
-    add_light(face, at, weight, covered, sums);
+    sums.covered = hn::Add(sums.covered, hidden);
+    add_light(face, at, covered, hn::Sub(weight, hidden), sums);
     // Add up the uncovered directions; what a row shares is multiplied once, at its end.
-    const auto direction =
-        hn::IfThenElseZero(empty, hn::Mul(own, hn::LoadU(f, cube.inverse_length + at)));
     row_open = hn::Add(row_open, direction);
     sums.open[1] = hn::MulAdd(direction, pu, sums.open[1]);
   }
@@ -189,19 +231,20 @@ HWY_INLINE void add_row(const FaceView& face, int y, bool last, float* HWY_RESTR
 }
 
 /// Adds up the rows of a face that are above the horizon.
-template <bool kMoves>
+template <bool kMoves, bool kShaped>
 HWY_INLINE void add_face(const FaceView& face, LaneSums& sums) {
   alignas(64) float down[kMaxResolution] = {};
   int y = 0, end = face.cube.resolution;
   while (y < end && !face.sees(y)) ++y;
   while (y < end && !face.sees(end - 1)) --end;
-  for (; y < end; ++y) add_row<kMoves>(face, y, y + 1 == end, down, sums);
+  for (; y < end; ++y) add_row<kMoves, kShaped>(face, y, y + 1 == end, down, sums);
 }
 
 }  // namespace
 
 void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
-                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums) {
+                const glm::vec3& normal, const ViewOffsets* offsets, const PixelWeights* weights,
+                PixelSums& sums) {
   const W f;
   const auto zero = hn::Zero(f);
   LaneSums lane{zero, zero, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
@@ -217,8 +260,10 @@ void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* 
                   .sky = sky ? sky + static_cast<std::size_t>(3 * i) * plane : nullptr,
                   .nw = axes.sign * normal[axes.w],
                   .nu = normal[axes.u],
-                  .nv = normal[axes.v]};
-    if (face.nw + std::abs(face.nu) + std::abs(face.nv) <= 0) continue;
+                  .nv = normal[axes.v],
+                  .weights = weights};
+    if (!(weights && weights->sphere) && face.nw + std::abs(face.nu) + std::abs(face.nv) <= 0)
+      continue;
     for (auto& sum : lane.open) sum = zero;
     if (offsets) {
       for (std::size_t k = 0; k < kViewpoints; ++k) {
@@ -226,9 +271,9 @@ void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* 
         face.offset_u[k] = offsets->axis[axes.u][k];
         face.offset_v[k] = offsets->axis[axes.v][k];
       }
-      add_face<true>(face, lane);
+      weights ? add_face<true, true>(face, lane) : add_face<true, false>(face, lane);
     } else {
-      add_face<false>(face, lane);
+      weights ? add_face<false, true>(face, lane) : add_face<false, false>(face, lane);
     }
     open[axes.w] = hn::MulAdd(hn::Set(f, axes.sign), lane.open[0], open[axes.w]);
     open[axes.u] = hn::Add(open[axes.u], lane.open[1]);
@@ -254,8 +299,9 @@ namespace ptc {
 HWY_EXPORT(sum_pixels);
 
 void sum_pixels(const CubeGeometry& cube, const PixelView& pixels, const float* sky,
-                const glm::vec3& normal, const ViewOffsets* offsets, PixelSums& sums) {
-  HWY_DYNAMIC_DISPATCH(sum_pixels)(cube, pixels, sky, normal, offsets, sums);
+                const glm::vec3& normal, const ViewOffsets* offsets, const PixelWeights* weights,
+                PixelSums& sums) {
+  HWY_DYNAMIC_DISPATCH(sum_pixels)(cube, pixels, sky, normal, offsets, weights, sums);
 }
 
 }  // namespace ptc

@@ -22,73 +22,13 @@
 
 #include "engine/base/numbers.h"
 #include "engine/io/cloud/record.h"
-#include "engine/shade/outgoing.h"
+#include "engine/shade/reference/plain_cluster.h"
 #include "format/node_layout.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
 
 namespace ptc {
 namespace {
-
-/// A child of a group relative to a receiver, in scene units.
-struct Cluster {
-  glm::vec3 to{0};  ///< mean position
-  float radius = 0;
-  float area = 0;
-  float thickness = 0;
-  std::array<float, 6> facing{};  ///< share of the area that faces each axis
-  glm::vec3 mean{0};              ///< sum of area times normal over the area; not unit
-  float flatness = 0;             ///< length of `mean`
-};
-
-float share_at(const GroupView& group, int axis, int child) {
-  return static_cast<float>(GroupView::u16_at(group.facing(axis), child)) /
-         static_cast<float>(kFacingSteps);
-}
-
-/// Decodes child i of a group.
-/// @param from  position of the receiver, scene units
-Cluster read_cluster(const GroupView& group, int i, const Frame& frame, const glm::dvec3& from) {
-  // Decode the position relative to the group's cell.
-  const LatticePoint corner = decode_morton(group.cell());
-  const double step = cell_edge(group.level()) / kMeanSteps;
-  const std::array<const std::byte*, 3> columns{group.mean_x(), group.mean_y(), group.mean_z()};
-  Cluster c;
-  for (int k = 0; k < 3; ++k) {
-    const auto axis = static_cast<std::size_t>(k);
-    const double at =
-        static_cast<double>(corner[axis]) + step * GroupView::u16_at(columns[axis], i);
-    c.to[k] = static_cast<float>(frame.origin[axis] + at * frame.unit() - from[k]);
-  }
-  // Decode the shape; the mean normal is the difference of opposite shares.
-  const auto unit = static_cast<float>(frame.unit());
-  c.radius = unit * decode_ufloat16(GroupView::u16_at(group.radius(), i));
-  c.thickness = unit * decode_ufloat16(GroupView::u16_at(group.thickness(), i));
-  c.area = decode_ufloat16(GroupView::u16_at(group.area(), i));
-  for (int k = 0; k < 6; ++k) c.facing[static_cast<std::size_t>(k)] = share_at(group, k, i);
-  c.mean = {c.facing[0] - c.facing[1], c.facing[2] - c.facing[3], c.facing[4] - c.facing[5]};
-  c.flatness = glm::length(c.mean);
-  return c;
-}
-
-/// The light that leaves a cluster towards a receiver by the three faces of the ambient cube that
-/// look at it.
-struct Front {
-  float area = 0;         ///< projected area of the fronts over the cluster's area
-  glm::vec3 radiance{0};  ///< sum of their radiance times that area
-};
-
-Front front_of(const GroupView& group, int i, const Cluster& c, const glm::vec3& toward) {
-  Front front;
-  for (int axis = 0; axis < 3; ++axis) {
-    const int face = 2 * axis + (toward[axis] < 0 ? 1 : 0);
-    const std::array<float, 3> colour = decode_rgbe(outgoing_rgbe(group, face, i));
-    const float weight = std::abs(toward[axis]) * c.facing[static_cast<std::size_t>(face)];
-    front.radiance += weight * glm::vec3(colour[0], colour[1], colour[2]);
-    front.area += weight;
-  }
-  return front;
-}
 
 std::uint32_t pack(const glm::vec3& colour) {
   return encode_rgbe({colour.r, colour.g, colour.b});

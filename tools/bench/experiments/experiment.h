@@ -50,7 +50,9 @@ struct Experiment {
 [[nodiscard]] Experiment make_mutations_experiment();
 [[nodiscard]] Experiment make_remote_experiment();
 [[nodiscard]] Experiment make_scale_experiment();
+[[nodiscard]] Experiment make_scan_experiment();
 [[nodiscard]] Experiment make_sort_experiment();
+[[nodiscard]] Experiment make_specks_experiment();
 [[nodiscard]] Experiment make_verify_experiment();
 
 /// Runs an experiment that measures rows, and publishes a report whenever there are more rows.

@@ -1,0 +1,91 @@
+#include "engine/io/cloud/display_colour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "engine/io/image/srgb.h"
+
+namespace ptc {
+namespace {
+
+// Returns the channel of this name, if this program knows its type.
+std::optional<RowChannel> find_channel(const PointWriteInfo& info, std::string_view name) {
+  for (const RowChannel& row : row_channels(info.channels, {})) {
+    if (row.channel.name == name) return row;
+  }
+  return std::nullopt;
+}
+
+bool is_stored_colour(const Channel& channel) {
+  return channel.components == 3 && channel.colour_space == ColourSpace::srgb &&
+         (channel.type == ChannelType::u8 || channel.type == ChannelType::u16) &&
+         channel.scale == 1 && channel.offset == 0;
+}
+
+// Returns a number in [0, 1]; what is no number becomes 0.
+float to_share(double value) {
+  return static_cast<float>(value > 0 ? std::min(value, 1.0) : 0.0);
+}
+
+std::uint16_t to_srgb(float linear) {
+  return static_cast<std::uint16_t>(std::lround(
+      65535 * linear_to_srgb(static_cast<double>(to_share(static_cast<double>(linear))))));
+}
+
+}  // namespace
+
+DisplayColour::DisplayColour(const PointWriteInfo& info)
+    : chosen_(!info.colour_from.empty()), surfels_have_albedo_(info.has_albedo) {
+  if (info.has_albedo) kind_ = Kind::albedo;
+  source_ = find_channel(info, chosen_ ? info.colour_from : "rgb");
+  if (!source_) return;
+  if (is_stored_colour(source_->channel)) {
+    kind_ = Kind::stored;
+  } else if (chosen_) {
+    kind_ = Kind::shown;
+  }
+}
+
+glm::vec3 DisplayColour::linear(const Surfel& surfel, const std::byte* row) const {
+  if (kind_ == Kind::shown) return shown_light(row);
+  if (kind_ != Kind::stored || (surfels_have_albedo_ && !chosen_)) return surfel.albedo;
+  const std::array<std::uint16_t, 3> stored = stored_values(row);
+  glm::vec3 light;
+  for (std::size_t i = 0; i < 3; ++i) {
+    light[static_cast<int>(i)] = static_cast<float>(srgb_to_linear(stored[i] / 65535.0));
+  }
+  return light;
+}
+
+std::array<std::uint16_t, 3> DisplayColour::srgb(const Surfel& surfel, const std::byte* row) const {
+  const glm::vec3 light = linear(surfel, row);
+  return {to_srgb(light.r), to_srgb(light.g), to_srgb(light.b)};
+}
+
+std::array<std::uint16_t, 3> DisplayColour::stored_values(const std::byte* row) const {
+  const bool bytes = source_->channel.type == ChannelType::u8;
+  std::array<std::uint16_t, 3> values{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t value = load_integer(source_->channel.type, source_->at(row, i));
+    values[i] = static_cast<std::uint16_t>(bytes ? 257 * value : value);
+  }
+  return values;
+}
+
+glm::vec3 DisplayColour::shown_light(const std::byte* row) const {
+  const Channel& channel = source_->channel;
+  const auto number = [&](std::size_t i) {
+    return channel.scale * load_number(channel.type, source_->at(row, i)) + channel.offset;
+  };
+  if (channel.components == 1) {
+    const bool covers = channel.name == "occlusion";
+    return glm::vec3(to_share(covers ? 1 - number(0) : number(0)));
+  }
+  const glm::dvec3 light(number(0), number(1), number(2));
+  const double luminance = 0.2126 * light.r + 0.7152 * light.g + 0.0722 * light.b;  // Rec. 709
+  const double factor = luminance > 0 ? 1 / (1 + luminance) : 1;
+  return {to_share(factor * light.r), to_share(factor * light.g), to_share(factor * light.b)};
+}
+
+}  // namespace ptc

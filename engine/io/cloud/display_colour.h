@@ -1,0 +1,54 @@
+// Internal to the point writers: the colour that a viewer shows of a point.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include <glm/vec3.hpp>
+
+#include "engine/io/cloud/point_rows.h"
+#include "engine/io/cloud/point_writer.h"
+
+namespace ptc {
+
+/// Finds the colour of each point: that of PointWriteInfo::colour_from, else the albedo. A colour
+/// whose numbers a channel has as the scanner stored them, such as the channel `rgb`, is known to
+/// the last bit.
+///
+/// Light has no upper limit, so colours of three components are compressed by their luminance Y to
+/// Y / (1 + Y), in which black stays black and nothing reaches white (Reinhard et al. 2002, eq. 3).
+class DisplayColour {
+ public:
+  explicit DisplayColour(const PointWriteInfo& info);
+
+  /// Says whether points have a colour.
+  [[nodiscard]] bool exists() const noexcept { return kind_ != Kind::none; }
+  /// Returns the channel that has the numbers of the colour as they were stored, on the sRGB curve;
+  /// null when there is none.
+  [[nodiscard]] const RowChannel* stored() const noexcept {
+    return kind_ == Kind::stored ? &*source_ : nullptr;
+  }
+  /// Says whether the colour takes the place of the albedo.
+  [[nodiscard]] bool hides_albedo() const noexcept { return chosen_; }
+  /// Returns the colour, linear, each component in [0, 1].
+  [[nodiscard]] glm::vec3 linear(const Surfel& surfel, const std::byte* row) const;
+  /// Returns the colour on the sRGB curve, 65535 for 1.
+  [[nodiscard]] std::array<std::uint16_t, 3> srgb(const Surfel& surfel, const std::byte* row) const;
+  /// Returns the values of stored(), 257-fold if they have 8 bits. Those of 16 bits can be of any
+  /// scale: many programs write bytes into fields of 16 bits.
+  [[nodiscard]] std::array<std::uint16_t, 3> stored_values(const std::byte* row) const;
+
+ private:
+  enum class Kind : std::uint8_t { none, albedo, stored, shown };
+
+  [[nodiscard]] glm::vec3 shown_light(const std::byte* row) const;
+
+  Kind kind_ = Kind::none;
+  bool chosen_;  // PointWriteInfo::colour_from names the source
+  bool surfels_have_albedo_;
+  std::optional<RowChannel> source_;  // of the kinds stored and shown
+};
+
+}  // namespace ptc

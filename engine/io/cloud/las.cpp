@@ -1,0 +1,214 @@
+// Reads clouds from LAS, LAZ and COPC.
+//
+//   header, records  -->  facts, texts, channels                              (las_header, las_crs
+//   ...) points           -->  records  -->  position, colour  -->  surfel
+//                                  -->  row of attributes                     (las_records,
+//                                  las_fields)
+//
+// Colours have fields of 16 bits, but many programs write values of 8 bits into them. No field says
+// which, so a sample of the points decides before the first one is returned: colours that are all
+// at most 255 are taken as 8 bits. A colour that contradicts this later ends the reading, because
+// the points before it were read wrongly.
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/las_crs.h"
+#include "engine/io/cloud/las_fields.h"
+#include "engine/io/cloud/las_header.h"
+#include "engine/io/cloud/las_records.h"
+#include "engine/io/cloud/las_texts.h"
+#include "engine/io/cloud/surfel_check.h"
+#include "engine/io/image/srgb.h"
+#include "engine/io/laz/layout.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::string_view kSpecUser = "LASF_Spec";
+constexpr unsigned kExtraBytesNumber = 4;
+constexpr std::size_t kMaxRowsBytes = std::size_t{1} << 24;  // returned at once
+
+// How the colours of a file are to be understood.
+enum class Colours { none, black, eight_bits, sixteen_bits };
+
+// The place of the colour in a record of a format that has one.
+std::size_t rgb_place(unsigned format) {
+  if (format >= 6) return 30;
+  return laz::has_time(format) ? 28 : 20;
+}
+
+std::array<std::uint16_t, 3> rgb_at(const std::byte* record, std::size_t place) {
+  std::array<std::uint16_t, 3> rgb{};
+  std::memcpy(rgb.data(), record + place, sizeof rgb);
+  return rgb;
+}
+
+std::string shortest(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+// Returns the linear value of each stored one from 0 to `most`.
+std::vector<double> tabulate_srgb(std::size_t most) {
+  std::vector<double> curve(most + 1);
+  for (std::size_t i = 0; i <= most; ++i)
+    curve[i] = srgb_to_linear(static_cast<double>(i) / static_cast<double>(most));
+  return curve;
+}
+
+class LasSource : public PointSource {
+ public:
+  explicit LasSource(const std::filesystem::path& path)
+      : file_(path),
+        header_(read_las_header(file_)),
+        rows_of_(header_),
+        records_(open_las_records(file_, header_)) {
+    look_at_colours();
+    static const std::vector<double> narrow = tabulate_srgb(255);
+    static const std::vector<double> wide = tabulate_srgb(65535);
+    if (colours_ == Colours::eight_bits) curve_ = narrow;
+    if (colours_ == Colours::sixteen_bits) curve_ = wide;
+  }
+
+  // Returns the facts about the file.
+  [[nodiscard]] PointFileInfo info() const {
+    PointFileInfo info;
+    info.count = header_.points;
+    info.has_albedo = !curve_.empty();
+    add_channels(info);
+    add_texts(info);
+    if (colours_ == Colours::eight_bits) {
+      info.notes.emplace_back(
+          "The colours are taken as 8 bits: no point that was looked at has one above 255.");
+    } else if (colours_ == Colours::black) {
+      info.notes.emplace_back(
+          "All colours that were looked at are 0, so the points are taken to have no colour.");
+    }
+    return info;
+  }
+
+  std::size_t next(std::span<Surfel> out) override {
+    rows_.clear();
+    if (block_.records.empty()) block_ = records_->next();
+    const std::size_t record_bytes = header_.record_bytes;
+    const std::size_t count = std::min(
+        {out.size(), block_.records.size() / record_bytes, kMaxRowsBytes / rows_of_.row_bytes()});
+    rows_.resize(count * rows_of_.row_bytes());
+    const std::byte* record = block_.records.data();
+    std::byte* row = rows_.data();
+    for (std::size_t i = 0; i < count; ++i) {
+      read_surfel(record, out[i]);
+      rows_of_.write(record, row);
+      ++done_;
+      block_.offset += block_.stride;
+      record += record_bytes;
+      row += rows_of_.row_bytes();
+    }
+    block_.records = block_.records.subspan(count * record_bytes);
+    return count;
+  }
+
+  [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return rows_; }
+
+ private:
+  // Decides what the colours are by a sample of the points.
+  void look_at_colours() {
+    if (!laz::has_rgb(header_.format) || header_.points == 0) return;
+    const std::size_t place = rgb_place(header_.format);
+    std::uint16_t most = 0;
+    records_->sample([&](std::span<const std::byte> records) {
+      for (; !records.empty(); records = records.subspan(header_.record_bytes))
+        most = std::max(most, std::ranges::max(rgb_at(records.data(), place)));
+    });
+    colours_ = most == 0    ? Colours::black
+               : most > 255 ? Colours::sixteen_bits
+                            : Colours::eight_bits;
+  }
+
+  void add_channels(PointFileInfo& info) const {
+    std::vector<std::byte> descriptions;
+    const LasRecord* const record = header_.find(kSpecUser, kExtraBytesNumber);
+    if (record != nullptr)
+      descriptions = read_las_payload(file_, *record).value_or(std::vector<std::byte>());
+    LasChannels channels = make_las_channels(header_, descriptions);
+    info.channels = std::move(channels.channels);
+    info.notes = std::move(channels.notes);
+  }
+
+  void add_texts(PointFileInfo& info) const {
+    info.text.emplace("up", "z");
+    LasCrs crs = read_las_crs(file_, header_);
+    if (!crs.text.empty()) info.text["crs"] = crs.text;
+    if (crs.metres_per_unit) info.text["metres_per_unit"] = shortest(*crs.metres_per_unit);
+    std::ranges::move(crs.notes, std::back_inserter(info.notes));
+    const unsigned bits = colours_ == Colours::eight_bits     ? 8
+                          : colours_ == Colours::sixteen_bits ? 16
+                                                              : 0;
+    info.text["las.header"] = make_las_header_text(header_, bits);
+    LasRecordsText records = make_las_records_text(file_, header_);
+    if (!records.base64.empty()) info.text["las.vlrs"] = std::move(records.base64);
+    if (records.left_out > 0) {
+      info.notes.push_back(std::to_string(records.left_out) +
+                           " variable-length records are left out: only 16 KiB are kept.");
+    }
+  }
+
+  [[noreturn]] void fail(const std::string& rule) const {
+    refuse_las(file_, block_.offset, "point " + std::to_string(done_) + ": " + rule);
+  }
+
+  void read_surfel(const std::byte* record, Surfel& surfel) {
+    RawSurfel raw;
+    std::array<std::int32_t, 3> place{};
+    std::memcpy(place.data(), record, sizeof place);
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<std::size_t>(axis);
+      raw.position[axis] = static_cast<double>(place[k]) * header_.scale[k] + header_.offset[k];
+    }
+    if (colours_ != Colours::none) read_colour(record, raw);
+    const std::string rule = convert_surfel(raw, false, surfel);
+    if (!rule.empty()) fail(rule);
+  }
+
+  void read_colour(const std::byte* record, RawSurfel& raw) const {
+    const std::array<std::uint16_t, 3> rgb = rgb_at(record, rgb_place(header_.format));
+    const std::uint16_t most = std::ranges::max(rgb);
+    if (colours_ == Colours::black) {
+      if (most > 0)
+        fail("the point has a colour, but all points that were looked at on opening have none");
+      return;
+    }
+    if (most >= curve_.size()) {
+      fail(
+          "a colour is above 255, but those of all points that were looked at on opening are of 8 "
+          "bits");
+    }
+    raw.albedo = {curve_[rgb[0]], curve_[rgb[1]], curve_[rgb[2]]};
+  }
+
+  InputFile file_;
+  LasHeader header_;
+  LasRows rows_of_;
+  std::unique_ptr<LasRecordSource> records_;
+  Colours colours_ = Colours::none;
+  std::vector<double> curve_;    // linear value of each stored colour; empty without colours
+  LasBlock block_;               // records that next() has not returned
+  std::vector<std::byte> rows_;  // of the surfels that next() returned last
+  std::uint64_t done_ = 0;       // points that next() has returned
+};
+
+}  // namespace
+
+PointFile open_las(const std::filesystem::path& path) {
+  auto source = std::make_unique<LasSource>(path);
+  PointFileInfo info = source->info();
+  return {std::move(info), std::move(source)};
+}
+
+}  // namespace ptc

@@ -1,0 +1,260 @@
+// The fields of a LAS point record, as channels.
+//
+//   formats 0 to 5    x y z 12 | intensity 2 | returns 1 | class 1 | angle user source time rgb ...
+//   formats 6 to 10   x y z 12 | intensity 2 | returns 1 | flags 1 | class 1 | user angle source
+//   ... row               intensity 2 | return, returns, direction, edge, class, flags, 1 each |
+//                     [channel 1] | the rest of the record as it is
+//
+// Fields that share a byte become a channel each. The rest of a record, from the byte behind the
+// classification on, is copied as it is, so its channels stand in the order of the record. Extra
+// bytes are what a record has beyond its format; a record of the file describes them:
+//
+//   offset  size  of 192 bytes for each field        offset  size
+//        2     1  type: 0 any bytes, 1 u8, 2 i8,         40     8  no-data value, as u64, i64 or
+//        f64
+//                 ... 8 i64, 9 f32, 10 f64; + 10 for    112    24  scales f64
+//                 pairs, + 20 for triples               136    24  offsets f64
+//        3     1  options: bit 0 no data, 3 scale,      160    32  description
+//                 4 offset; of type 0 the bytes
+//        4    32  name
+//
+// Source: LAS Specification 1.4 R15, tables 7 to 17 and 24 to 26; types 11 to 30 in R13.
+#include "engine/io/cloud/las_fields.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "engine/io/cloud/formats.h"
+#include "engine/io/laz/layout.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kDescriptionBytes = 192;
+constexpr std::size_t kMaxComponents = 16;  // of a channel
+constexpr unsigned kNoDataOption = 1;
+constexpr unsigned kScaleOption = 8;
+constexpr unsigned kOffsetOption = 16;
+constexpr unsigned kMaxType = 30;
+
+constexpr std::array<ChannelType, 10> kTypes = {
+    ChannelType::u8,  ChannelType::i8,  ChannelType::u16, ChannelType::i16, ChannelType::u32,
+    ChannelType::i32, ChannelType::u64, ChannelType::i64, ChannelType::f32, ChannelType::f64};
+
+template <typename T>
+T value_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
+  T value;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+// Collects the channels of a file.
+class ChannelList {
+ public:
+  explicit ChannelList(const LasHeader& header) : header_(header) {}
+
+  LasChannels make(std::span<const std::byte> descriptions) {
+    add_core();
+    add_optional();
+    add_extra(descriptions);
+    return std::move(list_);
+  }
+
+ private:
+  Channel& add(const std::string& name, ChannelType type, ChannelRole role = ChannelRole::value) {
+    Channel channel;
+    channel.name = channel_name(name, list_.channels);
+    channel.type = type;
+    channel.role = role;
+    list_.channels.push_back(channel);
+    return list_.channels.back();
+  }
+
+  void note(const std::string& sentence) { list_.notes.push_back(sentence); }
+
+  void add_core() {
+    add("intensity", ChannelType::u16);
+    add("return_number", ChannelType::u8);
+    add("number_of_returns", ChannelType::u8);
+    add("scan_direction", ChannelType::u8);
+    add("edge_of_flight_line", ChannelType::u8);
+    add("classification", ChannelType::u8, ChannelRole::label);
+    add("class_flags", ChannelType::u8, ChannelRole::label);
+    if (header_.format >= 6) {
+      add("scanner_channel", ChannelType::u8);
+      add("user_data", ChannelType::u8);
+      Channel& angle = add("scan_angle", ChannelType::i16);
+      angle.unit = "deg";
+      angle.scale = 0.006;
+    } else {
+      add("scan_angle", ChannelType::i8).unit = "deg";
+      add("user_data", ChannelType::u8);
+    }
+    add("point_source_id", ChannelType::u16, ChannelRole::label);
+  }
+
+  void add_optional() {
+    if (laz::has_time(header_.format))
+      add("gps_time", ChannelType::f64, ChannelRole::time).unit = std::string("s");
+    if (laz::has_rgb(header_.format)) {
+      Channel& rgb = add("rgb", ChannelType::u16, ChannelRole::colour);
+      rgb.components = 3;
+      rgb.colour_space = ColourSpace::srgb;
+    }
+    if (laz::has_nir(header_.format)) add("nir", ChannelType::u16);
+    if (!laz::has_wave_packet(header_.format)) return;
+    add("wave_descriptor", ChannelType::u8, ChannelRole::label);
+    add("wave_offset", ChannelType::u64);
+    add("wave_bytes", ChannelType::u32);
+    add("wave_return", ChannelType::f32).unit = "ps";
+    Channel& direction = add("wave_direction", ChannelType::f32, ChannelRole::vector);
+    direction.components = 3;
+    note("The waveforms are not read; the points keep the fields that refer to them.");
+  }
+
+  void add_extra(std::span<const std::byte> descriptions) {
+    std::size_t left = header_.record_bytes - laz::format_bytes(header_.format);
+    bool all_fit = descriptions.size() % kDescriptionBytes == 0;
+    for (; all_fit && descriptions.size() >= kDescriptionBytes;
+         descriptions = descriptions.subspan(kDescriptionBytes)) {
+      all_fit = add_described(descriptions.first(kDescriptionBytes), left);
+    }
+    if (!all_fit)
+      note(
+          "The record that describes the extra bytes does not fit them; what does not is ignored.");
+    if (left == 0) return;
+    note(std::to_string(left) +
+         " extra bytes of each point are not described; they are kept as bytes.");
+    add_bytes("extra_bytes", left);
+  }
+
+  // Adds one described field and takes it off the bytes that are left. Returns false when it does
+  // not fit.
+  bool add_described(std::span<const std::byte> description, std::size_t& left) {
+    const unsigned type = value_at<std::uint8_t>(description, 2);
+    std::string name(reinterpret_cast<const char*>(description.data()) + 4, 32);
+    name.resize(std::min(name.find('\0'), name.size()));
+    if (name.empty()) name = "extra_bytes";
+    if (type == 0) {
+      const std::size_t bytes = value_at<std::uint8_t>(description, 3);
+      if (bytes > left) return false;
+      add_bytes(name, bytes);
+      left -= bytes;
+      return true;
+    }
+    if (type > kMaxType) return false;
+    const ChannelType number = kTypes[(type - 1) % kTypes.size()];
+    const std::size_t components = (type - 1) / kTypes.size() + 1;
+    const std::size_t bytes = components * channel_bytes(number);
+    if (bytes > left) return false;
+    add_numbers(name, number, components, description);
+    left -= bytes;
+    return true;
+  }
+
+  // Adds a field of one to three numbers: one channel, or one for each number when their scales,
+  // offsets or no-data values differ.
+  void add_numbers(const std::string& name, ChannelType type, std::size_t components,
+                   std::span<const std::byte> description) {
+    std::vector<Channel> numbers;
+    for (std::size_t i = 0; i < components; ++i) {
+      Channel channel;
+      channel.type = type;
+      const unsigned options = value_at<std::uint8_t>(description, 3);
+      const auto scale = value_at<double>(description, 112 + 8 * i);
+      const auto offset = value_at<double>(description, 136 + 8 * i);
+      if ((options & kScaleOption) != 0 && std::isfinite(scale) && scale != 0)
+        channel.scale = scale;
+      if ((options & kOffsetOption) != 0 && std::isfinite(offset)) channel.offset = offset;
+      if ((options & kNoDataOption) != 0)
+        channel.no_value = no_value(description, 40 + 8 * i, type);
+      numbers.push_back(channel);
+    }
+    const bool alike =
+        std::ranges::all_of(numbers, [&](const Channel& c) { return c == numbers[0]; });
+    if (alike) numbers.resize(1);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      Channel& channel = numbers[i];
+      channel.components = static_cast<std::uint8_t>(alike ? components : 1);
+      channel.name = channel_name(alike ? name : name + "_" + std::to_string(i), list_.channels);
+      list_.channels.push_back(channel);
+    }
+  }
+
+  // Returns the bits of the value that stands for "not known", or nothing when the type has no such
+  // value.
+  static std::optional<std::uint64_t> no_value(std::span<const std::byte> description,
+                                               std::size_t at, ChannelType type) {
+    const auto bits = value_at<std::uint64_t>(description, at);
+    const auto number = value_at<double>(description, at);
+    if (type == ChannelType::f64) return bits;
+    if (type == ChannelType::f32) {
+      const auto narrow = static_cast<float>(number);
+      std::uint32_t narrow_bits = 0;
+      std::memcpy(&narrow_bits, &narrow, sizeof narrow);
+      return narrow_bits;
+    }
+    const unsigned width = static_cast<unsigned>(8 * channel_bytes(type));
+    if (width == 64) return bits;
+    const std::uint64_t mask = (std::uint64_t{1} << width) - 1;
+    const bool is_signed =
+        type == ChannelType::i8 || type == ChannelType::i16 || type == ChannelType::i32;
+    const bool negative = is_signed && (bits >> (width - 1) & 1) != 0;
+    const std::uint64_t extended = negative ? bits | ~mask : bits & mask;
+    if (extended != bits) return std::nullopt;
+    return bits & mask;
+  }
+
+  void add_bytes(const std::string& name, std::size_t bytes) {
+    for (std::size_t done = 0; done < bytes; done += kMaxComponents) {
+      add(name, ChannelType::u8).components =
+          static_cast<std::uint8_t>(std::min(kMaxComponents, bytes - done));
+    }
+  }
+
+  const LasHeader& header_;
+  LasChannels list_;
+};
+
+}  // namespace
+
+LasChannels make_las_channels(const LasHeader& header, std::span<const std::byte> descriptions) {
+  return ChannelList(header).make(descriptions);
+}
+
+LasRows::LasRows(const LasHeader& header)
+    : layered_(header.format >= 6),
+      tail_(layered_ ? 17 : 16),
+      tail_bytes_(header.record_bytes - tail_),
+      row_bytes_((layered_ ? 9 : 8) + tail_bytes_) {}
+
+void LasRows::write(const std::byte* record, std::byte* row) const noexcept {
+  const auto byte_at = [record](std::size_t at) { return std::to_integer<unsigned>(record[at]); };
+  const unsigned returns = byte_at(14);
+  const unsigned third = byte_at(15);
+  std::memcpy(row, record + 12, 2);
+  const auto put = [row](std::size_t at, unsigned value) {
+    row[at] = static_cast<std::byte>(value);
+  };
+  if (layered_) {  // third: flags of the class, 4 bits; channel, 2; direction; edge
+    put(2, returns & 15);
+    put(3, returns >> 4);
+    put(4, third >> 6 & 1);
+    put(5, third >> 7);
+    put(6, byte_at(16));
+    put(7, third & 15);
+    put(8, third >> 4 & 3);
+    std::memcpy(row + 9, record + tail_, tail_bytes_);
+  } else {  // third: class, 5 bits; its flags, 3
+    put(2, returns & 7);
+    put(3, returns >> 3 & 7);
+    put(4, returns >> 6 & 1);
+    put(5, returns >> 7);
+    put(6, third & 31);
+    put(7, third >> 5);
+    std::memcpy(row + 8, record + tail_, tail_bytes_);
+  }
+}
+
+}  // namespace ptc

@@ -1,0 +1,265 @@
+// Decides the head of a LAS file and the records between its header and its points.
+//
+// A cloud that came from LAS carries two texts. `las.header` is a JSON object with the members
+// scale, offset, system or system_id, software (bytes as code points), day, year, encoding or
+// global_encoding, file_source_id and guid (32 hexadecimal digits); `las.vlrs` is base64 of the
+// variable length records as they lay in the file. Both may come from a file of anyone, so nothing
+// in them is taken for granted: what is not of the expected form is passed over.
+//
+// Other clouds get steps of a power of ten, the finest with which 32 bits suffice:
+//
+//   |<------------- side of the bounds ------------->|
+//   low               offset, a round number       high      |X| <= side / step <= 2^31 - 1
+#include "engine/io/cloud/las_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "engine/io/cloud/formats.h"
+#include "engine/io/text/text.h"
+
+namespace ptc::las {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kMostStep = std::numeric_limits<std::int32_t>::max();
+constexpr double kStepOfPlace = 1e-3;             // when all points lie in one place
+constexpr std::uint16_t kKeptEncoding = 1U | 8U;  // kind of the times, synthetic return numbers
+constexpr std::size_t kRecordHeadBytes = 54;
+
+// Returns 10^exponent as the nearest double, which std::pow() may miss.
+double power_of_ten(int exponent) {
+  return parse_number(fmt::format("1e{}", exponent)).value_or(1);
+}
+
+// Sets `out` to the text of a member, whose code points are bytes; a code point that is no byte is
+// left as it is.
+void take_text(const Json& head, const char* name, std::string& out) {
+  const auto member = head.find(name);
+  if (member == head.end() || !member->is_string()) return;
+  const auto text = member->get<std::string>();
+  out.clear();
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if ((byte == 0xc2 || byte == 0xc3) && i + 1 < text.size()) {  // of U+0080 to U+00ff
+      out += static_cast<char>((byte & 3) << 6 | (static_cast<unsigned char>(text[++i]) & 0x3f));
+    } else {
+      out += text[i];
+    }
+  }
+}
+
+void take_number(const Json& head, const char* name, std::uint16_t& out) {
+  const auto member = head.find(name);
+  if (member == head.end() || !member->is_number_unsigned()) return;
+  const auto value = member->get<std::uint64_t>();
+  if (value <= std::numeric_limits<std::uint16_t>::max()) out = static_cast<std::uint16_t>(value);
+}
+
+void take_guid(const Json& head, std::array<std::byte, 16>& out) {
+  const auto member = head.find("guid");
+  if (member == head.end() || !member->is_string()) return;
+  const auto digits = member->get<std::string>();
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  if (digits.size() != 32 || digits.find_first_not_of(kDigits) != std::string::npos) return;
+  const auto value = [&](std::size_t i) { return kDigits.find(digits[i]); };
+  for (std::size_t i = 0; i < 16; ++i)
+    out[i] = static_cast<std::byte>(16 * value(2 * i) + value(2 * i + 1));
+}
+
+std::optional<glm::dvec3> find_triple(const Json& head, const char* name) {
+  const auto member = head.find(name);
+  if (member == head.end() || !member->is_array() || member->size() != 3) return std::nullopt;
+  glm::dvec3 triple;
+  for (int i = 0; i < 3; ++i) {
+    const Json& number = (*member)[static_cast<std::size_t>(i)];
+    if (!number.is_number()) return std::nullopt;
+    triple[i] = number.get<double>();
+    if (!std::isfinite(triple[i])) return std::nullopt;
+  }
+  return triple;
+}
+
+// Says whether the steps of all coordinates within the bounds are integers of 32 bits.
+bool steps_hold(const Bounds& bounds, const glm::dvec3& scale, const glm::dvec3& offset) {
+  for (int i = 0; i < 3; ++i) {
+    if (!(scale[i] > 0)) return false;
+    for (const double corner : {bounds.low[i], bounds.high[i]}) {
+      const double steps = std::round(std::abs((corner - offset[i]) / scale[i]));
+      if (!bounds.empty() && !(steps <= kMostStep)) return false;
+    }
+  }
+  return true;
+}
+
+// Returns the finest step for coordinates that are at most `side` away from their offset.
+double choose_step(double side) {
+  const double finest = side / 2e9;      // well below kMostStep, whatever is rounded on the way
+  if (finest == 0) return kStepOfPlace;  // its offset says it all
+  int exponent = static_cast<int>(std::floor(std::log10(finest)));
+  while (power_of_ten(exponent) < finest) ++exponent;
+  return power_of_ten(exponent);
+}
+
+// Returns a round number near the middle of an interval, at most its length from either end.
+double choose_offset(double low, double high) {
+  const double side = high - low;
+  if (side == 0) return low;
+  const double unit = power_of_ten(static_cast<int>(std::floor(std::log10(side))));
+  const double middle = low + side / 2;
+  const double round = std::round(middle / unit) * unit;
+  const bool is_near =
+      std::isfinite(round) && std::abs(round - low) <= side && std::abs(round - high) <= side;
+  return is_near ? round : middle;
+}
+
+void choose_steps(const PointWriteInfo& info, Head& head) {
+  head.own_steps = true;
+  head.scale = glm::dvec3(kStepOfPlace);
+  head.offset = glm::dvec3(0);
+  if (info.bounds.empty()) return;
+  const glm::dvec3 sides = info.bounds.high - info.bounds.low;
+  head.scale = glm::dvec3(choose_step(std::max({sides.x, sides.y, sides.z})));
+  for (int i = 0; i < 3; ++i) {
+    head.offset[i] = choose_offset(info.bounds.low[i], info.bounds.high[i]);
+  }
+}
+
+// Decodes base64 (RFC 4648). @return nothing when the text is not base64
+std::optional<std::string> decode_base64(std::string_view text) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  if (text.size() % 4 != 0) return std::nullopt;
+  for (int i = 0; i < 2 && text.ends_with('='); ++i) text.remove_suffix(1);
+  std::string bytes;
+  std::uint32_t bits = 0;
+  int held = 0;  // bits that are not in `bytes` yet
+  for (const char c : text) {
+    const std::size_t digit = kDigits.find(c);
+    if (digit == std::string_view::npos) return std::nullopt;
+    bits = bits << 6 | static_cast<std::uint32_t>(digit);
+    held += 6;
+    if (held < 8) continue;
+    held -= 8;
+    bytes += static_cast<char>(bits >> held & 0xff);
+  }
+  return bytes;
+}
+
+std::string_view until_zero(std::string_view text) {
+  return text.substr(0, text.find('\0'));
+}
+
+// Says whether a record describes how points are stored in the file that it comes from.
+bool is_about_storage(std::string_view user, unsigned id) {
+  if (user == "LASF_Spec") return id == 4 || (id >= 100 && id < 355);  // extra bytes, waveforms
+  return user == "laszip encoded" || user == "copc";
+}
+
+// Appends the records of the text `las.vlrs` that stay true. @return false when they are damaged
+bool add_original(std::string_view text, Records& records) {
+  const std::optional<std::string> decoded = decode_base64(text);
+  if (!decoded) return false;
+  std::string_view rest = *decoded;
+  Records kept;
+  while (!rest.empty()) {
+    if (rest.size() < kRecordHeadBytes) return false;
+    const auto number = [&](std::size_t at) {
+      return static_cast<unsigned>(static_cast<unsigned char>(rest[at])) |
+             static_cast<unsigned>(static_cast<unsigned char>(rest[at + 1])) << 8;
+    };
+    const std::string_view user = until_zero(rest.substr(2, 16));
+    const unsigned id = number(18);
+    const std::size_t bytes = kRecordHeadBytes + number(20);
+    if (bytes > rest.size()) return false;
+    if (!is_about_storage(user, id)) {
+      const auto whole = std::as_bytes(std::span(rest.substr(0, bytes)));
+      kept.bytes.insert(kept.bytes.end(), whole.begin(), whole.end());
+      kept.has_wkt |= user == "LASF_Projection" && id == 2112;
+      kept.has_geotiff |= user == "LASF_Projection" && id == 34735;
+      ++kept.count;
+    }
+    rest.remove_prefix(bytes);
+  }
+  records = std::move(kept);
+  return true;
+}
+
+}  // namespace
+
+Head plan_head(const PointWriteInfo& info) {
+  Head head;
+  const auto text = info.text.find("las.header");
+  const Json from = text == info.text.end() ? Json() : Json::parse(text->second, nullptr, false);
+  if (!from.is_object()) {
+    choose_steps(info, head);
+    return head;
+  }
+  take_text(from, "system", head.system);
+  take_text(from, "system_id", head.system);
+  take_text(from, "software", head.software);
+  take_number(from, "day", head.day);
+  take_number(from, "year", head.year);
+  take_number(from, "encoding", head.encoding);
+  take_number(from, "global_encoding", head.encoding);
+  take_number(from, "file_source_id", head.source);
+  head.encoding &= kKeptEncoding;
+  take_guid(from, head.guid);
+  const auto scale = find_triple(from, "scale"), offset = find_triple(from, "offset");
+  if (scale && offset && steps_hold(info.bounds, *scale, *offset)) {
+    head.scale = *scale;
+    head.offset = *offset;
+  } else {
+    choose_steps(info, head);
+  }
+  return head;
+}
+
+void Records::add(std::string_view user, std::uint16_t id, std::string_view description,
+                  std::string_view content) {
+  const auto add_padded = [this](std::string_view text, std::size_t size) {
+    const auto raw = std::as_bytes(std::span(text.substr(0, size)));
+    bytes.insert(bytes.end(), raw.begin(), raw.end());
+    bytes.resize(bytes.size() + size - raw.size());
+  };
+  append_value(bytes, std::uint16_t{0});
+  add_padded(user, 16);
+  append_value(bytes, id);
+  append_value(bytes, static_cast<std::uint16_t>(content.size()));
+  add_padded(description, 32);
+  add_padded(content, content.size());
+  ++count;
+}
+
+Records plan_records(const PointWriteInfo& info) {
+  Records records;
+  const auto original = info.text.find("las.vlrs");
+  if (original != info.text.end() && !add_original(original->second, records)) {
+    records.dropped.push_back("The text las.vlrs is damaged: its records are left out.");
+  }
+  const auto crs = info.text.find("crs");
+  if (records.has_wkt || crs == info.text.end()) return records;
+  if (crs->second.find('[') == std::string::npos) {  // a name such as EPSG:4326
+    if (!records.has_geotiff) {
+      records.dropped.push_back("The coordinate reference system is left out: it is not WKT.");
+    }
+    return records;
+  }
+  const std::string zero_ended = crs->second + '\0';
+  if (zero_ended.size() > std::numeric_limits<std::uint16_t>::max()) {
+    records.dropped.push_back(
+        "The coordinate reference system is left out: its text has more than 65,534 bytes.");
+    return records;
+  }
+  records.add("LASF_Projection", 2112, "OGC COORDINATE SYSTEM WKT", zero_ended);
+  records.has_wkt = true;
+  return records;
+}
+
+}  // namespace ptc::las

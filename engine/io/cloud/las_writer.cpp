@@ -1,0 +1,308 @@
+// Writes LAS 1.4.
+//
+//   | header 375 | records: originals, WKT, extra bytes | point | point | ...
+//     ^ again at the end: bounds and counts of returns are known then
+//
+// Points keep the steps of the LAS file that they came from, so each coordinate gets the integer
+// that it had. las_plan.cpp and las_layout.cpp decide everything before the first point.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/las_plan.h"
+#include "engine/io/file/buffered_output.h"
+
+namespace ptc {
+namespace las {
+namespace {
+
+constexpr std::uint16_t kHeaderBytes = 375;
+constexpr std::uint16_t kWktBit = 16;                   // of "Global Encoding"
+constexpr std::size_t kMostExtraNumbers = 65535 / 192;  // whose descriptions fit one record
+constexpr std::size_t kReturns = 15;
+
+// Returns the greatest value of a field without a sign.
+std::int64_t most_of(Field field) {
+  switch (field) {
+    case Field::return_number:
+    case Field::number_of_returns:
+    case Field::class_flags:
+      return 15;
+    case Field::scanner_channel:
+      return 3;
+    case Field::scan_direction:
+    case Field::edge_of_flight_line:
+      return 1;
+    default:
+      return 65535;  // a type that fits is all that the field takes
+  }
+}
+
+// What the header says of the points, gathered while they are written.
+struct Totals {
+  std::array<std::int32_t, 3> low{};
+  std::array<std::int32_t, 3> high{};
+  std::uint64_t points = 0;
+  std::array<std::uint64_t, kReturns> by_return{};  // of return numbers from 1 on
+
+  void add(const std::array<std::int32_t, 3>& place, unsigned return_number) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      low[i] = points == 0 ? place[i] : std::min(low[i], place[i]);
+      high[i] = points == 0 ? place[i] : std::max(high[i], place[i]);
+    }
+    ++points;
+    if (return_number >= 1 && return_number <= kReturns) ++by_return[return_number - 1];
+  }
+};
+
+void append_padded(std::vector<std::byte>& bytes, const std::string& text) {
+  const auto raw = std::as_bytes(std::span(text)).first(std::min<std::size_t>(text.size(), 32));
+  bytes.insert(bytes.end(), raw.begin(), raw.end());
+  bytes.resize(bytes.size() + 32 - raw.size());
+}
+
+class LasWriter : public CheckedWriter {
+ public:
+  LasWriter(const std::filesystem::path& target, const PointWriteInfo& info, Layout layout)
+      : CheckedWriter(info.count, row_bytes(info.channels)),
+        layout_(std::move(layout)),
+        head_(plan_head(info)),
+        records_(plan_records(info)),
+        record_(layout_.record_bytes),
+        out_(target) {
+    if (records_.has_wkt) head_.encoding |= kWktBit;
+    if (layout_.extra_numbers > 0) {
+      records_.add("LASF_Spec", 4, "Extra Bytes", layout_.extra_records());
+    }
+    const std::vector<std::byte> header = make_header();
+    out_.put(header.data(), header.size());
+    out_.put(records_.bytes.data(), records_.bytes.size());
+  }
+
+ private:
+  [[nodiscard]] std::vector<std::byte> make_header() const {
+    // Say what the file is and where it comes from
+    std::vector<std::byte> h;
+    for (const char c : {'L', 'A', 'S', 'F'}) append_value(h, c);
+    append_value(h, head_.source);
+    append_value(h, head_.encoding);
+    for (const std::byte byte : head_.guid) h.push_back(byte);
+    append_value(h, std::uint8_t{1});
+    append_value(h, std::uint8_t{4});
+    append_padded(h, head_.system);
+    append_padded(h, head_.software);
+    append_value(h, head_.day);
+    append_value(h, head_.year);
+    // Say where the points are and how they are laid out
+    append_value(h, kHeaderBytes);
+    append_value(h, static_cast<std::uint32_t>(kHeaderBytes + records_.bytes.size()));
+    append_value(h, records_.count);
+    append_value(h, layout_.point_format);
+    append_value(h, static_cast<std::uint16_t>(layout_.record_bytes));
+    h.resize(h.size() + 24);  // legacy counts, which are 0 from point format 6 on
+    // Say what they are
+    for (int i = 0; i < 3; ++i) append_value(h, head_.scale[i]);
+    for (int i = 0; i < 3; ++i) append_value(h, head_.offset[i]);
+    for (int i = 0; i < 3; ++i) {
+      append_value(h, coordinate(totals_.high, i));
+      append_value(h, coordinate(totals_.low, i));
+    }
+    h.resize(h.size() + 20);  // no waveforms, no extended records
+    append_value(h, totals_.points);
+    for (const std::uint64_t count : totals_.by_return) append_value(h, count);
+    return h;
+  }
+  [[nodiscard]] double coordinate(const std::array<std::int32_t, 3>& place, int i) const {
+    if (totals_.points == 0) return 0;
+    return place[static_cast<std::size_t>(i)] * head_.scale[i] + head_.offset[i];
+  }
+
+  void put(const Surfel& surfel, const std::byte* row) override {
+    std::ranges::fill(record_, std::byte{0});
+    const std::array<std::int32_t, 3> place = to_steps(surfel.position);
+    std::memcpy(record_.data(), place.data(), sizeof place);
+    unsigned returned = 1, returns = 0;
+    for (const PlacedChannel& field : layout_.fields) {
+      if (field.field == Field::return_number) {
+        returned = value_of(field, row);
+      } else if (field.field == Field::number_of_returns) {
+        returns = value_of(field, row);
+      } else {
+        set_field(field, row);
+      }
+    }
+    if (!has(Field::number_of_returns)) returns = returned;
+    set<std::uint8_t>(14, static_cast<std::uint8_t>(returned | returns << 4));
+    if (layout_.colour.exists()) {
+      const bool is_stored = layout_.colour.stored() != nullptr;
+      const std::array<std::uint16_t, 3> colour =
+          is_stored ? layout_.colour.stored_values(row) : layout_.colour.srgb(surfel, row);
+      std::memcpy(record_.data() + 30, colour.data(), sizeof colour);
+    }
+    set_extras(surfel, row);
+    out_.put(record_.data(), record_.size());
+    totals_.add(place, returned);
+  }
+
+  void end() override {
+    const std::vector<std::byte> header = make_header();
+    out_.put_at(0, header.data(), header.size());
+    out_.publish();
+  }
+
+  [[nodiscard]] std::array<std::int32_t, 3> to_steps(const glm::dvec3& position) const {
+    std::array<std::int32_t, 3> place{};
+    for (int i = 0; i < 3; ++i) {
+      const double steps = std::round((position[i] - head_.offset[i]) / head_.scale[i]);
+      if (!(std::abs(steps) <= std::numeric_limits<std::int32_t>::max())) {
+        throw std::invalid_argument("PointWriter: a point lies outside of the announced bounds");
+      }
+      place[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(steps);
+    }
+    return place;
+  }
+
+  [[nodiscard]] bool has(Field field) const {
+    return std::ranges::find(layout_.fields, field, &PlacedChannel::field) != layout_.fields.end();
+  }
+  // Returns the value of a field without a sign, cut to what fits.
+  static unsigned value_of(const PlacedChannel& field, const std::byte* row) {
+    const Channel& channel = field.channel.channel;
+    const std::int64_t value = load_integer(channel.type, field.channel.at(row, 0)) +
+                               static_cast<std::int64_t>(channel.offset);
+    return static_cast<unsigned>(std::min(value, most_of(field.field)));
+  }
+  template <typename T>
+  void set(std::size_t offset, T value) {
+    std::memcpy(record_.data() + offset, &value, sizeof value);
+  }
+  void set_bits(std::size_t offset, unsigned value) {
+    record_[offset] |= static_cast<std::byte>(value);
+  }
+
+  // Sets a place of point formats 6 to 8 other than the numbers of returns.
+  void set_field(const PlacedChannel& field, const std::byte* row) {
+    // Numbers with a sign or a fraction
+    const ChannelType type = field.channel.channel.type;
+    if (field.field == Field::gps_time) {
+      return set(22, load_number(type, field.channel.at(row, 0)));
+    }
+    if (field.field == Field::scan_angle) {
+      const double angle = load_number(type, field.channel.at(row, 0));
+      const double steps = type == ChannelType::i8 ? std::round(angle / 0.006) : angle;
+      return set(18, static_cast<std::int16_t>(steps));
+    }
+    // All others
+    const unsigned value = value_of(field, row);
+    switch (field.field) {
+      case Field::intensity:
+        return set(12, static_cast<std::uint16_t>(value));
+      case Field::class_flags:
+        return set_bits(15, value);
+      case Field::scanner_channel:
+        return set_bits(15, value << 4);
+      case Field::scan_direction:
+        return set_bits(15, value << 6);
+      case Field::edge_of_flight_line:
+        return set_bits(15, value << 7);
+      case Field::classification:
+        return set(16, static_cast<std::uint8_t>(value));
+      case Field::user_data:
+        return set(17, static_cast<std::uint8_t>(value));
+      case Field::point_source_id:
+        return set(20, static_cast<std::uint16_t>(value));
+      case Field::nir:
+        return set(36, static_cast<std::uint16_t>(type == ChannelType::u8 ? 257 * value : value));
+      default:
+        break;
+    }
+  }
+
+  void set_extras(const Surfel& surfel, const std::byte* row) {
+    std::byte* to = record_.data() + layout_.standard_bytes;
+    for (const Extra& extra : layout_.extras) {
+      const Channel& channel = extra.channel.channel;
+      if (extra.source != ExtraSource::channel) {
+        const std::size_t bytes = channel.components * sizeof(float);
+        std::memcpy(to, floats_of(extra.source, surfel), bytes);
+        to += bytes;
+        continue;
+      }
+      for (std::size_t i = 0; i < channel.components; ++i)
+        to = store_number(channel.type, extra.channel.at(row, i), extra_type(channel.type), to);
+    }
+  }
+  static const float* floats_of(ExtraSource source, const Surfel& surfel) {
+    switch (source) {
+      case ExtraSource::normal:
+        return &surfel.normal.x;
+      case ExtraSource::radiance:
+        return &surfel.radiance.x;
+      case ExtraSource::emission:
+        return &surfel.emission.x;
+      case ExtraSource::albedo:
+        return &surfel.albedo.x;
+      default:
+        return &surfel.radius;
+    }
+  }
+
+  Layout layout_;
+  Head head_;
+  Records records_;
+  Totals totals_;
+  std::vector<std::byte> record_;  // of the current point
+  BufferedOutput out_;
+};
+
+}  // namespace
+}  // namespace las
+
+std::unique_ptr<PointWriter> create_las(const std::filesystem::path& target,
+                                        const PointWriteInfo& info) {
+  las::Layout layout(info);
+  if (layout.extra_numbers > las::kMostExtraNumbers) {
+    throw RequestError("target",
+                       fmt::format("a .las holds at most {} numbers of each point beyond those of "
+                                   "the standard, but these points have {}",
+                                   las::kMostExtraNumbers, layout.extra_numbers));
+  }
+  return std::make_unique<las::LasWriter>(target, info, std::move(layout));
+}
+
+std::vector<std::string> las_losses(const PointWriteInfo& info) {
+  std::vector<std::string> sentences;
+  const las::Head head = las::plan_head(info);
+  const las::Layout layout(info);
+  const bool was_las = info.text.contains("las.header");
+  if (head.own_steps) {
+    sentences.push_back(
+        fmt::format("Positions are rounded to steps of {:.2g} units.", head.scale.x));
+    if (was_las) {
+      sentences.push_back(
+          "The steps of the LAS file that the points came from do not hold all positions.");
+    }
+  }
+  if (info.has_albedo && !layout.colour.hides_albedo() && layout.colour.stored() == nullptr) {
+    sentences.push_back("Colours are rounded to 16 bits on the sRGB curve.");
+  }
+  for (const las::PlacedChannel& field : layout.fields) {
+    const std::int64_t most = las::most_of(field.field);
+    if (was_las || most > 15) continue;
+    sentences.push_back(fmt::format("Values of the channel {} above {} become {}.",
+                                    field.channel.channel.name, most, most));
+  }
+  const las::Records records = las::plan_records(info);
+  sentences.insert(sentences.end(), records.dropped.begin(), records.dropped.end());
+  return sentences;
+}
+
+}  // namespace ptc

@@ -1,0 +1,200 @@
+// Chooses the writer of a format, and says what a format does not keep.
+//
+// A loss is known before the first point: it follows from the types of the channels, the bounds
+// and the facts about the file. Values are not looked at, so a sentence about integers that may
+// not fit says from which number on they do not.
+#include "engine/io/cloud/point_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/point_rows.h"
+#include "engine/io/text/text.h"
+
+namespace ptc {
+namespace {
+
+struct Format {
+  OutputFormat format;
+  std::unique_ptr<PointWriter> (*create)(const std::filesystem::path&, const PointWriteInfo&);
+  std::vector<std::string> (*losses)(const PointWriteInfo&);
+  bool shows_colour;  ///< PointWriteInfo::colour_from may be given
+};
+
+const Format& entry_of(OutputFormat format) {
+  static const auto lossless = [](const PointWriteInfo& info) {
+    std::vector<std::string> sentences;
+    add_unscaled_channels(sentences, info);
+    add_lost_crs(sentences, info);
+    return sentences;
+  };
+  static const std::array<Format, 8> kFormats{{
+      {OutputFormat::bgeo, create_bgeo, bgeo_losses, true},
+      {OutputFormat::las, create_las, las_losses, true},
+      {OutputFormat::pcd, create_pcd, pcd_losses, true},
+      {OutputFormat::ply, create_ply, ply_losses, false},
+      {OutputFormat::ptc, create_ptc, ptc_losses, false},
+      {OutputFormat::usda, create_usda, usd_losses, true},
+      {OutputFormat::usdc, create_usdc, usd_losses, true},
+      {OutputFormat::xyz, create_xyz, lossless, false},
+  }};
+  return kFormats.at(static_cast<std::size_t>(format));
+}
+
+void check_colour(const Format& format, const PointWriteInfo& info) {
+  if (info.colour_from.empty()) return;
+  if (!format.shows_colour) {
+    throw RequestError("colour_from",
+                       "`colour_from` does not go with this format, which has no colour to show");
+  }
+  const auto is_wanted = [&](const Channel& channel) {
+    return channel.name == info.colour_from && channel_bytes(channel.type) != 0 &&
+           (channel.components == 1 || channel.components == 3);
+  };
+  if (std::ranges::none_of(info.channels, is_wanted)) {
+    throw RequestError(
+        "colour_from",
+        "`colour_from` names no channel of one or three components: " + info.colour_from);
+  }
+}
+
+// Returns the bits of the greatest integers of a type, or of the fraction of a floating-point one.
+int digits_of(ChannelType type) {
+  switch (type) {
+    case ChannelType::u32:
+    case ChannelType::i32:
+      return 32;
+    case ChannelType::u64:
+    case ChannelType::i64:
+      return 64;
+    case ChannelType::f64:
+      return 53;
+    default:
+      return 24;  // every value is a float
+  }
+}
+
+}  // namespace
+
+void CheckedWriter::write(std::span<const Surfel> surfels, std::span<const std::byte> rows) {
+  if (rows.size() != surfels.size() * row_bytes_) {
+    throw std::invalid_argument(fmt::format("PointWriter: {} bytes of attributes for {} points",
+                                            rows.size(), surfels.size()));
+  }
+  const std::uint64_t left = announced_ - std::min(written_, announced_);
+  const std::size_t fitting =
+      static_cast<std::size_t>(std::min<std::uint64_t>(left, surfels.size()));
+  for (std::size_t i = 0; i < fitting; ++i) put(surfels[i], rows.data() + i * row_bytes_);
+  written_ += surfels.size();  // with points beyond the announced ones, finish() refuses the file
+}
+
+void CheckedWriter::finish() {
+  if (written_ != announced_) {
+    throw std::invalid_argument(
+        fmt::format("PointWriter: {} points instead of {}", written_, announced_));
+  }
+  end();
+}
+
+std::unique_ptr<PointWriter> create_points(const std::filesystem::path& target, OutputFormat format,
+                                           const PointWriteInfo& info) {
+  const Format& entry = entry_of(format);
+  check_colour(entry, info);
+  return entry.create(target, info);
+}
+
+std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info) {
+  std::vector<std::string> sentences = entry_of(format).losses(info);
+  for (const Channel& channel : info.channels) {
+    if (channel_bytes(channel.type) != 0) continue;
+    sentences.push_back("The channel " + channel.name +
+                        " is left out: its type is one of a later version.");
+  }
+  return sentences;
+}
+
+std::optional<OutputFormat> output_format(const std::filesystem::path& path) {
+  using enum OutputFormat;
+  constexpr std::array<std::pair<std::string_view, OutputFormat>, 11> kEndings{{
+      {".bgeo", bgeo},
+      {".las", las},
+      {".pcd", pcd},
+      {".ply", ply},
+      {".ptc", ptc},
+      {".usd", usdc},
+      {".usda", usda},
+      {".usdc", usdc},
+      {".asc", xyz},
+      {".txt", xyz},
+      {".xyz", xyz},
+  }};
+  const std::string ending = lower_extension(path);
+  if (ending == ".laz") {
+    throw RequestError("target", "LAZ is read but not written: name a .las, which holds the same");
+  }
+  const auto* const found =
+      std::ranges::find(kEndings, ending, &std::pair<std::string_view, OutputFormat>::first);
+  if (found == kEndings.end()) return std::nullopt;
+  return found->second;
+}
+
+double float_error(const Bounds& bounds) noexcept {
+  if (bounds.empty()) return 0;
+  double most = 0;
+  for (int i = 0; i < 3; ++i) {
+    most = std::max({most, std::abs(bounds.low[i]), std::abs(bounds.high[i])});
+  }
+  if (most == 0) return 0;
+  if (most > static_cast<double>(std::numeric_limits<float>::max())) return most;
+  return std::ldexp(0.5, std::ilogb(most) - 23);  // half of the last place
+}
+
+double least_spacing(const PointWriteInfo& info) noexcept {
+  if (info.bounds.empty() || info.count == 0) return 0;
+  const glm::dvec3 sides = info.bounds.high - info.bounds.low;
+  return std::max({sides.x, sides.y, sides.z}) / std::sqrt(static_cast<double>(info.count));
+}
+
+void add_float_positions(std::vector<std::string>& losses, const Bounds& bounds) {
+  const double error = float_error(bounds);
+  if (error == 0) return;
+  losses.push_back(fmt::format("Positions are rounded to float, by up to {:.2g} units.", error));
+}
+
+void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo& info,
+                          int digits) {
+  for (const Channel& channel : info.channels) {
+    if (digits_of(channel.type) <= digits) continue;
+    if (channel.type == ChannelType::f64) {
+      losses.push_back("The channel " + channel.name + " is rounded from double to float.");
+    } else {
+      losses.push_back(fmt::format("Integers of the channel {} are rounded from 2^{} on.",
+                                   channel.name, digits));
+    }
+  }
+}
+
+void add_unscaled_channels(std::vector<std::string>& losses, const PointWriteInfo& info) {
+  for (const Channel& channel : info.channels) {
+    if (channel.scale == 1 && channel.offset == 0) continue;
+    losses.push_back(
+        fmt::format("The file does not say that a value v of the channel {} means {} v + {}.",
+                    channel.name, channel.scale, channel.offset));
+  }
+}
+
+void add_lost_crs(std::vector<std::string>& losses, const PointWriteInfo& info) {
+  if (!info.text.contains("crs")) return;
+  losses.push_back("The file does not name its coordinate reference system.");
+}
+
+}  // namespace ptc

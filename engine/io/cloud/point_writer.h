@@ -1,0 +1,91 @@
+// Writing of point clouds in the formats that other programs read.
+//
+//   create_points() --> PointWriter --write(), write() ...--> --finish()--> the target is replaced
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/base/surfel.h"
+#include "format/schema.h"
+
+namespace ptc {
+
+/// A format in which points can be written.
+enum class OutputFormat : std::uint8_t {
+  bgeo,  ///< Houdini's classic binary geometry, version 5
+  las,   ///< LAS 1.4, point format 6, 7 or 8
+  pcd,   ///< Point Cloud Library, version 0.7, binary
+  ply,   ///< binary little-endian PLY
+  ptc,   ///< RenderMan point cloud
+  usda,  ///< USD as text: one prim of type Points
+  usdc,  ///< USD as a crate file: one prim of type Points
+  xyz    ///< text with one point on each line
+};
+
+/// What a point file will hold.
+struct PointWriteInfo {
+  std::uint64_t count = 0;                  ///< exact number of points
+  std::vector<Channel> channels;            ///< columns of the rows of write(), in their order
+  std::map<std::string, std::string> text;  ///< facts under the keys of spec/points.md#texts
+  Bounds bounds;                            ///< holds all points, scene units
+  bool has_normals = false;                 ///< the normals of the surfels are worth writing
+  bool has_radius = false;                  ///< the radii are
+  bool has_radiance = false;                ///< the radiances are
+  bool has_albedo = false;                  ///< the albedos are
+  bool emits = false;                       ///< the emissions are
+  /// The channel that viewers shall show as the colour of a point, in place of its albedo; empty to
+  /// show the albedo. The channel `occlusion` becomes a grey, white where nothing covers the point;
+  /// another channel of one component is a grey itself; three components are linear light, which is
+  /// compressed to the range of a screen. The formats bgeo, las, pcd, usda and usdc have such a
+  /// colour.
+  std::string colour_from;
+};
+
+/// Writes the points of one file, in the order in which they come.
+///
+/// The target is replaced by finish(). A writer that is destroyed before leaves the target as it
+/// was.
+class PointWriter {
+ public:
+  virtual ~PointWriter() = default;
+  /// Writes the next points.
+  /// @param rows  the values of all channels of each point, little-endian and without padding, as
+  ///              PointSource::attributes() has them
+  /// @throws std::invalid_argument when `rows` has another size, or when a point lies outside of
+  ///         the bounds of a LAS file; std::system_error
+  virtual void write(std::span<const Surfel> surfels, std::span<const std::byte> rows) = 0;
+  /// Ends the file and puts it in the place of its target.
+  /// @throws std::invalid_argument when the number of points is not the announced one;
+  ///         std::system_error
+  virtual void finish() = 0;
+};
+
+/// Begins a file of points.
+///
+/// Nothing that a surfel or a channel holds is left out without a sentence in losses().
+/// @throws RequestError about `target` when the format cannot hold so many points or channels, or
+///         about `colour_from` when no channel has this name or the format shows no colours;
+///         std::system_error
+/// Memory: below 4 MiB, and 64 KiB for each channel of a USD file.
+[[nodiscard]] std::unique_ptr<PointWriter> create_points(const std::filesystem::path& target,
+                                                         OutputFormat format,
+                                                         const PointWriteInfo& info);
+
+/// Returns what a file of this format would not keep, and what it would round and by how much, a
+/// sentence each.
+[[nodiscard]] std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info);
+
+/// Returns the format that the ending of a name stands for; nothing for an ending that names no
+/// format of points.
+/// @throws RequestError about `target` for .laz, which is only read
+[[nodiscard]] std::optional<OutputFormat> output_format(const std::filesystem::path& path);
+
+}  // namespace ptc

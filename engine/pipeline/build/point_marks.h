@@ -1,0 +1,79 @@
+// What the completion of a scan says of single points: marks, on their way to a channel.
+//
+// A mark travels in PointRecord::flags from the scan through later stages. A tap takes it out
+// before the octree is built, in whose pages flags are 0.
+//
+//   complete_scan --> marked_points --> merge, unique --> PointMarks::tap --> round, build
+//                     flags = mark                          | flags = 0
+//                                                           '--> temporary file --> write()
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "engine/base/stream.h"
+#include "engine/io/file/file.h"
+#include "engine/scan/scan.h"
+#include "engine/store/writer.h"
+#include "format/schema.h"
+
+namespace ptc {
+
+/// The name of the channel that is 1 for points far from all others, else 0.
+inline constexpr const char* kOutlierChannel = "outlier";
+/// The name of the channel that says how far a receiver must rise above a point to stand clear of
+/// the noise of its surface, in eighths of the point's radius.
+inline constexpr const char* kRiseChannel = "rise";
+
+/// Adds these channels to a record, in a group of their own behind all others.
+/// @return whether there is room for them: no channel has their names, and there is a group left
+[[nodiscard]] bool add_marks(Meta& meta);
+
+/// Where the rise of a point lies in a row of its channels.
+class RisePlace {
+ public:
+  /// Looks for the channel. @param channels  of a row
+  explicit RisePlace(std::span<const Channel> channels);
+
+  /// Says whether there is such a channel.
+  [[nodiscard]] bool exists() const noexcept { return exists_; }
+  /// Returns how far a receiver must rise above a point, in radii; 0 without the channel.
+  /// @param row  of the point; null where nothing is known of it
+  [[nodiscard]] float radii(const std::byte* row) const noexcept {
+    return exists_ && row ? 0.125F * static_cast<float>(std::to_integer<unsigned>(row[offset_]))
+                          : 0;
+  }
+
+ private:
+  bool exists_ = false;
+  std::size_t offset_ = 0;
+};
+
+/// Yields the points of a completed scan with their marks as flags.
+[[nodiscard]] std::unique_ptr<PointStream> marked_points(std::unique_ptr<ScanStream> scan);
+
+/// Yields the points of a stream without those whose key is that of the point before.
+/// @param sorted  must outlive the result
+[[nodiscard]] std::unique_ptr<PointStream> unique_points(PointStream& sorted);
+
+/// Keeps the marks of a stream, a byte for each point, in a temporary file.
+class PointMarks {
+ public:
+  explicit PointMarks(const std::filesystem::path& directory) : file_(directory) {}
+
+  /// Yields the points of a stream with flags of 0, and keeps their marks.
+  /// @param points  must outlive the result, as must this object
+  [[nodiscard]] std::unique_ptr<PointStream> tap(PointStream& points);
+  /// Writes the attribute pages of the channels.
+  /// @param points    number of points that passed the tap
+  /// @param channels  of the file; the last are those of add_marks()
+  void write(std::uint64_t points, std::span<const Channel> channels, ContainerWriter& writer);
+
+ private:
+  TempFile file_;
+};
+
+}  // namespace ptc

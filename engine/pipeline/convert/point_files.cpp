@@ -1,0 +1,173 @@
+#include "engine/pipeline/convert/point_files.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/io/cloud/points.h"
+#include "engine/parallel/thread_pool.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/build/attributes.h"
+#include "engine/pipeline/convert/container_source.h"
+#include "engine/pipeline/point_input.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kBlock = 1 << 13;  // points that are copied at once
+
+OutputFormat format_of(const std::filesystem::path& target) {
+  const std::optional<OutputFormat> format = output_format(target);
+  if (format) return *format;
+  throw RequestError("target", target.string() +
+                                   ": the ending of the name stands for no format of points that "
+                                   "can be written");
+}
+
+/// Copies all points of a source to a file.
+void copy_points(PointSource& source, const std::filesystem::path& target, OutputFormat format,
+                 const PointWriteInfo& info, Progress& progress) {
+  const std::unique_ptr<PointWriter> writer = create_points(target, format, info);
+  std::vector<Surfel> block(kBlock);
+  while (const std::size_t count = source.next(block)) {
+    writer->write(std::span(block).first(count), source.attributes());
+    progress.advance(count);
+  }
+  writer->finish();
+}
+
+/// Counts the points of a source and finds their bounds.
+void measure(PointSource& source, PointWriteInfo& info, Progress* progress = nullptr) {
+  info.count = 0;
+  info.bounds = {};
+  std::vector<Surfel> block(kBlock);
+  while (const std::size_t count = source.next(block)) {
+    for (std::size_t i = 0; i < count; ++i) info.bounds.add(block[i].position);
+    info.count += count;
+    if (progress) progress->advance(count);
+  }
+}
+
+/// Opens the points of a container that the options take, in their order.
+/// @param sort_bytes  memory of the sort, which only the order of the input needs
+std::unique_ptr<PointSource> open_ordered(const ContainerReader& container,
+                                          const PointFileOptions& options,
+                                          const std::filesystem::path& target,
+                                          std::uint64_t sort_bytes, const Executor& executor) {
+  if (!options.original_order) return open_selected(container, options.selection);
+  auto points = open_in_input_order(
+      container, {.memory_bytes = sort_bytes, .temp_dirs = temp_dirs(options.run, target)},
+      executor);
+  if (options.selection.takes_all() && !options.selection.channels) return points;
+  std::vector<Channel> channels = container.meta().channels;
+  std::erase_if(channels, [](const Channel& c) { return c.name == kOriginalIndex; });
+  return select_points(std::move(points), channels, options.selection, container.path());
+}
+
+/// Opens a file that was written and compares it with what it should hold.
+/// @throws DataError when it differs
+void compare_written(const std::filesystem::path& target, OutputFormat format,
+                     const PointWriteInfo& info) {
+  if (format == OutputFormat::usda || format == OutputFormat::usdc) return;  // they are not read
+  const PointFile written = open_points(target);
+  if (written.info.count && *written.info.count != info.count) {
+    throw DataError(fmt::format("{}: {} points were written, but the file has {}", target.string(),
+                                info.count, *written.info.count));
+  }
+}
+
+}  // namespace
+
+PointWriteInfo describe_points(const ContainerReader& container, const PointFileOptions& options) {
+  const Superblock& superblock = container.superblock();
+  const auto& [low, high] = std::pair(superblock.bounds_low, superblock.bounds_high);
+  const Selection& selection = options.selection;
+  PointWriteInfo info{.count = superblock.points,
+                      .text = container.meta().text,
+                      .has_normals = true,
+                      .has_radius = true,
+                      .has_radiance = superblock.flux != std::array<double, 3>{},
+                      .has_albedo = !selection.level,
+                      .emits = container.header().point_bytes != kPointBytes && !selection.level,
+                      .colour_from = options.colour_from};
+  info.bounds = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+  if (!selection.level)
+    info.channels = kept_channels(container.meta().channels, selection, container.path());
+  if (options.original_order)
+    std::erase_if(info.channels, [](const Channel& c) { return c.name == kOriginalIndex; });
+  if (!selection.takes_all()) measure(*open_selected(container, selection), info);
+  return info;
+}
+
+PointWriteInfo describe_points(const std::filesystem::path& cloud, const PointFileOptions& options,
+                               Progress& progress) {
+  PointFile file = open_point_input(cloud, options.selection);
+  for (const std::string& note : file.info.notes)
+    progress.note(cloud.filename().string() + ": " + note);
+  PointWriteInfo info{.channels = file.info.channels,
+                      .text = file.info.text,
+                      .has_normals = file.info.has_normals,
+                      .has_radius = file.info.has_radius,
+                      .has_radiance = file.info.has_radiance,
+                      .has_albedo = file.info.has_albedo,
+                      .emits = file.info.has_emission,
+                      .colour_from = options.colour_from};
+  measure(*file.source, info, &progress);
+  return info;
+}
+
+ConvertReport container_to_points(const ContainerReader& container,
+                                  const std::filesystem::path& target,
+                                  const PointFileOptions& options, Progress& progress) {
+  // Check the request and the memory
+  const OutputFormat format = format_of(target);
+  if (options.original_order && !has_input_order(container)) {
+    throw RequestError("original_order",
+                       container.path().string() +
+                           ": `original_order` needs the place that each point had in its input: "
+                           "build the container with it, too");
+  }
+  require_request(!(options.original_order && options.selection.level), "level",
+                  "`level` takes clusters, which have no place in the input: leave out "
+                  "`original_order`");
+  MemoryBudget budget = budget_of(options.run.memory_bytes, "this conversion");
+  charge_directory(budget, container);
+  const std::uint64_t sort_bytes =
+      budget.rest("the sort", options.original_order ? input_order_bytes(container) : 0);
+
+  // Write the points
+  const PointWriteInfo info = describe_points(container, options);
+  ConvertReport report{.points = info.count};
+  {
+    const Stage stage(report.seconds, progress, "convert", info.count, "points");
+    const ThreadPool executor(options.run.threads);
+    const std::unique_ptr<PointSource> source =
+        open_ordered(container, options, target, sort_bytes, executor);
+    copy_points(*source, target, format, info, progress);
+  }
+  compare_written(target, format, info);
+  return report;
+}
+
+ConvertReport cloud_to_points(const std::filesystem::path& cloud,
+                              const std::filesystem::path& target, const PointFileOptions& options,
+                              Progress& progress) {
+  const OutputFormat format = format_of(target);
+  ConvertReport report;
+  PointWriteInfo info;
+  {
+    const Stage stage(report.seconds, progress, "measure", 0, "points");
+    info = describe_points(cloud, options, progress);
+  }
+  report.points = info.count;
+  {
+    const Stage stage(report.seconds, progress, "convert", info.count, "points");
+    copy_points(*open_point_input(cloud, options.selection).source, target, format, info, progress);
+  }
+  compare_written(target, format, info);
+  return report;
+}
+
+}  // namespace ptc

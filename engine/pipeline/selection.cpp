@@ -1,0 +1,123 @@
+#include "engine/pipeline/selection.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/io/cloud/point_rows.h"
+
+namespace ptc {
+namespace {
+
+constexpr const char* kClassChannel = "classification";
+
+/// Returns the names of channels for an error.
+std::string names_of(std::span<const Channel> channels) {
+  std::string names;
+  for (const Channel& channel : channels) names += (names.empty() ? "" : ", ") + channel.name;
+  return names.empty() ? "it has no channels" : "it has " + names;
+}
+
+/// The points of another source that pass a selection.
+class SelectedPoints : public PointSource {
+ public:
+  SelectedPoints(std::unique_ptr<PointSource> source, std::span<const Channel> channels,
+                 const Selection& selection, const std::filesystem::path& path)
+      : source_(std::move(source)), selection_(selection) {
+    const std::vector<Channel> kept = kept_channels(channels, selection, path);
+    bool has_classes = false;
+    for (const Channel& channel : channels) {
+      const std::size_t bytes = channel.component_bytes() * channel.components;
+      if (channel.name == kClassChannel && channel.components == 1 && is_integer(channel.type)) {
+        has_classes = true;
+        class_type_ = channel.type;
+        class_offset_ = row_bytes_;
+      }
+      if (std::ranges::find(kept, channel.name, &Channel::name) != kept.end())
+        copies_.push_back({row_bytes_, bytes});
+      row_bytes_ += bytes;
+    }
+    if (!selection.classes.empty() && !has_classes) {
+      throw RequestError("classes", path.string() +
+                                        ": there is no channel of whole numbers named " +
+                                        kClassChannel + ": " + names_of(channels));
+    }
+  }
+
+  std::size_t next(std::span<Surfel> out) override {
+    rows_.clear();
+    while (const std::size_t count = source_->next(out)) {
+      const std::byte* row = source_->attributes().data();
+      std::size_t taken = 0;
+      for (std::size_t i = 0; i < count; ++i, row += row_bytes_) {
+        if (!takes(out[i], row)) continue;
+        out[taken++] = out[i];
+        for (const Copy& copy : copies_)
+          rows_.insert(rows_.end(), row + copy.offset, row + copy.offset + copy.bytes);
+      }
+      if (taken > 0) return taken;
+    }
+    return 0;
+  }
+
+  [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return rows_; }
+  [[nodiscard]] std::uint64_t left_out() const noexcept override { return source_->left_out(); }
+
+ private:
+  /// A run of bytes of a row that is kept.
+  struct Copy {
+    std::size_t offset, bytes;
+  };
+
+  bool takes(const Surfel& surfel, const std::byte* row) {
+    const glm::dvec3& p = surfel.position;
+    if (const auto& box = selection_.box) {
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!(p[axis] >= box->low[axis] && p[axis] <= box->high[axis])) return false;
+      }
+    }
+    if (!selection_.classes.empty()) {
+      const std::int64_t number = load_integer(class_type_, row + class_offset_);
+      if (number < 0 || std::ranges::find(selection_.classes, static_cast<std::uint64_t>(number)) ==
+                            selection_.classes.end())
+        return false;
+    }
+    return passed_++ % selection_.every == 0;
+  }
+
+  std::unique_ptr<PointSource> source_;
+  Selection selection_;
+  std::size_t row_bytes_ = 0;
+  ChannelType class_type_ = ChannelType::u8;
+  std::size_t class_offset_ = 0;
+  std::vector<Copy> copies_;
+  std::vector<std::byte> rows_;  ///< of the points that next() returned last
+  std::uint64_t passed_ = 0;     ///< points that all other conditions took
+};
+
+}  // namespace
+
+std::vector<Channel> kept_channels(std::span<const Channel> channels, const Selection& selection,
+                                   const std::filesystem::path& path) {
+  if (!selection.channels) return {channels.begin(), channels.end()};
+  for (const std::string& name : *selection.channels) {
+    if (std::ranges::find(channels, name, &Channel::name) != channels.end()) continue;
+    throw RequestError("channels", path.string() + ": there is no channel named " + name + ": " +
+                                       names_of(channels));
+  }
+  std::vector<Channel> kept;
+  for (const Channel& channel : channels) {
+    if (std::ranges::find(*selection.channels, channel.name) != selection.channels->end())
+      kept.push_back(channel);
+  }
+  return kept;
+}
+
+std::unique_ptr<PointSource> select_points(std::unique_ptr<PointSource> source,
+                                           std::span<const Channel> channels,
+                                           const Selection& selection,
+                                           const std::filesystem::path& path) {
+  return std::make_unique<SelectedPoints>(std::move(source), channels, selection, path);
+}
+
+}  // namespace ptc

@@ -1,0 +1,369 @@
+#include "engine/scan/orientation.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "format/instruction_sets.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+using Vec3 = std::array<float, 3>;
+
+constexpr float kGrazing = 0.1F;      // cosine below which a known direction decides no side alone
+constexpr int kFewest = 3;            // neighbours without which there is no plane
+constexpr float kDoubt = 0.6F;        // |m| up to which a vote says nothing
+constexpr float kNoiseReach = 2;      // offsets along normals that noise explains, in its RMS
+constexpr int kSafe = kFullVote / 2;  // of a single vote, to join places in a block
+constexpr std::int64_t kFirm = 6 * kFullVote;  // of the sum between patches, to join in a chunk
+
+float dot(const Vec3& a, const Vec3& b) noexcept {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void flip(Vec3& v) noexcept {
+  for (float& x : v) x = -x;
+}
+
+/// Moves a number towards 0 by what noise may explain.
+float less_noise(float x, float noise) noexcept {
+  return std::max(x - noise, 0.0F) + std::min(x + noise, 0.0F);
+}
+
+/// Returns the vote of two places; see vote_of(). It has no branches, so that a loop over several
+/// links becomes one over vectors.
+int plain_vote(float ax, float ay, float az, float a_noise, float bx, float by, float bz,
+               float b_noise, float x, float y, float z) noexcept {
+  const float squared = std::max(x * x + y * y + z * z, 1e-30F);
+  const float noise = kNoiseReach / 2 * (a_noise + b_noise);
+  const float along_a = less_noise(x * ax + y * ay + z * az, noise);
+  const float along_b = less_noise(x * bx + y * by + z * bz, noise);
+  const float both = along_a * along_b / squared, cosine = ax * bx + ay * by + az * bz;
+  const float mirrored = cosine - 2 * both;
+  const float sure = std::min(1.0F, (std::abs(mirrored) - kDoubt) * (1 / (1 - kDoubt)));
+  const float vote = std::max(0.0F, sure) * kFullVote;
+  const float sign = mirrored < 0 ? -1.0F : 1.0F;
+  const float through = std::abs(both) > 0.5F && std::abs(cosine) > 0.7F ? 0.0F : 1.0F;
+  const float apart = squared > 1e-30F ? 1.0F : 0.0F;
+  return static_cast<int>(vote * sign * through * apart);
+}
+
+/// The other ends of the links of a place.
+struct LinkLanes {
+  float nx[kLinks], ny[kLinks], nz[kLinks], noise[kLinks], x[kLinks], y[kLinks], z[kLinks];
+};
+
+/// The work on one chunk. Votes are computed once, for the normals as they were fitted; signs tell
+/// which of these are flipped in the meantime.
+class ChunkOrientation {
+ public:
+  ChunkOrientation(ScanChunk& chunk, ChunkPieces& pieces, OrientationRoom& room)
+      : chunk_(chunk),
+        pieces_(pieces),
+        count_(static_cast<std::uint32_t>(chunk.places.size())),
+        room_(room) {}
+
+  void run(const KnownSides& sides) {
+    pieces_.of.assign(count_, 0);
+    pieces_.votes.clear();
+    set_known(sides);
+    if (std::ranges::find(room_.known, 0) != room_.known.end()) {
+      room_.sign.assign(count_, 1);
+      count_votes();
+      join_patches();
+      join_pieces();
+      flip_single();
+      for (std::uint32_t i = 0; i < count_; ++i) {
+        if (room_.sign[i] < 0) flip(chunk_.fits[i].normal);
+      }
+    }
+    add_up();
+  }
+
+ private:
+  /// Turns the normals whose side is known.
+  void set_known(const KnownSides& sides) {
+    room_.known.assign(count_, 1);
+    room_.lean.assign(count_, 0);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const Place& place = chunk_.places[i];
+      Vec3& normal = chunk_.fits[i].normal;
+      if (place.unknown_normal == 0) {
+        const auto uv = std::bit_cast<std::array<std::int16_t, 2>>(place.normal);
+        normal = decode_octahedral(uv[0], uv[1]);
+        continue;
+      }
+      const auto towards = sides.towards(place, chunk_.positions[i]);
+      if (chunk_.fits[i].count < kFewest) {
+        normal = towards.value_or(sides.up());
+        continue;
+      }
+      const float cosine = towards ? dot(normal, *towards) : 0;
+      if (cosine < 0) flip(normal);
+      room_.lean[i] = std::abs(cosine);
+      room_.known[i] = room_.lean[i] >= kGrazing ? 1 : 0;
+    }
+  }
+
+  /// Computes the votes of all links of which one end at least is unknown.
+  void count_votes() {
+    std::vector<LinkEnd>& ends = room_.ends;
+    ends.resize(count_);
+    for (std::uint32_t i = 0; i < count_; ++i)
+      ends[i] = {chunk_.fits[i].normal, chunk_.fits[i].noise};
+    room_.votes.assign(count_, {});
+    with_instructions(widest_instructions(), [this, &ends] {
+      for (std::uint32_t i = 0; i < count_; ++i) {
+        LinkLanes lanes{};
+        const LatticePosition& p = chunk_.positions[i];
+        for (std::size_t link = 0; link < kLinks; ++link) {
+          const std::uint32_t j = chunk_.links[i][link];
+          if (j == kNoLink || (room_.known[i] != 0 && room_.known[j] != 0)) continue;
+          const LinkEnd& end = ends[j];
+          const LatticePosition& q = chunk_.positions[j];
+          lanes.nx[link] = end.normal[0];
+          lanes.ny[link] = end.normal[1];
+          lanes.nz[link] = end.normal[2];
+          lanes.noise[link] = end.noise;
+          lanes.x[link] = static_cast<float>(q[0] - p[0]);
+          lanes.y[link] = static_cast<float>(q[1] - p[1]);
+          lanes.z[link] = static_cast<float>(q[2] - p[2]);
+        }
+        const LinkEnd own = ends[i];
+        std::int16_t* votes = room_.votes[i].data();
+        for (std::size_t k = 0; k < kLinks; ++k) {
+          votes[k] = static_cast<std::int16_t>(plain_vote(
+              own.normal[0], own.normal[1], own.normal[2], own.noise, lanes.nx[k], lanes.ny[k],
+              lanes.nz[k], lanes.noise[k], lanes.x[k], lanes.y[k], lanes.z[k]));
+        }
+      }
+    });
+  }
+
+  /// Joins the places of each block to patches, along links that are safe. Patch 0 is the known
+  /// one.
+  void join_patches() {
+    SignedGroups& groups = room_.groups;
+    groups.reset(count_);
+    for (const PlaceBlock& block : chunk_.blocks) {
+      for (std::uint32_t i = block.begin; i < block.end; ++i) {
+        if (room_.known[i] != 0) continue;
+        for (std::size_t link = 0; link < kLinks; ++link) {
+          const std::uint32_t j = chunk_.links[i][link];
+          const int vote = room_.votes[i][link];
+          if (std::abs(vote) < kSafe || j < block.begin || j >= block.end || room_.known[j] != 0)
+            continue;
+          groups.join(i, j, vote < 0);
+        }
+      }
+    }
+    room_.patch.assign(count_, 0);
+    std::vector<std::uint32_t>& number = room_.number;
+    number.assign(count_, 0);
+    patches_ = 1;
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      if (room_.known[i] != 0) continue;
+      const SignedGroups::Group group = groups.find(i);
+      if (number[group.root] == 0) number[group.root] = patches_++;
+      room_.patch[i] = number[group.root];
+      if (group.flipped) room_.sign[i] = -1;
+    }
+  }
+
+  /// Joins patches to pieces by the votes between them.
+  void join_pieces() {
+    // Add up the votes.
+    SignedGraph graph(patches_);
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      for (std::size_t link = 0; link < kLinks; ++link) {
+        const std::uint32_t j = chunk_.links[i][link];
+        if (room_.votes[i][link] != 0 && room_.patch[i] != room_.patch[j])
+          graph.add(room_.patch[i], room_.patch[j],
+                    room_.votes[i][link] * room_.sign[i] * room_.sign[j]);
+      }
+      if (room_.known[i] == 0 && room_.lean[i] > 0)
+        graph.add(0, room_.patch[i], static_cast<int>(room_.lean[i] * kFullVote) * room_.sign[i]);
+    }
+    // Contract what is firm, or everything when too many pieces would be left.
+    graph.contract(kFirm);
+    if (number_pieces(graph) > kMostPieces) {
+      graph.contract(1);
+      number_pieces(graph);
+    }
+    // Flip so that the known piece stays as it is.
+    const SignedGraph::Group known = graph.find(0);
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      const SignedGraph::Group group = graph.find(room_.patch[i]);
+      const bool turned = known.flipped && group.root == known.root;
+      if (group.flipped != turned) room_.sign[i] = static_cast<std::int8_t>(-room_.sign[i]);
+      pieces_.of[i] = static_cast<std::uint16_t>(room_.number[group.root]);
+    }
+    for (const SignedGraph::Edge& edge : graph.edges()) {
+      const bool turned = known.flipped && (edge.a == known.root || edge.b == known.root);
+      pieces_.votes.push_back(
+          {room_.number[edge.a], room_.number[edge.b], turned ? -edge.vote : edge.vote});
+    }
+  }
+
+  /// Numbers the groups of patches in the order of their first patch. Those past the maximum share
+  /// the last number. @return the number of groups
+  std::size_t number_pieces(SignedGraph& graph) {
+    room_.number.assign(patches_, kNoLink);
+    std::uint32_t next = 0;
+    for (std::uint32_t patch = 0; patch < patches_; ++patch) {
+      std::uint32_t& number = room_.number[graph.find(patch).root];
+      if (number == kNoLink) number = std::min<std::uint32_t>(next++, kMostPieces - 1);
+    }
+    return next;
+  }
+
+  /// Flips places that most of their neighbours in the piece vote against.
+  void flip_single() {
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      if (room_.known[i] != 0) continue;
+      int sum = 0;
+      for (std::size_t link = 0; link < kLinks; ++link) {
+        const std::uint32_t j = chunk_.links[i][link];
+        if (room_.votes[i][link] != 0 && pieces_.of[i] == pieces_.of[j])
+          sum += room_.votes[i][link] * room_.sign[j];
+      }
+      if (sum * room_.sign[i] < 0) room_.sign[i] = static_cast<std::int8_t>(-room_.sign[i]);
+    }
+  }
+
+  void add_up() {
+    const std::uint16_t last = *std::ranges::max_element(pieces_.of);
+    pieces_.sums.assign(last + std::size_t{1}, {});
+    for (std::size_t i = 0; i < count_; ++i) {
+      const PlaceFit& fit = chunk_.fits[i];
+      const LatticePosition& p = chunk_.positions[i];
+      const double area = static_cast<double>(fit.reach) * static_cast<double>(fit.reach);
+      PieceSums& sums = pieces_.sums[pieces_.of[i]];
+      sums.area += area;
+      ++sums.places;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double along = area * static_cast<double>(fit.normal[k]);
+        sums.normal[k] += along;
+        sums.position[k] += area * p[k];
+        sums.flux += along * p[k];
+      }
+    }
+  }
+
+  ScanChunk& chunk_;
+  ChunkPieces& pieces_;
+  std::uint32_t count_;
+  OrientationRoom& room_;
+  std::uint32_t patches_ = 0;
+};
+
+/// Says whether an island is to be flipped: a closed one turns outwards, an open sheet upwards.
+bool points_inwards(const PieceSums& island, const Vec3& up) noexcept {
+  constexpr double kOpen = 0.4;  // mean of the normals from which on an island is a sheet
+  if (!(island.area > 0)) return false;
+  double upwards = 0, outwards = island.flux, length = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double mean = island.normal[k] / island.area;
+    length += mean * mean;
+    upwards += mean * up[k];
+    outwards -= island.normal[k] * island.position[k] / island.area;
+  }
+  const bool sheet = std::sqrt(length) > kOpen && std::abs(upwards) > kOpen / 2;
+  return sheet ? upwards < 0 : outwards < 0;
+}
+
+}  // namespace
+
+std::int64_t vote_of(const LinkEnd& a, const LinkEnd& b,
+                     const std::array<float, 3>& link) noexcept {
+  return plain_vote(a.normal[0], a.normal[1], a.normal[2], a.noise, b.normal[0], b.normal[1],
+                    b.normal[2], b.noise, link[0], link[1], link[2]);
+}
+
+void PieceSums::add(const PieceSums& other, bool flipped) noexcept {
+  const double sign = flipped ? -1 : 1;
+  area += other.area;
+  flux += sign * other.flux;
+  for (std::size_t k = 0; k < 3; ++k) {
+    normal[k] += sign * other.normal[k];
+    position[k] += other.position[k];
+  }
+  places += other.places;
+}
+
+void orient_chunk(ScanChunk& chunk, const KnownSides& sides, ChunkPieces& pieces,
+                  OrientationRoom& room) {
+  ChunkOrientation(chunk, pieces, room).run(sides);
+}
+
+void Islands::add_chunk(const ChunkPieces& pieces) {
+  first_.push_back(static_cast<std::uint32_t>(sums_.size()));
+  const std::uint64_t chunk = first_.size() - 1;
+  sums_[0].add(pieces.sums[0], false);
+  sums_.insert(sums_.end(), pieces.sums.begin() + 1, pieces.sums.end());
+  std::vector<SignedGraph::Edge> votes;
+  for (const SignedGraph::Edge& edge : pieces.votes) {
+    votes.push_back({piece(chunk, static_cast<std::uint16_t>(edge.a)),
+                     piece(chunk, static_cast<std::uint16_t>(edge.b)), edge.vote});
+  }
+  add_votes(votes);
+}
+
+void Islands::add_votes(std::vector<SignedGraph::Edge>& votes) {
+  for (SignedGraph::Edge& edge : votes) {
+    if (edge.a > edge.b) std::swap(edge.a, edge.b);
+  }
+  std::ranges::sort(votes, [](const SignedGraph::Edge& x, const SignedGraph::Edge& y) {
+    return x.a != y.a ? x.a < y.a : x.b < y.b;
+  });
+  const std::size_t first = votes_.size();
+  for (const SignedGraph::Edge& edge : votes) {
+    if (edge.a == edge.b) continue;
+    const bool more =
+        votes_.size() > first && votes_.back().a == edge.a && votes_.back().b == edge.b;
+    if (more) {
+      votes_.back().vote += edge.vote;
+    } else {
+      votes_.push_back(edge);
+    }
+  }
+  votes.clear();
+}
+
+std::uint64_t Islands::bytes() const noexcept {
+  constexpr std::uint64_t kGraph = 64;  // of a node: its group and the list of its neighbours
+  constexpr std::uint64_t kEdge = 160;  // in the table, at most half full, the lists, the queue
+  return sums_.size() * (3 * sizeof(PieceSums) + kGraph) +
+         votes_.size() * (2 * sizeof(SignedGraph::Edge) + kEdge);
+}
+
+void Islands::solve(const std::array<float, 3>& up) {
+  const auto count = static_cast<std::uint32_t>(sums_.size());
+  SignedGraph graph(count);
+  for (const SignedGraph::Edge& edge : votes_) graph.add(edge.a, edge.b, edge.vote);
+  graph.contract(1);
+  // Add up the pieces of each island.
+  std::vector<PieceSums> islands(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const SignedGraph::Group group = graph.find(i);
+    islands[group.root].add(sums_[i], group.flipped);
+  }
+  // Turn them: the one of piece 0 so that this piece stays as it is.
+  const SignedGraph::Group known = graph.find(0);
+  flipped_.assign(count, 0);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const SignedGraph::Group group = graph.find(i);
+    const bool turn = group.root == known.root && sums_[0].places > 0
+                          ? known.flipped
+                          : points_inwards(islands[group.root], up);
+    flipped_[i] = group.flipped != turn;
+    islands_ +=
+        i == group.root && islands[i].places > 0 && (i != known.root || sums_[0].places == 0);
+  }
+  sums_ = {};
+  votes_ = {};
+}
+
+}  // namespace ptc

@@ -1,0 +1,115 @@
+// Gives the normals of a cloud the same side everywhere.
+//
+// What cannot be known from a place alone is settled in three steps, each with fewer things to join
+// than the one before, so that the last fits in memory:
+//
+//     places --links in a block--> patches --votes in a chunk--> pieces --votes--> islands
+//     all                          a few for each block          a few for each    closed surfaces,
+//                                                                chunk             loose parts
+//
+// A vote is what two neighbouring places say about their sides. All places whose side is known
+// beforehand form one piece, number 0, which is never flipped. An island without such a place turns
+// outwards, or upwards where it is an open sheet.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/scan/chunk_fit.h"
+#include "engine/scan/known_sides.h"
+#include "engine/scan/signed_graph.h"
+
+namespace ptc {
+
+/// The greatest magnitude of a single vote.
+inline constexpr int kFullVote = 256;
+/// The maximum number of pieces of a chunk, the known one included.
+inline constexpr std::size_t kMostPieces = 256;
+
+/// One end of a link.
+struct LinkEnd {
+  std::array<float, 3> normal;
+  float noise;  ///< lattice units
+};
+/// Returns the vote of two places: above 0 when their normals agree, below 0 when one of them must
+/// be flipped, 0 when nothing can be said.
+///
+/// On a surface that turns evenly, the normal of one place is the mirror image of the other's in
+/// the plane across the link: so m = a . b - 2 (e . a)(e . b) is 1 or -1, where e is the link's
+/// unit vector. Where m is not near either, the places do not lie on one surface. A link along the
+/// normals leads through a wall or a gap, and does not count.
+/// Source: Xie, Wang, Hua, Qin and Kaufman 2003, Piecewise C1 continuous surface reconstruction of
+/// noisy point clouds via local implicit quadric regression, section 3.
+[[nodiscard]] std::int64_t vote_of(const LinkEnd& a, const LinkEnd& b,
+                                   const std::array<float, 3>& link) noexcept;
+
+/// Sums over the places of a piece, by which its outside is found.
+struct PieceSums {
+  double area = 0;                             ///< lattice units squared
+  double flux = 0;                             ///< area * (normal . position)
+  std::array<double, 3> normal{}, position{};  ///< times area
+  std::uint64_t places = 0;
+
+  void add(const PieceSums& other, bool flipped) noexcept;
+};
+
+/// The pieces of a chunk after its own votes.
+struct ChunkPieces {
+  std::vector<std::uint16_t> of;         ///< by place: its piece; 0 where the side is known
+  std::vector<PieceSums> sums;           ///< by piece
+  std::vector<SignedGraph::Edge> votes;  ///< between pieces, that are left
+};
+
+/// Room for the work on a chunk, which is kept for the next one.
+struct OrientationRoom {
+  std::vector<LinkEnd> ends;                            ///< by place
+  std::vector<std::uint8_t> known;                      ///< by place: its side is known
+  std::vector<float> lean;                              ///< by place: cosine to where it was seen
+                                                        ///< from, or 0
+  std::vector<std::array<std::int16_t, kLinks>> votes;  ///< by place
+  std::vector<std::int8_t> sign;                        ///< by place: 1 or -1
+  std::vector<std::uint32_t> patch;                     ///< by place
+  std::vector<std::uint32_t> number;                    ///< by root place: its patch; then by root
+                                                        ///< patch: its piece
+  SignedGroups groups{0};
+};
+
+/// Flips normals of a chunk so that they agree within each piece. A known normal takes the place of
+/// the fitted one.
+/// Threads: may be called concurrently for different chunks, pieces and rooms.
+void orient_chunk(ScanChunk& chunk, const KnownSides& sides, ChunkPieces& pieces,
+                  OrientationRoom& room);
+
+/// Joins the pieces of all chunks.
+class Islands {
+ public:
+  /// Adds the pieces of the next chunk.
+  void add_chunk(const ChunkPieces& pieces);
+  /// Adds votes between pieces of all chunks. Those of the same pieces are added up.
+  /// @param votes  are used up
+  void add_votes(std::vector<SignedGraph::Edge>& votes);
+  /// Returns the number of a piece among the pieces of all chunks; 0 for the known one.
+  [[nodiscard]] std::uint32_t piece(std::uint64_t chunk, std::uint16_t piece) const noexcept {
+    return piece == 0 ? 0 : first_[static_cast<std::size_t>(chunk)] + piece - 1;
+  }
+  /// Returns the memory of the pieces and votes, with what solve() needs in addition, bytes.
+  [[nodiscard]] std::uint64_t bytes() const noexcept;
+  /// Decides which pieces are flipped.
+  /// @param up  unit
+  void solve(const std::array<float, 3>& up);
+  /// Says whether the normals of a piece are flipped. @pre solve() was called
+  [[nodiscard]] bool flipped(std::uint32_t piece) const noexcept { return flipped_[piece] != 0; }
+  /// The number of islands without a place whose side is known. @pre solve() was called
+  [[nodiscard]] std::uint64_t count() const noexcept { return islands_; }
+
+ private:
+  std::vector<std::uint32_t> first_;  ///< by chunk: number of its piece 1
+  std::vector<PieceSums> sums_{1};    ///< by piece
+  std::vector<SignedGraph::Edge> votes_;
+  std::vector<std::uint8_t> flipped_;
+  std::uint64_t islands_ = 0;
+};
+
+}  // namespace ptc

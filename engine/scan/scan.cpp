@@ -1,0 +1,292 @@
+// Chunks are worked on in groups, one chunk for each thread. What needs no other chunk is done in
+// parallel; then, in the order of the chunks, their results go to a file and their links to earlier
+// chunks vote:
+//
+//     parallel     | fit 4, orient 4, result 4 |     | fit 6, orient ...
+//                  | fit 5, orient 5, result 5 |     | fit 7, ...
+//     in order                                  4, 5                      6, 7
+#include "engine/scan/scan.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <exception>
+#include <string>
+
+#include "engine/base/memory_budget.h"
+#include "engine/io/file/file.h"
+#include "engine/scan/chunk_fit.h"
+#include "engine/scan/known_sides.h"
+#include "engine/scan/orientation.h"
+#include "engine/scan/place_result.h"
+#include "engine/scan/scan_spool.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kReadRecords = std::size_t{1}
+                                     << 13;  // records or results that are read at once
+constexpr std::uint64_t kScatter = 10;       // quarters of an octave beyond the usual spacing, from
+                                             // which a point that is on no surface is an outlier
+
+/// What a thread needs for a chunk.
+struct Worker {
+  Worker(const ScanSpool& spool, std::size_t slots) : fitter(spool, slots) {}
+
+  ChunkFitter fitter;
+  ScanChunk chunk;
+  ChunkPieces pieces;
+  OrientationRoom room;
+  std::vector<PlaceResult> results;
+};
+
+std::size_t slots_for(std::size_t page_places) noexcept {
+  constexpr std::size_t kHeld = 3 * kChunkPlaces;  // places in memory, pages being small
+  return std::max<std::size_t>(48, kHeld / page_places);
+}
+
+std::uint64_t worker_bytes(std::size_t page_places) noexcept {
+  constexpr std::uint64_t kOrientation = 160;  // of a place: patches and the graph between them
+  return ChunkFitter::bytes(page_places, slots_for(page_places)) +
+         kChunkPlaces * (kOrientation + sizeof(PlaceResult));
+}
+
+/// Reads single results of places in ascending order, through a window of the file.
+class ResultWindow {
+ public:
+  explicit ResultWindow(const TempFile& file, std::uint64_t places)
+      : file_(file), places_(places) {}
+
+  const PlaceResult& at(std::uint64_t place) {
+    if (place < first_ || place >= first_ + window_.size()) {
+      first_ = place;
+      window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(64, places_ - place)));
+      file_.read_at(first_ * sizeof(PlaceResult), std::as_writable_bytes(std::span(window_)));
+    }
+    return window_[static_cast<std::size_t>(place - first_)];
+  }
+
+ private:
+  const TempFile& file_;
+  std::uint64_t places_;  ///< that have results
+  std::uint64_t first_ = 0;
+  std::vector<PlaceResult> window_;
+};
+
+/// The passes over the places, from the spool to their results.
+class Completion {
+ public:
+  Completion(const ScanSpool& spool, TempFile& results, const ScanOptions& options,
+             const Frame& frame)
+      : spool_(spool),
+        results_(results),
+        sides_(frame, options.scanners, options.up, options.aerial),
+        unit_(frame.unit()) {}
+
+  void run(std::size_t workers, const Executor& executor, Progress& progress) {
+    const std::uint64_t chunks = (spool_.places() + kChunkPlaces - 1) / kChunkPlaces;
+    std::vector<std::unique_ptr<Worker>> all;
+    for (std::size_t i = 0; i < workers; ++i)
+      all.push_back(std::make_unique<Worker>(spool_, slots_for(spool_.index().page_places())));
+    progress.begin("normals", spool_.places(), "points");
+    for (std::uint64_t first = 0; first < chunks; first += workers) {
+      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(workers, chunks - first));
+      executor.for_each(count, [&](std::size_t i, unsigned) {
+        Worker& worker = *all[i];
+        worker.fitter.fit(first + i, worker.chunk);
+        orient_chunk(worker.chunk, sides_, worker.pieces, worker.room);
+        make_results(worker.chunk, worker.pieces, unit_, worker.results);
+        progress.advance(worker.chunk.places.size());
+      });
+      for (std::size_t i = 0; i < count; ++i) keep(*all[i]);
+    }
+    progress.end();
+  }
+
+  Islands& islands() noexcept { return islands_; }
+  const KnownSides& sides() const noexcept { return sides_; }
+
+  /// Returns the octave of the usual spacing: half of the places have no greater one.
+  [[nodiscard]] std::uint64_t usual_octave() const noexcept {
+    std::uint64_t below = 0;
+    for (std::uint64_t octave = 0; octave < octaves_.size(); ++octave) {
+      below += octaves_[octave];
+      if (2 * below >= spool_.places()) return octave;
+    }
+    return octaves_.size();
+  }
+
+ private:
+  /// Writes the results of a chunk, and lets its links to earlier chunks vote.
+  void keep(Worker& worker) {
+    ScanChunk& chunk = worker.chunk;
+    results_.write_at(chunk.first * sizeof(PlaceResult), std::as_bytes(std::span(worker.results)));
+    for (const PlaceResult& result : worker.results) ++octaves_[result.octave];
+    islands_.add_chunk(worker.pieces);
+    std::ranges::sort(chunk.outer, [](const OuterLink& a, const OuterLink& b) {
+      return a.to != b.to ? a.to < b.to : a.from < b.from;
+    });
+    const std::uint64_t number = chunk.first / kChunkPlaces;
+    ResultWindow earlier(results_, chunk.first);
+    std::vector<SignedGraph::Edge> votes;
+    for (const OuterLink& link : chunk.outer) {
+      const PlaceResult& other = earlier.at(link.to);
+      const std::uint32_t a = islands_.piece(number, worker.pieces.of[link.from]);
+      const std::uint32_t b = islands_.piece(link.to / kChunkPlaces, other.piece);
+      if (a == b) continue;
+      const PlaceFit& fit = chunk.fits[link.from];
+      const std::int64_t vote =
+          vote_of({fit.normal, fit.noise},
+                  {decode_octahedral(other.normal[0], other.normal[1]), fit.noise}, link.offset);
+      if (vote != 0) votes.push_back({a, b, vote});
+    }
+    islands_.add_votes(votes);
+  }
+
+  const ScanSpool& spool_;
+  TempFile& results_;
+  KnownSides sides_;
+  double unit_;
+  Islands islands_;
+  std::array<std::uint64_t, 256> octaves_{};  ///< places by PlaceResult::octave
+};
+
+/// Merges records and results.
+class CompletedStream final : public ScanStream {
+ public:
+  CompletedStream(std::unique_ptr<ScanSpool> spool, std::unique_ptr<TempFile> results,
+                  std::unique_ptr<Islands> islands, std::uint64_t usual_octave, float usual_radius,
+                  bool radii, ScanReport& report)
+      : spool_(std::move(spool)),
+        results_(std::move(results)),
+        islands_(std::move(islands)),
+        usual_octave_(usual_octave),
+        usual_radius_(usual_radius),
+        radii_(radii),
+        report_(report) {}
+
+  std::size_t next(std::span<PointRecord> out) override {
+    const auto count = static_cast<std::size_t>(
+        std::min<std::uint64_t>({out.size(), kReadRecords, spool_->records() - at_}));
+    spool_->read_records(at_, out.first(count));
+    marks_.assign(count, 0);
+    for (std::size_t i = 0; i < count; ++i) marks_[i] = complete(out[i]);
+    at_ += count;
+    return count;
+  }
+
+  [[nodiscard]] std::span<const std::uint8_t> marks() const noexcept override { return marks_; }
+
+ private:
+  /// Completes the next record. @return its mark
+  std::uint8_t complete(PointRecord& record) {
+    std::uint8_t mark = 0;
+    if (places_ > 0 && record.key == last_) {
+      mark = kDuplicate;
+    } else {
+      advance();
+      last_ = record.key;
+    }
+    const PlaceResult& result = window_[static_cast<std::size_t>(places_ - 1 - first_)];
+    bool flip = false;
+    if ((record.flags & kUnknownNormal) != 0) {
+      flip = islands_->flipped(islands_->piece((places_ - 1) / kChunkPlaces, result.piece));
+      record.normal = flip ? flip_octahedral(result.normal) : result.normal;
+    }
+    record.flags = 0;
+    const float given = record.radius;
+    if (radii_ && given == 0) {
+      record.radius = result.radius;
+      ++report_.radii;
+    }
+    const bool scattered =
+        (result.facts & kScattered) != 0 && result.octave > usual_octave_ + kScatter;
+    if (scattered || (result.facts & kIsolated) != 0) {
+      mark |= kOutlier;
+      // The distance to its neighbours says nothing of how large an outlier is
+      if (radii_ && given == 0) record.radius = std::min(record.radius, usual_radius_);
+    }
+    report_.outliers += mark & kOutlier;
+    mark |= static_cast<std::uint8_t>(result.rise[flip ? 1 : 0] << kRiseShift);
+    report_.alone += radii_ && record.radius == 0;
+    return mark;
+  }
+
+  /// Goes on to the next place.
+  void advance() {
+    if (places_++ != first_ + window_.size()) return;
+    first_ = places_ - 1;
+    window_.resize(
+        static_cast<std::size_t>(std::min<std::uint64_t>(kReadRecords, spool_->places() - first_)));
+    results_->read_at(first_ * sizeof(PlaceResult), std::as_writable_bytes(std::span(window_)));
+  }
+
+  std::unique_ptr<ScanSpool> spool_;
+  std::unique_ptr<TempFile> results_;
+  std::unique_ptr<Islands> islands_;
+  std::uint64_t usual_octave_;
+  float usual_radius_;  ///< scene units
+  bool radii_;
+  ScanReport& report_;
+  std::uint64_t at_ = 0;      ///< number of the next record
+  std::uint64_t places_ = 0;  ///< places of the records before it
+  MortonKey last_;            ///< of the record before it
+  std::uint64_t first_ = 0;   ///< place of the window's first result
+  std::vector<PlaceResult> window_;
+  std::vector<std::uint8_t> marks_;
+};
+
+/// Writes all points to the spool.
+void fill(ScanSpool& spool, PointStream& sorted, Progress& progress, ScanReport& report) {
+  progress.begin("spool", 0, "points");
+  std::vector<PointRecord> block(kReadRecords);
+  while (const std::size_t count = sorted.next(block)) {
+    const auto records = std::span(block).first(count);
+    spool.add(records);
+    for (const PointRecord& record : records)
+      report.normals += (record.flags & kUnknownNormal) != 0;
+    progress.advance(count);
+  }
+  spool.finish();
+  progress.end();
+  report.points = spool.records();
+  report.duplicates = spool.records() - spool.places();
+}
+
+}  // namespace
+
+std::unique_ptr<ScanStream> complete_scan(PointStream& sorted, const Frame& frame,
+                                          const ScanOptions& options, const Executor& executor,
+                                          Progress& progress, ScanReport& report) {
+  report = {};
+  // Write the points to disk, with an index that takes an eighth of the memory at most.
+  const std::uint64_t index_bytes = std::clamp<std::uint64_t>(
+      options.memory_bytes / 8, std::uint64_t{1} << 16, std::uint64_t{1} << 28);
+  auto spool = std::make_unique<ScanSpool>(options.temp_dirs, index_bytes);
+  fill(*spool, sorted, progress, report);
+  // Work on as many chunks at once as memory allows.
+  MemoryBudget budget(options.memory_bytes, "completing a scan");
+  budget.charge("the index of points", index_bytes);
+  budget.charge("buffers", std::uint64_t{2} << 20);
+  const std::uint64_t each = worker_bytes(spool->index().page_places());
+  const std::uint64_t rest = budget.rest("a chunk of points", each);
+  const auto workers =
+      static_cast<std::size_t>(std::min<std::uint64_t>(executor.threads(), rest / each));
+  auto results = std::make_unique<TempFile>(options.temp_dirs.back());
+  Completion completion(*spool, *results, options, frame);
+  completion.run(workers, executor, progress);
+  spool->discard_places();
+  // Settle the sides.
+  auto islands = std::make_unique<Islands>(std::move(completion.islands()));
+  budget.charge("normals of unknown side", islands->bytes());
+  budget.require();
+  islands->solve(completion.sides().up());
+  report.islands = islands->count();
+  const std::uint64_t octave = completion.usual_octave();
+  const auto radius = static_cast<float>(frame.unit() * length_of_octave(octave));
+  return std::make_unique<CompletedStream>(std::move(spool), std::move(results), std::move(islands),
+                                           octave, radius, options.radii, report);
+}
+
+}  // namespace ptc

@@ -1,0 +1,136 @@
+"""Files of points: what goes in comes out, in other formats, in order, from pipes and directories."""
+
+import json
+import struct
+import subprocess
+import unittest
+
+from programs import BIN, ProgramTest, ball, read_ply, write_ply
+
+NAMES = ["x", "y", "z", "nx", "ny", "nz", "radius", "intensity", "number"]
+
+
+def points_of(count):
+    """Points of a ball with an intensity, and their place in the file as a number."""
+    return [(*p[:7], 0.25 * i, float(i)) for i, p in enumerate(ball(count))]
+
+
+def read_las(path):
+    """Returns the version, the point format, the count, and the positions of a LAS file."""
+    data = path.read_bytes()
+    assert data[:4] == b"LASF"
+    offset, = struct.unpack_from("<I", data, 96)
+    kind, size = struct.unpack_from("<BH", data, 104)
+    scale = struct.unpack_from("<3d", data, 131)
+    shift = struct.unpack_from("<3d", data, 155)
+    count, = struct.unpack_from("<Q", data, 247)
+    places = [struct.unpack_from("<3i", data, offset + i * size) for i in range(count)]
+    return data[24:26], kind, count, [tuple(v * s + o for v, s, o in zip(p, scale, shift)) for p in places]
+
+
+class Formats(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.scan = self.here / "scan.ply"
+        self.points = points_of(500)
+        write_ply(self.scan, self.points, NAMES)
+
+    def order(self, path):
+        names, points = read_ply(path)
+        return [round(p[names.index("number")]) for p in points]
+
+    def test_attributes_are_channels_of_their_names(self):
+        self.succeed("ptcbuild", self.scan, "-o", self.here / "a.ptcx")
+        self.succeed("ptcverify", self.here / "a.ptcx", "--level", "4")
+        facts = json.loads(self.succeed("ptcinfo", self.here / "a.ptcx", "--json").stdout)
+        self.assertEqual({c["name"] for c in facts["channels"]}, {"intensity", "number"})
+
+    def test_a_cloud_is_shaded_in_its_order_by_one_command(self):
+        self.succeed("ptcshade", self.scan, "-o", self.here / "lit.ply")
+        self.assertEqual(self.order(self.here / "lit.ply"), list(range(500)))
+        names, _ = read_ply(self.here / "lit.ply")
+        self.assertIn("occlusion", names)
+        self.assertNotIn("original_index", names)
+
+    def test_the_order_comes_back_only_where_it_is_known(self):
+        self.succeed("ptcbuild", self.scan, "-o", self.here / "a.ptcx")
+        self.succeed("ptcbuild", self.scan, "--original-order", "-o", self.here / "b.ptcx")
+        text = self.fail_with(2, "ptcconvert", self.here / "a.ptcx", self.here / "a.ply", "--original-order")
+        self.assertIn("--original-order", text)
+        self.succeed("ptcconvert", self.here / "b.ptcx", self.here / "b.ply", "--original-order")
+        self.assertEqual(self.order(self.here / "b.ply"), list(range(500)))
+        self.succeed("ptcconvert", self.here / "b.ptcx", self.here / "c.ply")
+        self.assertNotEqual(self.order(self.here / "c.ply"), list(range(500)))
+
+    def test_standard_input_a_directory_a_pattern_and_a_list_are_inputs(self):
+        tiles = self.here / "tiles"
+        tiles.mkdir()
+        write_ply(tiles / "a.ply", self.points[:200], NAMES)
+        write_ply(tiles / "b.ply", self.points[200:], NAMES)
+        (tiles / "notes.md").write_text("no tile\n")
+        (self.here / "list.txt").write_text("# tiles\ntiles/a.ply\n\ntiles/b.ply\n")
+        made = []
+        for i, given in enumerate([["tiles/a.ply", "tiles/b.ply"], ["tiles"], ["tiles/*.ply"], ["@list.txt"]]):
+            self.succeed("ptcbuild", *given, "-o", f"{i}.ptcx", cwd=self.here)
+            made.append((self.here / f"{i}.ptcx").read_bytes())
+        self.assertEqual(len(set(made)), 1)
+        piped = subprocess.run([BIN / "ptcbuild", "-", "-o", self.here / "p.ptcx"], stdin=open(self.scan, "rb"),
+                               capture_output=True, text=True, timeout=60)
+        self.assertEqual(piped.returncode, 0, piped.stderr)
+        facts = json.loads(self.succeed("ptcinfo", self.here / "p.ptcx", "--json").stdout)
+        self.assertEqual((facts["points"], facts["text"]["inputs"]), (500, "stdin"))
+        self.assertEqual([p.name for p in self.here.iterdir() if p.name.startswith(".")], [])
+
+    def test_inputs_that_stand_for_nothing_are_refused(self):
+        (self.here / "empty").mkdir()
+        (self.here / "none.txt").write_text("# nothing\n")
+        for given, said in (("empty", "no mesh and no cloud"), ("*.las", "no file matches"), ("@none.txt", "names no file")):
+            text = self.fail_with(1, "ptcbuild", given, "-o", "o.ptcx", cwd=self.here)
+            self.assertIn(said, text)
+        piped = subprocess.run([BIN / "ptcbuild", "-", "-o", self.here / "p.ptcx"], stdin=subprocess.DEVNULL,
+                               capture_output=True, text=True, timeout=60)
+        self.assertEqual(piped.returncode, 1)
+        self.assertIn("standard input is empty", piped.stderr)
+
+    def test_las_holds_what_the_container_has(self):
+        self.succeed("ptcshade", self.scan, "-o", self.here / "lit.las")
+        version, kind, count, places = read_las(self.here / "lit.las")
+        self.assertEqual((version, count), (b"\1\4", 500))
+        self.assertIn(kind, (6, 7))
+        for place, point in zip(places, self.points):
+            for a, b in zip(place, point):
+                self.assertAlmostEqual(a, b, delta=1e-3)
+        self.succeed("ptcconvert", self.here / "lit.las", self.here / "again.ply")
+        names, again = read_ply(self.here / "again.ply")
+        self.assertEqual(len(again), 500)
+        self.assertIn("occlusion", names)
+
+    def test_a_dry_run_writes_nothing_and_says_what_is_lost(self):
+        self.succeed("ptcbuild", self.scan, "-o", self.here / "a.ptcx")
+        before = sorted(self.here.iterdir())
+        said = self.succeed("ptcconvert", self.here / "a.ptcx", self.here / "a.las", "--dry-run").stdout
+        self.assertIn("500 points", said)
+        self.assertEqual(sorted(self.here.iterdir()), before)
+
+    def test_a_cloud_without_normals_and_light_is_lit(self):
+        write_ply(self.here / "bare.ply", [p[:3] for p in ball(2000)], ["x", "y", "z"])
+        said = self.succeed("ptcbuild", self.here / "bare.ply", "-o", self.here / "bare.ptcx").stderr
+        self.assertIn("the normals of 2000 points are estimated", said)
+        self.succeed("ptcshade", self.here / "bare.ptcx", "-o", self.here / "bare.ply")
+        names, points = read_ply(self.here / "bare.ply")
+        at = {name: i for i, name in enumerate(names)}
+        outward = [sum(p[at[a]] * p[at["n" + a]] for a in "xyz") for p in points]
+        self.assertGreater(min(outward), 0.9)  # the normals of a ball are its positions
+        self.assertLess(max(p[at["occlusion"]] for p in points), 0.1)
+        self.assertGreater(min(p[at["sky_g"]] for p in points), 2.8)  # pi in the open
+
+    def test_duplicates_go_on_request_and_are_counted(self):
+        said = self.succeed("ptcbuild", self.scan, self.scan, "--remove-duplicates", "-o", self.here / "a.ptcx").stderr
+        self.assertIn("500 points lie where another one does", said)
+        facts = json.loads(self.succeed("ptcinfo", self.here / "a.ptcx", "--json").stdout)
+        self.assertEqual(facts["points"], 500)
+        self.succeed("ptcverify", self.here / "a.ptcx", "--level", "4")
+
+
+if __name__ == "__main__":
+    unittest.main()

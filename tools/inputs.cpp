@@ -1,0 +1,116 @@
+#include "tools/inputs.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <glob.h>
+
+#include "engine/base/error.h"
+#include "engine/io/text/byte_stream.h"
+#include "engine/io/text/text.h"
+#include "format/text.h"
+#include "tools/common.h"
+#include "tools/options.h"
+
+namespace ptc {
+namespace {
+
+bool is_pattern(const std::string& name) {
+  return name.find_first_of("*?[") != std::string::npos && !std::filesystem::exists(name);
+}
+
+/// Says whether the name of a file ends as those of meshes and clouds do.
+bool has_input_ending(const std::filesystem::path& path) {
+  const std::vector<std::string> endings = input_endings();
+  return std::ranges::any_of(endings, [&](const auto& e) { return has_ending(path, e); });
+}
+
+}  // namespace
+
+InputFiles::InputFiles(const std::vector<std::filesystem::path>& arguments,
+                       const std::string& format, const RunOptions& run,
+                       const std::filesystem::path& output) {
+  for (const std::filesystem::path& argument : arguments) {
+    const std::string name = argument.string();
+    if (name == "-") {
+      add_standard_input(format, roomiest_temp_dir(run, output));
+    } else if (name.starts_with('@')) {
+      add_list(name.substr(1));
+    } else if (is_pattern(name)) {
+      add_matches(argument);
+    } else if (std::filesystem::is_directory(argument)) {
+      add_directory(argument);
+    } else {
+      add(argument);
+    }
+  }
+}
+
+void InputFiles::add(const std::filesystem::path& path) {
+  check_input(path);
+  paths_.push_back(path);
+  if (!names_.empty()) names_ += ' ';
+  names_ += printable(path.filename().string());
+}
+
+void InputFiles::add_directory(const std::filesystem::path& directory) {
+  std::vector<std::filesystem::path> found;
+  for (const auto& entry : std::filesystem::directory_iterator(directory)) {
+    if (entry.is_regular_file() && has_input_ending(entry.path())) found.push_back(entry.path());
+  }
+  if (found.empty())
+    throw DataError(directory.string() + ": the directory holds no mesh and no cloud");
+  std::ranges::sort(found);
+  for (const auto& path : found) add(path);
+}
+
+void InputFiles::add_matches(const std::filesystem::path& pattern) {
+  glob_t matches{};
+  const int failure = ::glob(pattern.c_str(), 0, nullptr, &matches);
+  const std::vector<std::filesystem::path> found(matches.gl_pathv,
+                                                 matches.gl_pathv + matches.gl_pathc);
+  ::globfree(&matches);
+  if (failure != 0 || found.empty()) throw DataError(pattern.string() + ": no file matches");
+  for (const auto& path : found) add(path);
+}
+
+void InputFiles::add_list(const std::filesystem::path& list) {
+  check_input(list);
+  ByteStream stream(list);
+  std::string_view line;
+  while (stream.next_line(line)) {
+    const std::string_view name = Words(line).rest();
+    if (name.empty() || name.front() == '#') continue;
+    // Names are relative to the list, so that it can be used from anywhere
+    add(list.parent_path() / std::filesystem::path(name));
+  }
+  if (paths_.empty()) throw DataError(list.string() + ": the list names no file");
+}
+
+void InputFiles::add_standard_input(const std::string& format,
+                                    const std::filesystem::path& directory) {
+  // Copy it, because the input of a build is read twice
+  const std::filesystem::path path =
+      directory / fmt::format(".stdin-{}{}{}", getpid(), format.empty() ? "" : ".", format);
+  temporary_.push_back(std::make_unique<TemporaryName>(path));
+  OutputFile file(path);
+  std::vector<std::byte> buffer(std::size_t{1} << 20);
+  for (;;) {
+    const ssize_t count = ::read(STDIN_FILENO, buffer.data(), buffer.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw std::system_error(errno, std::generic_category(), "read standard input");
+    if (count == 0) break;
+    file.append(std::span<const std::byte>(buffer).first(static_cast<std::size_t>(count)));
+  }
+  if (file.size() == 0) throw DataError("standard input is empty");
+  file.publish();
+  paths_.push_back(path);
+  if (!names_.empty()) names_ += ' ';
+  names_ += "stdin";
+}
+
+}  // namespace ptc
