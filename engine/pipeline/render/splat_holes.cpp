@@ -16,11 +16,12 @@
 namespace ptc {
 namespace {
 
-constexpr int kMaxReach = 64;  // samples; wider gaps are not closed
-constexpr int kPasses = 3;     // holes beside holes take more than one
-constexpr float kReach = 4;    // radii of the disc: points at random leave such gaps
-constexpr float kInFront = 3;  // radii by which a surface is nearer than what shows through it
-constexpr float kBand = 12;    // radii by which depths of one surface differ around a hole
+constexpr int kMaxReach = 64;    // samples; wider gaps are not closed
+constexpr unsigned kBlock = 16;  // samples along the side of a block
+constexpr int kPasses = 3;       // holes beside holes take more than one
+constexpr float kReach = 4;      // radii of the disc: points at random leave such gaps
+constexpr float kInFront = 3;    // radii by which a surface is nearer than what shows through it
+constexpr float kBand = 12;      // radii by which depths of one surface differ around a hole
 constexpr std::size_t kLeastHits = 7;    // of eight directions
 constexpr std::size_t kLeastOfBack = 5;  // the same where the back of a disc is seen
 constexpr std::array<std::array<int, 2>, 8> kDirections{
@@ -29,9 +30,25 @@ constexpr std::array<std::array<int, 2>, 8> kDirections{
 /// Looks for the surface around one sample.
 class HoleTest {
  public:
-  explicit HoleTest(const SplatPicture& picture) : picture_(picture) {
-    for (const SplatSample& sample : picture.samples) {
-      if (!sample.empty()) reach_ = std::max(reach_, std::min<float>(kMaxReach, reach_of(sample)));
+  explicit HoleTest(const SplatPicture& picture)
+      : picture_(picture),
+        columns_((picture.width + kBlock - 1) / kBlock),
+        rows_((picture.height + kBlock - 1) / kBlock) {
+    // Find the greatest reach in each block, and then among the blocks that are near enough to
+    // matter
+    std::vector<float> own(std::size_t{columns_} * rows_);
+    for (unsigned y = 0; y < picture.height; ++y) {
+      for (unsigned x = 0; x < picture.width; ++x) {
+        const SplatSample& sample = at(static_cast<int>(x), static_cast<int>(y));
+        if (sample.empty()) continue;
+        float& greatest = own[std::size_t{y / kBlock} * columns_ + x / kBlock];
+        greatest = std::max(greatest, std::min<float>(kMaxReach, reach_of(sample)));
+      }
+    }
+    reach_.resize(own.size());
+    for (unsigned row = 0; row < rows_; ++row) {
+      for (unsigned column = 0; column < columns_; ++column)
+        reach_[std::size_t{row} * columns_ + column] = reach_around(own, row, column);
     }
   }
 
@@ -39,12 +56,15 @@ class HoleTest {
   [[nodiscard]] SplatSample closing(int x, int y) const {
     // Look for the surface in all directions
     const SplatSample& seen = at(x, y);
+    const float reach = reach_[static_cast<std::size_t>(y) / kBlock * columns_ +
+                               static_cast<std::size_t>(x) / kBlock];
+    if (reach == 0) return {};
     const std::size_t least = !seen.empty() && seen.payload.back ? kLeastOfBack : kLeastHits;
     const float depth = seen.depth;
     std::array<Hit, kDirections.size()> hits;
     std::size_t count = 0;
     for (std::size_t i = 0; i < kDirections.size(); ++i) {
-      if (const Hit hit = look(x, y, kDirections[i], depth); hit.sample) {
+      if (const Hit hit = look(x, y, kDirections[i], depth, reach); hit.sample) {
         std::size_t k = count++;  // hits stay in the order of their depths
         for (; k > 0 && hits[k - 1].sample->depth > hit.sample->depth; --k) hits[k] = hits[k - 1];
         hits[k] = hit;
@@ -90,10 +110,31 @@ class HoleTest {
     return std::max(1.5F, kReach * radius_of(sample) * picture_.focal / sample.depth);
   }
 
+  /// Returns the greatest reach of the samples whose reach may lead into a block.
+  [[nodiscard]] float reach_around(const std::vector<float>& own, unsigned row,
+                                   unsigned column) const {
+    constexpr unsigned kAround = kMaxReach / kBlock;
+    float greatest = 0;
+    for (unsigned r = row < kAround ? 0 : row - kAround; r < std::min(rows_, row + kAround + 1);
+         ++r) {
+      for (unsigned c = column < kAround ? 0 : column - kAround;
+           c < std::min(columns_, column + kAround + 1); ++c) {
+        const unsigned apart =
+            std::max(r < row ? row - r : r - row, c < column ? column - c : c - column);
+        const float reach = own[std::size_t{r} * columns_ + c];
+        if (reach > static_cast<float>(apart == 0 ? 0 : (apart - 1) * kBlock))
+          greatest = std::max(greatest, reach);
+      }
+    }
+    return greatest;
+  }
+
   /// Follows a direction to the first sample that is in front of `depth`.
-  [[nodiscard]] Hit look(int x, int y, const std::array<int, 2>& direction, float depth) const {
+  /// @param reach  greatest distance to look at, samples
+  [[nodiscard]] Hit look(int x, int y, const std::array<int, 2>& direction, float depth,
+                         float reach) const {
     const float step = direction[0] != 0 && direction[1] != 0 ? 1.4142135F : 1;
-    for (int k = 1; static_cast<float>(k) <= reach_; ++k) {
+    for (int k = 1; static_cast<float>(k) <= reach; ++k) {
       const int sx = x + k * direction[0], sy = y + k * direction[1];
       if (sx < 0 || sy < 0 || sx >= static_cast<int>(picture_.width) ||
           sy >= static_cast<int>(picture_.height))
@@ -108,7 +149,8 @@ class HoleTest {
   }
 
   const SplatPicture& picture_;
-  float reach_ = 0;  ///< the greatest of any sample
+  unsigned columns_, rows_;   ///< of blocks
+  std::vector<float> reach_;  ///< by block: greatest reach of samples in it or near it
 };
 
 }  // namespace
