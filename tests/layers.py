@@ -95,6 +95,23 @@ def word_faults_of(path, text, fields):
     return faults
 
 
+class Headers(unittest.TestCase):
+    def test_a_source_begins_with_the_header_of_its_name(self):
+        # So each header is compiled alone
+        faults, checked = [], 0
+        for folder in FOLDERS:
+            for source in sorted((ROOT / folder).rglob("*.cpp")):
+                header = source.with_suffix(".h").relative_to(ROOT).as_posix()
+                if not (ROOT / header).exists():
+                    continue
+                checked += 1
+                first = re.search(r'^#include ["<]([^">]+)', source.read_text(), re.MULTILINE)
+                if not first or first[1] != header:
+                    faults.append(header)
+        self.assertEqual(faults, [])
+        self.assertGreater(checked, 100)
+
+
 class Words(unittest.TestCase):
     FIELDS = set(re.findall(r'FieldName\{"([^"]+)", "--[a-z-]+"\}', (ROOT / "tools/field_names.cpp").read_text()))
 

@@ -134,7 +134,7 @@ Means compare_with_paths(const ContainerReader& lit, const DirectLight& light, c
   const std::vector<Receiver> all = all_points(lit);
   for (std::size_t i = 0; i < all.size(); i += 83) {
     const bool near_seam = std::abs(all[i].position.x - 2) < 0.1;
-    if (!near_seam && all[i].position.x > 2 == second_room) receivers.push_back(all[i]);
+    if (!near_seam && (all[i].position.x > 2) == second_room) receivers.push_back(all[i]);
   }
   const std::vector<Shading> shaded = shade(lit, receivers);
   std::vector<float> ours, traced;
