@@ -132,9 +132,11 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   request.camera = arguments.camera.camera();
   request.size = arguments.camera.size();
   if (arguments.lights.given()) request.lights = arguments.lights.rig();
-  const glm::vec3 up = ptc::up_of_files({request.scene});
-  if (request.lights) request.lights->sky.up = up;
-  if (request.camera) request.camera->up = up;
+  if (request.lights || request.camera) {
+    const glm::vec3 up = ptc::up_of_files({request.scene});
+    if (request.lights) request.lights->sky.up = up;
+    if (request.camera) request.camera->up = up;
+  }
   std::vector<ptc::PictureTarget> targets = arguments.layers;
   for (const auto& output : arguments.outputs) targets.push_back({.path = output});
   const ptc::LightingReport report = ptc::render_picture(request, targets, progress);
