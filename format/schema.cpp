@@ -185,6 +185,22 @@ void append_text(std::vector<std::byte>& out, std::string_view text) {
 
 }  // namespace
 
+std::size_t row_bytes(std::span<const Channel> channels) noexcept {
+  std::size_t bytes = 0;
+  for (const Channel& channel : channels) bytes += channel.bytes();
+  return bytes;
+}
+
+std::optional<RowPlace> find_in_row(std::span<const Channel> channels,
+                                    std::string_view name) noexcept {
+  std::size_t offset = 0;
+  for (const Channel& channel : channels) {
+    if (channel.name == name) return RowPlace{&channel, offset};
+    offset += channel.bytes();
+  }
+  return std::nullopt;
+}
+
 std::size_t channel_bytes(ChannelType type) noexcept {
   switch (type) {
     case ChannelType::u8:

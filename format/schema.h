@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace ptc {
@@ -68,7 +69,23 @@ struct Channel {
   [[nodiscard]] std::size_t component_bytes() const noexcept {
     return size == 0 ? channel_bytes(type) : size;
   }
+  /// Returns the bytes of all components of a point.
+  [[nodiscard]] std::size_t bytes() const noexcept { return component_bytes() * components; }
 };
+
+// A row holds what channels say of a point: their values one after another, without padding.
+
+/// Returns the bytes of a row.
+[[nodiscard]] std::size_t row_bytes(std::span<const Channel> channels) noexcept;
+
+/// A channel and its place in a row.
+struct RowPlace {
+  const Channel* channel;
+  std::size_t offset;  ///< bytes from the start of the row
+};
+/// Finds the channel of a name in the rows of some channels. @return nothing when there is none
+[[nodiscard]] std::optional<RowPlace> find_in_row(std::span<const Channel> channels,
+                                                  std::string_view name) noexcept;
 
 /// The content of the meta page.
 struct Meta {

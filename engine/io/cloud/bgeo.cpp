@@ -1,8 +1,6 @@
 // Reads the points of Houdini's classic geometry: .bgeo in binary and .geo as text. The fourth
 // number of a position is a weight for curves, and is left out.
 #include <algorithm>
-#include <memory>
-#include <utility>
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/geo_header.h"
@@ -86,9 +84,7 @@ class GeoSource : public RecordSource {
 }  // namespace
 
 PointFile open_bgeo(const std::filesystem::path& path) {
-  auto source = std::make_unique<GeoSource>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<GeoSource>(path);
 }
 
 }  // namespace ptc

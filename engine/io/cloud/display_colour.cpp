@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "engine/io/cloud/packed_number.h"
 #include "engine/io/image/srgb.h"
 
 namespace ptc {
@@ -76,7 +77,7 @@ std::array<std::uint16_t, 3> DisplayColour::stored_values(const std::byte* row) 
 glm::vec3 DisplayColour::shown_light(const std::byte* row) const {
   const Channel& channel = source_->channel;
   const auto number = [&](std::size_t i) {
-    return channel.scale * load_number(channel.type, source_->at(row, i)) + channel.offset;
+    return channel.scale * load_number(source_->at(row, i), channel.type) + channel.offset;
   };
   if (channel.components == 1) {
     const bool covers = channel.name == "occlusion";

@@ -10,8 +10,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <memory>
-#include <utility>
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/e57_channels.h"
@@ -254,9 +252,7 @@ PointFileInfo E57Source::info() const {
 }  // namespace
 
 PointFile open_e57(const std::filesystem::path& path) {
-  auto source = std::make_unique<E57Source>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<E57Source>(path);
 }
 
 }  // namespace ptc

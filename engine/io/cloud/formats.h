@@ -12,11 +12,13 @@
 #include <cstddef>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "engine/io/cloud/points.h"
@@ -36,6 +38,14 @@ static_assert(std::endian::native == std::endian::little, "rows and channels are
 [[nodiscard]] PointFile open_pts(const std::filesystem::path& path);
 [[nodiscard]] PointFile open_ptx(const std::filesystem::path& path);
 [[nodiscard]] PointFile open_xyz(const std::filesystem::path& path);
+
+/// Opens a file by a source of points whose info() describes it.
+template <class Source, class... Arguments>
+[[nodiscard]] PointFile open_source(Arguments&&... arguments) {
+  auto source = std::make_unique<Source>(std::forward<Arguments>(arguments)...);
+  PointFileInfo info = source->info();
+  return {std::move(info), std::move(source)};
+}
 
 /// Appends a value to rows of attributes.
 template <typename T>

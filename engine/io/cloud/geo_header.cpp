@@ -8,6 +8,7 @@
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/particle_names.h"
 #include "engine/io/text/text.h"
+#include "format/bytes.h"
 
 namespace ptc {
 namespace {
@@ -22,7 +23,7 @@ template <typename T>
 T take_big(ByteStream& stream) {
   std::array<std::byte, sizeof(T)> bytes;
   std::ranges::reverse_copy(stream.take(sizeof(T)), bytes.begin());
-  return load_as<T>(bytes.data());
+  return load<T>(bytes.data(), 0);
 }
 
 std::string take_name(ByteStream& stream) {

@@ -206,9 +206,7 @@ class LasSource : public PointSource {
 }  // namespace
 
 PointFile open_las(const std::filesystem::path& path) {
-  auto source = std::make_unique<LasSource>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<LasSource>(path);
 }
 
 }  // namespace ptc

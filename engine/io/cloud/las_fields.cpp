@@ -27,6 +27,7 @@
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/laz/layout.h"
+#include "format/bytes.h"
 
 namespace ptc {
 namespace {
@@ -41,13 +42,6 @@ constexpr unsigned kMaxType = 30;
 constexpr std::array<ChannelType, 10> kTypes = {
     ChannelType::u8,  ChannelType::i8,  ChannelType::u16, ChannelType::i16, ChannelType::u32,
     ChannelType::i32, ChannelType::u64, ChannelType::i64, ChannelType::f32, ChannelType::f64};
-
-template <typename T>
-T value_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
-  T value;
-  std::memcpy(&value, bytes.data() + at, sizeof value);
-  return value;
-}
 
 // Collects the channels of a file.
 class ChannelList {
@@ -132,12 +126,12 @@ class ChannelList {
   // Adds one described field and takes it off the bytes that are left. Returns false when it does
   // not fit.
   bool add_described(std::span<const std::byte> description, std::size_t& left) {
-    const unsigned type = value_at<std::uint8_t>(description, 2);
+    const unsigned type = load<std::uint8_t>(description.data(), 2);
     std::string name(reinterpret_cast<const char*>(description.data()) + 4, 32);
     name.resize(std::min(name.find('\0'), name.size()));
     if (name.empty()) name = "extra_bytes";
     if (type == 0) {
-      const std::size_t bytes = value_at<std::uint8_t>(description, 3);
+      const std::size_t bytes = load<std::uint8_t>(description.data(), 3);
       if (bytes > left) return false;
       add_bytes(name, bytes);
       left -= bytes;
@@ -161,9 +155,9 @@ class ChannelList {
     for (std::size_t i = 0; i < components; ++i) {
       Channel channel;
       channel.type = type;
-      const unsigned options = value_at<std::uint8_t>(description, 3);
-      const auto scale = value_at<double>(description, 112 + 8 * i);
-      const auto offset = value_at<double>(description, 136 + 8 * i);
+      const unsigned options = load<std::uint8_t>(description.data(), 3);
+      const auto scale = load<double>(description.data(), 112 + 8 * i);
+      const auto offset = load<double>(description.data(), 136 + 8 * i);
       if ((options & kScaleOption) != 0 && std::isfinite(scale) && scale != 0)
         channel.scale = scale;
       if ((options & kOffsetOption) != 0 && std::isfinite(offset)) channel.offset = offset;
@@ -186,8 +180,8 @@ class ChannelList {
   // value.
   static std::optional<std::uint64_t> no_value(std::span<const std::byte> description,
                                                std::size_t at, ChannelType type) {
-    const auto bits = value_at<std::uint64_t>(description, at);
-    const auto number = value_at<double>(description, at);
+    const auto bits = load<std::uint64_t>(description.data(), at);
+    const auto number = load<double>(description.data(), at);
     if (type == ChannelType::f64) return bits;
     if (type == ChannelType::f32) {
       const auto narrow = static_cast<float>(number);

@@ -21,6 +21,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/laz/layout.h"
+#include "format/bytes.h"
 
 namespace ptc {
 namespace {
@@ -34,13 +35,6 @@ constexpr std::uint64_t kMaxPayload = std::uint64_t{1} << 20;
 constexpr std::size_t kMaxRecordBytes = 2048;
 constexpr unsigned kMaxMinor = 5;
 constexpr unsigned kMaxFormat = 10;
-
-template <typename T>
-T value_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
-  T value;
-  std::memcpy(&value, bytes.data() + at, sizeof value);
-  return value;
-}
 
 // Returns the text of a field that zeros fill up.
 std::string text_at(std::span<const std::byte> bytes, std::size_t at, std::size_t size) {
@@ -79,8 +73,10 @@ class HeaderReader {
   }
 
   [[nodiscard]] unsigned minor() const noexcept { return header_.minor; }
-  [[nodiscard]] std::uint64_t evlr_offset() const { return value_at<std::uint64_t>(bytes_, 235); }
-  [[nodiscard]] std::uint32_t evlr_count() const { return value_at<std::uint32_t>(bytes_, 243); }
+  [[nodiscard]] std::uint64_t evlr_offset() const {
+    return load<std::uint64_t>(bytes_.data(), 235);
+  }
+  [[nodiscard]] std::uint32_t evlr_count() const { return load<std::uint32_t>(bytes_.data(), 243); }
 
   void read_bytes() {
     bytes_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(file_.size(), kHeaderBytes14)));
@@ -90,13 +86,13 @@ class HeaderReader {
   }
 
   void read_version() {
-    const auto major = value_at<std::uint8_t>(bytes_, 24);
-    header_.minor = value_at<std::uint8_t>(bytes_, 25);
+    const auto major = load<std::uint8_t>(bytes_.data(), 24);
+    header_.minor = load<std::uint8_t>(bytes_.data(), 25);
     if (major != 1 || minor() > kMaxMinor) {
       fail(24, "LAS version " + std::to_string(major) + "." + std::to_string(minor()) +
                    " is not supported");
     }
-    header_bytes_ = value_at<std::uint16_t>(bytes_, 94);
+    header_bytes_ = load<std::uint16_t>(bytes_.data(), 94);
     const std::size_t least = minor() >= 4   ? kHeaderBytes14
                               : minor() == 3 ? kHeaderBytes13
                                              : kHeaderBytes;
@@ -110,22 +106,22 @@ class HeaderReader {
 
   // Reads what only a writer of LAS files needs.
   void read_facts() {
-    header_.source = value_at<std::uint16_t>(bytes_, 4);
-    header_.encoding = value_at<std::uint16_t>(bytes_, 6);
+    header_.source = load<std::uint16_t>(bytes_.data(), 4);
+    header_.encoding = load<std::uint16_t>(bytes_.data(), 6);
     std::memcpy(header_.guid.data(), bytes_.data() + 8, header_.guid.size());
     header_.system = text_at(bytes_, 26, 32);
     header_.software = text_at(bytes_, 58, 32);
-    header_.day = value_at<std::uint16_t>(bytes_, 90);
-    header_.year = value_at<std::uint16_t>(bytes_, 92);
+    header_.day = load<std::uint16_t>(bytes_.data(), 90);
+    header_.year = load<std::uint16_t>(bytes_.data(), 92);
   }
 
   void read_layout() {
-    const unsigned format = value_at<std::uint8_t>(bytes_, 104);
+    const unsigned format = load<std::uint8_t>(bytes_.data(), 104);
     header_.compressed = (format & 0x80) != 0;
     header_.format = format & 0x7f;
     if (header_.format > kMaxFormat)
       fail(104, "point format " + std::to_string(header_.format) + " is not supported");
-    header_.record_bytes = value_at<std::uint16_t>(bytes_, 105);
+    header_.record_bytes = load<std::uint16_t>(bytes_.data(), 105);
     if (header_.record_bytes < laz::format_bytes(header_.format)) {
       fail(105, "point records have " + std::to_string(header_.record_bytes) +
                     " bytes, but point format " + std::to_string(header_.format) + " needs " +
@@ -134,8 +130,8 @@ class HeaderReader {
     if (header_.record_bytes > kMaxRecordBytes)
       fail(105, "point records of more than 2048 bytes are not supported");
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      header_.scale[axis] = value_at<double>(bytes_, 131 + 8 * axis);
-      header_.offset[axis] = value_at<double>(bytes_, 155 + 8 * axis);
+      header_.scale[axis] = load<double>(bytes_.data(), 131 + 8 * axis);
+      header_.offset[axis] = load<double>(bytes_.data(), 155 + 8 * axis);
       if (!std::isfinite(header_.scale[axis]) || header_.scale[axis] == 0)
         fail(131 + 8 * axis, "a scale of coordinates is 0 or not a number");
       if (!std::isfinite(header_.offset[axis]))
@@ -144,23 +140,23 @@ class HeaderReader {
   }
 
   void read_placement() {
-    const std::uint64_t legacy = value_at<std::uint32_t>(bytes_, 107);
+    const std::uint64_t legacy = load<std::uint32_t>(bytes_.data(), 107);
     header_.points = legacy;
     if (minor() >= 4) {
-      const auto count = value_at<std::uint64_t>(bytes_, 247);
+      const auto count = load<std::uint64_t>(bytes_.data(), 247);
       if (count != 0) header_.points = count;
       if (count != 0 && legacy != 0 && count != legacy) {
         fail(247, "the header counts " + std::to_string(count) + " points here and " +
                       std::to_string(legacy) + " in its old field");
       }
     }
-    header_.points_offset = value_at<std::uint32_t>(bytes_, 96);
+    header_.points_offset = load<std::uint32_t>(bytes_.data(), 96);
     if (header_.points_offset < header_bytes_) fail(96, "the points begin inside the header");
     if (header_.points_offset > file_.size()) fail(file_.size(), "the file ends before its points");
   }
 
   void read_vlrs() {
-    const auto count = value_at<std::uint32_t>(bytes_, 100);
+    const auto count = load<std::uint32_t>(bytes_.data(), 100);
     std::uint64_t offset = header_bytes_;
     for (std::uint32_t i = 0; i < count; ++i)
       offset = read_record(offset, header_.points_offset, kVlrHeader, "the points");
@@ -184,11 +180,11 @@ class HeaderReader {
     LasRecord record;
     record.extended = header_bytes == kEvlrHeader;
     record.user = name_at(header, 2, 16);
-    record.number = value_at<std::uint16_t>(header, 18);
+    record.number = load<std::uint16_t>(header.data(), 18);
     record.offset = offset;
     record.payload = offset + header_bytes;
-    record.bytes =
-        record.extended ? value_at<std::uint64_t>(header, 20) : value_at<std::uint16_t>(header, 20);
+    record.bytes = record.extended ? load<std::uint64_t>(header.data(), 20)
+                                   : load<std::uint16_t>(header.data(), 20);
     if (record.bytes > end - record.payload) {
       fail(offset, "record " + std::to_string(record.number) + " goes on past " + what_follows);
     }
@@ -199,7 +195,7 @@ class HeaderReader {
   // Returns where waves begin inside the file, or the end of the file when it has none.
   [[nodiscard]] std::uint64_t waves_offset() const {
     if (minor() < 3 || !laz::has_wave_packet(header_.format)) return file_.size();
-    const auto offset = value_at<std::uint64_t>(bytes_, 227);
+    const auto offset = load<std::uint64_t>(bytes_.data(), 227);
     return offset < header_.points_offset ? file_.size() : std::min(offset, file_.size());
   }
 

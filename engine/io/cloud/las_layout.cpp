@@ -19,6 +19,7 @@
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/las_plan.h"
+#include "engine/io/cloud/packed_number.h"
 
 namespace ptc::las {
 namespace {
@@ -112,7 +113,7 @@ std::uint64_t widened(ChannelType type, std::uint64_t bits) {
   std::byte raw[8];
   std::memcpy(raw, &bits, sizeof raw);
   if (type == ChannelType::u64) return bits;
-  if (!is_integer(type)) return std::bit_cast<std::uint64_t>(load_number(type, raw));
+  if (!is_integer(type)) return std::bit_cast<std::uint64_t>(load_number(raw, type));
   return static_cast<std::uint64_t>(load_integer(type, raw));
 }
 

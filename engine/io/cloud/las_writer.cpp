@@ -18,6 +18,7 @@
 #include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/las_plan.h"
+#include "engine/io/cloud/packed_number.h"
 #include "engine/io/file/buffered_output.h"
 
 namespace ptc {
@@ -193,10 +194,10 @@ class LasWriter : public CheckedWriter {
     // Numbers with a sign or a fraction
     const ChannelType type = field.channel.channel.type;
     if (field.field == Field::gps_time) {
-      return set(22, load_number(type, field.channel.at(row, 0)));
+      return set(22, load_number(field.channel.at(row, 0), type));
     }
     if (field.field == Field::scan_angle) {
-      const double angle = load_number(type, field.channel.at(row, 0));
+      const double angle = load_number(field.channel.at(row, 0), type);
       const double steps = type == ChannelType::i8 ? std::round(angle / 0.006) : angle;
       return set(18, static_cast<std::int16_t>(steps));
     }

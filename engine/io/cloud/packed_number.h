@@ -6,46 +6,39 @@
 #include <cstring>
 #include <string_view>
 
+#include "format/bytes.h"
 #include "format/scalar.h"
 #include "format/schema.h"
 
 namespace ptc {
 
-/// Returns the value of type T whose bytes begin at `from`.
-template <typename T>
-[[nodiscard]] T load_as(const std::byte* from) noexcept {
-  T value;
-  std::memcpy(&value, from, sizeof value);
-  return value;
-}
-
 /// Returns the number of a type at `from`. It is exact unless it is an integer beyond 2^53.
 [[nodiscard]] inline double load_number(const std::byte* from, ChannelType type) noexcept {
   switch (type) {
     case ChannelType::u8:
-      return load_as<std::uint8_t>(from);
+      return load<std::uint8_t>(from, 0);
     case ChannelType::i8:
-      return load_as<std::int8_t>(from);
+      return load<std::int8_t>(from, 0);
     case ChannelType::u16:
-      return load_as<std::uint16_t>(from);
+      return load<std::uint16_t>(from, 0);
     case ChannelType::i16:
-      return load_as<std::int16_t>(from);
+      return load<std::int16_t>(from, 0);
     case ChannelType::u32:
-      return load_as<std::uint32_t>(from);
+      return load<std::uint32_t>(from, 0);
     case ChannelType::i32:
-      return load_as<std::int32_t>(from);
+      return load<std::int32_t>(from, 0);
     case ChannelType::u64:
-      return static_cast<double>(load_as<std::uint64_t>(from));
+      return static_cast<double>(load<std::uint64_t>(from, 0));
     case ChannelType::i64:
-      return static_cast<double>(load_as<std::int64_t>(from));
+      return static_cast<double>(load<std::int64_t>(from, 0));
     case ChannelType::half:
-      return static_cast<double>(decode_half(load_as<std::uint16_t>(from)));
+      return static_cast<double>(decode_half(load<std::uint16_t>(from, 0)));
     case ChannelType::f32:
-      return static_cast<double>(load_as<float>(from));
+      return static_cast<double>(load<float>(from, 0));
     case ChannelType::f64:
       break;
   }
-  return load_as<double>(from);
+  return load<double>(from, 0);
 }
 
 /// Stores a value as a number of a type, which is not half. A value beyond the range of float is

@@ -24,6 +24,7 @@
 #include "engine/io/cloud/pcd_header.h"
 #include "engine/io/cloud/record_source.h"
 #include "engine/io/cloud/text_fields.h"
+#include "format/bytes.h"
 
 namespace ptc {
 namespace {
@@ -251,8 +252,8 @@ std::unique_ptr<PointSource> open_compressed(ByteStream& stream, PcdHeader heade
   if (stream.compressed()) {
     refuse_file(stream.path(), "compressed PCD inside gzip is not supported: unpack the gzip file");
   }
-  const auto packed = load_as<std::uint32_t>(stream.take(4).data());
-  const auto bytes = load_as<std::uint32_t>(stream.take(4).data());
+  const auto packed = load<std::uint32_t>(stream.take(4).data(), 0);
+  const auto bytes = load<std::uint32_t>(stream.take(4).data(), 0);
   const std::uint64_t offset = stream.offset();
   if (packed > stream.max_left()) stream.fail_at(offset - 8, "the LZF data end too early");
   if (header.points > bytes / header.point_bytes || header.points * header.point_bytes != bytes)

@@ -15,14 +15,13 @@
 // A real of 8 bytes is left out: the only known file that has one has neither doubles nor pairs
 // there.
 #include <array>
-#include <memory>
-#include <utility>
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/particle_names.h"
 #include "engine/io/cloud/record_source.h"
 #include "engine/io/file/file.h"
+#include "format/bytes.h"
 
 namespace ptc {
 namespace {
@@ -47,9 +46,9 @@ class PdbSource : public ColumnSource {
     // Read the header.
     std::array<std::byte, kHeaderBytes> begin{};
     read(0, begin, "the header ends too early");
-    if (load_as<std::uint32_t>(begin.data()) != kMagic) fail(0, "not a PDB file of Maya");
-    count_ = load_as<std::uint32_t>(begin.data() + 16);
-    const auto channels = load_as<std::uint32_t>(begin.data() + 20);
+    if (load<std::uint32_t>(begin.data(), 0) != kMagic) fail(0, "not a PDB file of Maya");
+    count_ = load<std::uint32_t>(begin.data(), 16);
+    const auto channels = load<std::uint32_t>(begin.data(), 20);
     if (channels > kMaxChannels) fail(20, "the PDB has more than 1024 channels");
 
     // Read the channels, and pass over their values.
@@ -84,7 +83,7 @@ class PdbSource : public ColumnSource {
     constexpr const char* kCut = "a channel ends too early";
     std::array<std::byte, 4> magic{};
     read(at, magic, kCut);
-    if (load_as<std::uint32_t>(magic.data()) != kChannelMagic) {
+    if (load<std::uint32_t>(magic.data(), 0) != kChannelMagic) {
       fail(at,
            "no channel begins here; files with pointers of 64 bits or big-endian numbers are "
            "not supported");
@@ -97,10 +96,10 @@ class PdbSource : public ColumnSource {
     }
     std::array<std::byte, 20> shape{};
     read(offset, shape, kCut);
-    head.type = load_as<std::uint32_t>(shape.data());
-    head.value_bytes = load_as<std::uint32_t>(shape.data() + 4);
-    if (load_as<std::uint32_t>(shape.data() + 8) != count_ ||
-        load_as<std::uint32_t>(shape.data() + 12) != 1) {
+    head.type = load<std::uint32_t>(shape.data(), 0);
+    head.value_bytes = load<std::uint32_t>(shape.data(), 4);
+    if (load<std::uint32_t>(shape.data(), 8) != count_ ||
+        load<std::uint32_t>(shape.data(), 12) != 1) {
       fail(at, "the channel '" + head.name + "' is not one block of all particles");
     }
     return offset + shape.size();
@@ -151,9 +150,7 @@ class PdbSource : public ColumnSource {
 }  // namespace
 
 PointFile open_pdb(const std::filesystem::path& path) {
-  auto source = std::make_unique<PdbSource>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<PdbSource>(path);
 }
 
 }  // namespace ptc

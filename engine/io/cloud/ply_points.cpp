@@ -11,7 +11,6 @@
 // are therefore stored as double.
 #include <algorithm>
 #include <array>
-#include <memory>
 #include <utility>
 
 #include "engine/io/cloud/formats.h"
@@ -137,9 +136,7 @@ class PlySource : public RecordSource {
 }  // namespace
 
 PointFile open_ply(const std::filesystem::path& path) {
-  auto source = std::make_unique<PlySource>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<PlySource>(path);
 }
 
 }  // namespace ptc

@@ -116,7 +116,7 @@ PointLayout::PointLayout(const std::filesystem::path& path, std::span<const Reco
     if (used_[i]) continue;
     Channel channel = fields[i].channel;
     name_channel(channel, channels_);
-    add_copy({fields[i].offset, channel.type}, channel.components * channel.component_bytes());
+    add_copy({fields[i].offset, channel.type}, channel.bytes());
     channels_.push_back(std::move(channel));
   }
   fields_ = {};

@@ -13,17 +13,11 @@
 #include <string_view>
 #include <utility>
 
-#include "format/scalar.h"
+#include "engine/io/cloud/packed_number.h"
+#include "format/bytes.h"
 
 namespace ptc {
 namespace {
-
-template <typename T>
-T load(const std::byte* at) noexcept {
-  T value;
-  std::memcpy(&value, at, sizeof value);
-  return value;
-}
 
 template <typename T>
 std::byte* store(T value, std::byte* out) noexcept {
@@ -55,19 +49,13 @@ void take_name(RowChannel& row, std::size_t max_bytes, std::set<std::string>& ta
 
 }  // namespace
 
-std::size_t row_bytes(std::span<const Channel> channels) noexcept {
-  std::size_t bytes = 0;
-  for (const Channel& channel : channels) bytes += channel.component_bytes() * channel.components;
-  return bytes;
-}
-
 std::vector<RowChannel> row_channels(std::span<const Channel> channels, std::set<std::string> taken,
                                      std::size_t max_bytes) {
   std::vector<RowChannel> rows;
   std::size_t offset = 0;
   for (const Channel& channel : channels) {
     RowChannel row{.channel = channel, .offset = offset, .name = {}, .parts = {}};
-    offset += channel.component_bytes() * channel.components;
+    offset += channel.bytes();
     if (channel_bytes(channel.type) == 0) continue;  // a type of a later version
     take_name(row, max_bytes, taken);
     rows.push_back(std::move(row));
@@ -99,40 +87,25 @@ bool is_integer(ChannelType type) noexcept {
   return type != ChannelType::half && type != ChannelType::f32 && type != ChannelType::f64;
 }
 
-double load_number(ChannelType type, const std::byte* at) noexcept {
-  switch (type) {
-    case ChannelType::half:
-      return static_cast<double>(decode_half(load<std::uint16_t>(at)));
-    case ChannelType::f32:
-      return static_cast<double>(load<float>(at));
-    case ChannelType::f64:
-      return load<double>(at);
-    case ChannelType::u64:
-      return static_cast<double>(load<std::uint64_t>(at));
-    default:
-      return static_cast<double>(load_integer(type, at));
-  }
-}
-
 std::int64_t load_integer(ChannelType type, const std::byte* at) noexcept {
   switch (type) {
     case ChannelType::u8:
-      return load<std::uint8_t>(at);
+      return load<std::uint8_t>(at, 0);
     case ChannelType::u16:
-      return load<std::uint16_t>(at);
+      return load<std::uint16_t>(at, 0);
     case ChannelType::u32:
-      return load<std::uint32_t>(at);
+      return load<std::uint32_t>(at, 0);
     case ChannelType::u64:
       return static_cast<std::int64_t>(std::min<std::uint64_t>(
-          load<std::uint64_t>(at), std::numeric_limits<std::int64_t>::max()));
+          load<std::uint64_t>(at, 0), std::numeric_limits<std::int64_t>::max()));
     case ChannelType::i8:
-      return load<std::int8_t>(at);
+      return load<std::int8_t>(at, 0);
     case ChannelType::i16:
-      return load<std::int16_t>(at);
+      return load<std::int16_t>(at, 0);
     case ChannelType::i32:
-      return load<std::int32_t>(at);
+      return load<std::int32_t>(at, 0);
     case ChannelType::i64:
-      return load<std::int64_t>(at);
+      return load<std::int64_t>(at, 0);
     default:
       assert(false);
       return 0;
@@ -151,7 +124,7 @@ std::byte* store_number(ChannelType from, const std::byte* at, ChannelType to,
     constexpr std::int64_t kHigh = std::numeric_limits<std::int32_t>::max();
     return store(static_cast<std::int32_t>(std::clamp(load_integer(from, at), kLow, kHigh)), out);
   }
-  const double value = load_number(from, at);
+  const double value = load_number(at, from);
   return to == ChannelType::f32 ? store(static_cast<float>(value), out) : store(value, out);
 }
 

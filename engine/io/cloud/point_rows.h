@@ -29,9 +29,6 @@ struct RowChannel {
   }
 };
 
-/// Returns the bytes of a row.
-[[nodiscard]] std::size_t row_bytes(std::span<const Channel> channels) noexcept;
-
 /// Returns the channels whose types this program knows, in their order, with free names.
 ///
 /// A name is that of the channel, with `_` for dots. Components of three are _x _y _z in
@@ -54,8 +51,6 @@ struct RowChannel {
 /// Says whether a type holds integers.
 [[nodiscard]] bool is_integer(ChannelType type) noexcept;
 
-/// Returns the number that lies at `at`. Integers beyond 2^53 are rounded.
-[[nodiscard]] double load_number(ChannelType type, const std::byte* at) noexcept;
 /// Returns the integer that lies at `at`, cut to the range of the result; `type` is an integer one.
 [[nodiscard]] std::int64_t load_integer(ChannelType type, const std::byte* at) noexcept;
 

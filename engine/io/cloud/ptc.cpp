@@ -18,9 +18,7 @@
 //   phi = 2 pi a / 65535 - pi    z = 2 b / 65535 - 1    normal = (r sin phi, r cos phi, z)
 #include <array>
 #include <cmath>
-#include <memory>
 #include <numbers>
-#include <utility>
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/packed_number.h"
@@ -28,6 +26,7 @@
 #include "engine/io/cloud/record_source.h"
 #include "engine/io/text/byte_stream.h"
 #include "engine/io/text/text.h"
+#include "format/bytes.h"
 
 namespace ptc {
 namespace {
@@ -78,15 +77,15 @@ class PtcSource : public RecordSource {
     const std::string_view begin = stream_.peek(kMagic.size());
     if (begin != kMagic) stream_.fail_at(0, "not a PTC file");
     stream_.skip(kMagic.size());
-    if (load_as<std::uint32_t>(stream_.take(4).data()) != 0)
+    if (load<std::uint32_t>(stream_.take(4).data(), 0) != 0)
       stream_.fail_at(4, "the PTC version is not 0");
-    const auto count = load_as<double>(stream_.take(8).data());
+    const auto count = load<double>(stream_.take(8).data(), 0);
     if (!(count >= 0 && count <= kMaxCount && count == std::trunc(count)))
       stream_.fail_at(8, "the number of points is not a count");
     count_ = static_cast<std::uint64_t>(count);
     stream_.skip(kUnused);
-    channels_ = load_as<std::uint32_t>(stream_.take(4).data());
-    floats_ = load_as<std::uint32_t>(stream_.take(4).data());
+    channels_ = load<std::uint32_t>(stream_.take(4).data(), 0);
+    floats_ = load<std::uint32_t>(stream_.take(4).data(), 0);
     if (floats_ > kMaxFloats || channels_ > floats_)
       stream_.fail_at(180, "the PTC channels have no or more than 4096 numbers in a point");
   }
@@ -141,9 +140,9 @@ class PtcSource : public RecordSource {
     const std::byte* const from = stream_.take(record_bytes()).data();
     std::memcpy(packed_.data(), from, kNormalOffset);
     std::memcpy(packed_.data() + kNormalOffset, from + kNormalOffset + 4, sizeof(float));
-    const double phi = 2 * std::numbers::pi * load_as<std::uint16_t>(from + kNormalOffset) / 65535 -
-                       std::numbers::pi;
-    const double z = 2.0 * load_as<std::uint16_t>(from + kNormalOffset + 2) / 65535 - 1;
+    const double phi =
+        2 * std::numbers::pi * load<std::uint16_t>(from, kNormalOffset) / 65535 - std::numbers::pi;
+    const double z = 2.0 * load<std::uint16_t>(from, kNormalOffset + 2) / 65535 - 1;
     const double r = std::sqrt(std::max(0.0, 1 - z * z));
     const std::array<float, 3> normal = {static_cast<float>(r * std::sin(phi)),
                                          static_cast<float>(r * std::cos(phi)),
@@ -174,9 +173,7 @@ class PtcSource : public RecordSource {
 }  // namespace
 
 PointFile open_ptc(const std::filesystem::path& path) {
-  auto source = std::make_unique<PtcSource>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<PtcSource>(path);
 }
 
 }  // namespace ptc

@@ -19,6 +19,7 @@
 
 #include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/file/buffered_output.h"
 
@@ -113,7 +114,7 @@ class PtcWriter : public CheckedWriter {
     if (info_.emits) put_value(surfel.emission);
     for (const RowChannel& channel : channels_) {
       for (std::size_t i = 0; i < channel.channel.components; ++i) {
-        put_value(static_cast<float>(load_number(channel.channel.type, channel.at(row, i))));
+        put_value(static_cast<float>(load_number(channel.at(row, i), channel.channel.type)));
       }
     }
   }

@@ -3,8 +3,6 @@
 //   3                        the points of the block
 //   1.5 2 3 -1024 97 59 38   x y z [intensity] [r g b], the same for all points of the file
 //   ...
-#include <memory>
-#include <utility>
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/packed_number.h"
@@ -126,9 +124,7 @@ class PtsSource : public RecordSource {
 }  // namespace
 
 PointFile open_pts(const std::filesystem::path& path) {
-  auto source = std::make_unique<PtsSource>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<PtsSource>(path);
 }
 
 }  // namespace ptc

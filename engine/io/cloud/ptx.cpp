@@ -15,8 +15,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <utility>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -246,9 +244,7 @@ class PtxSource : public RecordSource {
 }  // namespace
 
 PointFile open_ptx(const std::filesystem::path& path) {
-  auto source = std::make_unique<PtxSource>(path);
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<PtxSource>(path);
 }
 
 }  // namespace ptc

@@ -168,10 +168,7 @@ PointFile open_xyz(const std::filesystem::path& path) {
   sample.names = lines.names();
   std::filesystem::path name = path;
   if (lower_extension(name) == ".gz") name = name.stem();
-  auto source = std::make_unique<XyzSource>(
-      path, choose_xyz_columns(sample, lower_extension(name) == ".xyzn"));
-  PointFileInfo info = source->info();
-  return {std::move(info), std::move(source)};
+  return open_source<XyzSource>(path, choose_xyz_columns(sample, lower_extension(name) == ".xyzn"));
 }
 
 }  // namespace ptc

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/file/buffered_output.h"
 
@@ -70,9 +71,9 @@ class XyzWriter : public CheckedWriter {
     } else if (is_integer(type)) {
       add(load_integer(type, at));
     } else if (type == ChannelType::f64) {
-      add(load_number(type, at));
+      add(load_number(at, type));
     } else {
-      add(static_cast<float>(load_number(type, at)));
+      add(static_cast<float>(load_number(at, type)));
     }
   }
 

@@ -21,6 +21,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "format/bytes.h"
+
 namespace ptc::laz {
 namespace {
 
@@ -44,13 +46,6 @@ std::uint16_t join(std::uint8_t low, std::uint8_t high) noexcept {
 // Decodes a byte as difference modulo 256 from a prediction.
 std::uint8_t byte_near(ArithmeticDecoder& in, SymbolModel& model, int predicted) {
   return static_cast<std::uint8_t>(static_cast<unsigned>(predicted) + in.symbol(model));
-}
-
-template <typename T>
-T value_at(const WavePacket& packet, std::size_t at) noexcept {
-  T value;
-  std::memcpy(&value, packet.data() + at, sizeof value);
-  return value;
 }
 
 }  // namespace
@@ -205,8 +200,8 @@ WavePacket WavePacketDecoder::decode(ArithmeticDecoder& in, const WavePacket& la
   put(0, static_cast<std::uint8_t>(in.symbol(descriptor_)));
 
   // Decode the offset: unchanged, right behind the last packet, by a step, or in full.
-  auto offset = value_at<std::uint64_t>(last, 1);
-  const auto last_size = value_at<std::int32_t>(last, 9);
+  auto offset = load<std::uint64_t>(last.data(), 1);
+  const auto last_size = load<std::int32_t>(last.data(), 9);
   offset_code_ = in.symbol(code_[offset_code_]);
   if (offset_code_ == 1) {
     offset += static_cast<std::uint32_t>(last_size);
@@ -221,10 +216,10 @@ WavePacket WavePacketDecoder::decode(ArithmeticDecoder& in, const WavePacket& la
 
   // Decode the other fields by the bits of their numbers.
   put(9, size_.decode(in, last_size));
-  put(13, location_.decode(in, value_at<std::int32_t>(last, 13)));
+  put(13, location_.decode(in, load<std::int32_t>(last.data(), 13)));
   for (unsigned axis = 0; axis < 3; ++axis) {
     const std::size_t at = 17 + std::size_t{4} * axis;
-    put(at, direction_.decode(in, value_at<std::int32_t>(last, at), axis));
+    put(at, direction_.decode(in, load<std::int32_t>(last.data(), at), axis));
   }
   return packet;
 }

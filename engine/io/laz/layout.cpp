@@ -16,6 +16,7 @@
 #include "engine/io/laz/arithmetic.h"
 #include "engine/io/laz/error.h"
 #include "engine/io/laz/integer.h"
+#include "format/bytes.h"
 
 namespace ptc::laz {
 namespace {
@@ -33,13 +34,6 @@ constexpr std::array<const char*, 15> kItemNames = {
     "BYTE",  "SHORT",        "INT",     "LONG",  "FLOAT",    "DOUBLE",       "POINT10", "GPSTIME11",
     "RGB12", "WAVEPACKET13", "POINT14", "RGB14", "RGBNIR14", "WAVEPACKET14", "BYTE14"};
 constexpr unsigned kWavePacket13 = 9;
-
-template <typename T>
-T value_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
-  T value;
-  std::memcpy(&value, bytes.data() + at, sizeof value);
-  return value;
-}
 
 // Returns the items of a record.
 std::vector<Item> items_of(unsigned format, std::size_t record_bytes) {
@@ -78,9 +72,9 @@ unsigned decode_items(std::span<const std::byte> payload, unsigned format,
   }
   unsigned version = 0;
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    const auto type = value_at<std::uint16_t>(payload, i * kItemBytes);
-    const auto bytes = value_at<std::uint16_t>(payload, i * kItemBytes + 2);
-    const unsigned item_version = value_at<std::uint16_t>(payload, i * kItemBytes + 4);
+    const auto type = load<std::uint16_t>(payload.data(), i * kItemBytes);
+    const auto bytes = load<std::uint16_t>(payload.data(), i * kItemBytes + 2);
+    const unsigned item_version = load<std::uint16_t>(payload.data(), i * kItemBytes + 4);
     if (type != expected[i].type || bytes != expected[i].bytes) {
       throw LazError("the laszip record has item " + item_name(type) + " of " +
                      std::to_string(bytes) + " bytes where point format " + std::to_string(format) +
@@ -131,7 +125,7 @@ Layout decode_layout(std::span<const std::byte> payload, unsigned format,
   layout.record_bytes = record_bytes;
 
   // Decode the compressor.
-  const auto compressor = value_at<std::uint16_t>(payload, 0);
+  const auto compressor = load<std::uint16_t>(payload.data(), 0);
   if (compressor < 1 || compressor > 3)
     throw LazError("compressor " + std::to_string(compressor) + " is not supported");
   layout.compressor = static_cast<Compressor>(compressor);
@@ -139,11 +133,11 @@ Layout decode_layout(std::span<const std::byte> payload, unsigned format,
     throw LazError("compressor " + std::to_string(compressor) + " for point format " +
                    std::to_string(format) + " is not supported");
   }
-  const auto coder = value_at<std::uint16_t>(payload, 2);
+  const auto coder = load<std::uint16_t>(payload.data(), 2);
   if (coder != 0) throw LazError("coder " + std::to_string(coder) + " is not supported");
 
   // Decode the size of chunks.
-  const auto chunk_points = value_at<std::uint32_t>(payload, 12);
+  const auto chunk_points = load<std::uint32_t>(payload.data(), 12);
   const bool vary = chunk_points == 0xffffffffU;
   if (layout.compressor != Compressor::pointwise && !vary) {
     if (chunk_points == 0) throw LazError("the laszip record has chunks of no points");
@@ -151,7 +145,7 @@ Layout decode_layout(std::span<const std::byte> payload, unsigned format,
   }
 
   // Decode the items.
-  const std::size_t items = value_at<std::uint16_t>(payload, 32);
+  const std::size_t items = load<std::uint16_t>(payload.data(), 32);
   if (payload.size() - kFixedBytes < items * kItemBytes)
     throw LazError("the laszip record is too short for its items");
   const auto described = payload.subspan(kFixedBytes, items * kItemBytes);
@@ -164,9 +158,9 @@ std::vector<Chunk> decode_chunk_table(std::span<const std::byte> table, const La
                                       std::uint64_t end) {
   // Check the number of chunks against the points and the bytes.
   if (table.size() < kTableHeaderBytes + kSlackBytes) throw LazError("the chunk table is cut off");
-  if (value_at<std::uint32_t>(table, 0) != 0)
+  if (load<std::uint32_t>(table.data(), 0) != 0)
     throw LazError("the version of the chunk table is not 0");
-  const std::uint64_t count = value_at<std::uint32_t>(table, 4);
+  const std::uint64_t count = load<std::uint32_t>(table.data(), 4);
   if (count > (end - offset) / layout.record_bytes)
     throw LazError("the chunk table has more chunks than the file can hold");
   if (layout.chunk_points && count != (points - 1) / *layout.chunk_points + 1) {
