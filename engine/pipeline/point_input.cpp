@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/level_source.h"
@@ -39,18 +38,11 @@ SourcePages pages_of(const ContainerReader& container, const Selection& selectio
   for (const Channel& channel : container.meta().channels) {
     const bool kept =
         std::ranges::find(*selection.channels, channel.name) != selection.channels->end();
-    const bool needed = kept || (!selection.classes.empty() && channel.name == "classification");
+    const bool needed = kept || (!selection.classes.empty() && channel.name == kClassChannel);
     if (needed && std::ranges::find(*pages.groups, channel.group) == pages.groups->end())
       pages.groups->push_back(channel.group);
   }
   return pages;
-}
-
-/// Returns the channels of a container that travel with its points.
-std::vector<Channel> input_channels(const ContainerReader& container) {
-  std::vector<Channel> channels = container.meta().channels;
-  std::erase_if(channels, [](const Channel& c) { return c.name == kOriginalIndex; });
-  return channels;
 }
 
 PointFile open_container(const std::filesystem::path& path, const Selection& selection) {
@@ -65,9 +57,10 @@ PointFile open_container(const std::filesystem::path& path, const Selection& sel
   info.text = container->meta().text;
   for (const char* made : {kInputsKey, kSpacingKey, kRoundingKey, "shading", "salvaged"})
     info.text.erase(made);
-  if (!selection.level) info.channels = kept_channels(input_channels(*container), selection, path);
+  if (!selection.level)
+    info.channels = kept_channels(channels_without_index(*container), selection, path);
   Selection own = selection;
-  if (!own.channels) {
+  if (!own.channels && info.channels.size() < container->meta().channels.size()) {
     own.channels.emplace();
     for (const Channel& channel : info.channels) own.channels->push_back(channel.name);
   }

@@ -9,8 +9,6 @@
 namespace ptc {
 namespace {
 
-constexpr const char* kClassChannel = "classification";
-
 /// Returns the names of channels for an error.
 std::string names_of(std::span<const Channel> channels) {
   std::string names;
@@ -25,23 +23,20 @@ class SelectedPoints : public PointSource {
                  const Selection& selection, const std::filesystem::path& path)
       : source_(std::move(source)), selection_(selection) {
     const std::vector<Channel> kept = kept_channels(channels, selection, path);
-    bool has_classes = false;
     for (const Channel& channel : channels) {
-      const std::size_t bytes = channel.component_bytes() * channel.components;
-      if (channel.name == kClassChannel && channel.components == 1 && is_integer(channel.type)) {
-        has_classes = true;
-        class_type_ = channel.type;
-        class_offset_ = row_bytes_;
-      }
       if (std::ranges::find(kept, channel.name, &Channel::name) != kept.end())
-        copies_.push_back({row_bytes_, bytes});
-      row_bytes_ += bytes;
+        copies_.push_back({row_bytes_, channel.bytes()});
+      row_bytes_ += channel.bytes();
     }
-    if (!selection.classes.empty() && !has_classes) {
+    if (selection.classes.empty()) return;
+    const auto found = find_in_row(channels, kClassChannel);
+    if (!found || found->channel->components != 1 || !is_integer(found->channel->type)) {
       throw RequestError("classes", path.string() +
                                         ": there is no channel of whole numbers named " +
                                         kClassChannel + ": " + names_of(channels));
     }
+    class_type_ = found->channel->type;
+    class_offset_ = found->offset;
   }
 
   std::size_t next(std::span<Surfel> out) override {

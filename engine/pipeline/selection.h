@@ -16,11 +16,14 @@
 
 namespace ptc {
 
+/// The name of the channel that Selection::classes are values of.
+inline constexpr const char* kClassChannel = "classification";
+
 /// Which points are taken, and what of them. The conditions hold together; `every` counts the
 /// points that the others take.
 struct Selection {
   std::optional<Bounds> box;           ///< scene units; points within, those on its faces included
-  std::vector<std::uint64_t> classes;  ///< values of the channel `classification`; empty: all
+  std::vector<std::uint64_t> classes;  ///< values of the channel kClassChannel; empty: all
   std::uint64_t every = 1;             ///< takes the first of every so many points, 1 or more
   /// Names of the channels that are kept; without a value, all are.
   std::optional<std::vector<std::string>> channels;

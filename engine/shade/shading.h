@@ -46,8 +46,8 @@ struct Surroundings {
   float cone = 1.5707964F;
   /// Distance from which on surfaces cover nothing, scene units; infinite: none.
   float distance = std::numeric_limits<float>::infinity();
-  /// The same as a share of the diagonal of the scene's bounds; 0: `distance` holds. Requests take
-  /// it; for a gather it must be 0.
+  /// That distance as a share of the diagonal of the scene's bounds; 0: `distance` holds. Requests
+  /// take a share; for a gather it must be 0.
   float diagonals = 0;
   /// A surface at a distance d covers the share (1 - d / distance)^falloff of its direction: at 0
   /// all of it up to `distance`.

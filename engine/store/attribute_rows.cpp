@@ -61,23 +61,13 @@ std::size_t rows_to_columns(std::span<const Channel> channels, std::span<const s
       });
 }
 
-AttributeRows::AttributeRows(const ContainerReader& container, std::uint8_t first_group)
-    : container_(container), payload_(container.page_payload_limit()) {
-  for (const Channel& channel : container.meta().channels) {
-    if (channel.group >= first_group) add(channel);
-  }
-}
-
 AttributeRows::AttributeRows(const ContainerReader& container, std::span<const std::uint8_t> groups)
-    : container_(container), payload_(container.page_payload_limit()) {
+    : container_(container) {
   for (const Channel& channel : container.meta().channels) {
-    if (std::ranges::find(groups, channel.group) != groups.end()) add(channel);
+    if (std::ranges::find(groups, channel.group) != groups.end()) channels_.push_back(channel);
   }
-}
-
-void AttributeRows::add(const Channel& channel) {
-  channels_.push_back(channel);
-  row_bytes_ += channel.component_bytes() * channel.components;
+  row_bytes_ = ptc::row_bytes(channels_);
+  if (row_bytes_ > 0) payload_.resize(container.page_payload_limit());
 }
 
 std::span<const std::byte> AttributeRows::read(std::size_t rank, std::uint32_t count) {

@@ -17,9 +17,9 @@ namespace ptc {
 /// little-endian, without padding. Memory: the rows of a page, and an attribute page.
 class AttributeRows {
  public:
-  /// @param container    must outlive this
-  /// @param first_group  channels of groups before this one are left out
-  explicit AttributeRows(const ContainerReader& container, std::uint8_t first_group = 1);
+  /// @param container  must outlive this
+  explicit AttributeRows(const ContainerReader& container)
+      : AttributeRows(container, container.groups()) {}
   /// @param groups  channels of other groups are left out, and not read
   AttributeRows(const ContainerReader& container, std::span<const std::uint8_t> groups);
 
@@ -35,8 +35,6 @@ class AttributeRows {
   [[nodiscard]] std::span<const std::byte> read(std::size_t rank, std::uint32_t count);
 
  private:
-  void add(const Channel& channel);
-
   const ContainerReader& container_;
   std::vector<Channel> channels_;  ///< that are read, by group
   std::size_t row_bytes_ = 0;

@@ -18,9 +18,12 @@
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
+#include "tests/support/read_points.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
+using test::read_points;
+using test::ReadPoints;
 using test::TemporaryDirectory;
 
 namespace {
@@ -62,35 +65,10 @@ std::filesystem::path write_cloud(const std::filesystem::path& path, std::uint32
   return path;
 }
 
-/// The points of a source with their rows.
-struct Read {
-  std::vector<Surfel> surfels;
-  std::vector<std::byte> rows;
-  [[nodiscard]] std::size_t row_bytes() const { return rows.size() / surfels.size(); }
-  template <class T>
-  [[nodiscard]] T value(std::size_t point, std::size_t offset) const {
-    T value;
-    std::memcpy(&value, rows.data() + point * row_bytes() + offset, sizeof value);
-    return value;
-  }
-};
-
-Read read_all(PointSource& source) {
-  Read read;
-  std::vector<Surfel> block(777);
-  while (const std::size_t count = source.next(block)) {
-    read.surfels.insert(read.surfels.end(), block.begin(),
-                        block.begin() + static_cast<std::ptrdiff_t>(count));
-    const auto rows = source.attributes();
-    read.rows.insert(read.rows.end(), rows.begin(), rows.end());
-  }
-  return read;
-}
-
-Read read_all(const std::filesystem::path& path) {
+ReadPoints read_all(const std::filesystem::path& path) {
   const ContainerReader container(path);
   ContainerSource source(container);
-  return read_all(source);
+  return read_points(source);
 }
 
 /// Returns the offset of a channel in a row.
@@ -126,7 +104,7 @@ void check_attributes(const std::filesystem::path& path, std::uint32_t count) {
     points.emplace(std::array<double, 3>{p.x, p.y, p.z}, p);
   }
   REQUIRE(points.size() == count);  // positions differ, so that they tell the points apart
-  const Read read = read_all(path);
+  const ReadPoints read = read_all(path);
   REQUIRE(read.surfels.size() == count);
   const std::size_t intensity = offset_of(path, "intensity"), time = offset_of(path, "time"),
                     label = offset_of(path, "label");
@@ -181,7 +159,7 @@ TEST_CASE("attributes: what an input does not record is 0", "[attributes]") {
   const auto first = write_cloud(dir / "first.ply", 0, 500, false);
   const auto second = write_cloud(dir / "second.ply", 500, 500);
   build(request_of({first, second}), dir / "both.ptcx");
-  const Read read = read_all(dir / "both.ptcx");
+  const ReadPoints read = read_all(dir / "both.ptcx");
   const std::size_t time = offset_of(dir / "both.ptcx", "time");
   std::size_t unknown = 0;
   for (std::size_t i = 0; i < 1000; ++i) unknown += read.value<double>(i, time) == 0;
@@ -198,7 +176,7 @@ TEST_CASE("attributes: the order of the input comes back", "[attributes]") {
   container_to_points(ContainerReader(dir / "a.ptcx"), dir / "b.ply", {.original_order = true},
                       quiet);
   const PointFile written = open_points(dir / "b.ply");
-  const Read read = read_all(*written.source);
+  const ReadPoints read = read_points(*written.source);
   REQUIRE(read.surfels.size() == 30'000);
   REQUIRE(written.info.channels.size() == 3);
   std::size_t wrong = 0;

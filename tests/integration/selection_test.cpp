@@ -1,7 +1,6 @@
 // Parts of containers and clouds, and containers that are joined.
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <fstream>
 #include <numeric>
 #include <set>
@@ -18,6 +17,7 @@
 #include "engine/store/box_pages.h"
 #include "engine/store/point_scan.h"
 #include "engine/store/reader.h"
+#include "tests/support/read_points.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -35,26 +35,8 @@ bool is_inside(const glm::dvec3& p) {
   return true;
 }
 
-/// The points of a source, and their rows one after another.
-struct Read {
-  std::vector<Surfel> surfels;
-  std::vector<std::byte> rows;
-};
-
-Read read_all(PointSource& source) {
-  Read read;
-  std::vector<Surfel> block(321);
-  while (const std::size_t count = source.next(block)) {
-    read.surfels.insert(read.surfels.end(), block.begin(),
-                        block.begin() + static_cast<std::ptrdiff_t>(count));
-    const auto rows = source.attributes();
-    read.rows.insert(read.rows.end(), rows.begin(), rows.end());
-  }
-  return read;
-}
-
-Read read_all(const std::filesystem::path& path, const Selection& selection = {}) {
-  return read_all(*open_point_input(path, selection).source);
+ReadPoints read_all(const std::filesystem::path& path, const Selection& selection = {}) {
+  return read_points(*open_point_input(path, selection).source);
 }
 
 std::set<std::array<double, 3>> places(const std::vector<Surfel>& surfels) {
@@ -164,12 +146,11 @@ TEST_CASE("selection: classes, every so many, and channels, of clouds and contai
   const Selection selection{
       .classes = {1, 3}, .every = 4, .channels = std::vector<std::string>{"number"}};
   for (const auto& path : {cloud, container}) {
-    const Read read = read_all(path, selection);
+    const ReadPoints read = read_all(path, selection);
     CHECK(read.surfels.size() == 300);
     REQUIRE(read.rows.size() == 300 * sizeof(std::uint16_t));
     for (std::size_t i = 0; i < 300; ++i) {
-      std::uint16_t number = 0;
-      std::memcpy(&number, read.rows.data() + i * sizeof number, sizeof number);
+      const auto number = read.value<std::uint16_t>(i, 0);
       REQUIRE((number % 5 == 1 || number % 5 == 3));
     }
   }
@@ -191,7 +172,7 @@ TEST_CASE("selection: a part becomes a container, and parts are joined again", "
   const auto joined = build(request_of({low, high}), dir / "joined.ptcx");
   CHECK(ContainerReader(low).superblock().points == 1'600);
   CHECK(ContainerReader(joined).meta().channels == ContainerReader(whole).meta().channels);
-  const Read before = read_all(whole), after = read_all(joined);
+  const ReadPoints before = read_all(whole), after = read_all(joined);
   CHECK(places(before.surfels) == places(after.surfels));
   CHECK(before.rows == after.rows);
 }
@@ -205,12 +186,10 @@ TEST_CASE("selection: a file of points holds what was selected, in the order of 
   Progress silent;
   container_to_points(ContainerReader(whole), dir / "b.ply",
                       {.original_order = true, .selection = {.classes = {2}}}, silent);
-  const Read read = read_all(dir / "b.ply");
+  const ReadPoints read = read_all(dir / "b.ply");
   CHECK(read.surfels.size() == 400);
   for (std::size_t i = 0; i < 400; ++i) {
-    std::uint16_t number = 0;
-    std::memcpy(&number, read.rows.data() + i * 3 + 1, sizeof number);
-    REQUIRE(number == 5 * i + 2);
+    REQUIRE(read.value<std::uint16_t>(i, 1) == 5 * i + 2);
   }
 }
 

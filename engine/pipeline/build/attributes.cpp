@@ -108,7 +108,7 @@ class ContainerAttributes : public PointStream {
 
 AttributePlan::Place AttributePlan::add_channel(Channel channel) {
   // Put the channel behind the last one, or into a new group
-  const std::size_t bytes = channel.component_bytes() * channel.components;
+  const std::size_t bytes = channel.bytes();
   if (group_bytes_.empty() || group_bytes_.back() + bytes > kGroupBytes) {
     if (group_bytes_.size() == kMaxGroups)
       throw RequestError("inputs", "the inputs have more channels than a container can hold");
@@ -144,7 +144,7 @@ std::size_t AttributePlan::add_input(std::span<const Channel> channels) {
     for (const Channel& channel : divided(whole)) {
       const Place place = place_of(channel);
       input.indexed |= channel.name == kOriginalIndex;
-      const std::size_t bytes = channel.component_bytes() * channel.components;
+      const std::size_t bytes = channel.bytes();
       Piece* const last = input.pieces.empty() ? nullptr : &input.pieces.back();
       if (last && last->group == place.group && last->to + last->bytes == place.offset) {
         last->bytes += bytes;  // rows have no gaps, so the piece goes on in the row, too

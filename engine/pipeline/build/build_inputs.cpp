@@ -252,12 +252,9 @@ void Clouds::note_scan(const PointFileInfo& info, Cloud& cloud) {
   if (info.scanners.empty()) return;
   cloud.first_scanner = static_cast<std::uint32_t>(scanners.size());
   scanners.insert(scanners.end(), info.scanners.begin(), info.scanners.end());
-  for (const Channel& channel : info.channels) {
-    if (channel.name == "scan") {
-      cloud.scanner_bytes = std::min(channel.component_bytes(), sizeof(std::uint32_t));
-      return;
-    }
-    cloud.scanner_offset += channel.component_bytes() * channel.components;
+  if (const auto found = find_in_row(info.channels, "scan")) {
+    cloud.scanner_offset = found->offset;
+    cloud.scanner_bytes = std::min(found->channel->component_bytes(), sizeof(std::uint32_t));
   }
 }
 

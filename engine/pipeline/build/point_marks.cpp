@@ -90,13 +90,18 @@ bool add_marks(Meta& meta) {
   return true;
 }
 
+std::vector<std::uint8_t> rise_groups(std::span<const Channel> channels) {
+  const auto found = std::ranges::find(channels, kRiseChannel, &Channel::name);
+  if (found == channels.end()) return {};
+  return {found->group};
+}
+
 RisePlace::RisePlace(std::span<const Channel> channels) {
-  for (const Channel& channel : channels) {
-    exists_ = channel.name == kRiseChannel && channel.type == ChannelType::u8 &&
-              channel.components == 1 && channel.scale == 0.125;
-    if (exists_) return;
-    offset_ += channel.component_bytes() * channel.components;
-  }
+  const auto found = find_in_row(channels, kRiseChannel);
+  if (!found) return;
+  const Channel& channel = *found->channel;
+  if (channel.type == ChannelType::u8 && channel.components == 1 && channel.scale == 0.125)
+    offset_ = found->offset;
 }
 
 std::unique_ptr<PointStream> marked_points(std::unique_ptr<ScanStream> scan) {

@@ -12,7 +12,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "engine/base/stream.h"
 #include "engine/io/file/file.h"
@@ -32,24 +34,24 @@ inline constexpr const char* kRiseChannel = "rise";
 /// @return whether there is room for them: no channel has their names, and there is a group left
 [[nodiscard]] bool add_marks(Meta& meta);
 
+/// Returns the groups that must be read for the rises of points: one, or none where a container has
+/// no such channel.
+[[nodiscard]] std::vector<std::uint8_t> rise_groups(std::span<const Channel> channels);
+
 /// Where the rise of a point lies in a row of its channels.
 class RisePlace {
  public:
   /// Looks for the channel. @param channels  of a row
   explicit RisePlace(std::span<const Channel> channels);
 
-  /// Says whether there is such a channel.
-  [[nodiscard]] bool exists() const noexcept { return exists_; }
   /// Returns how far a receiver must rise above a point, in radii; 0 without the channel.
-  /// @param row  of the point; null where nothing is known of it
+  /// @param row  of the point
   [[nodiscard]] float radii(const std::byte* row) const noexcept {
-    return exists_ && row ? 0.125F * static_cast<float>(std::to_integer<unsigned>(row[offset_]))
-                          : 0;
+    return offset_ ? 0.125F * static_cast<float>(std::to_integer<unsigned>(row[*offset_])) : 0;
   }
 
  private:
-  bool exists_ = false;
-  std::size_t offset_ = 0;
+  std::optional<std::size_t> offset_;  ///< empty: there is no such channel
 };
 
 /// Yields the points of a completed scan with their marks as flags.

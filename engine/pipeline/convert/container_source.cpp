@@ -33,19 +33,13 @@ struct IndexPlace {
 };
 
 IndexPlace index_place(const ContainerReader& container) {
-  IndexPlace place;
-  for (const Channel& channel : container.meta().channels) {
-    place.bytes = channel.component_bytes();
-    if (channel.name == kOriginalIndex && channel.role == ChannelRole::index) return place;
-    place.offset += place.bytes * channel.components;
-  }
-  return {};
+  const auto found = find_in_row(container.meta().channels, kOriginalIndex);
+  if (!found || found->channel->role != ChannelRole::index) return {};
+  return {found->offset, found->channel->component_bytes()};
 }
 
 std::size_t pieces_of(const ContainerReader& container) {
-  std::size_t bytes = sizeof(PointRecord);
-  for (const Channel& channel : container.meta().channels)
-    bytes += channel.component_bytes() * channel.components;
+  const std::size_t bytes = sizeof(PointRecord) + row_bytes(container.meta().channels);
   return (bytes + kPieceBytes - 1) / kPieceBytes;
 }
 
@@ -160,6 +154,12 @@ std::size_t ContainerSource::next(std::span<Surfel> out) {
   given_ = page_rows_.subspan(at_ * rows_.row_bytes(), count * rows_.row_bytes());
   at_ += static_cast<std::uint32_t>(count);
   return count;
+}
+
+std::vector<Channel> channels_without_index(const ContainerReader& container) {
+  std::vector<Channel> channels = container.meta().channels;
+  std::erase_if(channels, [](const Channel& c) { return c.name == kOriginalIndex; });
+  return channels;
 }
 
 bool has_input_order(const ContainerReader& container) {

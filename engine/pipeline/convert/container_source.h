@@ -49,14 +49,17 @@ class ContainerSource : public PointSource {
   std::uint32_t at_ = 0;                  ///< the next point of the page
 };
 
+/// Returns the channels of a container without original_index.
+[[nodiscard]] std::vector<Channel> channels_without_index(const ContainerReader& container);
 /// Says whether the points of a container can be put into the order of their input: the container
 /// has the channel original_index.
 [[nodiscard]] bool has_input_order(const ContainerReader& container);
 /// Returns the least memory for open_in_input_order(), bytes.
 [[nodiscard]] std::uint64_t input_order_bytes(const ContainerReader& container);
 
-/// Opens the points of a container in the order of their input. The channel original_index is left
-/// out of the rows. It reads the container once before it returns.
+/// Opens the points of a container in the order of their input. Rows have
+/// the channels that channels_without_index() returns. It reads the container once before it
+/// returns.
 /// @param container  has_input_order(); must outlive the result
 /// @param options    memory and directories of the sort
 /// @param executor   must outlive the result

@@ -9,7 +9,6 @@
 #include "engine/io/cloud/points.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
-#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/point_input.h"
 
@@ -61,9 +60,8 @@ std::unique_ptr<PointSource> open_ordered(const ContainerReader& container,
       container, {.memory_bytes = sort_bytes, .temp_dirs = temp_dirs(options.run, target)},
       executor);
   if (options.selection.takes_all() && !options.selection.channels) return points;
-  std::vector<Channel> channels = container.meta().channels;
-  std::erase_if(channels, [](const Channel& c) { return c.name == kOriginalIndex; });
-  return select_points(std::move(points), channels, options.selection, container.path());
+  return select_points(std::move(points), channels_without_index(container), options.selection,
+                       container.path());
 }
 
 /// Opens a file that was written and compares it with what it should hold.
@@ -93,10 +91,11 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
                       .emits = container.header().point_bytes != kPointBytes && !selection.level,
                       .colour_from = options.colour_from};
   info.bounds = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
-  if (!selection.level)
-    info.channels = kept_channels(container.meta().channels, selection, container.path());
-  if (options.original_order)
-    std::erase_if(info.channels, [](const Channel& c) { return c.name == kOriginalIndex; });
+  if (!selection.level) {
+    info.channels = kept_channels(
+        options.original_order ? channels_without_index(container) : container.meta().channels,
+        selection, container.path());
+  }
   if (!selection.takes_all()) measure(*open_selected(container, selection), info);
   return info;
 }

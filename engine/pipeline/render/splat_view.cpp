@@ -69,7 +69,7 @@ class SurfelView : public PrimaryView {
   void draw(const ContainerReader& scene, LostPages* lost, const Executor& executor,
             Progress& progress) {
     const PageNumbers::Range pages = scene.point_pages();
-    const std::vector<std::uint8_t> rise_group = group_of_rise(scene);
+    const std::vector<std::uint8_t> groups = rise_groups(scene.meta().channels);
     for (std::size_t first = 0; first < pages.size(); first += kPagesAtOnce) {
       const auto some = pages.subrange(first, std::min(kPagesAtOnce, pages.size() - first));
       std::vector<std::vector<Projected>> discs(some.size());
@@ -78,7 +78,7 @@ class SurfelView : public PrimaryView {
         scan.next();
         progress.advance(scan.count());
         if (!scan.whole()) return;
-        AttributeRows attributes(scene, rise_group);
+        AttributeRows attributes(scene, groups);
         const RisePlace rise(attributes.channels());
         const std::byte* row = attributes.read(first + i, scan.count()).data();
         const PointPage points = scan.points();
@@ -149,14 +149,6 @@ class SurfelView : public PrimaryView {
         }
       }
     });
-  }
-
-  /// Returns the group of the channel of rises; nothing where there is none.
-  static std::vector<std::uint8_t> group_of_rise(const ContainerReader& scene) {
-    for (const Channel& channel : scene.meta().channels) {
-      if (channel.name == kRiseChannel) return {channel.group};
-    }
-    return {};
   }
 
   /// Appends the disc of a surfel, if the picture may show it.

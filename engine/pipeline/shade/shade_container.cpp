@@ -44,16 +44,17 @@ constexpr std::size_t kBatch = 16 * Shader::kBlock;  // receivers in memory at o
 /// which it reaches `all` is selected and takes `all` off.
 class PointCursor {
  public:
+  /// @param groups  of the channels whose values rows have
   /// @param wanted  number of points to select, at most as many as there are
   /// @param from    index among the selected points of the first that next() gives, below `wanted`
   /// @param lost    gets the damaged pages, whose points are skipped; null: damaged pages are
   ///                errors
-  PointCursor(const ContainerReader& container, std::uint64_t wanted, std::uint64_t from = 0,
-              LostPages* lost = nullptr)
+  PointCursor(const ContainerReader& container, std::span<const std::uint8_t> groups,
+              std::uint64_t wanted, std::uint64_t from = 0, LostPages* lost = nullptr)
       : container_(container),
         wanted_(wanted),
         scan_(container, noted_in(lost)),
-        rows_(container, kFirstInputGroup) {
+        rows_(container, groups) {
     if (from == 0) return;
     // The products of two numbers of points take up to 128 bits; share_ is below `wanted`
     __extension__ typedef unsigned __int128 Wide;
@@ -66,8 +67,11 @@ class PointCursor {
     if (scan_.next()) at_ = static_cast<std::uint32_t>(left);
   }
 
+  /// The channels of a row.
+  [[nodiscard]] std::span<const Channel> channels() const noexcept { return rows_.channels(); }
+
   /// Fills `out` from the front. @return the number of points, 0 at the end
-  /// @param rows  gets the rows of their channels, without those of an earlier shading; may be null
+  /// @param rows  gets the rows of their channels; may be null
   std::size_t next(std::span<Surfel> out, std::vector<std::byte>* rows = nullptr) {
     std::size_t filled = 0;
     if (rows) rows->clear();
@@ -143,16 +147,18 @@ struct OpenReceivers {
         container(other ? *other : lighting.scene()),
         wanted(std::min(request.count == 0 ? all() : request.count, all())),
         lost(other ? nullptr : lighting.lost()),
+        groups(groups_for(target)),
         points(lost ? count_whole() : wanted) {}
 
   [[nodiscard]] std::uint64_t all() const { return container.superblock().points; }
-  [[nodiscard]] PointCursor cursor() const { return {container, wanted, 0, lost}; }
+  [[nodiscard]] PointCursor cursor() const { return {container, groups, wanted, 0, lost}; }
 
   std::unique_ptr<ContainerReader> other;  ///< null: the receivers are the scene's own points
   const ContainerReader& container;
-  std::uint64_t wanted;  ///< number of points that were asked for
-  LostPages* lost;       ///< gets the damaged pages; null: damaged pages are errors
-  std::uint64_t points;  ///< number of wanted points that can be read
+  std::uint64_t wanted;              ///< number of points that were asked for
+  LostPages* lost;                   ///< gets the damaged pages; null: damaged pages are errors
+  std::vector<std::uint8_t> groups;  ///< of the channels that cursor() reads
+  std::uint64_t points;              ///< number of wanted points that can be read
 
  private:
   /// Opens a container as it is; builds a cloud into a temporary one.
@@ -170,6 +176,15 @@ struct OpenReceivers {
     return make_temporary_container(
         roomiest_temp_dir(request.run, target),
         [&](const std::filesystem::path& path) { build_container(build, path, progress); });
+  }
+
+  /// Returns the groups that are needed: for a file of points all but those of an earlier shading;
+  /// a container takes pages as they are, so the rises alone.
+  [[nodiscard]] std::vector<std::uint8_t> groups_for(const std::filesystem::path& target) const {
+    if (!output_format(target)) return rise_groups(container.meta().channels);
+    std::vector<std::uint8_t> all(container.groups().begin(), container.groups().end());
+    std::erase_if(all, [](std::uint8_t group) { return group < kFirstInputGroup; });
+    return all;
   }
 
   [[nodiscard]] std::uint64_t count_whole() const {
@@ -203,49 +218,44 @@ void check_count(const OpenReceivers& receivers, const std::filesystem::path& ta
                      "receivers. Name a .ply, or shade all points");
 }
 
-/// Puts receivers above the points of a container: at the lift of the run, and clear of the noise
-/// of scanned surfaces.
+/// Puts receivers above the points of a cursor: at the lift of the run, and clear of the noise of
+/// scanned surfaces.
 class Lifting {
  public:
-  Lifting(const ContainerReader& container, float lift)
-      : frame_(container.header().frame), lift_(lift), rise_(input_channels(container)) {}
+  /// @param channels  of the rows of the points
+  Lifting(const Frame& frame, std::span<const Channel> channels, float lift)
+      : frame_(frame), lift_(lift), row_bytes_(row_bytes(channels)), rise_(channels) {}
 
-  /// @param rows  of the channels of the surfels, which PointCursor::next() gives
   void place(std::span<const Surfel> surfels, std::span<const std::byte> rows,
              std::span<Receiver> receivers) const {
-    const std::size_t row_bytes = surfels.empty() ? 0 : rows.size() / surfels.size();
     for (std::size_t i = 0; i < surfels.size(); ++i) {
-      const float rise = rise_.radii(rows.empty() ? nullptr : rows.data() + i * row_bytes);
+      const float rise = rise_.radii(rows.data() + i * row_bytes_);
       receivers[i] = lifted(surfels[i], std::max(lift_, rise), frame_);
     }
   }
 
  private:
-  /// Returns the channels of a row of PointCursor.
-  static std::vector<Channel> input_channels(const ContainerReader& container) {
-    std::vector<Channel> channels = container.meta().channels;
-    std::erase_if(channels, [](const Channel& c) { return c.group < kFirstInputGroup; });
-    return channels;
-  }
-
   Frame frame_;
   float lift_;
+  std::size_t row_bytes_;
   RisePlace rise_;
 };
 
 /// Returns runs of receivers that stand for all receivers, each from the middle of its stride.
 std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
+  const ContainerReader& container = receivers.container;
   const PilotPlan plan = plan_pilots(receivers.points);
-  const Lifting lifting(receivers.container, lift);
+  const std::vector<std::uint8_t> groups = rise_groups(container.meta().channels);
   std::vector<Pilot> pilots(plan.count);
   std::vector<Surfel> surfels(plan.receivers);
   std::vector<std::byte> rows;
   for (std::size_t i = 0; i < pilots.size(); ++i) {
-    PointCursor cursor(receivers.container, receivers.points,
+    PointCursor cursor(container, groups, receivers.points,
                        i * plan.stride + (plan.stride - plan.receivers) / 2);
     const std::size_t count = cursor.next(surfels, &rows);
     pilots[i].receivers.resize(count);
-    lifting.place(std::span(surfels).first(count), rows, pilots[i].receivers);
+    Lifting(container.header().frame, cursor.channels(), lift)
+        .place(std::span(surfels).first(count), rows, pilots[i].receivers);
   }
   return pilots;
 }
@@ -253,7 +263,7 @@ std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
 /// Shades all receivers, batch by batch.
 void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, ShadedSink& sink) {
   PointCursor cursor = receivers.cursor();
-  const Lifting lifting(receivers.container, lift);
+  const Lifting lifting(receivers.container.header().frame, cursor.channels(), lift);
   std::vector<Surfel> surfels(kBatch);
   std::vector<Receiver> batch(kBatch);
   std::vector<std::byte> rows;

@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
 #include "engine/parallel/thread_pool.h"
@@ -54,18 +55,8 @@ void write_cloud(const std::vector<SampledPoint>& points, const std::filesystem:
   writer->finish();
 }
 
-/// Returns where a channel lies in the rows of a container.
-struct ChannelPlace {
-  ChannelType type = ChannelType::u8;
-  std::size_t offset = 0;
-};
-
-ChannelPlace place_of(std::span<const Channel> channels, const char* name) {
-  std::size_t offset = 0;
-  for (const Channel& channel : channels) {
-    if (channel.name == name) return {channel.type, offset};
-    offset += channel.component_bytes() * channel.components;
-  }
+RowPlace place_of(std::span<const Channel> channels, const char* name) {
+  if (const auto found = find_in_row(channels, name)) return *found;
   throw DataError(std::string("specks: the shaded points have no channel ") + name);
 }
 
@@ -73,8 +64,8 @@ ChannelPlace place_of(std::span<const Channel> channels, const char* name) {
 std::vector<float> occlusions(const std::filesystem::path& shaded) {
   const ContainerReader container(shaded);
   ContainerSource points(container);
-  const ChannelPlace index = place_of(points.channels(), kOriginalIndex);
-  const ChannelPlace occlusion = place_of(points.channels(), "occlusion");
+  const RowPlace index = place_of(points.channels(), kOriginalIndex);
+  const RowPlace occlusion = place_of(points.channels(), "occlusion");
   std::vector<float> found(container.superblock().points);
   std::vector<Surfel> block(1 << 13);
   while (const std::size_t count = points.next(block)) {
@@ -82,8 +73,8 @@ std::vector<float> occlusions(const std::filesystem::path& shaded) {
     const std::size_t bytes = rows.size() / count;
     for (std::size_t i = 0; i < count; ++i) {
       const std::byte* const row = rows.data() + i * bytes;
-      found[static_cast<std::size_t>(load_integer(index.type, row + index.offset))] =
-          static_cast<float>(load_number(occlusion.type, row + occlusion.offset));
+      found[static_cast<std::size_t>(load_integer(index.channel->type, row + index.offset))] =
+          static_cast<float>(load_number(row + occlusion.offset, occlusion.channel->type));
     }
   }
   return found;
