@@ -115,7 +115,7 @@ Experiment make_growth_experiment() {
     d.words("--panel", options->panels, "Vary only this; repeatable");
     d.checked(options->checked, 100);
     d.repeats(options->repeats, 3);
-    d.quick(options->middle_points, 200'000);
+    d.quick(options->middle_points, 50'000);
     d.quick(options->solid_angles, {0.1F, 0.03F, 0.01F, 0.003F, 0.001F});
     d.quick(options->layers, {1, 2, 4, 8, 16});
     d.quick(options->caps, {1, 0.29, 0.09});  // the pages are too few for smaller shares
