@@ -424,6 +424,7 @@ class Mutation {
 std::vector<std::vector<std::byte>> read_good_vectors() {
   std::vector<std::vector<std::byte>> files;
   for (const auto& entry : std::filesystem::directory_iterator(PTC_GOOD_VECTORS)) {
+    if (!entry.is_regular_file()) continue;  // the parts of a scene
     std::ifstream in(entry.path(), std::ios::binary);
     const std::vector<char> text((std::istreambuf_iterator<char>(in)), {});
     const auto bytes = std::as_bytes(std::span(text));

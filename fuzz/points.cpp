@@ -26,7 +26,17 @@ struct Reader {
   const char* name;  // of the file
   PointFile (*open)(const std::filesystem::path&);
 };
-constexpr std::array<Reader, 2> kReaders{{{"a.las", open_las}, {"a.laz", open_las}}};
+constexpr std::array<Reader, 11> kReaders{{{"a.las", open_las},
+                                           {"a.laz", open_las},
+                                           {"a.e57", open_e57},
+                                           {"a.ply", open_ply},
+                                           {"a.pcd", open_pcd},
+                                           {"a.xyz", open_xyz},
+                                           {"a.pts", open_pts},
+                                           {"a.ptx", open_ptx},
+                                           {"a.ptc", open_ptc},
+                                           {"a.bgeo", open_bgeo},
+                                           {"a.pdb", open_pdb}}};
 
 bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);

@@ -185,8 +185,7 @@ void PartialReader::load(std::span<const std::uint32_t> pages) {
     if (!pages_.contains(page)) wanted.push_back(page);
   }
   std::ranges::sort(wanted);
-  const auto repeated = std::ranges::unique(wanted);
-  wanted.erase(repeated.begin(), repeated.end());
+  wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
   load_entries(wanted);
   // Pages of the first request are at hand. Of the others, neighbours are read together.
   const std::uint64_t from = source_.size() - end_.size();
