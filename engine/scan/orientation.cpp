@@ -17,6 +17,8 @@ constexpr int kFewest = 3;            // neighbours without which there is no pl
 constexpr float kDoubt = 0.6F;        // |m| up to which a vote says nothing
 constexpr float kNoiseReach = 2;      // offsets along normals that noise explains, in its RMS
 constexpr int kSafe = kFullVote / 2;  // of a single vote, to join places in a block
+constexpr double kSheet = 0.3;        // cells across which the places of a sheet may lie
+constexpr double kNoisySheet = 0.7;   // the same where they are noisy
 constexpr std::int64_t kFirm = 6 * kFullVote;  // of the sum between patches, to join in a chunk
 
 float dot(const Vec3& a, const Vec3& b) noexcept {
@@ -30,6 +32,13 @@ void flip(Vec3& v) noexcept {
 /// Moves a number towards 0 by what noise may explain.
 float less_noise(float x, float noise) noexcept {
   return std::max(x - noise, 0.0F) + std::min(x + noise, 0.0F);
+}
+
+/// Returns the vote of the sky on a piece. Where its places see less than one direction
+/// more in the mean, that may be a beam through a gap.
+/// @param sky  sum of SkyView::more_in_front()
+std::int64_t vote_of_sky(std::int64_t sky, std::uint64_t places) noexcept {
+  return std::abs(sky) < static_cast<std::int64_t>(places) ? 0 : sky * (kFullVote / 16);
 }
 
 /// Returns the vote of two places; see vote_of(). It has no branches, so that a loop over several
@@ -59,8 +68,9 @@ struct LinkLanes {
 /// which of these are flipped in the meantime.
 class ChunkOrientation {
  public:
-  ChunkOrientation(ScanChunk& chunk, ChunkPieces& pieces, OrientationRoom& room)
+  ChunkOrientation(ScanChunk& chunk, const SkyView& sky, ChunkPieces& pieces, OrientationRoom& room)
       : chunk_(chunk),
+        sky_(sky),
         pieces_(pieces),
         count_(static_cast<std::uint32_t>(chunk.places.size())),
         room_(room) {}
@@ -69,14 +79,18 @@ class ChunkOrientation {
     pieces_.of.assign(count_, 0);
     pieces_.votes.clear();
     set_known(sides);
+    room_.sky.assign(count_, 0);
     if (std::ranges::find(room_.known, 0) != room_.known.end()) {
       room_.sign.assign(count_, 1);
+      if (!sides.knows_scanners()) look_at_sky();
       count_votes();
       join_patches();
       join_pieces();
       flip_single();
       for (std::uint32_t i = 0; i < count_; ++i) {
-        if (room_.sign[i] < 0) flip(chunk_.fits[i].normal);
+        if (room_.sign[i] > 0) continue;
+        flip(chunk_.fits[i].normal);
+        room_.sky[i] = static_cast<std::int8_t>(-room_.sky[i]);
       }
     }
     add_up();
@@ -105,6 +119,38 @@ class ChunkOrientation {
       room_.lean[i] = std::abs(cosine);
       room_.known[i] = room_.lean[i] >= kGrazing ? 1 : 0;
     }
+  }
+
+  /// Looks at the sky from both sides of the places whose side is unknown, where the places of a
+  /// cell are one sheet.
+  void look_at_sky() {
+    for (std::uint32_t i = 0, end = 0; i < count_; i = end) {
+      const std::size_t cell = sky_.cell_of(chunk_.positions[i]);
+      for (end = i + 1; end < count_ && sky_.cell_of(chunk_.positions[end]) == cell;) ++end;
+      if (!is_sheet(i, end)) continue;
+      for (std::uint32_t k = i; k < end; ++k) {
+        if (room_.known[k] != 0) continue;
+        room_.sky[k] = static_cast<std::int8_t>(
+            sky_.more_in_front(chunk_.positions[k], chunk_.fits[k].normal));
+      }
+    }
+  }
+
+  /// Says whether places lie on one surface, as far as noise lets it be known.
+  [[nodiscard]] bool is_sheet(std::uint32_t begin, std::uint32_t end) const {
+    const Vec3& normal = chunk_.fits[begin].normal;
+    const LatticePosition& from = chunk_.positions[begin];
+    double low = 0, high = 0, noise = 0;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      double along = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        along += (chunk_.positions[i][k] - from[k]) * double{normal[k]};
+      low = std::min(low, along);
+      high = std::max(high, along);
+      noise = std::max(noise, double{chunk_.fits[i].noise});
+    }
+    return high - low <
+           std::min(kSheet * sky_.cell_width() + 4 * noise, kNoisySheet * sky_.cell_width());
   }
 
   /// Computes the votes of all links of which one end at least is unknown.
@@ -243,6 +289,7 @@ class ChunkOrientation {
       PieceSums& sums = pieces_.sums[pieces_.of[i]];
       sums.area += area;
       ++sums.places;
+      if (pieces_.of[i] != 0) sums.sky += room_.sky[i];
       for (std::size_t k = 0; k < 3; ++k) {
         const double along = area * static_cast<double>(fit.normal[k]);
         sums.normal[k] += along;
@@ -253,6 +300,7 @@ class ChunkOrientation {
   }
 
   ScanChunk& chunk_;
+  const SkyView& sky_;
   ChunkPieces& pieces_;
   std::uint32_t count_;
   OrientationRoom& room_;
@@ -291,11 +339,12 @@ void PieceSums::add(const PieceSums& other, bool flipped) noexcept {
     position[k] += other.position[k];
   }
   places += other.places;
+  sky += flipped ? -other.sky : other.sky;
 }
 
-void orient_chunk(ScanChunk& chunk, const KnownSides& sides, ChunkPieces& pieces,
-                  OrientationRoom& room) {
-  ChunkOrientation(chunk, pieces, room).run(sides);
+void orient_chunk(ScanChunk& chunk, const KnownSides& sides, const SkyView& sky,
+                  ChunkPieces& pieces, OrientationRoom& room) {
+  ChunkOrientation(chunk, sky, pieces, room).run(sides);
 }
 
 void Islands::add_chunk(const ChunkPieces& pieces) {
@@ -343,6 +392,10 @@ void Islands::solve(const std::array<float, 3>& up) {
   const auto count = static_cast<std::uint32_t>(sums_.size());
   SignedGraph graph(count);
   for (const SignedGraph::Edge& edge : votes_) graph.add(edge.a, edge.b, edge.vote);
+  for (std::uint32_t i = 1; i < count; ++i) {
+    if (const std::int64_t vote = vote_of_sky(sums_[i].sky, sums_[i].places); vote != 0)
+      graph.add(0, i, vote);
+  }
   graph.contract(1);
   // Add up the pieces of each island.
   std::vector<PieceSums> islands(count);
@@ -355,12 +408,10 @@ void Islands::solve(const std::array<float, 3>& up) {
   flipped_.assign(count, 0);
   for (std::uint32_t i = 0; i < count; ++i) {
     const SignedGraph::Group group = graph.find(i);
-    const bool turn = group.root == known.root && sums_[0].places > 0
-                          ? known.flipped
-                          : points_inwards(islands[group.root], up);
+    const bool turn =
+        group.root == known.root ? known.flipped : points_inwards(islands[group.root], up);
     flipped_[i] = group.flipped != turn;
-    islands_ +=
-        i == group.root && islands[i].places > 0 && (i != known.root || sums_[0].places == 0);
+    islands_ += i == group.root && islands[i].places > 0 && i != known.root;
   }
   sums_ = {};
   votes_ = {};

@@ -8,7 +8,8 @@
 //                                                                chunk             loose parts
 //
 // A vote is what two neighbouring places say about their sides. All places whose side is known
-// beforehand form one piece, number 0, which is never flipped. An island without such a place turns
+// beforehand form one piece, number 0, which is never flipped. The sky votes, too, as if it were of
+// that piece: for the side from which more of it is seen. An island without any of this turns
 // outwards, or upwards where it is an open sheet.
 #pragma once
 
@@ -20,6 +21,7 @@
 #include "engine/scan/chunk_fit.h"
 #include "engine/scan/known_sides.h"
 #include "engine/scan/signed_graph.h"
+#include "engine/scan/sky_view.h"
 
 namespace ptc {
 
@@ -51,6 +53,7 @@ struct PieceSums {
   double flux = 0;                             ///< area * (normal . position)
   std::array<double, 3> normal{}, position{};  ///< times area
   std::uint64_t places = 0;
+  std::int64_t sky = 0;  ///< sum of SkyView::more_in_front()
 
   void add(const PieceSums& other, bool flipped) noexcept;
 };
@@ -68,6 +71,7 @@ struct OrientationRoom {
   std::vector<std::uint8_t> known;                      ///< by place: its side is known
   std::vector<float> lean;                              ///< by place: cosine to where it was seen
                                                         ///< from, or 0
+  std::vector<std::int8_t> sky;                         ///< by place: more_in_front() of its normal
   std::vector<std::array<std::int16_t, kLinks>> votes;  ///< by place
   std::vector<std::int8_t> sign;                        ///< by place: 1 or -1
   std::vector<std::uint32_t> patch;                     ///< by place
@@ -79,8 +83,8 @@ struct OrientationRoom {
 /// Flips normals of a chunk so that they agree within each piece. A known normal takes the place of
 /// the fitted one.
 /// Threads: may be called concurrently for different chunks, pieces and rooms.
-void orient_chunk(ScanChunk& chunk, const KnownSides& sides, ChunkPieces& pieces,
-                  OrientationRoom& room);
+void orient_chunk(ScanChunk& chunk, const KnownSides& sides, const SkyView& sky,
+                  ChunkPieces& pieces, OrientationRoom& room);
 
 /// Joins the pieces of all chunks.
 class Islands {

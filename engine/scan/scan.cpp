@@ -77,12 +77,15 @@ class ResultWindow {
 /// The passes over the places, from the spool to their results.
 class Completion {
  public:
-  Completion(const ScanSpool& spool, TempFile& results, const ScanOptions& options,
+  Completion(const ScanSpool& spool, SkyView& sky, TempFile& results, const ScanOptions& options,
              const Frame& frame)
       : spool_(spool),
+        sky_(sky),
         results_(results),
         sides_(frame, options.scanners, options.up, options.aerial),
-        unit_(frame.unit()) {}
+        unit_(frame.unit()) {
+    sky.finish(sides_.up());
+  }
 
   void run(std::size_t workers, const Executor& executor, Progress& progress) {
     const std::uint64_t chunks = (spool_.places() + kChunkPlaces - 1) / kChunkPlaces;
@@ -95,7 +98,7 @@ class Completion {
       executor.for_each(count, [&](std::size_t i, unsigned) {
         Worker& worker = *all[i];
         worker.fitter.fit(first + i, worker.chunk);
-        orient_chunk(worker.chunk, sides_, worker.pieces, worker.room);
+        orient_chunk(worker.chunk, sides_, sky_, worker.pieces, worker.room);
         make_results(worker.chunk, worker.pieces, unit_, worker.results);
         progress.advance(worker.chunk.places.size());
       });
@@ -145,6 +148,7 @@ class Completion {
   }
 
   const ScanSpool& spool_;
+  const SkyView& sky_;
   TempFile& results_;
   KnownSides sides_;
   double unit_;
@@ -238,7 +242,8 @@ class CompletedStream final : public ScanStream {
 };
 
 /// Writes all points to the spool.
-void fill(ScanSpool& spool, PointStream& sorted, Progress& progress, ScanReport& report) {
+void fill(ScanSpool& spool, SkyView& sky, PointStream& sorted, Progress& progress,
+          ScanReport& report) {
   progress.begin("spool", 0, "points");
   std::vector<PointRecord> block(kReadRecords);
   while (const std::size_t count = sorted.next(block)) {
@@ -246,6 +251,7 @@ void fill(ScanSpool& spool, PointStream& sorted, Progress& progress, ScanReport&
     spool.add(records);
     for (const PointRecord& record : records)
       report.normals += (record.flags & kUnknownNormal) != 0;
+    for (const PointRecord& record : records) sky.add(position_of(record.key));
     progress.advance(count);
   }
   spool.finish();
@@ -264,17 +270,19 @@ std::unique_ptr<ScanStream> complete_scan(PointStream& sorted, const Frame& fram
   const std::uint64_t index_bytes = std::clamp<std::uint64_t>(
       options.memory_bytes / 8, std::uint64_t{1} << 16, std::uint64_t{1} << 28);
   auto spool = std::make_unique<ScanSpool>(options.temp_dirs, index_bytes);
-  fill(*spool, sorted, progress, report);
+  SkyView sky;
+  fill(*spool, sky, sorted, progress, report);
   // Work on as many chunks at once as memory allows.
   MemoryBudget budget(options.memory_bytes, "completing a scan");
   budget.charge("the index of points", index_bytes);
+  budget.charge("the view of the sky", SkyView::kBytes);
   budget.charge("buffers", std::uint64_t{2} << 20);
   const std::uint64_t each = worker_bytes(spool->index().page_places());
   const std::uint64_t rest = budget.rest("a chunk of points", each);
   const auto workers =
       static_cast<std::size_t>(std::min<std::uint64_t>(executor.threads(), rest / each));
   auto results = std::make_unique<TempFile>(options.temp_dirs.back());
-  Completion completion(*spool, *results, options, frame);
+  Completion completion(*spool, sky, *results, options, frame);
   completion.run(workers, executor, progress);
   spool->discard_places();
   // Settle the sides.

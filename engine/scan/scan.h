@@ -49,7 +49,8 @@ struct ScanReport {
   std::uint64_t points = 0;      ///< records that were read
   std::uint64_t duplicates = 0;  ///< of them, points at the position of another one before them
   std::uint64_t normals = 0;     ///< unknown normals
-  std::uint64_t islands = 0;     ///< connected parts whose side followed from their shape alone
+  std::uint64_t islands = 0;     ///< connected parts whose side followed from their shape alone,
+                                 ///< for want of a scanner, neighbours and a sky
   // The counts below grow while the stream is read.
   std::uint64_t radii = 0;     ///< radii that were estimated
   std::uint64_t outliers = 0;  ///< points that are marked as outliers
@@ -79,8 +80,8 @@ class ScanStream : public PointStream {
 ///   - A normal is that of a quadratic surface through the nearest points: 16, or 48 where these
 ///     are noisy or lie on a line. Neighbours off the surface, as beyond an edge, count less.
 ///   - Normals turn to the scanner where its place is known, upwards in aerial scans, and
-///     otherwise so that neighbours agree. A connected part without any hint turns outwards, or
-///     upwards where it is an open sheet.
+///     otherwise so that neighbours agree and the side that sees more of the sky is the front. A
+///     connected part without any hint turns outwards, or upwards where it is an open sheet.
 ///   - A radius lets the disc circumscribe the cell of its point; between scan lines it reaches
 ///     half-way to the next line. It is 0 for a cloud of coincident points.
 ///   - Points that coincide count as one, and get the same normal and radius.

@@ -116,6 +116,7 @@ TEST_CASE("orientation: closed surfaces turn outwards", "[scan][orientation]") {
     for (const TrueCloud& cloud : {sphere, box}) {
       const RawScan scan = raw_scan(cloud);
       const Completed completed = complete(scan);
+      CAPTURE(count, &cloud == &sphere);
       CHECK(completed.report.islands <= 2);  // points at a corner may stand apart
       CHECK(compare(cloud, scan, completed.records).flipped < 0.003);
     }
@@ -137,7 +138,7 @@ TEST_CASE("orientation: separate surfaces turn outwards each", "[scan][orientati
   }
   const RawScan scan = raw_scan(cloud);
   const Completed completed = complete(scan);
-  CHECK(completed.report.islands == 2);
+  CHECK(completed.report.islands == 0);  // both have a top that sees the sky
   CHECK(compare(cloud, scan, completed.records).flipped == 0);
 }
 

@@ -1,0 +1,169 @@
+#include "engine/scan/sky_view.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "format/morton.h"
+
+namespace ptc {
+namespace {
+
+constexpr int kMostBits = 7;          // of a cell's number along an axis
+constexpr std::uint64_t kInCell = 8;  // places of a cell in the mean, at least
+constexpr float kAway = 1.5F;         // cells between a place and the cell from which it looks
+constexpr float kAlong = 0.1F;        // cosine to the normal up to which a direction leads along
+                                      // the surface
+
+std::size_t cell_at(int x, int y, int z, int bits) noexcept {
+  return static_cast<std::size_t>((((z << bits) + y) << bits) + x);
+}
+
+}  // namespace
+
+SkyView::SkyView() : bits_(kMostBits), full_(std::size_t{1} << (3 * kMostBits)) {}
+
+void SkyView::add(const LatticePosition& position) noexcept {
+  std::array<int, 3> cell{};
+  for (std::size_t k = 0; k < 3; ++k)
+    cell[k] =
+        static_cast<int>(static_cast<std::uint64_t>(position[k]) >> (kLatticeBits - kMostBits));
+  full_[cell_at(cell[0], cell[1], cell[2], kMostBits)] = true;
+  ++places_;
+}
+
+/// Makes the cells so large that they hold enough places.
+void SkyView::choose_cells() {
+  const auto too_few = [&] {
+    return kInCell * static_cast<std::uint64_t>(std::ranges::count(full_, true)) > places_;
+  };
+  while (bits_ > 1 && too_few()) {
+    const int half = 1 << (bits_ - 1);
+    std::vector<bool> larger(std::size_t{1} << (3 * (bits_ - 1)));
+    for (int z = 0; z < 2 * half; ++z) {
+      for (int y = 0; y < 2 * half; ++y) {
+        for (int x = 0; x < 2 * half; ++x) {
+          if (full_[cell_at(x, y, z, bits_)])
+            larger[cell_at(x / 2, y / 2, z / 2, bits_ - 1)] = true;
+        }
+      }
+    }
+    full_ = std::move(larger);
+    --bits_;
+  }
+}
+
+void SkyView::finish(const std::array<float, 3>& up) {
+  choose_cells();
+  // Spread the directions over the upper hemisphere: a ring of eight at 20 degrees, one of five at
+  // 45 and one of three at 70.
+  const std::size_t least = static_cast<std::size_t>(
+      std::ranges::min_element(up, {}, [](float x) { return std::abs(x); }) - up.begin());
+  std::array<double, 3> side{};
+  side[least] = 1;
+  double length = 0;
+  for (std::size_t k = 0; k < 3; ++k) side[k] -= double{up[least]} * double{up[k]};
+  for (const double x : side) length += x * x;
+  for (double& x : side) x /= std::sqrt(length);
+  std::size_t next = 0;
+  const auto add_ring = [&](int count, double elevation) {
+    const double rise = std::sin(elevation * std::numbers::pi / 180);
+    const double flat = std::cos(elevation * std::numbers::pi / 180);
+    for (int i = 0; i < count; ++i) {
+      const double turn = 2 * std::numbers::pi * (i + 0.5) / count;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t a = (k + 1) % 3, b = (k + 2) % 3;
+        const double other = double{up[a]} * side[b] - double{up[b]} * side[a];
+        directions_[next][k] = static_cast<float>(
+            flat * (std::cos(turn) * side[k] + std::sin(turn) * other) + rise * double{up[k]});
+      }
+      ++next;
+    }
+  };
+  add_ring(8, 20);
+  add_ring(5, 45);
+  add_ring(3, 70);
+  seen_.assign(full_.size(), 0);
+  for (std::size_t d = 0; d < kDirections; ++d) look(d);
+}
+
+/// Looks in one direction from all cells. The cells are taken in layers across the direction's
+/// longest component, from the sky on: a cell sees what the next one in the direction sees.
+void SkyView::look(std::size_t direction) {
+  const std::array<float, 3>& d = directions_[direction];
+  const std::size_t main = static_cast<std::size_t>(
+      std::ranges::max_element(d, {}, [](float x) { return std::abs(x); }) - d.begin());
+  const std::size_t a = (main + 1) % 3, b = (main + 2) % 3;
+  const int size = 1 << bits_, step = d[main] > 0 ? 1 : -1;
+  const auto moved = [&](std::size_t axis, int layer) {
+    return static_cast<int>(
+        std::floor(double{d[axis]} / double{d[main]} * static_cast<double>(layer) + 0.5));
+  };
+  const auto bit = static_cast<std::uint16_t>(1U << direction);
+  const auto cell = [&](int layer, int u, int v) {
+    std::array<int, 3> at{};
+    at[main] = layer;
+    at[a] = u;
+    at[b] = v;
+    return cell_at(at[0], at[1], at[2], bits_);
+  };
+  for (int k = 0; k < size; ++k) {
+    const int layer = step > 0 ? size - 1 - k : k, ahead = layer + step;
+    const int du = moved(a, ahead) - moved(a, layer), dv = moved(b, ahead) - moved(b, layer);
+    for (int v = 0; v < size; ++v) {
+      for (int u = 0; u < size; ++u) {
+        bool sees = true;
+        const int eu = u + du, ev = v + dv;
+        if (ahead >= 0 && ahead < size && eu >= 0 && eu < size && ev >= 0 && ev < size) {
+          const std::size_t other = cell(ahead, eu, ev);
+          sees = !full_[other] && (seen_[other] & bit) != 0;
+        }
+        if (sees) seen_[cell(layer, u, v)] |= bit;
+      }
+    }
+  }
+}
+
+std::size_t SkyView::cell_of(const LatticePosition& position) const noexcept {
+  return cell_along(position, {}, 0);
+}
+
+double SkyView::cell_width() const noexcept {
+  return std::ldexp(1.0, kLatticeBits - bits_);
+}
+
+std::size_t SkyView::cell_along(const LatticePosition& position, const std::array<float, 3>& normal,
+                                float cells) const noexcept {
+  std::array<int, 3> cell{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double away = double{cells} * double{normal[k]};
+    cell[k] = static_cast<int>(std::floor(position[k] / cell_width() + away));
+    if (cell[k] < 0 || cell[k] >= (1 << bits_)) return kOutside;
+  }
+  return cell_at(cell[0], cell[1], cell[2], bits_);
+}
+
+int SkyView::more_in_front(const LatticePosition& position,
+                           const std::array<float, 3>& normal) const noexcept {
+  const std::size_t own = cell_of(position);
+  for (const float way : {-kAway, -2 * kAway / 3, -kAway / 3, kAway / 3, 2 * kAway / 3, kAway}) {
+    const std::size_t cell = cell_along(position, normal, way);
+    if (cell != own && cell != kOutside && full_[cell]) return 0;
+  }
+  unsigned front = 0, behind = 0;
+  for (std::size_t d = 0; d < kDirections; ++d) {
+    const std::array<float, 3>& to = directions_[d];
+    const float cosine = to[0] * normal[0] + to[1] * normal[1] + to[2] * normal[2];
+    front |= (cosine > kAlong ? 1U : 0U) << d;
+    behind |= (cosine < -kAlong ? 1U : 0U) << d;
+  }
+  // Around the grid there is nothing that would hide the sky
+  const auto seen = [&](float side) -> unsigned {
+    const std::size_t cell = cell_along(position, normal, side);
+    return cell == kOutside ? 0xffff : seen_[cell];
+  };
+  return std::popcount(front & seen(kAway)) - std::popcount(behind & seen(-kAway));
+}
+
+}  // namespace ptc
