@@ -144,7 +144,7 @@ std::vector<PointRecord> complete(const SampledCloud& cloud, const ScanOptions& 
 ScanRow measure_ptcx(const SampledCloud& cloud, const ScanBenchOptions& options,
                      const std::filesystem::path& work, const RunOptions& run) {
   ScanRow row{.method = "ptcx"};
-  ScanOptions scan{.memory_bytes = run.memory_bytes, .temp_dirs = {work}};
+  ScanOptions scan{.memory_bytes = run.memory_bytes, .temp_dirs = {work}, .up = {0, 1, 0}};
   const ThreadPool executor(run.threads);
   std::vector<PointRecord> records;
   ScanReport report;

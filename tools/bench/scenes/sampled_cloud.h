@@ -35,6 +35,7 @@ struct SampledPoint {
 /// Returns the area of a mesh.
 [[nodiscard]] double area_of(const Mesh& mesh);
 /// Draws points from a mesh, uniformly by area but for the options, in the order of its triangles.
+/// Points inside of its solids, where no scanner sees them, are left out.
 /// Equal options give equal points.
 [[nodiscard]] std::vector<SampledPoint> sample_at_random(const Mesh& mesh,
                                                          const SampleOptions& options);
