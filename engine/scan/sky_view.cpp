@@ -20,6 +20,15 @@ std::size_t cell_at(int x, int y, int z, int bits) noexcept {
   return static_cast<std::size_t>((((z << bits) + y) << bits) + x);
 }
 
+/// Returns the axis of a vector's longest component.
+std::size_t longest(const std::array<float, 3>& v) noexcept {
+  std::size_t axis = 0;
+  for (std::size_t k = 1; k < 3; ++k) {
+    if (std::abs(v[k]) > std::abs(v[axis])) axis = k;
+  }
+  return axis;
+}
+
 }  // namespace
 
 SkyView::SkyView() : bits_(kMostBits), full_(std::size_t{1} << (3 * kMostBits)) {}
@@ -92,34 +101,29 @@ void SkyView::finish(const std::array<float, 3>& up) {
 /// longest component, from the sky on: a cell sees what the next one in the direction sees.
 void SkyView::look(std::size_t direction) {
   const std::array<float, 3>& d = directions_[direction];
-  const std::size_t main = static_cast<std::size_t>(
-      std::ranges::max_element(d, {}, [](float x) { return std::abs(x); }) - d.begin());
-  const std::size_t a = (main + 1) % 3, b = (main + 2) % 3;
+  const std::size_t main = longest(d);
+  const std::size_t a = main == 0 ? 1 : 0, b = main == 2 ? 1 : 2;
   const int size = 1 << bits_, step = d[main] > 0 ? 1 : -1;
+  const std::array<std::ptrdiff_t, 3> strides{1, size, std::ptrdiff_t{size} * size};
   const auto moved = [&](std::size_t axis, int layer) {
     return static_cast<int>(
         std::floor(double{d[axis]} / double{d[main]} * static_cast<double>(layer) + 0.5));
   };
   const auto bit = static_cast<std::uint16_t>(1U << direction);
-  const auto cell = [&](int layer, int u, int v) {
-    std::array<int, 3> at{};
-    at[main] = layer;
-    at[a] = u;
-    at[b] = v;
-    return cell_at(at[0], at[1], at[2], bits_);
-  };
   for (int k = 0; k < size; ++k) {
     const int layer = step > 0 ? size - 1 - k : k, ahead = layer + step;
     const int du = moved(a, ahead) - moved(a, layer), dv = moved(b, ahead) - moved(b, layer);
+    const std::ptrdiff_t next = step * strides[main] + du * strides[a] + dv * strides[b];
     for (int v = 0; v < size; ++v) {
-      for (int u = 0; u < size; ++u) {
+      const bool inside = ahead >= 0 && ahead < size && v + dv >= 0 && v + dv < size;
+      std::ptrdiff_t at = layer * strides[main] + v * strides[b];
+      for (int u = 0; u < size; ++u, at += strides[a]) {
         bool sees = true;
-        const int eu = u + du, ev = v + dv;
-        if (ahead >= 0 && ahead < size && eu >= 0 && eu < size && ev >= 0 && ev < size) {
-          const std::size_t other = cell(ahead, eu, ev);
-          sees = !full_[other] && (seen_[other] & bit) != 0;
+        if (inside && u + du >= 0 && u + du < size) {
+          const auto other = static_cast<std::size_t>(at + next);
+          sees = (seen_[other] & bit) != 0 && !full_[other];
         }
-        if (sees) seen_[cell(layer, u, v)] |= bit;
+        if (sees) seen_[static_cast<std::size_t>(at)] |= bit;
       }
     }
   }
