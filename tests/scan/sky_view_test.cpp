@@ -124,4 +124,18 @@ TEST_CASE("orientation: houses without floors on the ground turn outwards", "[sc
   CHECK(completed.report.islands == 0);
 }
 
+TEST_CASE("orientation: a pit faces the sky, though its shape is nearly closed",
+          "[scan][orientation]") {
+  Random random(4);
+  TrueCloud cloud;
+  const double density = 10'000, h = 0.4;  // the spacing is 0.01
+  add_rectangle(cloud, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, density, random);
+  add_rectangle(cloud, {0, 0, 0}, {1, 0, 0}, {0, 0, h}, {0, 1, 0}, density, random);
+  add_rectangle(cloud, {0, 1, 0}, {1, 0, 0}, {0, 0, h}, {0, -1, 0}, density, random);
+  add_rectangle(cloud, {0, 0, 0}, {0, 1, 0}, {0, 0, h}, {1, 0, 0}, density, random);
+  add_rectangle(cloud, {1, 0, 0}, {0, 1, 0}, {0, 0, h}, {-1, 0, 0}, density, random);
+  const RawScan scan = raw_scan(cloud);
+  CHECK(compare(cloud, scan, complete(scan).records).flipped < 0.01);
+}
+
 }  // namespace ptc::test
