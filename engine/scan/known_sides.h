@@ -24,8 +24,6 @@ class KnownSides {
   /// known.
   [[nodiscard]] std::optional<std::array<float, 3>> towards(
       const Place& place, const LatticePosition& position) const noexcept;
-  /// Says whether the place of any scanner is known.
-  [[nodiscard]] bool knows_scanners() const noexcept { return !scanners_.empty(); }
   /// The unit vector that points up.
   [[nodiscard]] const std::array<float, 3>& up() const noexcept { return up_; }
 

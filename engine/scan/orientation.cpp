@@ -38,7 +38,8 @@ float less_noise(float x, float noise) noexcept {
 /// more in the mean, that may be a beam through a gap.
 /// @param sky  sum of SkyView::more_in_front()
 std::int64_t vote_of_sky(std::int64_t sky, std::uint64_t places) noexcept {
-  return std::abs(sky) < static_cast<std::int64_t>(places) ? 0 : sky * (kFullVote / 16);
+  return std::abs(sky) < static_cast<std::int64_t>(places) ? 0
+                                                           : sky * kFullVote / SkyView::kDirections;
 }
 
 /// Returns the vote of two places; see vote_of(). It has no branches, so that a loop over several
@@ -68,7 +69,7 @@ struct LinkLanes {
 /// which of these are flipped in the meantime.
 class ChunkOrientation {
  public:
-  ChunkOrientation(ScanChunk& chunk, const SkyView& sky, ChunkPieces& pieces, OrientationRoom& room)
+  ChunkOrientation(ScanChunk& chunk, const SkyView* sky, ChunkPieces& pieces, OrientationRoom& room)
       : chunk_(chunk),
         sky_(sky),
         pieces_(pieces),
@@ -82,7 +83,7 @@ class ChunkOrientation {
     room_.sky.assign(count_, 0);
     if (std::ranges::find(room_.known, 0) != room_.known.end()) {
       room_.sign.assign(count_, 1);
-      if (!sides.knows_scanners()) look_at_sky();
+      if (sky_ != nullptr) look_at_sky();
       count_votes();
       join_patches();
       join_pieces();
@@ -125,13 +126,13 @@ class ChunkOrientation {
   /// cell are one sheet.
   void look_at_sky() {
     for (std::uint32_t i = 0, end = 0; i < count_; i = end) {
-      const std::size_t cell = sky_.cell_of(chunk_.positions[i]);
-      for (end = i + 1; end < count_ && sky_.cell_of(chunk_.positions[end]) == cell;) ++end;
+      const std::size_t cell = sky_->cell_of(chunk_.positions[i]);
+      for (end = i + 1; end < count_ && sky_->cell_of(chunk_.positions[end]) == cell;) ++end;
       if (!is_sheet(i, end)) continue;
       for (std::uint32_t k = i; k < end; ++k) {
         if (room_.known[k] != 0) continue;
         room_.sky[k] = static_cast<std::int8_t>(
-            sky_.more_in_front(chunk_.positions[k], chunk_.fits[k].normal));
+            sky_->more_in_front(chunk_.positions[k], chunk_.fits[k].normal));
       }
     }
   }
@@ -150,7 +151,7 @@ class ChunkOrientation {
       noise = std::max(noise, double{chunk_.fits[i].noise});
     }
     return high - low <
-           std::min(kSheet * sky_.cell_width() + 4 * noise, kNoisySheet * sky_.cell_width());
+           std::min(kSheet * sky_->cell_width() + 4 * noise, kNoisySheet * sky_->cell_width());
   }
 
   /// Computes the votes of all links of which one end at least is unknown.
@@ -289,7 +290,7 @@ class ChunkOrientation {
       PieceSums& sums = pieces_.sums[pieces_.of[i]];
       sums.area += area;
       ++sums.places;
-      if (pieces_.of[i] != 0) sums.sky += room_.sky[i];
+      sums.sky += room_.sky[i];
       for (std::size_t k = 0; k < 3; ++k) {
         const double along = area * static_cast<double>(fit.normal[k]);
         sums.normal[k] += along;
@@ -300,7 +301,7 @@ class ChunkOrientation {
   }
 
   ScanChunk& chunk_;
-  const SkyView& sky_;
+  const SkyView* sky_;
   ChunkPieces& pieces_;
   std::uint32_t count_;
   OrientationRoom& room_;
@@ -342,7 +343,7 @@ void PieceSums::add(const PieceSums& other, bool flipped) noexcept {
   sky += flipped ? -other.sky : other.sky;
 }
 
-void orient_chunk(ScanChunk& chunk, const KnownSides& sides, const SkyView& sky,
+void orient_chunk(ScanChunk& chunk, const KnownSides& sides, const SkyView* sky,
                   ChunkPieces& pieces, OrientationRoom& room) {
   ChunkOrientation(chunk, sky, pieces, room).run(sides);
 }

@@ -9,8 +9,8 @@
 //
 // A vote is what two neighbouring places say about their sides. All places whose side is known
 // beforehand form one piece, number 0, which is never flipped. The sky votes, too, as if it were of
-// that piece: for the side from which more of it is seen. An island without any of this turns
-// outwards, or upwards where it is an open sheet.
+// that piece, if no scanner is known: for the side from which more of it is seen. An island without
+// any of this turns outwards, or upwards where it is an open sheet.
 #pragma once
 
 #include <array>
@@ -82,8 +82,9 @@ struct OrientationRoom {
 
 /// Flips normals of a chunk so that they agree within each piece. A known normal takes the place of
 /// the fitted one.
+/// @param sky  null: it has no vote
 /// Threads: may be called concurrently for different chunks, pieces and rooms.
-void orient_chunk(ScanChunk& chunk, const KnownSides& sides, const SkyView& sky,
+void orient_chunk(ScanChunk& chunk, const KnownSides& sides, const SkyView* sky,
                   ChunkPieces& pieces, OrientationRoom& room);
 
 /// Joins the pieces of all chunks.

@@ -77,15 +77,13 @@ class ResultWindow {
 /// The passes over the places, from the spool to their results.
 class Completion {
  public:
-  Completion(const ScanSpool& spool, SkyView& sky, TempFile& results, const ScanOptions& options,
-             const Frame& frame)
+  Completion(const ScanSpool& spool, const SkyView* sky, TempFile& results,
+             const ScanOptions& options, const Frame& frame)
       : spool_(spool),
         sky_(sky),
         results_(results),
         sides_(frame, options.scanners, options.up, options.aerial),
-        unit_(frame.unit()) {
-    sky.finish(sides_.up());
-  }
+        unit_(frame.unit()) {}
 
   void run(std::size_t workers, const Executor& executor, Progress& progress) {
     const std::uint64_t chunks = (spool_.places() + kChunkPlaces - 1) / kChunkPlaces;
@@ -148,7 +146,7 @@ class Completion {
   }
 
   const ScanSpool& spool_;
-  const SkyView& sky_;
+  const SkyView* sky_;
   TempFile& results_;
   KnownSides sides_;
   double unit_;
@@ -241,8 +239,8 @@ class CompletedStream final : public ScanStream {
   std::vector<std::uint8_t> marks_;
 };
 
-/// Writes all points to the spool.
-void fill(ScanSpool& spool, SkyView& sky, PointStream& sorted, Progress& progress,
+/// Writes all points to the spool, and shows them to the view of the sky, if there is one.
+void fill(ScanSpool& spool, SkyView* sky, PointStream& sorted, Progress& progress,
           ScanReport& report) {
   progress.begin("spool", 0, "points");
   std::vector<PointRecord> block(kReadRecords);
@@ -251,7 +249,9 @@ void fill(ScanSpool& spool, SkyView& sky, PointStream& sorted, Progress& progres
     spool.add(records);
     for (const PointRecord& record : records)
       report.normals += (record.flags & kUnknownNormal) != 0;
-    for (const PointRecord& record : records) sky.add(position_of(record.key));
+    for (const PointRecord& record : records) {
+      if (sky != nullptr) sky->add(position_of(record.key));
+    }
     progress.advance(count);
   }
   spool.finish();
@@ -270,19 +270,21 @@ std::unique_ptr<ScanStream> complete_scan(PointStream& sorted, const Frame& fram
   const std::uint64_t index_bytes = std::clamp<std::uint64_t>(
       options.memory_bytes / 8, std::uint64_t{1} << 16, std::uint64_t{1} << 28);
   auto spool = std::make_unique<ScanSpool>(options.temp_dirs, index_bytes);
-  SkyView sky;
-  fill(*spool, sky, sorted, progress, report);
+  // The sky tells sides where no scanner does.
+  const auto sky = options.scanners.empty() ? std::make_unique<SkyView>() : nullptr;
+  fill(*spool, sky.get(), sorted, progress, report);
   // Work on as many chunks at once as memory allows.
   MemoryBudget budget(options.memory_bytes, "completing a scan");
   budget.charge("the index of points", index_bytes);
-  budget.charge("the view of the sky", SkyView::kBytes);
+  if (sky) budget.charge("the view of the sky", SkyView::kBytes);
   budget.charge("buffers", std::uint64_t{2} << 20);
   const std::uint64_t each = worker_bytes(spool->index().page_places());
   const std::uint64_t rest = budget.rest("a chunk of points", each);
   const auto workers =
       static_cast<std::size_t>(std::min<std::uint64_t>(executor.threads(), rest / each));
   auto results = std::make_unique<TempFile>(options.temp_dirs.back());
-  Completion completion(*spool, sky, *results, options, frame);
+  Completion completion(*spool, sky.get(), *results, options, frame);
+  if (sky && report.normals > 0) sky->finish(completion.sides().up());
   completion.run(workers, executor, progress);
   spool->discard_places();
   // Settle the sides.

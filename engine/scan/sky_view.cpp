@@ -94,7 +94,7 @@ void SkyView::finish(const std::array<float, 3>& up) {
   add_ring(5, 45);
   add_ring(3, 70);
   seen_.assign(full_.size(), 0);
-  for (std::size_t d = 0; d < kDirections; ++d) look(d);
+  for (std::size_t d = 0; d < directions_.size(); ++d) look(d);
 }
 
 /// Looks in one direction from all cells. The cells are taken in layers across the direction's
@@ -156,7 +156,7 @@ int SkyView::more_in_front(const LatticePosition& position,
     if (cell != own && cell != kOutside && full_[cell]) return 0;
   }
   unsigned front = 0, behind = 0;
-  for (std::size_t d = 0; d < kDirections; ++d) {
+  for (std::size_t d = 0; d < directions_.size(); ++d) {
     const std::array<float, 3>& to = directions_[d];
     const float cosine = to[0] * normal[0] + to[1] * normal[1] + to[2] * normal[2];
     front |= (cosine > kAlong ? 1U : 0U) << d;

@@ -27,6 +27,7 @@ namespace ptc {
 /// Threads: after finish(), const calls may be made concurrently.
 class SkyView {
  public:
+  static constexpr int kDirections = 16;
   static constexpr std::uint64_t kBytes = std::uint64_t{5} << 20;
 
   SkyView();
@@ -40,13 +41,12 @@ class SkyView {
   /// Returns the width of a cell, lattice units.
   [[nodiscard]] double cell_width() const noexcept;
   /// Returns how much more of the sky a place sees on the side of its normal than on the other, in
-  /// units of a direction: -16 to 16; 0 where other points are on the way to where it looks from.
-  /// Directions along the surface do not count.
+  /// units of a direction: -kDirections to kDirections; 0 where other points are on the way to
+  /// where it looks from. Directions along the surface do not count.
   [[nodiscard]] int more_in_front(const LatticePosition& position,
                                   const std::array<float, 3>& normal) const noexcept;
 
  private:
-  static constexpr std::size_t kDirections = 16;
   static constexpr std::size_t kOutside = SIZE_MAX;
 
   void choose_cells();

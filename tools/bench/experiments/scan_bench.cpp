@@ -63,12 +63,12 @@ struct SampledCloud {
 };
 
 /// Samples a mesh uniformly at random.
-SampledCloud sample(const Mesh& mesh, std::uint64_t points, double noise) {
+SampledCloud sample(const RayScene& scene, std::uint64_t points, double noise) {
   // Draw points from the mesh
-  SampledCloud cloud{.area = area_of(mesh)};
+  SampledCloud cloud{.area = area_of(scene.mesh())};
   std::vector<Surfel> surfels;
   Bounds bounds;
-  for (const SampledPoint& p : sample_at_random(mesh, {.points = points, .noise = noise})) {
+  for (const SampledPoint& p : sample_at_random(scene, {.points = points, .noise = noise})) {
     bounds.add(p.position);
     surfels.push_back({.position = p.position, .normal = p.normal});
   }
@@ -218,10 +218,11 @@ SceneScans measure_scans(const SceneChoice& choice, const ScanBenchOptions& opti
                          const std::filesystem::path& work, const RunOptions& run,
                          Progress& progress) {
   const Mesh mesh = mesh_of(choice, options.points, run);
+  const RayScene rays(mesh);
   SceneScans scene{.name = choice.name, .triangles = mesh.triangles.size(), .rows = {}};
   progress.begin(choice.name, options.noises.size(), "clouds");
   for (const double noise : options.noises) {
-    const SampledCloud cloud = sample(mesh, options.points, noise);
+    const SampledCloud cloud = sample(rays, options.points, noise);
     std::vector<ScanRow> rows{measure_ptcx(cloud, options, work, run)};
     if (!options.python.empty()) rows.push_back(measure_open3d(cloud, options, work));
     for (ScanRow& row : rows) {

@@ -242,7 +242,7 @@ std::vector<SpecksRow> measure_specks(const SceneChoice& choice, const SpecksOpt
     SpecksRow& row = rows.emplace_back();
     row.scene = choice.name;
     row.cloud = kind.name;
-    const std::vector<SampledPoint> points = sample_at_random(mesh, kind.options);
+    const std::vector<SampledPoint> points = sample_at_random(rays, kind.options);
     judge(points, shade(points, options, work, run, rays, executor, row), rays, options, executor,
           row);
     progress.advance(1);

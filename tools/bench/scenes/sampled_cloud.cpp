@@ -10,7 +10,6 @@
 #include "engine/base/numbers.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/scene/procedural/city.h"
-#include "engine/scene/ray_scene.h"
 
 namespace ptc::bench {
 namespace {
@@ -89,7 +88,8 @@ double area_of(const Mesh& mesh) {
   return Sampler(mesh).area();
 }
 
-std::vector<SampledPoint> sample_at_random(const Mesh& mesh, const SampleOptions& options) {
+std::vector<SampledPoint> sample_at_random(const RayScene& scene, const SampleOptions& options) {
+  const Mesh& mesh = scene.mesh();
   // Choose the gaps, and how many points must be drawn so that enough are left
   const Sampler sampler(mesh);
   Numbers numbers;
@@ -104,7 +104,6 @@ std::vector<SampledPoint> sample_at_random(const Mesh& mesh, const SampleOptions
       static_cast<std::uint64_t>(std::llround(static_cast<double>(options.points) / kept));
 
   // Draw them
-  const RayScene scene(mesh);
   Numbers directions(2);
   std::vector<SampledPoint> points;
   for (std::uint64_t i = 0; i < draws; ++i) {

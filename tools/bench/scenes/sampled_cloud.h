@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/io/mesh/mesh.h"
+#include "engine/scene/ray_scene.h"
 #include "tools/bench/scenes/bench_scene.h"
 
 namespace ptc::bench {
@@ -34,10 +35,10 @@ struct SampledPoint {
 
 /// Returns the area of a mesh.
 [[nodiscard]] double area_of(const Mesh& mesh);
-/// Draws points from a mesh, uniformly by area but for the options, in the order of its triangles.
-/// Points inside of its solids, where no scanner sees them, are left out.
-/// Equal options give equal points.
-[[nodiscard]] std::vector<SampledPoint> sample_at_random(const Mesh& mesh,
+/// Draws points from the mesh of a scene, uniformly by area but for the options, in the order of
+/// its triangles. Points inside of its solids, where no scanner sees them, are left out. Equal
+/// options give equal points.
+[[nodiscard]] std::vector<SampledPoint> sample_at_random(const RayScene& scene,
                                                          const SampleOptions& options);
 
 /// Returns the mesh of a scene. @param points  decides how finely procedural meshes are divided
