@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numbers>
 
+#include "engine/base/basis.h"
+#include "engine/base/numbers.h"
 #include "format/morton.h"
 
 namespace ptc {
@@ -34,11 +35,7 @@ std::size_t longest(const std::array<float, 3>& v) noexcept {
 SkyView::SkyView() : bits_(kMostBits), full_(std::size_t{1} << (3 * kMostBits)) {}
 
 void SkyView::add(const LatticePosition& position) noexcept {
-  std::array<int, 3> cell{};
-  for (std::size_t k = 0; k < 3; ++k)
-    cell[k] =
-        static_cast<int>(static_cast<std::uint64_t>(position[k]) >> (kLatticeBits - kMostBits));
-  full_[cell_at(cell[0], cell[1], cell[2], kMostBits)] = true;
+  full_[cell_of(position)] = true;
   ++places_;
 }
 
@@ -67,27 +64,15 @@ void SkyView::finish(const std::array<float, 3>& up) {
   choose_cells();
   // Spread the directions over the upper hemisphere: a ring of eight at 20 degrees, one of five at
   // 45 and one of three at 70.
-  const std::size_t least = static_cast<std::size_t>(
-      std::ranges::min_element(up, {}, [](float x) { return std::abs(x); }) - up.begin());
-  std::array<double, 3> side{};
-  side[least] = 1;
-  double length = 0;
-  for (std::size_t k = 0; k < 3; ++k) side[k] -= double{up[least]} * double{up[k]};
-  for (const double x : side) length += x * x;
-  for (double& x : side) x /= std::sqrt(length);
+  const Basis basis(glm::vec3(up[0], up[1], up[2]));
   std::size_t next = 0;
-  const auto add_ring = [&](int count, double elevation) {
-    const double rise = std::sin(elevation * std::numbers::pi / 180);
-    const double flat = std::cos(elevation * std::numbers::pi / 180);
+  const auto add_ring = [&](int count, float elevation) {
+    const float angle = elevation * kPi / 180;
     for (int i = 0; i < count; ++i) {
-      const double turn = 2 * std::numbers::pi * (i + 0.5) / count;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::size_t a = (k + 1) % 3, b = (k + 2) % 3;
-        const double other = double{up[a]} * side[b] - double{up[b]} * side[a];
-        directions_[next][k] = static_cast<float>(
-            flat * (std::cos(turn) * side[k] + std::sin(turn) * other) + rise * double{up[k]});
-      }
-      ++next;
+      const float turn = 2 * kPi * (static_cast<float>(i) + 0.5F) / static_cast<float>(count);
+      const glm::vec3 to = basis.to_world(
+          {std::cos(angle) * std::cos(turn), std::cos(angle) * std::sin(turn), std::sin(angle)});
+      directions_[next++] = {to.x, to.y, to.z};
     }
   };
   add_ring(8, 20);
@@ -130,7 +115,10 @@ void SkyView::look(std::size_t direction) {
 }
 
 std::size_t SkyView::cell_of(const LatticePosition& position) const noexcept {
-  return cell_along(position, {}, 0);
+  const auto cell = [&](double x) {
+    return static_cast<int>(static_cast<std::uint64_t>(x) >> (kLatticeBits - bits_));
+  };
+  return cell_at(cell(position[0]), cell(position[1]), cell(position[2]), bits_);
 }
 
 double SkyView::cell_width() const noexcept {

@@ -10,6 +10,7 @@
 #include "engine/base/numbers.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/scene/procedural/city.h"
+#include "engine/scene/sampling/directions.h"
 
 namespace ptc::bench {
 namespace {
@@ -72,10 +73,11 @@ class Sampler {
 bool is_open(const RayScene& scene, const SampledPoint& point, Numbers& numbers) {
   constexpr int kRays = 16;
   int backs = 0;
+  const Basis basis(point.normal);
   const glm::dvec3 from = point.origin + scene.epsilon() * glm::dvec3(point.normal);
   for (int i = 0; i < kRays && backs <= kRays / 2 && i - backs < kRays / 2; ++i) {
-    const glm::dvec3 any(numbers.normal(), numbers.normal(), numbers.normal());
-    const glm::vec3 ray = glm::normalize(point.normal + 0.999F * glm::vec3(glm::normalize(any)));
+    const glm::vec2 square(numbers.uniform(), numbers.uniform());
+    const glm::vec3 ray = basis.to_world(cosine_direction(square));
     const auto hit = scene.closest(from, ray, 0, std::numeric_limits<double>::infinity());
     if (hit && !hit->front) ++backs;
   }
