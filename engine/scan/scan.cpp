@@ -16,6 +16,7 @@
 #include "engine/base/memory_budget.h"
 #include "engine/io/file/file.h"
 #include "engine/scan/chunk_fit.h"
+#include "engine/scan/islands.h"
 #include "engine/scan/known_sides.h"
 #include "engine/scan/orientation.h"
 #include "engine/scan/place_result.h"
