@@ -1,13 +1,8 @@
-// Values of options, checked while they are parsed.
+// Options whose values are checked while they are parsed.
 #pragma once
 
-#include <charconv>
-#include <cmath>
 #include <cstdint>
-#include <initializer_list>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -15,30 +10,9 @@
 #include <CLI/CLI.hpp>
 
 #include "tools/option_text.h"
+#include "tools/parse.h"
 
 namespace ptc {
-
-/// The number that the whole of `text` spells; empty when it spells none, or none that is finite.
-template <class T>
-[[nodiscard]] std::optional<T> parse_number(std::string_view text) {
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return {};
-  if constexpr (std::is_floating_point_v<T>) {
-    if (!std::isfinite(value)) return {};
-  }
-  return value;
-}
-
-/// Refuses the value of an option: "--sun: expects ..., not '...'".
-/// @throws CLI::ValidationError always, as every check of this file does when a value is wrong
-[[noreturn]] void refuse(const std::string& option, const std::string& text,
-                         const std::string& expected);
-
-/// Finite numbers separated by commas. Refuses a list whose length is none of `counts`.
-[[nodiscard]] std::vector<double> parse_numbers(const std::string& option, const std::string& text,
-                                                std::initializer_list<std::size_t> counts,
-                                                const std::string& expected);
 
 /// Refuses values that are not finite numbers from `least` to `most`.
 [[nodiscard]] CLI::Validator in_range(double least, double most);
@@ -94,14 +68,10 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
       ->default_str(current);
 }
 
-/// A whole number from 1 to 2^48, with k, M or G for powers of 1000 or without: "250k", "1.5M".
-[[nodiscard]] std::uint64_t parse_count(const std::string& option, const std::string& text);
 /// Declares an option that takes a count as parse_count() does.
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& count,
                        const std::string& description);
 
-/// A number of bytes, with K, M, G or T for powers of 1024 or without: "256M", "1.5G".
-[[nodiscard]] std::uint64_t parse_size(const std::string& option, const std::string& text);
 /// Declares an option that takes a size as parse_size() does. The value so far is the default in
 /// the help.
 CLI::Option* add_size(CLI::App& app, const std::string& name, std::uint64_t& bytes,

@@ -5,7 +5,7 @@
 #include "tools/bench/experiments/accuracy.h"
 #include "tools/bench/experiments/accuracy_chart.h"
 #include "tools/bench/experiments/experiment.h"
-#include "tools/values.h"
+#include "tools/parse.h"
 
 namespace ptc::bench {
 namespace {
@@ -111,30 +111,22 @@ Experiment make_accuracy_experiment() {
   const auto options = std::make_shared<AccuracyOptions>();
   const auto scenes = std::make_shared<SceneList>();
   const auto declare = [=](Declaration& d) {
-    constexpr char kExpert[] = "Expert";
-    const auto is_power_of_two = [](const std::string& text) {
-      const auto rays = parse_number<unsigned>(text);
-      return rays && std::has_single_bit(*rays) ? std::string()
-                                                : "must be a power of two, is " + text;
-    };
     SceneOptions& scene = options->scene;
     d.scenes(*scenes);
     d.points(scene.points, "2M", 200'000);
     d.checked(options->checked, 200);
-    add_integer(d.command(), "--reference-rays", options->reference_rays, 16, 65536,
-                "Rays per receiver of each of the two halves of a reference, a power of two")
-        ->check(is_power_of_two);
+    d.integer("--reference-rays", options->reference_rays, 16, 65536,
+              "Rays per receiver of each of the two halves of a reference, a power of two");
     d.repeats(options->repeats, 3);
     d.list("--setting", "SR,RAD,R[,X]", options->settings, parse_setting,
            "Measure PTCX at this solid angle [sr], parallax [rad], resolution [pixels along a cube "
-           "edge] and inflation, in place of a list from coarse to fine; repeatable")
-        ->group(kExpert);
+           "edge] and inflation, in place of a list from coarse to fine; repeatable");
     const std::vector<GatherOptions> all = AccuracyOptions::default_settings();
     d.quick("--setting", options->settings, {all[0], all[2], all[3], all[5]});
-    d.words("--method", options->methods, "Measure only this method; repeatable")->group(kExpert);
+    d.words("--method", options->methods, "Measure only this method; repeatable");
     d.words("--set", options->sets,
-            "Shade only these receivers: pixels of a picture, or points of the scene; repeatable")
-        ->group(kExpert);
+            "Shade only these receivers: pixels of a picture, or points of the scene; repeatable");
+    for (const char* name : {"--setting", "--method", "--set"}) d.for_experts(name);
     // Shade the middle of the picture, not a smaller picture: receivers keep their distance, and so
     // their share of common work
     d.quick(scene.shaded_width, 192);
@@ -144,6 +136,13 @@ Experiment make_accuracy_experiment() {
     d.quick(scene.own_points, 8'192);
     d.quick(options->rays, {64, 256, 1024, 4096});
     d.quick(options->plain_solid_angles, {0.01F});
+  };
+  const auto check = [=] {
+    const unsigned rays = options->reference_rays;
+    if (!std::has_single_bit(rays)) {
+      refuse("--reference-rays", std::to_string(rays), "a power of two");
+    }
+    scenes->check();
   };
   const auto run = [=](const Bench& b) {
     const ThreadPool executor(b.run.threads);
@@ -162,7 +161,7 @@ Experiment make_accuracy_experiment() {
           "(192 x 108 pixels, 8k points), 200 of them checked, 3 runs of fewer settings",
       .declare = declare,
       .run = run,
-      .check = [scenes] { scenes->check(); }};
+      .check = check};
 }
 
 }  // namespace ptc::bench

@@ -3,7 +3,7 @@
 
 #include "tools/bench/experiments/build_bench.h"
 #include "tools/bench/experiments/experiment.h"
-#include "tools/values.h"
+#include "tools/parse.h"
 
 namespace ptc::bench {
 namespace {

@@ -3,7 +3,6 @@
 
 #include "tools/bench/experiments/cache_bench.h"
 #include "tools/bench/experiments/experiment.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {

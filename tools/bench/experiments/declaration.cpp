@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include <CLI/CLI.hpp>
+
 #include "engine/base/error.h"
 #include "engine/base/numbers.h"
 #include "tools/common.h"
@@ -69,26 +71,45 @@ void Declaration::scenes(SceneList& scenes) {
 }
 
 void Declaration::count(const char* name, std::uint64_t& value, const char* description,
-                        const char* shown, std::uint64_t less) {
+                        const char* shown) {
   add_count(*command_, name, value, description)->default_str(shown);
-  quick(name, value, less);
+}
+
+void Declaration::integer(const char* name, unsigned& value, std::uint64_t least,
+                          std::uint64_t most, const char* description) {
+  add_integer(*command_, name, value, least, most, description);
+}
+
+void Declaration::integer(const char* name, std::uint64_t& value, std::uint64_t least,
+                          std::uint64_t most, const char* description) {
+  add_integer(*command_, name, value, least, most, description);
+}
+
+void Declaration::number(const char* name, const char* unit, float& value, double least,
+                         double most, const char* description) {
+  add_number(*command_, name, value, least, most, description)->type_name(unit);
+}
+
+void Declaration::file(const char* name, std::filesystem::path& value, const char* description) {
+  command_->add_option(name, value, description)->type_name("FILE");
 }
 
 void Declaration::points(std::uint64_t& points, const char* shown, std::uint64_t less) {
-  count("--points", points, "Surfels wanted of a mesh or the city; k, M, G count by 1000", shown,
-        less);
+  count("--points", points, "Surfels wanted of a mesh or the city; k, M, G count by 1000", shown);
+  quick("--points", points, less);
 }
 
 void Declaration::city_points(std::uint64_t& points, const char* shown, std::uint64_t less) {
-  count("--points", points, "Points of the city", shown, less);
+  count("--points", points, "Points of the city", shown);
+  quick("--points", points, less);
 }
 
 void Declaration::block_receivers(std::uint64_t& receivers, const char* shown, std::uint64_t less) {
-  count("--receivers", receivers, "Receivers among these points, in blocks of neighbours", shown,
-        less);
+  count("--receivers", receivers, "Receivers among these points, in blocks of neighbours", shown);
+  quick("--receivers", receivers, less);
 }
 
-void Declaration::points(std::vector<std::uint64_t>& points, const std::string& description,
+void Declaration::points(std::vector<std::uint64_t>& points, const char* description,
                          std::vector<std::uint64_t> less) {
   const auto parse = [](const std::string& text) { return parse_count("--points", text); };
   list("--points", "COUNT", points, parse, description);
@@ -96,23 +117,38 @@ void Declaration::points(std::vector<std::uint64_t>& points, const std::string& 
 }
 
 void Declaration::checked(unsigned& checked, unsigned less) {
-  add_integer(*command_, "--checked", checked, 10, 1'000'000,
-              "Receivers whose error is measured, of each set");
+  integer("--checked", checked, 10, 1'000'000, "Receivers whose error is measured, of each set");
   quick("--checked", checked, less);
 }
 
 void Declaration::repeats(unsigned& repeats, unsigned less) {
-  add_integer(*command_, "--repeats", repeats, 1, 1000, "Runs of each measurement");
+  integer("--repeats", repeats, 1, 1000, "Runs of each measurement");
   quick("--repeats", repeats, less);
 }
 
-CLI::Option* Declaration::words(const char* name, std::vector<std::string>& chosen,
-                                const char* description) {
+void Declaration::words(const char* name, std::vector<std::string>& chosen,
+                        const char* description) {
   const std::string text = std::string(description) + " (" + join(chosen, "|") + ")";
-  return offer(command_->add_option(name, chosen, text), chosen)
+  offer(command_->add_option(name, chosen, text), chosen)
       ->type_name("NAME")
       ->allow_extra_args(false)
       ->check(one_of(chosen));
+}
+
+void Declaration::for_experts(const char* name) {
+  command_->get_option(name)->group(kExpertGroup);
+}
+
+bool Declaration::is_given(const CLI::App& command, const std::string& option) {
+  return !option.empty() && command.count(option) > 0;
+}
+
+void Declaration::repeatable(const char* name, const char* type,
+                             const std::function<void(const std::vector<std::string>&)>& set,
+                             const char* description) {
+  command_->add_option_function<std::vector<std::string>>(name, set, description)
+      ->type_name(type)
+      ->allow_extra_args(false);
 }
 
 }  // namespace ptc::bench

@@ -3,16 +3,19 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "engine/shade/shading.h"
 #include "tools/bench/scenes/bench_scene.h"
+
+namespace CLI {
+class App;  // of a header that takes seconds to compile, and that no experiment needs
+}
 
 namespace ptc::bench {
 
@@ -40,14 +43,13 @@ class Declaration {
  public:
   explicit Declaration(CLI::App& command) : command_(&command) {}
 
-  /// The command, for options of other kinds.
   [[nodiscard]] CLI::App& command() const noexcept { return *command_; }
 
   /// Makes --quick set a value, unless the option that sets it is given, too.
   template <class Value>
   void quick(const std::string& option, Value& value, std::type_identity_t<Value> less) {
     quick_.push_back([command = command_, option, &value, less = std::move(less)] {
-      if (option.empty() || command->count(option) == 0) value = less;
+      if (!is_given(*command, option)) value = less;
     });
   }
   /// Makes --quick set a value that has no option.
@@ -67,7 +69,7 @@ class Declaration {
   void points(std::uint64_t& points, const char* shown, std::uint64_t less);
   /// Declares a repeatable --points, whose values are put in ascending order.
   /// @param less  the values of --quick
-  void points(std::vector<std::uint64_t>& points, const std::string& description,
+  void points(std::vector<std::uint64_t>& points, const char* description,
               std::vector<std::uint64_t> less);
   /// Declares --points of the city.
   /// @param shown  the default as the help shows it
@@ -83,27 +85,44 @@ class Declaration {
   /// Declares --repeats, the number of runs.
   /// @param less  the value of --quick
   void repeats(unsigned& repeats, unsigned less);
+  /// Declares a count, which may have a suffix, as parse_count() takes it.
+  /// @param shown  the default as the help shows it; empty: it shows none
+  void count(const char* name, std::uint64_t& value, const char* description, const char* shown);
+  /// Declares a whole number from `least` to `most`.
+  void integer(const char* name, unsigned& value, std::uint64_t least, std::uint64_t most,
+               const char* description);
+  /// Declares a whole number from `least` to `most`.
+  void integer(const char* name, std::uint64_t& value, std::uint64_t least, std::uint64_t most,
+               const char* description);
+  /// Declares a finite number from `least` to `most`.
+  /// @param unit  the word for it in the help
+  void number(const char* name, const char* unit, float& value, double least, double most,
+              const char* description);
+  /// Declares the name of a file.
+  void file(const char* name, std::filesystem::path& value, const char* description);
   /// Declares a repeatable option whose values replace the default ones. Integers are put in
   /// ascending order.
   /// @param parse  makes a value of the text of one option, or throws CLI::ValidationError
   template <class Value, class Parse>
-  CLI::Option* list(const char* name, const char* type, std::vector<Value>& values,
-                    const Parse& parse, const std::string& description) {
+  void list(const char* name, const char* type, std::vector<Value>& values, const Parse& parse,
+            const char* description) {
     const auto set = [&values, parse](const std::vector<std::string>& texts) {
       values.clear();
       for (const std::string& text : texts) values.push_back(parse(text));
       if constexpr (std::is_integral_v<Value>) std::ranges::sort(values);
     };
-    return command_->add_option_function<std::vector<std::string>>(name, set, description)
-        ->type_name(type)
-        ->allow_extra_args(false);
+    repeatable(name, type, set, description);
   }
   /// Declares a repeatable option that chooses some of the words that `chosen` holds.
-  CLI::Option* words(const char* name, std::vector<std::string>& chosen, const char* description);
+  void words(const char* name, std::vector<std::string>& chosen, const char* description);
+  /// Puts an option under the heading of those that most users never need.
+  void for_experts(const char* name);
 
  private:
-  void count(const char* name, std::uint64_t& value, const char* description, const char* shown,
-             std::uint64_t less);
+  [[nodiscard]] static bool is_given(const CLI::App& command, const std::string& option);
+  void repeatable(const char* name, const char* type,
+                  const std::function<void(const std::vector<std::string>&)>& set,
+                  const char* description);
 
   CLI::App* command_;
   std::vector<std::function<void()>> quick_;

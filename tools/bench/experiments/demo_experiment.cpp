@@ -16,7 +16,6 @@
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {
@@ -277,9 +276,8 @@ Experiment make_demo_experiment() {
   const auto declare = [=](Declaration& d) {
     d.scenes(*scenes);
     d.points(options->scene.points, "2M", 50'000);
-    add_count(d.command(), "--receivers", options->receivers,
-              "Shade this many of the points, spread evenly [default: all]")
-        ->default_str("");
+    d.count("--receivers", options->receivers,
+            "Shade this many of the points, spread evenly [default: all]", "");
     d.words("--stage", options->stages, "Measure only this stage; repeatable");
     d.checked(options->checked, 200);
     d.repeats(options->repeats, 2);

@@ -5,7 +5,6 @@
 
 #include "tools/bench/experiments/error_knob.h"
 #include "tools/bench/experiments/experiment.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {
@@ -181,8 +180,7 @@ Experiment make_error_experiment() {
     d.scenes(*scenes);
     d.points(options->scene.points, "500k", 50'000);
     d.checked(options->checked, 400);
-    add_integer(d.command(), "--check-rays", options->rays, 16, 1 << 20,
-                "Rays for each checked receiver");
+    d.integer("--check-rays", options->rays, 16, 1 << 20, "Rays for each checked receiver");
     d.quick(options->scene.width, 320);
     d.quick(options->scene.height, 180);
   };

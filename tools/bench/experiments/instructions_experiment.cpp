@@ -6,7 +6,6 @@
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/references/methods.h"
 #include "tools/bench/references/reference.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {

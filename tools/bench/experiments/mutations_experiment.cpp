@@ -27,7 +27,6 @@
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/mutations.h"
 #include "tools/bench/experiments/work_file.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {
@@ -314,8 +313,8 @@ Report measure(std::size_t every, const Bench& bench) {
 Experiment make_mutations_experiment() {
   const auto every = std::make_shared<std::uint64_t>(1);
   const auto declare = [every](Declaration& d) {
-    add_integer(d.command(), "--every", *every, 1, 1'000'000,
-                "Try one way in N of the kinds of change that have at least 500");
+    d.integer("--every", *every, 1, 1'000'000,
+              "Try one way in N of the kinds of change that have at least 500");
     d.quick("--every", *every, 1009);
   };
   return {.name = "mutations",

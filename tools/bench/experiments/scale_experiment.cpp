@@ -7,7 +7,7 @@
 
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/scale_law.h"
-#include "tools/values.h"
+#include "tools/parse.h"
 
 namespace ptc::bench {
 namespace {
@@ -199,9 +199,8 @@ Experiment make_scale_experiment() {
     d.points(options->points,
              "Points of the city, in place of 1M, 5M and 20M; repeatable; 1000 or more",
              {200'000, 1'000'000});
-    add_count(d.command(), "--receivers", options->receivers,
-              "Receivers among these points, spread evenly")
-        ->default_str("100k");
+    d.count("--receivers", options->receivers, "Receivers among these points, spread evenly",
+            "100k");
     d.quick("--receivers", options->receivers, 8'000);
     d.repeats(options->repeats, 2);
   };

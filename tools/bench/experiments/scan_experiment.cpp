@@ -3,7 +3,6 @@
 
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/scan_bench.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {
@@ -84,10 +83,8 @@ Experiment make_scan_experiment() {
     d.scenes(*scenes);
     d.points(options->points, "1M", 50'000);
     d.repeats(options->repeats, 1);
-    d.command()
-        .add_option("--python", options->python,
-                    "A Python interpreter with the package open3d, which is then measured, too")
-        ->type_name("FILE");
+    d.file("--python", options->python,
+           "A Python interpreter with the package open3d, which is then measured, too");
   };
   const auto run = [=](const Bench& b) {
     return measure_scenes(*scenes, options->repeats, b, [&](const SceneChoice& choice) {

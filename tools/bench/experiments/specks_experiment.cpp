@@ -1,7 +1,6 @@
 // The experiment `ptcbench specks`: its table columns and its options.
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/specks.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {
@@ -56,9 +55,8 @@ Experiment make_specks_experiment() {
     d.scenes(*scenes);
     d.points(options->points, "300k", 20'000);
     d.checked(options->checked, 200);
-    add_number(d.command(), "--lift", options->lift, 0, 100,
-               "Height of receivers over their surfels, in radii")
-        ->type_name("RADII");
+    d.number("--lift", "RADII", options->lift, 0, 100,
+             "Height of receivers over their surfels, in radii");
   };
   const auto run = [=](const Bench& b) {
     return measure_scenes(*scenes, 1, b, [&](const SceneChoice& choice) {

@@ -14,7 +14,6 @@
 #include "tools/bench/experiments/growth.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
-#include "tools/values.h"
 
 namespace ptc::bench {
 namespace {
