@@ -161,6 +161,13 @@ class Bench(ProgramTest):
         self.assertLess(rows[0]["holes"], 0.01)
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["specks.csv", "specks.json"])
 
+    def test_scans_are_not_drawn_from_a_cloud(self):
+        cloud = self.here / "cloud.xyz"
+        cloud.write_text("".join(f"{x} {y} 0\n" for x in range(9) for y in range(9)))
+        for experiment in ("scan", "specks"):
+            message = self.fail_with(1, "ptcbench", experiment, cloud, "--points", "1k", "-o", self.here / "charts")
+            self.assertIn("cloud.xyz: has no triangles", message)
+
     def test_sorts_of_every_order_are_right_and_leave_their_files_alone(self):
         charts = self.here / "charts"
         printed = self.succeed("ptcbench", "sort", "--points", "40k", "--repeats", "1", "--memory", "1M", "--threads", "2", "-o", charts,

@@ -29,11 +29,6 @@ namespace {
 constexpr std::size_t kGrain = 1 << 11;  // records that a thread fills at once
 constexpr std::uint64_t kMaxGroups = kMaxGroup - kFirstInputGroup + 1;
 
-/// Returns where the values of a record begin.
-std::byte* values_of(PointRecord& record) noexcept {
-  return reinterpret_cast<std::byte*>(&record) + sizeof(MortonKey);
-}
-
 /// Returns whether two channels hold the same kind of value; their groups do not matter.
 bool same_kind(Channel a, const Channel& b) {
   a.group = b.group;
@@ -250,7 +245,8 @@ void write_attribute_pages(PointStream& values, std::uint8_t group,
   std::vector<PointRecord> block(points_per_page(writer.header()));
   std::vector<std::byte> payload;
   for (std::uint64_t left = points; left > 0;) {
-    const std::size_t count = read_full(values, block);
+    const std::size_t count =
+        read_full(values, std::span(block).first(std::min<std::uint64_t>(block.size(), left)));
     assert(count > 0);  // each sort of a build has a record for every point
     payload.resize(count * row_bytes);
     const std::span<const std::byte> rows(values_of(block.front()),

@@ -41,6 +41,11 @@ inline constexpr std::uint8_t kFirstInputGroup = 2;
 /// The name of the channel that holds the place of each point in its input.
 inline constexpr const char* kOriginalIndex = "original_index";
 
+/// Returns where the values of a group begin in a record.
+[[nodiscard]] inline std::byte* values_of(PointRecord& record) noexcept {
+  return reinterpret_cast<std::byte*>(&record) + sizeof(MortonKey);
+}
+
 /// The channels of all inputs together, and the way of each input's values to them.
 class AttributePlan {
  public:

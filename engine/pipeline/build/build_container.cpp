@@ -246,11 +246,10 @@ class Build {
       throw DataError(names + "the input has no points and no triangles");
     }
     Meta meta = make_meta(request_, inputs);
-    const bool marks = inputs.clouds.scan && !scene_ && add_marks(meta);
+    if (inputs.clouds.scan) add_marks(meta);
     check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);
     SortedPoints points{.plan = {.frame = frame_of(inputs.bounds),
                                  .scan = inputs.clouds.scan,
-                                 .marks = marks,
                                  .emits = inputs.emitters || inputs.clouds.emits ||
                                           (scene_ && scene_->header().point_bytes != kPointBytes)}};
     const Frame& frame = points.plan.frame;
@@ -387,7 +386,7 @@ class Build {
 
     // Chain the streams
     std::optional<PointMarks> marks;
-    if (plan.marks) marks.emplace(roomiest_temp_dir(request_.run, target_));
+    if (plan.scan) marks.emplace(roomiest_temp_dir(request_.run, target_));
     StreamChain chain(points.sorter->finish(needed(place.points)));
     if (plan.scan) complete(chain, points);
     join(chain, plan.frame, [&] { return std::make_unique<ContainerPoints>(*scene_); });
@@ -398,8 +397,8 @@ class Build {
 
     // Write all pages and publish the container
     const Superblock superblock = build_from(chain.last(), writer, *points.sorter, needed);
-    write_attributes(plan, *points.attributes, superblock.points, writer);
-    if (marks) marks->write(superblock.points, plan.meta.channels, writer);
+    write_attributes(plan, *points.attributes, marks ? &*marks : nullptr, superblock.points,
+                     writer);
     if (superblock.points < all) {
       progress_.note(fmt::format("{} points lie where another one does and are left out",
                                  all - superblock.points));
@@ -452,16 +451,21 @@ class Build {
   }
 
   /// Writes the pages of all groups of channels.
-  void write_attributes(const BuildPlan& plan, AttributeSorts& sorts, std::uint64_t points,
-                        ContainerWriter& writer) {
-    const AttributePlan attributes =
-        plan_of(scene_ ? &scene_->meta().channels : nullptr, plan.meta.channels);
-    for (std::size_t group = 0; group < sorts.size(); ++group) {
+  /// @param marks  of the scan; null: there was none
+  void write_attributes(const BuildPlan& plan, AttributeSorts& sorts, const PointMarks* marks,
+                        std::uint64_t points, ContainerWriter& writer) {
+    const std::vector<Channel>& channels = plan.meta.channels;
+    const AttributePlan attributes = plan_of(scene_ ? &scene_->meta().channels : nullptr, channels);
+    std::uint8_t number = kFirstInputGroup;
+    for (std::size_t group = 0; group < sorts.size(); ++group, ++number) {
       StreamChain chain(sorts.finish(group));
       join(chain, plan.frame, [&] { return container_attributes(*scene_, attributes, group); });
-      write_attribute_pages(chain.last(), static_cast<std::uint8_t>(kFirstInputGroup + group),
-                            plan.meta.channels, points, writer);
+      if (marks) chain.add(marks->put_into(&chain.last(), number, channels));
+      write_attribute_pages(chain.last(), number, channels, points, writer);
     }
+    if (!marks || channels.empty() || channels.back().group < number) return;
+    const auto rest = marks->put_into(nullptr, number, channels);
+    write_attribute_pages(*rest, number, channels, points, writer);
   }
 
   /// Returns how the points of the scene move into the frame of the new container.

@@ -11,6 +11,15 @@
 namespace ptc {
 namespace {
 
+Channel outlier_channel() {
+  return {.name = kOutlierChannel, .type = ChannelType::u8, .role = ChannelRole::label};
+}
+
+Channel rise_channel() {
+  return {
+      .name = kRiseChannel, .type = ChannelType::u8, .role = ChannelRole::value, .scale = 0.125};
+}
+
 /// A scan's points with their marks as flags.
 class MarkedStream : public PointStream {
  public:
@@ -69,25 +78,69 @@ class Tap : public PointStream {
   std::uint64_t done_ = 0;
 };
 
+/// Values of a group, into which marks are put.
+class MarkedValues : public PointStream {
+ public:
+  MarkedValues(PointStream* values, const TempFile& marks, std::uint8_t group,
+               std::span<const Channel> channels)
+      : values_(values), file_(marks) {
+    std::vector<Channel> own;
+    std::ranges::copy_if(channels, std::back_inserter(own),
+                         [group](const Channel& channel) { return channel.group == group; });
+    outlier_ = place_of(own, outlier_channel());
+    rise_ = place_of(own, rise_channel());
+  }
+
+  std::size_t next(std::span<PointRecord> out) override {
+    std::size_t count = out.size();
+    if (values_ != nullptr) {
+      count = values_->next(out);
+    } else {
+      std::ranges::fill(out, PointRecord{});
+    }
+    if (count == 0 || (!outlier_ && !rise_)) return count;
+    marks_.resize(count);
+    file_.read_at(done_, marks_);
+    done_ += count;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto mark = std::to_integer<std::uint8_t>(marks_[i]);
+      std::byte* const row = values_of(out[i]);
+      if (outlier_ && (mark & kOutlier) != 0) row[*outlier_] = std::byte{1};
+      if (rise_ && mark >> kRiseShift != 0)
+        row[*rise_] = static_cast<std::byte>(mark >> kRiseShift);
+    }
+    return count;
+  }
+
+ private:
+  /// Returns where a channel lies in a row of the group, if it is of the kind that marks make.
+  static std::optional<std::size_t> place_of(std::span<const Channel> own, Channel mark) {
+    const auto found = find_in_row(own, mark.name);
+    if (!found) return {};
+    mark.group = found->channel->group;
+    if (*found->channel != mark) return {};
+    return found->offset;
+  }
+
+  PointStream* values_;
+  const TempFile& file_;
+  std::optional<std::size_t> outlier_, rise_;
+  std::vector<std::byte> marks_;
+  std::uint64_t done_ = 0;  ///< points whose marks were read
+};
+
 }  // namespace
 
-bool add_marks(Meta& meta) {
+void add_marks(Meta& meta) {
   const std::uint8_t last =
       meta.channels.empty() ? kFirstInputGroup - 1 : meta.channels.back().group;
-  const auto is_taken = [](const Channel& channel) {
-    return channel.name == kOutlierChannel || channel.name == kRiseChannel;
-  };
-  if (last == kMaxGroup || std::ranges::any_of(meta.channels, is_taken)) return false;
-  Channel channel{.name = kOutlierChannel,
-                  .type = ChannelType::u8,
-                  .group = static_cast<std::uint8_t>(last + 1),
-                  .role = ChannelRole::label};
-  meta.channels.push_back(channel);
-  channel.name = kRiseChannel;
-  channel.role = ChannelRole::value;
-  channel.scale = 0.125;
-  meta.channels.push_back(channel);
-  return true;
+  if (last == kMaxGroup) return;
+  for (Channel channel : {outlier_channel(), rise_channel()}) {
+    if (std::ranges::find(meta.channels, channel.name, &Channel::name) != meta.channels.end())
+      continue;
+    channel.group = static_cast<std::uint8_t>(last + 1);
+    meta.channels.push_back(channel);
+  }
 }
 
 std::vector<std::uint8_t> rise_groups(std::span<const Channel> channels) {
@@ -116,23 +169,9 @@ std::unique_ptr<PointStream> PointMarks::tap(PointStream& points) {
   return std::make_unique<Tap>(points, file_);
 }
 
-void PointMarks::write(std::uint64_t points, std::span<const Channel> channels,
-                       ContainerWriter& writer) {
-  std::vector<std::byte> marks, payload;
-  for (std::uint64_t done = 0; done < points; done += marks.size()) {
-    marks.resize(static_cast<std::size_t>(
-        std::min<std::uint64_t>(points_per_page(writer.header()), points - done)));
-    file_.read_at(done, marks);
-    // The column of outliers precedes that of rises
-    payload.resize(2 * marks.size());
-    for (std::size_t i = 0; i < marks.size(); ++i) {
-      const auto mark = std::to_integer<std::uint8_t>(marks[i]);
-      payload[i] = static_cast<std::byte>(mark & kOutlier);
-      payload[marks.size() + i] = static_cast<std::byte>(mark >> kRiseShift);
-    }
-    writer.write_attributes(channels.back().group, payload,
-                            static_cast<std::uint32_t>(marks.size()), channels);
-  }
+std::unique_ptr<PointStream> PointMarks::put_into(PointStream* values, std::uint8_t group,
+                                                  std::span<const Channel> channels) const {
+  return std::make_unique<MarkedValues>(values, file_, group, channels);
 }
 
 }  // namespace ptc

@@ -5,7 +5,10 @@
 //
 //   complete_scan --> marked_points --> merge, unique --> PointMarks::tap --> round, build
 //                     flags = mark                          | flags = 0
-//                                                           '--> temporary file --> write()
+//                                                           '--> temporary file --> put_into()
+//
+// Inputs may have these channels already, as points do that were shaded and written before. Marks
+// then go into them, and points without a mark keep what they had.
 #pragma once
 
 #include <cstddef>
@@ -30,9 +33,9 @@ inline constexpr const char* kOutlierChannel = "outlier";
 /// the noise of its surface, in eighths of the point's radius.
 inline constexpr const char* kRiseChannel = "rise";
 
-/// Adds these channels to a record, in a group of their own behind all others.
-/// @return whether there is room for them: no channel has their names, and there is a group left
-[[nodiscard]] bool add_marks(Meta& meta);
+/// Adds those of these channels that a record lacks, in a group of their own behind all others, if
+/// there is one left.
+void add_marks(Meta& meta);
 
 /// Returns the groups that must be read for the rises of points: one, or none where a container has
 /// no such channel.
@@ -69,10 +72,11 @@ class PointMarks {
   /// Yields the points of a stream with flags of 0, and keeps their marks.
   /// @param points  must outlive the result, as must this object
   [[nodiscard]] std::unique_ptr<PointStream> tap(PointStream& points);
-  /// Writes the attribute pages of the channels.
-  /// @param points    number of points that passed the tap
-  /// @param channels  of the file; the last are those of add_marks()
-  void write(std::uint64_t points, std::span<const Channel> channels, ContainerWriter& writer);
+  /// Yields the values of a group of channels, with the marks in the channels that are theirs.
+  /// @param values    of the same points; null: they have none but marks
+  /// @param channels  of the file
+  [[nodiscard]] std::unique_ptr<PointStream> put_into(PointStream* values, std::uint8_t group,
+                                                      std::span<const Channel> channels) const;
 
  private:
   TempFile file_;

@@ -143,7 +143,6 @@ void put_plan(const BuildPlan& plan, StateWriter& state) {
   state.put_bytes(plan.uuid);
   state.put(static_cast<std::uint8_t>(plan.emits));
   state.put_bytes(encode_meta(plan.meta, plan.point_bytes()));
-  state.put(static_cast<std::uint8_t>(plan.marks));
   state.put(static_cast<std::uint8_t>(plan.scan.has_value()));
   if (!plan.scan) return;
   state.put(static_cast<std::uint8_t>(plan.scan->radii));
@@ -162,7 +161,6 @@ BuildPlan get_plan(StateReader& state) {
   std::ranges::copy(uuid, plan.uuid.begin());
   plan.emits = state.get<std::uint8_t>() != 0;
   plan.meta = decode_meta(state.get_bytes(), plan.point_bytes());
-  plan.marks = state.get<std::uint8_t>() != 0;
   if (state.get<std::uint8_t>() == 0) return plan;
   const auto place = [&] {
     const auto at = state.get<std::array<double, 3>>();

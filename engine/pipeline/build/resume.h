@@ -42,9 +42,8 @@ struct BuildPlan {
   Uuid uuid{};
   Meta meta;
   /// How the scan is completed, without its resources; empty when all inputs give normals and
-  /// radii.
+  /// radii. It fills the channels of add_marks().
   std::optional<ScanOptions> scan;
-  bool marks = false;  ///< the last channels are those of add_marks(), which the scan fills
   bool emits = false;  ///< at least one point may emit light
 
   /// Returns the bytes of a point in the container.

@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/error.h"
 #include "engine/base/numbers.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/scene/procedural/city.h"
@@ -68,20 +69,33 @@ class Sampler {
   std::vector<double> ends_;  ///< area up to each triangle and with it
 };
 
+/// Returns how many more solids a ray leaves than it enters on its way to the sky.
+int left_solids(const RayScene& scene, const glm::dvec3& from, const glm::vec3& ray) {
+  constexpr int kMostHits = 64;
+  int left = 0;
+  double near = 0;
+  for (int i = 0; i < kMostHits; ++i) {
+    const auto hit = scene.closest(from, ray, near, std::numeric_limits<double>::infinity());
+    if (!hit) break;
+    left += hit->front ? -1 : 1;
+    near = hit->distance + scene.epsilon();
+  }
+  return left;
+}
+
 /// Says whether a point lies in the open: that of 16 rays over its front side no more than half
-/// meet the back of a surface, as all rays inside of a solid do.
+/// leave more solids than they enter, as all rays do from within a solid, or from a floor that
+/// walls enclose.
 bool is_open(const RayScene& scene, const SampledPoint& point, Numbers& numbers) {
   constexpr int kRays = 16;
-  int backs = 0;
+  int inside = 0;
   const Basis basis(point.normal);
   const glm::dvec3 from = point.origin + scene.epsilon() * glm::dvec3(point.normal);
-  for (int i = 0; i < kRays && backs <= kRays / 2 && i - backs < kRays / 2; ++i) {
+  for (int i = 0; i < kRays && inside <= kRays / 2 && i - inside < kRays / 2; ++i) {
     const glm::vec2 square(numbers.uniform(), numbers.uniform());
-    const glm::vec3 ray = basis.to_world(cosine_direction(square));
-    const auto hit = scene.closest(from, ray, 0, std::numeric_limits<double>::infinity());
-    if (hit && !hit->front) ++backs;
+    if (left_solids(scene, from, basis.to_world(cosine_direction(square))) > 0) ++inside;
   }
-  return backs <= kRays / 2;
+  return inside <= kRays / 2;
 }
 
 }  // namespace
@@ -135,7 +149,10 @@ Mesh mesh_of(const SceneChoice& choice, std::uint64_t points, const RunOptions& 
     return request_scene(choice, {.points = points / kPerTriangle}, run).lit.mesh;
   }
   Progress silent;
-  return load_meshes({choice.file}, nullptr, choice.backdrop, silent);
+  Mesh mesh = load_meshes({choice.file}, nullptr, choice.backdrop, silent);
+  if (mesh.triangles.empty())
+    throw DataError(choice.file.string() + ": has no triangles from which points could be drawn");
+  return mesh;
 }
 
 }  // namespace ptc::bench

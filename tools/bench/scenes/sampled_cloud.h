@@ -36,12 +36,13 @@ struct SampledPoint {
 /// Returns the area of a mesh.
 [[nodiscard]] double area_of(const Mesh& mesh);
 /// Draws points from the mesh of a scene, uniformly by area but for the options, in the order of
-/// its triangles. Points inside of its solids, where no scanner sees them, are left out. Equal
+/// its triangles. Points that solids enclose, where no scanner sees them, are left out. Equal
 /// options give equal points.
 [[nodiscard]] std::vector<SampledPoint> sample_at_random(const RayScene& scene,
                                                          const SampleOptions& options);
 
 /// Returns the mesh of a scene. @param points  decides how finely procedural meshes are divided
+/// @throws DataError for a file without triangles
 [[nodiscard]] Mesh mesh_of(const SceneChoice& choice, std::uint64_t points, const RunOptions& run);
 
 }  // namespace ptc::bench
