@@ -246,7 +246,7 @@ class Build {
       throw DataError(names + "the input has no points and no triangles");
     }
     Meta meta = make_meta(request_, inputs);
-    if (inputs.clouds.scan) add_marks(meta);
+    if (inputs.clouds.scan && inputs.clouds.points > 0) add_marks(meta);
     check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);
     SortedPoints points{.plan = {.frame = frame_of(inputs.bounds),
                                  .scan = inputs.clouds.scan,
