@@ -5,9 +5,12 @@
 //   container    .ptcx              recode_container(), or build_container() of a selection
 //   cloud        .las, .ply, ...    cloud_to_points()
 //   cloud, mesh  .ptcx              build_container()
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "engine/io/cloud/points.h"
+#include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/pipeline/run.h"
@@ -81,18 +84,50 @@ void note_unused_options(const Arguments& arguments, const CLI::App& app, ptc::P
   if (!ptc::has_ending(arguments.output, ".ptcx"))
     ptc::note_unused(app, {"--profile", "--page-size"}, "the output is no container", progress);
   if (ptc::has_ending(arguments.output, ".ptcx"))
-    ptc::note_unused(app, {"--colour-from", "--dry-run"}, "the output is a container", progress);
+    ptc::note_unused(app, {"--colour-from"}, "the output is a container", progress);
+}
+
+/// Refuses an input that is no container and no cloud, where only these will do.
+[[noreturn]] void refuse_mesh(const Arguments& arguments) {
+  const auto names = [&](const std::string& ending) {
+    return ptc::has_ending(arguments.input, ending);
+  };
+  if (std::ranges::none_of(ptc::mesh_endings(), names))
+    static_cast<void>(ptc::read_mesh(arguments.input));  // says what can be read
+  throw CLI::ValidationError("INPUT", "'" + arguments.input.string() +
+                                          "' is a mesh, which is converted to .ptcx only, without "
+                                          "--dry-run");
+}
+
+/// Returns what a container would round of points, a sentence each.
+/// @param recoded  whether they are those of a container already
+std::vector<std::string> container_losses(const Arguments& arguments, bool recoded) {
+  std::vector<std::string> losses;
+  if (!recoded) {
+    losses.emplace_back("Positions are rounded to 2^-42 of the edge of a cube around the points.");
+    losses.emplace_back("Normals are rounded by up to 0.0001 rad, colours to 8 bits of sRGB.");
+  }
+  if (arguments.profile == ptc::Profile::fast || arguments.profile == ptc::Profile::compact) {
+    losses.emplace_back(
+        "Positions are rounded by up to 0.001 radii, radii by 1/512, normals by 0.0021 rad, "
+        "radiances by 1/256.");
+  }
+  return losses;
 }
 
 /// Says what the format of the output cannot hold of the points.
 ptc::Outcome tell_losses(const Arguments& arguments, ptc::Progress& progress) {
+  const bool from_container = ptc::is_container(arguments.input);
+  if (!from_container && !ptc::is_point_file(arguments.input)) refuse_mesh(arguments);
   const ptc::PointWriteInfo info =
-      ptc::is_container(arguments.input)
-          ? ptc::describe_points(ptc::ContainerReader(arguments.input), arguments.points)
-          : ptc::describe_points(arguments.input, arguments.points, progress);
-  const auto format = ptc::output_format(arguments.output);
-  const std::vector<std::string> losses =
-      format ? ptc::losses(*format, info) : std::vector<std::string>();
+      from_container ? ptc::describe_points(ptc::ContainerReader(arguments.input), arguments.points)
+                     : ptc::describe_points(arguments.input, arguments.points, progress);
+  std::vector<std::string> losses;
+  if (ptc::has_ending(arguments.output, ".ptcx")) {
+    losses = container_losses(arguments, from_container && !arguments.points.selection.level);
+  } else if (const auto format = ptc::output_format(arguments.output)) {
+    losses = ptc::losses(*format, info);
+  }
   std::string text = fmt::format("{}: {} points, {} channels; {}\n", arguments.output.string(),
                                  info.count, info.channels.size(),
                                  losses.empty() ? "nothing would be lost" : "not kept as it is:");
@@ -109,8 +144,7 @@ ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& ru
     if (to_container) return build(arguments, run, progress);
     if (ptc::is_point_file(arguments.input))
       return ptc::cloud_to_points(arguments.input, arguments.output, arguments.points, progress);
-    throw CLI::ValidationError(
-        "OUTPUT", "a mesh is converted to .ptcx only, not to '" + arguments.output.string() + "'");
+    refuse_mesh(arguments);
   }
   const ptc::Selection& selection = arguments.points.selection;
   if (to_container && !(selection.takes_all() && !selection.channels))
@@ -168,10 +202,11 @@ int main(int argc, char** argv) {
     arguments.input = inputs.paths().front();
     arguments.points.run = command.run_options();
     arguments.page_size_given = page_size->count() > 0;
-    if (arguments.dry_run && !ptc::has_ending(arguments.output, ".ptcx"))
-      return tell_losses(arguments, progress);
+    if (arguments.dry_run) return tell_losses(arguments, progress);
     note_unused_options(arguments, command.app(), progress);
     const ptc::ConvertReport report = convert(arguments, command.run_options(), progress);
+    if (report.points == 0 && !arguments.points.selection.takes_all())
+      progress.note("the selection takes no point");
     const std::uint64_t bytes = std::filesystem::file_size(arguments.output);
     nlohmann::ordered_json facts{{"output", arguments.output.string()}, {"points", report.points}};
     if (report.superblock) facts.update(ptc::container_facts(*report.superblock));

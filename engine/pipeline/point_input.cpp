@@ -60,7 +60,7 @@ PointFile open_container(const std::filesystem::path& path, const Selection& sel
   if (!selection.level)
     info.channels = kept_channels(channels_without_index(*container), selection, path);
   Selection own = selection;
-  if (!own.channels && info.channels.size() < container->meta().channels.size()) {
+  if (!own.channels && !own.level && info.channels.size() < container->meta().channels.size()) {
     own.channels.emplace();
     for (const Channel& channel : info.channels) own.channels->push_back(channel.name);
   }
@@ -77,6 +77,14 @@ bool holds_points(const std::filesystem::path& path) {
 std::unique_ptr<PointSource> open_selected(const ContainerReader& container,
                                            const Selection& selection) {
   if (selection.level) {
+    if (!selection.classes.empty())
+      throw RequestError("classes", container.path().string() +
+                                        ": the clusters of a level have no "
+                                        "class");
+    if (selection.channels)
+      throw RequestError("channels", container.path().string() +
+                                         ": the clusters of a level have "
+                                         "no channels");
     return select_points(open_level(container, *selection.level, selection.box), {},
                          {.box = selection.box, .every = selection.every}, container.path());
   }

@@ -112,6 +112,41 @@ class Formats(ProgramTest):
         self.assertIn("500 points", said)
         self.assertEqual(sorted(self.here.iterdir()), before)
 
+    def test_a_dry_run_into_a_container_leaves_the_file_of_its_name(self):
+        kept = self.here / "kept.ptcx"
+        kept.write_text("anything")
+        said = self.succeed("ptcconvert", self.scan, kept, "--dry-run").stdout
+        self.assertIn("rounded to 2^-42", said)
+        self.assertEqual(kept.read_text(), "anything")
+        self.succeed("ptcbuild", self.scan, "-o", self.here / "a.ptcx")
+        said = self.succeed("ptcconvert", self.here / "a.ptcx", kept, "--dry-run").stdout
+        self.assertIn("nothing would be lost", said)
+        said = self.succeed("ptcconvert", self.here / "a.ptcx", kept, "--dry-run", "--profile", "fast").stdout
+        self.assertIn("0.001 radii", said)
+        self.assertEqual(kept.read_text(), "anything")
+
+    def test_a_selection_that_takes_nothing_says_so(self):
+        self.succeed("ptcbuild", self.scan, "-o", self.here / "a.ptcx")
+        said = self.succeed("ptcconvert", self.here / "a.ptcx", self.here / "a.ply", "--bbox=90,90,90,91,91,91").stderr
+        self.assertIn("the selection takes no point", said)
+        for option in ("--class=2", "--channels=occlusion"):
+            self.assertIn("the clusters of a level", self.fail_with(2, "ptcconvert", self.here / "a.ptcx", self.here / "b.ply", "--level=2", option))
+
+    def test_what_is_neither_cloud_nor_mesh_is_told_what_can_be_read(self):
+        other = self.here / "passwords"
+        other.write_text("root:x:0:0\n")
+        self.assertIn("nothing that can be read", self.fail_with(1, "ptcconvert", other, self.here / "a.xyz"))
+
+    def test_places_of_a_scan_are_as_they_were(self):
+        header = b"ply\nformat binary_little_endian 1.0\nelement vertex 300\nproperty double x\nproperty double y\nproperty double z\nend_header\n"
+        places = [(500000.13 + i % 17 * 0.01, 4e6 + i // 17 * 0.03, i * i % 29 * 0.07) for i in range(300)]
+        (self.here / "far.ply").write_bytes(header + b"".join(struct.pack("<3d", *p) for p in places))
+        self.succeed("ptcshade", self.here / "far.ply", "-o", self.here / "lit.ply")
+        names, points = read_ply(self.here / "lit.ply")
+        for place, point in zip(places, points):
+            for a, b in zip(place, point[:3]):
+                self.assertAlmostEqual(a, b, delta=1e-9)
+
     def test_a_cloud_without_normals_and_light_is_lit(self):
         write_ply(self.here / "bare.ply", [p[:3] for p in ball(2000)], ["x", "y", "z"])
         said = self.succeed("ptcbuild", self.here / "bare.ply", "-o", self.here / "bare.ptcx").stderr

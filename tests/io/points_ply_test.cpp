@@ -181,7 +181,28 @@ TEST_CASE("ply: colours are sRGB as integers and linear as floats", "[io][points
   CHECK(albedo("int", "200") == Approx(std::pow((200 / 255.0 + 0.055) / 1.055, 2.4)));
   CHECK(albedo("ushort", "65535") == 1);
   CHECK(albedo("ushort", "32896") == Approx(0.2158605));  // 128 * 257
+  CHECK(albedo("ushort", "128") == Approx(0.2158605));    // bytes in wider fields
+  CHECK(albedo("ushort", "256") == Approx(256 / 65535.0 / 12.92));
   CHECK(albedo("float", "0.25") == 0.25);
+}
+
+TEST_CASE("ply: the largest colour of a file decides whether its fields hold bytes",
+          "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const auto albedo_of_first = [&](const char* second) {
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+        "property float z\nproperty ushort red\nproperty ushort green\nproperty ushort blue\n"
+        "end_header\n";
+    const auto path =
+        scratch.file("a.ply", header + "0 0 0 255 255 255\n1 0 0 0 " + second + " 0\n");
+    const Cloud cloud = read_cloud(path);
+    CHECK(cloud.value(0, "rgb", 1) == 255);
+    CHECK(cloud.info.notes.size() == (cloud.surfels[0].albedo.x == 1 ? 1 : 0));
+    return static_cast<double>(cloud.surfels[0].albedo.x);
+  };
+  CHECK(albedo_of_first("255") == 1);
+  CHECK(albedo_of_first("256") == Approx(255 / 65535.0 / 12.92));
 }
 
 TEST_CASE("ply: other names for normals and radius are recognised", "[io][points]") {

@@ -226,6 +226,10 @@ void PointLayout::add_rgb(const Indices& fields, ColourSpace space) {
   channels_.push_back(std::move(rgb));
 }
 
+void PointLayout::take_bytes_as_colours() noexcept {
+  std::ranges::replace(curves_, Curve::srgb16, Curve::srgb8);
+}
+
 // Appends bytes to the row, as part of the range before them where that continues.
 void PointLayout::add_copy(const Number& from, std::size_t bytes) {
   if (!copies_.empty() && copies_.back().from + copies_.back().bytes == from.offset) {

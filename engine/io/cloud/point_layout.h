@@ -75,6 +75,8 @@ class PointLayout {
   void describe(PointFileInfo& info) const;
   /// Returns the bytes of a row of attributes.
   [[nodiscard]] std::size_t row_bytes() const noexcept { return row_bytes_; }
+  /// Takes colours in fields of 16 bits as those of 8 bits.
+  void take_bytes_as_colours() noexcept;
   /// Converts a record. One without a place, whose position has a NaN, is left out; a normal of
   /// zero length is unknown and becomes 0.
   /// @param row   room for row_bytes() bytes

@@ -10,6 +10,8 @@
 #include "engine/io/cloud/ply.h"
 #include "engine/io/cloud/point_format.h"
 #include "engine/io/cloud/point_layout.h"
+#include "engine/io/cloud/point_rows.h"
+#include "engine/io/cloud/record_source.h"
 #include "engine/io/cloud/surfel_check.h"
 
 namespace ptc {
@@ -59,14 +61,10 @@ std::string convert_surfel(const RawSurfel& raw, bool has_normals, Surfel& out) 
   return {};
 }
 
-PointFile open_points(const std::filesystem::path& path) {
-  const std::optional<PointFormat> format = point_format(path);
-  if (!format) {
-    refuse_file(path,
-                "not a point cloud: its content and its name are those of none of PLY, LAS, LAZ, "
-                "E57, PCD, PTX, PTS, XYZ text, Pixar's PTC, Houdini's classic BGEO and Maya's PDB");
-  }
-  switch (*format) {
+namespace {
+
+PointFile open_as(PointFormat format, const std::filesystem::path& path) {
+  switch (format) {
     case PointFormat::ply:
       return open_ply(path);
     case PointFormat::las:
@@ -89,6 +87,44 @@ PointFile open_points(const std::filesystem::path& path) {
       break;
   }
   return open_xyz(path);
+}
+
+/// Says whether colours in fields of 16 bits are all up to 255, as many programs write them.
+/// @param probe  a file that was opened for this
+bool has_bytes_as_colours(const PointFile& probe) {
+  const auto rgb = find_in_row(probe.info.channels, "rgb");
+  if (!rgb || rgb->channel->type != ChannelType::u16) return false;
+  std::vector<Surfel> block(1 << 12);
+  bool black = true;
+  while (const std::size_t count = probe.source->next(block)) {
+    const std::span<const std::byte> rows = probe.source->attributes();
+    for (std::size_t at = rgb->offset; at < rows.size(); at += rows.size() / count) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (rows[at + 2 * k + 1] != std::byte{0}) return false;
+        black = black && rows[at + 2 * k] == std::byte{0};
+      }
+    }
+  }
+  return !black;
+}
+
+}  // namespace
+
+PointFile open_points(const std::filesystem::path& path) {
+  const std::optional<PointFormat> format = point_format(path);
+  if (!format) {
+    refuse_file(path,
+                "not a point cloud: its content and its name are those of none of PLY, LAS, LAZ, "
+                "E57, PCD, PTX, PTS, XYZ text, Pixar's PTC, Houdini's classic BGEO and Maya's PDB");
+  }
+  PointFile file = open_as(*format, path);
+  const bool may_be_bytes = *format == PointFormat::ply || *format == PointFormat::pcd;
+  if (may_be_bytes && has_bytes_as_colours(open_as(*format, path))) {
+    static_cast<RecordSource&>(*file.source).take_bytes_as_colours();
+    file.info.notes.emplace_back(
+        "Colours are up to 255 in fields of 16 bits: taken as 8-bit ones.");
+  }
+  return file;
 }
 
 bool is_point_file(const std::filesystem::path& path) {

@@ -24,6 +24,8 @@ class RecordSource : public PointSource {
     return std::span(rows_).first(used_);
   }
   [[nodiscard]] std::uint64_t left_out() const noexcept final { return left_out_; }
+  /// Takes colours in fields of 16 bits as those of 8 bits.
+  void take_bytes_as_colours() noexcept { layout_->take_bytes_as_colours(); }
 
  protected:
   /// Sets how records are converted, before the first call of next().

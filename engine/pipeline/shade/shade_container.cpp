@@ -341,7 +341,10 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   shading.scene = temporary_container_path(roomiest_temp_dir(request.run, target));
   const TemporaryName scene(shading.scene);
   const BuildReport built =
-      build_container({.inputs = {request.scene}, .original_order = in_order, .run = request.run},
+      build_container({.inputs = {request.scene},
+                       .original_order = in_order,
+                       .profile = in_order ? Profile::exact : Profile::compact,
+                       .run = request.run},
                       shading.scene, progress);
   LightingReport report = in_order ? shade_in_input_order(shading, target, progress)
                                    : shade_points(shading, target, progress);
