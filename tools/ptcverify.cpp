@@ -63,6 +63,8 @@ const char* text_of(ptc::Remedy remedy) {
       return "transfer the file again, as binary";
     case ptc::Remedy::cut:
       return "cut the file to the length stated, or use --salvage";
+    case ptc::Remedy::copy_parts:
+      return "copy the scene again with all of its parts";
     case ptc::Remedy::rescue:
       return "copy what can be read elsewhere, then use --salvage on the copy";
     case ptc::Remedy::other_file:

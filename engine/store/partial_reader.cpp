@@ -132,6 +132,13 @@ std::vector<PartialReader::Extent> PartialReader::merged(std::vector<Extent> ext
   return out;
 }
 
+/// Counts a round if one of these extents must be asked for.
+void PartialReader::count_round(std::span<const Extent> extents) {
+  const std::uint64_t from = source_.size() - end_.size();
+  const bool asks = std::ranges::any_of(extents, [&](const Extent& e) { return e.begin < from; });
+  rounds_ += asks ? 1 : 0;
+}
+
 /// Returns the bytes of an extent: from the first request, or by another one.
 std::span<const std::byte> PartialReader::bytes_of(const Extent& extent,
                                                    std::vector<std::byte>& buffer) {
@@ -160,6 +167,7 @@ void PartialReader::load_entries(std::span<const std::uint32_t> pages) {
                        {first}});
   }
   // Read them.
+  count_round(extents);
   std::vector<std::byte> buffer;
   for (const Extent& extent : merged(std::move(extents), 0)) {
     const std::span<const std::byte> bytes = bytes_of(extent, buffer);
@@ -202,6 +210,7 @@ void PartialReader::load(std::span<const std::uint32_t> pages) {
     const Extent extent{entry.offset, entry.offset + kPageHeaderBytes + entry.stored_bytes, {page}};
     (entry.offset >= from ? near : far).push_back(extent);
   }
+  count_round(far);
   std::vector<std::byte> buffer;
   for (std::vector<Extent>* extents : {&near, &far}) {
     for (const Extent& extent : merged(std::move(*extents), kGapBytes)) {

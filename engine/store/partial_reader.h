@@ -83,6 +83,8 @@ class PartialReader {
   /// Loads pages that are not loaded yet. Neighbouring ranges share a request.
   /// @param pages  page numbers of point, attribute and node pages, in any order
   void load(std::span<const std::uint32_t> pages);
+  /// Returns how many times so far requests were sent that did not wait for one another.
+  [[nodiscard]] unsigned rounds() const noexcept { return rounds_; }
   /// Says whether a page is loaded.
   [[nodiscard]] bool has(std::uint32_t page) const { return pages_.contains(page); }
   /// Forgets a page, to free its memory.
@@ -112,11 +114,13 @@ class PartialReader {
   void take_entries(std::uint32_t first, std::span<const std::byte> bytes);
   void check_entry(std::uint32_t page, const DirectoryEntry& entry) const;
   void take_page(std::uint32_t page, std::span<const std::byte> image);
+  void count_round(std::span<const Extent> extents);
   [[nodiscard]] static std::vector<Extent> merged(std::vector<Extent> extents, std::uint64_t gap);
   [[nodiscard]] std::span<const std::byte> bytes_of(const Extent& extent,
                                                     std::vector<std::byte>& buffer);
 
   RangeSource& source_;
+  unsigned rounds_ = 1;
   std::vector<std::byte> end_;  ///< the first request: the end of the source
   Superblock superblock_;
   PageNumbers numbers_;

@@ -33,6 +33,8 @@ constexpr std::array kCauses{
     CauseText{"unreadable", "the disk cannot read its blocks", Remedy::rescue},
     CauseText{"foreign", "", Remedy::other_file},
     CauseText{"newer", "", Remedy::newer_program},
+    CauseText{"part", "the scene was copied without this part, or the part was replaced",
+              Remedy::copy_parts},
     CauseText{"writer", "the program that wrote the file made this error", Remedy::report},
 };
 static_assert(kCauses.size() == static_cast<std::size_t>(Cause::writer) + 1);

@@ -27,6 +27,7 @@ enum class Cause : std::uint8_t {
   unreadable,  ///< the system could not read the bytes (EIO)
   foreign,     ///< the file is not of this format
   newer,       ///< the file has a version or a feature that this program does not know
+  part,        ///< a part of the scene is missing, or is another file than the scene was made of
   writer,      ///< all checksums are right but a rule is broken: the file was written that way
 };
 
@@ -45,6 +46,7 @@ enum class Remedy : std::uint8_t {
   transfer,       ///< transfer the file again, or salvage what is intact
   transfer_bare,  ///< transfer the file again, in binary mode
   cut,            ///< truncate the file to the length that the finding expects, or salvage
+  copy_parts,     ///< copy the scene again with all of its parts
   rescue,         ///< copy the readable bytes to another disk, then salvage that copy
   other_file,     ///< nothing: the file is of another kind
   newer_program,  ///< read the file with the program that wrote it, or a newer version of this one

@@ -282,7 +282,7 @@ class FileCheck {
       }
     } catch (const FormatError& error) {
       Finding finding = finding_of(error, 1);
-      finding.cause = Cause::writer;
+      finding.cause = code_of(finding) == "parts-file" ? Cause::part : Cause::writer;
       if (error.file() != file_.path()) finding.file = error.file();
       findings_.add(std::move(finding));
     }

@@ -212,8 +212,12 @@ TEST_CASE("parts: a part that is missing, replaced or nested is refused by its n
   CHECK_THAT(refusal(files.scene), Catch::Contains(part.string()) &&
                                        Catch::Contains("there is no such file") &&
                                        Catch::Contains("spec/parts.md#parts-file"));
+  Progress silent;
+  const auto cause = [&] { return verify_container(files.scene, {}, silent).findings.at(0).cause; };
+  CHECK(cause() == Cause::part);
   std::filesystem::copy_file(files.whole, part);
   CHECK_THAT(refusal(files.scene), Catch::Contains("it has another uuid"));
+  CHECK(cause() == Cause::part);
   std::filesystem::remove(part);
   std::filesystem::copy_file(files.scene, part);
   CHECK_THAT(refusal(files.scene), Catch::Contains(part.string()));

@@ -44,7 +44,6 @@ std::size_t ViewChoice::choose(std::size_t nodes) {
     }
     if (missing.empty()) return division.nodes;
     scene_.load(missing);
-    ++rounds_;
   }
 }
 

@@ -61,8 +61,6 @@ class ViewChoice {
   /// @param nodes  1 or more
   /// @return the number of nodes chosen: `nodes` or up to 7 more, or all nodes in view
   std::size_t choose(std::size_t nodes);
-  /// Returns the number of rounds so far.
-  [[nodiscard]] unsigned rounds() const noexcept { return rounds_; }
 
  private:
   /// A node that the group it refers to can divide.
@@ -86,7 +84,6 @@ class ViewChoice {
 
   PartialReader& scene_;
   ConeView view_;
-  unsigned rounds_ = 0;
 };
 
 }  // namespace ptc::bench

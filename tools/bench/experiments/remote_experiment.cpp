@@ -71,7 +71,7 @@ std::vector<RemoteRow> rows_of(const std::filesystem::path& container,
   };
   CountingRanges opening(ranges);
   const PartialReader opened(opening);
-  add(opened.superblock(), opening, {.view = "opened", .rounds = 1});
+  add(opened.superblock(), opening, {.view = "opened", .rounds = opened.rounds()});
   for (const ConeView& view : views_of(opened.superblock())) {
     CountingRanges source(ranges);
     PartialReader scene(source);
@@ -79,7 +79,7 @@ std::vector<RemoteRow> rows_of(const std::filesystem::path& container,
     for (const std::size_t nodes : options.nodes) {
       const std::size_t chosen = choice.choose(nodes);
       add(scene.superblock(), source,
-          {.view = view.name, .asked = nodes, .chosen = chosen, .rounds = choice.rounds() + 1});
+          {.view = view.name, .asked = nodes, .chosen = chosen, .rounds = scene.rounds()});
     }
   }
   return rows;
