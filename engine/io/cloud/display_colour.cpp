@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "engine/io/cloud/packed_number.h"
+#include "engine/io/cloud/points.h"
 #include "engine/io/image/srgb.h"
 
 namespace ptc {
@@ -19,9 +20,11 @@ std::optional<RowChannel> find_channel(const PointWriteInfo& info, std::string_v
 }
 
 bool is_stored_colour(const Channel& channel) {
+  const bool whole = channel.scale == 1;  // white is the greatest value of the type
   return channel.components == 3 && channel.colour_space == ColourSpace::srgb &&
-         (channel.type == ChannelType::u8 || channel.type == ChannelType::u16) &&
-         channel.scale == 1 && channel.offset == 0;
+         ((channel.type == ChannelType::u8 && whole) ||
+          (channel.type == ChannelType::u16 && (whole || channel.scale == kByteScale))) &&
+         channel.offset == 0;
 }
 
 // Returns a number in [0, 1]; what is no number becomes 0.
@@ -54,7 +57,9 @@ glm::vec3 DisplayColour::linear(const Surfel& surfel, const std::byte* row) cons
   const std::array<std::uint16_t, 3> stored = stored_values(row);
   glm::vec3 light;
   for (std::size_t i = 0; i < 3; ++i) {
-    light[static_cast<int>(i)] = static_cast<float>(srgb_to_linear(stored[i] / 65535.0));
+    const double white = source_->channel.scale == kByteScale ? 255 : 65535;
+    light[static_cast<int>(i)] =
+        static_cast<float>(srgb_to_linear(std::min(stored[i] / white, 1.0)));
   }
   return light;
 }

@@ -36,8 +36,8 @@ class DisplayColour {
   [[nodiscard]] glm::vec3 linear(const Surfel& surfel, const std::byte* row) const;
   /// Returns the colour on the sRGB curve, 65535 for 1.
   [[nodiscard]] std::array<std::uint16_t, 3> srgb(const Surfel& surfel, const std::byte* row) const;
-  /// Returns the values of stored(), 257-fold if they have 8 bits. Those of 16 bits can be of any
-  /// scale: many programs write bytes into fields of 16 bits.
+  /// Returns the values of stored(), 257-fold if they have 8 bits. Bytes in fields of 16 bits stay
+  /// as they are.
   [[nodiscard]] std::array<std::uint16_t, 3> stored_values(const std::byte* row) const;
 
  private:

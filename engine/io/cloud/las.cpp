@@ -138,6 +138,8 @@ class LasSource : public PointSource {
       descriptions = read_las_payload(file_, *record).value_or(std::vector<std::byte>());
     LasChannels channels = make_las_channels(header_, descriptions);
     info.channels = std::move(channels.channels);
+    if (colours_ == Colours::eight_bits)
+      std::ranges::find(info.channels, "rgb", &Channel::name)->scale = kByteScale;
     info.notes = std::move(channels.notes);
   }
 

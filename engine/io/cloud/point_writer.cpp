@@ -3,6 +3,7 @@
 // A loss is known before the first point: it follows from the types of the channels, the bounds
 // and the facts about the file. Values are not looked at, so a sentence about integers that may
 // not fit says from which number on they do not.
+#include "engine/io/cloud/points.h"
 #include "engine/io/cloud/point_writer.h"
 
 #include <algorithm>
@@ -185,7 +186,8 @@ void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo
 
 void add_unscaled_channels(std::vector<std::string>& losses, const PointWriteInfo& info) {
   for (const Channel& channel : info.channels) {
-    if (channel.scale == 1 && channel.offset == 0) continue;
+    const bool shown = channel.role == ChannelRole::colour && channel.scale == kByteScale;
+    if ((channel.scale == 1 || shown) && channel.offset == 0) continue;
     losses.push_back(
         fmt::format("The file does not say that a value v of the channel {} means {} v + {}.",
                     channel.name, channel.scale, channel.offset));

@@ -121,6 +121,7 @@ PointFile open_points(const std::filesystem::path& path) {
   const bool may_be_bytes = *format == PointFormat::ply || *format == PointFormat::pcd;
   if (may_be_bytes && has_bytes_as_colours(open_as(*format, path))) {
     static_cast<RecordSource&>(*file.source).take_bytes_as_colours();
+    std::ranges::find(file.info.channels, "rgb", &Channel::name)->scale = kByteScale;
     file.info.notes.emplace_back(
         "Colours are up to 255 in fields of 16 bits: taken as 8-bit ones.");
   }

@@ -18,6 +18,9 @@
 
 namespace ptc {
 
+/// The scale of a colour in fields of 16 bits that hold bytes: 255 is white.
+inline constexpr double kByteScale = 1 / 255.0;
+
 /// The facts about a point file that are known before its points are read.
 struct PointFileInfo {
   /// The number of records, those that PointSource::left_out() counts among them; nothing when the
