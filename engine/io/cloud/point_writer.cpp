@@ -3,7 +3,6 @@
 // A loss is known before the first point: it follows from the types of the channels, the bounds
 // and the facts about the file. Values are not looked at, so a sentence about integers that may
 // not fit says from which number on they do not.
-#include "engine/io/cloud/points.h"
 #include "engine/io/cloud/point_writer.h"
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/point_rows.h"
+#include "engine/io/cloud/points.h"
 #include "engine/io/text/text.h"
 
 namespace ptc {
