@@ -11,6 +11,32 @@
 
 namespace ptc {
 
+void join_texts(std::map<std::string, std::string>& text, const std::string& name,
+                const std::map<std::string, std::string>& added, const std::string& other,
+                Progress& progress) {
+  const auto compare = [&](const char* key, const char* what) {
+    const auto was = text.find(key);
+    const auto is = added.find(key);
+    if (was == text.end() || is == added.end() || was->second == is->second) return;
+    progress.note(other + ": its " + what + " is not that of " + name +
+                  ", which is recorded; positions are taken as they are");
+  };
+  compare(kCrsKey, "coordinate reference system");
+  compare(kUnitKey, "unit of length");
+  compare(kUpKey, "upward axis");
+  const auto is_placed = [](const std::map<std::string, std::string>& texts) {
+    return texts.contains(kCrsKey) || texts.contains(kUnitKey);
+  };
+  const bool placed = is_placed(text);
+  if (placed && !is_placed(added)) {
+    progress.note(other + ": it names no coordinate reference system and no unit; those of " +
+                  name + " are recorded for all");
+  }
+  for (const auto& [key, value] : added) {
+    if (!placed || (key != kCrsKey && key != kUnitKey)) text.emplace(key, value);
+  }
+}
+
 glm::vec3 up_of(const std::map<std::string, std::string>& text) {
   const auto found = text.find(kUpKey);
   if (found != text.end() && found->second == "x") return {1, 0, 0};

@@ -1,9 +1,11 @@
 // Whatever mesh readers leave out or replace is reported to the progress of the run.
 #include <algorithm>
 #include <fstream>
+#include <map>
 
 #include <catch2/catch.hpp>
 
+#include "engine/pipeline/scene_record.h"
 #include "engine/ptc.h"
 #include "tests/support/scenes.h"
 
@@ -34,6 +36,27 @@ void check_note(const Notes& notes, const std::filesystem::path& mesh) {
 }
 
 }  // namespace
+
+TEST_CASE("warnings: unit and reference system come from one file", "[integration]") {
+  using Texts = std::map<std::string, std::string>;
+  const auto joined = [](Texts text, const Texts& added, std::size_t notes) {
+    Notes progress;
+    join_texts(text, "first", added, "second", progress);
+    CHECK(progress.texts.size() == notes);
+    for (const std::string& note : progress.texts) {
+      CHECK_THAT(note, Contains("second: ") && Contains("first"));
+    }
+    return text;
+  };
+  CHECK(joined({}, {{"crs", "A"}, {"up", "z"}}, 0) == Texts{{"crs", "A"}, {"up", "z"}});
+  CHECK(joined({{"crs", "A"}}, {{"crs", "B"}, {"time", "3"}}, 1) ==
+        Texts{{"crs", "A"}, {"time", "3"}});
+  CHECK(joined({{"metres_per_unit", "1"}}, {{"crs", "B"}, {"metres_per_unit", "0.3048"}}, 1) ==
+        Texts{{"metres_per_unit", "1"}});
+  CHECK(joined({{"crs", "A"}}, {{"up", "z"}}, 1) == Texts{{"crs", "A"}, {"up", "z"}});
+  CHECK(joined({{"up", "y"}}, {{"up", "z"}}, 1) == Texts{{"up", "y"}});
+  CHECK(joined({{"crs", "A"}, {"up", "z"}}, {{"crs", "A"}, {"up", "z"}}, 0).size() == 2);
+}
 
 TEST_CASE("warnings: build, append and render note once what a mesh file lacks", "[integration]") {
   const TemporaryDirectory dir;

@@ -245,6 +245,15 @@ class Build {
       for (const auto& input : request_.inputs) names += input.string() + ": ";
       throw DataError(names + "the input has no points and no triangles");
     }
+    if (scene_) {
+      // What the scene says of its positions holds
+      std::map<std::string, std::string> texts = scene_->meta().text;
+      join_texts(texts, scene_->path().filename().string(), inputs.clouds.text,
+                 inputs.clouds.placed_by, progress_);
+      for (const char* key : {kCrsKey, kUnitKey}) {
+        if (!texts.contains(key)) inputs.clouds.text.erase(key);
+      }
+    }
     Meta meta = make_meta(request_, inputs);
     if (inputs.clouds.scan && inputs.clouds.points > 0) add_marks(meta);
     check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);

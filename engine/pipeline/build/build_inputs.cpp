@@ -216,7 +216,10 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   // Note what the file says of all its points
   const std::string name = path.filename().string();
   for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
-  text.insert(file.info.text.begin(), file.info.text.end());
+  const bool places = file.info.text.contains(kCrsKey) || file.info.text.contains(kUnitKey) ||
+                      file.info.text.contains(kUpKey);
+  join_texts(text, placed_by, file.info.text, name, progress);
+  if (placed_by.empty() && places) placed_by = name;
   unlit |= !file.info.has_radiance;
   Cloud& cloud = files.emplace_back(Cloud{path});
   if (!file.info.channels.empty()) cloud.input = attributes.add_input(file.info.channels);

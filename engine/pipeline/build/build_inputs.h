@@ -46,9 +46,9 @@ struct Clouds {
   bool unlit = false;                ///< one of the files gives no radiance
   bool emits = false;                ///< a point emits light
   std::vector<glm::dvec3> scanners;  ///< of all files, scene units
-  /// Facts about the files under the keys of spec/points.md#texts; the first file that has one
-  /// wins.
+  /// Facts about the files under the keys of spec/points.md#texts, by join_texts().
   std::map<std::string, std::string> text;
+  std::string placed_by;  ///< the first file that names a unit, an axis or a reference system
 
   /// Reads a cloud to its end and adds it to the others.
   /// @param attributes  gets the channels of the cloud
