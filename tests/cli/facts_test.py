@@ -10,7 +10,7 @@ import sys
 import unittest
 from pathlib import Path
 
-from programs import CORE, SMALL_PICTURE, ProgramTest, ball, read_ply, run, run_on_terminal, write_ply
+from programs import CORE, SMALL_PICTURE, WRITTEN, ProgramTest, ball, read_ply, run, run_on_terminal, write_ply
 
 VECTORS = Path(__file__).resolve().parents[2] / "spec/vectors"
 
@@ -214,7 +214,7 @@ class Facts(ProgramTest):
                     self.assertLess(discs["occlusion_rms"], 0.01, (radius, options))
                     self.assertLess(discs["irradiance_rms"] * discs["irradiance_mean"], 0.02, (radius, options))
                 names, shaded = read_ply(out)
-                for name in names[len(CORE):]:
+                for name in names[len(WRITTEN):]:
                     self.assertTrue(all(math.isfinite(point[names.index(name)]) for point in shaded), name)
                 facts = json.loads(self.succeed("ptcrender", scene, "-o", self.here / "o.png", *SMALL_PICTURE, "--check", "20",
                                                 "--json").stdout)

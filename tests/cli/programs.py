@@ -18,6 +18,7 @@ BIN = Path(os.environ["PTC_BIN"])
 PROGRAMS = os.environ["PTC_PROGRAMS"].split()
 CORE = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b",
         "red", "green", "blue"]
+WRITTEN = CORE[:10] + ["albedo_r", "albedo_g", "albedo_b"] + CORE[10:]
 SMALL_PICTURE = ["--camera", "0.5,0.5,3,0.5,0.5,0.5", "--size", "24x16", "--samples", "1"]
 
 

@@ -7,7 +7,7 @@ import time
 import unittest
 from pathlib import Path
 
-from programs import CORE, PROGRAMS, SMALL_PICTURE, ProgramTest, ball, read_ply, write_ply
+from programs import PROGRAMS, SMALL_PICTURE, WRITTEN, ProgramTest, ball, read_ply, write_ply
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -188,7 +188,7 @@ class Usage(ProgramTest):
 
     def test_endings_in_capitals_mean_what_small_ones_do(self):
         self.succeed("ptcshade", self.scene, "-o", self.here / "o.PLY")
-        self.assertEqual(read_ply(self.here / "o.PLY")[0][:len(CORE)], CORE)
+        self.assertEqual(read_ply(self.here / "o.PLY")[0][:len(WRITTEN)], WRITTEN)
         self.succeed("ptcshade", self.scene, "--receivers", self.scene, "--count", "9", "-o", self.here / "o.Ply")
         self.succeed("ptcrender", self.scene, *SMALL_PICTURE, "-o", self.here / "o.EXR", "-o", self.here / "o.PNG",
                      "--layer", f"occlusion={self.here}/a.Png")

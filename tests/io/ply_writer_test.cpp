@@ -73,7 +73,7 @@ TEST_CASE("ply writer: emission follows the albedo, and only where points may em
     const std::string properties =
         emits ? "property float emission_r\nproperty float emission_g\nproperty float emission_b\n"
               : "";
-    CHECK_THAT(bytes, Contains("property float blue\n" + properties + "property float a\n"));
+    CHECK_THAT(bytes, Contains("property float albedo_b\n" + properties + "property float a\n"));
     const std::size_t record_bytes = 64 + (emits ? 12 : 0) + 4;
     for (std::size_t i = 0; i < 2; ++i) {
       const std::size_t record = bytes.size() - (2 - i) * record_bytes;
@@ -97,7 +97,7 @@ TEST_CASE("ply writer: named columns follow the values of the surfel", "[io][wri
   writer.finish();
   const std::string bytes = slurp(path);
   CHECK_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\nelement vertex 2\n"));
-  CHECK_THAT(bytes, Contains("property float blue\nproperty float occlusion\n"
+  CHECK_THAT(bytes, Contains("property float albedo_b\nproperty float occlusion\n"
                              "property float irradiance_r\nproperty float irradiance_g\n"
                              "property float irradiance_b\nproperty float bent_x\n"
                              "property float bent_y\nproperty float bent_z\n"

@@ -142,8 +142,7 @@ TEST_CASE("point writers: a colour from a channel needs the channel, and a forma
       info.colour_from = name;
       return refused_field([&] { write_points(scratch / "a", format, info, surfels, rows); });
     };
-    const bool shows =
-        format != OutputFormat::ply && format != OutputFormat::ptc && format != OutputFormat::xyz;
+    const bool shows = format != OutputFormat::ptc && format != OutputFormat::xyz;
     CHECK(field_for("occlusion") == (shows ? "" : "colour_from"));
     CHECK(field_for("pair") == "colour_from");
     CHECK(field_for("none") == "colour_from");
@@ -248,8 +247,9 @@ TEST_CASE("point writers: a PLY has those numbers of a surfel that are worth wri
   const std::string all =
       "property float nx\nproperty float ny\nproperty float nz\nproperty float radius\n"
       "property float radiance_r\nproperty float radiance_g\nproperty float radiance_b\n"
-      "property float red\nproperty float green\nproperty float blue\n"
-      "property float emission_r\nproperty float emission_g\nproperty float emission_b\n";
+      "property float albedo_r\nproperty float albedo_g\nproperty float albedo_b\n"
+      "property float emission_r\nproperty float emission_g\nproperty float emission_b\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   write_points(scratch / "a.ply", OutputFormat::ply, full_info(surfels), surfels);
   CHECK_THAT(slurp(scratch / "a.ply"), Contains("property double z\n" + all + "end_header\n"));
   PointFile file = open_points(scratch / "a.ply");

@@ -160,7 +160,7 @@ class Peers(unittest.TestCase):
             head, _, data = (FOLDER / f"{name}.ply").read_bytes().partition(b"end_header\n")
             lines = [line.split() for line in head.decode().splitlines()]
             table = np.frombuffer(data, [(w[2], kinds[w[1]]) for w in lines if w[0] == "property"])
-            names = {"position": "xyz", "normal": ("nx", "ny", "nz"), "albedo": ("red", "green", "blue")}
+            names = {"position": "xyz", "normal": ("nx", "ny", "nz"), "albedo": ("albedo_r", "albedo_g", "albedo_b")}
             names |= {q: None for q in ["radius", "radiance", "emission"] + CHANNELS}
             self.compare_fields(table, columns(name), names)
             self.assertEqual([table.dtype[n].str for n in ("id", "rgb_r", "pair_1", "occlusion")], ["<f8", "<u2", "|i1", "<f4"])

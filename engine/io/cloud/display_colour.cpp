@@ -69,6 +69,24 @@ std::array<std::uint16_t, 3> DisplayColour::srgb(const Surfel& surfel, const std
   return {to_srgb(light.r), to_srgb(light.g), to_srgb(light.b)};
 }
 
+std::array<std::uint8_t, 3> DisplayColour::bytes(const Surfel& surfel, const std::byte* row) const {
+  constexpr float kRounding = 0.003F;  // of an albedo in a container
+  std::array<std::uint8_t, 3> bytes{};
+  if (kind_ == Kind::stored && source_->channel.type == ChannelType::u8) {
+    bool own = true;
+    for (std::size_t i = 0; i < 3; ++i) {
+      bytes[i] = std::to_integer<std::uint8_t>(*source_->at(row, i));
+      const auto light = static_cast<float>(srgb_to_linear(bytes[i] / 255.0));
+      own = own && std::abs(light - surfel.albedo[static_cast<int>(i)]) <= kRounding;
+    }
+    if (own || chosen_ || !surfels_have_albedo_) return bytes;
+  }
+  const std::array<std::uint16_t, 3> wide = srgb(surfel, row);
+  for (std::size_t i = 0; i < 3; ++i)
+    bytes[i] = static_cast<std::uint8_t>((wide[i] * 255U + 32767) / 65535);  // to the nearest
+  return bytes;
+}
+
 std::array<std::uint16_t, 3> DisplayColour::stored_values(const std::byte* row) const {
   const bool bytes = source_->channel.type == ChannelType::u8;
   std::array<std::uint16_t, 3> values{};

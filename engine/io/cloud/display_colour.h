@@ -36,6 +36,9 @@ class DisplayColour {
   [[nodiscard]] glm::vec3 linear(const Surfel& surfel, const std::byte* row) const;
   /// Returns the colour on the sRGB curve, 65535 for 1.
   [[nodiscard]] std::array<std::uint16_t, 3> srgb(const Surfel& surfel, const std::byte* row) const;
+  /// Returns the colour on the sRGB curve in 8 bits: those of stored(), if it has as many and the
+  /// point's albedo came from them.
+  [[nodiscard]] std::array<std::uint8_t, 3> bytes(const Surfel& surfel, const std::byte* row) const;
   /// Returns the values of stored(), 257-fold if they have 8 bits. Bytes in fields of 16 bits stay
   /// as they are.
   [[nodiscard]] std::array<std::uint16_t, 3> stored_values(const std::byte* row) const;

@@ -135,9 +135,7 @@ class PcdWriter : public CheckedWriter {
 
   [[nodiscard]] std::uint32_t packed_colour(const Surfel& surfel, const std::byte* row) const {
     std::uint32_t packed = 0;
-    for (const std::uint16_t v : colour_.srgb(surfel, row)) {
-      packed = packed << 8 | (v * 255U + 32767) / 65535;  // to 8 bits, to the nearest
-    }
+    for (const std::uint8_t v : colour_.bytes(surfel, row)) packed = packed << 8 | v;
     return packed;
   }
   void put_channel(const RowChannel& channel, const std::byte* row) {

@@ -6,12 +6,14 @@
 //   u8 u16 u32   uchar ushort uint          half f32   float
 //   i8 i16 i32   char  short  int           u64 i64 f64   double
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/display_colour.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/file/buffered_output.h"
@@ -22,17 +24,20 @@ namespace {
 // The quantities of a surfel that a file holds.
 struct SurfelParts {
   bool normal, radius, radiance, albedo, emission;
+  bool colour;  // for viewers
 };
 
 constexpr std::string_view kSurfelNames[] = {
-    "x",          "y",          "z",   "nx",    "ny",   "nz",         "radius",     "radiance_r",
-    "radiance_g", "radiance_b", "red", "green", "blue", "emission_r", "emission_g", "emission_b"};
+    "x",          "y",          "z",          "nx",       "ny",       "nz",       "radius",
+    "radiance_r", "radiance_g", "radiance_b", "albedo_r", "albedo_g", "albedo_b", "emission_r",
+    "emission_g", "emission_b", "red",        "green",    "blue"};
 
 // Returns the names that no column may have. Those of the colours without their ends are among
 // them, because a column of three components would repeat a property.
 std::set<std::string> taken_names() {
   std::set<std::string> taken(std::begin(kSurfelNames), std::end(kSurfelNames));
   taken.insert("radiance");
+  taken.insert("albedo");
   taken.insert("emission");
   return taken;
 }
@@ -100,8 +105,10 @@ class Header {
     add_if(parts.normal, {"nx", "ny", "nz"});
     add_if(parts.radius, {"radius"});
     add_if(parts.radiance, {"radiance_r", "radiance_g", "radiance_b"});
-    add_if(parts.albedo, {"red", "green", "blue"});
+    add_if(parts.albedo, {"albedo_r", "albedo_g", "albedo_b"});
     add_if(parts.emission, {"emission_r", "emission_g", "emission_b"});
+    if (!parts.colour) return;
+    for (const char* name : {"red", "green", "blue"}) add("uchar", name);
   }
   [[nodiscard]] std::string finish() && { return std::move(text_) + "end_header\n"; }
 
@@ -113,7 +120,7 @@ class Header {
 // Returns the header, or throws when a name cannot be a property or occurs twice.
 std::string make_header(std::uint64_t count, bool emits, const std::vector<PointColumn>& columns) {
   Header header(count);
-  header.add_surfel({true, true, true, true, emits});
+  header.add_surfel({true, true, true, true, emits, false});
   for (const PointColumn& column : columns) {
     for (const std::string& name : part_names(column.name, column.components, column.vector))
       header.add("float", name);
@@ -135,9 +142,21 @@ class PlyChannelWriter : public CheckedWriter {
  public:
   PlyChannelWriter(const std::filesystem::path& target, const PointWriteInfo& info)
       : CheckedWriter(info.count, row_bytes(info.channels)),
-        parts_{info.has_normals, info.has_radius, info.has_radiance, info.has_albedo, info.emits},
+        colour_(info),
+        parts_{.normal = info.has_normals,
+               .radius = info.has_radius,
+               .radiance = info.has_radiance,
+               .albedo = info.has_albedo,
+               .emission = info.emits,
+               .colour = colour_.exists()},
         channels_(row_channels(info.channels, taken_names())),
         out_(target) {
+    // Bytes of a colour are in red, green and blue already
+    const RowChannel* const stored = colour_.stored();
+    if (stored != nullptr && stored->channel.type == ChannelType::u8) {
+      std::erase_if(channels_,
+                    [&](const RowChannel& channel) { return channel.offset == stored->offset; });
+    }
     Header header(info.count);
     header.add_surfel(parts_);
     for (const RowChannel& row : channels_) {
@@ -150,6 +169,10 @@ class PlyChannelWriter : public CheckedWriter {
  private:
   void put(const Surfel& surfel, const std::byte* row) override {
     put_surfel(out_, parts_, surfel);
+    if (parts_.colour) {
+      const std::array<std::uint8_t, 3> bytes = colour_.bytes(surfel, row);
+      out_.put(bytes.data(), bytes.size());
+    }
     for (const RowChannel& channel : channels_) {
       const ChannelType from = channel.channel.type, to = ply_type(from);
       for (std::size_t i = 0; i < channel.channel.components; ++i) {
@@ -161,6 +184,7 @@ class PlyChannelWriter : public CheckedWriter {
   }
   void end() override { out_.publish(); }
 
+  DisplayColour colour_;
   SurfelParts parts_;
   std::vector<RowChannel> channels_;
   BufferedOutput out_;
@@ -209,7 +233,7 @@ void PlyWriter::write(std::span<const Surfel> surfels, std::span<const float> va
   written_ += surfels.size();
   if (written_ > announced_) return;  // finish() will refuse the file
   for (std::size_t i = 0; i < surfels.size(); ++i) {
-    put_surfel(out_, {true, true, true, true, emits_}, surfels[i]);
+    put_surfel(out_, {true, true, true, true, emits_, false}, surfels[i]);
     out_.put(values.data() + i * values_per_point_, values_per_point_ * sizeof(float));
   }
 }

@@ -42,7 +42,7 @@ const Format& entry_of(OutputFormat format) {
       {OutputFormat::bgeo, create_bgeo, bgeo_losses, true},
       {OutputFormat::las, create_las, las_losses, true},
       {OutputFormat::pcd, create_pcd, pcd_losses, true},
-      {OutputFormat::ply, create_ply, ply_losses, false},
+      {OutputFormat::ply, create_ply, ply_losses, true},
       {OutputFormat::ptc, create_ptc, ptc_losses, false},
       {OutputFormat::usda, create_usda, usd_losses, true},
       {OutputFormat::usdc, create_usdc, usd_losses, true},

@@ -44,8 +44,8 @@ struct PointWriteInfo {
   /// The channel that viewers shall show as the colour of a point, in place of its albedo; empty to
   /// show the albedo. The channel `occlusion` becomes a grey, white where nothing covers the point;
   /// another channel of one component is a grey itself; three components are linear light, which is
-  /// compressed to the range of a screen. The formats bgeo, las, pcd, usda and usdc have such a
-  /// colour.
+  /// compressed to the range of a screen. The formats bgeo, las, pcd, ply, usda and usdc have such
+  /// a colour.
   std::string colour_from;
 };
 
