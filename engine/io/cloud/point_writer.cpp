@@ -108,9 +108,12 @@ void CheckedWriter::finish() {
 
 std::unique_ptr<PointWriter> create_points(const std::filesystem::path& target, OutputFormat format,
                                            const PointWriteInfo& info) {
-  const Format& entry = entry_of(format);
-  check_colour(entry, info);
-  return entry.create(target, info);
+  check_colour_from(format, info);
+  return entry_of(format).create(target, info);
+}
+
+void check_colour_from(OutputFormat format, const PointWriteInfo& info) {
+  check_colour(entry_of(format), info);
 }
 
 std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info) {

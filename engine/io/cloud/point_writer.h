@@ -79,6 +79,10 @@ class PointWriter {
                                                          OutputFormat format,
                                                          const PointWriteInfo& info);
 
+/// Checks PointWriteInfo::colour_from, as create_points() does.
+/// @throws RequestError about `colour_from`
+void check_colour_from(OutputFormat format, const PointWriteInfo& info);
+
 /// Returns what a file of this format would not keep, and what it would round and by how much, a
 /// sentence each.
 [[nodiscard]] std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info);

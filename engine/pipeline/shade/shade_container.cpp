@@ -315,6 +315,12 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
 /// Shades into a temporary copy of the container, and writes its points in the order of the input.
 LightingReport shade_in_input_order(const ShadeRequest& request,
                                     const std::filesystem::path& target, Progress& progress) {
+  if (!request.colour_from.empty()) {
+    PointWriteInfo info = shaded_points(ContainerReader(request.scene), 0, "", request.colour_from);
+    const std::vector<Channel> added = shading_channels(request.estimate);
+    info.channels.insert(info.channels.end(), added.begin(), added.end());
+    check_colour_from(output_format(target).value(), info);
+  }
   LightingReport report;
   const std::unique_ptr<ContainerReader> shaded = make_temporary_container(
       roomiest_temp_dir(request.run, target),
