@@ -64,6 +64,11 @@ void InputFiles::add_directory(const std::filesystem::path& directory) {
   }
   if (found.empty())
     throw DataError(directory.string() + ": the directory holds no mesh and no cloud");
+  // A text beside clouds tells about them
+  const auto is_text = [](const std::filesystem::path& path) {
+    return has_ending(path, ".txt") || has_ending(path, ".csv");
+  };
+  if (!std::ranges::all_of(found, is_text)) std::erase_if(found, is_text);
   std::ranges::sort(found);
   for (const auto& path : found) add(path);
 }

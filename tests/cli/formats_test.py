@@ -68,6 +68,7 @@ class Formats(ProgramTest):
         write_ply(tiles / "a.ply", self.points[:200], NAMES)
         write_ply(tiles / "b.ply", self.points[200:], NAMES)
         (tiles / "notes.md").write_text("no tile\n")
+        (tiles / "readme.txt").write_text("Text beside clouds tells about them\n")
         (self.here / "list.txt").write_text("# tiles\ntiles/a.ply\n\ntiles/b.ply\n")
         made = []
         for i, given in enumerate([["tiles/a.ply", "tiles/b.ply"], ["tiles"], ["tiles/*.ply"], ["@list.txt"]]):
@@ -158,6 +159,15 @@ class Formats(ProgramTest):
         self.assertGreater(min(outward), 0.9)  # the normals of a ball are its positions
         self.assertLess(max(p[at["occlusion"]] for p in points), 0.1)
         self.assertGreater(min(p[at["sky_g"]] for p in points), 2.8)  # pi in the open
+
+    def test_a_format_that_must_have_normals_and_radii_has_none_to_give_back(self):
+        write_ply(self.here / "bare.ply", [p[:3] for p in ball(2000)], ["x", "y", "z"])
+        self.succeed("ptcconvert", self.here / "bare.ply", self.here / "bare.ptc")
+        said = self.succeed("ptcbuild", self.here / "bare.ptc", "-o", self.here / "a.ptcx").stderr
+        self.assertIn("the normals of 2000 points are estimated", said)
+        self.succeed("ptcconvert", self.here / "a.ptcx", self.here / "a.ply")
+        names, points = read_ply(self.here / "a.ply")
+        self.assertGreater(min(p[names.index("radius")] for p in points), 0)
 
     def test_duplicates_go_on_request_and_are_counted(self):
         said = self.succeed("ptcbuild", self.scan, self.scan, "--remove-duplicates", "-o", self.here / "a.ptcx").stderr

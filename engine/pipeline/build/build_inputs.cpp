@@ -225,12 +225,13 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   if (!file.info.channels.empty()) cloud.input = attributes.add_input(file.info.channels);
   note_scan(file.info, cloud);
   // Read its points
-  bool lacks_normals = false;
+  bool lacks_normals = false, lacks_radii = true;
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = file.source->next(block)) {
     for (std::size_t i = 0; i < count; ++i) {
       bounds.add(block[i].position);
       lacks_normals |= block[i].normal == glm::vec3(0);
+      lacks_radii = lacks_radii && block[i].radius == 0;
     }
     emits |= std::any_of(block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count),
                          [](const Surfel& s) { return s.emission != glm::vec3(0); });
@@ -240,7 +241,9 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
     progress.advance(count);
   }
   points += cloud.points;
-  if (lacks_normals && !scan) scan.emplace().radii = false;
+  if ((lacks_normals || (lacks_radii && cloud.points > 0)) && !scan) scan.emplace().radii = false;
+  if (scan && cloud.points > 0)
+    scan->radii |= lacks_radii;  // formats that must have radii have zeros
   if (const std::uint64_t lost = file.source->left_out()) {
     progress.note(fmt::format("{}: {} records name no place and are left out", name, lost));
   }
