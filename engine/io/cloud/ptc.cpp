@@ -16,6 +16,8 @@
 // A normal is an angle about z and its z, each over the full range of 16 bits:
 //
 //   phi = 2 pi a / 65535 - pi    z = 2 b / 65535 - 1    normal = (r sin phi, r cos phi, z)
+//
+// The greatest numbers of both stand for no normal.
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -31,6 +33,7 @@
 namespace ptc {
 namespace {
 
+constexpr std::uint32_t kNoNormal = 0xffffffff;
 constexpr std::size_t kCoreBytes = 20;  // position, normal and radius as the file has them
 constexpr std::size_t kNormalOffset = 12;
 constexpr std::size_t kPackedCore = 28;   // with the normal as three floats at its end
@@ -144,9 +147,9 @@ class PtcSource : public RecordSource {
         2 * std::numbers::pi * load<std::uint16_t>(from, kNormalOffset) / 65535 - std::numbers::pi;
     const double z = 2.0 * load<std::uint16_t>(from, kNormalOffset + 2) / 65535 - 1;
     const double r = std::sqrt(std::max(0.0, 1 - z * z));
-    const std::array<float, 3> normal = {static_cast<float>(r * std::sin(phi)),
-                                         static_cast<float>(r * std::cos(phi)),
-                                         static_cast<float>(z)};
+    std::array<float, 3> normal = {static_cast<float>(r * std::sin(phi)),
+                                   static_cast<float>(r * std::cos(phi)), static_cast<float>(z)};
+    if (load<std::uint32_t>(from, kNormalOffset) == kNoNormal) normal = {};
     std::memcpy(packed_.data() + kNormalOffset + sizeof(float), normal.data(), sizeof normal);
     std::memcpy(packed_.data() + kPackedCore, from + kCoreBytes, floats_ * sizeof(float));
     return packed_.data();
