@@ -5,7 +5,7 @@
 //   directory   type and bytes of every page: what points, nodes and channels take
 //   meta page   channels, and the texts that the build recorded
 //
-// No page of points or nodes is read, so the time grows with the directory alone, which takes 32
+// No page of points or nodes is read, so the time grows with the directory alone, which takes 40
 // bytes for each page.
 #include <algorithm>
 #include <array>
@@ -254,6 +254,8 @@ std::string record_text(const ordered_json& record) {
   const auto unit = record.find("metres_per_unit"), up = record.find(ptc::kUpKey);
   if (unit != record.end()) text += "  unit      " + unit->get<std::string>() + " m\n";
   if (up != record.end()) text += "  up        " + up->get<std::string>() + "\n";
+  if (const auto time = record.find("time"); time != record.end())
+    text += "  time      " + time->get<std::string>() + " s\n";
   if (const auto lights = record.find(ptc::kLightsKey); lights != record.end()) {
     text += "  lights    " + lights_text(*lights, record.contains(ptc::kEmittersKey)) + "\n";
   }
@@ -265,6 +267,27 @@ std::string record_text(const ordered_json& record) {
                  : quoted(*rounding)) +
             "\n";
   }
+  return text;
+}
+
+/// What the values of a channel are, beyond their type: ", label" or ", colour, srgb, W/m^2".
+std::string meaning_of(const ordered_json& channel) {
+  std::string text;
+  const ordered_json& role = channel["role"];
+  if (!role.is_string() || role != "value")
+    text += ", " + (role.is_string() ? role.get<std::string>() : "role " + role.dump());
+  for (const char* key : {"colour_space", "unit"}) {
+    const auto found = channel.find(key);
+    if (found == channel.end() || *found == "1") continue;
+    text += ", " + (found->is_string() ? found->get<std::string>() : key + (" " + found->dump()));
+  }
+  if (const auto scale = channel.find("scale"); scale != channel.end()) {
+    text += fmt::format(", v means {:.6g} v", scale->get<double>());
+    if (const double offset = channel["offset"].get<double>(); offset != 0)
+      text += fmt::format(" {} {:.6g}", offset < 0 ? '-' : '+', std::abs(offset));
+  }
+  if (const auto none = channel.find("no_value"); none != channel.end())
+    text += fmt::format(", {:#x} for not known", none->get<std::uint64_t>());
   return text;
 }
 
@@ -296,9 +319,10 @@ std::string summary_of(const ordered_json& facts) {
   text += record_text(facts["text"]);
   for (const auto& channel : facts["channels"]) {
     const ordered_json& type = channel["type"];
-    text += fmt::format("  channel   {}: {} x {}\n", channel["name"].get<std::string>(),
+    text += fmt::format("  channel   {}: {} x {}{}\n", channel["name"].get<std::string>(),
                         channel["components"].dump(),
-                        type.is_string() ? type.get<std::string>() : "type " + type.dump());
+                        type.is_string() ? type.get<std::string>() : "type " + type.dump(),
+                        meaning_of(channel));
   }
   return text;
 }
