@@ -38,6 +38,15 @@ CLI::Option* add_original_order(CLI::App& app, bool& original_order,
   return app.add_flag("--original-order", original_order, description);
 }
 
+CLI::Option* add_up(CLI::App& app, std::string& axis) {
+  return offer(app.add_option("--up", axis,
+                              "Axis that points up: x, y or z [default: as the files say, else y]\n"
+                              "LAS, LAZ, E57, PTX, PTS and PCD say z."),
+               {"x", "y", "z"})
+      ->type_name("AXIS")
+      ->check(CLI::IsMember({"x", "y", "z"}));
+}
+
 CLI::Option* add_colour_from(CLI::App& app, std::string& channel) {
   return app
       .add_option("--colour-from", channel,

@@ -23,6 +23,9 @@ namespace ptc {
 /// Endings of files of points that can be written, containers not among them.
 [[nodiscard]] std::vector<std::string> point_output_endings();
 
+/// Declares --up, the axis of clouds that points up: x, y or z; empty when it is not given.
+CLI::Option* add_up(CLI::App& app, std::string& axis);
+
 /// Notes which of these options were given, though the input leaves them without effect.
 /// @param because  the rest of the note: "--points has no effect, because no input is a mesh"
 void note_unused(const CLI::App& app, const std::vector<std::string>& options,

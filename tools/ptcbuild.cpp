@@ -82,13 +82,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
                "Keep one of the points that lie at the same place\n"
                "A note says how many were left out.")
       ->group(ptc::kFilesGroup);
-  ptc::offer(app.add_option("--up", request.up,
-                            "Axis that points up: x, y or z [default: as the files say, else y]\n"
-                            "LAS, LAZ, E57, PTX, PTS and PCD say z."),
-             {"x", "y", "z"})
-      ->type_name("AXIS")
-      ->check(CLI::IsMember({"x", "y", "z"}))
-      ->group(ptc::kFilesGroup);
+  ptc::add_up(app, request.up)->group(ptc::kFilesGroup);
   ptc::add_original_order(
       app, request.original_order,
       "Record the order of the inputs\n"
@@ -215,10 +209,7 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   request.sampling.camera = arguments.camera.camera();
   if (arguments.lights.given() || arguments.no_default_lights)
     request.lights = arguments.lights.rig();
-  if (request.lights) {
-    request.lights->sky.up = request.up.empty() ? ptc::up_of_files(request.inputs)
-                                                : ptc::up_of({{ptc::kUpKey, request.up}});
-  }
+  if (request.lights) request.lights->sky.up = ptc::up_of_files(request.inputs, request.up);
   if (request.city_points > 0 && arguments.lights.given())
     throw CLI::ExcludesError("--city", "lights: the city has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);

@@ -59,6 +59,7 @@ int main(int argc, char** argv) {
                      "Files of points: .las, .ply, .xyz, .pcd, .ptc, .bgeo, .usda, .usdc.");
   command.add_input("--receivers", request.receivers, receiver_endings,
                     "Cloud or container to shade [default: the points of SCENE]");
+  ptc::add_up(app, request.up)->group(ptc::kFilesGroup);
   ptc::add_count(app, "--count", request.count,
                  "Shade COUNT points, evenly spread [default: all]\n"
                  "They go into a file of points.")
@@ -88,7 +89,9 @@ int main(int argc, char** argv) {
     request.run = command.run_options();
     ptc::apply_preset(app, preset, request);
     if (lights.sky_given()) request.sky = lights.sky();
-    if (request.sky) request.sky->up = ptc::up_of_files({request.scene});
+    if (ptc::is_container(request.scene))
+      ptc::note_unused(app, {"--up"}, "the scene is a container", progress);
+    if (request.sky) request.sky->up = ptc::up_of_files({request.scene}, request.up);
     const ptc::LightingReport report = ptc::shade_container(request, output, progress);
     const bool all_left = !report.damage || report.damage->points == 0;
     if (request.count > report.receivers && all_left) {

@@ -148,7 +148,8 @@ Sky LightArguments::sky() const {
   return sky;
 }
 
-glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files) {
+glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files, const std::string& axis) {
+  if (!axis.empty()) return up_of({{kUpKey, axis}});
   for (const std::filesystem::path& file : files) {
     if (!holds_points(file)) continue;
     const std::map<std::string, std::string> text = open_point_input(file).info.text;

@@ -47,8 +47,10 @@ class LightArguments {
 
 /// Returns the direction that points up in the first of these files that says so, a container or a
 /// cloud; +y when none does.
+/// @param axis  x, y or z, which wins; may be empty
 /// @throws DataError, FormatError, std::system_error when a file cannot be read
-[[nodiscard]] glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files);
+[[nodiscard]] glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files,
+                                    const std::string& axis = {});
 
 /// Declares --sun-rays, --sky-rays and --area-rays.
 void add_light_sampling(CLI::App& app, LightSampling& sampling);

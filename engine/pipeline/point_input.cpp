@@ -53,9 +53,10 @@ PointFile open_container(const std::filesystem::path& path, const Selection& sel
   info.has_normals = info.has_radius = true;
   info.has_radiance = !sky_is_gathered(*container);
   info.has_emission = container->header().point_bytes != kPointBytes && !selection.level;
-  info.has_albedo = !selection.level;
+  info.has_albedo = !selection.level && has_colours(container->meta().text);
   info.text = container->meta().text;
-  for (const char* made : {kInputsKey, kSpacingKey, kRoundingKey, "shading", "salvaged"})
+  for (const char* made :
+       {kInputsKey, kSpacingKey, kRoundingKey, kAlbedoKey, "shading", "salvaged"})
     info.text.erase(made);
   if (!selection.level)
     info.channels = kept_channels(channels_without_index(*container), selection, path);

@@ -37,6 +37,11 @@ void join_texts(std::map<std::string, std::string>& text, const std::string& nam
   }
 }
 
+bool has_colours(const std::map<std::string, std::string>& text) {
+  const auto found = text.find(kAlbedoKey);
+  return found == text.end() || found->second != kAssumed;
+}
+
 glm::vec3 up_of(const std::map<std::string, std::string>& text) {
   const auto found = text.find(kUpKey);
   if (found != text.end() && found->second == "x") return {1, 0, 0};

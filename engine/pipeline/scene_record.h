@@ -24,7 +24,9 @@ inline constexpr const char* kSpacingKey = "spacing";    ///< between surfels on
 inline constexpr const char* kInputsKey = "inputs";      ///< file names, separated by spaces
 inline constexpr const char* kRoundingKey = "rounding";  ///< kRounding when points were rounded
 inline constexpr const char* kUpKey = "up";              ///< x, y or z; y when it is absent
-inline constexpr const char* kCrsKey = "crs";            ///< of positions, as WKT or EPSG:n
+inline constexpr const char* kAlbedoKey = "albedo";      ///< kAssumed when no input has colours
+inline constexpr const char* kAssumed = "assumed";
+inline constexpr const char* kCrsKey = "crs";               ///< of positions, as WKT or EPSG:n
 inline constexpr const char* kUnitKey = "metres_per_unit";  ///< a decimal number
 
 /// Adds texts to those of other points. What is there already stays; unit and reference system are
@@ -36,6 +38,9 @@ inline constexpr const char* kUnitKey = "metres_per_unit";  ///< a decimal numbe
 void join_texts(std::map<std::string, std::string>& text, const std::string& name,
                 const std::map<std::string, std::string>& added, const std::string& other,
                 Progress& progress);
+
+/// Says whether the colours of points, by the texts of their container, come from an input.
+[[nodiscard]] bool has_colours(const std::map<std::string, std::string>& text);
 
 /// Returns the unit vector along the axis that points up, by the texts of a container or of a file
 /// of points: +y when they do not name it.

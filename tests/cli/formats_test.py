@@ -169,6 +169,32 @@ class Formats(ProgramTest):
         names, points = read_ply(self.here / "a.ply")
         self.assertGreater(min(p[names.index("radius")] for p in points), 0)
 
+    def test_a_cloud_without_colours_gets_none(self):
+        write_ply(self.here / "bare.ply", [p[:3] for p in ball(900)], ["x", "y", "z"])
+        write_ply(self.here / "red.ply", [(*p[:3], 1, 0, 0) for p in ball(90)], ["x", "y", "z", "red", "green", "blue"])
+        grey = ["albedo_r", "red"]
+        for inputs, coloured in ((["bare.ply"], False), (["bare.ply", "red.ply"], True)):
+            self.succeed("ptcbuild", *inputs, "-o", "a.ptcx", cwd=self.here)
+            self.succeed("ptcconvert", "a.ptcx", "a.ply", cwd=self.here)
+            self.succeed("ptcconvert", "a.ptcx", "b.ptcx", cwd=self.here)
+            self.succeed("ptcconvert", "b.ptcx", "b.ply", cwd=self.here)
+            for name in ("a.ply", "b.ply"):
+                self.assertEqual([n in read_ply(self.here / name)[0] for n in grey], [coloured] * 2)
+        self.succeed("ptcbuild", "bare.ply", "-o", "a.ptcx", cwd=self.here)
+        self.succeed("ptcbuild", "red.ply", "--append", "a.ptcx", "-o", "b.ptcx", cwd=self.here)
+        self.succeed("ptcconvert", "b.ptcx", "b.ply", cwd=self.here)
+        self.assertIn("albedo_r", read_ply(self.here / "b.ply")[0])
+
+    def test_the_axis_that_points_up_can_be_told_to_every_program_that_takes_a_cloud(self):
+        floor = [(x * 0.1, y * 0.1, 0.001 * (x * y % 7)) for x in range(40) for y in range(40)]
+        write_ply(self.here / "floor.ply", floor, ["x", "y", "z"])
+        self.succeed("ptcshade", self.here / "floor.ply", "--up", "z", "-o", self.here / "up.ply")
+        names, points = read_ply(self.here / "up.ply")
+        up, sky = names.index("nz"), names.index("sky_g")
+        self.assertGreater(min(p[up] for p in points), 0.5)
+        self.assertGreater(sorted(p[sky] for p in points)[800], 3)
+        self.fail_with(2, "ptcshade", self.here / "floor.ply", "--up", "q", "-o", self.here / "o.ply")
+
     def test_duplicates_go_on_request_and_are_counted(self):
         said = self.succeed("ptcbuild", self.scan, self.scan, "--remove-duplicates", "-o", self.here / "a.ptcx").stderr
         self.assertIn("500 points lie where another one does", said)

@@ -178,7 +178,7 @@ TEST_CASE("attributes: the order of the input comes back", "[attributes]") {
   const PointFile written = open_points(dir / "b.ply");
   const ReadPoints read = read_points(*written.source);
   REQUIRE(read.surfels.size() == 30'000);
-  REQUIRE(written.info.channels.size() == 4);  // and the colour that viewers show
+  REQUIRE(written.info.channels.size() == 3);
   const auto at = [&](const char* name) {
     return find_in_row(written.info.channels, name)->offset;
   };

@@ -204,6 +204,38 @@ TEST_CASE("parts: a salvage keeps the channels of the parts", "[integration][par
   CHECK(bytes_of(dir / "kept.ply") == bytes_of(dir / "scene.ply"));
 }
 
+TEST_CASE("parts: a flipped bit, a cut and a zeroed sector of any file of a scene are found",
+          "[integration][parts]") {
+  const Both files(3'000);
+  Progress silent;
+  for (const std::filesystem::path& file : {files.scene, files.dir.path() / "parts" / "0.ptcx",
+                                            files.dir.path() / "parts" / "2.ptcx"}) {
+    CAPTURE(file.string());
+    const std::vector<char> whole = bytes_of(file);
+    std::size_t tried = 0, found = 0;
+    const auto try_bytes = [&](const std::vector<char>& changed) {
+      if (changed == whole) return;
+      std::ofstream(file, std::ios::binary).write(changed.data(), std::ssize(changed));
+      ++tried;
+      found += verify_container(files.scene, {.flip_budget = 0}, silent).sound() ? 0U : 1U;
+    };
+    const std::size_t step = whole.size() / 250;
+    for (std::size_t at = 0; at < whole.size(); at += step) {
+      std::vector<char> changed = whole;
+      changed[at] = static_cast<char>(changed[at] ^ (1 << at % 8));
+      try_bytes(changed);
+      changed = whole;
+      std::fill_n(changed.begin() + static_cast<std::ptrdiff_t>(at - at % 512), 512, '\0');
+      try_bytes(changed);
+      if (at % 3 == 0) try_bytes({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(at)});
+    }
+    CHECK(tried > 400);
+    CHECK(found == tried);
+    std::ofstream(file, std::ios::binary).write(whole.data(), std::ssize(whole));
+  }
+  CHECK(verify_container(files.scene, {}, silent).sound());
+}
+
 TEST_CASE("parts: a part that is missing, replaced or nested is refused by its name",
           "[integration][parts]") {
   const Both files;

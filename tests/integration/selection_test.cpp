@@ -189,7 +189,7 @@ TEST_CASE("selection: a file of points holds what was selected, in the order of 
   const ReadPoints read = read_all(dir / "b.ply");
   CHECK(read.surfels.size() == 400);
   for (std::size_t i = 0; i < 400; ++i) {
-    REQUIRE(read.value<std::uint16_t>(i, 4) == 5 * i + 2);  // behind colour and class
+    REQUIRE(read.value<std::uint16_t>(i, 1) == 5 * i + 2);
   }
 }
 

@@ -58,6 +58,8 @@ Meta extended_meta(const Meta& scene, const Meta& added) {
     const auto [at, is_new] = meta.text.try_emplace(key, value);
     if (!is_new && key == kInputsKey) at->second += " " + value;
   }
+  // Colours of either are colours of the whole
+  if (has_colours(scene.text) || has_colours(added.text)) meta.text.erase(kAlbedoKey);
   // The record has room for one spacing: drop it when old and new points differ in theirs
   const auto was = scene.text.find(kSpacingKey), is = added.text.find(kSpacingKey);
   const bool same = was != scene.text.end() && is != added.text.end() && was->second == is->second;

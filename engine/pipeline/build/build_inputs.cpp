@@ -221,6 +221,7 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   join_texts(text, placed_by, file.info.text, name, progress);
   if (placed_by.empty() && places) placed_by = name;
   unlit |= !file.info.has_radiance;
+  coloured |= file.info.has_albedo;
   Cloud& cloud = files.emplace_back(Cloud{path});
   if (!file.info.channels.empty()) cloud.input = attributes.add_input(file.info.channels);
   note_scan(file.info, cloud);

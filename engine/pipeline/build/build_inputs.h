@@ -44,6 +44,7 @@ struct Clouds {
   /// How the points are completed, without the resources; empty when all have normals and radii.
   std::optional<ScanOptions> scan;
   bool unlit = false;                ///< one of the files gives no radiance
+  bool coloured = false;             ///< one of the files gives colours
   bool emits = false;                ///< a point emits light
   std::vector<glm::dvec3> scanners;  ///< of all files, scene units
   /// Facts about the files under the keys of spec/points.md#texts, by join_texts().

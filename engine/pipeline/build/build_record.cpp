@@ -34,6 +34,8 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs) {
   meta.text[kLightsKey] = lights_record(inputs.lights);
   if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
   if (inputs.clouds.unlit && !inputs.lit) meta.text[kSkyLightKey] = "gathered";
+  const bool assumed = inputs.clouds.points > 0 && !inputs.clouds.coloured && !inputs.lit;
+  if (assumed) meta.text[kAlbedoKey] = kAssumed;
   if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;

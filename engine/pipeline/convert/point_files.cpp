@@ -11,6 +11,7 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/point_input.h"
+#include "engine/pipeline/scene_record.h"
 
 namespace ptc {
 namespace {
@@ -87,7 +88,7 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
                       .has_normals = true,
                       .has_radius = true,
                       .has_radiance = superblock.flux != std::array<double, 3>{},
-                      .has_albedo = !selection.level,
+                      .has_albedo = !selection.level && has_colours(container.meta().text),
                       .emits = container.header().point_bytes != kPointBytes && !selection.level,
                       .colour_from = options.colour_from};
   info.bounds = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -14,6 +15,9 @@
 #include "engine/io/image/image.h"
 #include "engine/pipeline/convert/level_source.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/store/point_scan.h"
+#include "format/morton.h"
+#include "format/point_page.h"
 
 namespace ptc {
 namespace {
@@ -30,13 +34,51 @@ std::unique_ptr<PrimaryView> view_of(const ContainerReader& scene, const Camera&
   return view_surfels(scene, *open_level(scene, kLevel, {}), camera, kSide, executor);
 }
 
+/// The colours of a scene as an even share of its point pages tells them: clusters have none.
+class SampledColours {
+ public:
+  explicit SampledColours(const ContainerReader& scene) : frame_(scene.header().frame) {
+    constexpr std::size_t kMostPages = 4096;
+    constexpr std::uint32_t kRuns = 8;  // of a page, whose points lie along the curve
+    const std::size_t step = scene.point_pages().size() / kMostPages + 1;
+    for (PointScan scan(scene); scan.next(); scan.skip(step - 1)) {
+      const PointPage page = scan.points();
+      const std::uint32_t run = (page.size() + kRuns - 1) / kRuns;
+      for (std::uint32_t begin = 0; begin < page.size(); begin += run) {
+        const std::uint32_t end = std::min(begin + run, page.size());
+        glm::vec3 sum(0);
+        for (std::uint32_t i = begin; i < end; ++i) {
+          const std::array<std::uint8_t, 3> albedo = page.albedo(i);
+          sum += glm::vec3(albedo[0], albedo[1], albedo[2]);
+        }
+        keys_.push_back(encode_morton(page.position(begin)));
+        colours_.push_back(sum / (255 * static_cast<float>(end - begin)));
+      }
+    }
+  }
+
+  /// Returns the colour of the points that lie before a place on the curve.
+  [[nodiscard]] glm::vec3 at(const glm::dvec3& position) const {
+    const MortonKey key = encode_morton(frame_.to_lattice({position.x, position.y, position.z}));
+    const auto after = std::ranges::upper_bound(keys_, key) - keys_.begin();
+    return colours_[static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - 1, 0))];
+  }
+
+ private:
+  Frame frame_;
+  std::vector<MortonKey> keys_;  ///< ascending
+  std::vector<glm::vec3> colours_;
+};
+
 /// Returns the colour of what a sample sees.
 /// @param along   unit, from the camera
 /// @param is_lit  surfels have light of their own
-glm::vec3 colour_of(const PrimaryHit& hit, const glm::vec3& along, bool is_lit) {
+/// @param shown   null: surfels have their own colours
+glm::vec3 colour_of(const PrimaryHit& hit, const glm::vec3& along, bool is_lit,
+                    const SampledColours* shown) {
   if (is_lit) return hit.direct;
   const float facing = std::abs(glm::dot(hit.normal, along));
-  return hit.albedo * (0.25F + 0.75F * facing);
+  return (shown ? shown->at(hit.position) : hit.albedo) * (0.25F + 0.75F * facing);
 }
 
 /// Returns the factor that makes the 98th percentile of the brightness of what is seen 1.
@@ -63,6 +105,8 @@ void write_thumbnail(const ContainerReader& scene, const std::filesystem::path& 
       default_camera(scene, {}, false, std::array{kThumbnailWidth, kThumbnailHeight});
   const std::unique_ptr<PrimaryView> view = view_of(scene, camera, executor);
   const bool is_lit = scene.superblock().flux != std::array<double, 3>{};
+  std::optional<SampledColours> shown;
+  if (!is_lit && scene.superblock().points > kMostPoints) shown.emplace(scene);
 
   // Average the samples of each pixel
   Image image{.width = kThumbnailWidth, .height = kThumbnailHeight};
@@ -77,7 +121,7 @@ void write_thumbnail(const ContainerReader& scene, const std::filesystem::path& 
         continue;
       }
       const auto along = glm::normalize(glm::vec3(hit->position - camera.position));
-      image.pixels[pixel] += kShare * colour_of(*hit, along, is_lit);
+      image.pixels[pixel] += kShare * colour_of(*hit, along, is_lit, shown ? &*shown : nullptr);
     }
   }
   const float gain = gain_of(image.pixels);

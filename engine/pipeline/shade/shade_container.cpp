@@ -349,6 +349,7 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   const BuildReport built =
       build_container({.inputs = {request.scene},
                        .original_order = in_order,
+                       .up = request.up,
                        .profile = in_order ? Profile::exact : Profile::compact,
                        .run = request.run},
                       shading.scene, progress);

@@ -33,6 +33,9 @@ struct ShadeRequest : LightingRequest {
   /// Writes a file of points in the order of the input, which the scene must know. A scene that is
   /// a cloud is always written in its order.
   bool original_order = false;
+  /// Axis of a cloud that points up, x, y or z, when the scene is one; empty: as the file says,
+  /// else y.
+  std::string up;
   /// The channel that viewers shall show as colour in a file of points; empty: the albedo
   /// (PointWriteInfo::colour_from).
   std::string colour_from;

@@ -161,7 +161,8 @@ Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& nor
              offsets.empty() ? nullptr : &turned, weights, sums);
   // Divide by the sum of all weights instead of pi, so that an empty cube gives exactly 0.
   Shading shading;
-  shading.occlusion = sums.covered / sums.total;
+  // Borders of pixels that move can leave a little less than nothing covered
+  shading.occlusion = std::clamp(sums.covered / sums.total, 0.0F, 1.0F);
   shading.irradiance = sums.light * (kPi / sums.total);
   shading.sky = sums.sky * (kPi / sums.total);
   const float length = glm::length(sums.open);

@@ -7,6 +7,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/numbers.h"
+#include "engine/pipeline/point_input.h"
 #include "tools/common.h"
 #include "tools/option_text.h"
 #include "tools/values.h"
@@ -53,6 +54,14 @@ void SceneList::check() {
       throw DataError(scene.file.string() + ": No such file or directory; scenes are " + kScenes);
     }
     check_input(scene.file);
+  }
+}
+
+void SceneList::check_meshes() {
+  check();
+  for (const SceneChoice& scene : choices_) {
+    if (!scene.file.empty() && holds_points(scene.file))
+      throw DataError(scene.file.string() + ": has no triangles from which points could be drawn");
   }
 }
 

@@ -29,6 +29,9 @@ class SceneList {
   /// Parses the list and checks that its files can be read.
   /// @throws DataError for a file that cannot be read; RequestError as parse_scenes()
   void check();
+  /// As check(), for an experiment that draws points from meshes.
+  /// @throws DataError for a cloud, too
+  void check_meshes();
   /// The scenes in the order of the command line. @pre check() was called
   [[nodiscard]] const std::vector<SceneChoice>& choices() const noexcept { return choices_; }
 

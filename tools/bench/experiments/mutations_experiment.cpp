@@ -32,8 +32,9 @@ namespace ptc::bench {
 namespace {
 
 constexpr char kReading[] =
-    "Small containers of every profile, with and without channels, are changed in every way of "
-    "each kind. Found: the verification reports a finding. Accepted: it reports none. Misread: a "
+    "Small containers of every profile, with and without channels and light of their own, are "
+    "changed in every way of each kind. Found: the verification reports a finding. Accepted: it "
+    "reports none. Misread: a "
     "reader that loads every page returned other bytes without an error. Each change is tried in a "
     "child process, so that crashes and hangs are counted, too.";
 
@@ -118,19 +119,24 @@ Bytes content_of(const std::filesystem::path& path) {
 }
 
 /// Writes a cloud of random surfels in the unit cube, the same ones each time.
-void write_cloud(const std::filesystem::path& path) {
+/// @param emits  whether each second one has light of its own
+void write_cloud(const std::filesystem::path& path, bool emits) {
   std::mt19937_64 bits(3);
   const auto number = [&] {
     return static_cast<float>(bits() >> 40) / static_cast<float>(1 << 24);
   };
   std::ofstream file(path);
+  file << "# x y z nx ny nz radius radiance_r radiance_g radiance_b"
+       << (emits ? " emission_r emission_g emission_b\n" : "\n");
   for (std::size_t i = 0; i < kPoints; ++i) {
     const glm::vec3 position(number(), number(), number());
     const glm::vec3 turned = glm::vec3(number(), number(), number()) - 0.5F;
     const glm::vec3 normal = glm::normalize(turned + glm::vec3(0, 0, 1e-3F));
-    file << fmt::format("{} {} {} {} {} {} {} {} {} {}\n", position.x, position.y, position.z,
+    file << fmt::format("{} {} {} {} {} {} {} {} {} {}", position.x, position.y, position.z,
                         normal.x, normal.y, normal.z, 0.01F + 0.1F * number(), number(), number(),
                         number());
+    if (emits) file << fmt::format(" {} 0 {}", i % 2 == 0 ? 0.0F : number(), number());
+    file << '\n';
   }
 }
 
@@ -138,29 +144,32 @@ void write_cloud(const std::filesystem::path& path) {
 std::vector<Subject> make_subjects(const Bench& bench, const WorkFile& changed) {
   // Build and shade a scene
   const WorkFile cloud(bench.work, ".xyz"), scene(bench.work, "-scene.ptcx"),
-      lit(bench.work, "-lit.ptcx");
+      lamps(bench.work, "-lamps.ptcx"), lit(bench.work, "-lit.ptcx");
   Progress silent;
-  write_cloud(cloud.path());
-  build_container({.inputs = {cloud.path()},
-                   .page_shift = kPageShift,
-                   .profile = Profile::raw,
-                   .run = {.threads = 1}},
-                  scene.path(), silent);
+  for (const bool emits : {false, true}) {
+    write_cloud(cloud.path(), emits);
+    build_container({.inputs = {cloud.path()},
+                     .page_shift = kPageShift,
+                     .profile = Profile::raw,
+                     .run = {.threads = 1}},
+                    (emits ? lamps : scene).path(), silent);
+  }
   shade_container({{.scene = scene.path(), .run = {.threads = 1}}}, lit.path(), silent);
   // Recode it in every profile
   struct Kind {
     const char* name;
     Profile profile;
-    bool shaded;
+    const std::filesystem::path& source;
   };
   std::vector<Subject> subjects;
-  for (const Kind& kind : {Kind{"raw", Profile::raw, false},
-                           {"exact", Profile::exact, false},
-                           {"fast", Profile::fast, false},
-                           {"compact", Profile::compact, false},
-                           {"compact, shaded", Profile::compact, true}}) {
-    recode_container(ContainerReader(kind.shaded ? lit.path() : scene.path()), changed.path(),
-                     {.profile = kind.profile}, silent);
+  for (const Kind& kind : {Kind{"raw", Profile::raw, scene.path()},
+                           {"exact", Profile::exact, scene.path()},
+                           {"fast", Profile::fast, scene.path()},
+                           {"compact", Profile::compact, scene.path()},
+                           {"compact, emitting", Profile::compact, lamps.path()},
+                           {"compact, shaded", Profile::compact, lit.path()}}) {
+    recode_container(ContainerReader(kind.source), changed.path(), {.profile = kind.profile},
+                     silent);
     Subject& subject = subjects.emplace_back();
     subject = {.name = kind.name,
                .path = changed.path(),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <sstream>
 #include <string>
@@ -19,7 +20,7 @@ namespace {
 /// A property of the PLY's points.
 struct Property {
   std::string name;
-  std::size_t bytes = 0;  ///< 4: float, 8: double
+  std::size_t bytes = 0;  ///< 1: uchar, 4: float, 8: double
 };
 
 /// Lists the properties of a PLY.
@@ -31,13 +32,16 @@ std::vector<Property> properties_of(const std::string& header) {
     if (word != "property") continue;
     std::string type, name;
     words >> type >> name;
-    properties.push_back({name, type == "double" ? sizeof(double) : sizeof(float)});
+    properties.push_back({name, type == "double"  ? sizeof(double)
+                                : type == "float" ? sizeof(float)
+                                                  : sizeof(std::uint8_t)});
   }
   return properties;
 }
 
-/// Reads a float or a double.
+/// Reads a uchar, a float or a double.
 double value_at(const std::byte* at, std::size_t bytes) {
+  if (bytes == 1) return std::to_integer<int>(*at);
   double wide = 0;
   float narrow = 0;
   std::memcpy(bytes == sizeof wide ? static_cast<void*>(&wide) : &narrow, at, bytes);

@@ -96,7 +96,7 @@ Experiment make_scan_experiment() {
           .quick = "50k points of the first scene, 1 run",
           .declare = declare,
           .run = run,
-          .check = [scenes] { scenes->check(); }};
+          .check = [scenes] { scenes->check_meshes(); }};
 }
 
 }  // namespace ptc::bench

@@ -68,7 +68,7 @@ Experiment make_specks_experiment() {
           .quick = "20k points of the first scene, 200 checked",
           .declare = declare,
           .run = run,
-          .check = [scenes] { scenes->check(); }};
+          .check = [scenes] { scenes->check_meshes(); }};
 }
 
 }  // namespace ptc::bench

@@ -7,7 +7,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/base/error.h"
 #include "engine/base/numbers.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/scene/procedural/city.h"
@@ -149,10 +148,7 @@ Mesh mesh_of(const SceneChoice& choice, std::uint64_t points, const RunOptions& 
     return request_scene(choice, {.points = points / kPerTriangle}, run).lit.mesh;
   }
   Progress silent;
-  Mesh mesh = load_meshes({choice.file}, nullptr, choice.backdrop, silent);
-  if (mesh.triangles.empty())
-    throw DataError(choice.file.string() + ": has no triangles from which points could be drawn");
-  return mesh;
+  return load_meshes({choice.file}, nullptr, choice.backdrop, silent);
 }
 
 }  // namespace ptc::bench

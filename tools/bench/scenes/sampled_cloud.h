@@ -42,7 +42,7 @@ struct SampledPoint {
                                                          const SampleOptions& options);
 
 /// Returns the mesh of a scene. @param points  decides how finely procedural meshes are divided
-/// @throws DataError for a file without triangles
+/// @pre its file is no cloud
 [[nodiscard]] Mesh mesh_of(const SceneChoice& choice, std::uint64_t points, const RunOptions& run);
 
 }  // namespace ptc::bench
