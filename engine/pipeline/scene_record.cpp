@@ -11,14 +11,19 @@
 
 namespace ptc {
 
-void join_texts(std::map<std::string, std::string>& text, const std::string& name,
+void join_texts(std::map<std::string, std::string>& text,
+                std::map<std::string, std::string>& named_by,
                 const std::map<std::string, std::string>& added, const std::string& other,
                 Progress& progress) {
+  const auto owner_of = [&](const char* key) {
+    const auto found = named_by.find(key);
+    return found == named_by.end() ? std::string("the scene") : found->second;
+  };
   const auto compare = [&](const char* key, const char* what) {
     const auto was = text.find(key);
     const auto is = added.find(key);
     if (was == text.end() || is == added.end() || was->second == is->second) return;
-    progress.note(other + ": its " + what + " is not that of " + name +
+    progress.note(other + ": its " + what + " is not that of " + owner_of(key) +
                   ", which is recorded; positions are taken as they are");
   };
   compare(kCrsKey, "coordinate reference system");
@@ -30,10 +35,11 @@ void join_texts(std::map<std::string, std::string>& text, const std::string& nam
   const bool placed = is_placed(text);
   if (placed && !is_placed(added)) {
     progress.note(other + ": it names no coordinate reference system and no unit; those of " +
-                  name + " are recorded for all");
+                  owner_of(text.contains(kCrsKey) ? kCrsKey : kUnitKey) + " are recorded for all");
   }
   for (const auto& [key, value] : added) {
-    if (!placed || (key != kCrsKey && key != kUnitKey)) text.emplace(key, value);
+    if (placed && (key == kCrsKey || key == kUnitKey)) continue;
+    if (text.emplace(key, value).second) named_by.emplace(key, other);
   }
 }
 

@@ -31,11 +31,12 @@ inline constexpr const char* kUnitKey = "metres_per_unit";  ///< a decimal numbe
 
 /// Adds texts to those of other points. What is there already stays; unit and reference system are
 /// taken from one file, never from two.
-/// @param text, name    of the points so far: whose they are, for a note; empty while there are
-/// none
-/// @param added, other  those that are added, and whose they are
-/// @param progress      gets a note where positions mean something else in both
-void join_texts(std::map<std::string, std::string>& text, const std::string& name,
+/// @param text      of the points so far
+/// @param named_by  by key of `text`: whose it is, for a note; the scene's where it is missing
+/// @param added     those that are added, by `other`
+/// @param progress  gets a note where positions mean something else in both
+void join_texts(std::map<std::string, std::string>& text,
+                std::map<std::string, std::string>& named_by,
                 const std::map<std::string, std::string>& added, const std::string& other,
                 Progress& progress);
 

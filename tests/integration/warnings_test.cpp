@@ -41,7 +41,9 @@ TEST_CASE("warnings: unit and reference system come from one file", "[integratio
   using Texts = std::map<std::string, std::string>;
   const auto joined = [](Texts text, const Texts& added, std::size_t notes) {
     Notes progress;
-    join_texts(text, "first", added, "second", progress);
+    Texts named_by;
+    for (const auto& [key, value] : text) named_by[key] = "first";
+    join_texts(text, named_by, added, "second", progress);
     CHECK(progress.texts.size() == notes);
     for (const std::string& note : progress.texts) {
       CHECK_THAT(note, Contains("second: ") && Contains("first"));

@@ -247,9 +247,8 @@ class Build {
     }
     if (scene_) {
       // What the scene says of its positions holds
-      std::map<std::string, std::string> texts = scene_->meta().text;
-      join_texts(texts, scene_->path().filename().string(), inputs.clouds.text,
-                 inputs.clouds.placed_by, progress_);
+      std::map<std::string, std::string> texts = scene_->meta().text, named_by;
+      join_texts(texts, named_by, inputs.clouds.text, "what is appended", progress_);
       for (const char* key : {kCrsKey, kUnitKey}) {
         if (!texts.contains(key)) inputs.clouds.text.erase(key);
       }

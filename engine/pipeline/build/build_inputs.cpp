@@ -216,10 +216,7 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   // Note what the file says of all its points
   const std::string name = path.filename().string();
   for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
-  const bool places = file.info.text.contains(kCrsKey) || file.info.text.contains(kUnitKey) ||
-                      file.info.text.contains(kUpKey);
-  join_texts(text, placed_by, file.info.text, name, progress);
-  if (placed_by.empty() && places) placed_by = name;
+  join_texts(text, named_by, file.info.text, name, progress);
   unlit |= !file.info.has_radiance;
   coloured |= file.info.has_albedo;
   Cloud& cloud = files.emplace_back(Cloud{path});

@@ -49,7 +49,7 @@ struct Clouds {
   std::vector<glm::dvec3> scanners;  ///< of all files, scene units
   /// Facts about the files under the keys of spec/points.md#texts, by join_texts().
   std::map<std::string, std::string> text;
-  std::string placed_by;  ///< the first file that names a unit, an axis or a reference system
+  std::map<std::string, std::string> named_by;  ///< by key of `text`: the file that it is of
 
   /// Reads a cloud to its end and adds it to the others.
   /// @param attributes  gets the channels of the cloud
