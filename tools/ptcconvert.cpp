@@ -107,7 +107,7 @@ std::vector<std::string> container_losses(const Arguments& arguments, bool recod
     losses.emplace_back("Positions are rounded to 2^-42 of the edge of a cube around the points.");
     losses.emplace_back("Normals are rounded by up to 0.0001 rad, colours to 8 bits of sRGB.");
   }
-  if (arguments.profile == ptc::Profile::fast || arguments.profile == ptc::Profile::compact) {
+  if (ptc::is_rounded(arguments.profile)) {
     losses.emplace_back(
         "Positions are rounded by up to 0.001 radii, radii by 1/512, normals by 0.0021 rad, "
         "radiances by 1/256.");

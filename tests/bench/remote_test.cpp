@@ -18,16 +18,25 @@ std::filesystem::path city(const test::TemporaryDirectory& scratch, std::uint64_
   return path;
 }
 
+/// A city that is read in ranges, which are counted.
+struct RemoteCity {
+  explicit RemoteCity(std::uint64_t points) : file(city(scratch, points)) {}
+
+  test::TemporaryDirectory scratch;
+  InputFile file;
+  FileRanges ranges{file};
+  CountingRanges source{ranges};
+  PartialReader scene{source};
+};
+
 }  // namespace
 
 // The table of `ptcbench remote` has the counts of this view for 200 million points: 1 request and
 // 262 KB, then 1 more and 501 KB. Of 4 million points the 10,000 nodes reach deeper levels.
 TEST_CASE("remote: a view of a whole city takes few requests and few bytes", "[bench][remote]") {
-  const test::TemporaryDirectory scratch;
-  const InputFile file(city(scratch, 4'000'000));
-  FileRanges ranges(file);
-  CountingRanges source(ranges);
-  PartialReader scene(source);
+  RemoteCity remote(4'000'000);
+  const CountingRanges& source = remote.source;
+  PartialReader& scene = remote.scene;
   CHECK(source.requests() == 1);
   CHECK(source.bytes() <= 300'000);
   REQUIRE(scene.superblock().node_pages > 500);
@@ -48,11 +57,9 @@ TEST_CASE("remote: a view of a whole city takes few requests and few bytes", "[b
 }
 
 TEST_CASE("remote: a view from within a city takes no more than was measured", "[bench][remote]") {
-  const test::TemporaryDirectory scratch;
-  const InputFile file(city(scratch, 4'000'000));
-  FileRanges ranges(file);
-  CountingRanges source(ranges);
-  PartialReader scene(source);
+  RemoteCity remote(4'000'000);
+  const CountingRanges& source = remote.source;
+  PartialReader& scene = remote.scene;
   ViewChoice choice(scene, views_of(scene.superblock()).back());
   static_cast<void>(choice.choose(500));
   CHECK(source.requests() <= 3);

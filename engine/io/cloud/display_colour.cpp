@@ -87,6 +87,12 @@ std::array<std::uint8_t, 3> DisplayColour::bytes(const Surfel& surfel, const std
   return bytes;
 }
 
+std::vector<RowChannel> DisplayColour::without_bytes(std::vector<RowChannel> channels) const {
+  if (kind_ == Kind::stored && source_->channel.type == ChannelType::u8)
+    std::erase_if(channels, [&](const RowChannel& c) { return c.offset == source_->offset; });
+  return channels;
+}
+
 std::array<std::uint16_t, 3> DisplayColour::stored_values(const std::byte* row) const {
   const bool bytes = source_->channel.type == ChannelType::u8;
   std::array<std::uint16_t, 3> values{};

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include <glm/vec3.hpp>
 
@@ -39,6 +40,8 @@ class DisplayColour {
   /// Returns the colour on the sRGB curve in 8 bits: those of stored(), if it has as many and the
   /// point's albedo came from them.
   [[nodiscard]] std::array<std::uint8_t, 3> bytes(const Surfel& surfel, const std::byte* row) const;
+  /// Returns channels without the one whose values bytes() has.
+  [[nodiscard]] std::vector<RowChannel> without_bytes(std::vector<RowChannel> channels) const;
   /// Returns the values of stored(), 257-fold if they have 8 bits. Bytes in fields of 16 bits stay
   /// as they are.
   [[nodiscard]] std::array<std::uint16_t, 3> stored_values(const std::byte* row) const;

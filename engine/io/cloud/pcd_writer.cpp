@@ -83,11 +83,7 @@ class PcdWriter : public CheckedWriter {
     for (const Channel& channel : info_.channels) {
       if (channel.name == "rgb" && channel.components == 1) taken.insert(channel.name);
     }
-    channels_ = row_channels(info_.channels, taken);
-    const RowChannel* const stored = colour_.stored();
-    if (stored == nullptr || stored->channel.type != ChannelType::u8) return;
-    std::erase_if(channels_,
-                  [&](const RowChannel& channel) { return channel.offset == stored->offset; });
+    channels_ = colour_.without_bytes(row_channels(info_.channels, taken));
   }
 
   // Says whether the albedo has fields of its own, beside a colour of 8 bits.

@@ -149,14 +149,8 @@ class PlyChannelWriter : public CheckedWriter {
                .albedo = info.has_albedo,
                .emission = info.emits,
                .colour = colour_.exists()},
-        channels_(row_channels(info.channels, taken_names())),
+        channels_(colour_.without_bytes(row_channels(info.channels, taken_names()))),
         out_(target) {
-    // Bytes of a colour are in red, green and blue already
-    const RowChannel* const stored = colour_.stored();
-    if (stored != nullptr && stored->channel.type == ChannelType::u8) {
-      std::erase_if(channels_,
-                    [&](const RowChannel& channel) { return channel.offset == stored->offset; });
-    }
     Header header(info.count);
     header.add_surfel(parts_);
     for (const RowChannel& row : channels_) {

@@ -90,10 +90,12 @@ PointFile open_as(PointFormat format, const std::filesystem::path& path) {
 }
 
 /// Says whether colours in fields of 16 bits are all up to 255, as many programs write them.
-/// @param probe  a file that was opened for this
-bool has_bytes_as_colours(const PointFile& probe) {
-  const auto rgb = find_in_row(probe.info.channels, "rgb");
+/// @param info  of the file
+bool has_bytes_as_colours(PointFormat format, const std::filesystem::path& path,
+                          const PointFileInfo& info) {
+  const auto rgb = find_in_row(info.channels, "rgb");
   if (!rgb || rgb->channel->type != ChannelType::u16) return false;
+  const PointFile probe = open_as(format, path);
   std::vector<Surfel> block(1 << 12);
   bool black = true;
   while (const std::size_t count = probe.source->next(block)) {
@@ -119,7 +121,7 @@ PointFile open_points(const std::filesystem::path& path) {
   }
   PointFile file = open_as(*format, path);
   const bool may_be_bytes = *format == PointFormat::ply || *format == PointFormat::pcd;
-  if (may_be_bytes && has_bytes_as_colours(open_as(*format, path))) {
+  if (may_be_bytes && has_bytes_as_colours(*format, path, file.info)) {
     static_cast<RecordSource&>(*file.source).take_bytes_as_colours();
     std::ranges::find(file.info.channels, "rgb", &Channel::name)->scale = kByteScale;
     file.info.notes.emplace_back(

@@ -15,6 +15,7 @@
 #include "engine/io/image/image.h"
 #include "engine/pipeline/convert/level_source.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/store/point_scan.h"
 #include "format/morton.h"
 #include "format/point_page.h"
@@ -106,7 +107,8 @@ void write_thumbnail(const ContainerReader& scene, const std::filesystem::path& 
   const std::unique_ptr<PrimaryView> view = view_of(scene, camera, executor);
   const bool is_lit = scene.superblock().flux != std::array<double, 3>{};
   std::optional<SampledColours> shown;
-  if (!is_lit && scene.superblock().points > kMostPoints) shown.emplace(scene);
+  if (!is_lit && scene.superblock().points > kMostPoints && has_colours(scene.meta().text))
+    shown.emplace(scene);
 
   // Average the samples of each pixel
   Image image{.width = kThumbnailWidth, .height = kThumbnailHeight};
