@@ -128,10 +128,16 @@ function usage() {
   return USED_WRONGLY;
 }
 
+// While WebAssembly compiles, nothing else keeps the event loop alive. Node 20 then waits for its compiler threads, and waits
+// for ever when one of them waits for a garbage collection.
+const alive = setInterval(() => {}, 2 ** 30);
+
 const args = process.argv.slice(2);
 try {
   process.exitCode = await main(args);
 } catch (error) {
   console.error(`${error.file ?? args[1] ?? args[0]}: ${error.message}`);
   process.exitCode = error instanceof Refused ? BROKEN : SYSTEM;
+} finally {
+  clearInterval(alive);
 }

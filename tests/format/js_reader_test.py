@@ -83,7 +83,8 @@ def files():
 def verdicts(folder):
     """Returns what the reader says of every vector, by kind and name; one process judges them all."""
     names = "".join(os.path.join(VECTORS, *file) + "\n" for file in files())
-    done = subprocess.run(["node", "cli.js", "batch"], cwd=folder, input=names, capture_output=True, text=True)
+    done = subprocess.run(["node", "cli.js", "batch"], cwd=folder, input=names, capture_output=True, text=True,
+                          timeout=120)
     if done.returncode != 0:
         sys.exit(f"the reader failed: {done.stderr}")
     lines = [json.loads(line) for line in done.stdout.split("\n") if line]
@@ -201,7 +202,7 @@ def check_exit_codes(folder):
     for code, arguments in ((0, ["verify", good, "--level", "2"]), (1, ["verify", bad]), (1, ["dump", bad]),
                             (2, []), (2, ["verify", good, "--level", "4"]), (3, ["dump", os.path.join(TEMP, "none")]),
                             (0, ["xxh3", os.path.join(VECTORS, "xxh3.txt")])):
-        done = subprocess.run(["node", "cli.js", *arguments], cwd=folder, capture_output=True, text=True)
+        done = subprocess.run(["node", "cli.js", *arguments], cwd=folder, capture_output=True, text=True, timeout=60)
         if done.returncode != code:
             faults.append(f"{arguments} exits with {done.returncode} and not {code}: {done.stderr}")
 
