@@ -19,7 +19,9 @@ constexpr float kNoiseReach = 2;      // offsets along normals that noise explai
 constexpr int kSafe = kFullVote / 2;  // of a single vote, to join places in a block
 constexpr double kSheet = 0.3;        // cells across which the places of a sheet may lie
 constexpr double kNoisySheet = 0.7;   // the same where they are noisy
-constexpr std::int64_t kFirm = 6 * kFullVote;  // of the sum between patches, to join in a chunk
+constexpr std::int64_t kOpenShare = 4;  // of so many places of a patch, one must see the open air
+constexpr std::int64_t kOpenVote = kFullVote / 4;  // of a place that sees it
+constexpr std::int64_t kFirm = 6 * kFullVote;      // of the sum between patches, to join in a chunk
 
 float dot(const Vec3& a, const Vec3& b) noexcept {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -73,6 +75,7 @@ class ChunkOrientation {
     pieces_.votes.clear();
     set_known(sides);
     room_.sky.assign(count_, 0);
+    room_.open.assign(count_, 0);
     if (std::ranges::find(room_.known, 0) != room_.known.end()) {
       room_.sign.assign(count_, 1);
       if (sky_ != nullptr) look_at_sky();
@@ -114,23 +117,34 @@ class ChunkOrientation {
     }
   }
 
-  /// Looks at the sky from both sides of the places whose side is unknown, where the places of a
-  /// cell are one sheet.
+  /// Looks at the sky from both sides of the places whose side is unknown.
   void look_at_sky() {
+    for_each_in_sheets(sky_->cells(), [this](std::uint32_t i) {
+      room_.sky[i] =
+          static_cast<std::int8_t>(sky_->more_in_front(chunk_.positions[i], chunk_.fits[i].normal));
+    });
+    for_each_in_sheets(sky_->fine_cells(), [this](std::uint32_t i) {
+      room_.open[i] =
+          static_cast<std::int8_t>(sky_->open_side(chunk_.positions[i], chunk_.fits[i].normal));
+    });
+  }
+
+  /// Calls visit(place) for the places whose side is unknown and that lie in cells whose places are
+  /// one sheet.
+  template <class Visit>
+  void for_each_in_sheets(const FullCells& cells, const Visit& visit) const {
     for (std::uint32_t i = 0, end = 0; i < count_; i = end) {
-      const std::size_t cell = sky_->cell_of(chunk_.positions[i]);
-      for (end = i + 1; end < count_ && sky_->cell_of(chunk_.positions[end]) == cell;) ++end;
-      if (!is_sheet(i, end)) continue;
+      const std::size_t cell = cells.cell_of(chunk_.positions[i]);
+      for (end = i + 1; end < count_ && cells.cell_of(chunk_.positions[end]) == cell;) ++end;
+      if (!is_sheet(i, end, cells.width())) continue;
       for (std::uint32_t k = i; k < end; ++k) {
-        if (room_.known[k] != 0) continue;
-        room_.sky[k] = static_cast<std::int8_t>(
-            sky_->more_in_front(chunk_.positions[k], chunk_.fits[k].normal));
+        if (room_.known[k] == 0) visit(k);
       }
     }
   }
 
-  /// Says whether places lie on one surface, as far as noise lets it be known.
-  [[nodiscard]] bool is_sheet(std::uint32_t begin, std::uint32_t end) const {
+  /// Says whether places of a cell lie on one surface, as far as noise lets it be known.
+  [[nodiscard]] bool is_sheet(std::uint32_t begin, std::uint32_t end, double width) const {
     const Vec3& normal = chunk_.fits[begin].normal;
     const LatticePosition& from = chunk_.positions[begin];
     double low = 0, high = 0, noise = 0;
@@ -142,8 +156,7 @@ class ChunkOrientation {
       high = std::max(high, along);
       noise = std::max(noise, double{chunk_.fits[i].noise});
     }
-    return high - low <
-           std::min(kSheet * sky_->cell_width() + 4 * noise, kNoisySheet * sky_->cell_width());
+    return high - low < std::min(kSheet * width + 4 * noise, kNoisySheet * width);
   }
 
   /// Computes the votes of all links of which one end at least is unknown.
@@ -225,6 +238,7 @@ class ChunkOrientation {
       if (room_.known[i] == 0 && room_.lean[i] > 0)
         graph.add(0, room_.patch[i], static_cast<int>(room_.lean[i] * kFullVote) * room_.sign[i]);
     }
+    let_open_air_vote(graph);
     // Contract what is firm, or everything when too many pieces would be left.
     graph.contract(kFirm);
     if (number_pieces(graph) > kMostPieces) {
@@ -243,6 +257,22 @@ class ChunkOrientation {
       const bool turned = known.flipped && (edge.a == known.root || edge.b == known.root);
       pieces_.votes.push_back(
           {room_.number[edge.a], room_.number[edge.b], turned ? -edge.vote : edge.vote});
+    }
+  }
+
+  /// Lets the open air vote on the patches of which enough places have the same side in it.
+  void let_open_air_vote(SignedGraph& graph) {
+    std::vector<std::int64_t>& open = room_.patch_open;
+    std::vector<std::uint32_t>& places = room_.patch_places;
+    open.assign(patches_, 0);
+    places.assign(patches_, 0);
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      open[room_.patch[i]] += room_.open[i] * room_.sign[i];
+      ++places[room_.patch[i]];
+    }
+    for (std::uint32_t patch = 1; patch < patches_; ++patch) {
+      if (kOpenShare * std::abs(open[patch]) >= places[patch])
+        graph.add(0, patch, open[patch] * kOpenVote);
     }
   }
 

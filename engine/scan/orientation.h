@@ -9,7 +9,8 @@
 //
 // A vote is what two neighbouring places say about their sides. All places whose side is known
 // beforehand form one piece, number 0, which is never flipped. The sky votes, too, as if it were of
-// that piece, if no scanner is known: for the side from which more of it is seen. An island without
+// that piece, if no scanner is known: on patches, for the side that is in the open where the other
+// is not, and on pieces, for the side from which more of it is seen. An island without
 // any of this turns outwards, or upwards where it is an open sheet.
 #pragma once
 
@@ -72,6 +73,9 @@ struct OrientationRoom {
   std::vector<float> lean;                              ///< by place: cosine to where it was seen
                                                         ///< from, or 0
   std::vector<std::int8_t> sky;                         ///< by place: more_in_front() of its normal
+  std::vector<std::int8_t> open;                        ///< by place: open_side() of its normal
+  std::vector<std::int64_t> patch_open;                 ///< by patch: sum of open_side()
+  std::vector<std::uint32_t> patch_places;              ///< by patch: number of places
   std::vector<std::array<std::int16_t, kLinks>> votes;  ///< by place
   std::vector<std::int8_t> sign;                        ///< by place: 1 or -1
   std::vector<std::uint32_t> patch;                     ///< by place

@@ -11,11 +11,14 @@
 namespace ptc {
 namespace {
 
-constexpr int kMostBits = 7;          // of a cell's number along an axis
+constexpr int kFineBits = 8;          // of a fine cell's number along an axis, at most
+constexpr int kMostBits = 7;          // the same of a cell from which the sky is looked at
 constexpr std::uint64_t kInCell = 8;  // places of a cell in the mean, at least
 constexpr float kAway = 1.5F;         // cells between a place and the cell from which it looks
 constexpr float kAlong = 0.1F;        // cosine to the normal up to which a direction leads along
                                       // the surface
+constexpr float kFineAway = 2.5F;     // fine cells between a place and where it looks for open air
+constexpr int kOpen = 3;              // directions that are seen in the open, at least
 
 std::size_t cell_at(int x, int y, int z, int bits) noexcept {
   return static_cast<std::size_t>((((z << bits) + y) << bits) + x);
@@ -32,36 +35,78 @@ std::size_t longest(const std::array<float, 3>& v) noexcept {
 
 }  // namespace
 
-SkyView::SkyView() : bits_(kMostBits), full_(std::size_t{1} << (3 * kMostBits)) {}
+void FullCells::halve() {
+  const int half = 1 << (bits_ - 1);
+  std::vector<bool> larger(full_.size() / 8);
+  for (int z = 0; z < 2 * half; ++z) {
+    for (int y = 0; y < 2 * half; ++y) {
+      for (int x = 0; x < 2 * half; ++x) {
+        if (full_[cell_at(x, y, z, bits_)]) larger[cell_at(x / 2, y / 2, z / 2, bits_ - 1)] = true;
+      }
+    }
+  }
+  full_ = std::move(larger);
+  --bits_;
+}
+
+double FullCells::width() const noexcept {
+  return std::ldexp(1.0, kLatticeBits - bits_);
+}
+
+std::uint64_t FullCells::count() const noexcept {
+  return static_cast<std::uint64_t>(std::ranges::count(full_, true));
+}
+
+bool FullCells::is_near(std::size_t cell) const noexcept {
+  const std::size_t last = (std::size_t{1} << bits_) - 1;
+  bool near = full_[cell];
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t at = (cell >> (axis * bits_)) & last;
+    const std::size_t stride = std::size_t{1} << (axis * bits_);
+    near = near || (at > 0 && full_[cell - stride]) || (at < last && full_[cell + stride]);
+  }
+  return near;
+}
+
+std::size_t FullCells::cell_of(const LatticePosition& position) const noexcept {
+  const auto cell = [&](double x) {
+    return static_cast<int>(static_cast<std::uint64_t>(x) >> (kLatticeBits - bits_));
+  };
+  return cell_at(cell(position[0]), cell(position[1]), cell(position[2]), bits_);
+}
+
+std::array<int, 3> FullCells::along(const LatticePosition& position,
+                                    const std::array<float, 3>& vector,
+                                    float cells) const noexcept {
+  std::array<int, 3> cell{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double away = double{cells} * double{vector[k]};
+    cell[k] = static_cast<int>(std::floor(position[k] / width() + away));
+  }
+  return cell;
+}
+
+bool FullCells::holds(const std::array<int, 3>& cell) const noexcept {
+  return std::ranges::all_of(cell, [this](int c) { return c >= 0 && c < (1 << bits_); });
+}
+
+std::size_t FullCells::number(const std::array<int, 3>& cell) const noexcept {
+  return cell_at(cell[0], cell[1], cell[2], bits_);
+}
+
+SkyView::SkyView() : fine_(kFineBits), cells_(0) {}
 
 void SkyView::add(const LatticePosition& position) noexcept {
-  full_[cell_of(position)] = true;
+  fine_.add(position);
   ++places_;
 }
 
-/// Makes the cells so large that they hold enough places.
-void SkyView::choose_cells() {
-  const auto too_few = [&] {
-    return kInCell * static_cast<std::uint64_t>(std::ranges::count(full_, true)) > places_;
-  };
-  while (bits_ > 1 && too_few()) {
-    const int half = 1 << (bits_ - 1);
-    std::vector<bool> larger(std::size_t{1} << (3 * (bits_ - 1)));
-    for (int z = 0; z < 2 * half; ++z) {
-      for (int y = 0; y < 2 * half; ++y) {
-        for (int x = 0; x < 2 * half; ++x) {
-          if (full_[cell_at(x, y, z, bits_)])
-            larger[cell_at(x / 2, y / 2, z / 2, bits_ - 1)] = true;
-        }
-      }
-    }
-    full_ = std::move(larger);
-    --bits_;
-  }
-}
-
 void SkyView::finish(const std::array<float, 3>& up) {
-  choose_cells();
+  up_ = up;
+  // Make the cells so large that they hold enough places.
+  while (fine_.bits() > 1 && kInCell * fine_.count() > places_) fine_.halve();
+  cells_ = fine_;
+  while (cells_.bits() > kMostBits) cells_.halve();
   // Spread the directions over the upper hemisphere: a ring of eight at 20 degrees, one of five at
   // 45 and one of three at 70.
   const Basis basis(glm::vec3(up[0], up[1], up[2]));
@@ -78,7 +123,7 @@ void SkyView::finish(const std::array<float, 3>& up) {
   add_ring(8, 20);
   add_ring(5, 45);
   add_ring(3, 70);
-  seen_.assign(full_.size(), 0);
+  seen_.assign(cells_.size(), 0);
   for (std::size_t d = 0; d < directions_.size(); ++d) look(d);
 }
 
@@ -88,7 +133,7 @@ void SkyView::look(std::size_t direction) {
   const std::array<float, 3>& d = directions_[direction];
   const std::size_t main = longest(d);
   const std::size_t a = main == 0 ? 1 : 0, b = main == 2 ? 1 : 2;
-  const int size = 1 << bits_, step = d[main] > 0 ? 1 : -1;
+  const int size = 1 << cells_.bits(), step = d[main] > 0 ? 1 : -1;
   const std::array<std::ptrdiff_t, 3> strides{1, size, std::ptrdiff_t{size} * size};
   const auto moved = [&](std::size_t axis, int layer) {
     return static_cast<int>(
@@ -106,7 +151,7 @@ void SkyView::look(std::size_t direction) {
         bool sees = true;
         if (inside && u + du >= 0 && u + du < size) {
           const auto other = static_cast<std::size_t>(at + next);
-          sees = (seen_[other] & bit) != 0 && !full_[other];
+          sees = (seen_[other] & bit) != 0 && !cells_[other];
         }
         if (sees) seen_[static_cast<std::size_t>(at)] |= bit;
       }
@@ -114,34 +159,12 @@ void SkyView::look(std::size_t direction) {
   }
 }
 
-std::size_t SkyView::cell_of(const LatticePosition& position) const noexcept {
-  const auto cell = [&](double x) {
-    return static_cast<int>(static_cast<std::uint64_t>(x) >> (kLatticeBits - bits_));
-  };
-  return cell_at(cell(position[0]), cell(position[1]), cell(position[2]), bits_);
-}
-
-double SkyView::cell_width() const noexcept {
-  return std::ldexp(1.0, kLatticeBits - bits_);
-}
-
-std::size_t SkyView::cell_along(const LatticePosition& position, const std::array<float, 3>& normal,
-                                float cells) const noexcept {
-  std::array<int, 3> cell{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double away = double{cells} * double{normal[k]};
-    cell[k] = static_cast<int>(std::floor(position[k] / cell_width() + away));
-    if (cell[k] < 0 || cell[k] >= (1 << bits_)) return kOutside;
-  }
-  return cell_at(cell[0], cell[1], cell[2], bits_);
-}
-
 int SkyView::more_in_front(const LatticePosition& position,
                            const std::array<float, 3>& normal) const noexcept {
-  const std::size_t own = cell_of(position);
+  const std::size_t own = cells_.cell_of(position);
   for (const float way : {-kAway, -2 * kAway / 3, -kAway / 3, kAway / 3, 2 * kAway / 3, kAway}) {
-    const std::size_t cell = cell_along(position, normal, way);
-    if (cell != own && cell != kOutside && full_[cell]) return 0;
+    const auto cell = cells_.along(position, normal, way);
+    if (cells_.holds(cell) && cells_.number(cell) != own && cells_[cells_.number(cell)]) return 0;
   }
   unsigned front = 0, behind = 0;
   for (std::size_t d = 0; d < directions_.size(); ++d) {
@@ -152,10 +175,38 @@ int SkyView::more_in_front(const LatticePosition& position,
   }
   // Around the grid there is nothing that would hide the sky
   const auto seen = [&](float side) -> unsigned {
-    const std::size_t cell = cell_along(position, normal, side);
-    return cell == kOutside ? 0xffff : seen_[cell];
+    const auto cell = cells_.along(position, normal, side);
+    return cells_.holds(cell) ? seen_[cells_.number(cell)] : 0xffff;
   };
   return std::popcount(front & seen(kAway)) - std::popcount(behind & seen(-kAway));
+}
+
+SkyView::Air SkyView::air_at(const std::array<int, 3>& fine_cell) const noexcept {
+  if (!fine_.holds(fine_cell)) {
+    // Around the grid there is air, and underneath it the ground.
+    const auto is_below = [&](std::size_t k) {
+      return fine_cell[k] < 0 ? up_[k] > 0.5F
+                              : fine_cell[k] >= (1 << fine_.bits()) && up_[k] < -0.5F;
+    };
+    return is_below(0) || is_below(1) || is_below(2) ? Air::unclear : Air::open;
+  }
+  if (fine_.is_near(fine_.number(fine_cell))) return Air::unclear;
+  std::array<int, 3> cell = fine_cell;
+  for (int& c : cell) c >>= fine_.bits() - cells_.bits();
+  return std::popcount(seen_[cells_.number(cell)]) < kOpen ? Air::hidden : Air::open;
+}
+
+int SkyView::open_side(const LatticePosition& position,
+                       const std::array<float, 3>& normal) const noexcept {
+  for (const float way :
+       {-0.7F * kFineAway, -0.4F * kFineAway, 0.4F * kFineAway, 0.7F * kFineAway}) {
+    const auto cell = fine_.along(position, normal, way);
+    if (fine_.holds(cell) && fine_[fine_.number(cell)]) return 0;
+  }
+  const Air front = air_at(fine_.along(position, normal, kFineAway));
+  const Air behind = air_at(fine_.along(position, normal, -kFineAway));
+  if (front == Air::unclear || behind == Air::unclear || front == behind) return 0;
+  return front == Air::open ? 1 : -1;
 }
 
 }  // namespace ptc

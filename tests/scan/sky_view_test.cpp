@@ -98,6 +98,27 @@ TEST_CASE("sky view: from under a roof less is seen, and from inside of a box no
   CHECK(more(view, {0.2, 0.5, 0.25}, {1, 0, 0}) <= -6);
 }
 
+TEST_CASE("sky view: the outside of a house is in the open, its inside is not", "[scan][sky]") {
+  std::vector<glm::dvec3> places;
+  add_square(places, 2, 0.05, 0, 1);  // the ground
+  for (const double at : {0.3, 0.7}) {
+    add_square(places, 0, at, 0.3, 0.7);
+    add_square(places, 1, at, 0.3, 0.7);
+  }
+  add_square(places, 2, 0.7, 0.3, 0.7);  // the roof
+  const SkyView view = view_of(places, {0, 0, 1});
+  const auto side = [&](const glm::dvec3& p, const std::array<float, 3>& normal) {
+    const double unit = std::ldexp(1.0, kLatticeBits);
+    return view.open_side({p.x * unit, p.y * unit, p.z * unit}, normal);
+  };
+  CHECK(side({0.3, 0.5, 0.5}, {-1, 0, 0}) == 1);
+  CHECK(side({0.3, 0.5, 0.5}, {1, 0, 0}) == -1);
+  CHECK(side({0.5, 0.7, 0.5}, {0, 1, 0}) == 1);
+  CHECK(side({0.5, 0.5, 0.7}, {0, 0, -1}) == -1);
+  CHECK(side({0.5, 0.5, 0.7}, {0.7071F, 0, 0.7071F}) == 1);
+  CHECK(side({0.3, 0.5, 0.3}, {0, 0, 1}) == 0);  // along the wall, air is on both sides
+}
+
 TEST_CASE("orientation: houses without floors on the ground turn outwards", "[scan][orientation]") {
   // Four houses of different heights; the ground ends at their walls.
   Random random(3);

@@ -10,7 +10,6 @@
 #include "engine/base/numbers.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/scene/procedural/city.h"
-#include "engine/scene/sampling/directions.h"
 
 namespace ptc::bench {
 namespace {
@@ -68,33 +67,35 @@ class Sampler {
   std::vector<double> ends_;  ///< area up to each triangle and with it
 };
 
-/// Returns how many more solids a ray leaves than it enters on its way to the sky.
-int left_solids(const RayScene& scene, const glm::dvec3& from, const glm::vec3& ray) {
+/// Says whether a ray begins in a solid: on its way to the sky it leaves a solid that it has not
+/// entered.
+bool begins_inside(const RayScene& scene, const glm::dvec3& from, const glm::vec3& ray) {
   constexpr int kMostHits = 64;
-  int left = 0;
+  int entered = 0;
   double near = 0;
-  for (int i = 0; i < kMostHits; ++i) {
+  for (int i = 0; i < kMostHits && entered >= 0; ++i) {
     const auto hit = scene.closest(from, ray, near, std::numeric_limits<double>::infinity());
     if (!hit) break;
-    left += hit->front ? -1 : 1;
+    entered += hit->front ? 1 : -1;
     near = hit->distance + scene.epsilon();
   }
-  return left;
+  return entered < 0;
 }
 
-/// Says whether a point lies in the open: that of 16 rays over its front side no more than half
-/// leave more solids than they enter, as all rays do from within a solid, or from a floor that
-/// walls enclose.
+/// Says whether a point lies in the open: of pairs of opposite rays from its front side, fewer than
+/// half begin in a solid. From the ground below a house, rays downwards say nothing.
 bool is_open(const RayScene& scene, const SampledPoint& point, Numbers& numbers) {
-  constexpr int kRays = 16;
+  constexpr int kPairs = 8;
   int inside = 0;
-  const Basis basis(point.normal);
   const glm::dvec3 from = point.origin + scene.epsilon() * glm::dvec3(point.normal);
-  for (int i = 0; i < kRays && inside <= kRays / 2 && i - inside < kRays / 2; ++i) {
-    const glm::vec2 square(numbers.uniform(), numbers.uniform());
-    if (left_solids(scene, from, basis.to_world(cosine_direction(square))) > 0) ++inside;
+  for (int i = 0; i < kPairs; ++i) {
+    const double z = 2 * numbers.uniform() - 1, angle = 2 * std::numbers::pi * numbers.uniform();
+    const double across = std::sqrt(1 - z * z);
+    const glm::vec3 ray(across * std::cos(angle), across * std::sin(angle), z);
+    inside += begins_inside(scene, from, ray) ? 1 : 0;
+    inside += begins_inside(scene, from, -ray) ? 1 : 0;
   }
-  return inside <= kRays / 2;
+  return inside < kPairs;
 }
 
 }  // namespace
