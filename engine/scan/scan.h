@@ -80,8 +80,9 @@ class ScanStream : public PointStream {
 ///   - A normal is that of a quadratic surface through the nearest points: 16, or 48 where these
 ///     are noisy or lie on a line. Neighbours off the surface, as beyond an edge, count less.
 ///   - Normals turn to the scanner where its place is known, upwards in aerial scans, and
-///     otherwise so that neighbours agree and the side that sees more of the sky is the front. A
-///     connected part without any hint turns outwards, or upwards where it is an open sheet.
+///     otherwise so that neighbours agree, and the side that is in the open, or sees more of the
+///     sky, is the front. A connected part without any hint turns outwards, or upwards where it is
+///     an open sheet.
 ///   - A radius lets the disc circumscribe the cell of its point; between scan lines it reaches
 ///     half-way to the next line. It is 0 for a cloud of coincident points.
 ///   - Points that coincide count as one, and get the same normal and radius.

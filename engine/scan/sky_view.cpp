@@ -183,7 +183,7 @@ int SkyView::more_in_front(const LatticePosition& position,
 
 SkyView::Air SkyView::air_at(const std::array<int, 3>& fine_cell) const noexcept {
   if (!fine_.holds(fine_cell)) {
-    // Around the grid there is air, and underneath it the ground.
+    // Around the grid there is air; underneath it the ground may be.
     const auto is_below = [&](std::size_t k) {
       return fine_cell[k] < 0 ? up_[k] > 0.5F
                               : fine_cell[k] >= (1 << fine_.bits()) && up_[k] < -0.5F;
