@@ -10,8 +10,8 @@
 // A vote is what two neighbouring places say about their sides. All places whose side is known
 // beforehand form one piece, number 0, which is never flipped. The sky votes, too, as if it were of
 // that piece, if no scanner is known: on patches, for the side that is in the open where the other
-// is not, and on pieces, for the side from which more of it is seen. An island without
-// any of this turns outwards, or upwards where it is an open sheet.
+// is not, and on pieces, for the side from which more of it is seen. An island without any of this
+// turns outwards, or upwards where it is an open sheet.
 #pragma once
 
 #include <array>

@@ -36,25 +36,20 @@ std::size_t longest(const std::array<float, 3>& v) noexcept {
 }  // namespace
 
 void FullCells::halve() {
-  const int half = 1 << (bits_ - 1);
-  std::vector<bool> larger(full_.size() / 8);
-  for (int z = 0; z < 2 * half; ++z) {
-    for (int y = 0; y < 2 * half; ++y) {
-      for (int x = 0; x < 2 * half; ++x) {
-        if (full_[cell_at(x, y, z, bits_)]) larger[cell_at(x / 2, y / 2, z / 2, bits_ - 1)] = true;
+  const int size = 1 << bits_;
+  FullCells wider(bits_ - 1);
+  for (int z = 0; z < size; ++z) {
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        if (full_[cell_at(x, y, z, bits_)]) wider.fill(cell_at(x / 2, y / 2, z / 2, wider.bits_));
       }
     }
   }
-  full_ = std::move(larger);
-  --bits_;
+  *this = std::move(wider);
 }
 
 double FullCells::width() const noexcept {
   return std::ldexp(1.0, kLatticeBits - bits_);
-}
-
-std::uint64_t FullCells::count() const noexcept {
-  return static_cast<std::uint64_t>(std::ranges::count(full_, true));
 }
 
 bool FullCells::is_near(std::size_t cell) const noexcept {

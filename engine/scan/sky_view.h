@@ -27,7 +27,7 @@ class FullCells {
   /// @param bits  of a cell's number along an axis
   explicit FullCells(int bits) : bits_(bits), full_(std::size_t{1} << (3 * bits)) {}
 
-  void add(const LatticePosition& position) noexcept { full_[cell_of(position)] = true; }
+  void add(const LatticePosition& position) noexcept { fill(cell_of(position)); }
   /// Makes cells that are twice as wide.
   void halve();
 
@@ -37,7 +37,7 @@ class FullCells {
   /// Returns the number of all cells.
   [[nodiscard]] std::size_t size() const noexcept { return full_.size(); }
   /// Returns the number of cells that hold places.
-  [[nodiscard]] std::uint64_t count() const noexcept;
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   /// Says whether a cell holds a place.
   [[nodiscard]] bool operator[](std::size_t cell) const noexcept { return full_[cell]; }
   /// Says whether a cell, or one that shares a face with it, holds a place.
@@ -55,8 +55,14 @@ class FullCells {
   [[nodiscard]] std::size_t number(const std::array<int, 3>& cell) const noexcept;
 
  private:
+  void fill(std::size_t cell) noexcept {
+    count_ += full_[cell] ? 0U : 1U;
+    full_[cell] = true;
+  }
+
   int bits_;
   std::vector<bool> full_;
+  std::uint64_t count_ = 0;
 };
 
 /// The sky as a cloud sees it, in 16 directions at 10 degrees above the horizon and more.
@@ -67,7 +73,7 @@ class FullCells {
 class SkyView {
  public:
   static constexpr int kDirections = 16;
-  static constexpr std::uint64_t kBytes = std::uint64_t{7} << 20;
+  static constexpr std::uint64_t kBytes = std::uint64_t{25} << 18;
 
   SkyView();
   /// Adds a place of the cloud.

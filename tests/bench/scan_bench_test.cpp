@@ -12,7 +12,7 @@ using namespace ptc;
 using namespace ptc::bench;
 
 TEST_CASE("scan: what the walls of a house enclose is not drawn", "[bench][scan]") {
-  // The floors of the city's houses are a sixth of its area, and face down as its ledges do.
+  // The floors of the city's houses are a fifth of its area, and face down as its ledges do.
   const Mesh mesh = mesh_of(parse_scene("city"), 100'000, {});
   const RayScene rays(mesh);
   const auto points = sample_at_random(rays, {.points = 100'000});
