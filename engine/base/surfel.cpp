@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 namespace ptc {
 
@@ -14,6 +15,10 @@ bool fits_coordinates(const glm::dvec3& p) noexcept {
 
 void Bounds::add(const glm::dvec3& p) noexcept {
   add(Bounds{p, p});
+}
+
+bool Bounds::contains(const glm::dvec3& p) const noexcept {
+  return glm::all(glm::lessThanEqual(low, p)) && glm::all(glm::lessThanEqual(p, high));
 }
 
 void Bounds::add(const Bounds& other) noexcept {

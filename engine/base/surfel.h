@@ -36,6 +36,8 @@ struct Bounds {
   void add(const glm::dvec3& p) noexcept;
   /// Enlarges the box to hold another one; an empty one changes nothing.
   void add(const Bounds& other) noexcept;
+  /// Says whether a point lies in the box or on its sides.
+  [[nodiscard]] bool contains(const glm::dvec3& p) const noexcept;
 };
 
 }  // namespace ptc

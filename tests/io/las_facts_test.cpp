@@ -59,6 +59,43 @@ std::string description(unsigned type, unsigned options, std::string name,
 
 }  // namespace
 
+TEST_CASE("las: the box of the header is told where the points do not speak against it",
+          "[io][points][las]") {
+  const test::TemporaryDirectory scratch;
+  LasFile file{.points = 3};
+  file.low = {-1, 0, 2};
+  file.high = {1, 10, 2};
+  file.records = las_point(-100, 0, 200) + las_point(100, 1000, 200) + las_point(0, 100, 200);
+  const PointFileInfo told = read_las(scratch, file.bytes()).info;
+  REQUIRE(told.bounds);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    CHECK(told.bounds->low[axis] == Approx(file.low[k]).margin(1e-4));
+    CHECK(told.bounds->high[axis] == Approx(file.high[k]).margin(1e-4));
+    CHECK(told.bounds->low[axis] < file.low[k]);
+    CHECK(told.bounds->high[axis] > file.high[k]);
+  }
+  REQUIRE(told.sample.size() == 1);
+  CHECK(told.sample[0] == glm::dvec3(-1, 0, 2));
+
+  // One that does not hold a point, one that is far too large, and one that is no box are not told
+  const auto not_told = [&](std::size_t axis, double low, double high) {
+    LasFile other = file;
+    other.low[axis] = low;
+    other.high[axis] = high;
+    const PointFileInfo info = read_las(scratch, other.bytes()).info;
+    CHECK_FALSE(info.bounds);
+    CHECK(info.sample.empty());
+  };
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  not_told(0, 0, 1);
+  not_told(0, 1, -1);
+  not_told(0, kNaN, 1);
+  not_told(0, -1, kInfinity);
+  not_told(1, 0, 21);
+}
+
 TEST_CASE("las: described extra bytes become channels of their type", "[io][points][las]") {
   const test::TemporaryDirectory scratch;
   LasFile file;

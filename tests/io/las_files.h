@@ -21,6 +21,7 @@ struct LasFile {
   std::uint64_t points = 0;  ///< in the field of the version
   std::array<double, 3> scale = {0.01, 0.01, 0.01};
   std::array<double, 3> offset = {0, 0, 0};
+  std::array<double, 3> low = {0, 0, 0}, high = {0, 0, 0};  ///< of the points
   std::vector<std::string> vlrs;
   std::string records;             ///< of the points
   std::vector<std::string> evlrs;  ///< of version 1.4 on
@@ -41,7 +42,7 @@ struct LasFile {
     out += u16(record_bytes) + u32(minor >= 4 ? 0 : points) + std::string(20, '\0');
     for (const double value : scale) out += raw(value);
     for (const double value : offset) out += raw(value);
-    out += std::string(48, '\0');
+    for (std::size_t axis = 0; axis < 3; ++axis) out += raw(high[axis]) + raw(low[axis]);
     if (minor >= 3) out += raw(std::uint64_t{0});
     if (minor >= 4) {
       out += raw(std::uint64_t{evlrs.empty() ? 0 : points_offset + records.size()});

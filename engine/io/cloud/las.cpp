@@ -11,6 +11,7 @@
 // the points before it were read wrongly.
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -31,6 +32,7 @@ namespace {
 
 constexpr std::string_view kSpecUser = "LASF_Spec";
 constexpr unsigned kExtraBytesNumber = 4;
+constexpr std::size_t kSampleStride = 16;  // every so many records of the sample give a position
 constexpr std::size_t kMaxRowsBytes = std::size_t{1} << 24;  // returned at once
 
 // How the colours of a file are to be understood.
@@ -54,6 +56,11 @@ std::string shortest(double value) {
   return {text.data(), end};
 }
 
+double largest_side(const Bounds& box) {
+  const glm::dvec3 sides = box.high - box.low;
+  return std::max({sides.x, sides.y, sides.z});
+}
+
 // Returns the linear value of each stored one from 0 to `most`.
 std::vector<double> tabulate_srgb(std::size_t most) {
   std::vector<double> curve(most + 1);
@@ -69,7 +76,7 @@ class LasSource : public PointSource {
         header_(read_las_header(file_)),
         rows_of_(header_),
         records_(open_las_records(file_, header_)) {
-    look_at_colours();
+    look_at_points();
     static const std::vector<double> narrow = tabulate_srgb(255);
     static const std::vector<double> wide = tabulate_srgb(65535);
     if (colours_ == Colours::eight_bits) curve_ = narrow;
@@ -81,6 +88,7 @@ class LasSource : public PointSource {
     PointFileInfo info;
     info.count = header_.points;
     info.has_albedo = !curve_.empty();
+    add_bounds(info);
     add_channels(info);
     add_texts(info);
     if (colours_ == Colours::eight_bits) {
@@ -117,18 +125,43 @@ class LasSource : public PointSource {
   [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return rows_; }
 
  private:
-  // Decides what the colours are by a sample of the points.
-  void look_at_colours() {
-    if (!laz::has_rgb(header_.format) || header_.points == 0) return;
+  // Takes a sample of the points, which decides what the colours are.
+  void look_at_points() {
+    if (header_.points == 0) return;
+    const bool coloured = laz::has_rgb(header_.format);
     const std::size_t place = rgb_place(header_.format);
     std::uint16_t most = 0;
+    std::size_t looked = 0;
     records_->sample([&](std::span<const std::byte> records) {
-      for (; !records.empty(); records = records.subspan(header_.record_bytes))
-        most = std::max(most, std::ranges::max(rgb_at(records.data(), place)));
+      for (; !records.empty(); records = records.subspan(header_.record_bytes)) {
+        const glm::dvec3 position = position_of(records.data());
+        sampled_.add(position);
+        if (looked++ % kSampleStride == 0) sample_.push_back(position);
+        if (coloured) most = std::max(most, std::ranges::max(rgb_at(records.data(), place)));
+      }
     });
+    if (!coloured) return;
     colours_ = most == 0    ? Colours::black
                : most > 255 ? Colours::sixteen_bits
                             : Colours::eight_bits;
+  }
+
+  // Gives the box of the header, unless the sample says that the box is wrong or far too large, as
+  // programs leave it that cut a part out of a file.
+  void add_bounds(PointFileInfo& info) const {
+    Bounds box;
+    for (std::size_t k = 0; k < 3; ++k) {
+      // Programs compute the box in their own ways, so it is larger by what rounding may change
+      const double rounding = std::abs(header_.scale[k]) / 1024;
+      const auto axis = static_cast<int>(k);
+      box.low[axis] = header_.low[k] - rounding;
+      box.high[axis] = header_.high[k] + rounding;
+    }
+    if (sampled_.empty() || !box.contains(sampled_.low) || !box.contains(sampled_.high)) return;
+    if (largest_side(sampled_) < largest_side(box) / 2) return;
+    if (!fits_coordinates(box.low) || !fits_coordinates(box.high)) return;
+    info.bounds = box;
+    info.sample = sample_;
   }
 
   void add_channels(PointFileInfo& info) const {
@@ -165,14 +198,20 @@ class LasSource : public PointSource {
     refuse_las(file_, block_.offset, "point " + std::to_string(done_) + ": " + rule);
   }
 
-  void read_surfel(const std::byte* record, Surfel& surfel) {
-    RawSurfel raw;
+  [[nodiscard]] glm::dvec3 position_of(const std::byte* record) const {
     std::array<std::int32_t, 3> place{};
     std::memcpy(place.data(), record, sizeof place);
+    glm::dvec3 position;
     for (int axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<std::size_t>(axis);
-      raw.position[axis] = static_cast<double>(place[k]) * header_.scale[k] + header_.offset[k];
+      position[axis] = static_cast<double>(place[k]) * header_.scale[k] + header_.offset[k];
     }
+    return position;
+  }
+
+  void read_surfel(const std::byte* record, Surfel& surfel) {
+    RawSurfel raw;
+    raw.position = position_of(record);
     if (colours_ != Colours::none) read_colour(record, raw);
     const std::string rule = convert_surfel(raw, false, surfel);
     if (!rule.empty()) fail(rule);
@@ -198,6 +237,8 @@ class LasSource : public PointSource {
   LasHeader header_;
   LasRows rows_of_;
   std::unique_ptr<LasRecordSource> records_;
+  Bounds sampled_;                  // of the points that were looked at on opening
+  std::vector<glm::dvec3> sample_;  // positions of some of them
   Colours colours_ = Colours::none;
   std::vector<double> curve_;    // linear value of each stored colour; empty without colours
   LasBlock block_;               // records that next() has not returned

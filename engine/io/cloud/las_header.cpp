@@ -136,6 +136,8 @@ class HeaderReader {
         fail(131 + 8 * axis, "a scale of coordinates is 0 or not a number");
       if (!std::isfinite(header_.offset[axis]))
         fail(155 + 8 * axis, "an offset of coordinates is not a number");
+      header_.high[axis] = load<double>(bytes_.data(), 179 + 16 * axis);
+      header_.low[axis] = load<double>(bytes_.data(), 187 + 16 * axis);
     }
   }
 

@@ -40,6 +40,12 @@ struct PointFileInfo {
   /// Where the scanners stood, scene units. A channel named `scan` holds the index of the scanner
   /// of each point; without one, all points are of the first. Empty when that is not known.
   std::vector<glm::dvec3> scanners;
+  /// A box that the file says holds all points, scene units. Points beyond it are possible, but
+  /// none of `sample` is. Nothing when the file says none that can be believed.
+  std::optional<Bounds> bounds;
+  /// Positions of points from places that are spread evenly over the file, scene units; empty
+  /// without `bounds`.
+  std::vector<glm::dvec3> sample;
   /// What the reader leaves out or assumes, one sentence each, for the user.
   std::vector<std::string> notes;
 };

@@ -88,8 +88,10 @@ struct SortedPoints {
 /// One build, from the request to the published container. run() is called once.
 class Build {
  public:
-  Build(const BuildRequest& request, const std::filesystem::path& target, Progress& progress)
+  Build(const BuildRequest& request, BoundsFrom from, const std::filesystem::path& target,
+        Progress& progress)
       : request_(request),
+        bounds_from_(from),
         target_(behind_links(target)),
         progress_(progress),
         executor_(request.run.threads) {}
@@ -238,8 +240,9 @@ class Build {
   /// Feeds all inputs to a sort, which writes them to the disk when memory does not hold them.
   SortedPoints sort() {
     // Read and measure the inputs, choose the frame
-    BuildInputs inputs = read_inputs(request_, scene_ ? &scene_->meta().channels : nullptr,
-                                     report_.seconds, progress_);
+    BuildInputs inputs =
+        read_inputs(request_, bounds_from_, scene_ ? &scene_->meta().channels : nullptr,
+                    report_.seconds, progress_);
     if (inputs.bounds.empty() && !scene_) {
       std::string names;
       for (const auto& input : request_.inputs) names += input.string() + ": ";
@@ -502,6 +505,7 @@ class Build {
   static std::uint64_t first_of_all(std::uint64_t /*point*/) { return 0; }
 
   BuildRequest request_;
+  const BoundsFrom bounds_from_;
   const std::filesystem::path target_;  ///< behind symbolic links
   Progress& progress_;
   const ThreadPool executor_;
@@ -515,7 +519,12 @@ class Build {
 
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
                             Progress& progress) {
-  return Build(request, target, progress).run();
+  try {
+    return Build(request, BoundsFrom::files, target, progress).run();
+  } catch (const BoundsExceeded& error) {
+    progress.note(std::string(error.what()) + ", so all points are read once more");
+  }
+  return Build(request, BoundsFrom::points, target, progress).run();
 }
 
 }  // namespace ptc

@@ -4,7 +4,8 @@
 //   feed_inputs()   files, meshes, city --> blocks of 2^14 surfels --> records --> sort
 //
 // Clouds are read twice, so that their points never have to fit in memory. The second pass counts
-// them again: a file that changed in between is an error.
+// them again: a file that changed in between is an error. A file that says the bounds of its points
+// is read once, if they need nothing else of a first pass.
 #include "engine/pipeline/build/build_inputs.h"
 
 #include <algorithm>
@@ -127,6 +128,7 @@ class Feeder {
     while (const std::size_t count = source.next(surfels_)) {
       const std::span<const std::byte> rows = source.attributes();
       const std::size_t row_bytes = rows.size() / count;
+      if (cloud.said) require_within(*cloud.said, count, cloud.path);
       executor_.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
           records_[i] = to_record(surfels_[i], frame_);
@@ -144,6 +146,14 @@ class Feeder {
   }
 
  private:
+  /// Compares the surfels that were read last with what their file says of their place.
+  void require_within(const Bounds& said, std::size_t count, const std::filesystem::path& path) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!said.contains(surfels_[i].position))
+        throw BoundsExceeded(path.string() + ": a point lies outside the bounds of its header");
+    }
+  }
+
   const AttributePlan& plan_;
   const Frame& frame_;
   ExternalSorter& sorter_;
@@ -165,13 +175,13 @@ bool has_emitters(const Mesh& mesh) {
                              [](const Material& m) { return m.emission != glm::vec3(0); });
 }
 
-BuildInputs read_files(const BuildRequest& request, const std::vector<Channel>* scene,
-                       Progress& progress) {
+BuildInputs read_files(const BuildRequest& request, BoundsFrom from,
+                       const std::vector<Channel>* scene, Progress& progress) {
   BuildInputs inputs;
   if (scene) inputs.attributes.add_input(*scene);
   for (const auto& input : request.inputs) {
     if (!holds_points(input)) continue;
-    inputs.clouds.measure(input, request.selection, inputs.attributes, progress);
+    inputs.clouds.measure(input, request.selection, from, inputs.attributes, progress);
   }
   if (!request.up.empty()) inputs.clouds.text[kUpKey] = request.up;
   const bool indexed =
@@ -210,7 +220,7 @@ BuildInputs read_files(const BuildRequest& request, const std::vector<Channel>* 
 
 }  // namespace
 
-void Clouds::measure(const std::filesystem::path& path, const Selection& selection,
+void Clouds::measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
                      AttributePlan& attributes, Progress& progress) {
   PointFile file = open_point_input(path, selection);
   // Note what the file says of all its points
@@ -222,7 +232,25 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   Cloud& cloud = files.emplace_back(Cloud{path});
   if (!file.info.channels.empty()) cloud.input = attributes.add_input(file.info.channels);
   note_scan(file.info, cloud);
-  // Read its points
+  // Take what it says of their place, or read them
+  const bool told = from == BoundsFrom::files && file.info.bounds && file.info.count &&
+                    selection.takes_all() && !file.info.has_normals && !file.info.has_radius &&
+                    !file.info.has_emission;
+  if (told) {
+    cloud.said = file.info.bounds;
+    cloud.points = *file.info.count;
+    bounds.add(*cloud.said);
+    sample.insert(sample.end(), file.info.sample.begin(), file.info.sample.end());
+    thin(sample);
+  } else {
+    read_points(file, cloud, name, progress);
+  }
+  points += cloud.points;
+}
+
+/// Reads the points of a cloud and notes what they need.
+void Clouds::read_points(PointFile& file, Cloud& cloud, const std::string& name,
+                         Progress& progress) {
   bool lacks_normals = false, lacks_radii = true;
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = file.source->next(block)) {
@@ -238,7 +266,6 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
     cloud.points += count;
     progress.advance(count);
   }
-  points += cloud.points;
   if ((lacks_normals || (lacks_radii && cloud.points > 0)) && !scan) scan.emplace().radii = false;
   if (scan && cloud.points > 0)
     scan->radii |= lacks_radii;  // formats that must have radii have zeros
@@ -262,11 +289,12 @@ void Clouds::note_scan(const PointFileInfo& info, Cloud& cloud) {
   }
 }
 
-BuildInputs read_inputs(const BuildRequest& request, const std::vector<Channel>* scene,
-                        StageSeconds& seconds, Progress& progress) {
+BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from,
+                        const std::vector<Channel>* scene, StageSeconds& seconds,
+                        Progress& progress) {
   if (request.city_points > 0) return lay_city(request.city_points);
   const Stage stage(seconds, progress, "read", 0, "points");
-  return read_files(request, scene, progress);
+  return read_files(request, from, scene, progress);
 }
 
 double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,

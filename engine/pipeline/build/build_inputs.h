@@ -12,6 +12,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "engine/base/error.h"
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/io/cloud/points.h"
@@ -26,6 +27,16 @@
 
 namespace ptc {
 
+/// Where the bounds of clouds come from. Those that a file says of itself save a pass over it.
+enum class BoundsFrom { files, points };
+
+/// Thrown when a point lies beyond the bounds that its file says. The build must measure the points
+/// themselves.
+class BoundsExceeded : public DataError {
+ public:
+  using DataError::DataError;
+};
+
 /// The clouds of a request, checked and measured in a first pass.
 struct Clouds {
   struct Cloud {
@@ -36,6 +47,8 @@ struct Clouds {
     /// Where the number of its scanner lies in the row of a point, and its bytes; 0 bytes when all
     /// points are of the first.
     std::size_t scanner_offset = 0, scanner_bytes = 0;
+    std::optional<Bounds>
+        said;  ///< the box that the file says of its points; unless they were read
   };
   std::vector<Cloud> files;
   Bounds bounds;                   ///< of all points, scene units
@@ -51,14 +64,16 @@ struct Clouds {
   std::map<std::string, std::string> text;
   std::map<std::string, std::string> named_by;  ///< by key of `text`: the file that it is of
 
-  /// Reads a cloud to its end and adds it to the others.
+  /// Adds a cloud to the others. Reads it to its end, unless all that is asked stands in front of
+  /// its points.
   /// @param attributes  gets the channels of the cloud
   /// @throws DataError when the file breaks its format; RequestError, FormatError as
   ///         open_point_input()
-  void measure(const std::filesystem::path& path, const Selection& selection,
+  void measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
                AttributePlan& attributes, Progress& progress);
 
  private:
+  void read_points(PointFile& file, Cloud& cloud, const std::string& name, Progress& progress);
   void note_scan(const PointFileInfo& info, Cloud& cloud);
 };
 
@@ -84,11 +99,12 @@ struct BuildInputs {
 };
 
 /// Reads the meshes and measures the clouds of a request.
+/// @param from     where the bounds of clouds may come from
 /// @param scene    channels of the container that the inputs are appended to, which become input 0
 ///                 of the plan; null: there is none
 /// @param seconds  gets a row for the stage "read", except for a city
 /// @throws DataError, std::system_error
-[[nodiscard]] BuildInputs read_inputs(const BuildRequest& request,
+[[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from,
                                       const std::vector<Channel>* scene, StageSeconds& seconds,
                                       Progress& progress);
 
@@ -96,7 +112,7 @@ struct BuildInputs {
 /// sorts of attributes. Meshes are sampled and lit on the way, and freed afterwards.
 /// @param first  number of points that the container has before these
 /// @return  distance between neighbouring surfels on the meshes, scene units; 0 without meshes
-/// @throws DataError when a cloud changed since it was measured; std::system_error
+/// @throws BoundsExceeded; DataError when a cloud changed since it was measured; std::system_error
 double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
                    std::uint64_t first, ExternalSorter& sorter, AttributeSorts& attributes,
                    const Executor& executor, Progress& progress);
