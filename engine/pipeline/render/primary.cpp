@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/pipeline/render/overview.h"
 #include "engine/pipeline/scene_record.h"
 
 namespace ptc {
@@ -55,49 +56,6 @@ class MeshView : public PrimaryView {
   float lift_;
 };
 
-/// Returns a camera that sees everything from the front, the right and above, as near as all
-/// corners of the bounds allow. A backdrop is larger than what stands on it, so it is seen from
-/// half the distance and may leave the picture.
-/// @param up  unit; the axis that points up
-Camera overview(const Superblock& superblock, const glm::dvec3& up, bool backdrop,
-                const std::optional<std::array<unsigned, 2>>& size) {
-  // Look at the middle of the bounds
-  const glm::dvec3 low(superblock.bounds_low[0], superblock.bounds_low[1],
-                       superblock.bounds_low[2]);
-  const glm::dvec3 high(superblock.bounds_high[0], superblock.bounds_high[1],
-                        superblock.bounds_high[2]);
-  Camera camera;
-  if (size) {
-    camera.width = (*size)[0];
-    camera.height = (*size)[1];
-  }
-  camera.look_at = (low + high) * 0.5;
-  // Stand on the side of +z when +y is up, of -y when +z is, of +y when +x is
-  const glm::dvec3 from(0.45, 0.35, 1);
-  const glm::dvec3 away = glm::normalize(up.z > 0   ? glm::dvec3(from.x, -from.z, from.y)
-                                         : up.x > 0 ? glm::dvec3(from.y, from.z, from.x)
-                                                    : from);
-  camera.up = glm::vec3(up);
-  camera.position = camera.look_at + away;
-
-  // Step back until every corner is in the picture, with a margin of 5 %
-  const CameraAxes axes = axes_of(camera);
-  const double tall = std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * 0.95;
-  const double wide = tall * camera.width / camera.height;
-  double distance = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    glm::dvec3 p;
-    for (int axis = 0; axis < 3; ++axis)
-      p[axis] = ((corner >> axis & 1) != 0 ? high : low)[axis] - camera.look_at[axis];
-    const double aside =
-        std::max(std::abs(glm::dot(p, axes.right)) / wide, std::abs(glm::dot(p, axes.up)) / tall);
-    distance = std::max(distance, aside - glm::dot(p, axes.forward));
-  }
-  camera.position =
-      camera.look_at + away * (distance > 0 ? distance * (backdrop ? 0.5 : 1.0) : 1.0);
-  return camera;
-}
-
 }  // namespace
 
 std::unique_ptr<PrimaryView> view_mesh(const RayScene& scene, const DirectLight& light,
@@ -111,7 +69,7 @@ Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> 
   const auto& text = scene.meta().text;
   if (const auto recorded = text.find(kCameraKey); recorded != text.end())
     return camera_from_json(recorded->second);
-  if (cameras.empty()) return overview(scene.superblock(), up_of(text), backdrop, size);
+  if (cameras.empty()) return overview(scene, up_of(text), backdrop, size);
   Camera camera;
   const MeshCamera& from = cameras.front();
   const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);

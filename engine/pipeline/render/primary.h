@@ -72,8 +72,7 @@ class PrimaryView {
                                                         unsigned side, const Executor& executor);
 
 /// Returns the camera of a request that names none: the one recorded in the container or, without a
-/// record, the first one of the mesh files or, without that, one that sees everything from the
-/// front, the right and above.
+/// record, the first one of the mesh files or, without that, that of overview().
 /// @param backdrop  the scene stands on a backdrop, which is larger and may leave the picture
 /// @param size      width and height of the picture; empty: those of the camera
 [[nodiscard]] Camera default_camera(const ContainerReader& scene,

@@ -1,0 +1,169 @@
+// A scene is in the picture when it lies on the inner side of four planes through the eye:
+//
+//          a \       / b        along an axis across the view, with s = tan of half the angle:
+//             \ o o /             x - s z <= e_x - s e_z      plane a
+//              \ o /             -x - s z <= -e_x - s e_z     plane b
+//               \ /
+//                e            so the farthest points to each side give the nearest eye
+#include "engine/pipeline/render/overview.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "engine/pipeline/convert/level_source.h"
+#include "format/error.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kClusters = 1000;  // that are framed, at least, where there are as many
+constexpr double kLeftOut = 1.0 / 2000;  // of the area, to each side
+constexpr double kMargin = 0.95;         // of half the picture, which the scene fills
+
+/// A part of the scene that is to be seen, a disc.
+struct Part {
+  glm::dvec3 middle{0};
+  glm::dvec3 normal{0};  ///< unit
+  double radius = 0;
+};
+
+/// Returns the corners of the bounds.
+std::vector<Part> corners_of(const Superblock& superblock) {
+  std::vector<Part> parts(8);
+  for (std::size_t corner = 0; corner < parts.size(); ++corner) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto& side = (corner >> axis & 1) != 0 ? superblock.bounds_high : superblock.bounds_low;
+      parts[corner].middle[static_cast<int>(axis)] = side[axis];
+    }
+  }
+  return parts;
+}
+
+/// Returns the clusters of a level.
+std::vector<Part> clusters_of(const ContainerReader& scene, unsigned level) {
+  std::vector<Part> parts;
+  const auto clusters = open_level(scene, level, {});
+  std::vector<Surfel> block(kClusters);
+  while (const std::size_t count = clusters->next(block)) {
+    for (std::size_t i = 0; i < count; ++i)
+      parts.push_back({block[i].position, glm::dvec3(block[i].normal), block[i].radius});
+  }
+  return parts;
+}
+
+/// Returns the clusters of the first level that has enough of them; none where a page is damaged.
+std::vector<Part> clusters_of(const ContainerReader& scene) {
+  std::vector<Part> parts;
+  try {
+    for (unsigned level = 1; level <= scene.superblock().levels && parts.size() < kClusters;
+         ++level)
+      parts = clusters_of(scene, level);
+  } catch (const FormatError&) {
+    return {};
+  }
+  return parts;
+}
+
+/// Returns how far parts reach along a direction that may be of any length, but for the small area
+/// that reaches farthest.
+double reach(const std::vector<Part>& parts, const glm::dvec3& direction) {
+  struct Reach {
+    double at, area;
+  };
+  std::vector<Reach> reaches;
+  double left = 0;
+  for (const Part& part : parts) {
+    const double aside = glm::length(glm::cross(part.normal, direction));
+    const double area = part.radius * part.radius;
+    reaches.push_back({glm::dot(part.middle, direction) + part.radius * aside, area});
+    left += area * kLeftOut;
+  }
+  std::ranges::sort(reaches, std::greater<>(), &Reach::at);
+  for (const Reach& next : reaches) {
+    if ((left -= next.area) < 0) return next.at;
+  }
+  return reaches.front().at;  // none has an area
+}
+
+/// The edge of two planes that just hold the parts between them.
+struct Wedge {
+  /// @param across   unit; the axis of the picture that the planes bound
+  /// @param forward  unit
+  /// @param slope    tangent of the angle between a plane and `forward`
+  Wedge(const std::vector<Part>& parts, const glm::dvec3& across, const glm::dvec3& forward,
+        double slope) {
+    const double one = reach(parts, across - slope * forward);
+    const double other = reach(parts, -across - slope * forward);
+    depth = -(one + other) / (2 * slope);
+    aside = (one - other) / 2;
+  }
+
+  double depth;  ///< along `forward`
+  double aside;  ///< along `across`
+};
+
+/// Returns where along an axis of the picture an eye at a given depth has the parts in the middle:
+/// at the edge of the steepest wedge that begins there.
+double middle_of(const std::vector<Part>& parts, const glm::dvec3& across,
+                 const glm::dvec3& forward, double slope, double depth) {
+  constexpr int kHalvings = 20;
+  double low = 0;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double half = (low + slope) / 2;
+    (Wedge(parts, across, forward, half).depth < depth ? low : slope) = half;
+  }
+  return Wedge(parts, across, forward, slope).aside;
+}
+
+}  // namespace
+
+Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdrop,
+                const std::optional<std::array<unsigned, 2>>& size) {
+  const Superblock& superblock = scene.superblock();
+  Camera camera;
+  if (size) {
+    camera.width = (*size)[0];
+    camera.height = (*size)[1];
+  }
+  std::vector<Part> parts;
+  if (!backdrop) parts = clusters_of(scene);
+  if (parts.empty()) parts = corners_of(superblock);
+  // Measure from the middle of the bounds, where numbers are small
+  glm::dvec3 middle(0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    middle[static_cast<int>(axis)] =
+        superblock.bounds_low[axis] / 2 + superblock.bounds_high[axis] / 2;
+  }
+  for (Part& part : parts) part.middle -= middle;
+
+  // Look from the side of +z when +y is up, of -y when +z is, of +y when +x is
+  const glm::dvec3 from(0.45, 0.35, 1);
+  const glm::dvec3 away = glm::normalize(up.z > 0   ? glm::dvec3(from.x, -from.z, from.y)
+                                         : up.x > 0 ? glm::dvec3(from.y, from.z, from.x)
+                                                    : from);
+  camera.up = glm::vec3(up);
+  camera.look_at = middle;
+  camera.position = middle + away;
+
+  // Stand as near as both pairs of planes allow, and look at the middle of what they leave
+  const CameraAxes axes = axes_of(camera);
+  const double tall = std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * kMargin;
+  const double wide = tall * camera.width / camera.height;
+  const double nearest = std::min(Wedge(parts, axes.right, axes.forward, wide).depth,
+                                  Wedge(parts, axes.up, axes.forward, tall).depth);
+  const double target = (reach(parts, axes.forward) - reach(parts, -axes.forward)) / 2;
+  double distance = target - nearest;
+  if (distance <= 0) distance = 1;  // a single point
+  const double depth = target - distance;
+  camera.look_at = middle + axes.right * middle_of(parts, axes.right, axes.forward, wide, depth) +
+                   axes.up * middle_of(parts, axes.up, axes.forward, tall, depth) +
+                   axes.forward * target;
+  camera.position = camera.look_at - axes.forward * distance * (backdrop ? 0.5 : 1.0);
+  return camera;
+}
+
+}  // namespace ptc

@@ -1,0 +1,28 @@
+// The camera that sees a whole scene.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <glm/vec3.hpp>
+
+#include "engine/scene/camera.h"
+#include "engine/store/reader.h"
+
+namespace ptc {
+
+/// Returns a camera that sees a scene from the front, the right and above, and that the scene fills
+/// as far as its shape allows. What fits are the clusters of a coarse level of the octree, but for
+/// the 2,000th part of their area that reaches farthest to each side, so that a point that strayed
+/// does not shrink the scene. Where node pages are damaged, the bounds of the points are taken.
+/// @param up        unit; the axis that points up
+/// @param backdrop  the scene stands on a backdrop, which is larger than what it holds: the scene
+/// is
+///                  seen from half the distance, and may leave the picture
+/// @param size      width and height of the picture; empty: those of the camera
+/// @throws std::system_error
+/// Memory: 17 MiB at most.
+[[nodiscard]] Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdrop,
+                              const std::optional<std::array<unsigned, 2>>& size);
+
+}  // namespace ptc
