@@ -161,6 +161,22 @@ class Bench(ProgramTest):
         self.assertLess(rows[0]["holes"], 0.01)
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["specks.csv", "specks.json"])
 
+    def test_points_are_written_and_read_in_every_format(self):
+        charts = self.here / "charts"
+        cloud = self.here / "more.xyz"
+        cloud.write_text("".join(f"{x} {y} 0\n" for x in range(9) for y in range(9)))
+        self.succeed("ptcbench", "formats", cloud, "--quick", "-o", charts)
+        rows = json.loads((charts / "formats.json").read_text())["rows"]
+        both = [".ply", ".las", ".pcd", ".xyz", ".bgeo", ".ptc"]
+        self.assertEqual([(r["file"], r["work"]) for r in rows],
+                         [(f, w) for f in both for w in ("write", "read")] +
+                         [(".usdc", "write"), (".usda", "write"), ("more.xyz", "read")])
+        for row in rows[:2 * len(both):2]:
+            exact = row["file"] in (".ply", ".xyz")
+            self.assertLess(row["difference"], 1e-15 if exact else 1e-4)
+        self.assertEqual(rows[-1]["points"], 81)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["formats.csv", "formats.json"])
+
     def test_scans_are_not_drawn_from_a_cloud(self):
         cloud = self.here / "cloud.xyz"
         cloud.write_text("".join(f"{x} {y} 0\n" for x in range(9) for y in range(9)))

@@ -103,6 +103,10 @@ void Declaration::file(const char* name, std::filesystem::path& value, const cha
   command_->add_option(name, value, description)->type_name("FILE");
 }
 
+void Declaration::files(std::vector<std::filesystem::path>& values, const char* description) {
+  command_->add_option("files", values, description)->type_name("FILE")->check(CLI::ExistingFile);
+}
+
 void Declaration::points(std::uint64_t& points, const char* shown, std::uint64_t less) {
   count("--points", points, "Surfels wanted of a mesh or the city; k, M, G count by 1000", shown);
   quick("--points", points, less);

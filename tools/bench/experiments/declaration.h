@@ -118,6 +118,8 @@ class Declaration {
   }
   /// Declares a repeatable option that chooses some of the words that `chosen` holds.
   void words(const char* name, std::vector<std::string>& chosen, const char* description);
+  /// Declares the names of any number of files as positional arguments.
+  void files(std::vector<std::filesystem::path>& values, const char* description);
   /// Puts an option under the heading of those that most users never need.
   void for_experts(const char* name);
 
