@@ -161,6 +161,75 @@ TEST_CASE("las: scale, offset and no-data value of extra bytes are those of the 
   CHECK_FALSE(extra[4].no_value);
 }
 
+TEST_CASE("las: extra bytes with the names of normal, radius and light are parts of the surfel",
+          "[io][points][las]") {
+  const test::TemporaryDirectory scratch;
+  LasFile file;
+  file.points = 1;
+  const auto cloud = [&](const std::string& descriptions, const std::string& extra) {
+    file.record_bytes = 20 + static_cast<unsigned>(extra.size());
+    file.records = las_point(0, 0, 0) + extra;
+    file.vlrs = {las_vlr("LASF_Spec", 4, descriptions)};
+    return read_las(scratch, file.bytes());
+  };
+  const auto extra_names = [](const LasCloud& of) {
+    const auto names = channel_names(of.info);
+    return std::vector(names.begin() + 10, names.end());
+  };
+  const auto triple = [](const char* a, const char* b, const char* c, unsigned type) {
+    return description(type, 0, a) + description(type, 0, b) + description(type, 0, c);
+  };
+
+  // As this project writes them, between channels
+  std::string extra = raw(std::uint8_t{1});
+  for (const float v : {0.0F, 0.6F, -0.8F, 0.25F, 1.0F, 2.0F, 3.0F, 4.0F, 5.0F, 6.0F, 0.5F, 0.0F})
+    extra += raw(v);
+  extra += raw(0.75F) + raw(std::uint16_t{7});
+  const LasCloud own =
+      cloud(description(1, 0, "first") + triple("normal_x", "normal_y", "normal_z", 9) +
+                description(9, 0, "radius") + triple("radiance_r", "radiance_g", "radiance_b", 9) +
+                triple("emission_r", "emission_g", "emission_b", 9) +
+                triple("albedo_r", "albedo_g", "albedo_b", 9) + description(3, 0, "last"),
+            extra);
+  const PointFileInfo& info = own.info;
+  CHECK((info.has_normals && info.has_radius && info.has_radiance));
+  CHECK((info.has_emission && info.has_albedo));
+  CHECK(extra_names(own) == std::vector<std::string>{"first", "last"});
+  CHECK(own.rows.ends_with(raw(std::uint8_t{1}) + raw(std::uint16_t{7})));
+  CHECK(own.surfels[0].normal == glm::vec3(0, 0.6F, -0.8F));
+  CHECK(own.surfels[0].radius == 0.25F);
+  CHECK(own.surfels[0].radiance == glm::vec3(1, 2, 3));
+  CHECK(own.surfels[0].emission == glm::vec3(4, 5, 6));
+  CHECK(own.surfels[0].albedo == glm::vec3(0.5F, 0, 0.75F));
+
+  // As other programs write them
+  const std::string up = raw(0.0) + raw(0.0) + raw(2.0);
+  CHECK(cloud(triple("NormalX", "NormalY", "NormalZ", 10), up).surfels[0].normal ==
+        glm::vec3(0, 0, 1));
+  CHECK(cloud(triple("nx", "ny", "nz", 10), up).surfels[0].normal == glm::vec3(0, 0, 1));
+  const std::string scaled = description(4, 24, "NX", {1e-4, 0, 0}, {0.5, 0, 0}) +
+                             description(4, 8, "NY", {1e-4, 0, 0}) +
+                             description(4, 9, "NZ", {1e-4, 0, 0}, {}, raw(std::int64_t{-1}));
+  const auto shorts = [](int x, int y, int z) {
+    return raw(static_cast<std::int16_t>(x)) + raw(static_cast<std::int16_t>(y)) +
+           raw(static_cast<std::int16_t>(z));
+  };
+  CHECK(cloud(scaled, shorts(1000, -8000, 0)).surfels[0].normal == glm::vec3(0.6F, -0.8F, 0));
+  CHECK(cloud(scaled, shorts(1000, -8000, -1)).surfels[0].normal == glm::vec3(0));
+  const std::string none = raw(0.0) + raw(std::nan("")) + raw(2.0);
+  CHECK(cloud(triple("nx", "ny", "nz", 10), none).surfels[0].normal == glm::vec3(0));
+
+  // What is no whole part, or holds plain integers, is a channel
+  const LasCloud rest = cloud(description(9, 0, "nx") + description(9, 0, "ny") +
+                                  description(3, 0, "radius") + description(29, 0, "normal"),
+                              std::string(22, '\0'));
+  CHECK_FALSE(rest.info.has_normals);
+  CHECK_FALSE(rest.info.has_radius);
+  CHECK(extra_names(rest) == std::vector<std::string>{"nx", "ny", "radius", "normal"});
+  CHECK_THROWS_WITH(cloud(description(9, 0, "radius"), raw(-1.0F)),
+                    Contains("point 0: the radius is negative"));
+}
+
 TEST_CASE("las: extra bytes that are not described are kept as bytes, with a note",
           "[io][points][las]") {
   const test::TemporaryDirectory scratch;

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "engine/base/error.h"
+#include "tests/io/las_files.h"
 #include "tests/io/written_las.h"
 
 using namespace ptc;
@@ -238,4 +239,31 @@ TEST_CASE("las writer: a colour from a channel takes the place of the stored one
   CHECK(shown.extra_names() == std::vector<std::string>{"albedo_r 9", "albedo_g 9", "albedo_b 9",
                                                         "rgb_r 1", "rgb_g 1", "rgb_b 1",
                                                         "occlusion 9"});
+}
+
+TEST_CASE("las writer: surfels and channels come back from a file as they went in",
+          "[io][writers][las]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(50);
+  PointWriteInfo info = full_info(surfels);
+  info.channels = {channel("occlusion", ChannelType::f32), channel("id", ChannelType::u16)};
+  info.colour_from = "occlusion";  // so that the albedo has extra bytes of its own
+  std::vector<std::byte> rows;
+  for (std::uint16_t i = 0; i < 50; ++i) {
+    append_value(rows, static_cast<float>(i) / 64);
+    append_value(rows, i);
+  }
+  write_points(scratch / "a.las", OutputFormat::las, info, surfels, rows);
+  const LasCloud back = read_las(scratch / "a.las");
+  REQUIRE(back.surfels.size() == 50);
+  for (std::size_t i = 0; i < 50; ++i) {
+    CHECK(back.surfels[i].normal == surfels[i].normal);
+    CHECK(back.surfels[i].radius == surfels[i].radius);
+    CHECK(back.surfels[i].radiance == surfels[i].radiance);
+    CHECK(back.surfels[i].emission == surfels[i].emission);
+    CHECK(back.surfels[i].albedo == surfels[i].albedo);
+    const std::size_t row = back.rows.size() / 50;
+    CHECK(back.rows.substr((i + 1) * row - 6, 6) ==
+          std::string(reinterpret_cast<const char*>(rows.data()) + 6 * i, 6));
+  }
 }

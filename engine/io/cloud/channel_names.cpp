@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "engine/io/cloud/formats.h"
 
@@ -37,6 +38,26 @@ constexpr std::array kUsual = std::to_array<Usual>({
     {"segmentid", {}, ChannelRole::label},
     {"segmentindex", {}, ChannelRole::label},
     {"objectid", {}, ChannelRole::label},
+});
+
+// Numbers of the surfel, by their names as bare_name() gives them and as PointLayout has them.
+constexpr std::array kSurfel = std::to_array<std::pair<std::string_view, std::string_view>>({
+    {"nx", "nx"},
+    {"ny", "ny"},
+    {"nz", "nz"},
+    {"normalx", "nx"},
+    {"normaly", "ny"},
+    {"normalz", "nz"},
+    {"radius", "radius"},
+    {"radiancer", "radiance_r"},
+    {"radianceg", "radiance_g"},
+    {"radianceb", "radiance_b"},
+    {"emissionr", "emission_r"},
+    {"emissiong", "emission_g"},
+    {"emissionb", "emission_b"},
+    {"albedor", "albedo_r"},
+    {"albedog", "albedo_g"},
+    {"albedob", "albedo_b"},
 });
 
 bool is_letter_or_digit(char c) {
@@ -80,6 +101,14 @@ std::string channel_name(std::string_view text, std::span<const Channel> others)
     unique.append("_").append(end);
   }
   return unique;
+}
+
+std::optional<std::string_view> surfel_name(std::string_view name) {
+  const std::string bare = bare_name(name);
+  for (const auto& [spelling, known] : kSurfel) {
+    if (bare == spelling) return known;
+  }
+  return std::nullopt;
 }
 
 void name_channel(Channel& channel, std::span<const Channel> others) {

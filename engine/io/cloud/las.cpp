@@ -1,9 +1,8 @@
 // Reads clouds from LAS, LAZ and COPC.
 //
-//   header, records  -->  facts, texts, channels                              (las_header, las_crs
-//   ...) points           -->  records  -->  position, colour  -->  surfel
-//                                  -->  row of attributes                     (las_records,
-//                                  las_fields)
+//   header, records  -->  facts, texts, fields                          (las_header, las_crs ...)
+//   points           -->  records  -->  position, colour, parts in extra bytes  -->  surfel
+//                                  -->  row of attributes               (las_records, las_fields)
 //
 // Colours have fields of 16 bits, but many programs write values of 8 bits into them. No field says
 // which, so a sample of the points decides before the first one is returned: colours that are all
@@ -23,6 +22,7 @@
 #include "engine/io/cloud/las_header.h"
 #include "engine/io/cloud/las_records.h"
 #include "engine/io/cloud/las_texts.h"
+#include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/surfel_check.h"
 #include "engine/io/image/srgb.h"
 #include "engine/io/laz/layout.h"
@@ -74,7 +74,8 @@ class LasSource : public PointSource {
   explicit LasSource(const std::filesystem::path& path)
       : file_(path),
         header_(read_las_header(file_)),
-        rows_of_(header_),
+        fields_(read_fields(file_, header_)),
+        rows_of_(header_, fields_.surfel),
         records_(open_las_records(file_, header_)) {
     look_at_points();
     static const std::vector<double> narrow = tabulate_srgb(255);
@@ -87,9 +88,17 @@ class LasSource : public PointSource {
   [[nodiscard]] PointFileInfo info() const {
     PointFileInfo info;
     info.count = header_.points;
-    info.has_albedo = !curve_.empty();
+    const LasSurfel& surfel = fields_.surfel;
+    info.has_normals = surfel.normal.has_value();
+    info.has_radius = surfel.radius.has_value();
+    info.has_radiance = surfel.radiance.has_value();
+    info.has_emission = surfel.emission.has_value();
+    info.has_albedo = surfel.albedo.has_value() || !curve_.empty();
     add_bounds(info);
-    add_channels(info);
+    info.channels = fields_.channels;
+    if (colours_ == Colours::eight_bits)
+      std::ranges::find(info.channels, "rgb", &Channel::name)->scale = kByteScale;
+    info.notes = fields_.notes;
     add_texts(info);
     if (colours_ == Colours::eight_bits) {
       info.notes.emplace_back(
@@ -125,6 +134,13 @@ class LasSource : public PointSource {
   [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return rows_; }
 
  private:
+  static LasFields read_fields(const InputFile& file, const LasHeader& header) {
+    const LasRecord* const record = header.find(kSpecUser, kExtraBytesNumber);
+    if (record == nullptr) return make_las_fields(header, {});
+    return make_las_fields(header,
+                           read_las_payload(file, *record).value_or(std::vector<std::byte>()));
+  }
+
   // Takes a sample of the points, which decides what the colours are.
   void look_at_points() {
     if (header_.points == 0) return;
@@ -164,18 +180,6 @@ class LasSource : public PointSource {
     info.sample = sample_;
   }
 
-  void add_channels(PointFileInfo& info) const {
-    std::vector<std::byte> descriptions;
-    const LasRecord* const record = header_.find(kSpecUser, kExtraBytesNumber);
-    if (record != nullptr)
-      descriptions = read_las_payload(file_, *record).value_or(std::vector<std::byte>());
-    LasChannels channels = make_las_channels(header_, descriptions);
-    info.channels = std::move(channels.channels);
-    if (colours_ == Colours::eight_bits)
-      std::ranges::find(info.channels, "rgb", &Channel::name)->scale = kByteScale;
-    info.notes = std::move(channels.notes);
-  }
-
   void add_texts(PointFileInfo& info) const {
     info.text.emplace("up", "z");
     LasCrs crs = read_las_crs(file_, header_);
@@ -213,8 +217,40 @@ class LasSource : public PointSource {
     RawSurfel raw;
     raw.position = position_of(record);
     if (colours_ != Colours::none) read_colour(record, raw);
-    const std::string rule = convert_surfel(raw, false, surfel);
+    const bool has_normal = read_parts(record, raw);
+    const std::string rule = convert_surfel(raw, has_normal, surfel);
     if (!rule.empty()) fail(rule);
+  }
+
+  // Reads what extra bytes hold of the surfel. @return whether the point has a normal
+  bool read_parts(const std::byte* record, RawSurfel& raw) const {
+    const LasSurfel& parts = fields_.surfel;
+    if (parts.radius) raw.radius = value_of(record, *parts.radius).value_or(0);
+    if (parts.radiance) raw.radiance = values_of(record, *parts.radiance).value_or(glm::dvec3(0));
+    if (parts.emission) raw.emission = values_of(record, *parts.emission).value_or(glm::dvec3(0));
+    if (parts.albedo) raw.albedo = values_of(record, *parts.albedo).value_or(raw.albedo);
+    if (!parts.normal) return false;
+    raw.normal = values_of(record, *parts.normal).value_or(glm::dvec3(0));
+    const bool has_nan =
+        std::isnan(raw.normal.x) || std::isnan(raw.normal.y) || std::isnan(raw.normal.z);
+    return !has_nan && raw.normal != glm::dvec3(0);
+  }
+
+  // Returns what a number stands for; nothing when it is not known.
+  static std::optional<double> value_of(const std::byte* record, const LasNumber& number) {
+    const std::byte* const at = record + number.offset;
+    if (number.no_value && std::memcmp(at, &*number.no_value, channel_bytes(number.type)) == 0)
+      return std::nullopt;
+    return load_number(at, number.type) * number.scale + number.shift;
+  }
+  static std::optional<glm::dvec3> values_of(const std::byte* record, const LasTriple& triple) {
+    glm::dvec3 values;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::optional<double> value = value_of(record, triple[i]);
+      if (!value) return std::nullopt;
+      values[static_cast<int>(i)] = *value;
+    }
+    return values;
   }
 
   void read_colour(const std::byte* record, RawSurfel& raw) const {
@@ -235,6 +271,7 @@ class LasSource : public PointSource {
 
   InputFile file_;
   LasHeader header_;
+  LasFields fields_;
   LasRows rows_of_;
   std::unique_ptr<LasRecordSource> records_;
   Bounds sampled_;                  // of the points that were looked at on opening

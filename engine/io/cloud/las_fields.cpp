@@ -6,8 +6,9 @@
 //                     [channel 1] | the rest of the record as it is
 //
 // Fields that share a byte become a channel each. The rest of a record, from the byte behind the
-// classification on, is copied as it is, so its channels stand in the order of the record. Extra
-// bytes are what a record has beyond its format; a record of the file describes them:
+// classification on, is copied as it is but for what is part of the surfel, so its channels stand
+// in the order of the record. Extra bytes are what a record has beyond its format; a record of the
+// file describes them:
 //
 //   offset  size  of 192 bytes for each field        offset  size
 //        2     1  type: 0 any bytes, 1 u8, 2 i8,         40     8  no-data value, as u64, i64 or
@@ -25,6 +26,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "engine/io/cloud/channel_names.h"
 #include "engine/io/cloud/formats.h"
 #include "engine/io/laz/layout.h"
 #include "format/bytes.h"
@@ -43,12 +45,23 @@ constexpr std::array<ChannelType, 10> kTypes = {
     ChannelType::u8,  ChannelType::i8,  ChannelType::u16, ChannelType::i16, ChannelType::u32,
     ChannelType::i32, ChannelType::u64, ChannelType::i64, ChannelType::f32, ChannelType::f64};
 
-// Collects the channels of a file.
-class ChannelList {
- public:
-  explicit ChannelList(const LasHeader& header) : header_(header) {}
+// A field of the extra bytes as it is described.
+struct Described {
+  std::span<const std::byte> description;
+  std::string name;
+  std::size_t offset = 0;      // in the record
+  std::size_t bytes = 0;       // of the record
+  ChannelType type{};          // of its numbers
+  std::size_t components = 0;  // 0 for bytes of no type
+  bool in_surfel = false;      // it is part of the surfel
+};
 
-  LasChannels make(std::span<const std::byte> descriptions) {
+// Collects the fields of a file.
+class FieldList {
+ public:
+  explicit FieldList(const LasHeader& header) : header_(header) {}
+
+  LasFields make(std::span<const std::byte> descriptions) {
     add_core();
     add_optional();
     add_extra(descriptions);
@@ -108,43 +121,105 @@ class ChannelList {
   }
 
   void add_extra(std::span<const std::byte> descriptions) {
+    // Read the descriptions
     std::size_t left = header_.record_bytes - laz::format_bytes(header_.format);
+    std::vector<Described> fields;
     bool all_fit = descriptions.size() % kDescriptionBytes == 0;
     for (; all_fit && descriptions.size() >= kDescriptionBytes;
          descriptions = descriptions.subspan(kDescriptionBytes)) {
-      all_fit = add_described(descriptions.first(kDescriptionBytes), left);
+      all_fit = describe(descriptions.first(kDescriptionBytes), left, fields);
     }
     if (!all_fit)
       note(
           "The record that describes the extra bytes does not fit them; what does not is ignored.");
+
+    // Choose those of the surfel; the others become channels
+    find_surfel(fields);
+    for (const Described& field : fields) {
+      if (field.in_surfel) continue;
+      if (field.components == 0) {
+        add_bytes(field.name, field.bytes);
+      } else {
+        add_numbers(field.name, field.type, field.components, field.description);
+      }
+    }
     if (left == 0) return;
     note(std::to_string(left) +
          " extra bytes of each point are not described; they are kept as bytes.");
     add_bytes("extra_bytes", left);
   }
 
-  // Adds one described field and takes it off the bytes that are left. Returns false when it does
+  // Appends a described field and takes it off the bytes that are left. Returns false when it does
   // not fit.
-  bool add_described(std::span<const std::byte> description, std::size_t& left) {
+  [[nodiscard]] bool describe(std::span<const std::byte> description, std::size_t& left,
+                              std::vector<Described>& fields) const {
     const unsigned type = load<std::uint8_t>(description.data(), 2);
-    std::string name(reinterpret_cast<const char*>(description.data()) + 4, 32);
-    name.resize(std::min(name.find('\0'), name.size()));
-    if (name.empty()) name = "extra_bytes";
-    if (type == 0) {
-      const std::size_t bytes = load<std::uint8_t>(description.data(), 3);
-      if (bytes > left) return false;
-      add_bytes(name, bytes);
-      left -= bytes;
-      return true;
-    }
     if (type > kMaxType) return false;
-    const ChannelType number = kTypes[(type - 1) % kTypes.size()];
-    const std::size_t components = (type - 1) / kTypes.size() + 1;
-    const std::size_t bytes = components * channel_bytes(number);
-    if (bytes > left) return false;
-    add_numbers(name, number, components, description);
-    left -= bytes;
+    Described field{.description = description, .offset = header_.record_bytes - left};
+    field.name.assign(reinterpret_cast<const char*>(description.data()) + 4, 32);
+    field.name.resize(std::min(field.name.find('\0'), field.name.size()));
+    if (field.name.empty()) field.name = "extra_bytes";
+    if (type == 0) {
+      field.bytes = load<std::uint8_t>(description.data(), 3);
+    } else {
+      field.type = kTypes[(type - 1) % kTypes.size()];
+      field.components = (type - 1) / kTypes.size() + 1;
+      field.bytes = field.components * channel_bytes(field.type);
+    }
+    if (field.bytes > left) return false;
+    left -= field.bytes;
+    fields.push_back(std::move(field));
     return true;
+  }
+
+  void find_surfel(std::vector<Described>& fields) {
+    const auto triple = [&](const std::array<std::string_view, 3>& names) {
+      std::optional<LasTriple> numbers;
+      std::array<Described*, 3> at{};
+      for (std::size_t i = 0; i < 3; ++i) at[i] = find_number(fields, names[i]);
+      if (std::ranges::find(at, nullptr) != at.end()) return numbers;
+      numbers.emplace();
+      for (std::size_t i = 0; i < 3; ++i) (*numbers)[i] = take_number(*at[i]);
+      return numbers;
+    };
+    LasSurfel& surfel = list_.surfel;
+    surfel.normal = triple({"nx", "ny", "nz"});
+    surfel.radiance = triple({"radiance_r", "radiance_g", "radiance_b"});
+    surfel.emission = triple({"emission_r", "emission_g", "emission_b"});
+    surfel.albedo = triple({"albedo_r", "albedo_g", "albedo_b"});
+    if (Described* const radius = find_number(fields, "radius"))
+      surfel.radius = take_number(*radius);
+  }
+
+  // Returns the field that may be this number of the surfel; null when there is none.
+  static Described* find_number(std::vector<Described>& fields, std::string_view name) {
+    const auto found = std::ranges::find_if(fields, [&](const Described& field) {
+      if (field.components != 1 || surfel_name(field.name) != name) return false;
+      const Channel number = number_of(field.type, field.description, 0);
+      return field.type == ChannelType::f32 || field.type == ChannelType::f64 || number.scale != 1;
+    });
+    return found == fields.end() ? nullptr : &*found;
+  }
+
+  static LasNumber take_number(Described& field) {
+    field.in_surfel = true;
+    const Channel number = number_of(field.type, field.description, 0);
+    return {field.offset, field.type, number.scale, number.offset, number.no_value};
+  }
+
+  // Returns type, scale, offset and no-data value of a number of a described field.
+  static Channel number_of(ChannelType type, std::span<const std::byte> description,
+                           std::size_t component) {
+    Channel channel;
+    channel.type = type;
+    const unsigned options = load<std::uint8_t>(description.data(), 3);
+    const auto scale = load<double>(description.data(), 112 + 8 * component);
+    const auto offset = load<double>(description.data(), 136 + 8 * component);
+    if ((options & kScaleOption) != 0 && std::isfinite(scale) && scale != 0) channel.scale = scale;
+    if ((options & kOffsetOption) != 0 && std::isfinite(offset)) channel.offset = offset;
+    if ((options & kNoDataOption) != 0)
+      channel.no_value = no_value(description, 40 + 8 * component, type);
+    return channel;
   }
 
   // Adds a field of one to three numbers: one channel, or one for each number when their scales,
@@ -152,19 +227,7 @@ class ChannelList {
   void add_numbers(const std::string& name, ChannelType type, std::size_t components,
                    std::span<const std::byte> description) {
     std::vector<Channel> numbers;
-    for (std::size_t i = 0; i < components; ++i) {
-      Channel channel;
-      channel.type = type;
-      const unsigned options = load<std::uint8_t>(description.data(), 3);
-      const auto scale = load<double>(description.data(), 112 + 8 * i);
-      const auto offset = load<double>(description.data(), 136 + 8 * i);
-      if ((options & kScaleOption) != 0 && std::isfinite(scale) && scale != 0)
-        channel.scale = scale;
-      if ((options & kOffsetOption) != 0 && std::isfinite(offset)) channel.offset = offset;
-      if ((options & kNoDataOption) != 0)
-        channel.no_value = no_value(description, 40 + 8 * i, type);
-      numbers.push_back(channel);
-    }
+    for (std::size_t i = 0; i < components; ++i) numbers.push_back(number_of(type, description, i));
     const bool alike =
         std::ranges::all_of(numbers, [&](const Channel& c) { return c == numbers[0]; });
     if (alike) numbers.resize(1);
@@ -208,20 +271,39 @@ class ChannelList {
   }
 
   const LasHeader& header_;
-  LasChannels list_;
+  LasFields list_;
 };
 
 }  // namespace
 
-LasChannels make_las_channels(const LasHeader& header, std::span<const std::byte> descriptions) {
-  return ChannelList(header).make(descriptions);
+LasFields make_las_fields(const LasHeader& header, std::span<const std::byte> descriptions) {
+  return FieldList(header).make(descriptions);
 }
 
-LasRows::LasRows(const LasHeader& header)
-    : layered_(header.format >= 6),
-      tail_(layered_ ? 17 : 16),
-      tail_bytes_(header.record_bytes - tail_),
-      row_bytes_((layered_ ? 9 : 8) + tail_bytes_) {}
+std::vector<LasNumber> LasSurfel::numbers() const {
+  std::vector<LasNumber> all;
+  for (const auto& triple : {normal, radiance, emission, albedo}) {
+    if (triple) all.insert(all.end(), triple->begin(), triple->end());
+  }
+  if (radius) all.push_back(*radius);
+  std::ranges::sort(all, {}, &LasNumber::offset);
+  return all;
+}
+
+LasRows::LasRows(const LasHeader& header, const LasSurfel& surfel)
+    : layered_(header.format >= 6), row_bytes_(layered_ ? 9 : 8) {
+  // Copy the rest of the record, but jump over the numbers of the surfel
+  std::size_t from = layered_ ? 17 : 16;
+  const auto copy_until = [&](std::size_t end) {
+    if (end > from) runs_.push_back({from, row_bytes_, end - from});
+    row_bytes_ += end - from;
+  };
+  for (const LasNumber& number : surfel.numbers()) {
+    copy_until(number.offset);
+    from = number.offset + channel_bytes(number.type);
+  }
+  copy_until(header.record_bytes);
+}
 
 void LasRows::write(const std::byte* record, std::byte* row) const noexcept {
   const auto byte_at = [record](std::size_t at) { return std::to_integer<unsigned>(record[at]); };
@@ -239,7 +321,6 @@ void LasRows::write(const std::byte* record, std::byte* row) const noexcept {
     put(6, byte_at(16));
     put(7, third & 15);
     put(8, third >> 4 & 3);
-    std::memcpy(row + 9, record + tail_, tail_bytes_);
   } else {  // third: class, 5 bits; its flags, 3
     put(2, returns & 7);
     put(3, returns >> 3 & 7);
@@ -247,8 +328,8 @@ void LasRows::write(const std::byte* record, std::byte* row) const noexcept {
     put(5, returns >> 7);
     put(6, third & 31);
     put(7, third >> 5);
-    std::memcpy(row + 8, record + tail_, tail_bytes_);
   }
+  for (const Run& run : runs_) std::memcpy(row + run.to, record + run.from, run.bytes);
 }
 
 }  // namespace ptc

@@ -79,7 +79,9 @@ struct PointFile {
 /// radius or scalar_radius; radiance_r radiance_g radiance_b; emission_r emission_g emission_b; red
 /// green blue or diffuse_red diffuse_green diffuse_blue or, as integers, r g b. The last are the
 /// albedo: integers are sRGB (8 bits; 16 for short types) and are kept in the channel `rgb`, too;
-/// floats are linear in [0, 1]. All other properties become channels of their type.
+/// floats are linear in [0, 1]. All other properties become channels of their type. Extra bytes of
+/// LAS are such properties; there NormalX NormalY NormalZ are a normal, too, and plain integers are
+/// no part of the surfel.
 ///
 /// Lines of XYZ without names are "x y z [nx ny nz [radius [r g b]]]", where r g b is the linear
 /// radiance; "x y z intensity"; or "x y z" with 8-bit colours, if their values look like that.

@@ -101,36 +101,10 @@ Names guess_names(const Rows& rows, std::size_t count, bool has_normals, Names& 
 // Returns the name by which PointLayout knows a column, or the name as it is.
 std::string known_name(const std::string& name) {
   static const std::map<std::string, std::string, std::less<>> kNames = {
-      {"x", "x"},
-      {"y", "y"},
-      {"z", "z"},
-      {"nx", "nx"},
-      {"ny", "ny"},
-      {"nz", "nz"},
-      {"normalx", "nx"},
-      {"normaly", "ny"},
-      {"normalz", "nz"},
-      {"r", "red"},
-      {"g", "green"},
-      {"b", "blue"},
-      {"red", "red"},
-      {"green", "green"},
-      {"blue", "blue"},
-      {"rf", "red"},
-      {"gf", "green"},
-      {"bf", "blue"},
-      {"albedor", "albedo_r"},
-      {"albedog", "albedo_g"},
-      {"albedob", "albedo_b"},
-      {"a", "alpha"},
-      {"i", "intensity"},
-      {"radius", "radius"},
-      {"radiancer", "radiance_r"},
-      {"radianceg", "radiance_g"},
-      {"radianceb", "radiance_b"},
-      {"emissionr", "emission_r"},
-      {"emissiong", "emission_g"},
-      {"emissionb", "emission_b"}};
+      {"x", "x"},      {"y", "y"},     {"z", "z"},         {"r", "red"},      {"g", "green"},
+      {"b", "blue"},   {"red", "red"}, {"green", "green"}, {"blue", "blue"},  {"rf", "red"},
+      {"gf", "green"}, {"bf", "blue"}, {"a", "alpha"},     {"i", "intensity"}};
+  if (const auto part = surfel_name(name)) return std::string(*part);
   const auto found = kNames.find(bare_name(name));
   return found == kNames.end() ? name : found->second;
 }
