@@ -119,13 +119,16 @@ std::vector<std::string> container_losses(const Arguments& arguments, bool recod
 ptc::Outcome tell_losses(const Arguments& arguments, ptc::Progress& progress) {
   const bool from_container = ptc::is_container(arguments.input);
   if (!from_container && !ptc::is_point_file(arguments.input)) refuse_mesh(arguments);
+  const bool to_container = ptc::has_ending(arguments.output, ".ptcx");
+  const auto format = to_container ? std::nullopt : ptc::output_format(arguments.output);
   const ptc::PointWriteInfo info =
-      from_container ? ptc::describe_points(ptc::ContainerReader(arguments.input), arguments.points)
-                     : ptc::describe_points(arguments.input, arguments.points, progress);
+      from_container
+          ? ptc::describe_points(ptc::ContainerReader(arguments.input), arguments.points, format)
+          : ptc::describe_points(arguments.input, arguments.points, format, progress);
   std::vector<std::string> losses;
-  if (ptc::has_ending(arguments.output, ".ptcx")) {
+  if (to_container) {
     losses = container_losses(arguments, from_container && !arguments.points.selection.level);
-  } else if (const auto format = ptc::output_format(arguments.output)) {
+  } else if (format) {
     losses = ptc::losses(*format, info);
   }
   std::string text = fmt::format("{}: {} points, {} channels; {}\n", arguments.output.string(),

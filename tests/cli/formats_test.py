@@ -52,6 +52,23 @@ class Formats(ProgramTest):
         self.assertIn("occlusion", names)
         self.assertNotIn("original_index", names)
 
+    def test_an_intensity_of_floats_fills_the_field_of_las_from_a_cloud_a_container_and_shading(self):
+        self.succeed("ptcbuild", self.scan, "--original-order", "-o", self.here / "a.ptcx")
+        said = "Values of the channel intensity, from 0 to 124.75, are rounded to integers."
+        self.assertIn(said, self.succeed("ptcconvert", self.scan, self.here / "a.las", "--dry-run").stdout)
+        self.assertIn(said, self.succeed("ptcconvert", self.here / "a.ptcx", self.here / "a.las", "--dry-run").stdout)
+        self.succeed("ptcconvert", self.scan, self.here / "a.las")
+        self.succeed("ptcconvert", self.here / "a.ptcx", self.here / "b.las", "--original-order")
+        self.succeed("ptcshade", self.scan, "-o", self.here / "c.las")
+        self.succeed("ptcshade", self.here / "a.ptcx", "-o", self.here / "d.las")
+        for name in ("a.las", "b.las", "c.las", "d.las"):
+            data = (self.here / name).read_bytes()
+            begin, = struct.unpack_from("<I", data, 96)
+            size, = struct.unpack_from("<H", data, 105)
+            values = [struct.unpack_from("<H", data, begin + i * size + 12)[0] for i in range(500)]
+            wanted = [int(0.25 * i + 0.5) for i in range(500)]
+            self.assertEqual(sorted(values) if name == "d.las" else values, wanted, name)
+
     def test_the_order_comes_back_only_where_it_is_known(self):
         self.succeed("ptcbuild", self.scan, "-o", self.here / "a.ptcx")
         self.succeed("ptcbuild", self.scan, "--original-order", "-o", self.here / "b.ptcx")

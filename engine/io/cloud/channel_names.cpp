@@ -22,13 +22,17 @@ struct Usual {
 
 constexpr std::array kUsual = std::to_array<Usual>({
     {"returnnumber", "return_number"},
+    {"returnnum", "return_number"},
     {"numberofreturns", "number_of_returns"},
-    {"scandirectionflag", "scan_direction_flag"},
+    {"numreturns", "number_of_returns"},
+    {"scandirectionflag", "scan_direction"},
     {"edgeofflightline", "edge_of_flight_line"},
+    {"edgeofflightlineflag", "edge_of_flight_line"},
     {"scanangle", "scan_angle"},
     {"scananglerank", "scan_angle"},
     {"userdata", "user_data"},
     {"pointsourceid", "point_source_id", ChannelRole::label},
+    {"ptsrcid", "point_source_id", ChannelRole::label},
     {"gpstime", "gps_time", ChannelRole::time, "s"},
     {"classification", {}, ChannelRole::label},
     {"class", {}, ChannelRole::label},

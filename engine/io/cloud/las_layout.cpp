@@ -5,7 +5,7 @@
 //   |<------- point format 7 ------------------------------>|     |
 //   |<------- point format 8 ------------------------------------>|
 //
-// A channel fills a standard place when it has the name and every value of its type fits there.
+// A channel fills a standard place when it has the name and its values fit there (las_places.cpp).
 // All other channels, and the quantities of a surfel, become extra bytes, of which one record for
 // each number tells name, type and scale:
 //
@@ -26,66 +26,36 @@ namespace {
 
 constexpr std::size_t kMostNameBytes = 32;
 
-struct Place {
-  std::string_view name;
-  Field field;
-  std::vector<ChannelType> types;  // those whose values fit
-};
-
-const std::vector<Place>& places() {
-  using enum ChannelType;
-  static const std::vector<Place> kPlaces{
-      {"intensity", Field::intensity, {u8, u16}},
-      {"return_number", Field::return_number, {u8}},
-      {"number_of_returns", Field::number_of_returns, {u8}},
-      {"class_flags", Field::class_flags, {u8}},
-      {"scanner_channel", Field::scanner_channel, {u8}},
-      {"scan_direction", Field::scan_direction, {u8}},
-      {"edge_of_flight_line", Field::edge_of_flight_line, {u8}},
-      {"classification", Field::classification, {u8}},
-      {"user_data", Field::user_data, {u8}},
-      {"scan_angle", Field::scan_angle, {i8, i16}},
-      {"point_source_id", Field::point_source_id, {u8, u16}},
-      {"gps_time", Field::gps_time, {f64}},
-      {"nir", Field::nir, {u8, u16}},
-  };
-  return kPlaces;
-}
-
 // Names that readers have for the standard places; extra bytes of the same name would hide them.
 std::set<std::string> standard_names() {
-  std::set<std::string> names{"x",
-                              "y",
-                              "z",
-                              "red",
-                              "green",
-                              "blue",
-                              "synthetic",
-                              "key_point",
-                              "withheld",
-                              "overlap",
-                              "bit_fields",
-                              "scan_direction_flag",
-                              "scan_angle_rank",
-                              "raw_classification",
-                              "classification_flags"};
-  for (const Place& place : places()) names.emplace(place.name);
-  return names;
-}
-
-std::optional<Field> find_field(const Channel& channel) {
-  for (const Place& place : places()) {
-    if (channel.name != place.name || channel.components != 1) continue;
-    if (std::ranges::find(place.types, channel.type) == place.types.end()) return std::nullopt;
-    // Angles of 16 bits are steps of 0.006 degrees, as in the standard; all others are plain.
-    const bool angle = place.field == Field::scan_angle && channel.type == ChannelType::i16;
-    // Returns that are counted from 0, as in E57, have an offset of 1.
-    const bool counts_returns = place.field == Field::return_number && channel.offset == 1;
-    if (channel.scale != (angle ? 0.006 : 1)) return std::nullopt;
-    if (channel.offset != 0 && !counts_returns) return std::nullopt;
-    return place.field;
-  }
-  return std::nullopt;
+  return {"x",
+          "y",
+          "z",
+          "red",
+          "green",
+          "blue",
+          "synthetic",
+          "key_point",
+          "withheld",
+          "overlap",
+          "bit_fields",
+          "scan_direction_flag",
+          "scan_angle_rank",
+          "raw_classification",
+          "classification_flags",
+          "intensity",
+          "return_number",
+          "number_of_returns",
+          "class_flags",
+          "scanner_channel",
+          "scan_direction",
+          "edge_of_flight_line",
+          "classification",
+          "user_data",
+          "scan_angle",
+          "point_source_id",
+          "gps_time",
+          "nir"};
 }
 
 Extra surfel_extra(ExtraSource source, const char* name, std::uint8_t components, const char* unit,
@@ -164,12 +134,13 @@ Layout::Layout(const PointWriteInfo& info) : colour(info) {
   // Give the channels their places
   bool has_nir = false;
   for (const RowChannel& row : row_channels(info.channels, taken, kMostNameBytes)) {
-    const std::optional<Field> field = find_field(row.channel);
-    if (field) {
-      fields.push_back({*field, row});
-      has_nir |= *field == Field::nir;
+    if (auto placed = place_channel(row, info.ranges)) {
+      has_nir |= placed->field == Field::nir;
+      fields.push_back(*std::move(placed));
     } else if (colour.stored() == nullptr || colour.stored()->offset != row.offset) {
       extras.push_back({ExtraSource::channel, row});
+      if (std::string sentence = misfit(row, info.ranges); !sentence.empty())
+        misfits.push_back(std::move(sentence));
     }
   }
 

@@ -14,6 +14,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/io/cloud/display_colour.h"
+#include "engine/io/cloud/las_places.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
 
@@ -54,29 +55,6 @@ struct Records {
 /// file were stored, and one with the text `crs` if none names the reference system as WKT.
 [[nodiscard]] Records plan_records(const PointWriteInfo& info);
 
-/// The places of a point record that a channel can fill.
-enum class Field : std::uint8_t {
-  intensity,
-  return_number,
-  number_of_returns,
-  class_flags,
-  scanner_channel,
-  scan_direction,
-  edge_of_flight_line,
-  classification,
-  user_data,
-  scan_angle,
-  point_source_id,
-  gps_time,
-  nir
-};
-
-/// A channel that fills a place of the point record.
-struct PlacedChannel {
-  Field field{};
-  RowChannel channel;
-};
-
 /// What the bytes after the standard ones of a record hold, and where their values come from.
 enum class ExtraSource : std::uint8_t { normal, radius, radiance, emission, albedo, channel };
 
@@ -96,6 +74,7 @@ struct Layout {
   DisplayColour colour;
   std::vector<PlacedChannel> fields;
   std::vector<Extra> extras;
+  std::vector<std::string> misfits;  ///< about channels that do not fit a place, a sentence each
   std::uint8_t point_format = 6;
   std::size_t standard_bytes = 30;  ///< of the point format
   std::size_t record_bytes = 0;     ///< with the extra bytes

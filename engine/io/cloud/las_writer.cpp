@@ -30,23 +30,6 @@ constexpr std::uint16_t kWktBit = 16;                   // of "Global Encoding"
 constexpr std::size_t kMostExtraNumbers = 65535 / 192;  // whose descriptions fit one record
 constexpr std::size_t kReturns = 15;
 
-// Returns the greatest value of a field without a sign.
-std::int64_t most_of(Field field) {
-  switch (field) {
-    case Field::return_number:
-    case Field::number_of_returns:
-    case Field::class_flags:
-      return 15;
-    case Field::scanner_channel:
-      return 3;
-    case Field::scan_direction:
-    case Field::edge_of_flight_line:
-      return 1;
-    default:
-      return 65535;  // a type that fits is all that the field takes
-  }
-}
-
 // What the header says of the points, gathered while they are written.
 struct Totals {
   std::array<std::int32_t, 3> low{};
@@ -133,9 +116,9 @@ class LasWriter : public CheckedWriter {
     unsigned returned = 1, returns = 0;
     for (const PlacedChannel& field : layout_.fields) {
       if (field.field == Field::return_number) {
-        returned = value_of(field, row);
+        returned = static_cast<unsigned>(field.value(row));
       } else if (field.field == Field::number_of_returns) {
-        returns = value_of(field, row);
+        returns = static_cast<unsigned>(field.value(row));
       } else {
         set_field(field, row);
       }
@@ -174,13 +157,6 @@ class LasWriter : public CheckedWriter {
   [[nodiscard]] bool has(Field field) const {
     return std::ranges::find(layout_.fields, field, &PlacedChannel::field) != layout_.fields.end();
   }
-  // Returns the value of a field without a sign, cut to what fits.
-  static unsigned value_of(const PlacedChannel& field, const std::byte* row) {
-    const Channel& channel = field.channel.channel;
-    const std::int64_t value = load_integer(channel.type, field.channel.at(row, 0)) +
-                               static_cast<std::int64_t>(channel.offset);
-    return static_cast<unsigned>(std::min(value, most_of(field.field)));
-  }
   template <typename T>
   void set(std::size_t offset, T value) {
     std::memcpy(record_.data() + offset, &value, sizeof value);
@@ -191,18 +167,10 @@ class LasWriter : public CheckedWriter {
 
   // Sets a place of point formats 6 to 8 other than the numbers of returns.
   void set_field(const PlacedChannel& field, const std::byte* row) {
-    // Numbers with a sign or a fraction
-    const ChannelType type = field.channel.channel.type;
-    if (field.field == Field::gps_time) {
-      return set(22, load_number(field.channel.at(row, 0), type));
-    }
-    if (field.field == Field::scan_angle) {
-      const double angle = load_number(field.channel.at(row, 0), type);
-      const double steps = type == ChannelType::i8 ? std::round(angle / 0.006) : angle;
-      return set(18, static_cast<std::int16_t>(steps));
-    }
-    // All others
-    const unsigned value = value_of(field, row);
+    const double number = field.value(row);
+    if (field.field == Field::gps_time) return set(22, number);
+    if (field.field == Field::scan_angle) return set(18, static_cast<std::int16_t>(number));
+    const auto value = static_cast<unsigned>(number);
     switch (field.field) {
       case Field::intensity:
         return set(12, static_cast<std::uint16_t>(value));
@@ -221,7 +189,7 @@ class LasWriter : public CheckedWriter {
       case Field::point_source_id:
         return set(20, static_cast<std::uint16_t>(value));
       case Field::nir:
-        return set(36, static_cast<std::uint16_t>(type == ChannelType::u8 ? 257 * value : value));
+        return set(36, static_cast<std::uint16_t>(value));
       default:
         break;
     }
@@ -296,11 +264,13 @@ std::vector<std::string> las_losses(const PointWriteInfo& info) {
     sentences.push_back("Colours are rounded to 16 bits on the sRGB curve.");
   }
   for (const las::PlacedChannel& field : layout.fields) {
-    const std::int64_t most = las::most_of(field.field);
-    if (was_las || most > 15) continue;
-    sentences.push_back(fmt::format("Values of the channel {} above {} become {}.",
-                                    field.channel.channel.name, most, most));
+    const std::string& name = field.channel.channel.name;
+    if (!field.loss.empty()) sentences.push_back(field.loss);
+    if (was_las || field.high > 15 || info.ranges.contains(name)) continue;
+    sentences.push_back(
+        fmt::format("Values of the channel {} above {} become {}.", name, field.high, field.high));
   }
+  sentences.insert(sentences.end(), layout.misfits.begin(), layout.misfits.end());
   const las::Records records = las::plan_records(info);
   sentences.insert(sentences.end(), records.dropped.begin(), records.dropped.end());
   return sentences;

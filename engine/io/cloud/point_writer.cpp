@@ -17,6 +17,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/las_places.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/text/text.h"
@@ -114,6 +115,15 @@ std::unique_ptr<PointWriter> create_points(const std::filesystem::path& target, 
 
 void check_colour_from(OutputFormat format, const PointWriteInfo& info) {
   check_colour(entry_of(format), info);
+}
+
+std::vector<std::string> measured_channels(OutputFormat format, std::span<const Channel> channels) {
+  std::vector<std::string> names;
+  if (format != OutputFormat::las) return names;
+  for (const Channel& channel : channels) {
+    if (las::needs_range(channel)) names.push_back(channel.name);
+  }
+  return names;
 }
 
 std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info) {

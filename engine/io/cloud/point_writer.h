@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -30,17 +31,26 @@ enum class OutputFormat : std::uint8_t {
   xyz    ///< text with one point on each line
 };
 
+/// The values that a channel of one component has in some points, after its scale and offset.
+struct ValueRange {
+  double low = std::numeric_limits<double>::infinity();    ///< of the finite values
+  double high = -std::numeric_limits<double>::infinity();  ///< below `low` when there are none
+  bool whole = true;                                       ///< all of them are integers
+};
+
 /// What a point file will hold.
 struct PointWriteInfo {
   std::uint64_t count = 0;                  ///< exact number of points
   std::vector<Channel> channels;            ///< columns of the rows of write(), in their order
   std::map<std::string, std::string> text;  ///< facts under the keys of spec/points.md#texts
   Bounds bounds;                            ///< holds all points, scene units
-  bool has_normals = false;                 ///< the normals of the surfels are worth writing
-  bool has_radius = false;                  ///< the radii are
-  bool has_radiance = false;                ///< the radiances are
-  bool has_albedo = false;                  ///< the albedos are
-  bool emits = false;                       ///< the emissions are
+  /// The ranges of measured_channels(), by their names; a channel that is missing was not measured.
+  std::map<std::string, ValueRange> ranges;
+  bool has_normals = false;   ///< the normals of the surfels are worth writing
+  bool has_radius = false;    ///< the radii are
+  bool has_radiance = false;  ///< the radiances are
+  bool has_albedo = false;    ///< the albedos are
+  bool emits = false;         ///< the emissions are
   /// The channel that viewers shall show as the colour of a point, in place of its albedo; empty to
   /// show the albedo. The channel `occlusion` becomes a grey, white where nothing covers the point;
   /// another channel of one component is a grey itself; three components are linear light, which is
@@ -82,6 +92,11 @@ class PointWriter {
 /// Checks PointWriteInfo::colour_from, as create_points() does.
 /// @throws RequestError about `colour_from`
 void check_colour_from(OutputFormat format, const PointWriteInfo& info);
+
+/// Returns the names of channels whose values decide how a format holds them. They are measured
+/// before the file begins.
+[[nodiscard]] std::vector<std::string> measured_channels(OutputFormat format,
+                                                         std::span<const Channel> channels);
 
 /// Returns what a file of this format would not keep, and what it would round and by how much, a
 /// sentence each.

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/point_survey.h"
 #include "engine/io/cloud/points.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
@@ -38,16 +39,39 @@ void copy_points(PointSource& source, const std::filesystem::path& target, Outpu
   writer->finish();
 }
 
-/// Counts the points of a source and finds their bounds.
-void measure(PointSource& source, PointWriteInfo& info, Progress* progress = nullptr) {
+/// Counts the points of a source, finds their bounds and measures their channels.
+void measure(PointSource& source, std::optional<PointSurvey>& survey, PointWriteInfo& info,
+             Progress* progress = nullptr) {
   info.count = 0;
   info.bounds = {};
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = source.next(block)) {
     for (std::size_t i = 0; i < count; ++i) info.bounds.add(block[i].position);
     info.count += count;
+    if (survey) survey->add(source.attributes());
     if (progress) progress->advance(count);
   }
+  if (survey) survey->finish(info);
+}
+
+/// Returns what measures the channels of rows; nothing when none is measured.
+std::optional<PointSurvey> survey_for(std::optional<OutputFormat> format,
+                                      std::span<const Channel> channels) {
+  if (!format) return std::nullopt;
+  PointSurvey survey(*format, channels);
+  return survey.empty() ? std::nullopt : std::optional(std::move(survey));
+}
+
+/// Measures the channels of a container that a format wants to know the values of.
+void measure_channels(const ContainerReader& container, Selection selection, OutputFormat format,
+                      PointWriteInfo& info) {
+  selection.channels = measured_channels(format, info.channels);
+  if (selection.channels->empty()) return;
+  PointSurvey survey(format, kept_channels(container.meta().channels, selection, container.path()));
+  const std::unique_ptr<PointSource> source = open_selected(container, selection);
+  std::vector<Surfel> block(kBlock);
+  while (source->next(block) > 0) survey.add(source->attributes());
+  survey.finish(info);
 }
 
 /// Opens the points of a container that the options take, in their order.
@@ -79,7 +103,8 @@ void compare_written(const std::filesystem::path& target, OutputFormat format,
 
 }  // namespace
 
-PointWriteInfo describe_points(const ContainerReader& container, const PointFileOptions& options) {
+PointWriteInfo describe_points(const ContainerReader& container, const PointFileOptions& options,
+                               std::optional<OutputFormat> format) {
   const Superblock& superblock = container.superblock();
   const auto& [low, high] = std::pair(superblock.bounds_low, superblock.bounds_high);
   const Selection& selection = options.selection;
@@ -97,12 +122,16 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
         options.original_order ? channels_without_index(container) : container.meta().channels,
         selection, container.path());
   }
-  if (!selection.takes_all()) measure(*open_selected(container, selection), info);
+  if (!selection.takes_all()) {
+    std::optional<PointSurvey> none;
+    measure(*open_selected(container, selection), none, info);
+  }
+  if (format) measure_channels(container, selection, *format, info);
   return info;
 }
 
 PointWriteInfo describe_points(const std::filesystem::path& cloud, const PointFileOptions& options,
-                               Progress& progress) {
+                               std::optional<OutputFormat> format, Progress& progress) {
   PointFile file = open_point_input(cloud, options.selection);
   for (const std::string& note : file.info.notes)
     progress.note(cloud.filename().string() + ": " + note);
@@ -114,7 +143,8 @@ PointWriteInfo describe_points(const std::filesystem::path& cloud, const PointFi
                       .has_albedo = file.info.has_albedo,
                       .emits = file.info.has_emission,
                       .colour_from = options.colour_from};
-  measure(*file.source, info, &progress);
+  std::optional<PointSurvey> survey = survey_for(format, info.channels);
+  measure(*file.source, survey, info, &progress);
   return info;
 }
 
@@ -138,7 +168,7 @@ ConvertReport container_to_points(const ContainerReader& container,
       budget.rest("the sort", options.original_order ? input_order_bytes(container) : 0);
 
   // Write the points
-  const PointWriteInfo info = describe_points(container, options);
+  const PointWriteInfo info = describe_points(container, options, format);
   ConvertReport report{.points = info.count};
   {
     const Stage stage(report.seconds, progress, "convert", info.count, "points");
@@ -159,7 +189,7 @@ ConvertReport cloud_to_points(const std::filesystem::path& cloud,
   PointWriteInfo info;
   {
     const Stage stage(report.seconds, progress, "measure", 0, "points");
-    info = describe_points(cloud, options, progress);
+    info = describe_points(cloud, options, format, progress);
   }
   report.points = info.count;
   {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,15 +32,20 @@ struct PointFileOptions {
 };
 
 /// Describes the points of a container for a writer. They are read when a selection must be
-/// counted.
+/// counted or the format has channels that are measured.
+/// @param format  the format that will be written; nothing for a container
 /// @throws RequestError as open_point_input(); FormatError, std::system_error
 [[nodiscard]] PointWriteInfo describe_points(const ContainerReader& container,
-                                             const PointFileOptions& options);
+                                             const PointFileOptions& options,
+                                             std::optional<OutputFormat> format);
 /// Describes the points of a cloud for a writer. The cloud is read to its end.
+/// @param format  the format that will be written; nothing for a container
 /// @throws DataError when it breaks its format; RequestError as open_point_input();
 ///         std::system_error
 [[nodiscard]] PointWriteInfo describe_points(const std::filesystem::path& cloud,
-                                             const PointFileOptions& options, Progress& progress);
+                                             const PointFileOptions& options,
+                                             std::optional<OutputFormat> format,
+                                             Progress& progress);
 
 /// Writes the points of a container with its channels. The ending of the target chooses the
 /// format. The target is published when it is complete, and then opened again: it must have as many

@@ -295,11 +295,12 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   lighting.tune([&] { return pilots_of(receivers, request.lift); });
 
   // Shade all receivers into the target
-  const std::unique_ptr<ShadedSink> sink = make_shaded_sink(
-      target, receivers.container,
-      shaded_points(receivers.container, receivers.points,
-                    settings_text(request, lighting.gather()), request.colour_from),
-      request.estimate);
+  const std::unique_ptr<ShadedSink> sink =
+      make_shaded_sink(target, receivers.container,
+                       shaded_points(receivers.container, receivers.points,
+                                     settings_text(request, lighting.gather()), request.colour_from,
+                                     output_format(target)),
+                       request.estimate);
   {
     const Stage stage(report.seconds, progress, "shade", receivers.points, "points");
     shade_all(receivers, request.lift, lighting, *sink);
@@ -316,7 +317,8 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
 LightingReport shade_in_input_order(const ShadeRequest& request,
                                     const std::filesystem::path& target, Progress& progress) {
   if (!request.colour_from.empty()) {
-    PointWriteInfo info = shaded_points(ContainerReader(request.scene), 0, "", request.colour_from);
+    PointWriteInfo info =
+        shaded_points(ContainerReader(request.scene), 0, "", request.colour_from, std::nullopt);
     const std::vector<Channel> added = shading_channels(request.estimate);
     info.channels.insert(info.channels.end(), added.begin(), added.end());
     check_colour_from(output_format(target).value(), info);

@@ -223,8 +223,9 @@ std::vector<Channel> shading_channels(bool estimates) {
 }
 
 PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t points,
-                             const std::string& settings, const std::string& colour_from) {
-  PointWriteInfo info = describe_points(receivers, {.colour_from = colour_from});
+                             const std::string& settings, const std::string& colour_from,
+                             std::optional<OutputFormat> format) {
+  PointWriteInfo info = describe_points(receivers, {.colour_from = colour_from}, format);
   info.count = points;
   std::erase_if(info.channels, [](const Channel& c) { return c.group == kGroup; });
   info.text["shading"] = settings;

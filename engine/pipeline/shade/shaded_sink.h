@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -46,9 +47,11 @@ class ShadedSink {
 /// @param points       number of points that will be written
 /// @param settings     at most kMaxSettingsBytes
 /// @param colour_from  as PointWriteInfo::colour_from
+/// @param format       the format that will be written; nothing for a container
 [[nodiscard]] PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t points,
                                            const std::string& settings,
-                                           const std::string& colour_from);
+                                           const std::string& colour_from,
+                                           std::optional<OutputFormat> format);
 
 /// Checks that the points of a container can be shaded into a target: a copy of the container has
 /// room for the names and the record of the shading. It is called before work begins.
