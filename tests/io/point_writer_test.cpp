@@ -191,7 +191,7 @@ TEST_CASE("point writers: losses tell what is rounded, by how much, and what is 
   const std::string scale =
       "The file does not say that a value v of the channel angle means 0.006 v + 0.\n";
   const std::string crs = "The file does not name its coordinate reference system.\n";
-  CHECK_THAT(said(OutputFormat::xyz), Equals(scale + crs));
+  CHECK_THAT(said(OutputFormat::xyz), Equals(crs));
   CHECK_THAT(said(OutputFormat::ply),
              Equals("Integers of the channel id are rounded from 2^53 on.\n" + scale + crs));
   // 650,000 lies between 2^19 and 2^20, where floats are 2^-4 apart.
@@ -332,4 +332,36 @@ TEST_CASE("point writers: an XYZ has a column for each component of a channel", 
              Equals("# x y z albedo_r albedo_g albedo_b emission_r emission_g emission_b id x_ "
                     "sky_r sky_g sky_b t\n"
                     "10 20.5 0 0.25 1 0 0 0 3 18446744073709551615 -3 1 5.9604645e-08 inf 0.1\n"));
+}
+
+TEST_CASE("point writers: text has what scaled values mean, and NaN where they are not known",
+          "[io][writers]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(2);
+  PointWriteInfo info = plain_info(surfels);
+  info.channels = {
+      {.name = "a", .type = ChannelType::i16, .no_value = 0x8000, .scale = 0.1, .offset = -3},
+      {.name = "b", .type = ChannelType::u8, .scale = 0.125},
+      {.name = "rgb",
+       .type = ChannelType::u16,
+       .components = 3,
+       .role = ChannelRole::colour,
+       .colour_space = ColourSpace::srgb,
+       .scale = kByteScale},
+      {.name = "wide", .type = ChannelType::i64, .scale = 0.5}};
+  std::vector<std::byte> rows;
+  for (const std::int16_t a : std::initializer_list<std::int16_t>{696, -32768}) {
+    append_value(rows, a);
+    append_value(rows, std::uint8_t{3});
+    for (const std::uint16_t v : std::initializer_list<std::uint16_t>{255, 7, 0})
+      append_value(rows, v);
+    append_value(rows, std::int64_t{-3});
+  }
+  write_points(scratch / "a.xyz", OutputFormat::xyz, info, surfels, rows);
+  CHECK_THAT(slurp(scratch / "a.xyz"), Equals("# x y z a b rgb_r rgb_g rgb_b wide\n"
+                                              "10 20.5 0 66.6 0.375 255 7 0 -1.5\n"
+                                              "11 19.5 0.25 nan 0.375 255 7 0 -1.5\n"));
+  CHECK(losses(OutputFormat::xyz, info) ==
+        std::vector<std::string>{
+            "Values of the channel wide, which has a scale, are rounded to 15 digits."});
 }

@@ -67,6 +67,7 @@ class CheckedWriter : public PointWriter {
 [[nodiscard]] std::vector<std::string> ply_losses(const PointWriteInfo& info);
 [[nodiscard]] std::vector<std::string> ptc_losses(const PointWriteInfo& info);
 [[nodiscard]] std::vector<std::string> usd_losses(const PointWriteInfo& info);
+[[nodiscard]] std::vector<std::string> xyz_losses(const PointWriteInfo& info);
 
 /// Returns the most by which a coordinate within the bounds moves when it is rounded to float.
 [[nodiscard]] double float_error(const Bounds& bounds) noexcept;
@@ -78,6 +79,9 @@ class CheckedWriter : public PointWriter {
 void add_float_positions(std::vector<std::string>& losses, const Bounds& bounds);
 /// Says which channels are rounded where a file has floating-point numbers of `digits` bits.
 void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo& info, int digits);
+/// Says whether the stored values of a channel are not what they mean: scale and offset apply to
+/// them. Bytes of a colour in wider fields count as they are.
+[[nodiscard]] bool is_scaled(const Channel& channel) noexcept;
 /// Says which channels a format cannot scale on reading.
 void add_unscaled_channels(std::vector<std::string>& losses, const PointWriteInfo& info);
 /// Says that the coordinate reference system is not kept, if there is one.

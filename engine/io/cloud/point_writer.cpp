@@ -33,12 +33,6 @@ struct Format {
 };
 
 const Format& entry_of(OutputFormat format) {
-  static const auto lossless = [](const PointWriteInfo& info) {
-    std::vector<std::string> sentences;
-    add_unscaled_channels(sentences, info);
-    add_lost_crs(sentences, info);
-    return sentences;
-  };
   static const std::array<Format, 8> kFormats{{
       {OutputFormat::bgeo, create_bgeo, bgeo_losses, true},
       {OutputFormat::las, create_las, las_losses, true},
@@ -47,7 +41,7 @@ const Format& entry_of(OutputFormat format) {
       {OutputFormat::ptc, create_ptc, ptc_losses, false},
       {OutputFormat::usda, create_usda, usd_losses, true},
       {OutputFormat::usdc, create_usdc, usd_losses, true},
-      {OutputFormat::xyz, create_xyz, lossless, false},
+      {OutputFormat::xyz, create_xyz, xyz_losses, false},
   }};
   return kFormats.at(static_cast<std::size_t>(format));
 }
@@ -197,10 +191,14 @@ void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo
   }
 }
 
+bool is_scaled(const Channel& channel) noexcept {
+  const bool shown = channel.role == ChannelRole::colour && channel.scale == kByteScale;
+  return (channel.scale != 1 && !shown) || channel.offset != 0;
+}
+
 void add_unscaled_channels(std::vector<std::string>& losses, const PointWriteInfo& info) {
   for (const Channel& channel : info.channels) {
-    const bool shown = channel.role == ChannelRole::colour && channel.scale == kByteScale;
-    if ((channel.scale == 1 || shown) && channel.offset == 0) continue;
+    if (!is_scaled(channel)) continue;
     losses.push_back(
         fmt::format("The file does not say that a value v of the channel {} means {} v + {}.",
                     channel.name, channel.scale, channel.offset));

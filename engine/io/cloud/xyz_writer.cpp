@@ -1,5 +1,10 @@
 // Writes clouds as text: a comment with the names of the columns, then a line for each point, whose
 // numbers read back to the same bits.
+//
+// Text cannot name a scale, so scaled values are written as what they mean. They have 15 digits,
+// one or two fewer than a double: integers in steps of 0.1 are 66.6, not 66.60000000000001.
+#include <cmath>
+#include <cstring>
 #include <iterator>
 #include <string>
 
@@ -45,7 +50,7 @@ class XyzWriter : public CheckedWriter {
     if (info_.emits) add(surfel.emission);
     for (const RowChannel& channel : channels_) {
       for (std::size_t i = 0; i < channel.channel.components; ++i)
-        add_value(channel.channel.type, channel.at(row, i));
+        add_value(channel.channel, channel.at(row, i));
     }
     line_.back() = '\n';
     out_.put(line_.data(), line_.size());
@@ -63,8 +68,11 @@ class XyzWriter : public CheckedWriter {
   void add(const glm::dvec3& v) {
     for (int i = 0; i < 3; ++i) add(v[i]);
   }
-  void add_value(ChannelType type, const std::byte* at) {
-    if (type == ChannelType::u64) {
+  void add_value(const Channel& channel, const std::byte* at) {
+    const ChannelType type = channel.type;
+    if (is_scaled(channel)) {
+      add_scaled(channel, at);
+    } else if (type == ChannelType::u64) {
       std::uint64_t value = 0;
       store_number(type, at, type, reinterpret_cast<std::byte*>(&value));
       add(value);
@@ -75,6 +83,15 @@ class XyzWriter : public CheckedWriter {
     } else {
       add(static_cast<float>(load_number(at, type)));
     }
+  }
+
+  // Appends what a stored value means; NaN where it is not known.
+  void add_scaled(const Channel& channel, const std::byte* at) {
+    const bool unknown =
+        channel.no_value && std::memcmp(at, &*channel.no_value, channel.component_bytes()) == 0;
+    const double value =
+        unknown ? std::nan("") : load_number(at, channel.type) * channel.scale + channel.offset;
+    fmt::format_to(std::back_inserter(line_), "{:.15g} ", value);
   }
 
   PointWriteInfo info_;
@@ -88,6 +105,19 @@ class XyzWriter : public CheckedWriter {
 std::unique_ptr<PointWriter> create_xyz(const std::filesystem::path& target,
                                         const PointWriteInfo& info) {
   return std::make_unique<XyzWriter>(target, info);
+}
+
+std::vector<std::string> xyz_losses(const PointWriteInfo& info) {
+  std::vector<std::string> sentences;
+  for (const Channel& channel : info.channels) {
+    const bool wide = channel.type == ChannelType::f64 || channel.type == ChannelType::u64 ||
+                      channel.type == ChannelType::i64;
+    if (!wide || !is_scaled(channel)) continue;
+    sentences.push_back("Values of the channel " + channel.name +
+                        ", which has a scale, are rounded to 15 digits.");
+  }
+  add_lost_crs(sentences, info);
+  return sentences;
 }
 
 }  // namespace ptc
