@@ -26,8 +26,9 @@ inline constexpr const char* kRoundingKey = "rounding";  ///< kRounding when poi
 inline constexpr const char* kUpKey = "up";              ///< x, y or z; y when it is absent
 inline constexpr const char* kAlbedoKey = "albedo";      ///< kAssumed when no input has colours
 inline constexpr const char* kAssumed = "assumed";
-inline constexpr const char* kCrsKey = "crs";               ///< of positions, as WKT or EPSG:n
-inline constexpr const char* kUnitKey = "metres_per_unit";  ///< a decimal number
+inline constexpr const char* kCrsKey = "crs";                  ///< of positions, as WKT or EPSG:n
+inline constexpr const char* kViewpointKey = "pcd.viewpoint";  ///< of the one PCD of all inputs
+inline constexpr const char* kUnitKey = "metres_per_unit";     ///< a decimal number
 
 /// Adds texts to those of other points. What is there already stays; unit and reference system are
 /// taken from one file, never from two.

@@ -5,6 +5,8 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/point_survey.h"
+#include "engine/io/cloud/points.h"
 #include "tests/io/files.h"
 #include "tests/io/writer_inputs.h"
 
@@ -61,6 +63,76 @@ TEST_CASE("pcd writer: the header names all fields with bytes and kinds", "[io][
                       raw(0x0089ff00U) + raw(1.5F) + raw(1.0F) + raw(2.0F) + raw(0.125F) +
                       raw(0.25F) + raw(1.0F) + raw(0.0F) + raw(0.0F) + raw(1.0F) + raw(3.0F) +
                       raw(std::uint8_t{41}) + raw(-8.0) + raw(1.0F) + raw(2.0F) + raw(0.0F));
+}
+
+TEST_CASE("pcd writer: the viewpoint of a PCD is written again, and a damaged one is not",
+          "[io][writers][pcd]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(2);
+  PointWriteInfo info = plain_info(surfels);
+  const auto viewpoint = [&](const char* text) {
+    info.text["pcd.viewpoint"] = text;
+    write_points(scratch / "a.pcd", OutputFormat::pcd, info, surfels);
+    const std::string bytes = slurp(scratch / "a.pcd");
+    const std::size_t at = bytes.find("VIEWPOINT ") + 10;
+    return bytes.substr(at, bytes.find('\n', at) - at);
+  };
+  CHECK(viewpoint("1.5 -2 1e+30 0.1 0 1 0") == "1.5 -2 1e+30 0.1 0 1 0");
+  const PointFile file = open_points(scratch / "a.pcd");
+  CHECK(file.info.text.at("pcd.viewpoint") == "1.5 -2 1e+30 0.1 0 1 0");
+  CHECK(file.info.scanners == std::vector{glm::dvec3(1.5, -2, 1e30)});
+  for (const char* bad : {"", "1 2 3 4 5 6", "1 2 3 nan 5 6 7", "1 2 3 4 5 6 x"})
+    CHECK(viewpoint(bad) == "0 0 0 1 0 0 0");
+}
+
+TEST_CASE("pcd writer: points that lie in a grid row by row are organised, no others",
+          "[io][writers][pcd]") {
+  const test::TemporaryDirectory scratch;
+  using Cells = std::vector<std::array<std::uint32_t, 2>>;  // row and column of each point
+  const auto lines = [&](const Cells& cells) {
+    const std::vector<Surfel> surfels = surfels_of(static_cast<int>(cells.size()));
+    PointWriteInfo info = plain_info(surfels);
+    info.channels = {{.name = "row", .type = ChannelType::u32},
+                     {.name = "id", .type = ChannelType::u8},
+                     {.name = "column", .type = ChannelType::u32}};
+    std::vector<std::byte> rows;
+    for (const auto& [row, column] : cells) {
+      append_value(rows, row);
+      append_value(rows, std::uint8_t{7});
+      append_value(rows, column);
+    }
+    PointSurvey survey(OutputFormat::pcd, info.channels);
+    CHECK_FALSE(survey.empty());
+    survey.add(std::span(rows).first(9));
+    survey.add(std::span(rows).subspan(9));
+    survey.finish(info);
+    write_points(scratch / "a.pcd", OutputFormat::pcd, info, surfels, rows);
+    const std::string bytes = slurp(scratch / "a.pcd");
+    const auto line = [&](const char* word) {
+      const std::size_t at = bytes.find(word);
+      return bytes.substr(at, bytes.find('\n', at) - at) + "; ";
+    };
+    return line("FIELDS") + line("WIDTH") + line("HEIGHT");
+  };
+  const Cells whole{{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1}, {1, 2}};
+  CHECK(lines(whole) == "FIELDS x y z id; WIDTH 3; HEIGHT 2; ");
+  CHECK(lines({{0, 0}, {1, 0}}) == "FIELDS x y z id; WIDTH 1; HEIGHT 2; ");
+  const auto is_plain = [&](const Cells& cells) {
+    CHECK(lines(cells) ==
+          "FIELDS x y z row id column; WIDTH " + std::to_string(cells.size()) + "; HEIGHT 1; ");
+  };
+  for (std::size_t hole = 0; hole < whole.size(); ++hole) {
+    Cells some = whole;
+    some.erase(some.begin() + static_cast<std::ptrdiff_t>(hole));
+    is_plain(some);
+    Cells swapped = whole;
+    std::swap(swapped[hole], swapped[(hole + 1) % whole.size()]);
+    is_plain(swapped);
+  }
+  is_plain({{0, 0}, {0, 1}, {0, 2}});                    // no row but the first
+  is_plain({{0, 0}, {1, 0}, {0, 1}, {1, 1}});            // column by column
+  is_plain({{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1}});    // the last row is short
+  is_plain({{4'000'000'000U, 4'000'000'000U}, {0, 1}});  // anything
 }
 
 TEST_CASE("pcd writer: positions are floats near the origin and doubles in a national grid",

@@ -12,11 +12,14 @@
 //
 // VIEWPOINT does not move points: the format calls it an acquisition viewpoint that may help to
 // orient normals, and writers store points in the frame in which it is given. It becomes the place
-// of the scanner, unless it is the default of a cloud that is no grid, which says nothing.
+// of the scanner, unless it is the default of a cloud that is no grid, which says nothing. The text
+// `pcd.viewpoint` keeps all of its numbers for the writer.
 #include <algorithm>
 #include <array>
 #include <memory>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/lzf.h"
@@ -263,6 +266,14 @@ std::unique_ptr<PointSource> open_compressed(ByteStream& stream, PcdHeader heade
   return std::make_unique<PcdCompressedSource>(stream, offset, packed, std::move(header), record);
 }
 
+// Adds what the file says of its scanner.
+void add_viewpoint(const PcdHeader& header, PointFileInfo& info) {
+  if (!header.viewpoint) return;
+  info.text.emplace(kPcdViewpoint, fmt::format("{}", fmt::join(*header.viewpoint, " ")));
+  const glm::dvec3 position((*header.viewpoint)[0], (*header.viewpoint)[1], (*header.viewpoint)[2]);
+  if (header.height > 1 || position != glm::dvec3(0)) info.scanners.push_back(position);
+}
+
 }  // namespace
 
 PointFile open_pcd(const std::filesystem::path& path) {
@@ -275,8 +286,7 @@ PointFile open_pcd(const std::filesystem::path& path) {
   file.info.count = header.points;
   file.info.text.emplace("up", "z");
   file.info.notes = record.notes;
-  const bool given = header.viewpoint && (header.height > 1 || *header.viewpoint != glm::dvec3(0));
-  if (given) file.info.scanners.push_back(*header.viewpoint);
+  add_viewpoint(header, file.info);
   if (header.data == PcdData::compressed) {
     file.source = open_compressed(*stream, std::move(header), record);
   } else {

@@ -53,17 +53,6 @@ void check_version(const ByteStream& stream, std::string_view version) {
     stream.fail_at_line("the PCD version is not 0.5, 0.6 or 0.7");
 }
 
-std::optional<glm::dvec3> read_viewpoint(const ByteStream& stream, Words words) {
-  glm::dvec3 position{0};
-  for (int i = 0; i < 7; ++i) {
-    const std::optional<double> value = parse_number(words.next());
-    if (!value || !std::isfinite(*value))
-      stream.fail_at_line("a PCD viewpoint must have seven finite numbers");
-    if (i < 3) position[i] = *value;
-  }
-  return position;
-}
-
 PcdData read_data(const ByteStream& stream, std::string_view name) {
   if (name == "ascii") return PcdData::ascii;
   if (name == "binary") return PcdData::binary;
@@ -91,7 +80,8 @@ bool read_line(const ByteStream& stream, std::string_view line, Lines& lines, Pc
   } else if (keyword == "HEIGHT") {
     lines.height = read_integer(stream, words.next());
   } else if (keyword == "VIEWPOINT") {
-    header.viewpoint = read_viewpoint(stream, words);
+    header.viewpoint = read_pcd_viewpoint(words);
+    if (!header.viewpoint) stream.fail_at_line("a PCD viewpoint must have seven finite numbers");
   } else if (keyword == "POINTS") {
     lines.points = read_integer(stream, words.next());
   } else if (keyword == "DATA") {
@@ -157,6 +147,16 @@ void set_counts(const ByteStream& stream, const Lines& lines, PcdHeader& header)
 }
 
 }  // namespace
+
+std::optional<std::array<double, 7>> read_pcd_viewpoint(Words words) {
+  std::array<double, 7> numbers{};
+  for (double& number : numbers) {
+    const std::optional<double> value = parse_number(words.next());
+    if (!value || !std::isfinite(*value)) return std::nullopt;
+    number = *value;
+  }
+  return numbers;
+}
 
 PcdHeader read_pcd_header(ByteStream& stream) {
   PcdHeader header;

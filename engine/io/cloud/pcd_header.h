@@ -14,15 +14,15 @@
 //   DATA binary_compressed     or ascii, or binary; the points follow
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <glm/vec3.hpp>
-
 #include "engine/io/text/byte_stream.h"
+#include "engine/io/text/text.h"
 #include "format/schema.h"
 
 namespace ptc {
@@ -45,11 +45,18 @@ struct PcdHeader {
   std::vector<PcdField> fields;
   std::uint64_t width = 0;
   std::uint64_t height = 1;
-  std::uint64_t points = 0;             ///< width x height
-  std::optional<glm::dvec3> viewpoint;  ///< its position; nothing when the file has none
+  std::uint64_t points = 0;  ///< width x height
+  /// Position and quaternion (w x y z) of the scanner; nothing when the file has none.
+  std::optional<std::array<double, 7>> viewpoint;
   PcdData data = PcdData::ascii;
   std::size_t point_bytes = 0;  ///< of a binary point, at most kMaxPcdPointBytes
 };
+
+/// The key of the text that keeps the viewpoint of a file, as its header has it, for the writer.
+inline constexpr const char* kPcdViewpoint = "pcd.viewpoint";
+
+/// Reads the seven finite numbers of a viewpoint. @return nothing when there are fewer
+[[nodiscard]] std::optional<std::array<double, 7>> read_pcd_viewpoint(Words words);
 
 /// The greatest accepted size of a point, bytes.
 inline constexpr std::size_t kMaxPcdPointBytes = std::size_t{1} << 20;

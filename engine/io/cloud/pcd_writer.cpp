@@ -4,6 +4,9 @@
 // points follow as packed little-endian records. The colour is one field `rgb`, whose bits are
 // 0x00RRGGBB but whose kind is float, which is how the Point Cloud Library looks for it.
 //
+// Points that lie in a grid, row by row, get its WIDTH and HEIGHT in place of the channels `row`
+// and `column`. VIEWPOINT is that of the PCD that the points came from.
+//
 // That library takes x, y and z as floats only. So they are floats where that moves no point by
 // more than 1e-4 of the spacing of the points, and doubles elsewhere, such as in a national grid.
 #include <set>
@@ -13,6 +16,7 @@
 
 #include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/display_colour.h"
+#include "engine/io/cloud/pcd_header.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/file/buffered_output.h"
 
@@ -84,6 +88,10 @@ class PcdWriter : public CheckedWriter {
       if (channel.name == "rgb" && channel.components == 1) taken.insert(channel.name);
     }
     channels_ = colour_.without_bytes(row_channels(info_.channels, taken));
+    const auto is_cell = [](const RowChannel& row) {
+      return row.channel.name == "row" || row.channel.name == "column";
+    };
+    if (info_.grid) std::erase_if(channels_, is_cell);  // WIDTH and HEIGHT say the same
   }
 
   // Says whether the albedo has fields of its own, beside a colour of 8 bits.
@@ -106,11 +114,19 @@ class PcdWriter : public CheckedWriter {
       for (const std::string& name : channel.parts)
         fields.add(name, channel_bytes(pcd_type(type)), kind_of(type));
     }
-    const std::string count = std::to_string(info_.count);
+    const PointGrid grid = info_.grid.value_or(PointGrid{.width = info_.count, .height = 1});
     return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS" + fields.names +
            "\nSIZE" + fields.sizes + "\nTYPE" + fields.kinds + "\nCOUNT" + fields.counts +
-           "\nWIDTH " + count + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count +
+           "\nWIDTH " + std::to_string(grid.width) + "\nHEIGHT " + std::to_string(grid.height) +
+           "\nVIEWPOINT " + viewpoint() + "\nPOINTS " + std::to_string(info_.count) +
            "\nDATA binary\n";
+  }
+  // Returns the viewpoint of the file that the points came from, or the default.
+  [[nodiscard]] std::string viewpoint() const {
+    const auto text = info_.text.find(kPcdViewpoint);
+    if (text == info_.text.end() || !read_pcd_viewpoint(Words(text->second)))
+      return "0 0 0 1 0 0 0";
+    return fmt::format("{}", fmt::join(*read_pcd_viewpoint(Words(text->second)), " "));
   }
 
   void put(const Surfel& surfel, const std::byte* row) override {

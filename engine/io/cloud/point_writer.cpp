@@ -113,6 +113,14 @@ void check_colour_from(OutputFormat format, const PointWriteInfo& info) {
 
 std::vector<std::string> measured_channels(OutputFormat format, std::span<const Channel> channels) {
   std::vector<std::string> names;
+  if (format == OutputFormat::pcd) {
+    const auto counts = [&](std::string_view name) {
+      const auto found = std::ranges::find(channels, name, &Channel::name);
+      return found != channels.end() && found->components == 1 && is_integer(found->type) &&
+             channel_bytes(found->type) != 0 && !is_scaled(*found);
+    };
+    if (counts("row") && counts("column")) names = {"row", "column"};
+  }
   if (format != OutputFormat::las) return names;
   for (const Channel& channel : channels) {
     if (las::needs_range(channel)) names.push_back(channel.name);

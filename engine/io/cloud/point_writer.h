@@ -38,6 +38,12 @@ struct ValueRange {
   bool whole = true;                                       ///< all of them are integers
 };
 
+/// A grid in which points lie row by row, each cell with one of them.
+struct PointGrid {
+  std::uint64_t width = 0;   ///< columns
+  std::uint64_t height = 0;  ///< rows, at least 2
+};
+
 /// What a point file will hold.
 struct PointWriteInfo {
   std::uint64_t count = 0;                  ///< exact number of points
@@ -46,6 +52,9 @@ struct PointWriteInfo {
   Bounds bounds;                            ///< holds all points, scene units
   /// The ranges of measured_channels(), by their names; a channel that is missing was not measured.
   std::map<std::string, ValueRange> ranges;
+  /// The grid of the channels `row` and `column`, if they are measured_channels() and the points
+  /// are written in its order; nothing otherwise.
+  std::optional<PointGrid> grid;
   bool has_normals = false;   ///< the normals of the surfels are worth writing
   bool has_radius = false;    ///< the radii are
   bool has_radiance = false;  ///< the radiances are

@@ -58,6 +58,7 @@ Meta extended_meta(const Meta& scene, const Meta& added) {
     const auto [at, is_new] = meta.text.try_emplace(key, value);
     if (!is_new && key == kInputsKey) at->second += " " + value;
   }
+  meta.text.erase(kViewpointKey);
   // Colours of either are colours of the whole
   if (has_colours(scene.text) || has_colours(added.text)) meta.text.erase(kAlbedoKey);
   // The record has room for one spacing: drop it when old and new points differ in theirs

@@ -183,6 +183,7 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from,
     if (!holds_points(input)) continue;
     inputs.clouds.measure(input, request.selection, from, inputs.attributes, progress);
   }
+  if (inputs.clouds.files.size() > 1) inputs.clouds.text.erase(kViewpointKey);
   if (!request.up.empty()) inputs.clouds.text[kUpKey] = request.up;
   const bool indexed =
       scene && std::ranges::find(*scene, kOriginalIndex, &Channel::name) != scene->end();

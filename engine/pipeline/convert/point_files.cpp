@@ -10,6 +10,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
+#include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
@@ -63,11 +64,17 @@ std::optional<PointSurvey> survey_for(std::optional<OutputFormat> format,
 }
 
 /// Measures the channels of a container that a format wants to know the values of.
-void measure_channels(const ContainerReader& container, Selection selection, OutputFormat format,
-                      PointWriteInfo& info) {
+void measure_channels(const ContainerReader& container, const PointFileOptions& options,
+                      OutputFormat format, PointWriteInfo& info) {
+  // Points in the order of the curve lie in no grid
+  const bool grid = format == OutputFormat::pcd;
+  if (grid && !(options.original_order && has_input_order(container))) return;
+  Selection selection = options.selection;
   selection.channels = measured_channels(format, info.channels);
   if (selection.channels->empty()) return;
-  PointSurvey survey(format, kept_channels(container.meta().channels, selection, container.path()));
+  if (grid) selection.channels->emplace_back(kOriginalIndex);
+  PointSurvey survey(format, kept_channels(container.meta().channels, selection, container.path()),
+                     kOriginalIndex);
   const std::unique_ptr<PointSource> source = open_selected(container, selection);
   std::vector<Surfel> block(kBlock);
   while (source->next(block) > 0) survey.add(source->attributes());
@@ -126,7 +133,7 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
     std::optional<PointSurvey> none;
     measure(*open_selected(container, selection), none, info);
   }
-  if (format) measure_channels(container, selection, *format, info);
+  if (format) measure_channels(container, options, *format, info);
   return info;
 }
 
