@@ -387,14 +387,24 @@ TEST_CASE("las: the texts las.header and las.vlrs keep what a writer needs", "[i
   CHECK(bytes == first + last);
 }
 
-TEST_CASE("las: records beyond 16 KiB are left out with a note", "[io][points][las]") {
+TEST_CASE("las: records beyond 16 KiB are left out and named, with their bytes",
+          "[io][points][las]") {
   const test::TemporaryDirectory scratch;
-  LasFile file = one_point(0);
+  LasFile file = one_point(6);
   file.vlrs = {las_vlr("a", 1, std::string(16'384 - 54, 'x'))};
   CHECK(read_las(scratch, file.bytes()).info.notes.empty());
-  file.vlrs.push_back(las_vlr("a", 2, ""));
+  file.vlrs.push_back(las_vlr("b", 2, ""));
+  file.evlrs = {las_vlr("LASF_Projection", 2112, std::string(70'000, ' '), true)};
+  for (int i = 0; i < 3; ++i) file.vlrs.push_back(las_vlr("c\x1b", 7, "12345"));
   const PointFileInfo info = read_las(scratch, file.bytes()).info;
-  REQUIRE(info.notes.size() == 1);
-  CHECK_THAT(info.notes[0], Contains("1 variable-length records are left out"));
+  const std::string end = " left out: only 16 KiB of records are kept.";
+  CHECK(info.notes == std::vector<std::string>{
+                          "The record 2112 of the user 'LASF_Projection', 70000 bytes, is" + end,
+                          "The record 2 of the user 'b', 0 bytes, is" + end,
+                          "3 records 7 of the user 'c\\x1b', 15 bytes in all, are" + end});
   CHECK(info.text.at("las.vlrs").size() == (16'384 + 2) / 3 * 4);
+  for (unsigned i = 0; i < 9; ++i) file.vlrs.push_back(las_vlr("d", i, ""));
+  const auto notes = read_las(scratch, file.bytes()).info.notes;
+  REQUIRE(notes.size() == 9);
+  CHECK(notes.back() == "Records of 4 more kinds are left out.");
 }

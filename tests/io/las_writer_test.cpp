@@ -267,3 +267,61 @@ TEST_CASE("las writer: surfels and channels come back from a file as they went i
           std::string(reinterpret_cast<const char*>(rows.data()) + 6 * i, 6));
   }
 }
+
+TEST_CASE("las writer: extra bytes keep the names and descriptions that they had in a LAS file",
+          "[io][writers][las]") {
+  const test::TemporaryDirectory scratch;
+  const auto description = [](unsigned type, std::string name, const std::string& says) {
+    std::string out(192, '\0');
+    out[2] = static_cast<char>(type);
+    name.resize(32);
+    out.replace(4, 32, name);
+    return out.replace(160, says.size(), says);
+  };
+  LasFile file;
+  file.points = 1;
+  file.record_bytes = 20 + 2 + 4 + 6 + 12 + 1 + 1;
+  file.records = las_point(1, 2, 3) + std::string(26, '\0');
+  file.vlrs = {las_vlr("LASF_Spec", 4,
+                       description(3, "Echo Width", "of the pulse [ns]") +
+                           description(5, "Intensity", "Brightness") +
+                           description(23, "Colours", "three") + description(9, "NormalX", "") +
+                           description(9, "NormalY", "") + description(9, "NormalZ", "") +
+                           description(1, "echo width", "another") +
+                           description(1, "z", "hides a coordinate"))};
+  const auto path = scratch.file("a.las", file.bytes());
+  const auto names_of = [&](const LasCloud& cloud) {
+    PointWriteInfo info = plain_info(cloud.surfels);
+    info.channels = cloud.info.channels;
+    info.text = cloud.info.text;
+    info.has_normals = cloud.info.has_normals;
+    std::vector<std::byte> rows(cloud.rows.size());
+    std::memcpy(rows.data(), cloud.rows.data(), rows.size());
+    write_points(scratch / "b.las", OutputFormat::las, info, cloud.surfels, rows);
+    return Las(scratch / "b.las").extra_names();
+  };
+  const LasCloud cloud = read_las(path);
+  CHECK(names_of(cloud) == std::vector<std::string>{"NormalX 9", "NormalY 9", "NormalZ 9",
+                                                    "Echo Width 3", "Intensity 5", "Colours_r 3",
+                                                    "Colours_g 3", "Colours_b 3", "echo width 1",
+                                                    "z_ 1"});
+  const std::string list = Las(scratch / "b.las").record("LASF_Spec", 4);
+  const auto says = [&](std::size_t i) {
+    return std::string(list.substr(i * 192 + 160, 32).c_str());
+  };
+  CHECK(says(3) == "of the pulse [ns]");
+  CHECK(says(4) == "Brightness");
+  CHECK(says(6) == "three");
+  CHECK(says(8) == "another");
+  // Written again, the names stay; without the records, or a header that fits them, they are plain
+  CHECK(names_of(read_las(scratch / "b.las"))[3] == "Echo Width 3");
+  LasCloud other = cloud;
+  other.info.text["las.vlrs"] = "AAAA";
+  CHECK(names_of(other)[3] == "echo_width 3");
+  for (const char* header :
+       {R"({"format":11,"record_length":99})", R"({"format":0})", "{}", "no"}) {
+    other = cloud;
+    other.info.text["las.header"] = header;
+    CHECK(names_of(other)[3] == "echo_width 3");
+  }
+}

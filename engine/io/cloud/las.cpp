@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -26,6 +27,7 @@
 #include "engine/io/cloud/surfel_check.h"
 #include "engine/io/image/srgb.h"
 #include "engine/io/laz/layout.h"
+#include "format/text.h"
 
 namespace ptc {
 namespace {
@@ -192,9 +194,33 @@ class LasSource : public PointSource {
     info.text["las.header"] = make_las_header_text(header_, bits);
     LasRecordsText records = make_las_records_text(file_, header_);
     if (!records.base64.empty()) info.text["las.vlrs"] = std::move(records.base64);
-    if (records.left_out > 0) {
-      info.notes.push_back(std::to_string(records.left_out) +
-                           " variable-length records are left out: only 16 KiB are kept.");
+    note_lost(records.left_out, info.notes);
+  }
+
+  // Names the records that are left out, those of one kind together; the first few kinds of many.
+  static void note_lost(std::span<const LasRecord> lost, std::vector<std::string>& notes) {
+    constexpr std::size_t kMostNamed = 8;
+    std::map<std::pair<std::string, unsigned>, std::pair<std::size_t, std::uint64_t>> kinds;
+    for (const LasRecord& record : lost) {
+      auto& [count, bytes] = kinds[{record.user, record.number}];
+      ++count;
+      bytes += record.bytes;
+    }
+    std::size_t named = 0;
+    for (const auto& [kind, sum] : kinds) {
+      if (named++ == kMostNamed) {
+        notes.push_back("Records of " + std::to_string(kinds.size() - kMostNamed) +
+                        " more kinds are left out.");
+        break;
+      }
+      const auto& [count, bytes] = sum;
+      const std::string what =
+          std::to_string(kind.second) + " of the user '" + printable(kind.first) + "', ";
+      const std::string size = std::to_string(bytes) + " bytes";
+      notes.push_back((count == 1
+                           ? "The record " + what + size + ", is"
+                           : std::to_string(count) + " records " + what + size + " in all, are") +
+                      " left out: only 16 KiB of records are kept.");
     }
   }
 

@@ -137,11 +137,13 @@ class FieldList {
     find_surfel(fields);
     for (const Described& field : fields) {
       if (field.in_surfel) continue;
+      const std::size_t before = list_.channels.size();
       if (field.components == 0) {
         add_bytes(field.name, field.bytes);
       } else {
         add_numbers(field.name, field.type, field.components, field.description);
       }
+      keep_names(field, before);
     }
     if (left == 0) return;
     note(std::to_string(left) +
@@ -201,8 +203,27 @@ class FieldList {
     return found == fields.end() ? nullptr : &*found;
   }
 
-  static LasNumber take_number(Described& field) {
+  // Keeps what the file calls a field whose channels are those from `first` on.
+  void keep_names(const Described& field, std::size_t first) {
+    const bool one = list_.channels.size() - first == 1;
+    for (std::size_t i = first; i < list_.channels.size(); ++i) {
+      list_.names.push_back(
+          {.channel = list_.channels[i].name,
+           .name = one ? field.name : field.name + "_" + std::to_string(i - first),
+           .description = description_of(field)});
+    }
+  }
+
+  static std::string description_of(const Described& field) {
+    const std::string text(reinterpret_cast<const char*>(field.description.data()) + 160, 32);
+    return text.substr(0, text.find('\0'));
+  }
+
+  LasNumber take_number(Described& field) {
     field.in_surfel = true;
+    list_.names.push_back({.channel = std::string(*surfel_name(field.name)),
+                           .name = field.name,
+                           .description = description_of(field)});
     const Channel number = number_of(field.type, field.description, 0);
     return {field.offset, field.type, number.scale, number.offset, number.no_value};
   }

@@ -39,16 +39,25 @@ struct LasSurfel {
   [[nodiscard]] std::vector<LasNumber> numbers() const;
 };
 
+/// What a file calls a field of its extra bytes.
+struct LasName {
+  std::string channel;      ///< the channel that it became, or the name of surfel_name()
+  std::string name;         ///< as the file has it
+  std::string description;  ///< as the file has it
+};
+
 /// What the fields of a point record mean.
 struct LasFields {
   std::vector<Channel> channels;  ///< in the order of a row
   LasSurfel surfel;
+  std::vector<LasName> names;      ///< of the described extra bytes
   std::vector<std::string> notes;  ///< sentences for the user
 };
 
 /// Finds out what the fields of a file's records mean. Extra bytes that are floats, or integers
 /// with a scale, are parts of the surfel where they have the names by which surfel_name() knows
 /// them and a part is there as a whole; all other fields become channels.
+/// @param header        its point format and the bytes of a record count
 /// @param descriptions  payload of the record that describes extra bytes; may be empty
 [[nodiscard]] LasFields make_las_fields(const LasHeader& header,
                                         std::span<const std::byte> descriptions);

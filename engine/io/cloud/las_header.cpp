@@ -34,7 +34,6 @@ constexpr std::uint64_t kEvlrHeader = 60;
 constexpr std::uint64_t kMaxPayload = std::uint64_t{1} << 20;
 constexpr std::size_t kMaxRecordBytes = 2048;
 constexpr unsigned kMaxMinor = 5;
-constexpr unsigned kMaxFormat = 10;
 
 // Returns the text of a field that zeros fill up.
 std::string text_at(std::span<const std::byte> bytes, std::size_t at, std::size_t size) {
@@ -119,7 +118,7 @@ class HeaderReader {
     const unsigned format = load<std::uint8_t>(bytes_.data(), 104);
     header_.compressed = (format & 0x80) != 0;
     header_.format = format & 0x7f;
-    if (header_.format > kMaxFormat)
+    if (header_.format > kMaxLasFormat)
       fail(104, "point format " + std::to_string(header_.format) + " is not supported");
     header_.record_bytes = load<std::uint16_t>(bytes_.data(), 105);
     if (header_.record_bytes < laz::format_bytes(header_.format)) {

@@ -21,6 +21,9 @@ namespace ptc {
 inline constexpr std::string_view kLaszipUser = "laszip encoded";
 inline constexpr unsigned kLaszipNumber = 22204;
 
+/// The last point format of LAS.
+inline constexpr unsigned kMaxLasFormat = 10;
+
 /// A variable-length record: a header of 54 bytes, or 60 of an extended one, and a payload.
 struct LasRecord {
   std::string user;           ///< who defined it, e.g. "LASF_Projection"

@@ -17,6 +17,7 @@
 #include <set>
 #include <span>
 
+#include "engine/io/cloud/channel_names.h"
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/las_plan.h"
 #include "engine/io/cloud/packed_number.h"
@@ -94,7 +95,7 @@ void append_padded(std::vector<std::byte>& bytes, std::string_view text, std::si
 }
 
 void append_extra_record(std::vector<std::byte>& bytes, const Channel& channel,
-                         const std::string& name) {
+                         const std::string& name, const std::string& description) {
   const bool scaled = channel.scale != 1 || channel.offset != 0;
   const unsigned options = (channel.no_value ? 1U : 0U) | (scaled ? 8U | 16U : 0U);
   append_value(bytes, std::uint16_t{0});
@@ -109,8 +110,58 @@ void append_extra_record(std::vector<std::byte>& bytes, const Channel& channel,
   append_padded(bytes, "", 16);
   append_value(bytes, channel.offset);
   append_padded(bytes, "", 16);
-  append_padded(bytes, channel.unit, 32);
+  append_padded(bytes, description.empty() ? channel.unit : description, 32);
 }
+
+// Returns the name that LasName has for a component of a quantity of the surfel.
+std::string name_in_surfel(const Extra& extra, std::size_t component) {
+  return std::string(surfel_name(extra.channel.parts[component]).value_or(""));
+}
+
+// Gives extra bytes the names and descriptions that they have in the LAS file that they came from,
+// unless a name is taken.
+class OriginalNames {
+ public:
+  OriginalNames(const PointWriteInfo& info, const std::vector<Extra>& extras)
+      : names_(original_names(info)), taken_(standard_names()) {
+    for (const Extra& extra : extras)
+      taken_.insert(extra.channel.parts.begin(), extra.channel.parts.end());
+  }
+
+  void restore(Extra& extra) {
+    std::vector<std::string>& parts = extra.channel.parts;
+    if (extra.source != ExtraSource::channel) {
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        if (const LasName* const was = find(name_in_surfel(extra, i)))
+          take({&parts[i], 1}, {was->name});
+      }
+      return;
+    }
+    const Channel& channel = extra.channel.channel;
+    const LasName* const was = find(channel.name);
+    if (was == nullptr) return;
+    extra.description = was->description;
+    take(parts, part_names(was->name, channel.components, has_axes(channel)));
+  }
+
+ private:
+  [[nodiscard]] const LasName* find(const std::string& channel) const {
+    const auto found = std::ranges::find(names_, channel, &LasName::channel);
+    return found == names_.end() ? nullptr : &*found;
+  }
+  // Replaces names, if all others are free and short enough.
+  void take(std::span<std::string> names, const std::vector<std::string>& by) {
+    const auto is_free = [&](const std::string& name) {
+      return name.size() <= kMostNameBytes && !taken_.contains(name);
+    };
+    if (!std::ranges::all_of(by, is_free)) return;
+    std::ranges::copy(by, names.begin());
+    taken_.insert(by.begin(), by.end());
+  }
+
+  std::vector<LasName> names_;
+  std::set<std::string> taken_;
+};
 
 }  // namespace
 
@@ -144,6 +195,9 @@ Layout::Layout(const PointWriteInfo& info) : colour(info) {
     }
   }
 
+  OriginalNames names(info, extras);
+  for (Extra& extra : extras) names.restore(extra);
+
   // Choose the point format
   if (has_nir) {
     point_format = 8;
@@ -164,7 +218,7 @@ std::string Layout::extra_records() const {
   std::vector<std::byte> bytes;
   for (const Extra& extra : extras) {
     for (const std::string& name : extra.channel.parts)
-      append_extra_record(bytes, extra.channel.channel, name);
+      append_extra_record(bytes, extra.channel.channel, name, extra.description);
   }
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }

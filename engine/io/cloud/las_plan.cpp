@@ -21,6 +21,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/io/cloud/formats.h"
+#include "engine/io/laz/layout.h"
 #include "engine/io/text/text.h"
 
 namespace ptc::las {
@@ -162,41 +163,59 @@ bool is_about_storage(std::string_view user, unsigned id) {
   return user == "laszip encoded" || user == "copc";
 }
 
-// Appends the records of the text `las.vlrs` that stay true. @return false when they are damaged
-bool add_original(std::string_view text, Records& records) {
+// A record of the text `las.vlrs`.
+struct Original {
+  std::string user;
+  unsigned id = 0;
+  std::string bytes;  // with its header
+};
+
+// Takes the text apart. @return nothing when it is damaged
+std::optional<std::vector<Original>> read_originals(std::string_view text) {
   const std::optional<std::string> decoded = decode_base64(text);
-  if (!decoded) return false;
-  std::string_view rest = *decoded;
-  Records kept;
-  while (!rest.empty()) {
-    if (rest.size() < kRecordHeadBytes) return false;
+  if (!decoded) return std::nullopt;
+  std::vector<Original> records;
+  for (std::string_view rest = *decoded; !rest.empty();) {
+    if (rest.size() < kRecordHeadBytes) return std::nullopt;
     const auto number = [&](std::size_t at) {
       return static_cast<unsigned>(static_cast<unsigned char>(rest[at])) |
              static_cast<unsigned>(static_cast<unsigned char>(rest[at + 1])) << 8;
     };
-    const std::string_view user = until_zero(rest.substr(2, 16));
-    const unsigned id = number(18);
     const std::size_t bytes = kRecordHeadBytes + number(20);
-    if (bytes > rest.size()) return false;
-    if (!is_about_storage(user, id)) {
-      const auto whole = std::as_bytes(std::span(rest.substr(0, bytes)));
-      kept.bytes.insert(kept.bytes.end(), whole.begin(), whole.end());
-      kept.has_wkt |= user == "LASF_Projection" && id == 2112;
-      kept.has_geotiff |= user == "LASF_Projection" && id == 34735;
-      ++kept.count;
-    }
+    if (bytes > rest.size()) return std::nullopt;
+    records.push_back({.user = std::string(until_zero(rest.substr(2, 16))),
+                       .id = number(18),
+                       .bytes = std::string(rest.substr(0, bytes))});
     rest.remove_prefix(bytes);
   }
-  records = std::move(kept);
-  return true;
+  return records;
+}
+
+// Returns the records that stay true in another file.
+Records kept_records(const std::vector<Original>& originals) {
+  Records kept;
+  for (const Original& record : originals) {
+    if (is_about_storage(record.user, record.id)) continue;
+    const auto whole = std::as_bytes(std::span(record.bytes));
+    kept.bytes.insert(kept.bytes.end(), whole.begin(), whole.end());
+    kept.has_wkt |= record.user == "LASF_Projection" && record.id == 2112;
+    kept.has_geotiff |= record.user == "LASF_Projection" && record.id == 34735;
+    ++kept.count;
+  }
+  return kept;
+}
+
+// Returns the text `las.header`; no object where there is none.
+Json read_header_text(const PointWriteInfo& info) {
+  const auto text = info.text.find("las.header");
+  return text == info.text.end() ? Json() : Json::parse(text->second, nullptr, false);
 }
 
 }  // namespace
 
 Head plan_head(const PointWriteInfo& info) {
   Head head;
-  const auto text = info.text.find("las.header");
-  const Json from = text == info.text.end() ? Json() : Json::parse(text->second, nullptr, false);
+  const Json from = read_header_text(info);
   if (!from.is_object()) {
     choose_steps(info, head);
     return head;
@@ -221,6 +240,31 @@ Head plan_head(const PointWriteInfo& info) {
   return head;
 }
 
+std::vector<LasName> original_names(const PointWriteInfo& info) {
+  // Find out how the records of the file were laid out
+  const Json from = read_header_text(info);
+  std::uint16_t format = 0, record_bytes = 0;
+  if (!from.is_object()) return {};
+  take_number(from, "format", format);
+  take_number(from, "record_length", record_bytes);
+  if (format > kMaxLasFormat || record_bytes < laz::format_bytes(format)) return {};
+  LasHeader header;
+  header.format = format;
+  header.record_bytes = record_bytes;
+
+  // Read the descriptions again, which gives each field the channel that it became
+  const auto text = info.text.find("las.vlrs");
+  const auto originals = text == info.text.end() ? std::nullopt : read_originals(text->second);
+  if (!originals) return {};
+  const auto describes = [](const Original& record) {
+    return record.user == "LASF_Spec" && record.id == 4 && record.bytes.size() > kRecordHeadBytes;
+  };
+  const auto found = std::ranges::find_if(*originals, describes);
+  if (found == originals->end()) return {};
+  return make_las_fields(header, std::as_bytes(std::span(found->bytes)).subspan(kRecordHeadBytes))
+      .names;
+}
+
 void Records::add(std::string_view user, std::uint16_t id, std::string_view description,
                   std::string_view content) {
   const auto add_padded = [this](std::string_view text, std::size_t size) {
@@ -239,9 +283,12 @@ void Records::add(std::string_view user, std::uint16_t id, std::string_view desc
 
 Records plan_records(const PointWriteInfo& info) {
   Records records;
-  const auto original = info.text.find("las.vlrs");
-  if (original != info.text.end() && !add_original(original->second, records)) {
-    records.dropped.push_back("The text las.vlrs is damaged: its records are left out.");
+  if (const auto text = info.text.find("las.vlrs"); text != info.text.end()) {
+    if (const auto originals = read_originals(text->second)) {
+      records = kept_records(*originals);
+    } else {
+      records.dropped.push_back("The text las.vlrs is damaged: its records are left out.");
+    }
   }
   const auto crs = info.text.find("crs");
   if (records.has_wkt || crs == info.text.end()) return records;

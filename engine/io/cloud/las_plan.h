@@ -14,6 +14,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/io/cloud/display_colour.h"
+#include "engine/io/cloud/las_fields.h"
 #include "engine/io/cloud/las_places.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
@@ -55,13 +56,18 @@ struct Records {
 /// file were stored, and one with the text `crs` if none names the reference system as WKT.
 [[nodiscard]] Records plan_records(const PointWriteInfo& info);
 
+/// Returns what the LAS file that the points came from calls its extra bytes, by the texts
+/// `las.header` and `las.vlrs`.
+[[nodiscard]] std::vector<LasName> original_names(const PointWriteInfo& info);
+
 /// What the bytes after the standard ones of a record hold, and where their values come from.
 enum class ExtraSource : std::uint8_t { normal, radius, radiance, emission, albedo, channel };
 
 /// One quantity in the extra bytes: one number of a type of LAS for each of its components.
 struct Extra {
   ExtraSource source{};
-  RowChannel channel;  ///< its type, names, unit and scale; of a surfel's quantity, too
+  RowChannel channel;         ///< its type, names, unit and scale; of a surfel's quantity, too
+  std::string description{};  ///< for people, at most 32 bytes; empty: the unit
 };
 
 /// Where all values go in the record of a point.

@@ -77,7 +77,7 @@ LasRecordsText make_las_records_text(const InputFile& file, const LasHeader& hea
   for (const LasRecord& record : header.records) {
     if (record.user == kLaszipUser || record.user == "copc") continue;
     if (record.bytes > kMaxKept || kVlrHeader + record.bytes > kMaxKept - kept.size()) {
-      ++text.left_out;
+      text.left_out.push_back(record);
       continue;
     }
     // A record's header begins with a reserved u16, user, number and length; the length has 2

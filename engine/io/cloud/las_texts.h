@@ -19,6 +19,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "engine/io/cloud/las_header.h"
 
@@ -30,8 +31,8 @@ namespace ptc {
 
 /// The text `las.vlrs`, and what is not in it.
 struct LasRecordsText {
-  std::string base64;        ///< empty when no record is kept
-  std::size_t left_out = 0;  ///< records that do not fit 16 KiB
+  std::string base64;               ///< empty when no record is kept
+  std::vector<LasRecord> left_out;  ///< records that do not fit 16 KiB
 };
 
 /// Returns the text `las.vlrs` of a file. @throws std::system_error
