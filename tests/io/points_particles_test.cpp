@@ -3,7 +3,9 @@
 #include <cmath>
 
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
+#include "engine/io/cloud/point_writer.h"
 #include "tests/io/clouds.h"
 
 using namespace ptc;
@@ -174,6 +176,67 @@ TEST_CASE("bgeo: binary and text give the same points", "[io][points]") {
   check_geo(read_cloud(scratch.file("a.bgeo", good_bgeo())));
   check_geo(read_cloud(scratch.file("a.geo", kGeo)));
   check_geo(read_cloud(scratch.file("a.bgeo", good_bgeo() + "primitives")));
+}
+
+TEST_CASE("bgeo: attributes have the same names and bits after they were read and written",
+          "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const auto attribute = [](const char* name, std::uint16_t size, std::int32_t type) {
+    return big_text(name) + big(size) + big(type) + std::string(std::size_t{4} * size, '\0');
+  };
+  const auto file = [&](const char* normal, const char* radius, const char* radiance) {
+    std::string bytes = bgeo_header(1, 0, 8);
+    bytes += attribute(normal, 3, 5) + attribute("Cd", 3, 0) + attribute(radius, 1, 0);
+    bytes += attribute(radiance, 3, 0) + attribute("emission", 3, 0) + attribute("rgb", 3, 1);
+    bytes += attribute("trailLength", 1, 0) + attribute("v-2", 3, 5);
+    for (const float v : {1.0F, 2.0F, 3.0F, 1.0F, 0.0F, 0.0F, 1.0F, 0.25F, 7.5F, -0.125F, 0.5F,
+                          4.0F, 5.0F, 6.0F, 0.0F, 8.0F, 9.0F})
+      bytes += big(v);
+    for (const std::int32_t v : {1, 0, -1}) bytes += big(v);
+    for (const float v : {10.0F, 11.0F, 12.0F, 13.0F}) bytes += big(v);
+    return bytes + std::string("\x00\xff", 2);
+  };
+  const auto again = [&](const std::string& bytes) {
+    const Cloud cloud = read_cloud(scratch.file("a.bgeo", bytes));
+    const PointFileInfo& from = cloud.info;
+    PointWriteInfo info{.count = 1, .channels = from.channels, .text = from.text};
+    info.has_normals = from.has_normals;
+    info.has_radius = from.has_radius;
+    info.has_radiance = from.has_radiance;
+    info.has_albedo = from.has_albedo;
+    info.emits = from.has_emission;
+    const auto writer = create_points(scratch / "b.bgeo", OutputFormat::bgeo, info);
+    writer->write(cloud.surfels, cloud.rows);
+    writer->finish();
+    return slurp(scratch / "b.bgeo");
+  };
+  CHECK(again(file("N", "pscale", "radiance")) == file("N", "pscale", "radiance"));
+  CHECK(again(file("normal", "radiusPP", "_radiosity")) ==
+        file("normal", "radiusPP", "_radiosity"));
+  CHECK(again(file("normal", "radius", "Ci")) == file("normal", "radius", "Ci"));
+}
+
+TEST_CASE("bgeo: names of attributes that cannot be kept give way to those of the channels",
+          "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const Cloud odd = read_cloud(scratch.file(
+      "a.bgeo", bgeo_header(0, 0, 2) + bgeo_attribute("\xff", 1, 0) + bgeo_attribute("X", 1, 0)));
+  CHECK(odd.info.text.at("bgeo.names") == R"({"x":"X"})");
+  PointWriteInfo info{.channels = {{.name = "x"}, {.name = "y"}, {.name = "z"}, {.name = "w"}}};
+  const auto names = [&](const std::string& text) {
+    info.text["bgeo.names"] = text;
+    create_points(scratch / "b.bgeo", OutputFormat::bgeo, info)->finish();
+    const Cloud back = read_cloud(scratch / "b.bgeo");
+    const auto kept = back.info.text.find("bgeo.names");
+    return back.names() + (kept == back.info.text.end() ? "" : " " + kept->second);
+  };
+  for (const char* bad : {"", "no", "[]", "{\"x\":1}", "{\"x\":\"\"}"})
+    CHECK(names(bad) == "x y z w");
+  // Cd is the colour's, w another channel's, and A can be taken once
+  CHECK(names(R"({"w":"A","x":"Cd","y":"w","z":"A"})") == R"(x y a w {"a":"A"})");
+  // What takes more than 1 KiB is not kept
+  CHECK(names(R"({"x":")" + std::string(980, 'X') + "\"}").size() > 1000);
+  CHECK(names(R"({"x":")" + std::string(1100, 'X') + "\"}") == std::string(31, 'x') + " y z w");
 }
 
 TEST_CASE("bgeo: every truncation within the points is refused", "[io][points]") {

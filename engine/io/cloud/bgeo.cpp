@@ -1,12 +1,17 @@
 // Reads the points of Houdini's classic geometry: .bgeo in binary and .geo as text. The fourth
 // number of a position is a weight for curves, and is left out.
 #include <algorithm>
+#include <map>
+#include <string>
+
+#include <nlohmann/json.hpp>
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/geo_header.h"
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/record_source.h"
 #include "engine/io/text/text.h"
+#include "format/text.h"
 
 namespace ptc {
 namespace {
@@ -25,10 +30,29 @@ class GeoSource : public RecordSource {
     layout().describe(info);
     info.count = header_.points;
     info.notes = header_.notes;
+    add_names(info);
     return info;
   }
 
  private:
+  // Keeps the names of attributes that channels do not have, if they are short. Attributes that are
+  // no part of the surfel are the last channels.
+  void add_names(PointFileInfo& info) const {
+    constexpr std::size_t kMostBytes = 1024;
+    std::map<std::string, std::string> names = header_.parts;
+    const auto is_plain = [](const RecordField& field) { return field.plain; };
+    const auto plain = static_cast<std::size_t>(std::ranges::count_if(header_.fields, is_plain));
+    auto channel = info.channels.end() - static_cast<std::ptrdiff_t>(plain);
+    for (const RecordField& field : header_.fields) {
+      if (!field.plain) continue;
+      if (channel->name != field.channel.name) names[channel->name] = field.channel.name;
+      ++channel;
+    }
+    std::erase_if(names, [](const auto& name) { return !is_utf8(name.second); });
+    const std::string text = nlohmann::json(names).dump();
+    if (!names.empty() && text.size() <= kMostBytes) info.text.emplace(kGeoNames, text);
+  }
+
   const std::byte* next_record() override {
     if (done_ == header_.points) return nullptr;
     header_.text ? read_line() : read_binary();

@@ -9,15 +9,24 @@
 //   0x00 0xff
 //
 // Kinds are 0 float, 1 integer, 5 vector: three floats that turn with the object. The names N, Cd
-// and pscale are those under which Houdini looks for normals, colours and sizes.
+// and pscale are those under which Houdini looks for normals, colours and sizes. Points that came
+// from a BGEO keep the names that their attributes had there, and a channel `rgb` of linear floats,
+// which is Cd as it was read, becomes Cd again.
+#include <algorithm>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
+
+#include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/display_colour.h"
+#include "engine/io/cloud/geo_header.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/file/buffered_output.h"
 
@@ -52,6 +61,25 @@ class BigEndian {
   std::string bytes_;
 };
 
+// Returns the names that the attributes had in a BGEO, by what they became.
+std::map<std::string, std::string> original_names(const PointWriteInfo& info) {
+  std::map<std::string, std::string> names;
+  const auto text = info.text.find(kGeoNames);
+  if (text == info.text.end()) return names;
+  const auto json = nlohmann::json::parse(text->second, nullptr, false);
+  if (!json.is_object()) return names;
+  for (const auto& [key, name] : json.items()) {
+    if (name.is_string()) names[key] = name.get<std::string>();
+  }
+  return names;
+}
+
+// Says whether a channel has the colour Cd as a BGEO had it.
+bool is_linear_colour(const Channel& channel) {
+  return channel.name == "rgb" && channel.components == 3 && channel.type == ChannelType::f32 &&
+         channel.colour_space == ColourSpace::rec709 && !is_scaled(channel);
+}
+
 class BgeoWriter : public CheckedWriter {
  public:
   BgeoWriter(const std::filesystem::path& target, const PointWriteInfo& info)
@@ -60,7 +88,9 @@ class BgeoWriter : public CheckedWriter {
         colour_(info),
         channels_(row_channels(info.channels,
                                {"N", "Cd", "pscale", "radiance", "emission", "albedo", "P", "Pw"})),
+        names_(original_names(info)),
         out_(target) {
+    find_colour();
     declare_attributes();
     BigEndian header;
     header.add("BgeoV");
@@ -75,21 +105,42 @@ class BgeoWriter : public CheckedWriter {
  private:
   [[nodiscard]] bool has_own_albedo() const { return info_.has_albedo && colour_.hides_albedo(); }
 
+  // Takes the channel that becomes Cd from the others.
+  void find_colour() {
+    const auto found = std::ranges::find_if(
+        channels_, [](const RowChannel& row) { return is_linear_colour(row.channel); });
+    if (found == channels_.end() || !info_.has_albedo || has_own_albedo()) return;
+    linear_ = std::move(*found);
+    channels_.erase(found);
+  }
+
   void declare_attributes() {
-    if (info_.has_normals) declare("N", 3, Kind::vector);
+    // Name them
+    for (const char* name : {"N", "Cd", "pscale", "radiance", "albedo", "emission", "P", "Pw"})
+      taken_.insert(name);
+    for (const RowChannel& row : channels_) taken_.insert(row.name);
+    // Declare them in the order of their values
+    if (info_.has_normals) declare(name_of("nx", "N"), 3, Kind::vector);
     if (colour_.exists()) declare("Cd", 3, Kind::number);
-    if (info_.has_radius) declare("pscale", 1, Kind::number);
-    if (info_.has_radiance) declare("radiance", 3, Kind::number);
+    if (info_.has_radius) declare(name_of("radius", "pscale"), 1, Kind::number);
+    if (info_.has_radiance) declare(name_of("radiance_r", "radiance"), 3, Kind::number);
     if (has_own_albedo()) declare("albedo", 3, Kind::number);
-    if (info_.emits) declare("emission", 3, Kind::number);
+    if (info_.emits) declare(name_of("emission_r", "emission"), 3, Kind::number);
     for (const RowChannel& row : channels_) {
       const Channel& channel = row.channel;
       const bool vector = channel.components == 3 && has_axes(channel);
-      declare(row.name, channel.components,
+      declare(name_of(channel.name, row.name), channel.components,
               is_integer(channel.type) ? Kind::integer
               : vector                 ? Kind::vector
                                        : Kind::number);
     }
+  }
+  // Returns the name that a quantity had in a BGEO, if it is free, else another.
+  std::string name_of(const std::string& quantity, const std::string& otherwise) {
+    const auto was = names_.find(quantity);
+    const bool fits = was != names_.end() && !was->second.empty() &&
+                      was->second.size() <= std::numeric_limits<std::uint16_t>::max();
+    return fits && taken_.insert(was->second).second ? was->second : otherwise;
   }
   void declare(const std::string& name, std::uint16_t numbers, Kind kind) {
     attributes_.add(static_cast<std::uint16_t>(name.size()));
@@ -105,7 +156,7 @@ class BgeoWriter : public CheckedWriter {
     point_.add(glm::vec3(surfel.position));
     point_.add(1.0F);
     if (info_.has_normals) point_.add(surfel.normal);
-    if (colour_.exists()) point_.add(colour_.linear(surfel, row));
+    if (colour_.exists()) point_.add(colour_of(surfel, row));
     if (info_.has_radius) point_.add(surfel.radius);
     if (info_.has_radiance) point_.add(surfel.radiance);
     if (has_own_albedo()) point_.add(surfel.albedo);
@@ -129,9 +180,19 @@ class BgeoWriter : public CheckedWriter {
     out_.publish();
   }
 
+  [[nodiscard]] glm::vec3 colour_of(const Surfel& surfel, const std::byte* row) const {
+    if (!linear_) return colour_.linear(surfel, row);
+    glm::vec3 colour;
+    std::memcpy(&colour, linear_->at(row, 0), sizeof colour);
+    return colour;
+  }
+
   PointWriteInfo info_;
   DisplayColour colour_;
-  std::vector<RowChannel> channels_;
+  std::vector<RowChannel> channels_;          // that become attributes of their own
+  std::optional<RowChannel> linear_;          // becomes Cd
+  std::map<std::string, std::string> names_;  // by quantity
+  std::set<std::string> taken_;
   BigEndian attributes_;
   std::uint32_t attribute_count_ = 0;
   BigEndian point_;

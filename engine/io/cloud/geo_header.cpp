@@ -62,7 +62,10 @@ void add(GeoHeader& header, const std::string& name, std::size_t size, GeoType t
                            " numbers in each point and is left out.");
   } else {
     channel.components = static_cast<std::uint8_t>(size);
+    const std::size_t first = header.fields.size();
     add_attribute(channel, header.numbers * 4, header.fields);
+    const RecordField& field = header.fields[first];
+    if (!field.plain) header.parts.emplace(field.channel.name, name);
   }
   header.numbers += size;
   header.is_integer.resize(header.numbers, integer);

@@ -18,6 +18,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -34,8 +35,14 @@ struct GeoHeader {
   std::size_t numbers = 4;
   std::vector<bool> is_integer;     ///< by number
   std::vector<RecordField> fields;  ///< of a packed record, which has all numbers
-  std::vector<std::string> notes;   ///< what is left out, a sentence each
+  /// The first number of the surfel that an attribute gave, and what the file calls the attribute.
+  std::map<std::string, std::string> parts;
+  std::vector<std::string> notes;  ///< what is left out, a sentence each
 };
+
+/// The key of the text that keeps the names of attributes for the writer, a JSON object. Its
+/// members are channels, and numbers of the surfel such as nx, radius, red and radiance_r.
+inline constexpr const char* kGeoNames = "bgeo.names";
 
 /// Reads the header, so that the stream is at the first point.
 /// @throws DataError with the offset or the line that breaks a rule

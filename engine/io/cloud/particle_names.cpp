@@ -25,6 +25,9 @@ constexpr std::array kKnown = std::to_array<Known>({
     {"_radiosity", {"radiance_r", "radiance_g", "radiance_b"}},
     {"Cs", {"radiance_r", "radiance_g", "radiance_b"}},
     {"Ci", {"radiance_r", "radiance_g", "radiance_b"}},
+    {"radiance", {"radiance_r", "radiance_g", "radiance_b"}},
+    {"emission", {"emission_r", "emission_g", "emission_b"}},
+    {"albedo", {"albedo_r", "albedo_g", "albedo_b"}},
 });
 
 }  // namespace

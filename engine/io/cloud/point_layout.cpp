@@ -183,7 +183,8 @@ void PointLayout::find_colours(const LayoutRules& rules) {
   };
   if (std::ranges::all_of(kAlbedo, is_number)) {
     albedo_ = numbers(find_triple(kAlbedo));
-    if (indices) keep_colours(*indices, ColourSpace::srgb);
+    const bool linear = rules.float_colours == FloatColours::unbounded;
+    if (indices) keep_colours(*indices, linear ? ColourSpace::rec709 : ColourSpace::srgb);
     return;
   }
   if (!indices) return;
