@@ -69,6 +69,17 @@ class Formats(ProgramTest):
             wanted = [int(0.25 * i + 0.5) for i in range(500)]
             self.assertEqual(sorted(values) if name == "d.las" else values, wanted, name)
 
+    def test_damage_that_is_tolerated_does_not_keep_channels_from_being_measured(self):
+        scene, broken = self.here / "a.ptcx", self.here / "b.ptcx"
+        self.succeed("ptcbuild", self.scan, "--page-size", "4K", "-o", scene)
+        whole = bytearray(scene.read_bytes())
+        for byte in (64, 65):  # of the first page, which holds points
+            whole[4096 + byte] ^= 0xff
+        broken.write_bytes(whole)
+        self.fail_with(1, "ptcshade", broken, "-o", self.here / "o.las")
+        self.succeed("ptcshade", broken, "-o", self.here / "o.las", "--tolerate-damage")
+        self.assertIn("are rounded to integers", self.succeed("ptcconvert", broken, self.here / "o.las", "--dry-run").stdout)
+
     def test_the_order_comes_back_only_where_it_is_known(self):
         self.succeed("ptcbuild", self.scan, "-o", self.here / "a.ptcx")
         self.succeed("ptcbuild", self.scan, "--original-order", "-o", self.here / "b.ptcx")

@@ -1,6 +1,7 @@
 #include "engine/pipeline/convert/point_files.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/store/attribute_rows.h"
 
 namespace ptc {
 namespace {
@@ -63,6 +65,23 @@ std::optional<PointSurvey> survey_for(std::optional<OutputFormat> format,
   return survey.empty() ? std::nullopt : std::optional(std::move(survey));
 }
 
+/// Measures the channels of all points of a container. A damaged page is passed over: it is an
+/// error when its points are written, unless damage is tolerated.
+void measure_all(const ContainerReader& container, std::span<const std::uint8_t> groups,
+                 OutputFormat format, PointWriteInfo& info) {
+  AttributeRows rows(container, groups);
+  PointSurvey survey(format, rows.channels(), kOriginalIndex);
+  std::size_t rank = 0;
+  for (const std::uint32_t page : container.point_pages()) {
+    try {
+      survey.add(rows.read(rank++, container.entry(page).record_count));
+    } catch (const FormatError&) {
+      continue;
+    }
+  }
+  survey.finish(info);
+}
+
 /// Measures the channels of a container that a format wants to know the values of.
 void measure_channels(const ContainerReader& container, const PointFileOptions& options,
                       OutputFormat format, PointWriteInfo& info) {
@@ -73,8 +92,16 @@ void measure_channels(const ContainerReader& container, const PointFileOptions& 
   selection.channels = measured_channels(format, info.channels);
   if (selection.channels->empty()) return;
   if (grid) selection.channels->emplace_back(kOriginalIndex);
-  PointSurvey survey(format, kept_channels(container.meta().channels, selection, container.path()),
-                     kOriginalIndex);
+  const std::vector<Channel> channels =
+      kept_channels(container.meta().channels, selection, container.path());
+
+  // Read the attribute pages alone where all points are taken
+  if (selection.takes_all()) {
+    std::set<std::uint8_t> groups;
+    for (const Channel& channel : channels) groups.insert(channel.group);
+    return measure_all(container, std::vector(groups.begin(), groups.end()), format, info);
+  }
+  PointSurvey survey(format, channels, kOriginalIndex);
   const std::unique_ptr<PointSource> source = open_selected(container, selection);
   std::vector<Surfel> block(kBlock);
   while (source->next(block) > 0) survey.add(source->attributes());
