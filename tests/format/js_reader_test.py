@@ -41,8 +41,8 @@ def installed():
     if not node or not npm:
         skip("node or npm is not installed")
     version = subprocess.run([node, "--version"], capture_output=True, text=True, check=True).stdout.strip()
-    if int(re.match(r"v(\d+)", version)[1]) < 20:
-        skip(f"node {version} is older than 20")
+    if int(re.match(r"v(\d+)", version)[1]) < 18:
+        skip(f"node {version} is older than 18")
     folder = os.path.join(TEMP, "js")
     os.makedirs(folder, exist_ok=True)
     lock = os.path.join(folder, "package-lock.json")
