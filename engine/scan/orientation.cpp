@@ -119,14 +119,23 @@ class ChunkOrientation {
 
   /// Looks at the sky from both sides of the places whose side is unknown.
   void look_at_sky() {
-    for_each_in_sheets(sky_->cells(), [this](std::uint32_t i) {
+    const auto set_sky = [this](std::uint32_t i) {
       room_.sky[i] =
           static_cast<std::int8_t>(sky_->more_in_front(chunk_.positions[i], chunk_.fits[i].normal));
-    });
-    for_each_in_sheets(sky_->fine_cells(), [this](std::uint32_t i) {
+    };
+    const auto set_open = [this](std::uint32_t i) {
       room_.open[i] =
           static_cast<std::int8_t>(sky_->open_side(chunk_.positions[i], chunk_.fits[i].normal));
-    });
+    };
+    if (sky_->cells().bits() == sky_->fine_cells().bits()) {  // the same cells: one pass does both
+      for_each_in_sheets(sky_->cells(), [&](std::uint32_t i) {
+        set_sky(i);
+        set_open(i);
+      });
+    } else {
+      for_each_in_sheets(sky_->cells(), set_sky);
+      for_each_in_sheets(sky_->fine_cells(), set_open);
+    }
   }
 
   /// Calls visit(place) for the places whose side is unknown and that lie in cells whose places are
