@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/points.h"
+#include "engine/io/cloud/point_writer.h"
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"
 #include "tools/bench/experiments/scale_answers.h"
@@ -95,14 +95,18 @@ void spoil(const std::filesystem::path& ply) {
   stream.write(reinterpret_cast<const char*>(&none), sizeof none);
 }
 
-/// Writes a PLY of two points with a column of values.
+/// Writes a PLY of two points with a channel of floats.
 std::filesystem::path write_values(const std::filesystem::path& target, float second) {
-  PlyWriter writer(target, 2, false, {{.name = "light"}});
   const std::vector<Surfel> surfels(
       2, Surfel{.position = {1, 2, 3}, .normal = {0, 0, 1}, .radius = 1});
   const std::vector<float> values{1, second};
-  writer.write(surfels, values);
-  writer.finish();
+  const auto writer = create_points(target, OutputFormat::ply,
+                                    {.count = 2,
+                                     .channels = {{.name = "light", .type = ChannelType::f32}},
+                                     .has_normals = true,
+                                     .has_radius = true});
+  writer->write(surfels, std::as_bytes(std::span(values)));
+  writer->finish();
   return target;
 }
 

@@ -30,12 +30,6 @@ std::vector<Surfel> lamps(std::size_t count, std::uint64_t seed) {
   return surfels;
 }
 
-void write_ply(const std::filesystem::path& path, const std::vector<Surfel>& surfels, bool emits) {
-  PlyWriter writer(path, surfels.size(), emits, {});
-  writer.write(surfels, {});
-  writer.finish();
-}
-
 /// A room of 4 x 4 x 4 without walls: a floor, and a lamp of 1 x 1 above its middle.
 Mesh lit_floor() {
   Mesh mesh;

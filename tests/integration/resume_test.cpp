@@ -61,9 +61,7 @@ void write_pairs(const std::filesystem::path& path, std::size_t count) {
 void write_lamps(const std::filesystem::path& path, std::size_t count) {
   std::vector<Surfel> surfels = random_surfels(count, 5);
   for (std::size_t i = 0; i < count; i += 3) surfels[i].emission = {3, 2, 1};
-  PlyWriter writer(path, count, true, {});
-  writer.write(surfels, {});
-  writer.finish();
+  write_ply(path, surfels, true);
 }
 
 enum class Kind { city, cloud, pairs, lamps };

@@ -1,14 +1,17 @@
 // Writing clouds as PLY and reading them back.
 #include <random>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
 #include "engine/io/cloud/points.h"
 #include "tests/io/files.h"
+#include "tests/io/writer_inputs.h"
 
 using namespace ptc;
+using namespace ptc::test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 
@@ -29,6 +32,22 @@ std::vector<Surfel> make_surfels(std::size_t count) {
   return surfels;
 }
 
+PointWriteInfo info_of(const std::vector<Surfel>& surfels, bool emits) {
+  PointWriteInfo info = full_info(surfels);
+  info.emits = emits;
+  return info;
+}
+
+Channel channel(const char* name, std::uint8_t components = 1,
+                ChannelRole role = ChannelRole::value) {
+  return {.name = name, .type = ChannelType::f32, .components = components, .role = role};
+}
+
+std::vector<std::byte> bytes_of(const std::vector<float>& values) {
+  const auto bytes = std::as_bytes(std::span(values));
+  return {bytes.begin(), bytes.end()};
+}
+
 }  // namespace
 
 TEST_CASE("ply writer: every value of every surfel is read back bit for bit", "[io][writer]") {
@@ -37,11 +56,7 @@ TEST_CASE("ply writer: every value of every surfel is read back bit for bit", "[
   for (const bool emits : {false, true}) {
     for (const std::size_t count : {0U, 1U, 20'000U}) {  // none, one, more than one buffer
       const std::vector<Surfel> surfels = make_surfels(count);
-      PlyWriter writer(path, count, emits, {});
-      const std::size_t half = count / 2;
-      writer.write(std::span(surfels).first(half), {});
-      writer.write(std::span(surfels).subspan(half), {});
-      writer.finish();
+      write_points(path, OutputFormat::ply, info_of(surfels, emits), surfels);
       PointFile file = open_points(path);
       CHECK(file.info.count == count);
       CHECK(file.info.has_emission == emits);
@@ -66,15 +81,15 @@ TEST_CASE("ply writer: emission follows the albedo, and only where points may em
   const auto path = scratch.path() / "a.ply";
   const std::vector<Surfel> surfels = make_surfels(2);
   for (const bool emits : {false, true}) {
-    PlyWriter writer(path, 2, emits, {{"a", 1}});
-    writer.write(surfels, std::vector<float>{5, 6});
-    writer.finish();
+    PointWriteInfo info = info_of(surfels, emits);
+    info.channels = {channel("a")};
+    write_points(path, OutputFormat::ply, info, surfels, bytes_of({5, 6}));
     const std::string bytes = slurp(path);
     const std::string properties =
         emits ? "property float emission_r\nproperty float emission_g\nproperty float emission_b\n"
               : "";
-    CHECK_THAT(bytes, Contains("property float albedo_b\n" + properties + "property float a\n"));
-    const std::size_t record_bytes = 64 + (emits ? 12 : 0) + 4;
+    CHECK_THAT(bytes, Contains("property float albedo_b\n" + properties + "property uchar red\n"));
+    const std::size_t record_bytes = 64 + (emits ? 12 : 0) + 3 + 4;
     for (std::size_t i = 0; i < 2; ++i) {
       const std::size_t record = bytes.size() - (2 - i) * record_bytes;
       for (std::size_t k = 0; emits && k < 3; ++k) {
@@ -86,85 +101,68 @@ TEST_CASE("ply writer: emission follows the albedo, and only where points may em
   }
 }
 
-TEST_CASE("ply writer: named columns follow the values of the surfel", "[io][writer]") {
+TEST_CASE("ply writer: channels follow the values of the surfel", "[io][writer]") {
   const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.ply";
   const std::vector<Surfel> surfels = make_surfels(2);
-  PlyWriter writer(path, 2, false,
-                   {{"occlusion", 1}, {"irradiance", 3}, {"bent", 3, true}, {"pair", 2}});
+  PointWriteInfo info = info_of(surfels, false);
+  info.channels = {channel("occlusion"), channel("irradiance", 3),
+                   channel("bent", 3, ChannelRole::direction), channel("pair", 2)};
   const std::vector<float> values = {0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14, 15, 16, 17, 18};
-  writer.write(surfels, values);
-  writer.finish();
+  write_points(path, OutputFormat::ply, info, surfels, bytes_of(values));
   const std::string bytes = slurp(path);
   CHECK_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\nelement vertex 2\n"));
-  CHECK_THAT(bytes, Contains("property float albedo_b\nproperty float occlusion\n"
+  CHECK_THAT(bytes, Contains("property uchar blue\nproperty float occlusion\n"
                              "property float irradiance_r\nproperty float irradiance_g\n"
                              "property float irradiance_b\nproperty float bent_x\n"
                              "property float bent_y\nproperty float bent_z\n"
                              "property float pair_0\nproperty float pair_1\nend_header\n"));
   for (std::size_t i = 0; i < 2; ++i) {
-    const std::size_t record = bytes.size() - (2 - i) * (64 + 36);
+    const std::size_t record = bytes.size() - (2 - i) * (64 + 3 + 36);
     for (std::size_t k = 0; k < 9; ++k) {
-      CHECK(bytes.substr(record + 64 + 4 * k, 4) == raw(values[9 * i + k]));
+      CHECK(bytes.substr(record + 67 + 4 * k, 4) == raw(values[9 * i + k]));
     }
   }
   CHECK(open_points(path).info.count == 2);
 }
 
-TEST_CASE("ply writer: wrong numbers of points or values leave no file", "[io][writer]") {
+TEST_CASE("ply writer: names that no property can have are refused", "[io][writer]") {
   const test::TemporaryDirectory scratch;
-  const auto path = scratch.path() / "a.ply";
-  const std::vector<Surfel> surfels = make_surfels(3);
-  for (const std::uint64_t announced : {2U, 4U}) {
-    PlyWriter writer(path, announced, false, {});
-    writer.write(surfels, {});
-    CHECK_THROWS_AS(writer.finish(), std::invalid_argument);
+  for (const char* name : {"", "a b", "a\n"}) {
+    PointWriteInfo info;
+    info.channels = {channel(name)};
+    CHECK_THROWS_AS(create_points(scratch / "a.ply", OutputFormat::ply, info),
+                    std::invalid_argument);
   }
-  {
-    PlyWriter writer(path, 3, false, {{"a", 1}});
-    CHECK_THROWS_AS(writer.write(surfels, {}), std::invalid_argument);
-    CHECK_THROWS_AS(writer.write(surfels, std::vector<float>(4)), std::invalid_argument);
-  }
-  CHECK(scratch.listing().empty());
-}
-
-TEST_CASE("ply writer: column names that are invalid or taken are refused", "[io][writer]") {
-  const test::TemporaryDirectory scratch;
-  const auto path = scratch.path() / "a.ply";
-  const auto make = [&](std::vector<PointColumn> columns, bool emits = false) {
-    PlyWriter writer(path, 0, emits, columns);
-  };
-  CHECK_THROWS_AS(make({{"", 1}}), std::invalid_argument);
-  CHECK_THROWS_AS(make({{"a b", 1}}), std::invalid_argument);
-  CHECK_THROWS_AS(make({{"a\n", 1}}), std::invalid_argument);
-  CHECK_THROWS_AS(make({{"nx", 1}}), std::invalid_argument);
-  CHECK_THROWS_AS(make({{"radiance", 3}}), std::invalid_argument);
-  CHECK_THROWS_AS(make({{"a", 1}, {"a", 1}}), std::invalid_argument);
-  CHECK_THROWS_AS(make({{"emission", 3}}, true), std::invalid_argument);
   CHECK(scratch.listing().empty());
 }
 
 TEST_CASE("ply writer: channels get free names, vectors with x, y and z", "[io][writer]") {
-  const auto channel = [](const char* name, std::uint8_t components) {
-    return Channel{name, ChannelType::half, components, 1};
-  };
-  const std::vector<Channel> channels{
-      channel("bent_normal", 3), channel("sky", 3),       channel("a.b", 1),
-      channel("a_b", 1),         channel("c_r", 1),       channel("c", 3),
-      channel("radiance", 3),    channel("radius", 1),    channel("pair", 2),
-      channel("pair_1", 1),      channel("radiance_", 1), channel("emission", 3),
-      channel("emission_g", 1)};
-  const std::vector<PointColumn> columns = ply_columns(channels);
-  std::vector<std::string> names;
-  for (const PointColumn& column : columns) names.push_back(column.name);
-  CHECK(names == std::vector<std::string>{"bent_normal", "sky", "a_b", "a_b_", "c_r", "c_",
-                                          "radiance_", "radius_", "pair", "pair_1_", "radiance__",
-                                          "emission_", "emission_g_"});
-  CHECK(columns[0].vector);
-  CHECK_FALSE(columns[1].vector);
+  PointWriteInfo info = info_of({}, true);
+  info.channels = {channel("bent_normal", 3),
+                   channel("sky", 3),
+                   channel("a.b"),
+                   channel("a_b"),
+                   channel("c_r"),
+                   channel("c", 3),
+                   channel("radiance", 3),
+                   channel("radius"),
+                   channel("pair", 2),
+                   channel("pair_1"),
+                   channel("radiance_"),
+                   channel("emission", 3),
+                   channel("emission_g")};
   const test::TemporaryDirectory scratch;
-  const auto path = scratch.path() / "a.ply";
-  PlyWriter(path, 0, true, columns).finish();
-  CHECK_THAT(slurp(path), Contains("property float bent_normal_x\nproperty float bent_normal_y\n"));
-  CHECK_THAT(slurp(path), Contains("property float sky_r\n"));
+  write_points(scratch / "a.ply", OutputFormat::ply, info, {});
+  std::string properties;
+  for (const char* name :
+       {"bent_normal_x", "bent_normal_y", "bent_normal_z", "sky_r",       "sky_g",
+        "sky_b",         "a_b",           "a_b_",          "c_r",         "c__r",
+        "c__g",          "c__b",          "radiance__r",   "radiance__g", "radiance__b",
+        "radius_",       "pair_0",        "pair_1",        "pair_1_",     "radiance__",
+        "emission__r",   "emission__g",   "emission__b",   "emission_g_"}) {
+    properties += std::string("property float ") + name + "\n";
+  }
+  CHECK_THAT(slurp(scratch / "a.ply"),
+             Contains("property uchar blue\n" + properties + "end_header\n"));
 }

@@ -9,6 +9,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/io/cloud/point_writer.h"
 #include "engine/io/cloud/record.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/store/container_points.h"
@@ -119,6 +120,18 @@ std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed) {
                        .albedo = glm::vec3(0.5F)});
   }
   return surfels;
+}
+
+void write_ply(const std::filesystem::path& path, const std::vector<Surfel>& surfels, bool emits) {
+  const auto writer = create_points(path, OutputFormat::ply,
+                                    {.count = surfels.size(),
+                                     .has_normals = true,
+                                     .has_radius = true,
+                                     .has_radiance = true,
+                                     .has_albedo = true,
+                                     .emits = emits});
+  writer->write(surfels, {});
+  writer->finish();
 }
 
 }  // namespace ptc::test

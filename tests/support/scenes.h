@@ -56,4 +56,7 @@ void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double r
 /// the same seed.
 [[nodiscard]] std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed);
 
+/// Writes surfels with all of their numbers as a PLY. @param emits  whether emission is written
+void write_ply(const std::filesystem::path& path, const std::vector<Surfel>& surfels, bool emits);
+
 }  // namespace ptc::test

@@ -1,4 +1,4 @@
-// Writes clouds to PLY, and finds names for their columns.
+// Writes clouds as PLY.
 //
 // A record has the values of the surfel and then those of the columns, each in the type that PLY
 // has for it:
@@ -81,7 +81,7 @@ bool is_property_name(const std::string& name) {
   });
 }
 
-// A header in the making, which knows the names of its properties.
+// A header in the making.
 class Header {
  public:
   explicit Header(std::uint64_t count)
@@ -90,9 +90,7 @@ class Header {
 
   void add(const char* type, const std::string& name) {
     if (!is_property_name(name))
-      throw std::invalid_argument("PlyWriter: not a property name: " + name);
-    if (!names_.insert(name).second)
-      throw std::invalid_argument("PlyWriter: two properties have the name " + name);
+      throw std::invalid_argument("PointWriter: not the name of a PLY property: " + name);
     text_ += std::string("property ") + type + " " + name + "\n";
   }
   void add_surfel(const SurfelParts& parts) {
@@ -114,19 +112,7 @@ class Header {
 
  private:
   std::string text_;
-  std::set<std::string> names_;
 };
-
-// Returns the header, or throws when a name cannot be a property or occurs twice.
-std::string make_header(std::uint64_t count, bool emits, const std::vector<PointColumn>& columns) {
-  Header header(count);
-  header.add_surfel({true, true, true, true, emits, false});
-  for (const PointColumn& column : columns) {
-    for (const std::string& name : part_names(column.name, column.components, column.vector))
-      header.add("float", name);
-  }
-  return std::move(header).finish();
-}
 
 void put_surfel(BufferedOutput& out, const SurfelParts& parts, const Surfel& surfel) {
   out.put(&surfel.position, sizeof surfel.position);
@@ -197,47 +183,6 @@ std::vector<std::string> ply_losses(const PointWriteInfo& info) {
   add_unscaled_channels(sentences, info);
   add_lost_crs(sentences, info);
   return sentences;
-}
-
-std::vector<PointColumn> ply_columns(std::span<const Channel> channels) {
-  std::vector<PointColumn> columns;
-  for (const RowChannel& row : row_channels(channels, taken_names())) {
-    columns.push_back(
-        {.name = row.name, .components = row.channel.components, .vector = has_axes(row.channel)});
-  }
-  return columns;
-}
-
-PlyWriter::PlyWriter(const std::filesystem::path& target, std::uint64_t count, bool emits,
-                     std::vector<PointColumn> columns)
-    : columns_(std::move(columns)),
-      header_(make_header(count, emits, columns_)),
-      emits_(emits),
-      announced_(count),
-      out_(target) {
-  for (const PointColumn& column : columns_) values_per_point_ += column.components;
-  out_.put(header_.data(), header_.size());
-}
-
-void PlyWriter::write(std::span<const Surfel> surfels, std::span<const float> values) {
-  if (values.size() != surfels.size() * values_per_point_) {
-    throw std::invalid_argument("PlyWriter: " + std::to_string(values.size()) + " values for " +
-                                std::to_string(surfels.size()) + " points");
-  }
-  written_ += surfels.size();
-  if (written_ > announced_) return;  // finish() will refuse the file
-  for (std::size_t i = 0; i < surfels.size(); ++i) {
-    put_surfel(out_, {true, true, true, true, emits_, false}, surfels[i]);
-    out_.put(values.data() + i * values_per_point_, values_per_point_ * sizeof(float));
-  }
-}
-
-void PlyWriter::finish() {
-  if (written_ != announced_) {
-    throw std::invalid_argument("PlyWriter: " + std::to_string(written_) + " points instead of " +
-                                std::to_string(announced_));
-  }
-  out_.publish();
 }
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// Reading of point clouds of many formats, and writing of PLY.
+// Reading of point clouds of many formats.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,6 @@
 
 #include "engine/base/stream.h"
 #include "engine/base/surfel.h"
-#include "engine/io/file/buffered_output.h"
 #include "format/schema.h"
 
 namespace ptc {
@@ -103,47 +102,5 @@ struct PointFile {
 /// with faces is a mesh.
 /// @throws DataError when a PLY header breaks a rule; std::system_error
 [[nodiscard]] bool is_point_file(const std::filesystem::path& path);
-
-/// A named quantity of every point that PlyWriter writes in addition to the surfel.
-struct PointColumn {
-  std::string name;         ///< name of the PLY property, of letters, digits and _
-  unsigned components = 1;  ///< 1 keeps the name; 3 appends _r _g _b; others append _0 _1 ...
-  bool vector = false;      ///< three components append _x _y _z instead of _r _g _b
-};
-
-/// Returns the columns under which a PLY file holds channels. Their names are those of
-/// spec/points.md#ply; none is a property of the surfel, and no two are equal.
-[[nodiscard]] std::vector<PointColumn> ply_columns(std::span<const Channel> channels);
-
-/// Writes a binary little-endian PLY file: x y z (double), nx ny nz, radius, radiance_rgb, albedo
-/// as red green blue, emission_rgb where points may emit light (float), then the columns (float).
-/// The file replaces its target when finish() returns.
-class PlyWriter {
- public:
-  /// Begins a file.
-  /// @param count  exact number of points that will follow
-  /// @param emits  whether emission is written
-  /// @throws std::system_error; std::invalid_argument when the name of a column cannot name a
-  ///         property or occurs twice
-  PlyWriter(const std::filesystem::path& target, std::uint64_t count, bool emits,
-            std::vector<PointColumn> columns);
-  /// Writes the next points.
-  /// @param values  values of the columns, surfels.size() x sum of components, point by point
-  /// @throws std::invalid_argument when `values` has another size; std::system_error
-  void write(std::span<const Surfel> surfels, std::span<const float> values);
-  /// Ends the file and puts it in the place of its target.
-  /// @throws std::invalid_argument when the number of points is not the announced one;
-  ///         std::system_error
-  void finish();
-
- private:
-  std::vector<PointColumn> columns_;
-  std::string header_;       ///< made before the file, so that a bad column leaves no file
-  bool emits_;               ///< emission is written
-  std::uint64_t announced_;  ///< points of the header
-  std::uint64_t written_ = 0;
-  std::size_t values_per_point_ = 0;
-  BufferedOutput out_;
-};
 
 }  // namespace ptc

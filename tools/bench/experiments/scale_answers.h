@@ -25,7 +25,7 @@ void require_whole(const VerifyReport& report, std::uint64_t asked, std::uint64_
 /// Checks that two runs of one size gave the same answers. @throws DataError naming what differs
 void require_same(const ScaleAnswers& first, const ScaleAnswers& now);
 
-/// Returns a digest of the points of a binary PLY as PlyWriter writes it.
+/// Returns a digest of the points of a binary PLY as create_points() writes it.
 /// @param points  number of points that it must hold
 /// @throws DataError naming file, point and property when a value is not finite, or the file when
 ///         the number of points differs; std::system_error
