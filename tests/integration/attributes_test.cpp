@@ -2,9 +2,11 @@
 #include "engine/pipeline/build/attributes.h"
 
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -14,10 +16,12 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/unknown_values.h"
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
+#include "format/point_page.h"
 #include "tests/support/read_points.h"
 #include "tests/support/scenes.h"
 
@@ -81,6 +85,48 @@ std::size_t offset_of(const std::filesystem::path& path, const std::string& name
   }
   throw std::out_of_range(name);
 }
+
+/// Returns a channel of a container.
+Channel channel_of(const std::filesystem::path& path, const std::string& name) {
+  const ContainerReader container(path);
+  const std::optional<RowPlace> found = find_in_row(container.meta().channels, name);
+  if (!found) throw std::out_of_range(name);
+  return *found->channel;
+}
+
+/// Writes a PLY with a point for each label; without the channel `label` when the labels are -1.
+std::filesystem::path write_labels(const std::filesystem::path& path,
+                                   const std::vector<int>& labels) {
+  const bool has = labels.front() >= 0;
+  std::ofstream file(path);
+  file << "ply\nformat ascii 1.0\nelement vertex " << labels.size()
+       << "\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n"
+          "property float ny\nproperty float nz\nproperty float radius\n"
+       << (has ? "property uchar label\n" : "") << "end_header\n";
+  for (const int label : labels) {
+    file << &label - labels.data() << " 0 0 0 0 1 0.5";
+    if (has) file << ' ' << label;
+    file << '\n';
+  }
+  return path;
+}
+
+/// Returns the values of a channel of one byte.
+std::multiset<unsigned> labels_of(const std::filesystem::path& path,
+                                  const std::string& name = "label") {
+  const ReadPoints read = read_all(path);
+  const std::size_t at = offset_of(path, name);
+  std::multiset<unsigned> labels;
+  for (std::size_t i = 0; i < read.surfels.size(); ++i)
+    labels.insert(read.value<std::uint8_t>(i, at));
+  return labels;
+}
+
+/// Keeps all notes.
+struct Notes : Progress {
+  void note(const std::string& text) override { texts.push_back(text); }
+  std::vector<std::string> texts;
+};
 
 BuildRequest request_of(std::vector<std::filesystem::path> inputs, std::uint64_t memory = 1 << 28) {
   BuildRequest request;
@@ -154,16 +200,124 @@ TEST_CASE("attributes: appended points give what one build of all gives", "[attr
   check_attributes(dir / "both.ptcx", 15'000);
 }
 
-TEST_CASE("attributes: what an input does not record is 0", "[attributes]") {
+TEST_CASE("attributes: what an input does not record is marked as not known", "[attributes]") {
   const TemporaryDirectory dir;
   const auto first = write_cloud(dir / "first.ply", 0, 500, false);
   const auto second = write_cloud(dir / "second.ply", 500, 500);
-  build(request_of({first, second}), dir / "both.ptcx");
+  Notes notes;
+  build_container(request_of({first, second}), dir / "both.ptcx", notes);
+  CHECK(notes.texts ==
+        std::vector<std::string>{"first.ply has no time: these values are marked as not known"});
+  const Channel time = channel_of(dir / "both.ptcx", "time");
   const ReadPoints read = read_all(dir / "both.ptcx");
-  const std::size_t time = offset_of(dir / "both.ptcx", "time");
+  const std::size_t at = offset_of(dir / "both.ptcx", "time");
   std::size_t unknown = 0;
-  for (std::size_t i = 0; i < 1000; ++i) unknown += read.value<double>(i, time) == 0;
+  for (std::size_t i = 0; i < 1000; ++i) {
+    unknown += read.value<std::uint64_t>(i, at) == time.no_value;
+    CHECK((read.value<double>(i, at) > 0) != std::isnan(read.value<double>(i, at)));
+  }
   CHECK(unknown == 500);
+  CHECK_FALSE(channel_of(dir / "both.ptcx", "label").no_value);
+  // Files that keep the sorted points go the same way
+  BuildRequest kept = request_of({first, second});
+  kept.resume = true;
+  build(kept, dir / "kept.ptcx");
+  CHECK(test::bytes_of(dir / "kept.ptcx") == test::bytes_of(dir / "both.ptcx"));
+}
+
+TEST_CASE("attributes: no value of a point is taken for not known", "[attributes]") {
+  const TemporaryDirectory dir;
+  const auto bare = write_labels(dir / "bare.ply", {-1, -1});
+  const auto build_labels = [&](int last) {
+    Notes notes;
+    const auto labelled = write_labels(dir / "labelled.ply", {1, 2, last});
+    build_container(request_of({labelled, bare}), dir / "a.ptcx", notes);
+    return std::pair(labels_of(dir / "a.ptcx"), notes.texts);
+  };
+  const auto [marked, mark] = build_labels(254);
+  CHECK(channel_of(dir / "a.ptcx", "label").no_value == 255);
+  CHECK(marked == std::multiset<unsigned>{1, 2, 254, 255, 255});
+  CHECK(mark ==
+        std::vector<std::string>{"bare.ply has no label: these values are marked as not known"});
+  const auto [plain, why] = build_labels(255);
+  CHECK_FALSE(channel_of(dir / "a.ptcx", "label").no_value);
+  CHECK(plain == std::multiset<unsigned>{0, 0, 1, 2, 255});
+  CHECK(why == std::vector<std::string>{
+                   "bare.ply has no label: 0 stands there, because other points use the value that "
+                   "would mark what is not known"});
+}
+
+TEST_CASE(
+    "attributes: the values of a scene are looked at before one of them is taken for not known",
+    "[attributes]") {
+  const TemporaryDirectory dir;
+  for (const unsigned last : {254U, 255U}) {
+    build(request_of({write_labels(dir / "scene.ply", {1, 2, static_cast<int>(last)})}),
+          dir / "scene.ptcx");
+    BuildRequest more = request_of({write_labels(dir / "bare.ply", {-1})});
+    more.append = dir / "scene.ptcx";
+    build(more, dir / "both.ptcx");
+    const bool free = last == 254;
+    CHECK(channel_of(dir / "both.ptcx", "label").no_value.has_value() == free);
+    CHECK(labels_of(dir / "both.ptcx") == std::multiset<unsigned>{1, 2, last, free ? 255U : 0U});
+  }
+}
+
+TEST_CASE("attributes: points go on in a channel that is marked, unless they have the mark's value",
+          "[attributes]") {
+  const TemporaryDirectory dir;
+  build(request_of({write_labels(dir / "a.ply", {1}), write_labels(dir / "b.ply", {-1})}),
+        dir / "marked.ptcx");
+  for (const unsigned added : {7U, 255U}) {
+    BuildRequest more = request_of({write_labels(dir / "c.ply", {static_cast<int>(added)})});
+    more.append = dir / "marked.ptcx";
+    build(more, dir / "more.ptcx");
+    const bool goes_on = added == 7;
+    CHECK(ContainerReader(dir / "more.ptcx").meta().channels.size() == (goes_on ? 1 : 2));
+    CHECK(channel_of(dir / "more.ptcx", "label").no_value == 255);
+    CHECK(labels_of(dir / "more.ptcx") == std::multiset<unsigned>{1, 255, goes_on ? added : 255});
+    if (goes_on) continue;
+    // The second channel has the value that would mark what is not known
+    CHECK_FALSE(channel_of(dir / "more.ptcx", "label_2").no_value);
+    CHECK(labels_of(dir / "more.ptcx", "label_2") == std::multiset<unsigned>{0, 0, 255});
+  }
+}
+
+TEST_CASE("attributes: a watch sees the usual mark in every type and component", "[attributes]") {
+  for (int type = 1; type <= 11; ++type) {
+    const std::vector<Channel> channels{
+        {.name = "before", .type = ChannelType::u8},
+        {.name = "a", .type = static_cast<ChannelType>(type), .components = 3}};
+    Meta meta{.channels = channels};
+    const std::uint64_t usual = usual_no_value(channels[1]).value();
+    meta.channels[1].no_value = usual;
+    CHECK_NOTHROW(encode_meta(meta, kPointBytes));  // it fits the type
+    const std::size_t bytes = channels[1].component_bytes();
+    const bool is_float = type == 3 || type == 4 || type == 11;
+    for (std::size_t component = 0; component < 3; ++component) {
+      std::vector<std::byte> rows(2 * row_bytes(channels));
+      std::memcpy(&rows[row_bytes(channels) + 1 + component * bytes], &usual, bytes);
+      ValueWatch watch(channels), none(channels);
+      watch.add(rows);
+      none.add(std::span(rows).first(row_bytes(channels)));
+      CHECK(watch.taken() == std::vector<bool>{false, !is_float});
+      CHECK(none.taken() == std::vector<bool>{false, false});
+    }
+  }
+  CHECK_FALSE(usual_no_value({.name = "later", .type = static_cast<ChannelType>(99), .size = 4}));
+}
+
+TEST_CASE("attributes: two channels of an input never become one", "[attributes]") {
+  const Channel bytes{.name = "a", .type = ChannelType::u8};
+  const Channel words{.name = "a", .type = ChannelType::u16};
+  Channel more = words;
+  more.name = "a_2";
+  AttributePlan plan;
+  plan.add_input(std::vector{bytes});
+  plan.add_input(std::vector{words, more});
+  std::vector<std::string> names;
+  for (const Channel& c : plan.channels()) names.push_back(c.name);
+  CHECK(names == std::vector<std::string>{"a", "a_2", "a_2_2"});
 }
 
 TEST_CASE("attributes: the order of the input comes back", "[attributes]") {

@@ -137,6 +137,56 @@ TEST_CASE("las writer: points without numbers of returns are the first of one",
   CHECK(written(info, surfels, {std::byte{3}}).point<std::uint8_t>(0, 14) == 0x31);
 }
 
+TEST_CASE("las writer: what is not known is as in a file without the channel",
+          "[io][writers][las]") {
+  const std::vector<Surfel> surfels = surfels_of(1);
+  PointWriteInfo info = plain_info(surfels);
+  info.has_albedo = true;
+  std::vector<std::byte> rows;
+  const auto add = [&](const char* name, ChannelType type, auto bits) {
+    info.channels.push_back(channel(name, type));
+    info.channels.back().no_value = bits;
+    append_value(rows, bits);
+  };
+  add("intensity", ChannelType::u16, std::uint16_t{0xffff});
+  add("return_number", ChannelType::u8, std::uint8_t{0xff});
+  add("number_of_returns", ChannelType::u8, std::uint8_t{0xff});
+  add("class_flags", ChannelType::u8, std::uint8_t{0xff});
+  add("classification", ChannelType::u8, std::uint8_t{0xff});
+  add("scan_angle", ChannelType::i8, std::uint8_t{0x80});
+  add("gps_time", ChannelType::f64, std::uint64_t{0x7ff8000000000000});
+  add("mine", ChannelType::u8, std::uint8_t{0xff});
+  const auto standard = [&](double scale) {
+    PointWriteInfo with_colour = info;
+    with_colour.channels.push_back(stored_colour(ChannelType::u16));
+    with_colour.channels.back().scale = scale;
+    with_colour.channels.back().no_value = 0xffff;
+    std::vector<std::byte> all = rows;
+    for (int i = 0; i < 3; ++i) append_value(all, std::uint16_t{0xffff});
+    return written(with_colour, surfels, all);
+  };
+  const Las las = standard(1);
+  CHECK(las.point<std::uint16_t>(0, 12) == 0);
+  CHECK(las.point<std::uint8_t>(0, 14) == 0x11);
+  CHECK(las.point<std::uint8_t>(0, 15) == 0);
+  CHECK(las.point<std::uint8_t>(0, 16) == 0);
+  CHECK(las.point<std::int16_t>(0, 18) == 0);
+  CHECK(las.point<double>(0, 22) == 0);
+  CHECK(las.point<std::uint8_t>(0, 36) == 0xff);  // its description says what that means
+  // The albedo is the colour: sRGB of 1/4 is 0.5370987
+  CHECK(las.point<std::uint16_t>(0, 30) == 35199);
+  CHECK(las.point<std::uint16_t>(0, 32) == 65535);
+  CHECK(las.point<std::uint16_t>(0, 34) == 0);
+  const Las bytes = standard(1 / 255.0);
+  CHECK(bytes.point<std::uint16_t>(0, 30) == 137);
+  CHECK(bytes.point<std::uint16_t>(0, 32) == 255);
+  CHECK(unknown_losses(OutputFormat::las, info) ==
+        std::vector<std::string>{
+            "LAS has no value for \"not known\": points without intensity, class_flags, "
+            "classification, scan_angle, gps_time get 0 there.",
+            "Points without return_number, number_of_returns become the first of one return."});
+}
+
 TEST_CASE("las writer: channels that fit no field, and surfels, become extra bytes",
           "[io][writers][las]") {
   const std::vector<Surfel> surfels = surfels_of(2);

@@ -1,4 +1,5 @@
 // What all writers of points have in common, and the columns of PLY and XYZ.
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <stdexcept>
@@ -170,6 +171,49 @@ TEST_CASE("point writers: channels of a later version's type are left out, and t
   }
   write_points(scratch / "a", OutputFormat::ply, info, surfels, rows);
   CHECK(slurp(scratch / "a").back() == 77);
+}
+
+TEST_CASE("point writers: numbers that stand for not known are named where a file does not say so",
+          "[io][writers]") {
+  PointWriteInfo info = plain_info(surfels_of(1));
+  info.channels = {channel("class", ChannelType::u8),   channel("angle", ChannelType::i16),
+                   channel("id", ChannelType::u64),     channel("time", ChannelType::f64),
+                   channel("height", ChannelType::f32), channel("known", ChannelType::u8)};
+  const std::array<std::uint64_t, 5> bits{0xff, 0x8000, ~std::uint64_t{0}, 0x7ff8000000000000,
+                                          0xc61c3c00};
+  for (std::size_t i = 0; i < bits.size(); ++i) info.channels[i].no_value = bits[i];
+  for (const OutputFormat format : kFormats) {
+    const std::vector<std::string> sentences = unknown_losses(format, info);
+    if (format == OutputFormat::las) {
+      CHECK(sentences.empty());  // the descriptions of extra bytes say it
+    } else {
+      CHECK(sentences == std::vector<std::string>{
+                             "The file does not say that these stand for \"not known\": class 255, "
+                             "angle -32768, id 18446744073709551615, height -9999."});
+    }
+    for (const std::string& sentence : sentences) {
+      const std::vector<std::string> all = losses(format, info);
+      CHECK(std::ranges::find(all, sentence) != all.end());
+    }
+  }
+}
+
+TEST_CASE("point writers: where the stored colour is not known, viewers show the albedo",
+          "[io][writers]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(1);
+  PointWriteInfo info = plain_info(surfels);
+  info.channels = {channel("rgb", ChannelType::u8, 3)};
+  info.channels[0].colour_space = ColourSpace::srgb;
+  info.channels[0].no_value = 0xff;
+  write_points(scratch / "a", OutputFormat::ply, info, surfels,
+               std::vector<std::byte>(3, std::byte{0xff}));
+  CHECK(slurp(scratch / "a").ends_with(std::string("\x89\xff\0", 3)));  // sRGB of 1/4, 1 and 0
+  for (const OutputFormat format : {OutputFormat::las, OutputFormat::ply, OutputFormat::pcd}) {
+    CHECK(
+        unknown_losses(format, info) ==
+        std::vector<std::string>{"Points without a colour of their own get that of their albedo."});
+  }
 }
 
 TEST_CASE("point writers: losses tell what is rounded, by how much, and what is missing",

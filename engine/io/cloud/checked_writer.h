@@ -69,6 +69,12 @@ class CheckedWriter : public PointWriter {
 [[nodiscard]] std::vector<std::string> usd_losses(const PointWriteInfo& info);
 [[nodiscard]] std::vector<std::string> xyz_losses(const PointWriteInfo& info);
 
+/// Returns what unknown_losses() says of LAS.
+[[nodiscard]] std::vector<std::string> las_unknown_losses(const PointWriteInfo& info);
+/// Says that points whose stored colour is not known get that of their albedo.
+inline constexpr const char* kAlbedoAsColour =
+    "Points without a colour of their own get that of their albedo.";
+
 /// Returns the most by which a coordinate within the bounds moves when it is rounded to float.
 [[nodiscard]] double float_error(const Bounds& bounds) noexcept;
 /// Returns a length that no two neighbours should be closer than, for points that cover a surface

@@ -32,9 +32,13 @@ float to_share(double value) {
   return static_cast<float>(value > 0 ? std::min(value, 1.0) : 0.0);
 }
 
-std::uint16_t to_srgb(float linear) {
-  return static_cast<std::uint16_t>(std::lround(
-      65535 * linear_to_srgb(static_cast<double>(to_share(static_cast<double>(linear))))));
+// Returns a colour on the sRGB curve, `white` for 1.
+std::array<std::uint16_t, 3> to_srgb(const glm::vec3& light, double white) {
+  const auto number = [white](float linear) {
+    const auto share = static_cast<double>(to_share(static_cast<double>(linear)));
+    return static_cast<std::uint16_t>(std::lround(white * linear_to_srgb(share)));
+  };
+  return {number(light.r), number(light.g), number(light.b)};
 }
 
 }  // namespace
@@ -53,8 +57,9 @@ DisplayColour::DisplayColour(const PointWriteInfo& info)
 
 glm::vec3 DisplayColour::linear(const Surfel& surfel, const std::byte* row) const {
   if (kind_ == Kind::shown) return shown_light(row);
-  if (kind_ != Kind::stored || (surfels_have_albedo_ && !chosen_)) return surfel.albedo;
-  const std::array<std::uint16_t, 3> stored = stored_values(row);
+  if (kind_ != Kind::stored || (surfels_have_albedo_ && !chosen_) || !knows(row))
+    return surfel.albedo;
+  const std::array<std::uint16_t, 3> stored = stored_values(surfel, row);
   glm::vec3 light;
   for (std::size_t i = 0; i < 3; ++i) {
     const double white = source_->channel.scale == kByteScale ? 255 : 65535;
@@ -65,14 +70,13 @@ glm::vec3 DisplayColour::linear(const Surfel& surfel, const std::byte* row) cons
 }
 
 std::array<std::uint16_t, 3> DisplayColour::srgb(const Surfel& surfel, const std::byte* row) const {
-  const glm::vec3 light = linear(surfel, row);
-  return {to_srgb(light.r), to_srgb(light.g), to_srgb(light.b)};
+  return to_srgb(linear(surfel, row), 65535);
 }
 
 std::array<std::uint8_t, 3> DisplayColour::bytes(const Surfel& surfel, const std::byte* row) const {
   constexpr float kRounding = 0.003F;  // of an albedo in a container
   std::array<std::uint8_t, 3> bytes{};
-  if (kind_ == Kind::stored && source_->channel.type == ChannelType::u8) {
+  if (kind_ == Kind::stored && source_->channel.type == ChannelType::u8 && knows(row)) {
     bool own = true;
     for (std::size_t i = 0; i < 3; ++i) {
       bytes[i] = std::to_integer<std::uint8_t>(*source_->at(row, i));
@@ -93,7 +97,14 @@ std::vector<RowChannel> DisplayColour::without_bytes(std::vector<RowChannel> cha
   return channels;
 }
 
-std::array<std::uint16_t, 3> DisplayColour::stored_values(const std::byte* row) const {
+bool DisplayColour::knows(const std::byte* row) const noexcept {
+  return !is_unknown(source_->channel, source_->at(row, 0));
+}
+
+std::array<std::uint16_t, 3> DisplayColour::stored_values(const Surfel& surfel,
+                                                          const std::byte* row) const {
+  if (!knows(row))
+    return to_srgb(surfel.albedo, source_->channel.scale == kByteScale ? 255 : 65535);
   const bool bytes = source_->channel.type == ChannelType::u8;
   std::array<std::uint16_t, 3> values{};
   for (std::size_t i = 0; i < 3; ++i) {

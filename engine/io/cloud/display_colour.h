@@ -16,7 +16,7 @@ namespace ptc {
 
 /// Finds the colour of each point: that of PointWriteInfo::colour_from, else the albedo. A colour
 /// whose numbers a channel has as the scanner stored them, such as the channel `rgb`, is known to
-/// the last bit.
+/// the last bit. Where it is not known, points show their albedo.
 ///
 /// Light has no upper limit, so colours of three components are compressed by their luminance Y to
 /// Y / (1 + Y), in which black stays black and nothing reaches white (Reinhard et al. 2002, eq. 3).
@@ -43,12 +43,15 @@ class DisplayColour {
   /// Returns channels without the one whose values bytes() has.
   [[nodiscard]] std::vector<RowChannel> without_bytes(std::vector<RowChannel> channels) const;
   /// Returns the values of stored(), 257-fold if they have 8 bits. Bytes in fields of 16 bits stay
-  /// as they are.
-  [[nodiscard]] std::array<std::uint16_t, 3> stored_values(const std::byte* row) const;
+  /// as they are. Where they are not known, the albedo takes their place.
+  [[nodiscard]] std::array<std::uint16_t, 3> stored_values(const Surfel& surfel,
+                                                           const std::byte* row) const;
 
  private:
   enum class Kind : std::uint8_t { none, albedo, stored, shown };
 
+  /// Says whether the numbers of stored() are known of a point.
+  [[nodiscard]] bool knows(const std::byte* row) const noexcept;
   [[nodiscard]] glm::vec3 shown_light(const std::byte* row) const;
 
   Kind kind_ = Kind::none;

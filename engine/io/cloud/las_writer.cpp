@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -113,8 +114,11 @@ class LasWriter : public CheckedWriter {
     std::ranges::fill(record_, std::byte{0});
     const std::array<std::int32_t, 3> place = to_steps(surfel.position);
     std::memcpy(record_.data(), place.data(), sizeof place);
-    unsigned returned = 1, returns = 0;
+    unsigned returned = 1;
+    std::optional<unsigned> returns;
     for (const PlacedChannel& field : layout_.fields) {
+      // What is not known stays as it is in a file without the channel
+      if (is_unknown(field.channel.channel, field.channel.at(row, 0))) continue;
       if (field.field == Field::return_number) {
         returned = static_cast<unsigned>(field.value(row));
       } else if (field.field == Field::number_of_returns) {
@@ -123,12 +127,12 @@ class LasWriter : public CheckedWriter {
         set_field(field, row);
       }
     }
-    if (!has(Field::number_of_returns)) returns = returned;
-    set<std::uint8_t>(14, static_cast<std::uint8_t>(returned | returns << 4));
+    const unsigned of = returns.value_or(returned);
+    set<std::uint8_t>(14, static_cast<std::uint8_t>(returned | of << 4));
     if (layout_.colour.exists()) {
       const bool is_stored = layout_.colour.stored() != nullptr;
       const std::array<std::uint16_t, 3> colour =
-          is_stored ? layout_.colour.stored_values(row) : layout_.colour.srgb(surfel, row);
+          is_stored ? layout_.colour.stored_values(surfel, row) : layout_.colour.srgb(surfel, row);
       std::memcpy(record_.data() + 30, colour.data(), sizeof colour);
     }
     set_extras(surfel, row);
@@ -154,9 +158,6 @@ class LasWriter : public CheckedWriter {
     return place;
   }
 
-  [[nodiscard]] bool has(Field field) const {
-    return std::ranges::find(layout_.fields, field, &PlacedChannel::field) != layout_.fields.end();
-  }
   template <typename T>
   void set(std::size_t offset, T value) {
     std::memcpy(record_.data() + offset, &value, sizeof value);
@@ -245,6 +246,29 @@ std::unique_ptr<PointWriter> create_las(const std::filesystem::path& target,
                                    las::kMostExtraNumbers, layout.extra_numbers));
   }
   return std::make_unique<las::LasWriter>(target, info, std::move(layout));
+}
+
+std::vector<std::string> las_unknown_losses(const PointWriteInfo& info) {
+  const las::Layout layout(info);
+  std::vector<std::string> zeros, ones, sentences;
+  for (const las::PlacedChannel& field : layout.fields) {
+    if (!field.channel.channel.no_value) continue;
+    const bool counts_returns =
+        field.field == las::Field::return_number || field.field == las::Field::number_of_returns;
+    (counts_returns ? ones : zeros).push_back(field.channel.channel.name);
+  }
+  if (!zeros.empty()) {
+    sentences.push_back(
+        fmt::format("LAS has no value for \"not known\": points without {} get 0 there.",
+                    fmt::join(zeros, ", ")));
+  }
+  if (!ones.empty()) {
+    sentences.push_back(
+        fmt::format("Points without {} become the first of one return.", fmt::join(ones, ", ")));
+  }
+  if (layout.colour.stored() != nullptr && layout.colour.stored()->channel.no_value)
+    sentences.push_back(kAlbedoAsColour);
+  return sentences;
 }
 
 std::vector<std::string> las_losses(const PointWriteInfo& info) {

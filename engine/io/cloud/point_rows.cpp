@@ -78,6 +78,11 @@ std::vector<std::string> part_names(const std::string& name, unsigned components
   return names;
 }
 
+bool is_unknown(const Channel& channel, const std::byte* at) noexcept {
+  if (!channel.no_value) return false;
+  return std::memcmp(at, &*channel.no_value, channel.component_bytes()) == 0;
+}
+
 bool has_axes(const Channel& channel) noexcept {
   return channel.role == ChannelRole::direction || channel.role == ChannelRole::vector ||
          channel.name.find("normal") != std::string::npos;

@@ -45,6 +45,9 @@ struct RowChannel {
 [[nodiscard]] std::vector<std::string> part_names(const std::string& name, unsigned components,
                                                   bool vector);
 
+/// Says whether the component at `at` has the value that stands for "not known".
+[[nodiscard]] bool is_unknown(const Channel& channel, const std::byte* at) noexcept;
+
 /// Says whether the components of a channel of three are x, y and z.
 [[nodiscard]] bool has_axes(const Channel& channel) noexcept;
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string_view>
@@ -17,7 +18,9 @@
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/display_colour.h"
 #include "engine/io/cloud/las_places.h"
+#include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/text/text.h"
@@ -79,6 +82,16 @@ int digits_of(ChannelType type) {
   }
 }
 
+// Returns the number of a type that `bits` stand for; "nan" for any NaN.
+std::string number_text(ChannelType type, std::uint64_t bits) {
+  std::byte raw[sizeof bits];
+  std::memcpy(raw, &bits, sizeof bits);
+  if (type == ChannelType::u64) return fmt::format("{}", bits);
+  if (is_integer(type)) return fmt::format("{}", load_integer(type, raw));
+  const double number = load_number(raw, type);
+  return std::isnan(number) ? "nan" : fmt::format("{}", number);
+}
+
 }  // namespace
 
 void CheckedWriter::write(std::span<const Surfel> surfels, std::span<const std::byte> rows) {
@@ -130,10 +143,36 @@ std::vector<std::string> measured_channels(OutputFormat format, std::span<const 
 
 std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info) {
   std::vector<std::string> sentences = entry_of(format).losses(info);
+  const std::vector<std::string> unknown = unknown_losses(format, info);
+  sentences.insert(sentences.end(), unknown.begin(), unknown.end());
   for (const Channel& channel : info.channels) {
     if (channel_bytes(channel.type) != 0) continue;
     sentences.push_back("The channel " + channel.name +
                         " is left out: its type is one of a later version.");
+  }
+  return sentences;
+}
+
+std::vector<std::string> unknown_losses(OutputFormat format, const PointWriteInfo& info) {
+  if (format == OutputFormat::las) return las_unknown_losses(info);
+  // In PLY and PCD, a colour of 8 bits is the one that viewers show
+  const bool packs_colour = format == OutputFormat::ply || format == OutputFormat::pcd;
+  const DisplayColour colour(info);
+  std::vector<std::string> values, sentences;
+  for (const Channel& channel : info.channels) {
+    if (!channel.no_value || channel_bytes(channel.type) == 0) continue;
+    const bool packed = packs_colour && channel.type == ChannelType::u8 && colour.stored() &&
+                        colour.stored()->channel.name == channel.name;
+    if (packed) {
+      sentences.emplace_back(kAlbedoAsColour);
+    } else if (const std::string value = number_text(channel.type, *channel.no_value);
+               value != "nan") {
+      values.push_back(channel.name + " " + value);
+    }
+  }
+  if (!values.empty()) {
+    sentences.push_back(fmt::format("The file does not say that these stand for \"not known\": {}.",
+                                    fmt::join(values, ", ")));
   }
   return sentences;
 }

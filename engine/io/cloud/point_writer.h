@@ -111,6 +111,11 @@ void check_colour_from(OutputFormat format, const PointWriteInfo& info);
 /// sentence each.
 [[nodiscard]] std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info);
 
+/// Returns what becomes of values that stand for "not known" where a file of this format cannot say
+/// so, a sentence each. They are among those of losses().
+[[nodiscard]] std::vector<std::string> unknown_losses(OutputFormat format,
+                                                      const PointWriteInfo& info);
+
 /// Returns the format that the ending of a name stands for; nothing for an ending that names no
 /// format of points.
 /// @throws RequestError about `target` for .laz, which is only read

@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/pipeline/build/unknown_values.h"
 #include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/sort/point_streams.h"
 #include "engine/store/attribute_rows.h"
@@ -29,10 +30,21 @@ namespace {
 constexpr std::size_t kGrain = 1 << 11;  // records that a thread fills at once
 constexpr std::uint64_t kMaxGroups = kMaxGroup - kFirstInputGroup + 1;
 
-/// Returns whether two channels hold the same kind of value; their groups do not matter.
+/// Returns whether two channels hold the same kind of value. Their groups and the values that
+/// stand for "not known" do not matter.
 bool same_kind(Channel a, const Channel& b) {
   a.group = b.group;
+  a.no_value = b.no_value;
   return a == b;
+}
+
+/// Returns whether the values of two channels of the same kind can stand in one: each value that
+/// stands for "not known" does so in both, or its other channel has no such value.
+/// @param taken_a, taken_b  whether a point has usual_no_value() in the channel
+bool agree_on_unknown(const Channel& a, bool taken_a, const Channel& b, bool taken_b) {
+  if (a.no_value == b.no_value) return true;
+  if (a.no_value && b.no_value) return false;
+  return (a.no_value ? a : b).no_value == usual_no_value(a) && !(a.no_value ? taken_b : taken_a);
 }
 
 /// Returns a name of at most 31 bytes that ends in `ending`.
@@ -101,7 +113,7 @@ class ContainerAttributes : public PointStream {
 
 }  // namespace
 
-AttributePlan::Place AttributePlan::add_channel(Channel channel) {
+std::size_t AttributePlan::add_channel(Channel channel, bool taken) {
   // Put the channel behind the last one, or into a new group
   const std::size_t bytes = channel.bytes();
   if (group_bytes_.empty() || group_bytes_.back() + bytes > kGroupBytes) {
@@ -116,28 +128,43 @@ AttributePlan::Place AttributePlan::add_channel(Channel channel) {
   fill_unknown(channel, unknown_.data() + place.group * kGroupBytes + place.offset);
   channels_.push_back(std::move(channel));
   places_.push_back(place);
-  return place;
+  taken_.push_back(taken);
+  return channels_.size() - 1;
 }
 
-AttributePlan::Place AttributePlan::place_of(const Channel& channel) {
+void AttributePlan::set_no_value(std::size_t channel, std::uint64_t bits) {
+  const Place& place = places_[channel];
+  channels_[channel].no_value = bits;
+  fill_unknown(channels_[channel], unknown_.data() + place.group * kGroupBytes + place.offset);
+}
+
+std::size_t AttributePlan::join(const Channel& channel, bool taken, const Input& input) {
   // Look for the same channel of an earlier input, then for a name that is free
   Channel wanted = channel;
   const std::vector<Channel> shaded = shading_channels(true);
   for (unsigned number = 2;; ++number) {
     const bool reserved = std::ranges::find(shaded, wanted.name, &Channel::name) != shaded.end();
     const auto found = std::ranges::find(channels_, wanted.name, &Channel::name);
-    if (!reserved && found == channels_.end()) return add_channel(std::move(wanted));
-    if (!reserved && same_kind(wanted, *found))
-      return places_[static_cast<std::size_t>(found - channels_.begin())];
+    if (!reserved && found == channels_.end()) return add_channel(std::move(wanted), taken);
+    const auto at = static_cast<std::size_t>(found - channels_.begin());
+    if (!reserved && std::ranges::find(input.channels, at) == input.channels.end() &&
+        same_kind(wanted, *found) && agree_on_unknown(wanted, taken, *found, taken_[at])) {
+      if (wanted.no_value && !found->no_value) set_no_value(at, *wanted.no_value);
+      taken_[at] = taken_[at] || taken;
+      return at;
+    }
     wanted.name = with_ending(channel.name, fmt::format("_{}", number));
   }
 }
 
-std::size_t AttributePlan::add_input(std::span<const Channel> channels) {
+std::size_t AttributePlan::add_input(std::span<const Channel> channels,
+                                     const std::vector<bool>& taken) {
   Input input;
-  for (const Channel& whole : channels) {
-    for (const Channel& channel : divided(whole)) {
-      const Place place = place_of(channel);
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    for (const Channel& channel : divided(channels[i])) {
+      const std::size_t index = join(channel, !taken.empty() && taken[i], input);
+      const Place& place = places_[index];
+      input.channels.push_back(index);
       input.indexed |= channel.name == kOriginalIndex;
       const std::size_t bytes = channel.bytes();
       Piece* const last = input.pieces.empty() ? nullptr : &input.pieces.back();
@@ -154,7 +181,24 @@ std::size_t AttributePlan::add_input(std::span<const Channel> channels) {
 }
 
 void AttributePlan::add_original_index() {
-  index_ = place_of({.name = kOriginalIndex, .type = ChannelType::u64, .role = ChannelRole::index});
+  index_ = join({.name = kOriginalIndex, .type = ChannelType::u64, .role = ChannelRole::index},
+                false, {});
+}
+
+bool AttributePlan::has(std::size_t input, std::size_t channel) const {
+  if (channel == index_) return true;
+  if (input == kNoInput) return false;
+  const std::vector<std::size_t>& own = inputs_[input].channels;
+  return std::ranges::find(own, channel) != own.end();
+}
+
+bool AttributePlan::mark_unknown(std::size_t channel) {
+  const Channel& marked = channels_[channel];
+  if (marked.no_value) return true;
+  const std::optional<std::uint64_t> usual = usual_no_value(marked);
+  if (!usual || taken_[channel]) return false;
+  set_no_value(channel, *usual);
+  return true;
 }
 
 void AttributePlan::fill(std::size_t input, std::span<const std::byte> rows, std::uint64_t first,
@@ -172,10 +216,10 @@ void AttributePlan::fill(std::size_t input, std::span<const std::byte> rows, std
       }
     }
   }
-  if (!index_ || index_->group != group) return;
+  if (!index_ || places_[*index_].group != group) return;
   if (input != kNoInput && inputs_[input].indexed) return;
   for (PointRecord& record : records) {
-    std::memcpy(values_of(record) + index_->offset, &first, sizeof first);
+    std::memcpy(values_of(record) + places_[*index_].offset, &first, sizeof first);
     ++first;
   }
 }

@@ -1,7 +1,8 @@
 // The channels of a build's inputs, on their way from rows of attributes to attribute pages.
 //
 // Inputs differ in what they record of a point. The plan joins their channels and says where each
-// value of a row goes; values that an input does not have are "not known".
+// value of a row goes. Values that an input does not have are "not known": they are the channel's
+// no_value, or 0 in a channel without one (unknown_values.h).
 //
 //   input 0: intensity | class           ->                    group 2             group 3
 //   input 1: class | time | intensity    ->   intensity | class | returns | ...   time | ...
@@ -55,17 +56,27 @@ class AttributePlan {
   /// Adds the channels of the next input.
   ///
   /// A channel that an earlier input has, too, of the same type, meaning and unit, is the same
-  /// channel. A name that stands for another kind of channel, or for a channel of shading, gets a
-  /// number at its end. A channel
-  /// of more than kGroupBytes becomes several, NAME_0, NAME_1 and so on.
+  /// channel. If only one of the two has a no_value, they are the same channel when that is
+  /// usual_no_value() and the points of the other do not have this value. A name that stands for
+  /// another kind of channel, or for a channel of shading, gets a number at its end. A channel of
+  /// more than kGroupBytes becomes several, NAME_0, NAME_1 and so on.
   /// @param channels  in the order of a row; their groups mean nothing
+  /// @param taken     for each channel, whether a point of the input has usual_no_value() in it;
+  ///                  empty: no point has
   /// @return the number of the input, counted from 0
-  std::size_t add_input(std::span<const Channel> channels);
+  std::size_t add_input(std::span<const Channel> channels, const std::vector<bool>& taken = {});
   /// Adds the channel kOriginalIndex, a u64. fill() counts the points of inputs that lack it.
   void add_original_index();
 
   /// The channels of the container, by group from kFirstInputGroup on.
   [[nodiscard]] const std::vector<Channel>& channels() const noexcept { return channels_; }
+  /// Says whether an input has a channel, or fill() makes its values.
+  /// @param input    as for fill()
+  /// @param channel  index in channels()
+  [[nodiscard]] bool has(std::size_t input, std::size_t channel) const;
+  /// Gives a channel without a no_value the usual one, if no point of an input has this value.
+  /// @return whether the channel has a no_value now
+  bool mark_unknown(std::size_t channel);
   /// The number of groups.
   [[nodiscard]] std::size_t groups() const noexcept { return group_bytes_.size(); }
   /// Bytes of a row of an input.
@@ -93,6 +104,7 @@ class AttributePlan {
     std::size_t bytes;
   };
   struct Input {
+    std::vector<std::size_t> channels;  ///< indices in channels_
     std::vector<Piece> pieces;
     std::size_t row_bytes = 0;
     bool indexed = false;  ///< the input itself says where its points were
@@ -101,15 +113,17 @@ class AttributePlan {
     std::size_t group, offset;
   };
 
-  [[nodiscard]] Place place_of(const Channel& channel);
-  [[nodiscard]] Place add_channel(Channel channel);
+  [[nodiscard]] std::size_t join(const Channel& channel, bool taken, const Input& input);
+  [[nodiscard]] std::size_t add_channel(Channel channel, bool taken);
+  void set_no_value(std::size_t channel, std::uint64_t bits);
 
   std::vector<Channel> channels_;         ///< by group
   std::vector<Place> places_;             ///< of each channel
+  std::vector<bool> taken_;               ///< for each channel: a point has usual_no_value()
   std::vector<std::size_t> group_bytes_;  ///< bytes of a point in each group
   std::vector<std::byte> unknown_;        ///< kGroupBytes for each group
   std::vector<Input> inputs_;
-  std::optional<Place> index_;  ///< of kOriginalIndex
+  std::optional<std::size_t> index_;  ///< the channel kOriginalIndex
 };
 
 /// The external sorts of all groups of a plan.

@@ -241,8 +241,7 @@ class Build {
   SortedPoints sort() {
     // Read and measure the inputs, choose the frame
     BuildInputs inputs =
-        read_inputs(request_, bounds_from_, scene_ ? &scene_->meta().channels : nullptr,
-                    report_.seconds, progress_);
+        read_inputs(request_, bounds_from_, scene_.get(), report_.seconds, progress_);
     if (inputs.bounds.empty() && !scene_) {
       std::string names;
       for (const auto& input : request_.inputs) names += input.string() + ": ";

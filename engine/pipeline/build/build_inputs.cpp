@@ -5,7 +5,7 @@
 //
 // Clouds are read twice, so that their points never have to fit in memory. The second pass counts
 // them again: a file that changed in between is an error. A file that says the bounds of its points
-// is read once, if they need nothing else of a first pass.
+// is read once, if it is the only one and they need nothing else of a first pass.
 #include "engine/pipeline/build/build_inputs.h"
 
 #include <algorithm>
@@ -22,6 +22,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/build/unknown_values.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/run.h"
 #include "engine/pipeline/scene_record.h"
@@ -175,19 +176,53 @@ bool has_emitters(const Mesh& mesh) {
                              [](const Material& m) { return m.emission != glm::vec3(0); });
 }
 
-BuildInputs read_files(const BuildRequest& request, BoundsFrom from,
-                       const std::vector<Channel>* scene, Progress& progress) {
+/// Adds the channels of a container to a plan, as input 0.
+/// @param clouds  that are added to its points
+void plan_scene(const ContainerReader& scene, const Clouds& clouds, bool meshes,
+                AttributePlan& plan) {
+  // Its values matter where what is added may lack the channel, or may mark what is not known
+  const std::vector<Channel>& channels = scene.meta().channels;
+  std::vector<bool> wanted(channels.size());
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    wanted[i] = meshes || !std::ranges::all_of(clouds.files, [&](const Clouds::Cloud& cloud) {
+                  return std::ranges::any_of(cloud.channels, [&](Channel channel) {
+                    channel.group = channels[i].group;
+                    return channel == channels[i];
+                  });
+                });
+  }
+  plan.add_input(channels, taken_values(scene, wanted));
+}
+
+/// Plans the channels of all points, and settles what stands where points lack one.
+void plan_channels(const BuildRequest& request, const ContainerReader* scene, bool meshes,
+                   BuildInputs& inputs, Progress& progress) {
+  AttributePlan& plan = inputs.attributes;
+  std::vector<BuildSource> sources;
+  bool indexed = request.original_order;
+  if (scene) {
+    plan_scene(*scene, inputs.clouds, meshes, plan);
+    if (scene->superblock().points > 0) sources.push_back({scene->path().filename().string(), 0});
+    indexed |= find_in_row(scene->meta().channels, kOriginalIndex).has_value();
+  }
+  for (Clouds::Cloud& cloud : inputs.clouds.files) {
+    if (!cloud.channels.empty()) cloud.input = plan.add_input(cloud.channels, cloud.taken);
+    if (cloud.points > 0) sources.push_back({cloud.path.filename().string(), cloud.input});
+  }
+  if (meshes) sources.push_back({"what is sampled on meshes", AttributePlan::kNoInput});
+  if (indexed) plan.add_original_index();
+  mark_unknown_values(plan, sources, progress);
+}
+
+BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
+                       Progress& progress) {
   BuildInputs inputs;
-  if (scene) inputs.attributes.add_input(*scene);
+  const bool alone = request.inputs.size() == 1 && !request.mesh && !scene;
   for (const auto& input : request.inputs) {
-    if (!holds_points(input)) continue;
-    inputs.clouds.measure(input, request.selection, from, inputs.attributes, progress);
+    if (holds_points(input)) inputs.clouds.measure(input, request.selection, from, alone, progress);
   }
   if (inputs.clouds.files.size() > 1) inputs.clouds.text.erase(kViewpointKey);
   if (!request.up.empty()) inputs.clouds.text[kUpKey] = request.up;
-  const bool indexed =
-      scene && std::ranges::find(*scene, kOriginalIndex, &Channel::name) != scene->end();
-  if (request.original_order || indexed) inputs.attributes.add_original_index();
   if (inputs.clouds.scan) {
     inputs.clouds.scan->scanners = inputs.clouds.scanners;
     inputs.clouds.scan->up = glm::dvec3(up_of(inputs.clouds.text));
@@ -197,6 +232,7 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from,
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
   Mesh mesh = load_meshes(request.inputs, request.mesh.get(), request.backdrop, progress);
+  plan_channels(request, scene, !mesh.triangles.empty(), inputs, progress);
   if (request.lights) {
     inputs.lights = *request.lights;
   } else if (const std::string& lights = inputs.clouds.text[kLightsKey]; !lights.empty()) {
@@ -222,7 +258,7 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from,
 }  // namespace
 
 void Clouds::measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
-                     AttributePlan& attributes, Progress& progress) {
+                     bool alone, Progress& progress) {
   PointFile file = open_point_input(path, selection);
   // Note what the file says of all its points
   const std::string name = path.filename().string();
@@ -231,10 +267,10 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   unlit |= !file.info.has_radiance;
   coloured |= file.info.has_albedo;
   Cloud& cloud = files.emplace_back(Cloud{path});
-  if (!file.info.channels.empty()) cloud.input = attributes.add_input(file.info.channels);
   note_scan(file.info, cloud);
+  cloud.channels = std::move(file.info.channels);
   // Take what it says of their place, or read them
-  const bool told = from == BoundsFrom::files && file.info.bounds && file.info.count &&
+  const bool told = from == BoundsFrom::files && alone && file.info.bounds && file.info.count &&
                     selection.takes_all() && !file.info.has_normals && !file.info.has_radius &&
                     !file.info.has_emission;
   if (told) {
@@ -244,14 +280,15 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
     sample.insert(sample.end(), file.info.sample.begin(), file.info.sample.end());
     thin(sample);
   } else {
-    read_points(file, cloud, name, progress);
+    read_points(file, alone, name, cloud, progress);
   }
   points += cloud.points;
 }
 
 /// Reads the points of a cloud and notes what they need.
-void Clouds::read_points(PointFile& file, Cloud& cloud, const std::string& name,
+void Clouds::read_points(PointFile& file, bool alone, const std::string& name, Cloud& cloud,
                          Progress& progress) {
+  ValueWatch watch(alone ? std::span<const Channel>() : cloud.channels);
   bool lacks_normals = false, lacks_radii = true;
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = file.source->next(block)) {
@@ -264,9 +301,11 @@ void Clouds::read_points(PointFile& file, Cloud& cloud, const std::string& name,
                          [](const Surfel& s) { return s.emission != glm::vec3(0); });
     for (std::size_t i = 0; i < count; i += 64) sample.push_back(block[i].position);
     thin(sample);
+    watch.add(file.source->attributes());
     cloud.points += count;
     progress.advance(count);
   }
+  cloud.taken = watch.taken();
   if ((lacks_normals || (lacks_radii && cloud.points > 0)) && !scan) scan.emplace().radii = false;
   if (scan && cloud.points > 0)
     scan->radii |= lacks_radii;  // formats that must have radii have zeros
@@ -290,9 +329,8 @@ void Clouds::note_scan(const PointFileInfo& info, Cloud& cloud) {
   }
 }
 
-BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from,
-                        const std::vector<Channel>* scene, StageSeconds& seconds,
-                        Progress& progress) {
+BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
+                        StageSeconds& seconds, Progress& progress) {
   if (request.city_points > 0) return lay_city(request.city_points);
   const Stage stage(seconds, progress, "read", 0, "points");
   return read_files(request, from, scene, progress);

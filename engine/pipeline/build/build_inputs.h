@@ -42,6 +42,8 @@ struct Clouds {
   struct Cloud {
     std::filesystem::path path;
     std::uint64_t points = 0;
+    std::vector<Channel> channels;                ///< in the order of its rows
+    std::vector<bool> taken;                      ///< as for AttributePlan::add_input()
     std::size_t input = AttributePlan::kNoInput;  ///< its number in the plan of the channels
     std::uint32_t first_scanner = kNoScanner;     ///< the number of the first of its scanners
     /// Where the number of its scanner lies in the row of a point, and its bytes; 0 bytes when all
@@ -66,14 +68,15 @@ struct Clouds {
 
   /// Adds a cloud to the others. Reads it to its end, unless all that is asked stands in front of
   /// its points.
-  /// @param attributes  gets the channels of the cloud
+  /// @param alone  whether all points of the build are of this cloud, whose values need no watch
   /// @throws DataError when the file breaks its format; RequestError, FormatError as
   ///         open_point_input()
   void measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
-               AttributePlan& attributes, Progress& progress);
+               bool alone, Progress& progress);
 
  private:
-  void read_points(PointFile& file, Cloud& cloud, const std::string& name, Progress& progress);
+  void read_points(PointFile& file, bool alone, const std::string& name, Cloud& cloud,
+                   Progress& progress);
   void note_scan(const PointFileInfo& info, Cloud& cloud);
 };
 
@@ -100,12 +103,12 @@ struct BuildInputs {
 
 /// Reads the meshes and measures the clouds of a request.
 /// @param from     where the bounds of clouds may come from
-/// @param scene    channels of the container that the inputs are appended to, which become input 0
-///                 of the plan; null: there is none
+/// @param scene    container that the inputs are appended to, whose channels become input 0 of the
+///                 plan; null: there is none
 /// @param seconds  gets a row for the stage "read", except for a city
-/// @throws DataError, std::system_error
+/// @throws DataError, FormatError, std::system_error
 [[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from,
-                                      const std::vector<Channel>* scene, StageSeconds& seconds,
+                                      const ContainerReader* scene, StageSeconds& seconds,
                                       Progress& progress);
 
 /// Feeds the surfels of all inputs to the sort, and what is recorded of them beyond that to the

@@ -20,6 +20,11 @@ Channel rise_channel() {
       .name = kRiseChannel, .type = ChannelType::u8, .role = ChannelRole::value, .scale = 0.125};
 }
 
+bool same_but_for_group(const Channel& channel, Channel other) {
+  other.group = channel.group;
+  return channel == other;
+}
+
 /// A scan's points with their marks as flags.
 class MarkedStream : public PointStream {
  public:
@@ -114,11 +119,9 @@ class MarkedValues : public PointStream {
 
  private:
   /// Returns where a channel lies in a row of the group, if it is of the kind that marks make.
-  static std::optional<std::size_t> place_of(std::span<const Channel> own, Channel mark) {
+  static std::optional<std::size_t> place_of(std::span<const Channel> own, const Channel& mark) {
     const auto found = find_in_row(own, mark.name);
-    if (!found) return {};
-    mark.group = found->channel->group;
-    if (*found->channel != mark) return {};
+    if (!found || !same_but_for_group(*found->channel, mark)) return {};
     return found->offset;
   }
 
@@ -130,6 +133,11 @@ class MarkedValues : public PointStream {
 };
 
 }  // namespace
+
+bool holds_marks(const Channel& channel) {
+  return same_but_for_group(channel, outlier_channel()) ||
+         same_but_for_group(channel, rise_channel());
+}
 
 void add_marks(Meta& meta) {
   const std::uint8_t last =

@@ -33,6 +33,10 @@ inline constexpr const char* kOutlierChannel = "outlier";
 /// the noise of its surface, in eighths of the point's radius.
 inline constexpr const char* kRiseChannel = "rise";
 
+/// Says whether a channel is of the kind that marks make. Points without a mark have 0 in it, which
+/// is what marks mean by it.
+[[nodiscard]] bool holds_marks(const Channel& channel);
+
 /// Adds those of these channels that a record lacks, in a group of their own behind all others, if
 /// there is one left.
 void add_marks(Meta& meta);

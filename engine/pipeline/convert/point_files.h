@@ -31,6 +31,11 @@ struct PointFileOptions {
   RunOptions run;       ///< memory, threads and temporary directories
 };
 
+/// Notes what becomes of values that stand for "not known" in a file of points that is about to be
+/// written (unknown_losses()). Nothing for a target that is a container.
+void note_unknown_losses(const std::filesystem::path& target, const PointWriteInfo& info,
+                         Progress& progress);
+
 /// Describes the points of a container for a writer. They are read when a selection must be
 /// counted or the format has channels that are measured.
 /// @param format  the format that will be written; nothing for a container

@@ -295,12 +295,12 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   lighting.tune([&] { return pilots_of(receivers, request.lift); });
 
   // Shade all receivers into the target
+  const PointWriteInfo info = shaded_points(receivers.container, receivers.points,
+                                            settings_text(request, lighting.gather()),
+                                            request.colour_from, output_format(target));
+  note_unknown_losses(target, info, progress);
   const std::unique_ptr<ShadedSink> sink =
-      make_shaded_sink(target, receivers.container,
-                       shaded_points(receivers.container, receivers.points,
-                                     settings_text(request, lighting.gather()), request.colour_from,
-                                     output_format(target)),
-                       request.estimate);
+      make_shaded_sink(target, receivers.container, info, request.estimate);
   {
     const Stage stage(report.seconds, progress, "shade", receivers.points, "points");
     shade_all(receivers, request.lift, lighting, *sink);
