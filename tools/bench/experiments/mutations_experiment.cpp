@@ -3,15 +3,20 @@
 //
 //   parent                                    child, one at a time
 //   fork ---------------------------------->  for each way: write the changed file, verify, read
-//   watch Tally::next in shared memory   <--  next, tried, accepted, misread
+//   watch Tally::next in shared memory   <--  next, tried, accepted, refused, misread
 //   killed or exited: count a crash or a hang, fork again at the way after it
+//
+// Of a scene of parts one file is changed at a time, its own or one of a part, and the scene is
+// verified and read. Last, its files are removed, exchanged, and put in the place of each other.
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <fstream>
+#include <functional>
 #include <new>
 #include <random>
 #include <string>
@@ -26,6 +31,7 @@
 #include "engine/verify/verify.h"
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/mutations.h"
+#include "tools/bench/experiments/two_parts.h"
 #include "tools/bench/experiments/work_file.h"
 
 namespace ptc::bench {
@@ -34,9 +40,11 @@ namespace {
 constexpr char kReading[] =
     "Small containers of every profile, with and without channels and light of their own, are "
     "changed in every way of each kind. Found: the verification reports a finding. Accepted: it "
-    "reports none. Misread: a "
-    "reader that loads every page returned other bytes without an error. Each change is tried in a "
-    "child process, so that crashes and hangs are counted, too.";
+    "reports none. Refused: a reader that loads every page stops with an error; it does not look "
+    "at padding, for example. Misread: it returned other bytes without an error. Each change is "
+    "tried in a child process, so that crashes and hangs are counted, too. The last rows are of a "
+    "scene of two parts: one of its files was changed in all of these ways, or files of it were "
+    "missing or others were in their place.";
 
 constexpr auto kPatience = std::chrono::seconds(20);  // for one way; longer is a hang
 constexpr std::size_t kFew = 500;                     // kinds with fewer ways are tried whole
@@ -49,6 +57,7 @@ struct Tally {
   std::size_t next = 0;  ///< number of the way that is tried now
   std::size_t tried = 0;
   std::size_t accepted = 0;
+  std::size_t refused = 0;
   std::size_t misread = 0;
   std::size_t first_accepted = 0;
 };
@@ -56,7 +65,7 @@ struct Tally {
 /// The counts of one kind of change.
 struct MutationRow {
   std::string change;
-  std::size_t tried = 0, accepted = 0, misread = 0, crashes = 0, hangs = 0;
+  std::size_t tried = 0, accepted = 0, refused = 0, misread = 0, crashes = 0, hangs = 0;
 
   [[nodiscard]] std::size_t found() const { return tried - accepted - crashes - hangs; }
   [[nodiscard]] bool all_found() const { return accepted + misread + crashes + hangs == 0; }
@@ -64,6 +73,7 @@ struct MutationRow {
   MutationRow& operator+=(const MutationRow& other) {
     tried += other.tried;
     accepted += other.accepted;
+    refused += other.refused;
     misread += other.misread;
     crashes += other.crashes;
     hangs += other.hangs;
@@ -76,18 +86,19 @@ const Columns<MutationRow>& columns() {
   static const Columns<R> columns{
       {"change", {"change"}, &R::change},    {"tried", {"tried"}, &R::tried},
       {"found", {"found"}, &R::found},       {"accepted", {"accepted"}, &R::accepted},
-      {"misread", {"misread"}, &R::misread}, {"crashes", {"crashes"}, &R::crashes},
-      {"hangs", {"hangs"}, &R::hangs}};
+      {"refused", {"refused"}, &R::refused}, {"misread", {"misread"}, &R::misread},
+      {"crashes", {"crashes"}, &R::crashes}, {"hangs", {"hangs"}, &R::hangs}};
   return columns;
 }
 
-/// A container that is changed.
+/// A file that is changed.
 struct Subject {
-  std::string name;            ///< its profile
-  std::filesystem::path path;  ///< where changed files are written
-  Bytes whole;                 ///< the file as it was written
+  std::string name;              ///< its profile
+  std::filesystem::path path;    ///< where changed files are written
+  std::filesystem::path opened;  ///< what is verified and read: itself, or the scene that it is of
+  Bytes whole;                   ///< the file as it was written
   std::vector<PagePlace> pages;
-  Bytes content;  ///< content_of() the file as it was written
+  Bytes content;  ///< content_of() what is opened, as it was written
 };
 
 /// Reads a whole file.
@@ -106,16 +117,52 @@ void write_file(const std::filesystem::path& path, const Bytes& bytes) {
   if (!file.flush()) throw DataError(path.string() + ": a changed file could not be written");
 }
 
-/// The payloads of all pages, one after another.
-Bytes content_of(const std::filesystem::path& path) {
-  const ContainerReader reader(path);
+/// Appends the payloads of all pages, one after another.
+void append_content(const ContainerReader& reader, Bytes& all) {
   PageDecoder decoder;
-  Bytes all, buffer(reader.page_payload_limit());
+  Bytes buffer(reader.page_payload_limit());
   for (std::uint32_t page = 0; page < reader.page_count(); ++page) {
     const PageHeader header = reader.read_page(page, buffer, decoder);
     all.insert(all.end(), buffer.begin(), buffer.begin() + header.raw_bytes);
   }
+}
+
+/// The payloads of all pages, and of those of the parts of a scene of parts.
+Bytes content_of(const std::filesystem::path& path) {
+  const ContainerReader reader(path);
+  Bytes all;
+  append_content(reader, all);
+  for (const auto& part : reader.parts()) append_content(*part, all);
   return all;
+}
+
+bool verification_finds_it(const std::filesystem::path& path) {
+  Progress silent;
+  try {
+    return !verify_container(path, {.threads = 1, .flip_budget = 0}, silent).sound();
+  } catch (const std::runtime_error&) {  // an error is a finding, too
+    return true;
+  }
+}
+
+/// Describes a file that is changed.
+/// @param opened  as Subject::opened
+/// @throws DataError when the verification finds something before any change
+Subject subject_of(const std::string& name, const std::filesystem::path& path,
+                   const std::filesystem::path& opened) {
+  if (verification_finds_it(opened)) throw DataError(name + ": the unchanged file is not sound");
+  Subject subject{.name = name,
+                  .path = path,
+                  .opened = opened,
+                  .whole = read_file(path),
+                  .pages = {},
+                  .content = content_of(opened)};
+  const ContainerReader container(path);
+  for (const DirectoryEntry& entry : container.entries()) {
+    subject.pages.push_back(
+        {entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
+  }
+  return subject;
 }
 
 /// Writes a cloud of random surfels in the unit cube, the same ones each time.
@@ -140,8 +187,20 @@ void write_cloud(const std::filesystem::path& path, bool emits) {
   }
 }
 
+/// The files of a scene of parts and of what its parts are cut from.
+struct SceneFiles {
+  explicit SceneFiles(const std::filesystem::path& work)
+      : whole(work, "-whole.ptcx"),
+        scene(work, "-parts.ptcx"),
+        first(work, "-part0.ptcx"),
+        second(work, "-part1.ptcx") {}
+  WorkFile whole, scene, first, second;
+};
+
 /// Builds the containers that are changed.
-std::vector<Subject> make_subjects(const Bench& bench, const WorkFile& changed) {
+/// @param parts  gets a scene of parts with the points of the container "compact"
+std::vector<Subject> make_subjects(const Bench& bench, const WorkFile& changed,
+                                   const SceneFiles& parts) {
   // Build and shade a scene
   const WorkFile cloud(bench.work, ".xyz"), scene(bench.work, "-scene.ptcx"),
       lamps(bench.work, "-lamps.ptcx"), lit(bench.work, "-lit.ptcx");
@@ -170,49 +229,52 @@ std::vector<Subject> make_subjects(const Bench& bench, const WorkFile& changed) 
                            {"compact, shaded", Profile::compact, lit.path()}}) {
     recode_container(ContainerReader(kind.source), changed.path(), {.profile = kind.profile},
                      silent);
-    Subject& subject = subjects.emplace_back();
-    subject = {.name = kind.name,
-               .path = changed.path(),
-               .whole = read_file(changed.path()),
-               .pages = {},
-               .content = content_of(changed.path())};
-    const ContainerReader container(changed.path());
-    for (const DirectoryEntry& entry : container.entries()) {
-      subject.pages.push_back(
-          {entry.offset, round_up(kPageHeaderBytes + entry.stored_bytes, kSectorBytes)});
-    }
+    subjects.push_back(subject_of(kind.name, changed.path(), changed.path()));
   }
+  // Cut it into parts
+  recode_container(ContainerReader(scene.path()), parts.whole.path(), {.profile = Profile::compact},
+                   silent);
+  write_two_parts(ContainerReader(parts.whole.path()), parts.scene.path(),
+                  {parts.first.path(), parts.second.path()});
   return subjects;
 }
 
-bool verification_finds_it(const std::filesystem::path& path) {
-  Progress silent;
+/// Lets a reader load every page, and counts when it stops with an error or returns other bytes.
+void read_changed(const Subject& subject, Tally& tally) {
   try {
-    return !verify_container(path, {.threads = 1, .flip_budget = 0}, silent).sound();
-  } catch (const std::runtime_error&) {  // an error is a finding, too
-    return true;
+    if (content_of(subject.opened) != subject.content) ++tally.misread;
+  } catch (const std::runtime_error&) {
+    ++tally.refused;
   }
 }
 
-/// Whether a reader returns other bytes without an error.
-bool reader_is_misled(const Subject& subject) {
-  try {
-    return content_of(subject.path) != subject.content;
-  } catch (const std::runtime_error&) {  // the reader refused the file
-    return false;
-  }
+/// Numbered ways to change files.
+struct Ways {
+  std::string change;
+  std::size_t count = 0;
+  /// Writes the files changed in way k. @return whether they differ from the whole ones
+  std::function<bool(std::size_t k)> write;
+};
+
+/// The ways of a kind of change to one file.
+Ways ways_of(const Subject& subject, const Mutation& mutation) {
+  return {.change = mutation.name,
+          .count = mutation.count,
+          .write = [&subject, mutation, changed = Bytes()](std::size_t k) mutable {
+            if (!mutation.apply(subject.whole, subject.pages, k, changed)) return false;
+            write_file(subject.path, changed);
+            return true;
+          }};
 }
 
 /// Tries the ways from tally.next on; runs in a child process.
-void work(const Subject& subject, const Mutation& mutation, std::size_t every, Tally& tally) {
-  Bytes changed;
-  for (; tally.next < mutation.count; tally.next += every) {
-    if (!mutation.apply(subject.whole, subject.pages, tally.next, changed)) continue;
-    write_file(subject.path, changed);
+void work(const Subject& subject, const Ways& ways, std::size_t every, Tally& tally) {
+  for (; tally.next < ways.count; tally.next += every) {
+    if (!ways.write(tally.next)) continue;
     ++tally.tried;
-    if (!verification_finds_it(subject.path) && tally.accepted++ == 0)
+    if (!verification_finds_it(subject.opened) && tally.accepted++ == 0)
       tally.first_accepted = tally.next;
-    tally.misread += reader_is_misled(subject);
+    read_changed(subject, tally);
   }
 }
 
@@ -233,22 +295,22 @@ int wait_patiently(pid_t child, const Tally& tally) {
   return status;
 }
 
-/// Tries every `every`-th way of one kind on one container.
-MutationRow try_all(const Subject& subject, const Mutation& mutation, std::size_t every,
+/// Tries every `every`-th way of one kind on one file, which is whole again afterwards.
+MutationRow try_all(const Subject& subject, const Ways& ways, std::size_t every,
                     Progress& progress) {
   // Share a tally with the children
   void* const shared =
       ::mmap(nullptr, sizeof(Tally), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (shared == MAP_FAILED) throw std::bad_alloc();
   auto& tally = *new (shared) Tally;
-  MutationRow row{.change = mutation.name};
+  MutationRow row{.change = ways.change};
   // Fork a child, and another one after each crash or hang
-  while (tally.next < mutation.count) {
+  while (tally.next < ways.count) {
     const pid_t child = ::fork();
     if (child == 0) {
       ::signal(SIGALRM, SIG_DFL);
       try {
-        work(subject, mutation, every, tally);
+        work(subject, ways, every, tally);
       } catch (...) {  // counts as a crash
         ::abort();
       }
@@ -258,15 +320,17 @@ MutationRow try_all(const Subject& subject, const Mutation& mutation, std::size_
     if (!WIFSIGNALED(status) && WEXITSTATUS(status) == 0) continue;
     ++(WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM ? row.hangs : row.crashes);
     progress.note(
-        fmt::format("{}, {}: way {} ended the process", subject.name, mutation.name, tally.next));
+        fmt::format("{}, {}: way {} ended the process", subject.name, ways.change, tally.next));
     tally.next += every;
   }
+  write_file(subject.path, subject.whole);
   // Take over the counts
   row.tried = tally.tried;
   row.accepted = tally.accepted;
+  row.refused = tally.refused;
   row.misread = tally.misread;
   if (tally.accepted > 0) {
-    progress.note(fmt::format("{}, {}: way {} was accepted", subject.name, mutation.name,
+    progress.note(fmt::format("{}, {}: way {} was accepted", subject.name, ways.change,
                               tally.first_accepted));
   }
   ::munmap(shared, sizeof(Tally));
@@ -286,27 +350,90 @@ Report report_of(const std::vector<MutationRow>& rows, std::size_t every) {
   return report;
 }
 
+/// Tries one kind on one file.
+MutationRow try_kind(const Subject& subject, const Mutation& mutation, std::size_t every,
+                     Progress& progress) {
+  return try_all(subject, ways_of(subject, mutation), mutation.count < kFew ? 1 : every, progress);
+}
+
+/// Tries all kinds on one file of a scene of parts. @param change  name of the row
+MutationRow try_file(const std::string& change, const std::filesystem::path& path,
+                     const SceneFiles& parts, std::size_t every, Progress& progress) {
+  const Subject subject = subject_of(change, path, parts.scene.path());
+  MutationRow sum;
+  for (const Mutation& mutation : mutations_of(subject.whole, subject.pages))
+    sum += try_kind(subject, mutation, every, progress);
+  sum.change = change;
+  return sum;
+}
+
+/// Tries the files of a scene of parts in the place of each other. Way 5 p + j puts file j in the
+/// place of part p: none, an empty one, the other part, the scene, or the container with all
+/// points; the last way exchanges the parts.
+MutationRow try_exchanges(const SceneFiles& parts, Progress& progress) {
+  const Subject subject = subject_of("a scene of parts", parts.scene.path(), parts.scene.path());
+  const std::array<std::filesystem::path, 2> paths{parts.first.path(), parts.second.path()};
+  const std::array<Bytes, 2> wholes{read_file(paths[0]), read_file(paths[1])};
+  const Bytes points = read_file(parts.whole.path());
+  constexpr std::size_t kFiles = 5;
+  const auto restore = [&] {
+    for (std::size_t p = 0; p < 2; ++p) write_file(paths[p], wholes[p]);
+  };
+  MutationRow row = try_all(subject,
+                            {.change = "a scene of parts: files missing or exchanged",
+                             .count = 2 * kFiles + 1,
+                             .write =
+                                 [&](std::size_t k) {
+                                   restore();
+                                   const std::size_t part = k / kFiles;
+                                   if (k == 2 * kFiles) {
+                                     for (std::size_t p = 0; p < 2; ++p)
+                                       write_file(paths[p], wholes[1 - p]);
+                                   } else if (k % kFiles == 0) {
+                                     std::filesystem::remove(paths[part]);
+                                   } else {
+                                     const std::array<Bytes, kFiles> files{
+                                         Bytes(), Bytes(), wholes[1 - part], subject.whole, points};
+                                     write_file(paths[part], files[k % kFiles]);
+                                   }
+                                   return true;
+                                 }},
+                            1, progress);
+  restore();
+  return row;
+}
+
 /// Tries all kinds on all containers.
 /// @throws DataError when a change was not found, or too few were tried
 Report measure(std::size_t every, const Bench& bench) {
   const WorkFile changed(bench.work, "-changed.ptcx");
-  const std::vector<Subject> subjects = make_subjects(bench, changed);
+  const SceneFiles parts(bench.work);
+  const std::vector<Subject> subjects = make_subjects(bench, changed, parts);
   const std::size_t kinds = mutations_of(subjects[0].whole, subjects[0].pages).size();
   std::vector<MutationRow> rows;
   MutationRow all{.change = "all"};
-  bench.progress.begin("mutations", kinds, "kinds");
+  const auto publish = [&](const MutationRow& row) {
+    all += row;
+    rows.push_back(row);
+    bench.publish(report_of(rows, every));
+    bench.progress.advance(1);
+  };
+  constexpr std::size_t kSceneRows = 3;
+  bench.progress.begin("mutations", kinds + kSceneRows, "kinds");
   for (std::size_t kind = 0; kind < kinds; ++kind) {
     MutationRow sum;
     for (const Subject& subject : subjects) {
       const Mutation mutation = mutations_of(subject.whole, subject.pages)[kind];
       sum.change = mutation.name;
-      sum += try_all(subject, mutation, mutation.count < kFew ? 1 : every, bench.progress);
+      sum += try_kind(subject, mutation, every, bench.progress);
     }
-    all += sum;
-    rows.push_back(sum);
-    bench.publish(report_of(rows, every));
-    bench.progress.advance(1);
+    publish(sum);
   }
+  publish(try_file("a scene of parts: any of these to its own file", parts.scene.path(), parts,
+                   every, bench.progress));
+  publish(try_file("a scene of parts: any of these to a part", parts.first.path(), parts, every,
+                   bench.progress));
+  publish(try_exchanges(parts, bench.progress));
   bench.progress.end();
   rows.push_back(all);
   bench.publish(report_of(rows, every));
@@ -329,7 +456,7 @@ Experiment make_mutations_experiment() {
   return {.name = "mutations",
           .purpose =
               "How many changes to a file a verification and a reader detect: flipped bits, holes, "
-              "pages in the wrong place, wrong lengths, transfers as text",
+              "pages in the wrong place, wrong lengths, transfers as text, parts exchanged",
           .quick = "A few seconds: one way in 1009 of the kinds of change that have at least 500",
           .declare = declare,
           .run = [every](const Bench& bench) { return measure(*every, bench); }};
