@@ -102,6 +102,16 @@ TEST_CASE("marks: a scan that is appended to points without them marks its own",
   CHECK(both.at({20, 0, 9}) == std::array{1, both.at({20, 0, 9})[1]});
 }
 
+TEST_CASE("marks: points without marks that are appended to a scan have none", "[marks]") {
+  const TemporaryDirectory dir;
+  build({write_noisy(dir / "noisy.xyz", 1)}, dir / "noisy.ptcx");
+  std::ofstream(dir / "known.xyz") << "# x y z nx ny nz radius\n0 0 0 0 0 1 0.1\n0 1 0 0 0 1 0.1\n";
+  build({dir / "known.xyz"}, dir / "both.ptcx", dir / "noisy.ptcx");
+  CHECK(marks_of(dir / "both.ptcx").at({0, 0, 0}) == std::array{0, 0});
+  const ContainerReader both(dir / "both.ptcx");
+  for (const Channel& channel : both.meta().channels) CHECK_FALSE(channel.no_value);
+}
+
 TEST_CASE("marks: a scan that was written with its marks is read again", "[marks]") {
   const TemporaryDirectory dir;
   build({write_noisy(dir / "noisy.xyz", 1)}, dir / "a.ptcx");
