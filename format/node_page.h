@@ -204,6 +204,10 @@ class NodePageEncoder {
   std::uint16_t add(const GroupView& group);
   /// Returns the number of groups since the last take().
   [[nodiscard]] std::uint32_t size() const noexcept;
+  /// Returns the size of the payload that take() would return, bytes.
+  [[nodiscard]] std::size_t bytes() const noexcept;
+  /// Returns the bytes that are left for more groups and their slots.
+  [[nodiscard]] std::size_t room() const noexcept { return limit_ - bytes(); }
   /// Returns the payload of the groups that were added; the encoder is empty afterwards.
   [[nodiscard]] std::vector<std::byte> take();
 

@@ -276,6 +276,10 @@ std::uint32_t NodePageEncoder::size() const noexcept {
   return static_cast<std::uint32_t>(slots_.size());
 }
 
+std::size_t NodePageEncoder::bytes() const noexcept {
+  return round_to_slot(sizeof(std::uint16_t) * slots_.size()) + groups_.size();
+}
+
 std::vector<std::byte> NodePageEncoder::take() {
   const std::size_t table = round_to_slot(sizeof(std::uint16_t) * slots_.size());
   std::vector<std::byte> payload(table + groups_.size());

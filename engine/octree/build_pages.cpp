@@ -120,6 +120,10 @@ void load_totals(StateReader& state, Superblock& superblock) {
 
 }  // namespace
 
+std::uint64_t held_pages_bytes(std::uint8_t page_shift) noexcept {
+  return PageOrder::held_limit(page_shift) + PageOrder::leaving_limit(page_shift);
+}
+
 Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
                        const Executor& executor, Progress& progress,
                        const Checkpoints& checkpoints) {
@@ -160,8 +164,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
   const OctreeBuilder::Result tree = octree.finish();
   order.finish();
   writer.write_pages(order.take(), executor);
-  writer.flush();
-  order.keep_tail();
+  order.finish_held(executor);
 
   superblock.nodes = tree.nodes;
   superblock.node_groups = tree.groups;

@@ -43,6 +43,9 @@ struct Checkpoints {
   StateReader* from = nullptr;
 };
 
+/// Returns the most memory of the node pages that build_pages() holds back, bytes.
+[[nodiscard]] std::uint64_t held_pages_bytes(std::uint8_t page_shift) noexcept;
+
 /// Writes the pages of all points and nodes in one pass. The result is the same for any number of
 /// threads.
 /// @param points  ascending keys in the lattice of the writer's frame
@@ -50,9 +53,9 @@ struct Checkpoints {
 /// @throws DataError, FormatError when the state to resume from is invalid;
 ///         std::invalid_argument when a point emits light and WriterOptions::point_bytes is
 ///         kPointBytes; and what stream and writer throw
-/// Memory: one open page for each stream. In addition, for a block of 65,536 points (or one page of
-/// points if that is more), the records twice and their pages and nodes three times: some 20 MB in
-/// all.
+/// Memory: held_pages_bytes(), and one open page for each stream. In addition, for a block of
+/// 65,536 points (or one page of points if that is more), the records twice and their pages and
+/// nodes three times: some 20 MB in all.
 [[nodiscard]] Superblock build_pages(PointStream& points, ContainerWriter& writer,
                                      const BuildOptions& options, const Executor& executor,
                                      Progress& progress, const Checkpoints& checkpoints = {});

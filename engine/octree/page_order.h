@@ -3,16 +3,21 @@
 // Groups arrive in post-order. Each goes to the open page of its stream, which is its level or a
 // few neighbouring levels, so that a reader that stops at one level reads a compact run of pages:
 //
-//   level 0   . . . . . . . [        ]     held: pages of the coarsest levels wait for the tail
-//   level 1   . . [        ][        ]     of the file
-//   ------------------------------------ cut: rises when more pages are held than the tail has
-//   level 2   [ page 1 ][ page 3 ][ 7 ]    full pages leave in the order in which they fill up
+//   level 0   . . . . . . . [        ]     held: pages of the coarser levels wait for the end, and
+//   level 1   . . [        ][        ]     leave level by level, the coarsest ones into the tail
+//   ------------------------------------ cut: rises when the pages that are held take too much
+//   level 2   [ page 1 ][ page 3 ][ 7 ]    full pages leave some at a time, level by level
 //   points    [0][2][5][6]                 a point page leaves before the groups that end in it
+//
+// A page ends early where a cell begins that is not expected to fit into what is left of it, so
+// that fewer pages hold what is in a region.
 //
 // The page of a group is known when the group is added, its rank is not: a held page has a
 // provisional number, which references to it keep until the page that they lie on leaves.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -35,12 +40,23 @@ namespace ptc {
 
 /// Collects groups in node pages, with one open page for each stream of levels, and emits pages in
 /// their final order. A page below the cut gets its rank when it is opened, so that parents can
-/// refer to groups that are not on disk yet, and is emitted when it is full. Pages of the coarsest
-/// levels are held until keep_tail(). A point page is emitted before the groups that end in it.
-/// Memory: one open page for each stream, and the pages that are held, up to 4 MiB.
+/// refer to groups that are not on disk yet, and is emitted together with others when it is full.
+/// Pages of the coarser levels are held until finish_held(). A point page is emitted before the
+/// groups that end in it.
+/// Memory: one open page for each stream, held_limit() and leaving_limit().
 class PageOrder : public GroupSink {
  public:
   using Page = ContainerWriter::Page;
+
+  // Files depend on these limits, so that no option changes them.
+  /// Returns the most bytes of pages that are held until the end: 256 pages, and at most 16 MiB.
+  [[nodiscard]] static constexpr std::uint64_t held_limit(std::uint8_t page_shift) noexcept {
+    return std::min(std::uint64_t{256} << page_shift, std::uint64_t{16} << 20);
+  }
+  /// Returns the most bytes of full pages that leave together: 64 pages, and at most 4 MiB.
+  [[nodiscard]] static constexpr std::uint64_t leaving_limit(std::uint8_t page_shift) noexcept {
+    return held_limit(page_shift) / 4;
+  }
 
   /// @param writer             gives out ranks; must outlive this
   /// @param levels_per_stream  see BuildOptions
@@ -57,10 +73,10 @@ class PageOrder : public GroupSink {
   [[nodiscard]] std::vector<Page> take() noexcept { return std::exchange(whole_, {}); }
   /// Emits all pages that are left but those that are held, the deepest level first.
   void finish();
-  /// Hands the pages that are held to the writer, for the tail: the deepest level first, the root
-  /// last. @pre finish(), and what take() returned was written
-  void keep_tail();
-  /// Returns a reference of add() with the page's rank. @pre keep_tail()
+  /// Hands the pages that are held to the writer, the deepest level first, the root last. The last
+  /// ones are for the tail. @pre finish(), and what take() returned was written
+  void finish_held(const Executor& executor);
+  /// Returns a reference of add() with the page's rank. @pre finish_held()
   [[nodiscard]] ChildRef placed(ChildRef ref) const noexcept;
   /// Returns whether add() may have returned a page of this number.
   [[nodiscard]] bool knows(std::uint32_t page) const;
@@ -86,14 +102,27 @@ class PageOrder : public GroupSink {
     NodePageEncoder encoder;
     Range keys{};
   };
-  /// A full page that waits for the tail.
+  /// How many bytes the groups of a stream take in cells of each size. Cells of height h are those
+  /// in which the high halves of keys differ in the last h octal digits alone.
+  struct Cells {
+    std::uint64_t key = 0;                         ///< high half of the last group's cell
+    std::uint64_t bytes = 0;                       ///< of all groups; 0: there was none
+    std::array<std::uint64_t, kHalfBits> begin{};  ///< `bytes` where the cell of height h began
+    std::array<std::uint64_t, kHalfBits> mean{};   ///< of ended cells of height h; 0: there is none
+    /// Ends the cells that a group is not in.
+    /// @param next  high half of the group's cell
+    /// @return  expected bytes of the largest cell that begins with the group; 0: not known
+    std::uint64_t enter(std::uint64_t next);
+  };
+  /// A full page that waits for the end.
   struct Held {
-    std::uint32_t page;  ///< provisional number
+    std::uint32_t page;  ///< provisional number; of a page of a state, also a rank
     Page content;
   };
   /// Some neighbouring levels.
   struct Stream {
     std::optional<Open> open;
+    Cells cells;
     std::vector<Held> held;
   };
 
@@ -103,12 +132,16 @@ class PageOrder : public GroupSink {
   void open(Stream& stream);
   void close(Stream& stream);
   void evict();
+  void place(std::uint32_t rank, Page& page) const;
   void emit(std::uint32_t rank, Page page);
+  void emit_leaving();
   void place_references(Page& page) const;
   void take_points();
   void save_open(const Stream& stream, StateWriter& state) const;
   void load_open(StateReader& state, Stream& stream, std::uint64_t points);
   void load_held(StateReader& state, Stream& stream, std::uint64_t points);
+  void save_page(std::uint32_t number, const Page& page, StateWriter& state) const;
+  [[nodiscard]] Held load_page(StateReader& state, std::uint64_t points) const;
   [[nodiscard]] NodePage load_groups(StateReader& state, std::vector<std::byte>& payload,
                                      std::uint32_t groups, std::uint64_t points) const;
 
@@ -117,10 +150,13 @@ class PageOrder : public GroupSink {
   int levels_per_stream_;
   std::size_t payload_limit_;
   bool may_emit_;
-  std::size_t most_held_;             ///< pages that the tail has room for
+  std::uint64_t held_limit_;          ///< held_limit()
+  std::uint64_t leaving_limit_;       ///< leaving_limit()
   std::vector<Stream> streams_;       ///< by level / levels_per_stream_
   std::size_t cut_;                   ///< streams below this index are held
-  std::size_t held_pages_ = 0;        ///< pages with a provisional number that has no rank yet
+  std::uint64_t held_bytes_ = 0;      ///< payloads of pages that are held; open ones count as full
+  std::vector<Page> leaving_;         ///< full pages below the cut that are not emitted yet
+  std::uint64_t leaving_bytes_ = 0;   ///< of their payloads
   std::vector<std::uint32_t> ranks_;  ///< by provisional number; kNoPage: not known yet
   std::deque<Page> points_;           ///< point pages not emitted yet
   std::uint64_t next_point_ = 0;      ///< number of their first point

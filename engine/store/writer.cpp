@@ -23,6 +23,9 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kFinishBytes = 96;  // memory that finish() takes for each page
+// Most bytes of node pages in the tail. A first request of 256 KiB then gets the last 2,400 entries
+// of the directory as well, and knows where the pages lie that it asks for next.
+constexpr std::uint64_t kTailBytes = 150'000;
 
 FileHeader make_header(const WriterOptions& options) {
   FileHeader header;
@@ -231,6 +234,19 @@ void ContainerWriter::keep_stored_page(const PageSummary& summary, Coding coding
   encoder_.take(summary, coding, raw_bytes, stored, kept_page(summary));
 }
 
+// Writes the first node pages that were kept, until the tail has no more than kTailBytes of them.
+void ContainerWriter::shorten_tail() {
+  const auto is_node = [](const PageImage& image) { return image.page.type == PageType::node; };
+  std::uint64_t bytes = 0;
+  for (const PageImage& image : tail_) bytes += is_node(image) ? image.bytes.size() : 0;
+  auto first = tail_.begin();
+  for (; bytes > kTailBytes && is_node(*first); ++first) {
+    append_page(*first);
+    bytes -= first->bytes.size();
+  }
+  tail_.erase(tail_.begin(), first);
+}
+
 // Gives the pages of the tail their places, one after another from an offset on.
 void ContainerWriter::place_tail(std::uint64_t offset) {
   for (const PageImage& image : tail_) {
@@ -306,6 +322,7 @@ Superblock ContainerWriter::finish(const Meta& meta, Superblock superblock) {
   finished_ = true;
 
   // Place the directory and the tail, and check what is about to be committed as a reader would
+  shorten_tail();
   end_ = round_up(end_, kBlockBytes);
   complete(superblock, meta);
   place_tail(superblock.tail_offset);

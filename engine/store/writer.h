@@ -121,7 +121,8 @@ class ContainerWriter {
                          std::span<const std::byte> stored);
 
   /// Keeps a page for the tail. Pages are kept in the order of the directory, after all others of
-  /// their type, at most kMaxTailPages - 1 of them.
+  /// their type, at most kMaxTailPages - 1 of them. The first node pages of these are written
+  /// before the directory when there are more than 150 KB of them.
   /// @param summary  of a node page, whose rank was reserved, or of a page of another type that
   ///                 stands behind them
   void keep_page(const PageSummary& summary, std::span<const std::byte> payload);
@@ -152,6 +153,7 @@ class ContainerWriter {
   void append(const PageImage& image);
   void append_page(const PageImage& image);
   PageImage& kept_page(const PageSummary& summary);
+  void shorten_tail();
   void place_tail(std::uint64_t offset);
   void write_directory(std::span<const std::byte> directory);
   void complete(Superblock& superblock, const Meta& meta) const;

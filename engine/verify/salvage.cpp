@@ -319,6 +319,7 @@ class Salvage {
     budget.charge("the program", kBaseBytes);
     budget.charge("the list of pages", kPageBytes * pages);
     budget.charge("open pages", kPagesOpen << header().page_shift);
+    budget.charge("node pages that wait", held_pages_bytes(header().page_shift));
     budget.require();
   }
 

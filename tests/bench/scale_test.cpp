@@ -171,8 +171,8 @@ TEST_CASE("scale: points beyond the cap are spilled, and every stage stays below
           "[bench][scale]") {
   const test::TemporaryDirectory dir;
   Progress silent;
-  const ScaleOptions options{.points = {900'000}, .receivers = 100, .repeats = 1};
-  const RunOptions run{.memory_bytes = std::uint64_t{96} << 20, .threads = 2};
+  const ScaleOptions options{.points = {1'500'000}, .receivers = 100, .repeats = 1};
+  const RunOptions run{.memory_bytes = std::uint64_t{116} << 20, .threads = 2};
   const std::vector<ScaleRow> rows = measure_scale(options, dir.path(), run, silent);
   REQUIRE(rows.size() == 6);
   CHECK(rows[0].spilled_bytes >=

@@ -248,7 +248,7 @@ class Bench(ProgramTest):
     def test_scale_goes_end_to_end_and_leaves_its_files_alone(self):
         charts = self.here / "charts"
         printed = self.succeed("ptcbench", "scale", "--quick", "--points", "20k", "--points", "900k", "--receivers", "300",
-                               "--memory", "96M", "--threads", "2", "-o", charts, "--json")
+                               "--memory", "116M", "--threads", "2", "-o", charts, "--json")
         self.assertIn("MB of temporary files in", printed.stderr)
         facts = json.loads((charts / "scale.json").read_text())
         said = json.loads(printed.stdout)

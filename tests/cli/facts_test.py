@@ -102,7 +102,7 @@ class Facts(ProgramTest):
         first, second = self.here / "first", self.here / "second"
         first.mkdir()
         second.mkdir()
-        command = ["ptcbuild", "--city", "700k", "--memory", "82M", "--temp", first, "--temp", second, "-o", self.here / "o.ptcx"]
+        command = ["ptcbuild", "--city", "700k", "--memory", "102M", "--temp", first, "--temp", second, "-o", self.here / "o.ptcx"]
         result = self.succeed(*command, "--json")
         space = json.loads(result.stdout)["space"]
         self.assertEqual(space["temp_bytes"], 700_000 * 34)
@@ -441,7 +441,7 @@ class Determinism(ProgramTest):
                                         ("ptcshade", [self.scene, "--bounces", "3"], "o.ptcx")):
             first = None
             for options in (["--threads", "1"], ["--threads", "2"], ["--threads", "5"],
-                            ["--memory", "128M"], ["--temp", str(self.here)]):
+                            ["--memory", "148M"], ["--temp", str(self.here)]):
                 self.succeed(program, *operands, *options, "-o", self.here / name)
                 data = (self.here / name).read_bytes()
                 first = first or data

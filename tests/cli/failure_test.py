@@ -29,7 +29,7 @@ class SystemFailure(ProgramTest):
         picture = ["--size", "200x200", "--camera", "0,0,3,0,0,0", "--samples", "1"]
         spilling = ["--city", "700k", "--page-size", "1M", "--profile", "raw", "-o", self.here / "o.ptcx"]
         for program, operands, kib in (("ptcbuild", [self.cloud, "-o", self.here / "o.ptcx"], 8),
-                                       ("ptcbuild", [*spilling, "--memory=86M"], 1024), ("ptcbuild", [*spilling, "--memory=200M", "--resume"], 1024),
+                                       ("ptcbuild", [*spilling, "--memory=106M"], 1024), ("ptcbuild", [*spilling, "--memory=300M", "--resume"], 1024),
                                        ("ptcbuild", [self.cloud, "--resume", "-o", self.here / "o.ptcx"], 0),
                                        ("ptcbuild", [self.cloud, "--append", self.scene, "-o", self.here / "o.ptcx"], 8),
                                        ("ptcshade", [self.scene, "-o", self.here / "o.ply"], 8),

@@ -57,11 +57,11 @@ SCENARIOS = [
     Scenario("build cloud", "ptcbuild {in}/ball.ply -o {out}/o.ptcx --threads 1 --page-size 4K", "o.ptcx"),
     Scenario("build packed", "ptcbuild {in}/ball.ply.gz -o {out}/o.ptcx --threads 1", "o.ptcx"),
     Scenario("build mesh", "ptcbuild {in}/box.obj -o {out}/o.ptcx --points 500 --threads 2", "o.ptcx"),
-    Scenario("build spilling", "ptcbuild --city 700K --memory 86M --threads 2 --page-size 1M --profile raw"
+    Scenario("build spilling", "ptcbuild --city 700K --memory 106M --threads 2 --page-size 1M --profile raw"
              " --temp {in}/temp -o {out}/o.ptcx", "o.ptcx", slow=True),
-    Scenario("build spread", "ptcbuild --city 700K --memory 86M --threads 2 --page-size 1M --profile raw"
+    Scenario("build spread", "ptcbuild --city 700K --memory 106M --threads 2 --page-size 1M --profile raw"
              " --temp {in}/temp --temp {in}/more -o {out}/o.ptcx", "o.ptcx", slow=True),
-    Scenario("build resumed", "ptcbuild --city 150K --memory 100M --threads 2 --resume --checkpoint 50K"
+    Scenario("build resumed", "ptcbuild --city 150K --memory 190M --threads 2 --resume --checkpoint 50K"
              " --temp {in}/temp --temp {in}/more -o {out}/o.ptcx", "o.ptcx", slow=True, keeps=True),
     Scenario("append", "ptcbuild {in}/ball.ply --append {in}/ball.ptcx -o {out}/o.ptcx --threads 1", "o.ptcx"),
     Scenario("shade to container", "ptcshade {in}/ball.ptcx -o {out}/o.ptcx --threads 1", "o.ptcx"),

@@ -59,8 +59,8 @@ void begin_build(const BuildRequest& request, const std::filesystem::path& targe
 }  // namespace
 
 TEST_CASE(
-    "memory: the cap of a build covers an encoder for each thread, and the directory after the "
-    "sort",
+    "memory: the cap of a build covers an encoder for each thread, pages that wait, and the "
+    "directory after the sort",
     "[integration][memory]") {
   const TemporaryDirectory dir;
   const auto building = [&](std::uint64_t points, std::uint8_t page_shift, unsigned threads) {
@@ -73,12 +73,14 @@ TEST_CASE(
     });
   };
   const std::uint64_t least = building(100, 12, 1);
-  CHECK(building(100, 16, 9) - least == 9 * ((768 << 10) + (2 << 16)) - ((768 << 10) + (2 << 12)));
+  const std::uint64_t encoders = 9 * ((768 << 10) + (2 << 16)) - ((768 << 10) + (2 << 12));
+  const std::uint64_t pages_of_4k = (256 + 64) << 12, pages_of_64k = (256 + 64) << 16;
+  CHECK(building(100, 16, 9) - least == encoders + pages_of_64k - pages_of_4k);
   CHECK(building(100'000, 12, 1) == least);
   // Their directories take more than the minimum that the sort is given before.
   const std::uint64_t per_page = points_per_page({.page_shift = 12}), some = 60'000'000,
                       more = 120'000'000;
-  const auto directory = [&](std::uint64_t points) { return 96 * (points / per_page * 3 / 2); };
+  const auto directory = [&](std::uint64_t points) { return 96 * (points / per_page * 8 / 5); };
   CHECK(building(more, 12, 1) - building(some, 12, 1) == directory(more) - directory(some));
   CHECK(building(some, 12, 1) - least == directory(some) - kMinSortBytes);
 }
@@ -103,7 +105,7 @@ TEST_CASE("memory: the cap of a build covers the directory of points that emit l
   };
   const std::uint64_t points = 60'000'000;
   const auto pages = [&](std::uint8_t point_bytes) {
-    return points / points_per_page({.page_shift = 12, .point_bytes = point_bytes}) * 3 / 2;
+    return points / points_per_page({.page_shift = 12, .point_bytes = point_bytes}) * 8 / 5;
   };
   CHECK(building(points, glm::vec3(1)) - building(points, glm::vec3(0)) ==
         96 * (pages(kEmittingPointBytes) - pages(kPointBytes)));

@@ -57,7 +57,7 @@ TEST_CASE("pipeline: neither threads nor the cap change any byte of a container"
   BuildRequest request = cube_request(dir / "cube.obj");
   build_container(request, dir / "one.ptcx", silent);
   request.run.threads = 2;
-  request.run.memory_bytes = std::uint64_t{128} << 20;
+  request.run.memory_bytes = std::uint64_t{148} << 20;
   build_container(request, dir / "two.ptcx", silent);
   CHECK(bytes_of(dir / "one.ptcx") == bytes_of(dir / "two.ptcx"));
   request.sampling.lights.sky_rays = 5;
@@ -147,7 +147,7 @@ TEST_CASE("pipeline: a build through temporary files gives the bytes of a build 
   request.run.threads = 2;
   request.run.memory_bytes = std::uint64_t{1} << 30;
   const BuildReport roomy = build_container(request, dir / "roomy.ptcx", silent);
-  request.run.memory_bytes = std::uint64_t{84} << 20;
+  request.run.memory_bytes = std::uint64_t{104} << 20;
   const BuildReport tight = build_container(request, dir / "tight.ptcx", silent);
   CHECK(roomy.sort.spilled_bytes == 0);
   CHECK(tight.sort.spilled_bytes > 0);
@@ -242,8 +242,8 @@ TEST_CASE("pipeline: a cap that is too small is refused with the minimum that wo
   request.city_points = 10'000;
   request.run = {.memory_bytes = std::uint64_t{60} << 20, .threads = 2};
   CHECK_THROWS_WITH(build_container(request, dir / "a.ptcx", silent),
-                    Catch::Contains("least that works is 82M"));
-  request.run.memory_bytes = std::uint64_t{82} << 20;
+                    Catch::Contains("least that works is 102M"));
+  request.run.memory_bytes = std::uint64_t{102} << 20;
   CHECK_NOTHROW(build_container(request, dir / "a.ptcx", silent));
 }
 

@@ -85,7 +85,7 @@ struct Place {
     if (kind == Kind::lamps) write_lamps(dir / "c.ply", 300'000);
     if (kind == Kind::cloud || kind == Kind::pairs) request.inputs = {dir / "c.xyz"};
     if (kind == Kind::lamps) request.inputs = {dir / "c.ply"};
-    request.run = {.memory_bytes = std::uint64_t{200} << 20,
+    request.run = {.memory_bytes = std::uint64_t{300} << 20,
                    .threads = 2,
                    .temp_dirs = {dir / "t1", dir / "t2"}};
     Progress silent;

@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
@@ -93,6 +95,81 @@ TEST_CASE("build: no page is still being written after the stream failed", "[bui
     CHECK(written() == bytes);
   }
   CHECK(std::filesystem::is_empty(dir / "."));
+}
+
+TEST_CASE("build: node pages that are held lie behind the points, the deepest level first",
+          "[build]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "a.ptcx", random_surfels(60'000, 10), {}, 12, Codec::raw);
+  const ContainerReader reader(dir / "a.ptcx");
+  const auto nodes = reader.node_pages();
+  REQUIRE(nodes.size() > 2 * kMaxTailPages);
+  std::uint64_t end = 0;
+  for (const std::uint32_t page : reader.point_pages())
+    end = std::max(end, reader.entry(page).offset);
+  for (std::size_t rank = 0; rank < nodes.size(); ++rank) {
+    const DirectoryEntry& entry = reader.entry(nodes[rank]);
+    CHECK(entry.offset > std::exchange(end, entry.offset));
+    if (rank == 0) continue;
+    const DirectoryEntry& before = reader.entry(nodes[rank - 1]);
+    CHECK(before.level >= entry.level);
+    if (before.level == entry.level) CHECK(before.first_key < entry.first_key);
+  }
+}
+
+TEST_CASE("build: node pages that are not held lie some 64 together, the deepest level first",
+          "[build]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "a.ptcx", random_surfels(100'000, 10), {.leaf_points = 2}, 12, Codec::raw);
+  const ContainerReader reader(dir / "a.ptcx");
+  std::vector<DirectoryEntry> nodes;
+  for (const std::uint32_t page : reader.node_pages()) nodes.push_back(reader.entry(page));
+  std::ranges::sort(nodes, {}, &DirectoryEntry::offset);
+  REQUIRE(nodes.size() > 600);
+  std::size_t rises = 0;
+  for (std::size_t i = 1; i < nodes.size(); ++i) {
+    if (nodes[i].level > nodes[i - 1].level) ++rises;
+  }
+  CHECK(rises >= 3);
+  CHECK(rises <= nodes.size() / 60);
+}
+
+TEST_CASE("build: the tail has as many of the last node pages as fit 150 KB", "[build]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "a.ptcx", random_surfels(60'000, 10), {}, 12, Codec::raw);
+  const ContainerReader reader(dir / "a.ptcx");
+  const Superblock& s = reader.superblock();
+  const auto bytes_from = [&](std::size_t rank) {
+    std::uint64_t bytes = 0;
+    for (; rank < s.node_pages; ++rank)
+      bytes += extent_bytes(reader.entry(reader.node_pages()[rank]).stored_bytes);
+    return bytes;
+  };
+  const std::size_t first = s.node_pages - (s.tail.size() - 1);
+  REQUIRE((first > 0 && s.tail.size() < kMaxTailPages));
+  CHECK(bytes_from(first) <= 150'000);
+  CHECK(bytes_from(first - 1) > 150'000);
+  CHECK(reader.entry(reader.node_pages()[first - 1]).offset < s.directory_offset);
+  CHECK(s.root_page == s.node_pages - 1);
+}
+
+TEST_CASE("build: most node pages end where a cell of several groups does", "[build]") {
+  const TemporaryDirectory dir;
+  write_scene(dir / "a.ptcx", random_surfels(200'000, 11), {}, 14);
+  const ContainerReader reader(dir / "a.ptcx");
+  const auto nodes = reader.node_pages();
+  std::size_t ends = 0, wide = 0;
+  for (std::size_t rank = 1; rank < nodes.size(); ++rank) {
+    const PageHeader before = reader.read_page_header(nodes[rank - 1]);
+    const PageHeader after = reader.read_page_header(nodes[rank]);
+    if (before.level != after.level || before.last_key >= after.first_key) continue;
+    // Both keys agree down to this level; groups of one cell agree down to their level less 1.
+    const int common = common_level({before.last_key, 0}, {after.first_key, 0});
+    ++ends;
+    if (common < before.level - 1) ++wide;
+  }
+  REQUIRE(ends > 100);
+  CHECK(wide > ends / 2);  // without regard to cells: an eighth
 }
 
 TEST_CASE("build: a container without points has no root", "[build]") {

@@ -23,6 +23,8 @@ class StateWriter {
     bytes_.resize(bytes_.size() + sizeof value);
     store(bytes_.data(), bytes_.size() - sizeof value, value);
   }
+  /// Makes room for this many more bytes, so that those that were appended are not copied.
+  void reserve(std::size_t bytes) { bytes_.reserve(bytes_.size() + bytes); }
   /// Appends bytes, preceded by their number.
   void put_bytes(std::span<const std::byte> bytes);
   /// Appends a text as put_bytes() does.

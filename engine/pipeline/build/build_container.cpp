@@ -60,10 +60,11 @@
 namespace ptc {
 namespace {
 
-// Memory of a checkpoint that is being saved: kCheckpointBytes, and as many open pages as there are
-// in it and in its copies.
+// Memory of a checkpoint that is being saved: kCheckpointBytes, as many open pages as there are in
+// it and in its copies, and the pages that it holds: once in the next one, twice in this one.
 constexpr std::uint64_t kCheckpointBytes = 8 << 20;
 constexpr std::uint64_t kOpenPages = 48;
+constexpr std::uint64_t kCopies = 3;
 // Bytes of the meta page that are kept for the spacing, which is known only once the meshes are
 // sampled: its key, its sizes, and at most 24 characters of a double.
 constexpr std::size_t kSpacingBytes = 64;
@@ -184,14 +185,14 @@ class Build {
     return complete_record(meta, spacing, scene_ ? &scene_->meta() : nullptr, request_.page_shift);
   }
 
-  /// Estimates the number of pages of points and nodes. In a city there are some 4 pages of nodes
-  /// for each 10 of points; 5 are assumed.
+  /// Estimates the number of pages of points and nodes. In a city there are some 5 pages of nodes
+  /// for each 10 of points; 6 are assumed.
   /// @param emits   whether a point may emit light, so that fewer fit a page
   /// @param groups  of channels, each of which has a page for every page of points
   [[nodiscard]] std::uint64_t pages_of(std::uint64_t points, bool emits, std::size_t groups) const {
     const FileHeader header{.page_shift = request_.page_shift,
                             .point_bytes = BuildPlan{.emits = emits}.point_bytes()};
-    return points / points_per_page(header) * (3 + 2 * groups) / 2;
+    return points / points_per_page(header) * (8 + 5 * groups) / 5;
   }
 
   [[nodiscard]] MemoryBudget build_budget() const {
@@ -214,12 +215,15 @@ class Build {
     const std::uint64_t pages = pages_of(expected + scene_points(), emits, groups);
     budget.charge("pages that are written",
                   ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()));
+    const std::uint64_t held = held_pages_bytes(request_.page_shift);
+    budget.charge("node pages that wait", held);
     if (scene_) {
       budget.charge("the directory of " + scene_->path().filename().string(),
                     ContainerReader::kMaxPageBytes * scene_->page_count());
     }
     if (resumption_) {
-      budget.charge("checkpoints", kCheckpointBytes + (kOpenPages << request_.page_shift));
+      budget.charge("checkpoints",
+                    kCheckpointBytes + (kOpenPages << request_.page_shift) + kCopies * held);
     }
     const std::uint64_t directory_bytes = ContainerWriter::finish_bytes(pages);
     const std::uint64_t least = kMinSortBytes + groups * kMinAttributeSortBytes;

@@ -121,6 +121,7 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   charge_directory(budget, container);
   budget.charge("pages that are written",
                 ContainerWriter::memory_bytes(pages, page_shift, executor.threads()));
+  budget.charge("node pages that wait", held_pages_bytes(page_shift));
   budget.require();
 
   // Copy the pages where they stay as they are, build them again elsewhere

@@ -102,7 +102,8 @@ void charge_bounces(MemoryBudget& budget, const ContainerReader& scene, unsigned
   budget.charge("the bounce that is read", ContainerReader::kPageBytes * scene.page_count());
   budget.charge(
       "the bounce that is written",
-      ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads));
+      ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads) +
+          held_pages_bytes(scene.header().page_shift));
 }
 
 std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
