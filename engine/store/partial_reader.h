@@ -4,17 +4,20 @@
 //                                                  |<----- the first request ------->|
 //               page <--- its entry, one of a range of the directory
 //
-// The first request gets the end of the file: the superblock, the entries of the tail, and most of
-// the tail itself. What lies deeper takes a request for some entries and one for the pages that
-// they name, where neighbours share a request.
+// The first request gets the end of the file: the superblock, the tail and the last entries of the
+// directory. What lies deeper takes a request for some entries and one for the pages that they
+// name, where neighbours share a request. A node page that an answer holds is loaded with it.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "engine/io/file/file.h"
@@ -59,11 +62,11 @@ class FileRanges : public RangeSource {
 ///     scene.load({{scene.numbers().nodes()[scene.superblock().root_page]}});
 ///     use(scene.nodes(scene.superblock().root_page));
 ///
-/// Opening checks the superblock and the meta page; loading checks the entry, the header, the
-/// checksum and the payload of each page. A reference is checked where it can be: that its page
-/// and points exist. That the page has its slot is known once nodes() has returned the page.
-/// Every function that reads throws FormatError, whose message begins with the name of the source,
-/// and what the source throws.
+/// Opening checks the superblock, the meta page and the entries that come with them; loading checks
+/// the entry, the header, the checksum and the payload of each page. A reference is checked where
+/// it can be: that its page and points exist. That the page has its slot is known once nodes() has
+/// returned the page. Every function that reads throws FormatError, whose message begins with the
+/// name of the source, and what the source throws.
 ///
 /// Memory: the first request, the entries that were read and the payloads that were loaded.
 class PartialReader {
@@ -80,9 +83,20 @@ class PartialReader {
   /// Returns the numbers of all pages.
   [[nodiscard]] const PageNumbers& numbers() const noexcept { return numbers_; }
 
-  /// Loads pages that are not loaded yet. Neighbouring ranges share a request.
+  /// Loads pages that are not loaded yet, and the node pages that come with them. Neighbouring
+  /// ranges share a request. A damaged page is refused when it is asked for, not when it comes with
+  /// others.
   /// @param pages  page numbers of point, attribute and node pages, in any order
   void load(std::span<const std::uint32_t> pages);
+  /// Reads the entries of pages whose entries are not known yet, and those around them.
+  /// @param pages  as for load(), which calls this
+  void load_entries(std::span<const std::uint32_t> pages);
+  /// Returns the least level of the groups on a node page. @pre its entry is known
+  [[nodiscard]] int level(std::uint32_t page) const { return entries_.at(page).level; }
+  /// Returns the node page of this level on which the group of a cell lies, as far as the known
+  /// entries tell: the last one that begins at the cell or before it.
+  /// @param key  high half of the cell's low corner
+  [[nodiscard]] std::optional<std::uint32_t> known_node_page(int level, std::uint64_t key) const;
   /// Returns how many times so far requests were sent that did not wait for one another.
   [[nodiscard]] unsigned rounds() const noexcept { return rounds_; }
   /// Says whether a page is loaded.
@@ -110,8 +124,12 @@ class PartialReader {
 
   void open();
   void read_meta();
-  void load_entries(std::span<const std::uint32_t> pages);
-  void take_entries(std::uint32_t first, std::span<const std::byte> bytes);
+  void take_entry(std::uint32_t page, const DirectoryEntry& entry);
+  void take_entries(std::uint64_t begin, std::span<const std::byte> bytes, std::uint32_t first,
+                    std::uint32_t last);
+  void take_last_entries();
+  void take_whole_pages(std::uint64_t begin, std::span<const std::byte> bytes);
+  [[nodiscard]] PageNumbers::Range kind_of(std::uint32_t page) const;
   void check_entry(std::uint32_t page, const DirectoryEntry& entry) const;
   void take_page(std::uint32_t page, std::span<const std::byte> image);
   void count_round(std::span<const Extent> extents);
@@ -128,6 +146,9 @@ class PartialReader {
   GroupColumns columns_;
   PageDecoder decoder_;
   std::map<std::uint32_t, DirectoryEntry> entries_;  ///< by page
+  /// Node pages whose entries are known: their level, first key and number.
+  std::set<std::tuple<int, std::uint64_t, std::uint32_t>> nodes_by_key_;
+  std::map<std::uint64_t, std::uint32_t> nodes_by_offset_;  ///< the same pages
   std::map<std::uint32_t, Loaded> pages_;
 };
 

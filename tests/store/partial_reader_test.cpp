@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -100,8 +101,10 @@ TEST_CASE("partial reader: its pages are those of a reader, in whatever order th
     CHECK(at_once.requests < 10);
     for (std::size_t i = 0; i < pages.size(); ++i) {
       const std::uint32_t page = pages[i * 7919 % pages.size()];
-      CHECK(single.has(page) == (page == reader.meta_page()));
+      const bool loaded = single.has(page);
+      const unsigned requests = one_by_one.requests;
       single.load({{page}});
+      if (loaded) CHECK(one_by_one.requests == requests);
       const PageHeader header = reader.read_page(page, expected, decoder);
       const auto payload = std::span(expected).first(header.raw_bytes);
       CHECK(std::ranges::equal(single.payload(page), payload));
@@ -129,6 +132,54 @@ TEST_CASE("partial reader: it opens by one request, and asks for a loaded page n
   scene.load({{0, root}});
   CHECK(source.requests == requests);
   CHECK(scene.points(0).size() == ContainerReader(path).entry(0).record_count);
+}
+
+TEST_CASE("partial reader: node pages that the first request got are loaded, and no others",
+          "[store][partial]") {
+  const TemporaryDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, large());
+  const ContainerReader reader(path);
+  const std::uint64_t from = reader.superblock().file_bytes - PartialReader::kFirstRequest;
+  const std::uint32_t root = reader.node_pages()[reader.superblock().root_page];
+  Bytes source(read_file(path));
+  const PartialReader scene(source);
+  CHECK(scene.has(root));
+  for (const std::uint32_t page : content_pages(reader)) {
+    const bool node = reader.entry(page).type == PageType::node;
+    CHECK(scene.has(page) ==
+          ((node && reader.entry(page).offset >= from) || page == reader.meta_page()));
+  }
+  // A damaged one is left until somebody asks for it.
+  source[reader.entry(root).offset + kPageHeaderBytes + 5] ^= std::byte{1};
+  PartialReader damaged(source);
+  CHECK_FALSE(damaged.has(root));
+  CHECK_THROWS_WITH(damaged.load({{root}}), Catch::Contains("spec/container.md#page-payload"));
+}
+
+TEST_CASE("partial reader: known entries tell which node page has the group of a cell",
+          "[store][partial]") {
+  const TemporaryDirectory scratch;
+  const std::filesystem::path path = scratch / "a.ptcx";
+  write_sample(path, large());
+  const ContainerReader reader(path);
+  Bytes source(read_file(path));
+  PartialReader scene(source);
+  const PageNumbers::Range nodes = scene.numbers().nodes();
+  scene.load_entries(std::vector<std::uint32_t>(nodes.begin(), nodes.end()));
+  for (const std::uint32_t page : nodes) {
+    const DirectoryEntry& entry = reader.entry(page);
+    CHECK(scene.level(page) == entry.level);
+    for (const std::uint64_t key : {entry.first_key, entry.first_key + 1, entry.first_key / 2}) {
+      std::optional<std::uint32_t> last;
+      for (const std::uint32_t other : nodes) {
+        const DirectoryEntry& at = reader.entry(other);
+        if (at.level != entry.level || at.first_key > key) continue;
+        if (!last || at.first_key >= reader.entry(*last).first_key) last = other;
+      }
+      CHECK(scene.known_node_page(entry.level, key) == last);
+    }
+  }
 }
 
 TEST_CASE("partial reader: damage of what is loaded is refused, other damage is not seen",

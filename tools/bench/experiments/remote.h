@@ -2,8 +2,10 @@
 // takes: the experiment `ptcbench remote`.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,9 +49,13 @@ struct ConeView {
 [[nodiscard]] std::vector<ConeView> views_of(const Superblock& scene);
 
 /// Chooses the nodes that show a scene in a view: those that look largest, as radius over distance,
-/// are divided first. Pages are loaded in rounds, each with all pages that are known to be needed.
-/// A page is needed when a node that it would divide looks more than kUnevenness times as large as
-/// the smallest that was divided.
+/// are divided first. It is done when no node that waits for a page looks more than kUnevenness
+/// times as large as the smallest that was divided.
+///
+/// Pages are loaded in rounds. A round asks for all that the view needs as far as can be foretold
+/// from what is loaded. How small the smallest node will be is estimated from the nodes that wait:
+/// n nodes of a surface become n k^2 when each looks a k-th as large. Which pages lie deeper is
+/// foretold from the levels and first keys of the known entries.
 class ViewChoice {
  public:
   static constexpr double kUnevenness = 1.4;
@@ -67,12 +73,21 @@ class ViewChoice {
   struct Candidate {
     double size;  ///< radius over distance
     ChildRef ref;
+    std::array<double, 3> mean{};  ///< lattice units
+    double radius = 0;             ///< lattice units
   };
   /// The nodes in view, as far as loaded pages divide them.
   struct Division {
     std::size_t nodes = 0;
     double least = 0;                ///< size of the smallest node that was divided
-    std::vector<Candidate> waiting;  ///< not divided, for want of a page; largest first
+    double expected = 0;             ///< about what `least` would be if all pages were loaded
+    double largest = 0;              ///< size of the largest node that waits
+    std::vector<Candidate> waiting;  ///< not divided, for want of a page
+  };
+  /// A cell of the octree.
+  struct Cell {
+    std::array<double, 3> low{};  ///< low corner, lattice units
+    int level = 0;
   };
 
   [[nodiscard]] std::uint32_t page_of(const ChildRef& ref) const {
@@ -80,6 +95,11 @@ class ViewChoice {
   }
   [[nodiscard]] Division divide(std::size_t nodes) const;
   void add_group(const ChildRef& ref, std::vector<Candidate>& heap, std::size_t& leaves) const;
+  [[nodiscard]] static double size_of_round(const Division& division, double most, unsigned round);
+  void add_pages_below(const Candidate& node, double size, std::set<std::uint32_t>& pages) const;
+  void add_pages_in(const Cell& cell, const Candidate& node, double size, int levels,
+                    std::set<std::uint32_t>& pages) const;
+  [[nodiscard]] glm::dvec3 from_eye(const std::array<double, 3>& at) const;
   [[nodiscard]] bool in_view(const glm::dvec3& to, double distance, double radius) const;
 
   PartialReader& scene_;
