@@ -51,7 +51,7 @@ class SystemFailure(ProgramTest):
 
     def test_a_build_that_met_a_limit_on_the_size_of_files_goes_on_without_it(self):
         temps = [self.here / name for name in ("t1", "t2")]
-        command = ["ptcbuild", "--city", "600k", "--memory", "100M", "--profile", "raw", "-o", self.here / "o.ptcx"]
+        command = ["ptcbuild", "--city", "600k", "--memory", "180M", "--profile", "raw", "-o", self.here / "o.ptcx"]
         self.succeed(*command)
         whole = (self.here / "o.ptcx").read_bytes()
         (self.here / "o.ptcx").unlink()
@@ -68,7 +68,7 @@ class SystemFailure(ProgramTest):
         self.assertEqual(sorted(path.name for path in self.here.rglob("*")), ["o.ptcx", "t1", "t2"])
 
     def test_a_build_that_was_killed_goes_on_to_the_same_bytes(self):
-        command = ["ptcbuild", "--city", "600k", "--memory", "100M", "-o", self.here / "o.ptcx"]
+        command = ["ptcbuild", "--city", "600k", "--memory", "180M", "-o", self.here / "o.ptcx"]
         self.succeed(*command)
         whole = (self.here / "o.ptcx").read_bytes()
         (self.here / "o.ptcx").unlink()
@@ -92,7 +92,7 @@ class SystemFailure(ProgramTest):
         self.assertEqual(os.listdir(self.here), ["o.ptcx"])
 
     def test_a_build_that_was_killed_in_its_sort_says_that_it_starts_again(self):
-        command = ["ptcbuild", "--city", "2M", "--memory", "128M", "-o", self.here / "o.ptcx", "--resume"]
+        command = ["ptcbuild", "--city", "2M", "--memory", "208M", "-o", self.here / "o.ptcx", "--resume"]
         process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
                                    stderr=subprocess.DEVNULL)
         while not (self.here / "o.ptcx.resume").exists():
@@ -112,7 +112,7 @@ class SystemFailure(ProgramTest):
         self.assertEqual(first.wait(60), 0)
 
     def test_points_on_the_disk_that_are_not_what_was_written_are_refused(self):
-        command = ["ptcbuild", "--city", "2M", "--memory", "128M", "-o", self.here / "o.ptcx", "--resume", "--checkpoint", "1"]
+        command = ["ptcbuild", "--city", "2M", "--memory", "208M", "-o", self.here / "o.ptcx", "--resume", "--checkpoint", "1"]
         process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
                                    stderr=subprocess.DEVNULL)
         while not (self.here / "o.ptcx.resume-at").exists():
@@ -137,7 +137,7 @@ class SystemFailure(ProgramTest):
 
     def build_to_kill(self):
         """Kills a build that can go on, once it has written pages, and returns its command."""
-        command = ["ptcbuild", "--city", "2M", "--memory", "128M", "-o", self.here / "o.ptcx", "--resume", "--checkpoint", "100k"]
+        command = ["ptcbuild", "--city", "2M", "--memory", "208M", "-o", self.here / "o.ptcx", "--resume", "--checkpoint", "100k"]
         process = subprocess.Popen([str(BIN / command[0]), *map(str, command[1:])], stdout=subprocess.DEVNULL,
                                    stderr=subprocess.DEVNULL)
         while not (self.here / "o.ptcx.resume-at").exists():
