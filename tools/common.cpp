@@ -195,7 +195,7 @@ ExitCode exit_code_of(const FormatError& error) {
 }
 
 void check_input(const std::filesystem::path& path) {
-  if (path == "-") throw DataError("-: standard input is not read yet; give a file");
+  if (path == "-") throw DataError("-: standard input is not taken here; write it to a file first");
   try {
     const InputFile file(path);
     if (file.size() == 0) throw DataError(path.string() + ": offset 0: the file is empty");

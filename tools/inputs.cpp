@@ -10,10 +10,14 @@
 #include <glob.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/points.h"
 #include "engine/io/text/byte_stream.h"
 #include "engine/io/text/text.h"
+#include "engine/pipeline/light/built_scene.h"
+#include "engine/pipeline/point_input.h"
 #include "format/text.h"
 #include "tools/common.h"
+#include "tools/option_text.h"
 #include "tools/options.h"
 
 namespace ptc {
@@ -111,11 +115,71 @@ void InputFiles::add_standard_input(const std::string& format,
     if (count == 0) break;
     file.append(std::span<const std::byte>(buffer).first(static_cast<std::size_t>(count)));
   }
-  if (file.size() == 0) throw DataError("standard input is empty");
+  if (file.size() == 0) {
+    throw DataError(temporary_.size() > 1 ? "standard input is named twice, but can be read once"
+                                          : "standard input is empty");
+  }
   file.publish();
   paths_.push_back(path);
   if (!names_.empty()) names_ += ' ';
   names_ += "stdin";
+}
+
+bool is_build_input(const std::filesystem::path& path) {
+  if (has_input_ending(path)) return true;
+  try {
+    return is_point_file(path);
+  } catch (const DataError&) {  // it begins as a PLY or a gzip file does, but breaks its rules
+    return false;
+  }
+}
+
+std::string build_command(const std::filesystem::path& input) {
+  std::filesystem::path name = input.filename();
+  if (has_ending(name, ".gz")) name = name.stem();
+  return fmt::format("ptcbuild {} -o {}", input.string(), name.replace_extension(".ptcx").string());
+}
+
+void add_format(CLI::App& app, std::string& format) {
+  app.add_option("--format", format,
+                 "Format of standard input, as an ending: las, ply, xyz, ...\n"
+                 "Only text needs it: other formats are told by their bytes.")
+      ->type_name("FORMAT")
+      ->group(kFilesGroup);
+}
+
+void SceneArguments::declare(CLI::App& app, const std::string& description) {
+  app_ = &app;
+  std::vector<std::string> endings = input_endings();
+  endings.insert(endings.begin(), ".ptcx");
+  offer(app.add_option("SCENE", names_,
+                       description +
+                           "\n"
+                           "One container is used as it is. Of clouds, meshes and several files a "
+                           "container is built for the run, as ptcbuild builds it. Each argument "
+                           "is a file, a directory for all meshes and clouds in it, a pattern, "
+                           "@FILE for the files that its lines name, or - for standard input."),
+        endings)
+      ->type_name("FILE")
+      ->required()
+      ->group(kFilesGroup);
+  add_format(app, format_);
+  add_points(app, points_)->group(kFilesGroup);
+  add_up(app, up_)->group(kFilesGroup);
+}
+
+void SceneArguments::apply(LightingRequest& request, const std::filesystem::path& output,
+                           Progress& progress) {
+  files_.emplace(names_, format_, request.run, output);
+  request.scene = files_->paths().front();
+  request.joined.assign(files_->paths().begin() + 1, files_->paths().end());
+  request.scene_names = files_->names();
+  request.sampling.count = points_;
+  request.up = up_;
+  if (is_container_alone(request))
+    note_unused(*app_, {"--up"}, "the scene is a container", progress);
+  if (std::ranges::all_of(files_->paths(), holds_points))
+    note_unused(*app_, {"--points"}, "no file of the scene is a mesh", progress);
 }
 
 }  // namespace ptc

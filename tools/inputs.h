@@ -9,10 +9,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "engine/io/file/file.h"
+#include "engine/pipeline/light/lighting.h"
 #include "engine/pipeline/run.h"
 
 namespace ptc {
@@ -43,6 +47,38 @@ class InputFiles {
   std::vector<std::filesystem::path> paths_;
   std::string names_;
   std::vector<std::unique_ptr<TemporaryName>> temporary_;
+};
+
+/// Says whether a file is a mesh or a cloud that ptcbuild takes: by its ending, or by its bytes.
+/// @throws std::system_error when it cannot be read
+[[nodiscard]] bool is_build_input(const std::filesystem::path& path);
+
+/// Returns the command that builds a container of a file: "ptcbuild scan.laz -o scan.ptcx".
+[[nodiscard]] std::string build_command(const std::filesystem::path& input);
+
+/// Declares --format, the format of standard input.
+void add_format(CLI::App& app, std::string& format);
+
+/// The scene of a program that lights one: its arguments SCENE, --format, --points and --up.
+class SceneArguments {
+ public:
+  /// Declares the arguments. This object must outlive the parsing.
+  /// @param description  of SCENE, in a line
+  void declare(CLI::App& app, const std::string& description);
+  /// Sets the scene of a request: the files, their names, and how a container is built of them.
+  /// Temporary files exist as long as this object.
+  /// @param request   its RunOptions are set already
+  /// @param output    as for InputFiles, which says what is thrown
+  /// @param progress  gets notes about options that the files leave without effect
+  void apply(LightingRequest& request, const std::filesystem::path& output, Progress& progress);
+
+ private:
+  std::vector<std::filesystem::path> names_;
+  std::string format_;
+  std::uint64_t points_ = SamplingOptions{}.count;
+  std::string up_;
+  const CLI::App* app_ = nullptr;
+  std::optional<InputFiles> files_;
 };
 
 }  // namespace ptc

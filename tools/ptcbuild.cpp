@@ -73,11 +73,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
           "all meshes and clouds in it, @FILE for the files that its lines name."),
       ptc::input_endings());
   inputs->type_name("FILE")->group(ptc::kFilesGroup);
-  app.add_option("--format", arguments.format,
-                 "Format of standard input, as an ending: las, ply, xyz, ...\n"
-                 "Only text needs it: other formats are told by their bytes.")
-      ->type_name("FORMAT")
-      ->group(ptc::kFilesGroup);
+  ptc::add_format(app, arguments.format);
   app.add_flag("--remove-duplicates", request.remove_duplicates,
                "Keep one of the points that lie at the same place\n"
                "A note says how many were left out.")

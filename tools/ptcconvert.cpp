@@ -179,9 +179,7 @@ int main(int argc, char** argv) {
       ->group(ptc::kFilesGroup);
   command.add_output("OUTPUT", arguments.output, outputs,
                      "File to write (.ptcx, .las, .ply, .xyz, .pcd, .ptc, .bgeo, .usda, .usdc)");
-  app.add_option("--format", arguments.format, "Format of standard input, as an ending: las, xyz")
-      ->type_name("FORMAT")
-      ->group(ptc::kFilesGroup);
+  ptc::add_format(app, arguments.format);
   ptc::add_original_order(app, arguments.points.original_order,
                           "Write points in the order of the inputs of the container\n"
                           "The container must record it. A cloud that becomes a container gets the "

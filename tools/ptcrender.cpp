@@ -5,7 +5,9 @@
 #include <span>
 
 #include "engine/base/error.h"
+#include "engine/pipeline/light/built_scene.h"
 #include "tools/common.h"
+#include "tools/inputs.h"
 #include "tools/option_text.h"
 #include "tools/options.h"
 #include "tools/report.h"
@@ -15,10 +17,10 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Renders a picture of a container, with direct and indirect light.\n"
+    "Renders a picture of a container or a cloud, with direct and indirect light.\n"
     "Rays from the camera meet the meshes, or the surfels of the container when no mesh is given. "
     "Direct light comes by shadow rays from the lights and the sky; indirect light is gathered "
-    "from the surfels.\n"
+    "from the surfels. Of clouds and meshes a container is built first, in a temporary file.\n"
     "\n"
     "An .exr holds the picture in linear light, in W/m^2/sr, and the layers direct, indirect, "
     "occlusion, bent_normal, albedo and alpha. With --estimate it also holds occlusion_error and "
@@ -27,6 +29,9 @@ constexpr char kPurpose[] =
 constexpr char kExamples[] =
     "  # Render a mesh with the light of its container\n"
     "  ptcrender dragon.ptcx --mesh dragon.ply --backdrop -o dragon.png\n"
+    "  # Render a scan, or the tiles of one\n"
+    "  ptcrender scan.laz -o scan.png\n"
+    "  ptcrender tiles/ --size 1920x1080 -o scan.png\n"
     "  # Choose the camera and write all layers\n"
     "  ptcrender room.ptcx --camera 0,1.6,4,0,1.2,0 --fov 50 --size 1920x1080 -o room.exr\n"
     "  # Write the picture, and its occlusion as a picture of its own\n"
@@ -37,6 +42,7 @@ constexpr char kExamples[] =
 /// The request, and the arguments that are turned into it after parsing.
 struct Arguments {
   ptc::RenderRequest request;
+  ptc::SceneArguments scene;
   std::vector<std::filesystem::path> outputs;
   std::vector<ptc::PictureTarget> layers;
   ptc::LightArguments lights;
@@ -72,13 +78,15 @@ void add_layers(ptc::Command& command, Arguments& arguments) {
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   ptc::RenderRequest& request = arguments.request;
-  command.add_input("SCENE", request.scene, {".ptcx"}, "Container that gives the indirect light")
-      ->required();
+  arguments.scene.declare(command.app(),
+                          "Container, clouds or meshes whose surfels give the indirect light");
   command.add_outputs("-o,--output", arguments.outputs, {".exr", ".png"},
                       "Picture to write (.exr with all layers, or .png); repeatable");
   add_layers(command, arguments);
   command.add_inputs("--mesh", request.meshes, ptc::mesh_endings(),
-                     "Mesh that the camera sees; repeatable [default: the surfels]");
+                     "Mesh that the camera sees; repeatable\n"
+                     "By default the camera sees the surfels, or the meshes of SCENE when that has "
+                     "no container and no cloud.");
   command.app()
       .add_flag("--backdrop", request.backdrop,
                 "Set the meshes on a ground before a red wall, as ptcbuild does; +y is up")
@@ -129,11 +137,12 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   ptc::RenderRequest& request = arguments.request;
   refuse_clouds(request.meshes);
   request.run = run;
+  arguments.scene.apply(request, arguments.outputs.front(), progress);
   request.camera = arguments.camera.camera();
   request.size = arguments.camera.size();
   if (arguments.lights.given()) request.lights = arguments.lights.rig();
   if (request.lights || request.camera) {
-    const glm::vec3 up = ptc::up_of_files({request.scene});
+    const glm::vec3 up = ptc::up_of_files(ptc::scene_files(request), request.up);
     if (request.lights) request.lights->sky.up = up;
     if (request.camera) request.camera->up = up;
   }

@@ -1,7 +1,9 @@
 // ptcshade: computes the light that arrives at every point of a scene, or at given receivers.
 #include <fmt/format.h>
 
+#include "engine/pipeline/light/built_scene.h"
 #include "tools/common.h"
+#include "tools/inputs.h"
 #include "tools/options.h"
 #include "tools/report.h"
 #include "tools/scene_options.h"
@@ -19,13 +21,16 @@ constexpr char kPurpose[] =
     "point is not covered), irradiance (from surfaces, in W/m^2), sky (irradiance from the sky) "
     "and indirect (reflected light: albedo / pi times the sum of irradiance and sky). A .ptcx "
     "output is a container with these channels; files of other formats have them beside everything "
-    "that the input records of a point. A cloud or mesh in place of the container is built first, "
-    "into a temporary file; the points of a cloud are written in the order in which they came.";
+    "that the input records of a point. Of clouds and meshes a container is built first, in a "
+    "temporary file; the points of clouds are written in the order in which they came.";
 constexpr char kExamples[] =
     "  # Shade every point of a container\n"
     "  ptcshade dragon.ptcx -o lit.ptcx\n"
     "  # Shade a scan, and look at it in another program\n"
     "  ptcshade scan.laz --colour-from occlusion -o scan.las\n"
+    "  # Shade the tiles of a scan as one scene, or what another program writes\n"
+    "  ptcshade 'tiles/*.laz' --colour-from occlusion -o scan.las\n"
+    "  pdal translate in.copc.laz stdout.las | ptcshade - -o scan.las\n"
     "  # Shade a scene that is larger than memory, and show progress\n"
     "  ptcshade city.ptcx --memory 1G --threads 8 --progress -o lit.ptcx\n"
     "  # Show the corners of a closed room: only what is nearer than 2 units covers\n"
@@ -45,21 +50,17 @@ int main(int argc, char** argv) {
   ptc::ShadeRequest request;
   std::filesystem::path output;
   ptc::LightArguments lights;
-  std::vector<std::string> scene_endings = ptc::input_endings();
+  ptc::SceneArguments scene;
   std::vector<std::string> receiver_endings = ptc::cloud_endings();
   std::vector<std::string> output_endings = ptc::point_output_endings();
-  for (auto* endings : {&scene_endings, &receiver_endings, &output_endings})
+  for (auto* endings : {&receiver_endings, &output_endings})
     endings->insert(endings->begin(), ".ptcx");
-  command
-      .add_input("SCENE", request.scene, scene_endings,
-                 "Container, cloud or mesh whose surfels cast shadows and light")
-      ->required();
+  scene.declare(app, "Container, clouds or meshes whose surfels cast shadows and light");
   command.add_output("-o,--output", output, output_endings,
                      "File to write: .ptcx, or a file of points\n"
                      "Files of points: .las, .ply, .xyz, .pcd, .ptc, .bgeo, .usda, .usdc.");
   command.add_input("--receivers", request.receivers, receiver_endings,
                     "Cloud or container to shade [default: the points of SCENE]");
-  ptc::add_up(app, request.up)->group(ptc::kFilesGroup);
   ptc::add_count(app, "--count", request.count,
                  "Shade COUNT points, evenly spread [default: all]\n"
                  "They go into a file of points.")
@@ -89,9 +90,8 @@ int main(int argc, char** argv) {
     request.run = command.run_options();
     ptc::apply_preset(app, preset, request);
     if (lights.sky_given()) request.sky = lights.sky();
-    if (ptc::is_container(request.scene))
-      ptc::note_unused(app, {"--up"}, "the scene is a container", progress);
-    if (request.sky) request.sky->up = ptc::up_of_files({request.scene}, request.up);
+    scene.apply(request, output, progress);
+    if (request.sky) request.sky->up = ptc::up_of_files(ptc::scene_files(request), request.up);
     const ptc::LightingReport report = ptc::shade_container(request, output, progress);
     const bool all_left = !report.damage || report.damage->points == 0;
     if (request.count > report.receivers && all_left) {

@@ -64,9 +64,10 @@ class BadInput(ProgramTest):
             directory.rmdir()
 
     def test_standard_input_is_refused_as_such(self):
-        for arguments in (["ptcinfo", "-"], ["ptcverify", "-"], ["ptcshade", "-", "-o", self.here / "o.ply"],
-                          ["ptcrender", "-", "-o", self.here / "o.png"]):
-            self.assertIn("standard input is not read yet; give a file", self.fail_with(1, *arguments))
+        for arguments in (["ptcinfo", "-"], ["ptcverify", "-"],
+                          ["ptcshade", self.scene, "--receivers", "-", "-o", self.here / "o.ply"],
+                          ["ptcrender", self.scene, "--mesh", "-", "-o", self.here / "o.png"]):
+            self.assertIn("standard input is not taken here; write it to a file first", self.fail_with(1, *arguments))
 
     def test_empty_files(self):
         for kind, ending in (("cloud", ".ply"), ("cloud", ".xyz"), ("mesh", ".obj"),

@@ -23,6 +23,7 @@
 #include "engine/pipeline/quality/estimate.h"
 #include "engine/pipeline/quality/tuning.h"
 #include "engine/pipeline/run.h"
+#include "engine/scene/sampling/sampler.h"
 #include "engine/shade/lost_pages.h"
 #include "engine/shade/shader.h"
 #include "engine/store/reader.h"
@@ -32,7 +33,19 @@ namespace ptc {
 /// The common part of the requests to shade points and to render a picture: the scene whose surfels
 /// light the receivers, the quality and the resources.
 struct LightingRequest {
-  std::filesystem::path scene;  ///< container whose surfels occlude and emit
+  /// Container whose surfels occlude and emit. Of a mesh or a cloud, a container is built for the
+  /// run.
+  std::filesystem::path scene;
+  /// Meshes, clouds and containers that are joined with `scene` in a container for the run.
+  std::vector<std::filesystem::path> joined;
+  /// What a container that is built for the run records as the names of its inputs; empty: their
+  /// file names.
+  std::string scene_names;
+  /// How densely the meshes of a scene that is built for the run are sampled.
+  SamplingOptions sampling;
+  /// Axis that points up, x, y or z, in a scene that is built for the run; empty: as its files say,
+  /// else y.
+  std::string up;
   /// Reflections of the light before it reaches a receiver, at most. Every bounce but the last
   /// shades all points of the scene. 0: occlusion and sky alone, whatever GatherOptions::bleeding
   /// says.

@@ -23,6 +23,8 @@
 #include "engine/io/text/text.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/light/built_scene.h"
+#include "engine/pipeline/point_input.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/shade/lift.h"
@@ -268,8 +270,8 @@ class TileRenderer {
 /// @throws RequestError
 void check_names(const RenderRequest& request, std::span<const PictureTarget> targets,
                  const std::string& sky_picture) {
-  std::vector<std::filesystem::path> taken = request.meshes;
-  taken.push_back(request.scene);
+  std::vector<std::filesystem::path> taken = scene_files(request);
+  taken.insert(taken.end(), request.meshes.begin(), request.meshes.end());
   if (!sky_picture.empty()) taken.emplace_back(sky_picture);
   const std::size_t read = taken.size();
   for (const PictureTarget& target : targets) {
@@ -305,15 +307,20 @@ void check_targets(std::span<const PictureTarget> targets, bool estimate) {
   }
 }
 
-}  // namespace
-
-LightingReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
-                              Progress& progress) {
-  // Open the scene and load what the camera sees
-  LightingReport report;
+/// Checks what can be checked before any file is read.
+/// @throws RequestError
+void check_request(const RenderRequest& request, std::span<const PictureTarget> targets) {
   check_targets(targets, request.estimate);
   if (request.lights) check_lights(*request.lights);
   if (request.camera) check_camera(*request.camera, "camera");
+  static_cast<void>(side_of(request.samples));
+}
+
+/// Renders a picture of a container.
+LightingReport render_container(const RenderRequest& request,
+                                std::span<const PictureTarget> targets, Progress& progress) {
+  // Open the scene and load what the camera sees
+  LightingReport report;
   Subject subject{.side = side_of(request.samples)};
   Lighting lighting(request, report, progress);
   const LightRig lights =
@@ -346,6 +353,28 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
                   .mesh = subject.rays.get(),
                   .light = subject.light.get(),
                   .paths = {sampling, request.bounces}});
+  return report;
+}
+
+}  // namespace
+
+LightingReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
+                              Progress& progress) {
+  check_request(request, targets);
+  if (is_container_alone(request)) return render_container(request, targets, progress);
+  // Build a temporary container of clouds and meshes. The camera sees meshes as they are, unless
+  // there are clouds beside them.
+  check_names(request, targets, request.lights ? request.lights->sky.map_path : "");
+  const std::vector<std::filesystem::path> files = scene_files(request);
+  const BuiltScene scene(request, {.backdrop = request.backdrop, .lights = request.lights},
+                         targets.front().path, progress);
+  RenderRequest rendering = request;
+  rendering.scene = scene.path();
+  rendering.joined.clear();
+  if (rendering.meshes.empty() && !rendering.mesh && std::ranges::none_of(files, holds_points))
+    rendering.meshes = files;
+  LightingReport report = render_container(rendering, targets, progress);
+  scene.add_stages(report.seconds);
   return report;
 }
 

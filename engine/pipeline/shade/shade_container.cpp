@@ -25,6 +25,8 @@
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/point_files.h"
+#include "engine/pipeline/light/built_scene.h"
+#include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/pipeline/temporary_container.h"
@@ -338,26 +340,24 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
 
 LightingReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
                                Progress& progress) {
-  if (is_container(request.scene)) {
+  if (is_container_alone(request)) {
     return request.original_order ? shade_in_input_order(request, target, progress)
                                   : shade_points(request, target, progress);
   }
-  // Build a temporary container of a cloud or a mesh; points go out in the order in which they came
+  // Build a temporary container of clouds and meshes; points go out in the order in which they came
   const bool in_order = output_format(target).has_value() && request.receivers.empty() &&
-                        request.count == 0 && is_point_file(request.scene);
+                        request.count == 0 &&
+                        std::ranges::all_of(scene_files(request), holds_points);
+  const BuiltScene scene(
+      request,
+      {.original_order = in_order, .profile = in_order ? Profile::exact : Profile::compact}, target,
+      progress);
   ShadeRequest shading = request;
-  shading.scene = temporary_container_path(roomiest_temp_dir(request.run, target));
-  const TemporaryName scene(shading.scene);
-  const BuildReport built =
-      build_container({.inputs = {request.scene},
-                       .original_order = in_order,
-                       .up = request.up,
-                       .profile = in_order ? Profile::exact : Profile::compact,
-                       .run = request.run},
-                      shading.scene, progress);
+  shading.scene = scene.path();
+  shading.joined.clear();
   LightingReport report = in_order ? shade_in_input_order(shading, target, progress)
                                    : shade_points(shading, target, progress);
-  report.seconds.insert(report.seconds.begin(), built.seconds.begin(), built.seconds.end());
+  scene.add_stages(report.seconds);
   return report;
 }
 

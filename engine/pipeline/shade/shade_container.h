@@ -30,12 +30,9 @@ struct ShadeRequest : LightingRequest {
   /// Number of points to shade, evenly spread over all in their order; 0: all points. Fewer than
   /// all need a .ply as target.
   std::uint64_t count = 0;
-  /// Writes a file of points in the order of the input, which the scene must know. A scene that is
-  /// a cloud is always written in its order.
+  /// Writes a file of points in the order of the input, which the scene must know. A scene of
+  /// clouds is always written in their order.
   bool original_order = false;
-  /// Axis of a cloud that points up, x, y or z, when the scene is one; empty: as the file says,
-  /// else y.
-  std::string up;
   /// The channel that viewers shall show as colour in a file of points; empty: the albedo
   /// (PointWriteInfo::colour_from).
   std::string colour_from;
@@ -59,7 +56,7 @@ struct ShadeRequest : LightingRequest {
 /// all their channels and these. With `tolerate_damage` the scene's own points can only go to a
 /// file of points.
 ///
-/// A scene that is a cloud or a mesh is built first, into a temporary container.
+/// A scene of clouds and meshes is built first, into a temporary container.
 /// @param progress  gets the stages, and notes about the scene's record
 /// @return          what the run did, cost and, if asked for, how exact it was
 /// @throws RequestError when the request contradicts itself or a setting is out of range;

@@ -1,0 +1,35 @@
+#include "engine/pipeline/light/built_scene.h"
+
+#include <utility>
+
+#include "engine/pipeline/convert/convert.h"
+#include "engine/pipeline/temporary_container.h"
+
+namespace ptc {
+
+std::vector<std::filesystem::path> scene_files(const LightingRequest& request) {
+  std::vector<std::filesystem::path> files{request.scene};
+  files.insert(files.end(), request.joined.begin(), request.joined.end());
+  return files;
+}
+
+bool is_container_alone(const LightingRequest& request) {
+  return request.joined.empty() && is_container(request.scene);
+}
+
+BuiltScene::BuiltScene(const LightingRequest& request, BuildRequest build,
+                       const std::filesystem::path& target, Progress& progress)
+    : path_(temporary_container_path(roomiest_temp_dir(request.run, target))), name_(path_) {
+  build.inputs = scene_files(request);
+  build.input_names = request.scene_names;
+  build.sampling = request.sampling;
+  build.up = request.up;
+  build.run = request.run;
+  seconds_ = build_container(build, path_, progress).seconds;
+}
+
+void BuiltScene::add_stages(StageSeconds& seconds) const {
+  seconds.insert(seconds.begin(), seconds_.begin(), seconds_.end());
+}
+
+}  // namespace ptc
