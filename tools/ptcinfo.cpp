@@ -1,4 +1,5 @@
-// ptcinfo: prints what a container holds, from its header, superblock, directory and meta page.
+// ptcinfo: prints what a container holds, from its header, superblock, directory and meta page; or
+// what the header of a cloud says.
 //
 //   header      format version, page size, frame (the cube of the Z-curve), uuid
 //   superblock  points, nodes, levels, pages, bounds, area, flux, checksum of the contents
@@ -17,10 +18,12 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/points.h"
 #include "engine/io/file/file.h"
 #include "engine/octree/rounding.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
+#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/render/thumbnail.h"
 #include "engine/pipeline/run.h"
 #include "engine/pipeline/scene_record.h"
@@ -28,6 +31,8 @@
 #include "engine/store/reader.h"
 #include "format/point_page.h"
 #include "tools/common.h"
+#include "tools/inputs.h"
+#include "tools/options.h"
 #include "tools/report.h"
 
 namespace {
@@ -35,14 +40,18 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr char kPurpose[] =
-    "Prints what a container holds, without reading its points and nodes.\n"
+    "Prints what a container or a cloud holds, without reading its points and nodes.\n"
     "The summary has the numbers of points, nodes and pages, the bounds in scene units, the bytes, "
     "the channels, and the inputs and lights of the build. --json has these in full, with the "
-    "camera and all settings.";
+    "camera and all settings. Of a cloud the summary has what its header states: the format, the "
+    "number of points, the bounds of LAS, the coordinate system and what is recorded of each "
+    "point.";
 constexpr char kExamples[] =
     "  # Print a summary\n"
     "  ptcinfo scene.ptcx\n"
-    "  # Draw a small picture of it\n"
+    "  # Look at a scan before it is built\n"
+    "  ptcinfo scan.laz\n"
+    "  # Draw a small picture of a container\n"
     "  ptcinfo scene.ptcx --thumbnail scene.png\n"
     "  # Read one figure in a script\n"
     "  ptcinfo scene.ptcx --json | python3 -c 'import json,sys; "
@@ -92,9 +101,9 @@ std::string codec_of(const ptc::ContainerReader& container) {
   return "raw";
 }
 
-ordered_json channels_of(const ptc::Meta& meta) {
+ordered_json channels_of(std::span<const ptc::Channel> all) {
   ordered_json channels = ordered_json::array();
-  for (const ptc::Channel& channel : meta.channels) {
+  for (const ptc::Channel& channel : all) {
     ordered_json facts{{"name", channel.name},
                        {"type", name_or_number(channel.type, kTypes)},
                        {"components", channel.components},
@@ -143,7 +152,7 @@ ordered_json facts_of(const ptc::ContainerReader& container) {
     }
   }
   facts["codec"] = codec_of(container);
-  facts["channels"] = channels_of(container.meta());
+  facts["channels"] = channels_of(container.meta().channels);
   facts["leaf_points"] = superblock.leaf_points;
   facts["points_per_page"] = ptc::points_per_page(container.header());
   facts["frame"] = {{"origin", superblock.header.frame.origin},
@@ -291,6 +300,19 @@ std::string meaning_of(const ordered_json& channel) {
   return text;
 }
 
+/// A line for each channel.
+std::string channels_text(const ordered_json& facts) {
+  std::string text;
+  for (const auto& channel : facts["channels"]) {
+    const ordered_json& type = channel["type"];
+    text += fmt::format("  channel   {}: {} x {}{}\n", channel["name"].get<std::string>(),
+                        channel["components"].dump(),
+                        type.is_string() ? type.get<std::string>() : "type " + type.dump(),
+                        meaning_of(channel));
+  }
+  return text;
+}
+
 /// The lines of the summary, from the facts that --json prints.
 std::string summary_of(const ordered_json& facts) {
   const auto bytes = [&](const char* what) {
@@ -317,14 +339,60 @@ std::string summary_of(const ordered_json& facts) {
     }
   }
   text += record_text(facts["text"]);
-  for (const auto& channel : facts["channels"]) {
-    const ordered_json& type = channel["type"];
-    text += fmt::format("  channel   {}: {} x {}{}\n", channel["name"].get<std::string>(),
-                        channel["components"].dump(),
-                        type.is_string() ? type.get<std::string>() : "type " + type.dump(),
-                        meaning_of(channel));
+  return text + channels_text(facts);
+}
+
+/// What the header of a cloud says.
+ordered_json cloud_facts(const std::filesystem::path& path, const ptc::PointFileInfo& info) {
+  ordered_json facts{{"file", path.string()},
+                     {"format", info.format},
+                     {"points", info.count ? ordered_json(*info.count) : ordered_json()}};
+  if (info.stated_bounds) {
+    const auto corner = [](const glm::dvec3& p) { return std::array{p.x, p.y, p.z}; };
+    facts["bounds"] = {{"low", corner(info.stated_bounds->low)},
+                       {"high", corner(info.stated_bounds->high)}};
   }
+  facts["bytes"] = {{"file", std::filesystem::file_size(path)}};
+  facts["normals"] = info.has_normals;
+  facts["radii"] = info.has_radius;
+  facts["colours"] = info.has_albedo;
+  facts["channels"] = channels_of(info.channels);
+  facts["text"] = info.text;
+  facts["notes"] = info.notes;
+  return facts;
+}
+
+/// The lines of the summary of a cloud.
+std::string cloud_summary(const ordered_json& facts) {
+  std::string text = fmt::format("{}: {}, {}\n", facts["file"].get<std::string>(),
+                                 facts["format"].get<std::string>(),
+                                 ptc::bytes_text(facts["bytes"]["file"].get<std::uint64_t>()));
+  text += "  points    " +
+          (facts["points"].is_null() ? "not counted: the header does not say how many there are"
+                                     : facts["points"].dump()) +
+          "\n";
+  if (facts.contains("bounds"))
+    text += "  bounds    " + bounds_text(facts["bounds"]) + ", as the header states\n";
+  std::string surfel = "position";
+  for (const char* part : {"normals", "radii", "colours"}) {
+    if (facts[part].get<bool>()) surfel += std::string(", ") + part;
+  }
+  text += "  of each   " + surfel + "\n" + record_text(facts["text"]) + channels_text(facts);
+  for (const auto& note : facts["notes"]) text += "  note      " + note.get<std::string>() + "\n";
   return text;
+}
+
+/// Prints what a cloud says of itself.
+ptc::Outcome tell_cloud(const std::filesystem::path& path) {
+  const ptc::PointFile cloud = ptc::open_points(path);
+  const ordered_json facts = cloud_facts(path, cloud.info);
+  return {facts, cloud_summary(facts)};
+}
+
+/// Refuses what only a container can give.
+[[noreturn]] void refuse(const std::filesystem::path& path, const char* why) {
+  throw ptc::DataError(path.string() + ": " + why +
+                       "; to build a container of it: " + ptc::build_command(path));
 }
 
 }  // namespace
@@ -333,14 +401,22 @@ int main(int argc, char** argv) {
   ptc::Command command("ptcinfo", kPurpose, kExamples);
   std::filesystem::path file;
   std::filesystem::path thumbnail;
-  command.add_input("FILE", file, {".ptcx"}, "Container to look at")->required();
+  std::vector<std::string> endings = ptc::cloud_endings();
+  endings.insert(endings.begin(), ".ptcx");
+  command.add_input("FILE", file, endings, "Container or cloud to look at")->required();
   command
       .add_output("--thumbnail", thumbnail, {".png"},
-                  "Picture to write, 480 x 270 pixels\n"
+                  "Picture of a container to write, 480 x 270 pixels\n"
                   "It takes a moment for a scene of any size: of more than two million points "
                   "the coarse levels of the octree alone are drawn.")
       ->required(false);
   return command.run(argc, argv, [&](ptc::Progress&) -> ptc::Outcome {
+    if (!ptc::is_container(file) && ptc::is_build_input(file)) {
+      if (!ptc::is_point_file(file)) refuse(file, "this is a mesh");
+      if (!thumbnail.empty())
+        refuse(file, "--thumbnail draws containers alone, and this is a cloud");
+      return tell_cloud(file);
+    }
     require_memory(file, command.run_options());
     const ptc::ContainerReader container(file);
     const ordered_json facts = facts_of(container);

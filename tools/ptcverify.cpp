@@ -15,6 +15,7 @@
 #include "format/text.h"
 #include "tools/common.h"
 #include "tools/damage_map.h"
+#include "tools/inputs.h"
 #include "tools/option_text.h"
 #include "tools/report.h"
 #include "tools/values.h"
@@ -156,8 +157,13 @@ std::string verdict_text(const std::string& name, const ptc::VerifyReport& repor
                                        ptc::bytes_text(report.file_bytes), seconds);
   if (report.sound()) return fmt::format("{}: valid at level {}: {}\n", name, level, over);
   const ptc::Finding& first = report.findings.front();
-  if (is_foreign(report))
-    return fmt::format("ptcverify: {}: {} ({})\n", name, first.text, first.rule);
+  if (is_foreign(report)) {
+    return fmt::format(
+        "ptcverify: {}: {} ({}){}\n", name, first.text, first.rule,
+        ptc::is_build_input(name)
+            ? ". Only containers can be checked; to build one of it: " + ptc::build_command(name)
+            : "");
+  }
   std::string faults = counted(report.damage, "fault");
   if (report.pages)
     faults += fmt::format(" in {} of {}", *report.damaged_pages, counted(*report.pages, "page"));

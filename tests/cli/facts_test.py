@@ -313,7 +313,8 @@ class Verify(ProgramTest):
     def test_another_kind_of_file_is_called_so_and_not_damaged(self):
         for level in (0, 1, 3):
             self.assertEqual(self.fail_with(1, "ptcverify", self.cloud, "--level", level),
-                             f"ptcverify: {self.cloud}: not a PTCX file (spec/container.md#header-magic)\n")
+                             f"ptcverify: {self.cloud}: not a PTCX file (spec/container.md#header-magic). Only containers can "
+                             f"be checked; to build one of it: ptcbuild {self.cloud} -o ball.ptcx\n")
         packed = self.here / "scene.gz"
         packed.write_bytes(gzip.compress(self.scene.read_bytes()))
         self.assertIn(": not a PTCX file: it is a gzip file (", self.fail_with(1, "ptcverify", packed))

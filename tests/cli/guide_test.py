@@ -121,11 +121,11 @@ class GuideTest(unittest.TestCase):
 
     def test_a_page_that_is_wrong_is_noticed(self):
         with self.assertRaises(AssertionError):
-            self.run_page("```sh\nptcinfo scan.ply\n```\n")
-        stated = "```sh\nptcinfo scan.ply  # exit code 1\n```\n"
+            self.run_page("```sh\nptcverify scan.ply\n```\n")
+        stated = "```sh\nptcverify scan.ply  # exit code 1\n```\n"
         self.assertEqual(self.run_page(stated), 1)
         with self.assertRaises(AssertionError):
-            self.run_page(stated + "```text\nptcinfo: scan.ply is a container\n```\n")
+            self.run_page(stated + "```text\nptcverify: scan.ply is a container\n```\n")
 
     def test_readme(self):
         """The README's commands, with small counts and small pictures."""

@@ -105,6 +105,35 @@ class Inputs(ProgramTest):
                               ("@no.txt", "No such file")):
                 self.assertIn(why, self.fail_with(1, program, name, "-o", target, cwd=self.here))
 
+    def test_ptcinfo_prints_what_the_header_of_a_cloud_states(self):
+        self.succeed("ptcconvert", self.tiles / "a.ply", self.here / "a.las")
+        told = self.succeed("ptcinfo", self.here / "a.las").stdout
+        self.assertIn("LAS 1.4, point format ", told)
+        self.assertIn("\n  points    200\n", told)
+        self.assertRegex(told, r"\n  bounds    -?0\.\d+ .* to .*, as the header states\n")
+        self.assertIn("\n  channel   rgb: 3 x u16", told)
+        facts = json.loads(self.succeed("ptcinfo", self.here / "a.las", "--json").stdout)
+        self.assertEqual((facts["points"], facts["colours"], facts["radii"]), (200, True, False))
+        for k in range(3):
+            places = [point[k] for point in read_ply(self.tiles / "a.ply")[1]]
+            self.assertAlmostEqual(facts["bounds"]["low"][k], min(places), delta=1e-3)
+            self.assertAlmostEqual(facts["bounds"]["high"][k], max(places), delta=1e-3)
+
+    def test_ptcinfo_does_not_count_the_lines_of_a_text(self):
+        (self.here / "a.xyz").write_text("1 2 3\n4 5 6\n")
+        self.assertIn("points    not counted", self.succeed("ptcinfo", self.here / "a.xyz").stdout)
+        self.assertIsNone(json.loads(self.succeed("ptcinfo", self.here / "a.xyz", "--json").stdout)["points"])
+
+    def test_what_takes_containers_alone_names_the_command_that_builds_one(self):
+        for arguments in (["ptcinfo", self.mesh], ["ptcverify", self.mesh], ["ptcverify", self.cloud],
+                          ["ptcinfo", self.cloud, "--thumbnail", self.here / "o.png"]):
+            built = f"ptcbuild {arguments[1]} -o {arguments[1].stem}.ptcx"
+            self.assertTrue(self.fail_with(1, *arguments).endswith(f": {built}\n"))
+            self.succeed(*built.split(), "--points", "1k", cwd=self.here)
+        (self.here / "note").write_text("neither\n")
+        for program in ("ptcinfo", "ptcverify"):
+            self.assertNotIn("ptcbuild", self.fail_with(1, program, self.here / "note"))
+
 
 if __name__ == "__main__":
     unittest.main()

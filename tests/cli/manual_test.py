@@ -200,7 +200,8 @@ class Completions(unittest.TestCase):
                 (Path(here) / name).touch()
             (Path(here) / "folder").mkdir()
             for program, words, expected in (
-                    ("ptcinfo", [""], ["a b.ptcx"]),
+                    ("ptcverify", [""], ["a b.ptcx"]),
+                    ("ptcinfo", [""], ["a b.ptcx", "cloud.ply", "cloud.xyz", "mesh.ply.gz"]),
                     ("ptcshade", ["-o", ""], ["a b.ptcx", "cloud.ply", "cloud.xyz"]),
                     ("ptcshade", ["--receivers", "c"], ["cloud.ply", "cloud.xyz"]),
                     ("ptcbuild", ["-o", "x.ptcx", ""], ["cloud.ply", "cloud.xyz", "mesh.ply.gz"]),

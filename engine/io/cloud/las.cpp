@@ -89,6 +89,8 @@ class LasSource : public PointSource {
   // Returns the facts about the file.
   [[nodiscard]] PointFileInfo info() const {
     PointFileInfo info;
+    info.format = format_name();
+    info.stated_bounds = stated_bounds();
     info.count = header_.points;
     const LasSurfel& surfel = fields_.surfel;
     info.has_normals = surfel.normal.has_value();
@@ -167,19 +169,36 @@ class LasSource : public PointSource {
   // Gives the box of the header, unless the sample says that the box is wrong or far too large, as
   // programs leave it that cut a part out of a file.
   void add_bounds(PointFileInfo& info) const {
-    Bounds box;
-    for (std::size_t k = 0; k < 3; ++k) {
+    Bounds box = header_.bounds;
+    for (int axis = 0; axis < 3; ++axis) {
       // Programs compute the box in their own ways, so it is larger by what rounding may change
-      const double rounding = std::abs(header_.scale[k]) / 1024;
-      const auto axis = static_cast<int>(k);
-      box.low[axis] = header_.low[k] - rounding;
-      box.high[axis] = header_.high[k] + rounding;
+      const double rounding = std::abs(header_.scale[static_cast<std::size_t>(axis)]) / 1024;
+      box.low[axis] -= rounding;
+      box.high[axis] += rounding;
     }
     if (sampled_.empty() || !box.contains(sampled_.low) || !box.contains(sampled_.high)) return;
     if (largest_side(sampled_) < largest_side(box) / 2) return;
     if (!fits_coordinates(box.low) || !fits_coordinates(box.high)) return;
     info.bounds = box;
     info.sample = sample_;
+  }
+
+  /// Returns the format as its users name it: "LAZ 1.4 (COPC), point format 7".
+  [[nodiscard]] std::string format_name() const {
+    const bool copc = header_.find("copc", 1) != nullptr;
+    return std::string(header_.compressed ? "LAZ" : "LAS") + " 1." + std::to_string(header_.minor) +
+           (copc ? " (COPC)" : "") + ", point format " + std::to_string(header_.format);
+  }
+
+  /// Returns the bounds of the header, unless they are no box.
+  [[nodiscard]] std::optional<Bounds> stated_bounds() const {
+    const Bounds& bounds = header_.bounds;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::isfinite(bounds.low[axis]) && std::isfinite(bounds.high[axis]) &&
+            bounds.low[axis] <= bounds.high[axis]))
+        return std::nullopt;
+    }
+    return bounds;
   }
 
   void add_texts(PointFileInfo& info) const {

@@ -8,7 +8,7 @@
 //       26  system, software: 32 bytes each   227  since 1.3: offset of wave packets u64
 //       90  day u16, year u16                 235  since 1.4: offset of EVLRs u64, their number u32
 //       94  bytes of the header u16           247  since 1.4: points u64
-//       96  offset of points u32
+//       96  offset of points u32               179  bounds: max min of x, of y, of z f64
 //      100  number of VLRs u32
 //
 // Every number is compared with the size of the file before it leads anywhere.
@@ -131,12 +131,13 @@ class HeaderReader {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       header_.scale[axis] = load<double>(bytes_.data(), 131 + 8 * axis);
       header_.offset[axis] = load<double>(bytes_.data(), 155 + 8 * axis);
+      const auto k = static_cast<int>(axis);
+      header_.bounds.high[k] = load<double>(bytes_.data(), 179 + 16 * axis);
+      header_.bounds.low[k] = load<double>(bytes_.data(), 187 + 16 * axis);
       if (!std::isfinite(header_.scale[axis]) || header_.scale[axis] == 0)
         fail(131 + 8 * axis, "a scale of coordinates is 0 or not a number");
       if (!std::isfinite(header_.offset[axis]))
         fail(155 + 8 * axis, "an offset of coordinates is not a number");
-      header_.high[axis] = load<double>(bytes_.data(), 179 + 16 * axis);
-      header_.low[axis] = load<double>(bytes_.data(), 187 + 16 * axis);
     }
   }
 

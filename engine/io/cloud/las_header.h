@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/base/surfel.h"
 #include "engine/io/file/file.h"
 
 namespace ptc {
@@ -45,7 +46,7 @@ struct LasHeader {
   std::uint64_t points_offset = 0;
   std::array<double, 3> scale{};
   std::array<double, 3> offset{};
-  std::array<double, 3> low{}, high{};  ///< of the points, as the writer says; may be anything
+  Bounds bounds;  ///< of the points, as the writer says; may be anything; scene units
   unsigned source = 0;
   unsigned encoding = 0;  ///< global encoding bits
   std::array<std::uint8_t, 16> guid{};

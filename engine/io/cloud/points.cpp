@@ -89,6 +89,33 @@ PointFile open_as(PointFormat format, const std::filesystem::path& path) {
   return open_xyz(path);
 }
 
+/// Returns the name of a format, for files that do not state a version of it.
+const char* name_of(PointFormat format) {
+  switch (format) {
+    case PointFormat::ply:
+      return "PLY";
+    case PointFormat::las:
+      return "LAS";
+    case PointFormat::pcd:
+      return "PCD";
+    case PointFormat::e57:
+      return "E57";
+    case PointFormat::ptc:
+      return "Pixar's point cloud";
+    case PointFormat::bgeo:
+      return "Houdini's classic geometry";
+    case PointFormat::pdb:
+      return "Maya's PDB";
+    case PointFormat::ptx:
+      return "PTX";
+    case PointFormat::pts:
+      return "PTS";
+    case PointFormat::xyz:
+      break;
+  }
+  return "XYZ text";
+}
+
 /// Says whether colours in fields of 16 bits are all up to 255, as many programs write them.
 /// @param info  of the file
 bool has_bytes_as_colours(PointFormat format, const std::filesystem::path& path,
@@ -120,6 +147,7 @@ PointFile open_points(const std::filesystem::path& path) {
                 "E57, PCD, PTX, PTS, XYZ text, Pixar's PTC, Houdini's classic BGEO and Maya's PDB");
   }
   PointFile file = open_as(*format, path);
+  if (file.info.format.empty()) file.info.format = name_of(*format);
   const bool may_be_bytes = *format == PointFormat::ply || *format == PointFormat::pcd;
   if (may_be_bytes && has_bytes_as_colours(*format, path, file.info)) {
     static_cast<RecordSource&>(*file.source).take_bytes_as_colours();

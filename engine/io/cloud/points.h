@@ -22,6 +22,10 @@ inline constexpr double kByteScale = 1 / 255.0;
 
 /// The facts about a point file that are known before its points are read.
 struct PointFileInfo {
+  std::string format;  ///< with its version where the file states one: "LAS 1.2, point format 3"
+  /// The bounds that the header states, scene units; no reader relies on them. Empty when it states
+  /// none.
+  std::optional<Bounds> stated_bounds;
   /// The number of records, those that PointSource::left_out() counts among them; nothing when the
   /// file does not say it before its end.
   std::optional<std::uint64_t> count;
