@@ -265,6 +265,9 @@ class Peers(unittest.TestCase):
             found = {field: table[:, k] if field in double else np.float32(table[:, k]) for k, field in enumerate(names)}
             self.assertEqual(len(found), table.shape[1])
             wanted = columns(name)
+            # Text has what scaled values mean
+            wanted["scan_angle"] = np.float32(wanted["scan_angle"] * 0.006)
+            wanted["tilt"] = np.float32(wanted["tilt"] * 0.5 + 3)
             self.same(np.stack([found[f"n{a}"] for a in "xyz"], 1), wanted["normal"])
             self.compare_fields(found, wanted, {"position": "xyz"} | {q: None for q in [
                 "radius", "radiance", "albedo", "emission"] + CHANNELS})
