@@ -60,8 +60,9 @@
 namespace ptc {
 namespace {
 
-// Memory of a checkpoint that is being saved: kCheckpointBytes, as many open pages as there are in
-// it and in its copies, and the pages that it holds: once in the next one, twice in this one.
+// Memory of a checkpoint that is being saved: kCheckpointBytes, and as many open pages as there are
+// in it and in its copies. Pages that wait are in kCopies: the checkpoint that the build continues
+// from, the one that is being saved, and the next.
 constexpr std::uint64_t kCheckpointBytes = 8 << 20;
 constexpr std::uint64_t kOpenPages = 48;
 constexpr std::uint64_t kCopies = 3;

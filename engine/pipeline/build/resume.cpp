@@ -301,7 +301,7 @@ void Resumption::keep(const BuildPlan& plan, ExternalSorter& sorter, AttributeSo
   for (const auto& name : unsorted_) name->release();
 }
 
-void Resumption::save(const Checkpoint& checkpoint) const {
+std::vector<std::byte> Resumption::encode(const Checkpoint& checkpoint) const {
   StateWriter state;
   state.put(id_);
   state.put(checkpoint.place.points);
@@ -311,7 +311,11 @@ void Resumption::save(const Checkpoint& checkpoint) const {
   state.put(checkpoint.writer.node_pages);
   state.put(checkpoint.writer.end);
   state.put_bytes(checkpoint.build);
-  write_state(at_, state.take());
+  return state.take();
+}
+
+void Resumption::save(std::span<const std::byte> checkpoint) const {
+  write_state(at_, checkpoint);
 }
 
 // The manifest goes last: if the removal is interrupted, it still names the files that are left.
@@ -336,11 +340,13 @@ CheckpointSaver::~CheckpointSaver() {
 
 void CheckpointSaver::save(const BuildPlace& place, std::vector<std::byte> build) {
   if (saving_.valid()) saving_.get();
-  Checkpoint checkpoint{place, writer_.state(), std::move(build)};
-  saving_ = in_background([this, checkpoint = std::move(checkpoint)] {
+  // What is encoded takes the place of the state before the next one is made.
+  std::vector<std::byte> checkpoint =
+      resumption_.encode({place, writer_.state(), std::move(build)});
+  saving_ = in_background([this, points = place.points, checkpoint = std::move(checkpoint)] {
     writer_.sync();
     resumption_.save(checkpoint);
-    sorter_.discard_before(first_needed_(checkpoint.place.points));
+    sorter_.discard_before(first_needed_(points));
   });
 }
 

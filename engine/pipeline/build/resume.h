@@ -102,8 +102,10 @@ class Resumption {
 
   /// Makes all files outlive this object. To be called once, when all points have entered the sort.
   void keep(const BuildPlan& plan, ExternalSorter& sorter, AttributeSorts& attributes);
-  /// Replaces the checkpoint on the disk.
-  void save(const Checkpoint& checkpoint) const;
+  /// Returns a checkpoint as it lies on the disk.
+  [[nodiscard]] std::vector<std::byte> encode(const Checkpoint& checkpoint) const;
+  /// Replaces the checkpoint on the disk. @param checkpoint  encoded
+  void save(std::span<const std::byte> checkpoint) const;
   /// Refuses to continue from damaged files.
   /// @throws DataError with the text of `error`, followed by the files to remove for a new start
   [[noreturn]] void refuse(const DataError& error) const;
