@@ -22,6 +22,7 @@ namespace {
 
 constexpr std::size_t kClusters = 1000;  // that are framed, at least, where there are as many
 constexpr double kLeftOut = 1.0 / 2000;  // of the area, to each side
+constexpr double kHeight = 0.35;         // of the camera, for 1 to the front
 constexpr double kMargin = 0.95;         // of half the picture, which the scene fills
 
 /// A part of the scene that is to be seen, a disc.
@@ -30,6 +31,18 @@ struct Part {
   glm::dvec3 normal{0};  ///< unit
   double radius = 0;
 };
+
+/// Returns how high above the scene the camera stands, for 1 to the front: twice as high over flat
+/// land, whose parts would hide each other, as before a thing that is half as high as wide.
+double height_of(const Superblock& superblock, const glm::dvec3& up) {
+  double high = 0, wide = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    const double side = superblock.bounds_high[k] - superblock.bounds_low[k];
+    (up[axis] == 0 ? wide : high) = std::max(up[axis] == 0 ? wide : high, side);
+  }
+  return wide > 0 ? kHeight * (2 - std::min(1.0, 2 * high / wide)) : kHeight;
+}
 
 /// Returns the corners of the bounds.
 std::vector<Part> corners_of(const Superblock& superblock) {
@@ -140,8 +153,8 @@ Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdro
   }
   for (Part& part : parts) part.middle -= middle;
 
-  // Look from the side of +z when +y is up, of -y when +z is, of +y when +x is
-  const glm::dvec3 from(0.45, 0.35, 1);
+  // Look from above on the side of +z when +y is up, of -y when +z is, of +y when +x is
+  const glm::dvec3 from(0.45, backdrop ? kHeight : height_of(superblock, up), 1);
   const glm::dvec3 away = glm::normalize(up.z > 0   ? glm::dvec3(from.x, -from.z, from.y)
                                          : up.x > 0 ? glm::dvec3(from.y, from.z, from.x)
                                                     : from);

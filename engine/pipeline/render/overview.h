@@ -11,10 +11,11 @@
 
 namespace ptc {
 
-/// Returns a camera that sees a scene from the front, the right and above, and that the scene fills
-/// as far as its shape allows. What fits are the clusters of a coarse level of the octree, but for
-/// the 2,000th part of their area that reaches farthest to each side, so that a point that strayed
-/// does not shrink the scene. Where node pages are damaged, the bounds of the points are taken.
+/// Returns a camera that sees a scene from the front, the right and above, and from higher above
+/// where the scene is flat. The scene fills the picture as far as its shape allows. What fits are
+/// the clusters of a coarse level of the octree, but for the 2,000th part of their area that
+/// reaches farthest to each side, so that a point that strayed does not shrink the scene. Where
+/// node pages are damaged, the bounds of the points are taken.
 /// @param up        unit; the axis that points up
 /// @param backdrop  the scene stands on a backdrop, which is larger than what it holds: the scene
 /// is
