@@ -28,6 +28,7 @@ constexpr std::array kFields{
     FieldName{"count", "--count"},
     FieldName{"error", "--error"},
     FieldName{"estimate", "--estimate"},
+    FieldName{"format", "--format"},
     FieldName{"gather.around.cone", "--cone"},
     FieldName{"gather.around.diagonals", "--preset"},
     FieldName{"gather.around.distance", "--distance"},

@@ -14,6 +14,7 @@
 using namespace ptc;
 using namespace std::string_literals;
 using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
 
 TEST_CASE("formats: the beginning of a file decides, whatever its name", "[io][points]") {
   const test::TemporaryDirectory scratch;
@@ -53,6 +54,56 @@ TEST_CASE("formats: the name decides where the beginning does not", "[io][points
     CHECK(point_format(scratch.file(name, "no")) == format);
     CHECK(point_format(scratch.file(name, "")) == format);
   }
+}
+
+TEST_CASE("formats: the content wins over the name, and a note says so", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  for (const char* name : {"a.las", "a.ply", "a.e57", "a.pcd", "a.ptc", "a.bgeo"}) {
+    INFO(name);
+    const auto path = scratch.file(name, "\xEF\xBB\xBFX;Y;Z\r\n1;2;3\r\n");
+    CHECK(point_format(path) == PointFormat::xyz);
+    const PointFileInfo info = open_points(path).info;
+    CHECK(info.format == "XYZ text");
+    REQUIRE(info.notes.size() == 1);
+    CHECK_THAT(info.notes[0], EndsWith("but the content is that of XYZ text."));
+  }
+  for (const char* name : {"a.xyz", "a.pts", "a.foo"})
+    CHECK(open_points(scratch.file(name, "1 2 3\n4 5 6\n")).info.notes.empty());
+}
+
+TEST_CASE("formats: gzip is told by content, and refused where a file is not read in order",
+          "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const auto packed = [&](const char* name, const std::string& bytes) {
+    const auto path = scratch.path() / name;
+    gzFile file = gzopen(path.c_str(), "wb");
+    gzwrite(file, bytes.data(), static_cast<unsigned>(bytes.size()));
+    gzclose(file);
+    return path;
+  };
+  for (const char* name : {"a.xyz", "a.xyz.gz", "a", "a.las"}) {
+    PointFile file = open_points(packed(name, "1 2 3\n4 5 6\n"));
+    std::vector<Surfel> surfels(9);
+    CHECK(file.source->next(surfels) == 2);
+  }
+  for (const auto& [begin, format] : std::vector<std::pair<std::string, std::string>>{
+           {"LASF", "LAS"}, {"ASTM-E57", "E57"}, {"\x9e\x02\0\0\1\0"s, "Maya's PDB"}}) {
+    for (const char* name : {"a.gz", "a.las", "a"}) {
+      CHECK_THROWS_WITH(static_cast<void>(open_points(packed(name, begin))),
+                        Contains(": " + format + " packed by gzip") && Contains("gunzip"));
+    }
+  }
+}
+
+TEST_CASE("formats: a file that nothing can read gets a hint that fits", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const auto hint = [&](const std::string& text) {
+    return hint_at_content(scratch.file("a.foo", text));
+  };
+  CHECK_THAT(hint("Easting Northing Height\n1 2 3\n"), Contains("end its name in .xyz"));
+  CHECK_THAT(hint("1 2 3 tree\n"), Contains("end its name in .xyz"));
+  CHECK_THAT(hint("\x1f\x8b\x08"), Contains("unpack it"));
+  for (const char* text : {"", "words", "1 2\n3 4\n", "\x01 1 2 3\n"}) CHECK(hint(text).empty());
 }
 
 TEST_CASE("formats: text under any name is told apart by its lines", "[io][points]") {

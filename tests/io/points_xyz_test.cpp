@@ -10,6 +10,7 @@
 #include "tests/io/clouds.h"
 
 using namespace ptc;
+using Catch::Matchers::Contains;
 using Catch::Matchers::EndsWith;
 
 namespace {
@@ -73,15 +74,17 @@ TEST_CASE("xyz: an invalid line is reported by its number", "[io][points]") {
   std::string wide;
   for (int i = 0; i < 257; ++i) wide += "1 ";
   CHECK_THAT(fault(scratch, wide), EndsWith("line 1: the line has more than 256 values"));
-  CHECK_THAT(fault(scratch, "1 2 z\n"), EndsWith("line 1: a value is not a number"));
-  CHECK_THAT(fault(scratch, "1 2 3\nX Y Z\n"), EndsWith("line 2: a value is not a number"));
+  CHECK_THAT(fault(scratch, "1 2 z\n"), EndsWith("line 1: column 3: 'z' is not a number"));
+  CHECK_THAT(fault(scratch, "1 2 3\nX Y Z\n"), EndsWith("line 2: column 1: 'X' is not a number"));
   CHECK_THAT(fault(scratch, "X Y A\n1 2 3\n"),
              EndsWith("line 1: the line has neither values nor names with x, y and z"));
-  CHECK_THAT(fault(scratch, "x y z\nx y z\n1 2 3\n"), EndsWith("line 2: a value is not a number"));
-  CHECK_THAT(fault(scratch, "1,,3\n"), EndsWith("line 1: a value is missing"));
-  CHECK_THAT(fault(scratch, "1,5;2,5;3,5\n"),
-             EndsWith("line 1: the line has neither values nor names with x, y and z"));
-  CHECK_THAT(fault(scratch, "1;2;3,5\n"), EndsWith("line 1: a value is not a number"));
+  CHECK_THAT(fault(scratch, "x y z\nx y z\n1 2 3\n"),
+             EndsWith("line 2: column 1: 'x' is not a number"));
+  CHECK_THAT(fault(scratch, "1,,3\n"), EndsWith("line 1: column 2: a value is missing"));
+  CHECK_THAT(fault(scratch, "1 2 3 4\n1 2 3 four\n"),
+             EndsWith("line 2: column 4: 'four' is not a number"));
+  CHECK_THAT(fault(scratch, "1,2,3,4\n1,2,3,\n"),
+             EndsWith("line 2: 3 values, but the first line has 4"));
   CHECK_THAT(fault(scratch, "1 2 inf\n"), EndsWith("line 1: point 0: the position is not finite"));
   CHECK_THAT(
       fault(scratch, "1 2 3 0 0 1 -4\n"),
@@ -89,6 +92,44 @@ TEST_CASE("xyz: an invalid line is reported by its number", "[io][points]") {
   CHECK_THAT(
       fault(scratch, "1 2 3 0 0 1 4 1 1 -1\n"),
       EndsWith("point 0: the radiance is negative, not a number or beyond the range of float"));
+}
+
+TEST_CASE("xyz: decimal commas are refused by name", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  for (const char* text :
+       {"1,5;2,5;3,5\n", "1;2;3,5\n", "x;y;z\n1;2;3,5\n", "1,5 2,5 3,5\n", "1,5\t2,5\t3,5\n",
+        "x y z\n1,5 2,5 3,5\n", "x;y;z;label\n1,5;2,5;3,5;tree\n", "x;y;z;i\n1;2;3;4,5\n",
+        "x,y,z\n\"1,5\",\"2\",\"3\"\n"}) {
+    INFO(text);
+    CHECK_THAT(fault(scratch, text), Contains(": numbers with a decimal comma are not read"));
+  }
+}
+
+TEST_CASE("xyz: columns of text are left out and named", "[io][points]") {
+  const test::TemporaryDirectory scratch;
+  const auto check = [&](const std::string& text, const std::string& note) {
+    INFO(text);
+    const auto path = scratch.file("a.csv", text);
+    const PointFileInfo info = open_points(path).info;
+    REQUIRE_FALSE(info.notes.empty());
+    CHECK(info.notes.front() == note);
+    REQUIRE(info.channels.size() == 1);
+    CHECK(info.channels[0].name == "intensity");
+    const auto surfels = read_all(path);
+    REQUIRE(surfels.size() == 2);
+    CHECK(surfels[1].position == glm::dvec3(4, 5, 6));
+  };
+  const std::string named = "Column 4, 'label', has no numbers and is left out.";
+  const std::string last = "Column 5, 'label', has no numbers and is left out.";
+  check("x,y,z,label,i\n1,2,3,tree,7\n4,5,6,house,8\n", named);
+  check("x;y;z;label;i\r\n1;2;3;tree;7\r\n4;5;6;;8\r\n", named);
+  check("\xEF\xBB\xBFx,y,z,label,i\n1,2,3,\"a, b\",7\n4,5,6,\"c; d\",8\n", named);
+  check("x,y,z,i,label\n1,2,3,7,tree\n4,5,6,8,\n", last);
+  check("x,y,z,i,label\n1,2,3,7,\n4,5,6,8,tree\n", last);
+  check("# x y z label i\n1 2 3 tree 7\n4 5 6 \"big house\" 8\n", named);
+  check("x,y,z,label,i\n\"1\",\"2\",\"3\",\"tree\",\"7\"\n\"4\",\"5\",\"6\",\"house\",\"8\"\n",
+        named);
+  check("1 2 3 tree 7\n4 5 6 house 8\n", "Column 4 has no numbers and is left out.");
 }
 
 TEST_CASE("xyz: separators and comments of many programs are read", "[io][points]") {

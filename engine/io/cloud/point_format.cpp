@@ -1,7 +1,7 @@
 // Tells formats apart.
 //
-// Binary formats begin with bytes of their own. Text formats do not, so the ending of the name
-// counts, and only where that says nothing, the first lines:
+// Binary formats begin with bytes of their own. Text formats do not: the ending of the name counts
+// if it is one of text, and else the first lines:
 //
 //   PTX   two lines of an integer, four of 3 numbers, four of 4
 //   PTS   a line of an integer, then lines of 3 or more numbers
@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/base/error.h"
 #include "engine/io/cloud/channel_names.h"
 #include "engine/io/cloud/text_fields.h"
 #include "engine/io/text/byte_stream.h"
@@ -88,6 +89,7 @@ bool is_mesh_extension(std::string_view extension) {
 // A line that is not blank and no comment, as the sniffer sees it.
 struct SniffedLine {
   std::size_t values = 0;   // 0 when a field is not a number
+  std::size_t numbers = 0;  // fields that are numbers
   bool is_integer = false;  // a single integer
   bool is_names = false;    // no field is a number, and x, y and z are among them
 };
@@ -98,13 +100,14 @@ SniffedLine sniff_line(std::string_view line) {
   std::array<bool, 3> xyz{};
   const std::vector<std::string_view> fields = unquoted_fields(line);
   for (const std::string_view field : fields) {
-    if (parse_number(field)) ++numbers;
+    if (parse_number(field) || has_decimal_comma(field)) ++numbers;
     const std::string name = bare_name(field);
     for (std::size_t i = 0; i < 3; ++i) {
       if (name == std::string_view("xyz").substr(i, 1)) xyz[i] = true;
     }
   }
   if (numbers == fields.size()) result.values = numbers;
+  result.numbers = numbers;
   result.is_integer = fields.size() == 1 && parse_integer(fields[0]).has_value();
   result.is_names = numbers == 0 && xyz[0] && xyz[1] && xyz[2];
   return result;
@@ -116,6 +119,7 @@ std::optional<std::vector<SniffedLine>> sniff_lines(std::string_view begin, bool
     return static_cast<unsigned char>(c) < 32 && c != '\n' && c != '\r' && c != '\t';
   };
   if (std::ranges::any_of(begin, is_control)) return std::nullopt;
+  if (begin.starts_with("\xEF\xBB\xBF")) begin.remove_prefix(3);  // byte order mark
   // A line that goes on behind the beginning says nothing.
   if (!whole)
     begin = begin.substr(0, begin.rfind('\n') == std::string_view::npos ? 0 : begin.rfind('\n'));
@@ -154,15 +158,33 @@ std::optional<PointFormat> point_format(const std::filesystem::path& path) {
   const std::string_view begin = stream.peek(kPeekBytes);
   if (const auto format = by_magic(begin)) return format;
   const std::optional<PointFormat> named = by_extension(extension);
-  // Many files of the name .pts are XYZ: they do not begin with a count.
-  if (named && named != PointFormat::pts) return named;
+  if (named == PointFormat::xyz || named == PointFormat::ptx) return named;
   const auto lines = sniff_lines(begin, begin.size() < kPeekBytes);
   const std::optional<PointFormat> sniffed = lines ? by_lines(*lines) : std::nullopt;
-  return named && sniffed != PointFormat::xyz ? named : sniffed;
+  // Many files of the name .pts are XYZ: they do not begin with a count.
+  if (named == PointFormat::pts) return sniffed == PointFormat::xyz ? sniffed : named;
+  return sniffed ? sniffed : named;
+}
+
+std::optional<PointFormat> format_of_name(const std::filesystem::path& path) {
+  return by_extension(format_extension(path));
+}
+
+std::string hint_at_content(const std::filesystem::path& path) try {
+  ByteStream stream(path);
+  if (stream.compressed()) return "; it is packed by gzip: unpack it first, with gunzip";
+  const std::string_view begin = stream.peek(kPeekBytes);
+  const auto lines = sniff_lines(begin, begin.size() < kPeekBytes);
+  const auto has_numbers = [](const SniffedLine& line) { return line.numbers >= 3; };
+  if (!lines || std::ranges::none_of(*lines, has_numbers)) return "";
+  return "; its lines have numbers: if they are x, y, z and more, end its name in .xyz, or state "
+         "`format` xyz for standard input";
+} catch (const DataError&) {  // its name says that it is packed, but it is not
+  return "";
 }
 
 bool names_text_cloud(const std::filesystem::path& path) {
-  const std::optional<PointFormat> format = by_extension(format_extension(path));
+  const std::optional<PointFormat> format = format_of_name(path);
   return format == PointFormat::xyz || format == PointFormat::pts || format == PointFormat::ptx;
 }
 

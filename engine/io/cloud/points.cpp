@@ -13,6 +13,7 @@
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/record_source.h"
 #include "engine/io/cloud/surfel_check.h"
+#include "engine/io/text/byte_stream.h"
 
 namespace ptc {
 namespace {
@@ -137,6 +138,29 @@ bool has_bytes_as_colours(PointFormat format, const std::filesystem::path& path,
   return !black;
 }
 
+bool is_text(PointFormat format) {
+  return format == PointFormat::xyz || format == PointFormat::pts || format == PointFormat::ptx;
+}
+
+/// Refuses a file that is packed by gzip and is not read from front to back.
+void refuse_packed(PointFormat format, const std::filesystem::path& path) {
+  const bool in_order =
+      format != PointFormat::las && format != PointFormat::e57 && format != PointFormat::pdb;
+  if (in_order || !ByteStream(path).compressed()) return;
+  refuse_file(path, std::string(name_of(format)) +
+                        " packed by gzip, which cannot be read: unpack it first with gunzip, or "
+                        "give what gunzip -c writes as standard input");
+}
+
+/// Notes that the name of a file states another format than its content has. Formats of text have
+/// each other's endings too often to be worth a note.
+void note_name(PointFormat format, const std::filesystem::path& path, PointFileInfo& info) {
+  const std::optional<PointFormat> named = format_of_name(path);
+  if (!named || *named == format || (is_text(*named) && is_text(format))) return;
+  info.notes.push_back(std::string("The name says ") + name_of(*named) +
+                       ", but the content is that of " + name_of(format) + ".");
+}
+
 }  // namespace
 
 PointFile open_points(const std::filesystem::path& path) {
@@ -146,7 +170,9 @@ PointFile open_points(const std::filesystem::path& path) {
                 "not a point cloud: its content and its name are those of none of PLY, LAS, LAZ, "
                 "E57, PCD, PTX, PTS, XYZ text, Pixar's PTC, Houdini's classic BGEO and Maya's PDB");
   }
+  refuse_packed(*format, path);
   PointFile file = open_as(*format, path);
+  note_name(*format, path, file.info);
   if (file.info.format.empty()) file.info.format = name_of(*format);
   const bool may_be_bytes = *format == PointFormat::ply || *format == PointFormat::pcd;
   if (may_be_bytes && has_bytes_as_colours(*format, path, file.info)) {

@@ -74,7 +74,8 @@ struct PointFile {
 /// | Houdini's classic geometry | .bgeo .geo | points only |
 /// | Maya's PDB | .pdb | files of programs of 32 bits |
 ///
-/// The content decides, and the name only where the content says nothing. PLY, BGEO, PTC and text,
+/// The content decides, and the name only where the content says nothing; a note says when they
+/// differ. PLY, BGEO, PTC and text,
 /// a PCD that is not compressed, and PTX may be packed by gzip (.gz). `info.notes` says what a
 /// reader leaves out or assumes.
 ///
@@ -89,7 +90,8 @@ struct PointFile {
 /// Lines of XYZ without names are "x y z [nx ny nz [radius [r g b]]]", where r g b is the linear
 /// radiance; "x y z intensity"; or "x y z" with 8-bit colours, if their values look like that.
 /// Other columns become channels. Separators are white space, commas or semicolons, and comments
-/// begin with # or //. All lines have as many values as the first.
+/// begin with # or //. All lines have as many values as the first. A column in which none of the
+/// first lines has a number is left out; decimal commas are refused.
 ///
 /// Every surfel is checked: the position is within kMaxCoordinate, the normal has a finite length
 /// (it is normalised; 0 0 0 is unknown), radius, radiance and emission are finite and not negative,

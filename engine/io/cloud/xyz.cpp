@@ -6,7 +6,10 @@
 //   // X Y Z R G B           names, in a comment or not, quoted or not
 //   1.5 2 3 255 128 0        separators are white space, commas or semicolons
 //   # a comment
+//
+// A column in which no line of the sample has a number is one of text. It is left out.
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -46,7 +49,11 @@ std::string_view cut_comment(std::string_view line, std::string_view& comment) {
 // The lines of an XYZ file that have values, and the names of the columns.
 class XyzLines {
  public:
-  explicit XyzLines(const std::filesystem::path& path) : stream_(path) {}
+  // Reads lines as a sample: fields that are no numbers become NaN.
+  explicit XyzLines(const std::filesystem::path& path) : stream_(path), sampling_(true) {}
+  // Reads lines whose fields are numbers, except in columns of text, which are left out.
+  XyzLines(const std::filesystem::path& path, std::vector<bool> text)
+      : stream_(path), sampling_(false), text_(std::move(text)) {}
 
   // Reads the next line that has values. Every line has as many as the first. Returns false at the
   // end of the file.
@@ -56,9 +63,9 @@ class XyzLines {
       if (stream_.line() == 1 && line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
       std::string_view comment;
       const std::string_view text = trimmed(cut_comment(line, comment));
-      if (values_.empty() && text.empty()) read_names(comment, commented_names_);
+      if (columns_ == 0 && text.empty()) read_names(comment, commented_names_);
       if (text.empty()) continue;
-      if (values_.empty() && names_.empty() && read_header(text)) continue;
+      if (columns_ == 0 && names_.empty() && read_header(text)) continue;
       read_values(text);
       return true;
     }
@@ -67,11 +74,21 @@ class XyzLines {
 
   [[nodiscard]] const std::vector<double>& values() const noexcept { return values_; }
 
-  // Returns the names of the columns, after a line of values was read; empty when there are none.
+  // Returns the columns that had no number in any line of the sample, those of positions excepted.
+  [[nodiscard]] std::vector<bool> text_columns() const {
+    std::vector<bool> text = words_;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      const std::string name = i < names().size() ? bare_name(names()[i]) : "";
+      if (names().empty() ? i < 3 : name == "x" || name == "y" || name == "z") text[i] = false;
+    }
+    return text;
+  }
+
+  // Returns the names of all columns, after a line of values was read; empty when there are none.
   [[nodiscard]] const std::vector<std::string>& names() const noexcept {
     if (!names_.empty()) return names_;
     static const std::vector<std::string> kNone;
-    return commented_names_.size() == values_.size() ? commented_names_ : kNone;
+    return commented_names_.size() == columns_ ? commented_names_ : kNone;
   }
 
   [[noreturn]] void fail(const std::string& rule) const { stream_.fail_at_line(rule); }
@@ -88,42 +105,100 @@ class XyzLines {
   // Reads the line as names if it has no number. A line of words must be one of names.
   bool read_header(std::string_view text) {
     for (const std::string_view field : unquoted_fields(text)) {
-      if (parse_number(field)) return false;
+      if (parse_number(field) || has_decimal_comma(field)) return false;
     }
     if (!read_names(text, names_)) fail("the line has neither values nor names with x, y and z");
     return true;
   }
 
+  [[nodiscard]] bool is_text(std::size_t column) const {
+    return column < text_.size() && text_[column];
+  }
+
   void read_values(std::string_view text) {
-    const std::size_t expected = values_.empty() ? names_.size() : values_.size();
+    // Read the fields
+    const std::size_t expected = columns_ == 0 ? names_.size() : columns_;
     values_.clear();
+    std::size_t column = 0;
     LineFields fields(text);
-    for (std::string_view field; fields.next(field);) {
-      const std::optional<double> value = parse_number(field);
-      if (!value) fail(field.empty() ? "a value is missing" : "a value is not a number");
-      if (values_.size() == kMaxColumns) {
+    for (std::string_view field; fields.next(field); ++column) {
+      if (column == kMaxColumns)
         fail("the line has more than " + std::to_string(kMaxColumns) + " values");
-      }
-      values_.push_back(*value);
+      if (!is_text(column)) add_value(text, field, column);
     }
-    const std::string count = std::to_string(values_.size()) + " values, but ";
-    if (values_.size() < 3) fail(count + "lines of XYZ have at least x, y and z");
-    if (expected != 0 && values_.size() != expected) {
+    // An empty field at the end has only the separator before it
+    const bool ends_empty = column + 1 == expected && (text.back() == ';' || text.back() == ',');
+    if (ends_empty && (sampling_ || is_text(column))) {
+      if (sampling_) add_value(text, "", column);
+      ++column;
+    }
+    // Check their number
+    if (expected != 0 && column != expected) refuse_decimal_commas(text);
+    const std::string count = std::to_string(column) + " values, but ";
+    if (column < 3) fail(count + "lines of XYZ have at least x, y and z");
+    if (expected != 0 && column != expected) {
       fail(count + (names_.empty() ? "the first line has " : "the line of names has ") +
            std::to_string(expected));
     }
+    columns_ = column;
+  }
+
+  void add_value(std::string_view text, std::string_view field, std::size_t column) {
+    const std::optional<double> value = parse_number(unquoted(field));
+    if (sampling_) {
+      if (column == words_.size()) words_.push_back(true);
+      if (value || has_decimal_comma(unquoted(field))) words_[column] = false;
+    } else if (!value) {
+      refuse_field(text, field, column);
+    }
+    values_.push_back(value.value_or(std::numeric_limits<double>::quiet_NaN()));
+  }
+
+  // Refuses the line if its numbers have decimal commas. They stand between semicolons, in quotes,
+  // or between white space, where the commas seem to separate fields.
+  void refuse_decimal_commas(std::string_view text) const {
+    bool commas = false, numbers = true;
+    const bool separated = text.find_first_of(";\"") != std::string_view::npos;
+    LineFields fields(text);
+    Words words(text);
+    std::string_view field;
+    while (separated ? fields.next(field) : !(field = words.next()).empty()) {
+      if (has_decimal_comma(unquoted(field))) {
+        commas = true;
+      } else {
+        numbers = numbers && parse_number(field);
+      }
+    }
+    if (!commas || !(numbers || separated)) return;
+    fail(
+        "numbers with a decimal comma are not read: write points in place of the commas, as sed "
+        "'s/,/./g' does");
+  }
+
+  [[noreturn]] void refuse_field(std::string_view text, std::string_view field,
+                                 std::size_t column) const {
+    constexpr std::size_t kMaxLetters = 40;
+    const std::string place = "column " + std::to_string(column + 1) + ": ";
+    if (field.empty()) fail(place + "a value is missing");
+    refuse_decimal_commas(text);
+    const std::string shown(field.substr(0, kMaxLetters));
+    fail(place + "'" + shown + "' is not a number");
   }
 
   ByteStream stream_;
+  bool sampling_;
+  std::vector<bool> text_;                    // by column: it is one of text and left out
+  std::vector<bool> words_;                   // by column: no line of the sample has a number there
   std::vector<std::string> names_;            // of a line of their own
   std::vector<std::string> commented_names_;  // of the last comment before the values that has some
+  std::size_t columns_ = 0;                   // of a line, columns of text among them
   std::vector<double> values_;                // of the line that was read last
 };
 
 class XyzSource : public RecordSource {
  public:
-  XyzSource(const std::filesystem::path& path, XyzColumns columns)
-      : lines_(path), columns_(std::move(columns)) {
+  XyzSource(const std::filesystem::path& path, std::vector<bool> text, XyzColumns columns)
+      : lines_(path, std::move(text)), columns_(std::move(columns)) {
     const RecordField& last = columns_.fields.back();
     packed_.resize(last.offset + last.channel.component_bytes());
     set_layout(PointLayout(path, columns_.fields,
@@ -159,16 +234,46 @@ class XyzSource : public RecordSource {
   std::vector<std::byte> packed_;  // the line that was read last
 };
 
+// Removes what stands in columns of text.
+template <class T>
+void leave_out(const std::vector<bool>& text, std::vector<T>& columns) {
+  std::size_t i = 0;
+  std::erase_if(columns, [&](const T&) { return text[i++]; });
+}
+
+// Notes which columns are left out.
+void note_text(const std::vector<bool>& text, const std::vector<std::string>& names,
+               std::vector<std::string>& notes) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (!text[i]) continue;
+    notes.push_back("Column " + std::to_string(i + 1) +
+                    (names.empty() ? "" : ", '" + names[i] + "',") +
+                    " has no numbers and is left out.");
+  }
+}
+
 }  // namespace
 
 PointFile open_xyz(const std::filesystem::path& path) {
+  // Read the first lines, and tell columns of text from those of numbers
   XyzSample sample;
   XyzLines lines(path);
   while (sample.rows.size() < kSampleLines && lines.next()) sample.rows.push_back(lines.values());
+  const std::vector<bool> text = lines.text_columns();
+  XyzLines checked(path, text);
+  for (std::size_t i = 0; i < sample.rows.size(); ++i) static_cast<void>(checked.next());
+
+  // Choose the columns
   sample.names = lines.names();
+  std::vector<std::string> notes;
+  note_text(text, sample.names, notes);
+  if (!sample.names.empty() && !text.empty()) leave_out(text, sample.names);
+  for (std::vector<double>& row : sample.rows) leave_out(text, row);
   std::filesystem::path name = path;
   if (lower_extension(name) == ".gz") name = name.stem();
-  return open_source<XyzSource>(path, choose_xyz_columns(sample, lower_extension(name) == ".xyzn"));
+  XyzColumns columns = choose_xyz_columns(sample, lower_extension(name) == ".xyzn");
+  columns.notes.insert(columns.notes.begin(), notes.begin(), notes.end());
+  return open_source<XyzSource>(path, text, std::move(columns));
 }
 
 }  // namespace ptc

@@ -17,6 +17,7 @@
 #include <glm/matrix.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/point_format.h"
 #include "engine/io/file/buffered_output.h"
 #include "engine/io/mesh/mesh_soup.h"
 #include "engine/io/text/text.h"
@@ -120,7 +121,8 @@ MeshFile read_mesh(const std::filesystem::path& path) {
       path.string() +
       ": nothing that can be read: as a mesh its name would end in .obj, .ply, .off, .gltf, "
       ".glb or .stl, and its content is that of no point cloud among PLY, LAS, LAZ, E57, "
-      "PCD, PTX, PTS, XYZ text, Pixar's PTC, Houdini's classic BGEO and Maya's PDB");
+      "PCD, PTX, PTS, XYZ text, Pixar's PTC, Houdini's classic BGEO and Maya's PDB" +
+      hint_at_content(path));
 }
 
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, const char* field) {

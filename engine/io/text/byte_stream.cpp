@@ -90,11 +90,14 @@ struct ByteStream::Gunzip {
 };
 
 ByteStream::ByteStream(const std::filesystem::path& path) : file_(path), buffer_(kBufferBytes) {
-  if (lower_extension(path) != ".gz") return;
-  constexpr std::array kMagic = {std::byte{0x1f}, std::byte{0x8b}};
-  std::array<std::byte, 2> begin{};
+  constexpr std::array kMagic = {std::byte{0x1f}, std::byte{0x8b}, std::byte{8}};  // deflate
+  std::array<std::byte, 3> begin{};
   if (file_.size() >= begin.size()) file_.read_at(0, begin);
-  if (begin != kMagic) throw DataError(path.string() + ": the file is not a gzip file");
+  if (begin != kMagic) {
+    if (lower_extension(path) == ".gz")
+      throw DataError(path.string() + ": the file is not a gzip file");
+    return;
+  }
   gunzip_ = std::make_unique<Gunzip>(file_);
 }
 

@@ -14,8 +14,8 @@
 
 namespace ptc {
 
-/// Reads a file sequentially through a buffer. A file whose name ends in ".gz" is decompressed on
-/// the way, and all offsets count decompressed bytes.
+/// Reads a file sequentially through a buffer. A gzip file, as its first bytes tell, is
+/// decompressed on the way, and all offsets count decompressed bytes.
 ///
 /// Every read throws DataError when compressed data are damaged or decompress to more than 64 MiB
 /// plus 256 times their size, and std::system_error when the system refuses to read.
@@ -27,7 +27,8 @@ class ByteStream {
   /// The greatest length of a line or record, bytes.
   static constexpr std::size_t kMaxBytesAtOnce = std::size_t{1} << 26;
 
-  /// Opens a file. @throws std::system_error; DataError when a .gz is not a gzip file
+  /// Opens a file. @throws std::system_error; DataError when a name ends in .gz and the
+  /// file is no gzip file
   explicit ByteStream(const std::filesystem::path& path);
   ~ByteStream();
   ByteStream(const ByteStream&) = delete;
