@@ -184,6 +184,24 @@ std::string exit_codes_with(const std::string& own) {
 // Installed before main(), so that allocations of static objects are covered, too.
 [[maybe_unused]] const std::new_handler before_main = std::set_new_handler(end_without_memory);
 
+/// Passes a progress on, with the names in its notes replaced.
+class RenamingProgress : public Progress {
+ public:
+  using Rename = std::function<std::string(const std::string&)>;
+  RenamingProgress(Progress& to, Rename rename) : to_(to), rename_(std::move(rename)) {}
+
+  void begin(const std::string& stage, std::uint64_t total, const std::string& unit) override {
+    to_.begin(stage, total, unit);
+  }
+  void advance(std::uint64_t count) override { to_.advance(count); }
+  void end() override { to_.end(); }
+  void note(const std::string& text) override { to_.note(rename_(text)); }
+
+ private:
+  Progress& to_;
+  Rename rename_;
+};
+
 }  // namespace
 
 ExitCode exit_code_of(const FormatError& error) {
@@ -266,6 +284,20 @@ std::string Command::generated(const std::string& kind) const {
   if (kind == "zsh") return zsh_completion(app_);
   if (kind == "fish") return fish_completion(app_);
   refuse("--generate", kind, "man, bash, zsh or fish");
+}
+
+void Command::show_as(const std::filesystem::path& path, std::string name) {
+  shown_names_.emplace_back(path, std::move(name));
+}
+
+std::string Command::renamed(std::string text) const {
+  for (const auto& [path, name] : shown_names_) {
+    for (const std::string& written : {path.string(), path.filename().string()}) {
+      for (std::size_t at = 0; (at = text.find(written, at)) != text.npos; at += name.size())
+        text.replace(at, written.size(), name);
+    }
+  }
+  return text;
 }
 
 CLI::Option* Command::add_input(const std::string& name, std::filesystem::path& path,
@@ -351,7 +383,8 @@ int Command::perform(const std::function<Outcome(Progress&)>& body) const {
   const auto progress = quiet_      ? std::make_unique<Progress>()
                         : progress_ ? make_stderr_progress()
                                     : make_stderr_bar();
-  Outcome outcome = body(*progress);
+  RenamingProgress renaming(*progress, [this](const std::string& text) { return renamed(text); });
+  Outcome outcome = body(renaming);
   if (json_) {
     outcome.facts["memory_bytes"] = run_options_.memory_bytes;
     outcome.facts["peak_resident_bytes"] = peak_resident_bytes();
@@ -375,7 +408,7 @@ int Command::perform(const std::function<Outcome(Progress&)>& body) const {
 int Command::run(int argc, char** argv, const std::function<Outcome(Progress&)>& body) {
   const auto fail = [&](ExitCode code, const std::string& text) {
     std::fprintf(stderr, "%s: %s\n", app_.get_name().c_str(),
-                 printable(with_options(text)).c_str());
+                 printable(with_options(renamed(text))).c_str());
     return code;
   };
   try {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -75,6 +76,9 @@ class Command {
   /// The values of --memory, --threads and --temp, which are known once the body runs.
   [[nodiscard]] const RunOptions& run_options() const noexcept { return run_options_; }
 
+  /// Makes messages call a file by another name: the temporary copy of standard input, for example.
+  void show_as(const std::filesystem::path& path, std::string name);
+
   /// Declares a file that is read. It is opened before the body runs: a file that cannot be opened
   /// or is empty is invalid data.
   /// @param name     as CLI11 takes it: "SCENE" is positional, "--mesh" is an option
@@ -117,6 +121,10 @@ class Command {
   bool progress_ = false;
   bool quiet_ = false;
   bool json_ = false;
+  /// A message with the names of show_as().
+  [[nodiscard]] std::string renamed(std::string text) const;
+
+  std::vector<std::pair<std::filesystem::path, std::string>> shown_names_;
   using Paths = std::vector<std::filesystem::path>;
   std::vector<const std::filesystem::path*> inputs_;
   std::vector<const Paths*> input_lists_;

@@ -120,9 +120,14 @@ void InputFiles::add_standard_input(const std::string& format,
                                           : "standard input is empty");
   }
   file.publish();
+  copy_ = path;
   paths_.push_back(path);
   if (!names_.empty()) names_ += ' ';
   names_ += "stdin";
+}
+
+void InputFiles::name_in(Command& command) const {
+  if (!copy_.empty()) command.show_as(copy_, "standard input");
 }
 
 bool is_build_input(const std::filesystem::path& path) {
@@ -148,8 +153,9 @@ void add_format(CLI::App& app, std::string& format) {
       ->group(kFilesGroup);
 }
 
-void SceneArguments::declare(CLI::App& app, const std::string& description) {
-  app_ = &app;
+void SceneArguments::declare(Command& command, const std::string& description) {
+  command_ = &command;
+  CLI::App& app = command.app();
   std::vector<std::string> endings = input_endings();
   endings.insert(endings.begin(), ".ptcx");
   offer(app.add_option("SCENE", names_,
@@ -171,15 +177,16 @@ void SceneArguments::declare(CLI::App& app, const std::string& description) {
 void SceneArguments::apply(LightingRequest& request, const std::filesystem::path& output,
                            Progress& progress) {
   files_.emplace(names_, format_, request.run, output);
+  files_->name_in(*command_);
   request.scene = files_->paths().front();
   request.joined.assign(files_->paths().begin() + 1, files_->paths().end());
   request.scene_names = files_->names();
   request.sampling.count = points_;
   request.up = up_;
   if (is_container_alone(request))
-    note_unused(*app_, {"--up"}, "the scene is a container", progress);
+    note_unused(command_->app(), {"--up"}, "the scene is a container", progress);
   if (std::ranges::all_of(files_->paths(), holds_points))
-    note_unused(*app_, {"--points"}, "no file of the scene is a mesh", progress);
+    note_unused(command_->app(), {"--points"}, "no file of the scene is a mesh", progress);
 }
 
 }  // namespace ptc

@@ -18,6 +18,7 @@
 #include "engine/io/file/file.h"
 #include "engine/pipeline/light/lighting.h"
 #include "engine/pipeline/run.h"
+#include "tools/common.h"
 
 namespace ptc {
 
@@ -36,6 +37,8 @@ class InputFiles {
   [[nodiscard]] const std::vector<std::filesystem::path>& paths() const noexcept { return paths_; }
   /// The names of the files for a record, separated by spaces; standard input is "stdin".
   [[nodiscard]] const std::string& names() const noexcept { return names_; }
+  /// Makes the messages of a program say "standard input" for its temporary copy.
+  void name_in(Command& command) const;
 
  private:
   void add(const std::filesystem::path& path);
@@ -46,6 +49,7 @@ class InputFiles {
 
   std::vector<std::filesystem::path> paths_;
   std::string names_;
+  std::filesystem::path copy_;  ///< of standard input; empty: it is no input
   std::vector<std::unique_ptr<TemporaryName>> temporary_;
 };
 
@@ -64,7 +68,7 @@ class SceneArguments {
  public:
   /// Declares the arguments. This object must outlive the parsing.
   /// @param description  of SCENE, in a line
-  void declare(CLI::App& app, const std::string& description);
+  void declare(Command& command, const std::string& description);
   /// Sets the scene of a request: the files, their names, and how a container is built of them.
   /// Temporary files exist as long as this object.
   /// @param request   its RunOptions are set already
@@ -77,7 +81,7 @@ class SceneArguments {
   std::string format_;
   std::uint64_t points_ = SamplingOptions{}.count;
   std::string up_;
-  const CLI::App* app_ = nullptr;
+  Command* command_ = nullptr;
   std::optional<InputFiles> files_;
 };
 

@@ -68,8 +68,8 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
           "Mesh, cloud, container, directory, pattern, @list, or - for standard input\n"
           "Meshes: OBJ, PLY, OFF, glTF, GLB, STL. Clouds: LAS, LAZ, COPC, E57, PLY, PCD, XYZ, PTS, "
           "PTX, Pixar's .ptc, Houdini's .bgeo and .geo, Maya's .pdb. The bytes of a file tell its "
-          "format; only text goes by its ending, too. OBJ, PLY, OFF and text may be compressed by "
-          "gzip; the name then ends in .gz. A PLY without faces is a cloud. A directory stands for "
+          "format; only text goes by its ending, too. OBJ, PLY, OFF and text may be packed by "
+          "gzip; LAS, LAZ and E57 may not. A PLY without faces is a cloud. A directory stands for "
           "all meshes and clouds in it, @FILE for the files that its lines name."),
       ptc::input_endings());
   inputs->type_name("FILE")->group(ptc::kFilesGroup);
@@ -200,6 +200,7 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   }
   request.run = command.run_options();
   const ptc::InputFiles inputs(request.inputs, arguments.format, request.run, arguments.output);
+  inputs.name_in(command);
   request.inputs = inputs.paths();
   request.input_names = inputs.names();
   request.sampling.camera = arguments.camera.camera();

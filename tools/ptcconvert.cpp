@@ -200,6 +200,7 @@ int main(int argc, char** argv) {
                                  arguments.output);
     if (inputs.paths().size() != 1)
       throw CLI::ValidationError("INPUT", "stands for more than one file: ptcbuild joins files");
+    inputs.name_in(command);
     arguments.input = inputs.paths().front();
     arguments.points.run = command.run_options();
     arguments.page_size_given = page_size->count() > 0;

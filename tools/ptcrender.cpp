@@ -78,7 +78,7 @@ void add_layers(ptc::Command& command, Arguments& arguments) {
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   ptc::RenderRequest& request = arguments.request;
-  arguments.scene.declare(command.app(),
+  arguments.scene.declare(command,
                           "Container, clouds or meshes whose surfels give the indirect light");
   command.add_outputs("-o,--output", arguments.outputs, {".exr", ".png"},
                       "Picture to write (.exr with all layers, or .png); repeatable");

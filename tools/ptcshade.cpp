@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> output_endings = ptc::point_output_endings();
   for (auto* endings : {&receiver_endings, &output_endings})
     endings->insert(endings->begin(), ".ptcx");
-  scene.declare(app, "Container, clouds or meshes whose surfels cast shadows and light");
+  scene.declare(command, "Container, clouds or meshes whose surfels cast shadows and light");
   command.add_output("-o,--output", output, output_endings,
                      "File to write: .ptcx, or a file of points\n"
                      "Files of points: .las, .ply, .xyz, .pcd, .ptc, .bgeo, .usda, .usdc.");

@@ -2,9 +2,10 @@
 
 import json
 import os
+import subprocess
 import unittest
 
-from programs import SMALL_PICTURE, ProgramTest, ball, read_ply, write_ply
+from programs import BIN, SMALL_PICTURE, ProgramTest, ball, read_ply, write_ply
 
 NAMES = ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"]
 
@@ -92,6 +93,31 @@ class Inputs(ProgramTest):
         with (self.tiles / "a.ply").open() as piped:
             self.succeed("ptcshade", "-", "-o", self.here / "o.ptcx", stdin=piped)
         self.assertEqual(json.loads(self.succeed("ptcinfo", self.here / "o.ptcx", "--json").stdout)["text"]["inputs"], "stdin")
+
+    def test_messages_call_standard_input_by_that_name(self):
+        target = self.here / "o.ptcx"
+        for program, arguments in (("ptcbuild", ["-", "-o", target]), ("ptcconvert", ["-", target]),
+                                   ("ptcshade", ["-", "-o", target]),
+                                   ("ptcrender", ["-", "-o", self.here / "o.png", *SMALL_PICTURE])):
+            said = self.succeed(program, *arguments, input="1 2 3 0 0 1\n4 5 6 0 1 0\n").stderr
+            self.assertIn(f"{program}: standard input: The file does not name its columns", said)
+            self.assertNotIn(".stdin", said)
+            (target if program != "ptcrender" else self.here / "o.png").unlink()
+            said = self.fail_with(1, program, *arguments, "--format", "xyz", input="1 2 3\n4 five 6\n")
+            self.assertIn(f"{program}: standard input: line 2: column 2: 'five' is not a number", said)
+
+    def test_standard_input_may_be_packed(self):
+        lines = "".join("%g %g %g\n" % point[:3] for point in ball(60))
+        packed = subprocess.run(["gzip", "-c"], input=lines.encode(), capture_output=True, check=True).stdout
+        built = subprocess.run([str(BIN / "ptcbuild"), "-", "-o", "o.ptcx"], input=packed, cwd=self.here, capture_output=True)
+        self.assertEqual(built.returncode, 0, built.stderr)
+
+    def test_text_that_is_not_read_gets_a_hint(self):
+        other = self.here / "scan.dat"
+        other.write_text("Easting Northing Height\n1 2 3\n")
+        said = self.fail_with(1, "ptcbuild", other, "-o", self.here / "o.ptcx")
+        self.assertIn("nothing that can be read", said)
+        self.assertIn("end its name in .xyz, or state --format xyz for standard input", said)
 
     def test_standard_input_can_be_named_once(self):
         with (self.tiles / "a.ply").open() as piped:
