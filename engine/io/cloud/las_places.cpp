@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <string_view>
 #include <vector>
@@ -132,7 +131,7 @@ bool fit_range(PlacedChannel& placed, const ValueRange& range) {
 double PlacedChannel::value(const std::byte* row) const noexcept {
   const Channel& of = channel.channel;
   const std::byte* const at = channel.at(row, 0);
-  if (of.no_value && std::memcmp(at, &*of.no_value, of.component_bytes()) == 0) return 0;
+  if (is_unknown(of, at)) return 0;
   const double value = load_number(at, of.type) * factor + shift;
   if (field == Field::gps_time) return value;
   return std::isnan(value) ? 0 : std::clamp(std::round(value), low, high);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "engine/io/cloud/packed_number.h"
@@ -62,8 +61,7 @@ void PointSurvey::add_ranges(std::span<const std::byte> rows) noexcept {
     const Channel& channel = row.channel;
     for (std::size_t at = 0; at < rows.size(); at += row_bytes_) {
       const std::byte* const stored = row.at(rows.data() + at, 0);
-      const std::size_t bytes = channel.component_bytes();
-      if (channel.no_value && std::memcmp(stored, &*channel.no_value, bytes) == 0) continue;
+      if (is_unknown(channel, stored)) continue;
       const double value = load_number(stored, channel.type) * channel.scale + channel.offset;
       if (!std::isfinite(value)) continue;
       range.low = std::min(range.low, value);

@@ -161,6 +161,7 @@ std::vector<std::string> unknown_losses(OutputFormat format, const PointWriteInf
   std::vector<std::string> values, sentences;
   for (const Channel& channel : info.channels) {
     if (!channel.no_value || channel_bytes(channel.type) == 0) continue;
+    if (format == OutputFormat::xyz && is_scaled(channel)) continue;  // NaN says so
     const bool packed = packs_colour && channel.type == ChannelType::u8 && colour.stored() &&
                         colour.stored()->channel.name == channel.name;
     if (packed) {

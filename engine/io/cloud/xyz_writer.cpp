@@ -4,7 +4,6 @@
 // Text cannot name a scale, so scaled values are written as what they mean. They have 15 digits,
 // one or two fewer than a double: integers in steps of 0.1 are 66.6, not 66.60000000000001.
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <string>
 
@@ -87,10 +86,9 @@ class XyzWriter : public CheckedWriter {
 
   // Appends what a stored value means; NaN where it is not known.
   void add_scaled(const Channel& channel, const std::byte* at) {
-    const bool unknown =
-        channel.no_value && std::memcmp(at, &*channel.no_value, channel.component_bytes()) == 0;
-    const double value =
-        unknown ? std::nan("") : load_number(at, channel.type) * channel.scale + channel.offset;
+    const double value = is_unknown(channel, at)
+                             ? std::nan("")
+                             : load_number(at, channel.type) * channel.scale + channel.offset;
     fmt::format_to(std::back_inserter(line_), "{:.15g} ", value);
   }
 
