@@ -14,10 +14,8 @@ constexpr std::string_view kBlanks = " \t\r\v\f";
 /// Returns the place of the first of some characters that stands outside of double quotes; npos
 /// when there is none.
 std::size_t find_unquoted(std::string_view text, std::string_view characters) noexcept {
-  std::size_t at = text.find_first_of(characters);
-  if (at == text.npos || text.substr(0, at).find('"') == text.npos) return at;
   bool quoted = false;
-  for (at = 0; at < text.size(); ++at) {
+  for (std::size_t at = 0; at < text.size(); ++at) {
     if (text[at] == '"') quoted = !quoted;
     if (!quoted && characters.find(text[at]) != characters.npos) return at;
   }
@@ -26,17 +24,26 @@ std::size_t find_unquoted(std::string_view text, std::string_view characters) no
 
 }  // namespace
 
-LineFields::LineFields(std::string_view line) noexcept : rest_(trimmed(line)), separator_(' ') {
+LineFields::LineFields(std::string_view line) noexcept
+    : rest_(trimmed(line)), separator_(' '), quotes_(rest_.find('"') != rest_.npos) {
   for (const char candidate : {';', ','}) {
-    if (separator_ == ' ' && find_unquoted(rest_, {&candidate, 1}) != std::string_view::npos)
-      separator_ = candidate;
+    if (separator_ == ' ' && find(candidate) != rest_.npos) separator_ = candidate;
   }
+}
+
+std::size_t LineFields::find(char separator) const noexcept {
+  return quotes_ ? find_unquoted(rest_, {&separator, 1}) : rest_.find(separator);
 }
 
 bool LineFields::next(std::string_view& field) noexcept {
   if (rest_.empty()) return false;
-  const std::size_t at =
-      find_unquoted(rest_, separator_ == ' ' ? kBlanks : std::string_view(&separator_, 1));
+  if (separator_ == ' ' && !quotes_) {  // most lines of most files
+    Words words(rest_);
+    field = words.next();
+    rest_ = words.rest();
+    return true;
+  }
+  const std::size_t at = separator_ == ' ' ? find_unquoted(rest_, kBlanks) : find(separator_);
   field = trimmed(rest_.substr(0, at));
   rest_ = at == std::string_view::npos ? std::string_view() : trimmed(rest_.substr(at + 1));
   return true;

@@ -18,8 +18,11 @@ class LineFields {
   [[nodiscard]] bool next(std::string_view& field) noexcept;
 
  private:
+  [[nodiscard]] std::size_t find(char separator) const noexcept;
+
   std::string_view rest_;
   char separator_;  // ' ' stands for white space
+  bool quotes_;     // the line has double quotes
 };
 
 /// Says whether a field is a number that has a comma in place of its point, such as "1,5".
