@@ -4,12 +4,23 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <vector>
+
+#include "engine/base/surfel.h"
 
 namespace ptc {
 
 struct PointRecord;
-struct Surfel;
+
+/// Where points lie, as far as that is known without reading all of them.
+struct Extent {
+  /// A box that is said to hold all points, scene units. Points beyond it are possible, but none of
+  /// `sample` is.
+  Bounds bounds;
+  std::vector<glm::dvec3> sample;  ///< positions of points that are spread evenly, scene units
+};
 
 /// Yields surfels in the order of their file, one block after another.
 class PointSource {
@@ -24,6 +35,10 @@ class PointSource {
   /// values of all channels of the source in their order, little-endian, without padding. Empty
   /// when the source has no channels. Valid until the next call of next().
   [[nodiscard]] virtual std::span<const std::byte> attributes() const noexcept { return {}; }
+  /// Returns where the points lie; nothing when that is not known, or cannot be believed.
+  /// @pre next() was not called
+  /// @throws DataError as next(); std::system_error
+  [[nodiscard]] virtual std::optional<Extent> extent() { return std::nullopt; }
   /// Returns the number of records that next() left out so far because they name no place, such as
   /// the directions of a scan from which no echo came.
   [[nodiscard]] virtual std::uint64_t left_out() const noexcept { return 0; }

@@ -1,6 +1,7 @@
 #include "engine/pipeline/selection.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -57,6 +58,9 @@ class SelectedPoints : public PointSource {
 
   [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return rows_; }
   [[nodiscard]] std::uint64_t left_out() const noexcept override { return source_->left_out(); }
+  [[nodiscard]] std::optional<Extent> extent() override {
+    return selection_.takes_all() ? source_->extent() : std::nullopt;
+  }
 
  private:
   /// A run of bytes of a row that is kept.

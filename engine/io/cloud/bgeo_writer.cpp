@@ -86,8 +86,7 @@ class BgeoWriter : public CheckedWriter {
       : CheckedWriter(info.count, row_bytes(info.channels)),
         info_(info),
         colour_(info),
-        channels_(row_channels(info.channels,
-                               {"N", "Cd", "pscale", "radiance", "emission", "albedo", "P", "Pw"})),
+        channels_(row_channels(info.channels, taken_)),
         names_(original_names(info)),
         out_(target) {
     find_colour();
@@ -115,11 +114,7 @@ class BgeoWriter : public CheckedWriter {
   }
 
   void declare_attributes() {
-    // Name them
-    for (const char* name : {"N", "Cd", "pscale", "radiance", "albedo", "emission", "P", "Pw"})
-      taken_.insert(name);
     for (const RowChannel& row : channels_) taken_.insert(row.name);
-    // Declare them in the order of their values
     if (info_.has_normals) declare(name_of("nx", "N"), 3, Kind::vector);
     if (colour_.exists()) declare("Cd", 3, Kind::number);
     if (info_.has_radius) declare(name_of("radius", "pscale"), 1, Kind::number);
@@ -189,10 +184,11 @@ class BgeoWriter : public CheckedWriter {
 
   PointWriteInfo info_;
   DisplayColour colour_;
+  std::set<std::string> taken_{"N",        "Cd",     "pscale", "radiance",
+                               "emission", "albedo", "P",      "Pw"};  // names of attributes
   std::vector<RowChannel> channels_;          // that become attributes of their own
   std::optional<RowChannel> linear_;          // becomes Cd
   std::map<std::string, std::string> names_;  // by quantity
-  std::set<std::string> taken_;
   BigEndian attributes_;
   std::uint32_t attribute_count_ = 0;
   BigEndian point_;

@@ -14,6 +14,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -24,6 +25,7 @@
 #include "engine/io/cloud/las_records.h"
 #include "engine/io/cloud/las_texts.h"
 #include "engine/io/cloud/packed_number.h"
+#include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/surfel_check.h"
 #include "engine/io/image/srgb.h"
 #include "engine/io/laz/layout.h"
@@ -79,7 +81,7 @@ class LasSource : public PointSource {
         fields_(read_fields(file_, header_)),
         rows_of_(header_, fields_.surfel),
         records_(open_las_records(file_, header_)) {
-    look_at_points();
+    look_at_colours();
     static const std::vector<double> narrow = tabulate_srgb(255);
     static const std::vector<double> wide = tabulate_srgb(65535);
     if (colours_ == Colours::eight_bits) curve_ = narrow;
@@ -98,7 +100,6 @@ class LasSource : public PointSource {
     info.has_radiance = surfel.radiance.has_value();
     info.has_emission = surfel.emission.has_value();
     info.has_albedo = surfel.albedo.has_value() || !curve_.empty();
-    add_bounds(info);
     info.channels = fields_.channels;
     if (colours_ == Colours::eight_bits)
       std::ranges::find(info.channels, "rgb", &Channel::name)->scale = kByteScale;
@@ -137,6 +138,34 @@ class LasSource : public PointSource {
 
   [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return rows_; }
 
+  // Gives the box of the header, unless a sample of the points says that the box is wrong or far
+  // too large, as programs leave it that cut a part out of a file.
+  [[nodiscard]] std::optional<Extent> extent() override {
+    Extent extent{.bounds = header_.bounds};
+    for (int axis = 0; axis < 3; ++axis) {
+      // Programs compute the box in their own ways, so it is larger by what rounding may change
+      const double rounding = std::abs(header_.scale[static_cast<std::size_t>(axis)]) / 1024;
+      extent.bounds.low[axis] -= rounding;
+      extent.bounds.high[axis] += rounding;
+    }
+    Bounds sampled;
+    std::size_t looked = 0;
+    records_->sample([&](std::span<const std::byte> records) {
+      for (; !records.empty(); records = records.subspan(header_.record_bytes)) {
+        const glm::dvec3 position = position_of(records.data());
+        sampled.add(position);
+        if (looked++ % kSampleStride == 0) extent.sample.push_back(position);
+      }
+    });
+    const Bounds& box = extent.bounds;
+    const bool believed = !sampled.empty() && box.contains(sampled.low) &&
+                          box.contains(sampled.high) &&
+                          largest_side(sampled) >= largest_side(box) / 2 &&
+                          fits_coordinates(box.low) && fits_coordinates(box.high);
+    if (!believed) return std::nullopt;
+    return extent;
+  }
+
  private:
   static LasFields read_fields(const InputFile& file, const LasHeader& header) {
     const LasRecord* const record = header.find(kSpecUser, kExtraBytesNumber);
@@ -145,42 +174,18 @@ class LasSource : public PointSource {
                            read_las_payload(file, *record).value_or(std::vector<std::byte>()));
   }
 
-  // Takes a sample of the points, which decides what the colours are.
-  void look_at_points() {
-    if (header_.points == 0) return;
-    const bool coloured = laz::has_rgb(header_.format);
+  // Decides what the colours are by a sample of the points.
+  void look_at_colours() {
+    if (!laz::has_rgb(header_.format) || header_.points == 0) return;
     const std::size_t place = rgb_place(header_.format);
     std::uint16_t most = 0;
-    std::size_t looked = 0;
     records_->sample([&](std::span<const std::byte> records) {
-      for (; !records.empty(); records = records.subspan(header_.record_bytes)) {
-        const glm::dvec3 position = position_of(records.data());
-        sampled_.add(position);
-        if (looked++ % kSampleStride == 0) sample_.push_back(position);
-        if (coloured) most = std::max(most, std::ranges::max(rgb_at(records.data(), place)));
-      }
+      for (; !records.empty(); records = records.subspan(header_.record_bytes))
+        most = std::max(most, std::ranges::max(rgb_at(records.data(), place)));
     });
-    if (!coloured) return;
     colours_ = most == 0    ? Colours::black
                : most > 255 ? Colours::sixteen_bits
                             : Colours::eight_bits;
-  }
-
-  // Gives the box of the header, unless the sample says that the box is wrong or far too large, as
-  // programs leave it that cut a part out of a file.
-  void add_bounds(PointFileInfo& info) const {
-    Bounds box = header_.bounds;
-    for (int axis = 0; axis < 3; ++axis) {
-      // Programs compute the box in their own ways, so it is larger by what rounding may change
-      const double rounding = std::abs(header_.scale[static_cast<std::size_t>(axis)]) / 1024;
-      box.low[axis] -= rounding;
-      box.high[axis] += rounding;
-    }
-    if (sampled_.empty() || !box.contains(sampled_.low) || !box.contains(sampled_.high)) return;
-    if (largest_side(sampled_) < largest_side(box) / 2) return;
-    if (!fits_coordinates(box.low) || !fits_coordinates(box.high)) return;
-    info.bounds = box;
-    info.sample = sample_;
   }
 
   /// Returns the format as its users name it: "LAZ 1.4 (COPC), point format 7".
@@ -283,10 +288,10 @@ class LasSource : public PointSource {
 
   // Returns what a number stands for; nothing when it is not known.
   static std::optional<double> value_of(const std::byte* record, const LasNumber& number) {
+    const Channel& channel = number.channel;
     const std::byte* const at = record + number.offset;
-    if (number.no_value && std::memcmp(at, &*number.no_value, channel_bytes(number.type)) == 0)
-      return std::nullopt;
-    return load_number(at, number.type) * number.scale + number.shift;
+    if (is_unknown(channel, at)) return std::nullopt;
+    return load_number(at, channel.type) * channel.scale + channel.offset;
   }
   static std::optional<glm::dvec3> values_of(const std::byte* record, const LasTriple& triple) {
     glm::dvec3 values;
@@ -319,8 +324,6 @@ class LasSource : public PointSource {
   LasFields fields_;
   LasRows rows_of_;
   std::unique_ptr<LasRecordSource> records_;
-  Bounds sampled_;                  // of the points that were looked at on opening
-  std::vector<glm::dvec3> sample_;  // positions of some of them
   Colours colours_ = Colours::none;
   std::vector<double> curve_;    // linear value of each stored colour; empty without colours
   LasBlock block_;               // records that next() has not returned

@@ -224,8 +224,7 @@ class FieldList {
     list_.names.push_back({.channel = std::string(*surfel_name(field.name)),
                            .name = field.name,
                            .description = description_of(field)});
-    const Channel number = number_of(field.type, field.description, 0);
-    return {field.offset, field.type, number.scale, number.offset, number.no_value};
+    return {field.offset, number_of(field.type, field.description, 0)};
   }
 
   // Returns type, scale, offset and no-data value of a number of a described field.
@@ -321,7 +320,7 @@ LasRows::LasRows(const LasHeader& header, const LasSurfel& surfel)
   };
   for (const LasNumber& number : surfel.numbers()) {
     copy_until(number.offset);
-    from = number.offset + channel_bytes(number.type);
+    from = number.offset + number.channel.bytes();
   }
   copy_until(header.record_bytes);
 }

@@ -15,13 +15,10 @@
 
 namespace ptc {
 
-/// A number of the surfel in the extra bytes of a record. A value v stands for v scale + shift.
+/// A number of the surfel in the extra bytes of a record.
 struct LasNumber {
   std::size_t offset = 0;  ///< in the record, bytes
-  ChannelType type = ChannelType::f32;
-  double scale = 1;
-  double shift = 0;
-  std::optional<std::uint64_t> no_value;  ///< the bits that stand for "not known"
+  Channel channel;         ///< its type and what its values mean
 };
 
 /// Three numbers of the surfel that belong together.

@@ -23,8 +23,8 @@ inline constexpr double kByteScale = 1 / 255.0;
 /// The facts about a point file that are known before its points are read.
 struct PointFileInfo {
   std::string format;  ///< with its version where the file states one: "LAS 1.2, point format 3"
-  /// The bounds that the header states, scene units; no reader relies on them. Empty when it states
-  /// none.
+  /// The bounds that the header states, scene units, which may be wrong (PointSource::extent()).
+  /// Nothing when it states none.
   std::optional<Bounds> stated_bounds;
   /// The number of records, those that PointSource::left_out() counts among them; nothing when the
   /// file does not say it before its end.
@@ -43,12 +43,6 @@ struct PointFileInfo {
   /// Where the scanners stood, scene units. A channel named `scan` holds the index of the scanner
   /// of each point; without one, all points are of the first. Empty when that is not known.
   std::vector<glm::dvec3> scanners;
-  /// A box that the file says holds all points, scene units. Points beyond it are possible, but
-  /// none of `sample` is. Nothing when the file says none that can be believed.
-  std::optional<Bounds> bounds;
-  /// Positions of points from places that are spread evenly over the file, scene units; empty
-  /// without `bounds`.
-  std::vector<glm::dvec3> sample;
   /// What the reader leaves out or assumes, one sentence each, for the user.
   std::vector<std::string> notes;
 };

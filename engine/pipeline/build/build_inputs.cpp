@@ -270,15 +270,14 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   note_scan(file.info, cloud);
   cloud.channels = std::move(file.info.channels);
   // Take what it says of their place, or read them
-  const bool told = from == BoundsFrom::files && alone && file.info.bounds && file.info.count &&
-                    selection.takes_all() && !file.info.has_normals && !file.info.has_radius &&
-                    !file.info.has_emission;
-  if (told) {
-    cloud.said = file.info.bounds;
+  const bool place_suffices = from == BoundsFrom::files && alone && file.info.count &&
+                              !file.info.has_normals && !file.info.has_radius &&
+                              !file.info.has_emission;
+  if (auto told = place_suffices ? file.source->extent() : std::nullopt) {
+    cloud.said = told->bounds;
     cloud.points = *file.info.count;
-    bounds.add(*cloud.said);
-    sample.insert(sample.end(), file.info.sample.begin(), file.info.sample.end());
-    thin(sample);
+    bounds.add(told->bounds);
+    sample = std::move(told->sample);
   } else {
     read_points(file, alone, name, cloud, progress);
   }
