@@ -10,13 +10,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/point_writer.h"
@@ -25,6 +23,7 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/scene/procedural/city.h"
 #include "engine/sort/external_sort.h"
+#include "tools/bench/experiments/python_run.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 
@@ -245,20 +244,13 @@ class FormatsRun : public BenchRun<FormatsOptions, FormatRow> {
   void run_library(const std::string& library, const std::string& work, const std::string& name,
                    const std::filesystem::path& path, const std::vector<glm::dvec3>* positions) {
     if (options_.python.empty()) return;
-    const WorkFile script(work_, "-libraries.py"), facts(work_, "-facts"), places(work_, "-places"),
-        written(work_, "-written" + path.extension().string());
-    std::ofstream(script.path()) << kLibraries;
-    const std::string command =
-        fmt::format("'{}' '{}' '{}' '{}' '{}' '{}' '{}' '{}'", options_.python.string(),
-                    script.path().string(), library, work, path.string(), written.path().string(),
-                    places.path().string(), facts.path().string());
+    const WorkFile places(work_, "-places"), written(work_, "-written" + path.extension().string());
     Costs costs;
     for (unsigned i = 0; i < options_.repeats; ++i) {
-      if (std::system(command.c_str()) != 0)  // NOLINT(cert-env33-c): the user names it
-        throw DataError("formats: " + options_.python.string() + " cannot run " + library);
-      std::ifstream in(facts.path());
-      const auto read = nlohmann::json::parse(in);
-      costs.add({.wall = read.at("wall").get<double>(), .cpu = read.at("cpu").get<double>()});
+      const auto facts = run_python(
+          options_.python, work_, kLibraries,
+          {library, work, path.string(), written.path().string(), places.path().string()}, library);
+      costs.add({.wall = facts.at("wall").get<double>(), .cpu = facts.at("cpu").get<double>()});
     }
     std::vector<glm::dvec3> read(std::filesystem::file_size(places.path()) / sizeof(glm::dvec3));
     std::ifstream in(places.path(), std::ios::binary);

@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <numbers>
@@ -18,7 +17,6 @@
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/record.h"
@@ -26,6 +24,7 @@
 #include "engine/scan/scan.h"
 #include "format/checksum.h"
 #include "format/scalar.h"
+#include "tools/bench/experiments/python_run.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/sampled_cloud.h"
@@ -183,23 +182,16 @@ void write_bytes(const std::filesystem::path& path, const void* data, std::size_
 
 ScanRow measure_open3d(const SampledCloud& cloud, const ScanBenchOptions& options,
                        const std::filesystem::path& work) {
-  const WorkFile script(work, "-open3d.py"), points(work, "-points"), result(work, "-normals"),
-      facts(work, "-facts");
-  write_bytes(script.path(), kOpen3d, std::strlen(kOpen3d));
+  const WorkFile points(work, "-points"), result(work, "-normals");
   write_bytes(points.path(), cloud.positions.data(), cloud.positions.size() * sizeof(glm::dvec3));
-  const std::string command =
-      fmt::format("'{}' '{}' '{}' '{}' '{}'", options.python.string(), script.path().string(),
-                  points.path().string(), result.path().string(), facts.path().string());
   ScanRow row{.method = "Open3D, 30 neighbours"};
   std::vector<double> cpu, normals_cpu;
   for (unsigned i = 0; i < options.repeats; ++i) {
-    if (std::system(command.c_str()) != 0)  // NOLINT(cert-env33-c): the user names the interpreter
-      throw DataError("scan: " + options.python.string() + " cannot run Open3D");
-    std::ifstream in(facts.path());
-    const auto read = nlohmann::json::parse(in);
-    cpu.push_back(read.at("all").get<double>());
-    normals_cpu.push_back(read.at("normals").get<double>());
-    row.resident_bytes = std::max(row.resident_bytes, read.at("bytes").get<std::uint64_t>());
+    const auto facts = run_python(options.python, work, kOpen3d,
+                                  {points.path().string(), result.path().string()}, "Open3D");
+    cpu.push_back(facts.at("all").get<double>());
+    normals_cpu.push_back(facts.at("normals").get<double>());
+    row.resident_bytes = std::max(row.resident_bytes, facts.at("bytes").get<std::uint64_t>());
   }
   std::vector<glm::vec3> normals(cloud.records.size());
   std::ifstream in(result.path(), std::ios::binary);
