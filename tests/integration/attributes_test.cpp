@@ -22,10 +22,12 @@
 #include "engine/store/reader.h"
 #include "engine/verify/verify.h"
 #include "format/point_page.h"
+#include "tests/support/notes.h"
 #include "tests/support/read_points.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
+using test::Notes;
 using test::read_points;
 using test::ReadPoints;
 using test::TemporaryDirectory;
@@ -121,12 +123,6 @@ std::multiset<unsigned> labels_of(const std::filesystem::path& path,
     labels.insert(read.value<std::uint8_t>(i, at));
   return labels;
 }
-
-/// Keeps all notes.
-struct Notes : Progress {
-  void note(const std::string& text) override { texts.push_back(text); }
-  std::vector<std::string> texts;
-};
 
 BuildRequest request_of(std::vector<std::filesystem::path> inputs, std::uint64_t memory = 1 << 28) {
   BuildRequest request;

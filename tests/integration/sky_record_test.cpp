@@ -14,19 +14,13 @@
 #include "engine/ptc.h"
 #include "engine/store/container_points.h"
 #include "engine/store/reader.h"
+#include "tests/support/notes.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
 using namespace ptc::test;
 
 namespace {
-
-/// Collects the notes of a run.
-class Notes : public Progress {
- public:
-  void note(const std::string& text) override { texts.push_back(text); }
-  std::vector<std::string> texts;
-};
 
 /// A sky that is dark except for a bright band.
 void write_sky(const std::filesystem::path& path, float brightness) {

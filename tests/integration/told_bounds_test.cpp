@@ -10,6 +10,7 @@
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/store/reader.h"
 #include "tests/io/las_files.h"
+#include "tests/support/notes.h"
 #include "tests/support/read_points.h"
 #include "tests/support/scenes.h"
 
@@ -18,12 +19,6 @@ using namespace ptc::test;
 using Catch::Matchers::Contains;
 
 namespace {
-
-class Notes : public Progress {
- public:
-  void note(const std::string& text) override { texts.push_back(text); }
-  std::vector<std::string> texts;
-};
 
 /// A sheet of 200,000 points, of which the one at three quarters is at x = `odd`, hundredths.
 std::string sheet(std::int32_t odd) {

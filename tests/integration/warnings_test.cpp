@@ -7,6 +7,7 @@
 
 #include "engine/pipeline/scene_record.h"
 #include "engine/ptc.h"
+#include "tests/support/notes.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -14,12 +15,6 @@ using namespace ptc::test;
 using Catch::Matchers::Contains;
 
 namespace {
-
-class Notes : public Progress {
- public:
-  void note(const std::string& text) override { texts.push_back(text); }
-  std::vector<std::string> texts;
-};
 
 /// A triangle whose texture is missing.
 void write_bare(const std::filesystem::path& directory, const std::string& name) {
