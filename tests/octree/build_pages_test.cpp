@@ -163,7 +163,8 @@ TEST_CASE("build: most node pages end where a cell of several groups does", "[bu
     const PageHeader before = reader.read_page_header(nodes[rank - 1]);
     const PageHeader after = reader.read_page_header(nodes[rank]);
     if (before.level != after.level || before.last_key >= after.first_key) continue;
-    // Both keys agree down to this level; groups of one cell agree down to their level less 1.
+    // The last group of a page and the first of the next one share their cells down to `common`.
+    // Groups of one cell share all but the last of theirs.
     const int common = common_level({before.last_key, 0}, {after.first_key, 0});
     ++ends;
     if (common < before.level - 1) ++wide;

@@ -6,8 +6,8 @@
 //   watch Tally::next in shared memory   <--  next, tried, accepted, refused, misread
 //   killed or exited: count a crash or a hang, fork again at the way after it
 //
-// Of a scene of parts one file is changed at a time, its own or one of a part, and the scene is
-// verified and read. Last, its files are removed, exchanged, and put in the place of each other.
+// A scene of parts has several files. One of them is changed at a time, and the scene is verified
+// and read. Last, files are removed, exchanged, and put in the place of each other.
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
