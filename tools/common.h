@@ -109,6 +109,8 @@ class Command {
   void add_common_options();
   /// The text that --generate prints.
   [[nodiscard]] std::string generated(const std::string& kind) const;
+  /// A message with the names of show_as().
+  [[nodiscard]] std::string renamed(std::string text) const;
   void check_files() const;
   /// Returns false when nothing is left to do: after --help, --version and usage errors.
   [[nodiscard]] bool parse(int argc, char** argv, int& exit_code);
@@ -121,9 +123,6 @@ class Command {
   bool progress_ = false;
   bool quiet_ = false;
   bool json_ = false;
-  /// A message with the names of show_as().
-  [[nodiscard]] std::string renamed(std::string text) const;
-
   std::vector<std::pair<std::filesystem::path, std::string>> shown_names_;
   using Paths = std::vector<std::filesystem::path>;
   std::vector<const std::filesystem::path*> inputs_;

@@ -120,7 +120,7 @@ ptc::Outcome tell_losses(const Arguments& arguments, ptc::Progress& progress) {
   const bool from_container = ptc::is_container(arguments.input);
   if (!from_container && !ptc::is_point_file(arguments.input)) refuse_mesh(arguments);
   const bool to_container = ptc::has_ending(arguments.output, ".ptcx");
-  const auto format = to_container ? std::nullopt : ptc::output_format(arguments.output);
+  const auto format = ptc::output_format(arguments.output);
   const ptc::PointWriteInfo info =
       from_container
           ? ptc::describe_points(ptc::ContainerReader(arguments.input), arguments.points, format)

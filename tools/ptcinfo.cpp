@@ -355,6 +355,8 @@ ordered_json cloud_facts(const std::filesystem::path& path, const ptc::PointFile
   facts["bytes"] = {{"file", std::filesystem::file_size(path)}};
   facts["normals"] = info.has_normals;
   facts["radii"] = info.has_radius;
+  facts["radiance"] = info.has_radiance;
+  facts["emission"] = info.has_emission;
   facts["colours"] = info.has_albedo;
   facts["channels"] = channels_of(info.channels);
   facts["text"] = info.text;
@@ -374,7 +376,7 @@ std::string cloud_summary(const ordered_json& facts) {
   if (facts.contains("bounds"))
     text += "  bounds    " + bounds_text(facts["bounds"]) + ", as the header states\n";
   std::string surfel = "position";
-  for (const char* part : {"normals", "radii", "colours"}) {
+  for (const char* part : {"normals", "radii", "radiance", "emission", "colours"}) {
     if (facts[part].get<bool>()) surfel += std::string(", ") + part;
   }
   text += "  of each   " + surfel + "\n" + record_text(facts["text"]) + channels_text(facts);

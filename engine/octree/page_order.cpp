@@ -14,7 +14,6 @@ namespace ptc {
 namespace {
 
 constexpr std::uint32_t kProvisional = 0x80000000;  // bit of a number that is no rank yet
-constexpr std::size_t kPagesAtOnce = 64;            // held pages that are written together
 
 /// Copies bytes into a vector, whose memory is aligned so that payloads can be read as numbers.
 std::vector<std::byte> aligned(std::span<const std::byte> bytes) {
@@ -189,21 +188,22 @@ void PageOrder::finish() {
 }
 
 void PageOrder::finish_held(const Executor& executor) {
-  std::size_t left = 0;
-  for (const Stream& stream : streams_) left += stream.held.size();
+  std::vector<Page> pages;
   for (std::size_t i = cut_; i-- > 0;) {
     for (Held& page : std::exchange(streams_[i].held, {})) {
       const std::uint32_t rank = writer_.reserve_page(PageType::node);
       ranks_[page.page & ~kProvisional] = rank;
       place(rank, page.content);
-      whole_.push_back(std::move(page.content));
-      // Write pages together, and then keep those for which the tail has room
-      --left;
-      if (left >= kMaxTailPages ? whole_.size() == kPagesAtOnce : left == kMaxTailPages - 1)
-        writer_.write_pages(take(), executor);
+      pages.push_back(std::move(page.content));
     }
   }
-  for (const Page& page : take()) writer_.keep_page(page.summary, page.payload);
+  // Keep those for which the tail has room
+  const auto kept =
+      pages.end() - static_cast<std::ptrdiff_t>(std::min(pages.size(), kMaxTailPages - 1));
+  std::vector<Page> tail(std::make_move_iterator(kept), std::make_move_iterator(pages.end()));
+  pages.erase(kept, pages.end());
+  writer_.write_pages(std::move(pages), executor);
+  for (const Page& page : tail) writer_.keep_page(page.summary, page.payload);
 }
 
 void PageOrder::take_points() {

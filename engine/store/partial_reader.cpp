@@ -200,6 +200,8 @@ void PartialReader::load_entries(std::span<const std::uint32_t> pages) {
   // Find the entries that are not known, with those around them that are not known either
   std::vector<Extent> extents;
   for (const std::uint32_t page : pages) {
+    if (page >= superblock_.page_count)
+      throw std::invalid_argument("PartialReader: there is no page " + std::to_string(page));
     if (entries_.contains(page)) continue;
     const PageNumbers::Range kind = kind_of(page);
     std::uint32_t first = page - std::min(page - kind.first, kEntriesAround);
@@ -229,8 +231,6 @@ std::optional<std::uint32_t> PartialReader::known_node_page(int level, std::uint
 void PartialReader::load(std::span<const std::uint32_t> pages) {
   std::vector<std::uint32_t> wanted;
   for (const std::uint32_t page : pages) {
-    if (page >= superblock_.page_count)
-      throw std::invalid_argument("PartialReader::load: there is no page " + std::to_string(page));
     if (!pages_.contains(page)) wanted.push_back(page);
   }
   std::ranges::sort(wanted);

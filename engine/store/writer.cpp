@@ -22,6 +22,7 @@
 namespace ptc {
 namespace {
 
+constexpr std::size_t kPagesAtOnce = 64;    // that write_pages() encodes before it writes them
 constexpr std::uint64_t kFinishBytes = 96;  // memory that finish() takes for each page
 // Most bytes of node pages in the tail. A first request of 256 KiB then gets the last 2,400 entries
 // of the directory as well, and knows where the pages lie that it asks for next.
@@ -190,13 +191,16 @@ void ContainerWriter::write_pages(std::vector<Page> pages, const Executor& execu
   require_of_writer(std::ranges::all_of(pages, has_points_or_nodes, &Page::summary),
                     "write_pages() is for pages of points and nodes");
   begin_page();
-  if (images_.size() < pages.size()) images_.resize(pages.size());
+  images_.resize(std::max(images_.size(), std::min(pages.size(), kPagesAtOnce)));
   encoder_.prepare(executor.threads());
   auto write = [this, pages = std::move(pages), &executor] {
-    executor.for_each(pages.size(), [&](std::size_t i, unsigned thread) {
-      encoder_.encode(pages[i].summary, pages[i].payload, {}, thread, images_[i]);
-    });
-    for (const PageImage& image : std::span(images_).first(pages.size())) append_page(image);
+    for (std::size_t at = 0; at < pages.size(); at += kPagesAtOnce) {
+      const auto some = std::span(pages).subspan(at, std::min(kPagesAtOnce, pages.size() - at));
+      executor.for_each(some.size(), [&](std::size_t i, unsigned thread) {
+        encoder_.encode(some[i].summary, some[i].payload, {}, thread, images_[i]);
+      });
+      for (const PageImage& image : std::span(images_).first(some.size())) append_page(image);
+    }
   };
   if (executor.threads() == 1) return write();
   writing_ = in_background(std::move(write));

@@ -5,7 +5,6 @@
 
 #include <catch2/catch.hpp>
 
-#include "engine/io/cloud/points.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/ptc.h"
 #include "engine/verify/salvage.h"

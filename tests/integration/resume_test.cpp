@@ -6,7 +6,6 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/points.h"
 #include "engine/ptc.h"
 #include "engine/sort/spill.h"
 #include "tests/support/scenes.h"

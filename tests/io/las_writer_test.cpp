@@ -336,7 +336,7 @@ TEST_CASE("las writer: extra bytes keep the names and descriptions that they had
                        description(3, "Echo Width", "of the pulse [ns]") +
                            description(5, "Intensity", "Brightness") +
                            description(23, "Colours", "three") + description(9, "NormalX", "") +
-                           description(9, "NormalY", "") + description(9, "NormalZ", "") +
+                           description(9, "NormalY", "north") + description(9, "NormalZ", "") +
                            description(1, "echo width", "another") +
                            description(1, "z", "hides a coordinate"))};
   const auto path = scratch.file("a.las", file.bytes());
@@ -359,6 +359,8 @@ TEST_CASE("las writer: extra bytes keep the names and descriptions that they had
   const auto says = [&](std::size_t i) {
     return std::string(list.substr(i * 192 + 160, 32).c_str());
   };
+  CHECK(says(1) == "north");
+  CHECK(says(2) == "1");  // the unit
   CHECK(says(3) == "of the pulse [ns]");
   CHECK(says(4) == "Brightness");
   CHECK(says(6) == "three");

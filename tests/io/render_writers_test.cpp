@@ -135,6 +135,15 @@ TEST_CASE("pcd writer: points that lie in a grid row by row are organised, no ot
   is_plain({{4'000'000'000U, 4'000'000'000U}, {0, 1}});  // anything
 }
 
+TEST_CASE("pcd writer: a row of -1 is none of a grid", "[io][writers][pcd]") {
+  GridCheck check;
+  check.add(0, ~std::uint64_t{0}, 0);
+  check.add(1, 0, 1);
+  check.add(2, 1, 0);
+  check.add(3, 1, 1);
+  CHECK_FALSE(check.grid());
+}
+
 TEST_CASE("pcd writer: positions are floats near the origin and doubles in a national grid",
           "[io][writers][pcd]") {
   const test::TemporaryDirectory scratch;
@@ -347,6 +356,30 @@ TEST_CASE("bgeo writer: the header and the points are those of version 5, big-en
   CHECK(big_at<std::int32_t>(bytes, at + 16) == -1);
   CHECK(big_at<std::int32_t>(bytes, at + 20) == 100);
   CHECK(bytes.substr(at + 24) == std::string("\0\xff", 2));
+}
+
+TEST_CASE("bgeo writer: a colour that is not known gives way to the albedo",
+          "[io][writers][bgeo]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(2);
+  PointWriteInfo info = plain_info(surfels);
+  info.has_albedo = true;
+  info.channels = {{.name = "rgb",
+                    .type = ChannelType::f32,
+                    .components = 3,
+                    .role = ChannelRole::colour,
+                    .colour_space = ColourSpace::rec709,
+                    .no_value = 0x7fc00000}};
+  std::vector<std::byte> rows;
+  for (const float v : {0.5F, 0.125F, 1.0F}) append_value(rows, v);
+  for (int i = 0; i < 3; ++i) append_value(rows, std::uint32_t{0x7fc00000});
+  write_points(scratch / "a.bgeo", OutputFormat::bgeo, info, surfels, rows);
+  std::vector<Surfel> back(3);
+  REQUIRE(open_points(scratch / "a.bgeo").source->next(back) == 2);
+  CHECK(back[0].albedo == glm::vec3(0.5F, 0.125F, 1));
+  CHECK(back[1].albedo == surfels[1].albedo);
+  CHECK(unknown_losses(OutputFormat::bgeo, info) ==
+        std::vector<std::string>{"Points without a colour of their own get that of their albedo."});
 }
 
 TEST_CASE("bgeo writer: more points than its count can say are refused", "[io][writers][bgeo]") {

@@ -74,12 +74,6 @@ std::map<std::string, std::string> original_names(const PointWriteInfo& info) {
   return names;
 }
 
-// Says whether a channel has the colour Cd as a BGEO had it.
-bool is_linear_colour(const Channel& channel) {
-  return channel.name == "rgb" && channel.components == 3 && channel.type == ChannelType::f32 &&
-         channel.colour_space == ColourSpace::rec709 && !is_scaled(channel);
-}
-
 class BgeoWriter : public CheckedWriter {
  public:
   BgeoWriter(const std::filesystem::path& target, const PointWriteInfo& info)
@@ -176,7 +170,8 @@ class BgeoWriter : public CheckedWriter {
   }
 
   [[nodiscard]] glm::vec3 colour_of(const Surfel& surfel, const std::byte* row) const {
-    if (!linear_) return colour_.linear(surfel, row);
+    if (!linear_ || is_unknown(linear_->channel, linear_->at(row, 0)))
+      return colour_.linear(surfel, row);
     glm::vec3 colour;
     std::memcpy(&colour, linear_->at(row, 0), sizeof colour);
     return colour;
@@ -196,6 +191,11 @@ class BgeoWriter : public CheckedWriter {
 };
 
 }  // namespace
+
+bool is_linear_colour(const Channel& channel) noexcept {
+  return channel.name == "rgb" && channel.components == 3 && channel.type == ChannelType::f32 &&
+         channel.colour_space == ColourSpace::rec709 && !is_scaled(channel);
+}
 
 std::unique_ptr<PointWriter> create_bgeo(const std::filesystem::path& target,
                                          const PointWriteInfo& info) {

@@ -69,6 +69,8 @@ class CheckedWriter : public PointWriter {
 [[nodiscard]] std::vector<std::string> usd_losses(const PointWriteInfo& info);
 [[nodiscard]] std::vector<std::string> xyz_losses(const PointWriteInfo& info);
 
+/// Says whether a channel has the colour Cd as a BGEO had it, which becomes Cd again.
+[[nodiscard]] bool is_linear_colour(const Channel& channel) noexcept;
 /// Returns what unknown_losses() says of LAS.
 [[nodiscard]] std::vector<std::string> las_unknown_losses(const PointWriteInfo& info);
 /// Says that points whose stored colour is not known get that of their albedo.

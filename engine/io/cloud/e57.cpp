@@ -22,10 +22,6 @@
 namespace ptc {
 namespace {
 
-bool any_nan(const glm::dvec3& v) {
-  return std::isnan(v.x) || std::isnan(v.y) || std::isnan(v.z);
-}
-
 // Returns the point of a range (m), an azimuth in the xy plane from x to y, and an elevation.
 glm::dvec3 from_spherical(const glm::dvec3& polar) {
   const double flat = polar.x * std::cos(polar.z);
@@ -152,7 +148,7 @@ class E57Source : public PointSource {
     // Place it in the coordinates of the file.
     if (roles_.invalid && real(*roles_.invalid) != 0) return false;
     glm::dvec3 position = real(roles_.position);
-    if (any_nan(position)) return false;
+    if (has_nan(position)) return false;
     if (roles_.spherical) position = from_spherical(position);
     RawSurfel raw;
     raw.position = scan().rotation * position + scan().translation;
@@ -161,7 +157,7 @@ class E57Source : public PointSource {
     bool has_normal = false;
     if (roles_.normal) {
       const glm::dvec3 normal = real(*roles_.normal);
-      has_normal = !any_nan(normal) && normal != glm::dvec3(0);
+      has_normal = !has_nan(normal) && normal != glm::dvec3(0);
       if (has_normal) raw.normal = scan().rotation * normal;
     }
     if (roles_.colour && !(roles_.no_colour && real(*roles_.no_colour) != 0)) {
@@ -170,7 +166,7 @@ class E57Source : public PointSource {
         const auto component = static_cast<std::size_t>(i);
         colour[i] = curves_[component](value((*roles_.colour)[component]));
       }
-      if (!any_nan(colour)) raw.albedo = colour;
+      if (!has_nan(colour)) raw.albedo = colour;
     }
     const std::string rule = convert_surfel(raw, has_normal, surfel);
     if (!rule.empty()) {

@@ -141,7 +141,9 @@ class LasSource : public PointSource {
   // Gives the box of the header, unless a sample of the points says that the box is wrong or far
   // too large, as programs leave it that cut a part out of a file.
   [[nodiscard]] std::optional<Extent> extent() override {
-    Extent extent{.bounds = header_.bounds};
+    const std::optional<Bounds> stated = stated_bounds();
+    if (!stated) return std::nullopt;
+    Extent extent{.bounds = *stated};
     for (int axis = 0; axis < 3; ++axis) {
       // Programs compute the box in their own ways, so it is larger by what rounding may change
       const double rounding = std::abs(header_.scale[static_cast<std::size_t>(axis)]) / 1024;
@@ -188,14 +190,14 @@ class LasSource : public PointSource {
                             : Colours::eight_bits;
   }
 
-  /// Returns the format as its users name it: "LAZ 1.4 (COPC), point format 7".
+  // Returns the format as its users name it: "LAZ 1.4 (COPC), point format 7".
   [[nodiscard]] std::string format_name() const {
     const bool copc = header_.find("copc", 1) != nullptr;
     return std::string(header_.compressed ? "LAZ" : "LAS") + " 1." + std::to_string(header_.minor) +
            (copc ? " (COPC)" : "") + ", point format " + std::to_string(header_.format);
   }
 
-  /// Returns the bounds of the header, unless they are no box.
+  // Returns the bounds of the header, unless they are no box.
   [[nodiscard]] std::optional<Bounds> stated_bounds() const {
     const Bounds& bounds = header_.bounds;
     for (int axis = 0; axis < 3; ++axis) {
@@ -281,17 +283,12 @@ class LasSource : public PointSource {
     if (parts.albedo) raw.albedo = values_of(record, *parts.albedo).value_or(raw.albedo);
     if (!parts.normal) return false;
     raw.normal = values_of(record, *parts.normal).value_or(glm::dvec3(0));
-    const bool has_nan =
-        std::isnan(raw.normal.x) || std::isnan(raw.normal.y) || std::isnan(raw.normal.z);
-    return !has_nan && raw.normal != glm::dvec3(0);
+    return !has_nan(raw.normal) && raw.normal != glm::dvec3(0);
   }
 
   // Returns what a number stands for; nothing when it is not known.
   static std::optional<double> value_of(const std::byte* record, const LasNumber& number) {
-    const Channel& channel = number.channel;
-    const std::byte* const at = record + number.offset;
-    if (is_unknown(channel, at)) return std::nullopt;
-    return load_number(at, channel.type) * channel.scale + channel.offset;
+    return meaning_of(number.channel, record + number.offset);
   }
   static std::optional<glm::dvec3> values_of(const std::byte* record, const LasTriple& triple) {
     glm::dvec3 values;

@@ -5,10 +5,10 @@
 //        4  source u16, encoding u16          105  bytes of a point record u16
 //        8  GUID                              107  points u32; since 1.4 kept for old readers
 //       24  version u8 u8                     131  scale x y z f64, offset x y z f64
-//       26  system, software: 32 bytes each   227  since 1.3: offset of wave packets u64
-//       90  day u16, year u16                 235  since 1.4: offset of EVLRs u64, their number u32
-//       94  bytes of the header u16           247  since 1.4: points u64
-//       96  offset of points u32               179  bounds: max min of x, of y, of z f64
+//       26  system, software: 32 bytes each   179  bounds: max and min of x, of y, of z f64
+//       90  day u16, year u16                 227  since 1.3: offset of wave packets u64
+//       94  bytes of the header u16           235  since 1.4: offset of EVLRs u64, their number u32
+//       96  offset of points u32              247  since 1.4: points u64
 //      100  number of VLRs u32
 //
 // Every number is compared with the size of the file before it leads anywhere.

@@ -29,34 +29,23 @@ constexpr std::size_t kMostNameBytes = 32;
 
 // Names that readers have for the standard places; extra bytes of the same name would hide them.
 std::set<std::string> standard_names() {
-  return {"x",
-          "y",
-          "z",
-          "red",
-          "green",
-          "blue",
-          "synthetic",
-          "key_point",
-          "withheld",
-          "overlap",
-          "bit_fields",
-          "scan_direction_flag",
-          "scan_angle_rank",
-          "raw_classification",
-          "classification_flags",
-          "intensity",
-          "return_number",
-          "number_of_returns",
-          "class_flags",
-          "scanner_channel",
-          "scan_direction",
-          "edge_of_flight_line",
-          "classification",
-          "user_data",
-          "scan_angle",
-          "point_source_id",
-          "gps_time",
-          "nir"};
+  std::set<std::string> names{"x",
+                              "y",
+                              "z",
+                              "red",
+                              "green",
+                              "blue",
+                              "synthetic",
+                              "key_point",
+                              "withheld",
+                              "overlap",
+                              "bit_fields",
+                              "scan_direction_flag",
+                              "scan_angle_rank",
+                              "raw_classification",
+                              "classification_flags"};
+  for (const std::string_view name : place_names()) names.emplace(name);
+  return names;
 }
 
 Extra surfel_extra(ExtraSource source, const char* name, std::uint8_t components, const char* unit,
@@ -130,17 +119,20 @@ class OriginalNames {
 
   void restore(Extra& extra) {
     std::vector<std::string>& parts = extra.channel.parts;
+    extra.descriptions.resize(parts.size());
     if (extra.source != ExtraSource::channel) {
       for (std::size_t i = 0; i < parts.size(); ++i) {
-        if (const LasName* const was = find(name_in_surfel(extra, i)))
-          take({&parts[i], 1}, {was->name});
+        const LasName* const was = find(name_in_surfel(extra, i));
+        if (was == nullptr) continue;
+        extra.descriptions[i] = was->description;
+        take({&parts[i], 1}, {was->name});
       }
       return;
     }
     const Channel& channel = extra.channel.channel;
     const LasName* const was = find(channel.name);
     if (was == nullptr) return;
-    extra.description = was->description;
+    std::ranges::fill(extra.descriptions, was->description);
     take(parts, part_names(was->name, channel.components, has_axes(channel)));
   }
 
@@ -217,8 +209,9 @@ Layout::Layout(const PointWriteInfo& info) : colour(info) {
 std::string Layout::extra_records() const {
   std::vector<std::byte> bytes;
   for (const Extra& extra : extras) {
-    for (const std::string& name : extra.channel.parts)
-      append_extra_record(bytes, extra.channel.channel, name, extra.description);
+    for (std::size_t i = 0; i < extra.channel.parts.size(); ++i)
+      append_extra_record(bytes, extra.channel.channel, extra.channel.parts[i],
+                          extra.descriptions[i]);
   }
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }

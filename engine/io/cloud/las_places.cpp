@@ -31,7 +31,7 @@ constexpr double kMostWord = 65535;
 struct Place {
   std::string_view name;
   Field field;
-  std::vector<ChannelType> types;  // those whose values fit
+  std::vector<ChannelType> types;  // those whose values fit; all fit a time
   double low;
   double high;
 };
@@ -51,11 +51,7 @@ const std::vector<Place>& places() {
       {"user_data", Field::user_data, {u8}, 0, 255},
       {"scan_angle", Field::scan_angle, {i8, i16}, -32768, 32767},
       {"point_source_id", Field::point_source_id, {u8, u16}, 0, kMostWord},
-      {"gps_time",
-       Field::gps_time,
-       {u8, u16, half, f32, u32, u64, i8, i16, i32, i64, f64},
-       -kEndless,
-       kEndless},
+      {"gps_time", Field::gps_time, {}, -kEndless, kEndless},
       {"nir", Field::nir, {u8, u16}, 0, kMostWord},
   };
   return kPlaces;
@@ -75,8 +71,8 @@ bool holds_steps(const Channel& channel) {
 
 // Says whether every value of a channel's type fits a place.
 bool fits_by_type(const Place& place, const Channel& channel) {
-  if (std::ranges::find(place.types, channel.type) == place.types.end()) return false;
   if (place.field == Field::gps_time) return true;
+  if (std::ranges::find(place.types, channel.type) == place.types.end()) return false;
   if (place.field == Field::scan_angle && channel.type == ChannelType::i16)
     return holds_steps(channel);
   // Returns that are counted from 0, as in E57, have an offset of 1.
@@ -104,8 +100,9 @@ void scale_intensity(PlacedChannel& placed, const ValueRange& range) {
     append(placed, 16, 16 * 2048);
     placed.loss = fmt::format("{} become 16 (v + 2048){}.", subject, rounded);
   } else {
-    const double factor = kMostWord / (range.high - range.low);
-    append(placed, factor, -range.low * factor);
+    const double side = range.high - range.low;
+    const double factor = side > 0 && std::isfinite(side) ? kMostWord / side : 0;
+    append(placed, factor, factor == 0 ? 0 : -range.low * factor);
     placed.loss = subject + " are spread over 0 to 65535 and are rounded.";
   }
 }
@@ -131,10 +128,15 @@ bool fit_range(PlacedChannel& placed, const ValueRange& range) {
 double PlacedChannel::value(const std::byte* row) const noexcept {
   const Channel& of = channel.channel;
   const std::byte* const at = channel.at(row, 0);
-  if (is_unknown(of, at)) return 0;
   const double value = load_number(at, of.type) * factor + shift;
   if (field == Field::gps_time) return value;
   return std::isnan(value) ? 0 : std::clamp(std::round(value), low, high);
+}
+
+std::vector<std::string_view> place_names() {
+  std::vector<std::string_view> names;
+  for (const Place& place : places()) names.push_back(place.name);
+  return names;
 }
 
 bool needs_range(const Channel& channel) {
@@ -176,8 +178,7 @@ std::optional<PlacedChannel> place_channel(const RowChannel& row,
 
 std::string misfit(const RowChannel& row, const std::map<std::string, ValueRange>& ranges) {
   const Place* const place = find_place(row.channel);
-  if (place == nullptr || !ranges.contains(row.channel.name) || place_channel(row, ranges))
-    return {};
+  if (place == nullptr || !ranges.contains(row.channel.name)) return {};
   const std::string held = place->field == Field::scan_angle
                                ? "degrees from -180 to 180"
                                : fmt::format("integers from {} to {}", place->low, place->high);

@@ -7,6 +7,8 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
@@ -41,9 +43,12 @@ struct PlacedChannel {
   double high = 0;   ///< the greatest one
   std::string loss;  ///< what is not kept of the values, a sentence; empty when all is
 
-  /// Returns the value of the place for a point; 0 where the channel has none.
+  /// Returns the value of the place for a point of which it is known; 0 for NaN.
   [[nodiscard]] double value(const std::byte* row) const noexcept;
 };
+
+/// Returns the names of all places.
+[[nodiscard]] std::vector<std::string_view> place_names();
 
 /// Says whether a channel has the name of a place, but must be measured before it can fill it.
 [[nodiscard]] bool needs_range(const Channel& channel);
@@ -55,7 +60,7 @@ struct PlacedChannel {
     const RowChannel& channel, const std::map<std::string, ValueRange>& ranges);
 
 /// Returns a sentence about a channel that was measured and does not fit the place of its name;
-/// empty for any other channel.
+/// empty for any other channel. @pre place_channel() found no place
 [[nodiscard]] std::string misfit(const RowChannel& channel,
                                  const std::map<std::string, ValueRange>& ranges);
 

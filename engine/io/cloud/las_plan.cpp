@@ -1,10 +1,10 @@
 // Decides the head of a LAS file and the records between its header and its points.
 //
 // A cloud that came from LAS carries two texts. `las.header` is a JSON object with the members
-// scale, offset, system or system_id, software (bytes as code points), day, year, encoding or
-// global_encoding, file_source_id and guid (32 hexadecimal digits); `las.vlrs` is base64 of the
-// variable length records as they lay in the file. Both may come from a file of anyone, so nothing
-// in them is taken for granted: what is not of the expected form is passed over.
+// format, record_length, scale, offset, system or system_id, software (bytes as code points), day,
+// year, encoding or global_encoding, file_source_id and guid (32 hexadecimal digits); `las.vlrs` is
+// base64 of the variable length records as they lay in the file. Both may come from a file of
+// anyone, so nothing in them is taken for granted: what is not of the expected form is passed over.
 //
 // Other clouds get steps of a power of ten, the finest with which 32 bits suffice:
 //

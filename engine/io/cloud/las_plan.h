@@ -66,8 +66,9 @@ enum class ExtraSource : std::uint8_t { normal, radius, radiance, emission, albe
 /// One quantity in the extra bytes: one number of a type of LAS for each of its components.
 struct Extra {
   ExtraSource source{};
-  RowChannel channel;         ///< its type, names, unit and scale; of a surfel's quantity, too
-  std::string description{};  ///< for people, at most 32 bytes; empty: the unit
+  RowChannel channel;  ///< its type, names, unit and scale; of a surfel's quantity, too
+  /// For people, of each component, at most 32 bytes; empty: the unit.
+  std::vector<std::string> descriptions{};
 };
 
 /// Where all values go in the record of a point.

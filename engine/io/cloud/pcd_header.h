@@ -52,7 +52,7 @@ struct PcdHeader {
   std::size_t point_bytes = 0;  ///< of a binary point, at most kMaxPcdPointBytes
 };
 
-/// The key of the text that keeps the viewpoint of a file, as its header has it, for the writer.
+/// The key of the text that keeps the viewpoint of a file for the writer, seven decimal numbers.
 inline constexpr const char* kPcdViewpoint = "pcd.viewpoint";
 
 /// Reads the seven finite numbers of a viewpoint. @return nothing when there are fewer

@@ -124,9 +124,9 @@ class PcdWriter : public CheckedWriter {
   // Returns the viewpoint of the file that the points came from, or the default.
   [[nodiscard]] std::string viewpoint() const {
     const auto text = info_.text.find(kPcdViewpoint);
-    if (text == info_.text.end() || !read_pcd_viewpoint(Words(text->second)))
-      return "0 0 0 1 0 0 0";
-    return fmt::format("{}", fmt::join(*read_pcd_viewpoint(Words(text->second)), " "));
+    const auto numbers =
+        text == info_.text.end() ? std::nullopt : read_pcd_viewpoint(Words(text->second));
+    return numbers ? fmt::format("{}", fmt::join(*numbers, " ")) : "0 0 0 1 0 0 0";
   }
 
   void put(const Surfel& surfel, const std::byte* row) override {

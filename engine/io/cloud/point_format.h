@@ -13,8 +13,8 @@ namespace ptc {
 enum class PointFormat : std::uint8_t { ply, las, pcd, e57, ptc, bgeo, pdb, ptx, pts, xyz };
 
 /// Finds the format of a file, which may be compressed by gzip: by the bytes with which it begins,
-/// else by the ending of its name if that is one of text, else by the shape of its first lines,
-/// else by the ending. A PLY may be a mesh.
+/// else by the ending of its name if that is one of text (.pts only if its first lines do not look
+/// like XYZ), else by the shape of its first lines, else by the ending. A PLY may be a mesh.
 /// @return nothing when it is no point cloud; for names of meshes (.obj .off .stl .gltf .glb)
 ///         without looking into the file
 /// @throws std::system_error; DataError when the name ends in .gz and the file is not whole

@@ -36,10 +36,6 @@ bool is_float(ChannelType type) {
   return type == ChannelType::f32 || type == ChannelType::f64;
 }
 
-bool has_nan(const glm::dvec3& v) {
-  return std::isnan(v.x) || std::isnan(v.y) || std::isnan(v.z);
-}
-
 // Tabulates the sRGB curve for integers up to `most`.
 std::vector<float> tabulate(std::size_t most) {
   std::vector<float> curve(most + 1);

@@ -83,6 +83,11 @@ bool is_unknown(const Channel& channel, const std::byte* at) noexcept {
   return std::memcmp(at, &*channel.no_value, channel.component_bytes()) == 0;
 }
 
+std::optional<double> meaning_of(const Channel& channel, const std::byte* at) noexcept {
+  if (is_unknown(channel, at)) return std::nullopt;
+  return load_number(at, channel.type) * channel.scale + channel.offset;
+}
+
 bool has_axes(const Channel& channel) noexcept {
   return channel.role == ChannelRole::direction || channel.role == ChannelRole::vector ||
          channel.name.find("normal") != std::string::npos;

@@ -48,6 +48,10 @@ struct RowChannel {
 /// Says whether the component at `at` has the value that stands for "not known".
 [[nodiscard]] bool is_unknown(const Channel& channel, const std::byte* at) noexcept;
 
+/// Returns what the component at `at` means, with scale and offset; nothing when it is not known.
+[[nodiscard]] std::optional<double> meaning_of(const Channel& channel,
+                                               const std::byte* at) noexcept;
+
 /// Says whether the components of a channel of three are x, y and z.
 [[nodiscard]] bool has_axes(const Channel& channel) noexcept;
 

@@ -22,7 +22,7 @@ void GridCheck::add(std::uint64_t index, std::uint64_t row, std::uint64_t column
   } else {
     const std::uint64_t before = index - column;  // points in the rows before this one
     const std::uint64_t width = before / row;
-    holds_ = index >= column && before % row == 0 && (width_ == 0 || width == width_);
+    holds_ = index > column && before % row == 0 && (width_ == 0 || width == width_);
     width_ = width;
   }
   ++count_;
@@ -60,13 +60,11 @@ void PointSurvey::add_ranges(std::span<const std::byte> rows) noexcept {
   for (auto& [row, range] : measured_) {
     const Channel& channel = row.channel;
     for (std::size_t at = 0; at < rows.size(); at += row_bytes_) {
-      const std::byte* const stored = row.at(rows.data() + at, 0);
-      if (is_unknown(channel, stored)) continue;
-      const double value = load_number(stored, channel.type) * channel.scale + channel.offset;
-      if (!std::isfinite(value)) continue;
-      range.low = std::min(range.low, value);
-      range.high = std::max(range.high, value);
-      range.whole = range.whole && value == std::trunc(value);
+      const std::optional<double> value = meaning_of(channel, row.at(rows.data() + at, 0));
+      if (!value || !std::isfinite(*value)) continue;
+      range.low = std::min(range.low, *value);
+      range.high = std::max(range.high, *value);
+      range.whole = range.whole && *value == std::trunc(*value);
     }
   }
 }

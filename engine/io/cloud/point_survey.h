@@ -18,6 +18,7 @@ namespace ptc {
 /// 0 tells w, and all others must agree.
 class GridCheck {
  public:
+  /// Adds a point that lies in a cell.
   /// @param index  place of the point among those that will be written
   void add(std::uint64_t index, std::uint64_t row, std::uint64_t column) noexcept;
   /// Returns the grid of all points.
@@ -31,7 +32,7 @@ class GridCheck {
   std::uint64_t columns_ = 0;
 };
 
-/// Measures measured_channels().
+/// Measures, over all rows, the channels that measured_channels() names for a format.
 class PointSurvey {
  public:
   /// @param channels  of the rows that add() gets

@@ -164,7 +164,7 @@ std::vector<std::string> unknown_losses(OutputFormat format, const PointWriteInf
     if (format == OutputFormat::xyz && is_scaled(channel)) continue;  // NaN says so
     const bool packed = packs_colour && channel.type == ChannelType::u8 && colour.stored() &&
                         colour.stored()->channel.name == channel.name;
-    if (packed) {
+    if (packed || (format == OutputFormat::bgeo && is_linear_colour(channel))) {
       sentences.emplace_back(kAlbedoAsColour);
     } else if (const std::string value = number_text(channel.type, *channel.no_value);
                value != "nan") {

@@ -69,9 +69,8 @@ struct PointFile {
 /// | Maya's PDB | .pdb | files of programs of 32 bits |
 ///
 /// The content decides, and the name only where the content says nothing; a note says when they
-/// differ. PLY, BGEO, PTC and text,
-/// a PCD that is not compressed, and PTX may be packed by gzip (.gz). `info.notes` says what a
-/// reader leaves out or assumes.
+/// differ. PLY, BGEO, PTC and text, a PCD that is not compressed, and PTX may be packed by gzip
+/// (.gz). `info.notes` says what a reader leaves out or assumes.
 ///
 /// Properties with these names make the surfel: x y z; nx ny nz or normal_x normal_y normal_z;
 /// radius or scalar_radius; radiance_r radiance_g radiance_b; emission_r emission_g emission_b; red

@@ -1,6 +1,7 @@
 // Internal to the point readers: the rules that every surfel from a file must keep.
 #pragma once
 
+#include <cmath>
 #include <string>
 
 #include "engine/base/surfel.h"
@@ -18,6 +19,11 @@ struct RawSurfel {
   glm::dvec3 emission{0};
   glm::dvec3 albedo{0.5};
 };
+
+/// Says whether a component is not a number.
+[[nodiscard]] inline bool has_nan(const glm::dvec3& v) {
+  return std::isnan(v.x) || std::isnan(v.y) || std::isnan(v.z);
+}
 
 /// Checks a surfel and converts it to `out`.
 /// @return the rule that `raw` breaks, or an empty string when it breaks none

@@ -9,8 +9,6 @@ namespace ptc {
 
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\v\f";
-
 /// Returns the place of the first of some characters that stands outside of double quotes; npos
 /// when there is none.
 std::size_t find_unquoted(std::string_view text, std::string_view characters) noexcept {

@@ -171,8 +171,8 @@ class XyzLines {
     }
     if (!commas || !(numbers || separated)) return;
     fail(
-        "numbers with a decimal comma are not read: write points in place of the commas, as sed "
-        "'s/,/./g' does");
+        "numbers with a decimal comma are not read: write points in place of the commas, as sed -E "
+        "'s/([0-9]),([0-9])/\\1.\\2/g' does");
   }
 
   [[noreturn]] void refuse_field(std::string_view text, std::string_view field,

@@ -1,5 +1,5 @@
-// Writes clouds as text: a comment with the names of the columns, then a line for each point, whose
-// numbers read back to the same bits.
+// Writes clouds as text: a comment with the names of the columns, then a line for each point.
+// Numbers without a scale read back to the same bits.
 //
 // Text cannot name a scale, so scaled values are written as what they mean. They have 15 digits,
 // one or two fewer than a double: integers in steps of 0.1 are 66.6, not 66.60000000000001.
@@ -86,9 +86,7 @@ class XyzWriter : public CheckedWriter {
 
   // Appends what a stored value means; NaN where it is not known.
   void add_scaled(const Channel& channel, const std::byte* at) {
-    const double value = is_unknown(channel, at)
-                             ? std::nan("")
-                             : load_number(at, channel.type) * channel.scale + channel.offset;
+    const double value = meaning_of(channel, at).value_or(std::nan(""));
     fmt::format_to(std::back_inserter(line_), "{:.15g} ", value);
   }
 

@@ -10,8 +10,6 @@
 namespace ptc {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\v\f";
-
 // Removes a plus sign from the front of a number, because std::from_chars does not accept one.
 std::string_view without_plus(std::string_view word) noexcept {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-' && word[1] != '+') word.remove_prefix(1);

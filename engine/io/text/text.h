@@ -9,6 +9,9 @@
 
 namespace ptc {
 
+/// The characters that are white space within a line.
+inline constexpr std::string_view kBlanks = " \t\r\v\f";
+
 /// Splits a line into words, which are separated by white space. All views refer to the line.
 class Words {
  public:

@@ -33,9 +33,8 @@ constexpr std::uint64_t kMaxGroups = kMaxGroup - kFirstInputGroup + 1;
 /// Returns whether two channels hold the same kind of value. Their groups and the values that
 /// stand for "not known" do not matter.
 bool same_kind(Channel a, const Channel& b) {
-  a.group = b.group;
   a.no_value = b.no_value;
-  return a == b;
+  return same_but_for_group(std::move(a), b);
 }
 
 /// Returns whether the values of two channels of the same kind can stand in one: each value that
@@ -112,6 +111,11 @@ class ContainerAttributes : public PointStream {
 };
 
 }  // namespace
+
+bool same_but_for_group(Channel a, const Channel& b) {
+  a.group = b.group;
+  return a == b;
+}
 
 std::size_t AttributePlan::add_channel(Channel channel, bool taken) {
   // Put the channel behind the last one, or into a new group

@@ -47,6 +47,9 @@ inline constexpr const char* kOriginalIndex = "original_index";
   return reinterpret_cast<std::byte*>(&record) + sizeof(MortonKey);
 }
 
+/// Says whether two channels are the same in all but their group.
+[[nodiscard]] bool same_but_for_group(Channel a, const Channel& b);
+
 /// The channels of all inputs together, and the way of each input's values to them.
 class AttributePlan {
  public:

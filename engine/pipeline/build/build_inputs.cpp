@@ -22,6 +22,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/unknown_values.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/run.h"
@@ -180,16 +181,24 @@ bool has_emitters(const Mesh& mesh) {
 /// @param clouds  that are added to its points
 void plan_scene(const ContainerReader& scene, const Clouds& clouds, bool meshes,
                 AttributePlan& plan) {
-  // Its values matter where what is added may lack the channel, or may mark what is not known
+  // Its values matter where what is added may lack the channel, or may mark what is not known.
+  // Numbers of points and marks say something of all points, unless a cloud has its own
   const std::vector<Channel>& channels = scene.meta().channels;
+  const auto is_in = [](const Clouds::Cloud& cloud, const auto& matches) {
+    return std::ranges::any_of(cloud.channels, matches);
+  };
   std::vector<bool> wanted(channels.size());
   for (std::size_t i = 0; i < channels.size(); ++i) {
-    wanted[i] = meshes || !std::ranges::all_of(clouds.files, [&](const Clouds::Cloud& cloud) {
-                  return std::ranges::any_of(cloud.channels, [&](Channel channel) {
-                    channel.group = channels[i].group;
-                    return channel == channels[i];
-                  });
-                });
+    const Channel& channel = channels[i];
+    const bool lacked =
+        meshes || !std::ranges::all_of(clouds.files, [&](const Clouds::Cloud& c) {
+          return is_in(c, [&](const Channel& other) { return same_but_for_group(other, channel); });
+        });
+    const bool named = std::ranges::any_of(clouds.files, [&](const Clouds::Cloud& c) {
+      return is_in(c, [&](const Channel& other) { return other.name == channel.name; });
+    });
+    const bool complete = channel.name == kOriginalIndex || holds_marks(channel);
+    wanted[i] = lacked && (named || !complete) && is_watched(channel);
   }
   plan.add_input(channels, taken_values(scene, wanted));
 }
@@ -260,9 +269,11 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
 void Clouds::measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
                      bool alone, Progress& progress) {
   PointFile file = open_point_input(path, selection);
-  // Note what the file says of all its points
+  // Note what the file says of all its points, once
   const std::string name = path.filename().string();
-  for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
+  if (from == BoundsFrom::files) {
+    for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
+  }
   join_texts(text, named_by, file.info.text, name, progress);
   unlit |= !file.info.has_radiance;
   coloured |= file.info.has_albedo;
@@ -279,14 +290,13 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
     bounds.add(told->bounds);
     sample = std::move(told->sample);
   } else {
-    read_points(file, alone, name, cloud, progress);
+    read_points(file, alone, cloud, progress);
   }
   points += cloud.points;
 }
 
 /// Reads the points of a cloud and notes what they need.
-void Clouds::read_points(PointFile& file, bool alone, const std::string& name, Cloud& cloud,
-                         Progress& progress) {
+void Clouds::read_points(PointFile& file, bool alone, Cloud& cloud, Progress& progress) {
   ValueWatch watch(alone ? std::span<const Channel>() : cloud.channels);
   bool lacks_normals = false, lacks_radii = true;
   std::vector<Surfel> block(kBlock);
@@ -309,7 +319,8 @@ void Clouds::read_points(PointFile& file, bool alone, const std::string& name, C
   if (scan && cloud.points > 0)
     scan->radii |= lacks_radii;  // formats that must have radii have zeros
   if (const std::uint64_t lost = file.source->left_out()) {
-    progress.note(fmt::format("{}: {} records name no place and are left out", name, lost));
+    progress.note(fmt::format("{}: {} records name no place and are left out",
+                              cloud.path.filename().string(), lost));
   }
 }
 

@@ -27,7 +27,8 @@
 
 namespace ptc {
 
-/// Where the bounds of clouds come from. Those that a file says of itself save a pass over it.
+/// Where the bounds of clouds come from. Those that a file says of itself save a pass over it; a
+/// build that begins again because they were wrong takes those of the points.
 enum class BoundsFrom { files, points };
 
 /// Thrown when a point lies beyond the bounds that its file says. The build must measure the points
@@ -49,8 +50,7 @@ struct Clouds {
     /// Where the number of its scanner lies in the row of a point, and its bytes; 0 bytes when all
     /// points are of the first.
     std::size_t scanner_offset = 0, scanner_bytes = 0;
-    std::optional<Bounds>
-        said;  ///< the box that the file says of its points; unless they were read
+    std::optional<Bounds> said;  ///< the box of PointSource::extent(), if the points were not read
   };
   std::vector<Cloud> files;
   Bounds bounds;                   ///< of all points, scene units
@@ -75,8 +75,7 @@ struct Clouds {
                bool alone, Progress& progress);
 
  private:
-  void read_points(PointFile& file, bool alone, const std::string& name, Cloud& cloud,
-                   Progress& progress);
+  void read_points(PointFile& file, bool alone, Cloud& cloud, Progress& progress);
   void note_scan(const PointFileInfo& info, Cloud& cloud);
 };
 

@@ -20,11 +20,6 @@ Channel rise_channel() {
       .name = kRiseChannel, .type = ChannelType::u8, .role = ChannelRole::value, .scale = 0.125};
 }
 
-bool same_but_for_group(const Channel& channel, Channel other) {
-  other.group = channel.group;
-  return channel == other;
-}
-
 /// A scan's points with their marks as flags.
 class MarkedStream : public PointStream {
  public:

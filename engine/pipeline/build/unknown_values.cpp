@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/io/cloud/point_rows.h"
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/store/attribute_rows.h"
@@ -12,11 +13,7 @@
 namespace ptc {
 namespace {
 
-bool is_float(ChannelType type) noexcept {
-  return type == ChannelType::half || type == ChannelType::f32 || type == ChannelType::f64;
-}
-
-/// Says whether one of `components` values in each row is `usual`.
+/// Says whether a component of any row is `usual`.
 template <class T>
 bool occurs(std::span<const std::byte> rows, std::size_t row_bytes, std::size_t offset,
             unsigned components, std::uint64_t usual) noexcept {
@@ -72,14 +69,19 @@ std::optional<std::uint64_t> usual_no_value(const Channel& channel) noexcept {
   return std::nullopt;
 }
 
+bool is_watched(const Channel& channel) noexcept {
+  return usual_no_value(channel) && is_integer(channel.type) && !channel.no_value;
+}
+
 ValueWatch::ValueWatch(std::span<const Channel> channels)
     : taken_(channels.size()), row_bytes_(row_bytes(channels)) {
   std::size_t offset = 0;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     const Channel& channel = channels[i];
-    const std::optional<std::uint64_t> usual = usual_no_value(channel);
-    if (usual && !is_float(channel.type) && !channel.no_value)
-      watched_.push_back({i, offset, channel.component_bytes(), channel.components, *usual});
+    if (is_watched(channel)) {
+      watched_.push_back(
+          {i, offset, channel.component_bytes(), channel.components, *usual_no_value(channel)});
+    }
     offset += channel.bytes();
   }
 }
@@ -107,15 +109,15 @@ void ValueWatch::add(std::span<const std::byte> rows) {
 std::vector<bool> taken_values(const ContainerReader& container, const std::vector<bool>& wanted) {
   // Read the groups that have a channel to look at
   const std::vector<Channel>& all = container.meta().channels;
-  std::vector<std::uint8_t> groups;
+  std::vector<Channel> looked_at;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (wanted[i] && (groups.empty() || groups.back() != all[i].group))
-      groups.push_back(all[i].group);
+    if (wanted[i]) looked_at.push_back(all[i]);
   }
+  const std::vector<std::uint8_t> groups = channel_groups(looked_at);
   AttributeRows rows(container, groups);
   ValueWatch watch(rows.channels());
   const PageNumbers::Range pages = container.point_pages();
-  for (std::size_t rank = 0; rank < pages.size() && !groups.empty(); ++rank)
+  for (std::size_t rank = 0; rank < pages.size() && !groups.empty() && !watch.done(); ++rank)
     watch.add(rows.read(rank, container.entry(pages[rank]).record_count));
 
   // Give the channels that were read their places among all

@@ -28,14 +28,19 @@ class AttributePlan;
 /// type of a later version.
 [[nodiscard]] std::optional<std::uint64_t> usual_no_value(const Channel& channel) noexcept;
 
-/// Watches the values of channels for usual_no_value(). Floats and channels with a no_value are not
-/// watched: a NaN says of itself that nothing is known.
+/// Says whether a ValueWatch looks at a channel: not at floats, whose NaN says of itself that
+/// nothing is known, and not where a no_value says so.
+[[nodiscard]] bool is_watched(const Channel& channel) noexcept;
+
+/// Watches the values of channels for usual_no_value().
 class ValueWatch {
  public:
   explicit ValueWatch(std::span<const Channel> channels);
   /// Looks at the values of some points.
   /// @param rows  of the points, with all channels
   void add(std::span<const std::byte> rows);
+  /// Says whether no value that may still come matters.
+  [[nodiscard]] bool done() const noexcept { return watched_.empty(); }
   /// For each channel, whether a component of a point has usual_no_value().
   [[nodiscard]] const std::vector<bool>& taken() const noexcept { return taken_; }
 

@@ -121,7 +121,8 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   charge_directory(budget, container);
   budget.charge("pages that are written",
                 ContainerWriter::memory_bytes(pages, page_shift, executor.threads()));
-  budget.charge("node pages that wait", held_pages_bytes(page_shift));
+  const bool same_pages = page_shift == from.page_shift && !round && container.parts().empty();
+  if (!same_pages) budget.charge("node pages that wait", held_pages_bytes(page_shift));
   budget.require();
 
   // Copy the pages where they stay as they are, build them again elsewhere
@@ -131,7 +132,6 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
                                   .frame = from.frame,
                                   .point_bytes = from.point_bytes,
                                   .source = &container.file()});
-  const bool same_pages = page_shift == from.page_shift && !round && container.parts().empty();
   Superblock superblock = container.superblock();
   if (same_pages) {
     copy_pages(container, writer, progress);

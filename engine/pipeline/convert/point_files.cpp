@@ -1,7 +1,6 @@
 #include "engine/pipeline/convert/point_files.h"
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -66,11 +65,11 @@ std::optional<PointSurvey> survey_for(std::optional<OutputFormat> format,
   return survey.empty() ? std::nullopt : std::optional(std::move(survey));
 }
 
-/// Measures the channels of all points of a container. A damaged page is passed over: it is an
-/// error when its points are written, unless damage is tolerated.
-void measure_all(const ContainerReader& container, std::span<const std::uint8_t> groups,
+/// Measures channels of all points of a container by their attribute pages alone. A damaged page is
+/// passed over: it is an error when its points are written, unless damage is tolerated.
+void measure_all(const ContainerReader& container, std::span<const Channel> channels,
                  OutputFormat format, PointWriteInfo& info) {
-  AttributeRows rows(container, groups);
+  AttributeRows rows(container, channel_groups(channels));
   PointSurvey survey(format, rows.channels(), kOriginalIndex);
   std::size_t rank = 0;
   for (const std::uint32_t page : container.point_pages()) {
@@ -83,30 +82,19 @@ void measure_all(const ContainerReader& container, std::span<const std::uint8_t>
   survey.finish(info);
 }
 
-/// Measures the channels of a container that a format wants to know the values of.
-void measure_channels(const ContainerReader& container, const PointFileOptions& options,
-                      OutputFormat format, PointWriteInfo& info) {
+/// Returns the channels of a container that a format wants to know the values of.
+/// @param channels  that are written
+std::vector<std::string> channels_to_measure(const ContainerReader& container,
+                                             const PointFileOptions& options,
+                                             std::optional<OutputFormat> format,
+                                             std::span<const Channel> channels) {
+  if (!format) return {};
   // Points in the order of the curve lie in no grid
-  const bool grid = format == OutputFormat::pcd;
-  if (grid && !(options.original_order && has_input_order(container))) return;
-  Selection selection = options.selection;
-  selection.channels = measured_channels(format, info.channels);
-  if (selection.channels->empty()) return;
-  if (grid) selection.channels->emplace_back(kOriginalIndex);
-  const std::vector<Channel> channels =
-      kept_channels(container.meta().channels, selection, container.path());
-
-  // Read the attribute pages alone where all points are taken
-  if (selection.takes_all()) {
-    std::set<std::uint8_t> groups;
-    for (const Channel& channel : channels) groups.insert(channel.group);
-    return measure_all(container, std::vector(groups.begin(), groups.end()), format, info);
-  }
-  PointSurvey survey(format, channels, kOriginalIndex);
-  const std::unique_ptr<PointSource> source = open_selected(container, selection);
-  std::vector<Surfel> block(kBlock);
-  while (source->next(block) > 0) survey.add(source->attributes());
-  survey.finish(info);
+  const bool grid = *format == OutputFormat::pcd;
+  if (grid && !(options.original_order && has_input_order(container))) return {};
+  std::vector<std::string> names = measured_channels(*format, channels);
+  if (grid && !names.empty()) names.emplace_back(kOriginalIndex);
+  return names;
 }
 
 /// Opens the points of a container that the options take, in their order.
@@ -165,11 +153,21 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
         options.original_order ? channels_without_index(container) : container.meta().channels,
         selection, container.path());
   }
+  // Read what the writer must know of the values
+  const std::vector<std::string> names =
+      channels_to_measure(container, options, format, info.channels);
+  Selection reading = selection;
+  if (!selection.level) reading.channels = names;
+  const std::vector<Channel> measured =
+      names.empty() ? std::vector<Channel>()
+                    : kept_channels(container.meta().channels, reading, container.path());
   if (!selection.takes_all()) {
-    std::optional<PointSurvey> none;
-    measure(*open_selected(container, selection), none, info);
+    std::optional<PointSurvey> survey;
+    if (!names.empty()) survey.emplace(*format, measured, kOriginalIndex);
+    measure(*open_selected(container, reading), survey, info);
+  } else if (!names.empty()) {
+    measure_all(container, measured, *format, info);
   }
-  if (format) measure_channels(container, options, *format, info);
   return info;
 }
 

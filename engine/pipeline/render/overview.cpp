@@ -9,7 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <tuple>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -34,24 +34,21 @@ struct Part {
 
 /// Returns how high above the scene the camera stands, for 1 to the front: twice as high over flat
 /// land, whose parts would hide each other, as before a thing that is half as high as wide.
-double height_of(const Superblock& superblock, const glm::dvec3& up) {
+double height_of(const Bounds& bounds, const glm::dvec3& up) {
   double high = 0, wide = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    const double side = superblock.bounds_high[k] - superblock.bounds_low[k];
+    const double side = bounds.high[axis] - bounds.low[axis];
     (up[axis] == 0 ? wide : high) = std::max(up[axis] == 0 ? wide : high, side);
   }
   return wide > 0 ? kHeight * (2 - std::min(1.0, 2 * high / wide)) : kHeight;
 }
 
 /// Returns the corners of the bounds.
-std::vector<Part> corners_of(const Superblock& superblock) {
+std::vector<Part> corners_of(const Bounds& bounds) {
   std::vector<Part> parts(8);
   for (std::size_t corner = 0; corner < parts.size(); ++corner) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto& side = (corner >> axis & 1) != 0 ? superblock.bounds_high : superblock.bounds_low;
-      parts[corner].middle[static_cast<int>(axis)] = side[axis];
-    }
+    for (int axis = 0; axis < 3; ++axis)
+      parts[corner].middle[axis] = ((corner >> axis & 1) != 0 ? bounds.high : bounds.low)[axis];
   }
   return parts;
 }
@@ -95,11 +92,13 @@ double reach(const std::vector<Part>& parts, const glm::dvec3& direction) {
     reaches.push_back({glm::dot(part.middle, direction) + part.radius * aside, area});
     left += area * kLeftOut;
   }
-  std::ranges::sort(reaches, std::greater<>(), &Reach::at);
-  for (const Reach& next : reaches) {
-    if ((left -= next.area) < 0) return next.at;
+  std::ranges::make_heap(reaches, {}, &Reach::at);
+  const double farthest = reaches.front().at;
+  for (; !reaches.empty(); reaches.pop_back()) {
+    if ((left -= reaches.front().area) < 0) return reaches.front().at;
+    std::ranges::pop_heap(reaches, {}, &Reach::at);
   }
-  return reaches.front().at;  // none has an area
+  return farthest;  // none has an area
 }
 
 /// The edge of two planes that just hold the parts between them.
@@ -136,7 +135,8 @@ double middle_of(const std::vector<Part>& parts, const glm::dvec3& across,
 
 Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdrop,
                 const std::optional<std::array<unsigned, 2>>& size) {
-  const Superblock& superblock = scene.superblock();
+  const auto [low, high] = std::tie(scene.superblock().bounds_low, scene.superblock().bounds_high);
+  const Bounds bounds{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
   Camera camera;
   if (size) {
     camera.width = (*size)[0];
@@ -144,17 +144,13 @@ Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdro
   }
   std::vector<Part> parts;
   if (!backdrop) parts = clusters_of(scene);
-  if (parts.empty()) parts = corners_of(superblock);
+  if (parts.empty()) parts = corners_of(bounds);
   // Measure from the middle of the bounds, where numbers are small
-  glm::dvec3 middle(0);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    middle[static_cast<int>(axis)] =
-        superblock.bounds_low[axis] / 2 + superblock.bounds_high[axis] / 2;
-  }
+  const glm::dvec3 middle = bounds.low / 2.0 + bounds.high / 2.0;
   for (Part& part : parts) part.middle -= middle;
 
   // Look from above on the side of +z when +y is up, of -y when +z is, of +y when +x is
-  const glm::dvec3 from(0.45, backdrop ? kHeight : height_of(superblock, up), 1);
+  const glm::dvec3 from(0.45, backdrop ? kHeight : height_of(bounds, up), 1);
   const glm::dvec3 away = glm::normalize(up.z > 0   ? glm::dvec3(from.x, -from.z, from.y)
                                          : up.x > 0 ? glm::dvec3(from.y, from.z, from.x)
                                                     : from);

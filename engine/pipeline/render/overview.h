@@ -18,11 +18,10 @@ namespace ptc {
 /// node pages are damaged, the bounds of the points are taken.
 /// @param up        unit; the axis that points up
 /// @param backdrop  the scene stands on a backdrop, which is larger than what it holds: the scene
-/// is
-///                  seen from half the distance, and may leave the picture
+///                  is seen from half the distance, and may leave the picture
 /// @param size      width and height of the picture; empty: those of the camera
 /// @throws std::system_error
-/// Memory: 17 MiB at most.
+/// Memory: 17 MiB, and 4 bytes for each page of the container.
 [[nodiscard]] Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdrop,
                               const std::optional<std::array<unsigned, 2>>& size);
 

@@ -38,9 +38,8 @@ struct FormatRow {
 };
 
 /// Writes a city in every format that can be written, reads the files into a sort, and reads the
-/// further files likewise. A library's positions must be those that PTCX reads.
-/// @throws DataError when a count or a position differs, or the interpreter fails;
-///         std::system_error
+/// further files likewise.
+/// @throws DataError when a count differs, or the interpreter fails; std::system_error
 [[nodiscard]] std::vector<FormatRow> measure_formats(
     const FormatsOptions& options, const std::filesystem::path& work, const RunOptions& run,
     Progress& progress, const BenchRun<FormatsOptions, FormatRow>::Report& report);

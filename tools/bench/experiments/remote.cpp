@@ -66,10 +66,11 @@ std::size_t ViewChoice::choose(std::size_t nodes) {
       large.push_back(node);
       pages.insert(page_of(node.ref));
     }
-    scene_.load_entries(std::vector<std::uint32_t>(pages.begin(), pages.end()));
+    const auto listed = [&] { return std::vector<std::uint32_t>(pages.begin(), pages.end()); };
+    scene_.load_entries(listed());
     // Ask for these pages, and for what lies below them
     for (const Candidate& node : large) add_pages_below(node, size, pages);
-    scene_.load(std::vector<std::uint32_t>(pages.begin(), pages.end()));
+    scene_.load(listed());
   }
 }
 

@@ -15,7 +15,6 @@
 #include <numbers>
 #include <numeric>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
