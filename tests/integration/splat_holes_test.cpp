@@ -85,3 +85,18 @@ TEST_CASE("splat holes: windows, silhouettes and near steps stay", "[render]") {
   empty.cut(0, 0, kSide, kSide);
   CHECK(empty.close() == 0);
 }
+
+TEST_CASE("splat holes: the back of a disc beside a rim is closed, no farther than a radius or so",
+          "[render]") {
+  Plane plane;
+  SplatSample behind{.depth = 1.04F, .payload = {}};  // two radii
+  behind.payload.radius = encode_ufloat16(2 / kFocal);
+  plane.cut(40, 0, 24, 64, behind);
+  CHECK(plane.close() == 0);
+  behind.payload.back = true;
+  plane.cut(40, 0, 24, 64, behind);
+  static_cast<void>(plane.close());
+  CHECK(plane.at(41, 30).depth == Approx(1));
+  CHECK_FALSE(plane.at(41, 30).payload.back);
+  CHECK(plane.at(42, 30).payload.back);
+}

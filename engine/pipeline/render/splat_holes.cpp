@@ -21,17 +21,22 @@ constexpr unsigned kBlock = 16;  // samples along the side of a block
 constexpr int kPasses = 3;       // holes beside holes take more than one
 constexpr float kReach = 4;      // radii of the disc: points at random leave such gaps
 constexpr float kInFront = 3;    // radii by which a surface is nearer than what shows through it
-constexpr float kBand = 12;      // radii by which depths of one surface differ around a hole
-constexpr std::size_t kLeastHits = 7;    // of eight directions
+constexpr float kInFrontOfBack = 1;    // the same where the back of a disc shows
+constexpr float kBand = 12;            // radii by which depths of one surface differ around a hole
+constexpr std::size_t kLeastHits = 7;  // of eight directions
 constexpr std::size_t kLeastOfBack = 5;  // the same where the back of a disc is seen
+constexpr std::size_t kLeastNear = 3;    // the same of hits that are near
+constexpr float kNear = 1.5F;            // radii of the disc up to which a hit is near
 constexpr std::array<std::array<int, 2>, 8> kDirections{
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 
 /// Looks for the surface around one sample.
 class HoleTest {
  public:
-  explicit HoleTest(const SplatPicture& picture)
+  /// @param rims  also close samples at the rim of a surface, where the back of a disc shows
+  HoleTest(const SplatPicture& picture, bool rims)
       : picture_(picture),
+        rims_(rims),
         columns_((picture.width + kBlock - 1) / kBlock),
         rows_((picture.height + kBlock - 1) / kBlock) {
     // Find the greatest reach in each block, and then among the blocks that are near enough to
@@ -59,18 +64,21 @@ class HoleTest {
     const float reach = reach_[static_cast<std::size_t>(y) / kBlock * columns_ +
                                static_cast<std::size_t>(x) / kBlock];
     if (reach == 0) return {};
-    const std::size_t least = !seen.empty() && seen.payload.back ? kLeastOfBack : kLeastHits;
-    const float depth = seen.depth;
+    const bool back = !seen.empty() && seen.payload.back;
+    const std::size_t least = !back ? kLeastHits : rims_ ? kLeastNear : kLeastOfBack;
+    const float in_front = back ? kInFrontOfBack : kInFront;
     std::array<Hit, kDirections.size()> hits;
-    std::size_t count = 0;
+    std::size_t count = 0, near = 0;
     for (std::size_t i = 0; i < kDirections.size(); ++i) {
-      if (const Hit hit = look(x, y, kDirections[i], depth, reach); hit.sample) {
+      if (const Hit hit = look(x, y, kDirections[i], seen.depth, in_front, reach); hit.sample) {
         std::size_t k = count++;  // hits stay in the order of their depths
         for (; k > 0 && hits[k - 1].sample->depth > hit.sample->depth; --k) hits[k] = hits[k - 1];
         hits[k] = hit;
+        if (hit.distance <= reach_of(*hit.sample, kNear)) ++near;
       }
       if (i + 1 - count > kDirections.size() - least) return {};
     }
+    if (back && near < kLeastNear && count < kLeastOfBack) return {};
     // Leave out hits far behind the middle one: they see through a hole themselves
     const auto found = std::span(hits).first(count);
     const SplatSample& middle = *found[count / 2].sample;
@@ -105,9 +113,10 @@ class HoleTest {
     return picture_.scale.radius(decode_ufloat16(sample.payload.radius));
   }
 
-  /// Returns the distance within which a sample counts, samples.
-  [[nodiscard]] float reach_of(const SplatSample& sample) const {
-    return std::max(1.5F, kReach * radius_of(sample) * picture_.focal / sample.depth);
+  /// Returns the distance within which a sample counts, samples; at least that of the next ones.
+  /// @param radii  the same in radii of its disc
+  [[nodiscard]] float reach_of(const SplatSample& sample, float radii = kReach) const {
+    return std::max(1.5F, radii * radius_of(sample) * picture_.focal / sample.depth);
   }
 
   /// Returns the greatest reach of the samples whose reach may lead into a block.
@@ -130,9 +139,10 @@ class HoleTest {
   }
 
   /// Follows a direction to the first sample that is in front of `depth`.
-  /// @param reach  greatest distance to look at, samples
+  /// @param in_front  radii of its disc by which it must be in front
+  /// @param reach     greatest distance to look at, samples
   [[nodiscard]] Hit look(int x, int y, const std::array<int, 2>& direction, float depth,
-                         float reach) const {
+                         float in_front, float reach) const {
     const float step = direction[0] != 0 && direction[1] != 0 ? 1.4142135F : 1;
     for (int k = 1; static_cast<float>(k) <= reach; ++k) {
       const int sx = x + k * direction[0], sy = y + k * direction[1];
@@ -141,7 +151,7 @@ class HoleTest {
         break;
       const SplatSample& sample = at(sx, sy);
       if (sample.depth >= depth) continue;
-      if (!(sample.depth + kInFront * radius_of(sample) < depth)) continue;
+      if (!(sample.depth + in_front * radius_of(sample) < depth)) continue;
       const float distance = step * static_cast<float>(k);
       return {distance > reach_of(sample) ? nullptr : &sample, distance};
     }
@@ -149,6 +159,7 @@ class HoleTest {
   }
 
   const SplatPicture& picture_;
+  bool rims_;
   unsigned columns_, rows_;   ///< of blocks
   std::vector<float> reach_;  ///< by block: greatest reach of samples in it or near it
 };
@@ -159,7 +170,7 @@ std::size_t close_holes(const SplatPicture& picture, const Executor& executor) {
   std::size_t all = 0;
   for (int pass = 0; pass < kPasses; ++pass) {
     // Find the holes of all rows before any is closed, so that the order does not matter
-    const HoleTest test(picture);
+    const HoleTest test(picture, pass == 0);  // a rim that has grown is none
     std::vector<std::vector<std::pair<unsigned, SplatSample>>> closed(picture.height);
     executor.for_each(picture.height, [&](std::size_t y, unsigned) {
       for (unsigned x = 0; x < picture.width; ++x) {

@@ -47,8 +47,9 @@ struct SplatPicture {
 /// A sample is in a hole of a surface when it is surrounded by that surface within four radii of
 /// its discs: along at least seven of eight directions of the picture there is a sample in front of
 /// it, no farther away than four times the radius of its disc as the picture shows it. Five
-/// directions are enough where it sees the back of a disc, as past the rim of a closed surface. The
-/// sample then sees what the nearest of them does, at their mean nearness. So gaps that are as wide
+/// directions are enough where it sees the back of a disc, as past the rim of a closed surface, or
+/// three within one and a half radii. The sample then sees what the nearest of them does, at their
+/// mean nearness. So gaps that are as wide
 /// as the distance between points are closed, and wider ones, which the scan resolves, stay: points
 /// that lie at random leave a fraction of a percent of a surface farther than two radii from the
 /// next.
