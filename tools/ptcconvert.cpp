@@ -116,11 +116,12 @@ std::vector<std::string> container_losses(const Arguments& arguments, bool recod
 }
 
 /// Says what the format of the output cannot hold of the points.
-ptc::Outcome tell_losses(const Arguments& arguments, ptc::Progress& progress) {
+ptc::Outcome tell_losses(Arguments arguments, ptc::Progress& progress) {
   const bool from_container = ptc::is_container(arguments.input);
   if (!from_container && !ptc::is_point_file(arguments.input)) refuse_mesh(arguments);
   const bool to_container = ptc::has_ending(arguments.output, ".ptcx");
   const auto format = ptc::output_format(arguments.output);
+  arguments.points.measure_rounding = true;
   const ptc::PointWriteInfo info =
       from_container
           ? ptc::describe_points(ptc::ContainerReader(arguments.input), arguments.points, format)

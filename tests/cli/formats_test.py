@@ -141,6 +141,20 @@ class Formats(ProgramTest):
         self.assertIn("500 points", said)
         self.assertEqual(sorted(self.here.iterdir()), before)
 
+    def test_a_dry_run_speaks_of_rounding_only_where_a_number_is_rounded(self):
+        cloud = self.here / "floats.ply"
+        axes = "".join(f"property double {axis}\n" for axis in "xyz")
+        head = f"ply\nformat ascii 1.0\nelement vertex 2\n{axes}property uint id\nend_header\n"
+        for place, number, lost in (("0.125 0.75 -0.375", 7, []), ("0.1 0.7 -0.3", 7, ["float"]), ("0.125 0 0", 2**31, ["id"])):
+            cloud.write_text(f"{head}0 0 0 {number}\n{place} 1\n")
+            self.succeed("ptcbuild", cloud, "-o", self.here / "floats.ptcx")
+            for source in (cloud, self.here / "floats.ptcx"):
+                said = self.succeed("ptcconvert", source, self.here / "a.bgeo", "--dry-run", "--json").stdout
+                about = [loss for loss in json.loads(said)["losses"] if "float" in loss or "id" in loss.split()]
+                self.assertEqual(len(about), len(lost), (source, about))
+                for word in lost:
+                    self.assertIn(word, about[0])
+
     def test_a_dry_run_into_a_container_leaves_the_file_of_its_name(self):
         kept = self.here / "kept.ptcx"
         kept.write_text("anything")

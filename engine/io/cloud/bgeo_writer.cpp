@@ -207,8 +207,9 @@ std::unique_ptr<PointWriter> create_bgeo(const std::filesystem::path& target,
 
 std::vector<std::string> bgeo_losses(const PointWriteInfo& info) {
   std::vector<std::string> sentences;
-  add_float_positions(sentences, info.bounds);
+  add_float_positions(sentences, float_error(info));
   for (const Channel& channel : info.channels) {
+    if (!may_round(info, channel)) continue;
     if (channel.type == ChannelType::f64) {
       sentences.push_back("The channel " + channel.name + " is rounded from double to float.");
     } else if (channel.type == ChannelType::u32 || channel.type == ChannelType::u64 ||

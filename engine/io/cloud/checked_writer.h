@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -77,14 +78,33 @@ class CheckedWriter : public PointWriter {
 inline constexpr const char* kAlbedoAsColour =
     "Points without a colour of their own get that of their albedo.";
 
+/// What a file holds of the numbers of a channel, where that may be less than they have.
+struct Narrowing {
+  std::optional<ChannelType> type;  ///< that of the numbers in the file; without one, they are cut
+  double most = 0;                  ///< the greatest magnitude that is kept, if there is no type
+};
+
+/// Returns what a file of a format holds of the numbers of a channel; nothing when it holds all of
+/// them whatever they are, or when measured_channels() decides.
+[[nodiscard]] std::optional<Narrowing> narrowing_of(OutputFormat format, const Channel& channel);
+/// Says whether values of a channel may be rounded: it was not measured, or one of them is.
+[[nodiscard]] bool may_round(const PointWriteInfo& info, const Channel& channel);
+
 /// Returns the most by which a coordinate within the bounds moves when it is rounded to float.
 [[nodiscard]] double float_error(const Bounds& bounds) noexcept;
+/// Returns the most by which a coordinate of the points moves when it is rounded to float: as it
+/// was measured, else for their bounds.
+[[nodiscard]] double float_error(const PointWriteInfo& info) noexcept;
 /// Returns a length that no two neighbours should be closer than, for points that cover a surface
 /// evenly: the longest side of the bounds over the square root of the count. It is 0 when unknown.
 [[nodiscard]] double least_spacing(const PointWriteInfo& info) noexcept;
 
-/// Says by how much positions are rounded to float; nothing when there are none.
-void add_float_positions(std::vector<std::string>& losses, const Bounds& bounds);
+/// The most by which floats may move a point, in spacings, where a writer can choose other
+/// positions.
+inline constexpr double kMostMove = 1e-4;
+
+/// Says that positions are rounded to float by up to `error`; nothing when that is 0.
+void add_float_positions(std::vector<std::string>& losses, double error);
 /// Says which channels are rounded where a file has floating-point numbers of `digits` bits.
 void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo& info, int digits);
 /// Says whether the stored values of a channel are not what they mean: scale and offset apply to

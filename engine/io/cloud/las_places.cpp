@@ -144,6 +144,12 @@ bool needs_range(const Channel& channel) {
   return place != nullptr && !fits_by_type(*place, channel);
 }
 
+std::optional<double> cut_above(const Channel& channel) {
+  const Place* const place = find_place(channel);
+  const bool cuts = place != nullptr && place->high <= 15 && fits_by_type(*place, channel);
+  return cuts ? std::optional(place->high) : std::nullopt;
+}
+
 std::optional<PlacedChannel> place_channel(const RowChannel& row,
                                            const std::map<std::string, ValueRange>& ranges) {
   const Channel& channel = row.channel;

@@ -53,6 +53,10 @@ struct PlacedChannel {
 /// Says whether a channel has the name of a place, but must be measured before it can fill it.
 [[nodiscard]] bool needs_range(const Channel& channel);
 
+/// Returns the greatest value of the place that a channel fills without being measured, if its type
+/// has greater ones, which are cut; nothing for any other channel.
+[[nodiscard]] std::optional<double> cut_above(const Channel& channel);
+
 /// Finds the place of a channel: by its name, if its type fits there or all values that were
 /// measured do. An intensity always fits, because it is scaled.
 /// @param ranges  PointWriteInfo::ranges

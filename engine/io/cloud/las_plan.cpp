@@ -30,6 +30,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr double kMostStep = std::numeric_limits<std::int32_t>::max();
+constexpr double kStepNoise = 1e-3;               // of a step: what containers round
 constexpr double kStepOfPlace = 1e-3;             // when all points lie in one place
 constexpr std::uint16_t kKeptEncoding = 1U | 8U;  // kind of the times, synthetic return numbers
 constexpr std::size_t kRecordHeadBytes = 54;
@@ -238,6 +239,14 @@ Head plan_head(const PointWriteInfo& info) {
     choose_steps(info, head);
   }
   return head;
+}
+
+bool moves_positions(const PointWriteInfo& info, const Head& head) {
+  if (!info.rounding) return head.own_steps;
+  if (!head.own_steps) return info.rounding->step_error > kStepNoise;
+  // The offset is a multiple of the step, a power of ten, so decimals of as many digits lie on it
+  const unsigned decimals = info.rounding->decimals;
+  return decimals > kMostDecimals || power_of_ten(-static_cast<int>(decimals)) < head.scale.x;
 }
 
 std::vector<LasName> original_names(const PointWriteInfo& info) {

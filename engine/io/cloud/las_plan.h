@@ -39,6 +39,10 @@ struct Head {
 /// form that the reader of LAS gives it, with other steps if its own cannot hold the bounds.
 [[nodiscard]] Head plan_head(const PointWriteInfo& info);
 
+/// Says whether positions move when they are rounded to the steps of a head, by more than the last
+/// bits of a double; true where that was not measured, unless the head is that of a LAS file.
+[[nodiscard]] bool moves_positions(const PointWriteInfo& info, const Head& head);
+
 /// The records between the header and the points.
 struct Records {
   std::vector<std::byte> bytes;

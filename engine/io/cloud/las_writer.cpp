@@ -276,19 +276,22 @@ std::vector<std::string> las_losses(const PointWriteInfo& info) {
   const las::Head head = las::plan_head(info);
   const las::Layout layout(info);
   const bool was_las = info.text.contains("las.header");
-  if (head.own_steps) {
-    sentences.push_back(
-        fmt::format("Positions are rounded to steps of {:.2g} units.", head.scale.x));
-    if (was_las) {
+  if (las::moves_positions(info, head)) {
+    sentences.push_back(fmt::format("Positions are rounded to steps of {:.2g} units.",
+                                    std::max({head.scale.x, head.scale.y, head.scale.z})));
+    if (was_las && head.own_steps) {
       sentences.push_back(
           "The steps of the LAS file that the points came from do not hold all positions.");
     }
   }
-  if (info.has_albedo && !layout.colour.hides_albedo() && layout.colour.stored() == nullptr) {
+  if (info.has_albedo && !layout.colour.hides_albedo() && layout.colour.stored() == nullptr &&
+      (!info.rounding || info.rounding->albedos)) {
     sentences.push_back("Colours are rounded to 16 bits on the sRGB curve.");
   }
   for (const las::PlacedChannel& field : layout.fields) {
     const std::string& name = field.channel.channel.name;
+    const bool narrows = narrowing_of(OutputFormat::las, field.channel.channel).has_value();
+    if (narrows && !may_round(info, field.channel.channel)) continue;
     if (!field.loss.empty()) sentences.push_back(field.loss);
     if (was_las || field.high > 15 || info.ranges.contains(name)) continue;
     sentences.push_back(

@@ -24,7 +24,7 @@ namespace ptc {
 namespace {
 
 bool has_float_positions(const PointWriteInfo& info) {
-  return float_error(info.bounds) <= 1e-4 * least_spacing(info);
+  return float_error(info) <= kMostMove * least_spacing(info);
 }
 
 // Returns the type in which a file holds the numbers of a channel. PCD has no integers of 64 bits.
@@ -180,13 +180,13 @@ std::unique_ptr<PointWriter> create_pcd(const std::filesystem::path& target,
 std::vector<std::string> pcd_losses(const PointWriteInfo& info) {
   std::vector<std::string> sentences;
   if (has_float_positions(info)) {
-    add_float_positions(sentences, info.bounds);
+    add_float_positions(sentences, float_error(info));
   } else {
     sentences.push_back(
         fmt::format("Positions are doubles, since floats would move points by up to {:.2g} units: "
                     "programs that "
                     "know only floats, such as the Point Cloud Library, do not find them.",
-                    float_error(info.bounds)));
+                    float_error(info)));
   }
   add_rounded_channels(sentences, info, 53);
   add_unscaled_channels(sentences, info);

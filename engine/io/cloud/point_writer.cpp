@@ -1,8 +1,8 @@
 // Chooses the writer of a format, and says what a format does not keep.
 //
 // A loss is known before the first point: it follows from the types of the channels, the bounds
-// and the facts about the file. Values are not looked at, so a sentence about integers that may
-// not fit says from which number on they do not.
+// and the facts about the file. What types and bounds leave open was measured (RoundingSurvey), or
+// a sentence about integers that may not fit says from which number on they do not.
 #include "engine/io/cloud/point_writer.h"
 
 #include <algorithm>
@@ -203,6 +203,41 @@ std::optional<OutputFormat> output_format(const std::filesystem::path& path) {
   return found->second;
 }
 
+std::optional<Narrowing> narrowing_of(OutputFormat format, const Channel& channel) {
+  using enum ChannelType;
+  const ChannelType type = channel.type;
+  const bool is_long = type == u64 || type == i64;
+  switch (format) {
+    case OutputFormat::ptc:
+      if (digits_of(type) > 24) return Narrowing{.type = f32};
+      break;
+    case OutputFormat::bgeo:
+      if (type == f64) return Narrowing{.type = f32};
+      if (type == u32 || is_long) return Narrowing{.type = i32};
+      break;
+    case OutputFormat::pcd:
+    case OutputFormat::ply:
+      if (is_long) return Narrowing{.type = f64};
+      break;
+    case OutputFormat::xyz:
+      // A step of an integer is more than one of the 15th digit
+      if (is_long && is_scaled(channel)) return Narrowing{.most = 4e14 * std::abs(channel.scale)};
+      break;
+    case OutputFormat::las:
+      if (const auto most = las::cut_above(channel)) return Narrowing{.most = *most};
+      if (is_long && channel.name == "gps_time" && channel.components == 1)
+        return Narrowing{.type = f64};
+      break;
+    default:
+      break;
+  }
+  return std::nullopt;
+}
+
+bool may_round(const PointWriteInfo& info, const Channel& channel) {
+  return !info.rounding || info.rounding->channels.contains(channel.name);
+}
+
 double float_error(const Bounds& bounds) noexcept {
   if (bounds.empty()) return 0;
   double most = 0;
@@ -214,14 +249,17 @@ double float_error(const Bounds& bounds) noexcept {
   return std::ldexp(0.5, std::ilogb(most) - 23);  // half of the last place
 }
 
+double float_error(const PointWriteInfo& info) noexcept {
+  return info.rounding ? info.rounding->float_error : float_error(info.bounds);
+}
+
 double least_spacing(const PointWriteInfo& info) noexcept {
   if (info.bounds.empty() || info.count == 0) return 0;
   const glm::dvec3 sides = info.bounds.high - info.bounds.low;
   return std::max({sides.x, sides.y, sides.z}) / std::sqrt(static_cast<double>(info.count));
 }
 
-void add_float_positions(std::vector<std::string>& losses, const Bounds& bounds) {
-  const double error = float_error(bounds);
+void add_float_positions(std::vector<std::string>& losses, double error) {
   if (error == 0) return;
   losses.push_back(fmt::format("Positions are rounded to float, by up to {:.2g} units.", error));
 }
@@ -229,7 +267,7 @@ void add_float_positions(std::vector<std::string>& losses, const Bounds& bounds)
 void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo& info,
                           int digits) {
   for (const Channel& channel : info.channels) {
-    if (digits_of(channel.type) <= digits) continue;
+    if (digits_of(channel.type) <= digits || !may_round(info, channel)) continue;
     if (channel.type == ChannelType::f64) {
       losses.push_back("The channel " + channel.name + " is rounded from double to float.");
     } else {

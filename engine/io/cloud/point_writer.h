@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,6 +45,24 @@ struct PointGrid {
   std::uint64_t height = 0;  ///< rows, at least 2
 };
 
+/// The most digits behind the point that are counted.
+inline constexpr unsigned kMostDecimals = 15;
+
+/// What a format really rounds of points, measured over all of them (RoundingSurvey). What a format
+/// cannot round stays as it is here.
+struct Rounding {
+  double float_error = 0;  ///< the most by which a coordinate moves when it is rounded to float
+  int last_bit = 1024;     ///< all coordinates are multiples of 2^last_bit
+  /// All coordinates are decimals with so many digits behind the point, but for the last bits of a
+  /// double; beyond kMostDecimals when some are not.
+  unsigned decimals = 0;
+  /// How far coordinates are from the steps of the LAS file that they came from, in steps.
+  double step_error = 0;
+  bool normals = false;            ///< 16 bits for each of two angles change a normal
+  bool albedos = false;            ///< 16 bits on the sRGB curve change an albedo
+  std::set<std::string> channels;  ///< those with a value that their type in the file does not hold
+};
+
 /// What a point file will hold.
 struct PointWriteInfo {
   std::uint64_t count = 0;                  ///< exact number of points
@@ -55,6 +74,9 @@ struct PointWriteInfo {
   /// The grid of the channels `row` and `column`, if they are measured_channels() and the points
   /// are written in its order; nothing otherwise.
   std::optional<PointGrid> grid;
+  /// What the format rounds; nothing when that was not measured, and then losses() says what it may
+  /// round.
+  std::optional<Rounding> rounding;
   bool has_normals = false;   ///< the normals of the surfels are worth writing
   bool has_radius = false;    ///< the radii are
   bool has_radiance = false;  ///< the radiances are
@@ -108,7 +130,7 @@ void check_colour_from(OutputFormat format, const PointWriteInfo& info);
                                                          std::span<const Channel> channels);
 
 /// Returns what a file of this format would not keep, and what it would round and by how much, a
-/// sentence each.
+/// sentence each. Of what was measured (PointWriteInfo::rounding), it says only what is rounded.
 [[nodiscard]] std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info);
 
 /// Returns what becomes of values that stand for "not known" where a file of this format cannot say

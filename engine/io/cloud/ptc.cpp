@@ -13,16 +13,12 @@
 //   188      a line "TYPE NAME" for each channel
 //            points: f32[3] position, u16[2] normal, f32 radius, f32 of all channels
 //
-// A normal is an angle about z and its z, each over the full range of 16 bits:
-//
-//   phi = 2 pi a / 65535 - pi    z = 2 b / 65535 - 1    normal = (r sin phi, r cos phi, z)
-//
-// The greatest numbers of both stand for no normal.
+// packed_normal.h says what the two numbers of a normal mean.
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/packed_normal.h"
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/particle_names.h"
 #include "engine/io/cloud/record_source.h"
@@ -33,7 +29,6 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint32_t kNoNormal = 0xffffffff;
 constexpr std::size_t kCoreBytes = 20;  // position, normal and radius as the file has them
 constexpr std::size_t kNormalOffset = 12;
 constexpr std::size_t kPackedCore = 28;   // with the normal as three floats at its end
@@ -143,14 +138,9 @@ class PtcSource : public RecordSource {
     const std::byte* const from = stream_.take(record_bytes()).data();
     std::memcpy(packed_.data(), from, kNormalOffset);
     std::memcpy(packed_.data() + kNormalOffset, from + kNormalOffset + 4, sizeof(float));
-    const double phi =
-        2 * std::numbers::pi * load<std::uint16_t>(from, kNormalOffset) / 65535 - std::numbers::pi;
-    const double z = 2.0 * load<std::uint16_t>(from, kNormalOffset + 2) / 65535 - 1;
-    const double r = std::sqrt(std::max(0.0, 1 - z * z));
-    std::array<float, 3> normal = {static_cast<float>(r * std::sin(phi)),
-                                   static_cast<float>(r * std::cos(phi)), static_cast<float>(z)};
-    if (load<std::uint32_t>(from, kNormalOffset) == kNoNormal) normal = {};
-    std::memcpy(packed_.data() + kNormalOffset + sizeof(float), normal.data(), sizeof normal);
+    const glm::vec3 normal = unpack_normal({.phi = load<std::uint16_t>(from, kNormalOffset),
+                                            .z = load<std::uint16_t>(from, kNormalOffset + 2)});
+    std::memcpy(packed_.data() + kNormalOffset + sizeof(float), &normal, sizeof normal);
     std::memcpy(packed_.data() + kPackedCore, from + kCoreBytes, floats_ * sizeof(float));
     return packed_.data();
   }

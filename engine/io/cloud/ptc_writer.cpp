@@ -7,43 +7,21 @@
 //   variables u32 | floats of all variables u32 | "float NAME\n" or "color NAME\n" ...
 //   points: x y z f32 | phi u16 | z u16 | radius f32 | variables f32 ...
 //
-// A normal (nx, ny, nz) is stored as phi = 65535 (atan2(nx, ny) / 2 pi + 1/2) and z = 65535 (nz +
-// 1) / 2, rounded; both are 65535 for a point without one. What a disc emits and reflects is
+// packed_normal.h says what phi and z of a normal mean. What a disc emits and reflects is
 // `_radiosity`, and its `_area` is that of the square cell of a surfel: the names under which
 // RenderMan looks for them.
-#include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <set>
 #include <string>
 
 #include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/packed_normal.h"
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/file/buffered_output.h"
 
 namespace ptc {
 namespace {
-
-constexpr std::uint16_t kNoNormal = 65535;
-
-struct PackedNormal {
-  std::uint16_t phi = kNoNormal;
-  std::uint16_t z = kNoNormal;
-};
-
-// Returns the two numbers of a normal; zero is the normal of a point without one.
-PackedNormal pack_normal(const glm::vec3& normal) {
-  if (normal == glm::vec3(0)) return {};
-  const glm::dvec3 n(normal);
-  const double turn = std::atan2(n.x, n.y) / (2 * std::numbers::pi) + 0.5;
-  const double height = (std::clamp(n.z, -1.0, 1.0) + 1) / 2;
-  const auto phi = static_cast<std::uint16_t>(std::lround(65535 * turn));
-  // A whole turn is none, and the greatest number stands for a missing normal.
-  return {phi == kNoNormal ? std::uint16_t{0} : phi,
-          static_cast<std::uint16_t>(std::lround(65535 * height))};
-}
 
 const char* type_name(const Channel& channel) {
   if (channel.components != 3) return "float";
@@ -142,8 +120,8 @@ std::unique_ptr<PointWriter> create_ptc(const std::filesystem::path& target,
 
 std::vector<std::string> ptc_losses(const PointWriteInfo& info) {
   std::vector<std::string> sentences;
-  add_float_positions(sentences, info.bounds);
-  if (info.has_normals)
+  add_float_positions(sentences, float_error(info));
+  if (info.has_normals && (!info.rounding || info.rounding->normals))
     sentences.push_back("Normals are rounded to 16 bits for each of two angles.");
   add_rounded_channels(sentences, info, 24);
   add_unscaled_channels(sentences, info);

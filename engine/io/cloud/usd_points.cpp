@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstring>
 #include <set>
 
@@ -77,6 +78,15 @@ Bounds moved(const Bounds& bounds, const glm::dvec3& by) {
   return bounds.empty() ? bounds : Bounds{bounds.low - by, bounds.high - by};
 }
 
+// Returns the most by which a coordinate moves when it is rounded to float about the middle of the
+// bounds. Where all coordinates are multiples of 2^b, the middle is one of 2^(b - 1).
+double error_about(const PointWriteInfo& info, const glm::dvec3& middle) {
+  const glm::dvec3 sides = info.bounds.high - info.bounds.low;
+  const double side = std::max({sides.x, sides.y, sides.z});
+  if (info.rounding && side <= std::ldexp(1.0, info.rounding->last_bit + 24)) return 0;
+  return float_error(moved(info.bounds, middle));
+}
+
 }  // namespace
 
 UsdStage usd_stage(const PointWriteInfo& info) {
@@ -84,7 +94,7 @@ UsdStage usd_stage(const PointWriteInfo& info) {
   const auto up = info.text.find("up"), metres = info.text.find("metres_per_unit");
   if (up != info.text.end() && up->second == "z") stage.up = 'Z';
   if (metres != info.text.end()) stage.metres_per_unit = parse_number(metres->second);
-  if (float_error(info.bounds) > 1e-4 * least_spacing(info)) {
+  if (float_error(info) > kMostMove * least_spacing(info)) {
     const glm::dvec3 middle = info.bounds.low + (info.bounds.high - info.bounds.low) / 2.0;
     if (float_error(moved(info.bounds, middle)) < float_error(info.bounds)) {
       stage.translation = middle;
@@ -226,7 +236,8 @@ std::vector<glm::vec3> UsdWriter::extent() const {
 std::vector<std::string> usd_losses(const PointWriteInfo& info) {
   std::vector<std::string> sentences;
   const UsdStage stage = usd_stage(info);
-  add_float_positions(sentences, moved(info.bounds, stage.translation.value_or(glm::dvec3(0))));
+  add_float_positions(
+      sentences, stage.translation ? error_about(info, *stage.translation) : float_error(info));
   const auto up = info.text.find("up");
   if (up != info.text.end() && up->second == "x") {
     sentences.push_back("USD has no upward x axis: the stage names y instead.");

@@ -109,6 +109,7 @@ std::vector<std::string> xyz_losses(const PointWriteInfo& info) {
     const bool wide = channel.type == ChannelType::f64 || channel.type == ChannelType::u64 ||
                       channel.type == ChannelType::i64;
     if (!wide || !is_scaled(channel)) continue;
+    if (channel.type != ChannelType::f64 && !may_round(info, channel)) continue;
     sentences.push_back("Values of the channel " + channel.name +
                         ", which has a scale, are rounded to 15 digits.");
   }

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/point_survey.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/cloud/rounding_survey.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/attributes.h"
@@ -42,8 +44,10 @@ void copy_points(PointSource& source, const std::filesystem::path& target, Outpu
   writer->finish();
 }
 
-/// Counts the points of a source, finds their bounds and measures their channels.
-void measure(PointSource& source, std::optional<PointSurvey>& survey, PointWriteInfo& info,
+/// Counts the points of a source, finds their bounds and measures their channels and what is
+/// rounded of them.
+void measure(PointSource& source, std::optional<PointSurvey>& survey,
+             std::optional<RoundingSurvey>& rounding, PointWriteInfo& info,
              Progress* progress = nullptr) {
   info.count = 0;
   info.bounds = {};
@@ -52,9 +56,11 @@ void measure(PointSource& source, std::optional<PointSurvey>& survey, PointWrite
     for (std::size_t i = 0; i < count; ++i) info.bounds.add(block[i].position);
     info.count += count;
     if (survey) survey->add(source.attributes());
+    if (rounding) rounding->add(std::span(block).first(count), source.attributes());
     if (progress) progress->advance(count);
   }
   if (survey) survey->finish(info);
+  if (rounding) info.rounding = rounding->rounding();
 }
 
 /// Returns what measures the channels of rows; nothing when none is measured.
@@ -80,6 +86,30 @@ void measure_all(const ContainerReader& container, std::span<const Channel> chan
     }
   }
   survey.finish(info);
+}
+
+/// Measures what a format rounds of the points of a container. Of a damaged one it is not known.
+/// @param info  describes the points that are written
+void measure_rounding(const ContainerReader& container, const PointFileOptions& options,
+                      OutputFormat format, PointWriteInfo& info) {
+  Selection selection = options.selection;
+  if (!selection.level) {
+    selection.channels.emplace();
+    for (const Channel& channel : info.channels) selection.channels->push_back(channel.name);
+  }
+  RoundingSurvey survey(format, info);
+  try {
+    const std::unique_ptr<PointSource> source = open_selected(container, selection);
+    std::vector<Surfel> block(kBlock);
+    while (const std::size_t count = source->next(block))
+      survey.add(std::span(block).first(count), source->attributes());
+  } catch (const FormatError&) {
+    return;
+  }
+  info.rounding = survey.rounding();
+  // A conversion chooses the type of positions by the bounds alone; this must not change its choice
+  const double error = float_error(info.bounds);
+  if (error > kMostMove * least_spacing(info)) info.rounding->float_error = error;
 }
 
 /// Returns the channels of a container that a format wants to know the values of.
@@ -164,10 +194,12 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
   if (!selection.takes_all()) {
     std::optional<PointSurvey> survey;
     if (!names.empty()) survey.emplace(*format, measured, kOriginalIndex);
-    measure(*open_selected(container, reading), survey, info);
+    std::optional<RoundingSurvey> no_rounding;
+    measure(*open_selected(container, reading), survey, no_rounding, info);
   } else if (!names.empty()) {
     measure_all(container, measured, *format, info);
   }
+  if (options.measure_rounding && format) measure_rounding(container, options, *format, info);
   return info;
 }
 
@@ -185,7 +217,9 @@ PointWriteInfo describe_points(const std::filesystem::path& cloud, const PointFi
                       .emits = file.info.has_emission,
                       .colour_from = options.colour_from};
   std::optional<PointSurvey> survey = survey_for(format, info.channels);
-  measure(*file.source, survey, info, &progress);
+  std::optional<RoundingSurvey> rounding;
+  if (format) rounding.emplace(*format, info);
+  measure(*file.source, survey, rounding, info, &progress);
   return info;
 }
 

@@ -27,6 +27,9 @@ struct PointFileOptions {
   /// The channel that viewers shall show as colour; empty: the albedo
   /// (PointWriteInfo::colour_from).
   std::string colour_from;
+  /// Measures for losses() what the format rounds of a container, for which all of its points are
+  /// read. Of a cloud this is always measured.
+  bool measure_rounding = false;
   Selection selection;  ///< which points are written, and which channels
   RunOptions run;       ///< memory, threads and temporary directories
 };
