@@ -70,6 +70,11 @@ void check(const PointFileInfo& info, const Surfel& s) {
 void read(const Reader& reader, const std::filesystem::path& path) {
   PointFile file = reader.open(path);
   const std::size_t row_bytes = check(file.info);
+  if (const auto extent = file.source->extent()) {
+    for (int axis = 0; axis < 3; ++axis)
+      require(extent->bounds.low[axis] <= extent->bounds.high[axis]);
+    for (const glm::dvec3& place : extent->sample) require(is_finite(place));
+  }
   std::vector<Surfel> block(64);
   std::uint64_t points = 0;
   while (const std::size_t count = file.source->next(block)) {
