@@ -103,6 +103,12 @@ struct Narrowing {
 /// positions.
 inline constexpr double kMostMove = 1e-4;
 
+/// Says whether the writer of a format chooses its positions so.
+[[nodiscard]] constexpr bool chooses_positions(OutputFormat format) noexcept {
+  return format == OutputFormat::pcd || format == OutputFormat::usda ||
+         format == OutputFormat::usdc;
+}
+
 /// Says that positions are rounded to float by up to `error`; nothing when that is 0.
 void add_float_positions(std::vector<std::string>& losses, double error);
 /// Says which channels are rounded where a file has floating-point numbers of `digits` bits.

@@ -218,7 +218,8 @@ PointWriteInfo describe_points(const std::filesystem::path& cloud, const PointFi
                       .colour_from = options.colour_from};
   std::optional<PointSurvey> survey = survey_for(format, info.channels);
   std::optional<RoundingSurvey> rounding;
-  if (format) rounding.emplace(*format, info);
+  if (format && (options.measure_rounding || chooses_positions(*format)))
+    rounding.emplace(*format, info);
   measure(*file.source, survey, rounding, info, &progress);
   return info;
 }

@@ -27,8 +27,8 @@ struct PointFileOptions {
   /// The channel that viewers shall show as colour; empty: the albedo
   /// (PointWriteInfo::colour_from).
   std::string colour_from;
-  /// Measures for losses() what the format rounds of a container, for which all of its points are
-  /// read. Of a cloud this is always measured.
+  /// Measures for losses() what the format rounds. Without this, it is measured only where the
+  /// writer of a cloud chooses its positions by it. All points of a container are read for it.
   bool measure_rounding = false;
   Selection selection;  ///< which points are written, and which channels
   RunOptions run;       ///< memory, threads and temporary directories
