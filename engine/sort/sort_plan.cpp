@@ -26,8 +26,10 @@ constexpr std::uint64_t kMinReadBytes = SpillReader::kMinBytes, kMaxReadBytes = 
 constexpr std::size_t kRunStep = 2 * kPageRecords;
 static_assert(kPageRecords * sizeof(PointRecord) % kDirectBytes == 0);
 
-// A part of 94 MB holds a piece of each range that is long enough.
+// A part of 94 MB holds a piece of each range that is long enough, and where there are few ranges a
+// smaller one does: memory that is touched for the first time takes longer than the disk.
 constexpr std::uint64_t kPartRecords = kPageRecords * 4608;
+constexpr std::uint64_t kUsualPieceBytes = 1 << 20;
 
 // Each range becomes one bucket. Smaller buckets are sorted faster, but grouping by more ranges and
 // reading more pieces takes longer, which sets the minimum. The maximum lets a bucket fit into a
@@ -67,7 +69,11 @@ SortPlan plan_sort(std::uint64_t memory_bytes, unsigned threads, std::uint64_t e
       static_cast<std::size_t>(std::clamp(memory_bytes / 64, kMinReadBytes, kMaxReadBytes));
 
   // Find the largest useful runs within the cap by bisection, as plan_bytes() grows with the runs.
-  const std::uint64_t of_use = 2 * std::max(kPartRecords, expected / plan.ranges * 8 / 5);
+  const std::uint64_t part =
+      expected <= 2 * kPartRecords  // all fits, or it is not known what comes
+          ? kPartRecords
+          : std::min(kPartRecords, plan.ranges * kUsualPieceBytes / sizeof(PointRecord));
+  const std::uint64_t of_use = 2 * std::max(part, expected / plan.ranges * 8 / 5);
   std::uint64_t fits = 0;
   std::uint64_t exceeds =
       std::min({memory_bytes / (2 * sizeof(PointRecord)), of_use, kMaxRecords}) / kRunStep + 1;
