@@ -26,11 +26,7 @@ ChunkFitter::ChunkFitter(const ScanSpool& spool, std::size_t slots)
       lanes_(std::make_unique<FitLanes>()) {}
 
 std::uint64_t ChunkFitter::bytes(std::size_t page_places, std::size_t slots) noexcept {
-  constexpr std::uint64_t kOuter = 2 * sizeof(OuterLink);  // of a place, at most
-  constexpr std::uint64_t kPlace = sizeof(Place) + sizeof(LatticePosition) + sizeof(PlaceBlock) +
-                                   sizeof(PlaceFit) + kLinks * sizeof(std::uint32_t) + kOuter + 4;
-  return NeighbourSearch::bytes(page_places, slots) + sizeof(Batch) + sizeof(FitLanes) +
-         kChunkPlaces * kPlace;
+  return NeighbourSearch::bytes(page_places, slots) + sizeof(Batch) + sizeof(FitLanes);
 }
 
 void ChunkFitter::fit(std::uint64_t number, ScanChunk& chunk) {

@@ -47,7 +47,8 @@ struct OuterLink {
 
 /// A chunk of consecutive places, and what is known of them.
 struct ScanChunk {
-  std::uint64_t first = 0;  ///< number of its first place
+  static const std::uint64_t kBytes;  ///< memory of a chunk, at most
+  std::uint64_t first = 0;            ///< number of its first place
   std::vector<Place> places;
   std::vector<LatticePosition> positions;
   std::vector<PlaceBlock> blocks;
@@ -56,6 +57,9 @@ struct ScanChunk {
   std::vector<std::array<std::uint32_t, kLinks>> links;
   std::vector<OuterLink> outer;  ///< links to places of earlier chunks
 };
+inline constexpr std::uint64_t ScanChunk::kBytes =
+    kChunkPlaces * (sizeof(Place) + sizeof(LatticePosition) + sizeof(PlaceBlock) +
+                    sizeof(PlaceFit) + kLinks * sizeof(std::uint32_t) + 2 * sizeof(OuterLink) + 4);
 
 /// Fits surfaces to few neighbours where the points are clean, and to many where they are noisy or
 /// lie on lines.
@@ -66,7 +70,7 @@ class ChunkFitter {
   /// @param spool  finished; must outlive this
   /// @param slots  pages that are held in memory
   ChunkFitter(const ScanSpool& spool, std::size_t slots);
-  /// Returns the memory of a fitter and of one chunk, bytes.
+  /// Returns the memory of a fitter, bytes.
   [[nodiscard]] static std::uint64_t bytes(std::size_t page_places, std::size_t slots) noexcept;
 
   /// Reads the places of a chunk, and fits a surface to each.

@@ -1,16 +1,17 @@
-// Chunks are worked on in groups, one chunk for each thread. What needs no other chunk is done in
-// parallel; then, in the order of the chunks, their results go to a file and their links to earlier
-// chunks vote:
+// Each thread takes the next chunk and does what needs no other chunk. In the order of the chunks,
+// their results then go to a file and their links to earlier chunks vote. A chunk that is done
+// before its turn waits, while its thread takes another one:
 //
-//     parallel     | fit 4, orient 4, result 4 |     | fit 6, orient ...
-//                  | fit 5, orient 5, result 5 |     | fit 7, ...
-//     in order                                  4, 5                      6, 7
+//     thread 1   | fit, orient, result 4       | in order 4, 5 | fit, orient, result 7 ...
+//     thread 2   | fit, orient, result 5 | fit, orient, result 6  | in order 6 | ...
 #include "engine/scan/scan.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <exception>
+#include <condition_variable>
+#include <map>
+#include <mutex>
 #include <string>
 
 #include "engine/base/memory_budget.h"
@@ -28,17 +29,23 @@ namespace {
 
 constexpr std::size_t kReadRecords = std::size_t{1}
                                      << 13;  // records or results that are read at once
-constexpr std::uint64_t kScatter = 10;       // quarters of an octave beyond the usual spacing, from
-                                             // which a point that is on no surface is an outlier
+constexpr std::size_t kSpoolRecords = std::size_t{1} << 14;  // that are written at once
+constexpr std::uint64_t kScatter = 10;  // quarters of an octave beyond the usual spacing, from
+                                        // which a point that is on no surface is an outlier
 
-/// What a thread needs for a chunk.
+/// What a thread needs beside the chunk that it works on.
 struct Worker {
   Worker(const ScanSpool& spool, std::size_t slots) : fitter(spool, slots) {}
 
   ChunkFitter fitter;
+  OrientationRoom room;
+};
+
+/// A chunk, and what comes of it.
+struct ChunkWork {
+  std::uint64_t number = 0;
   ScanChunk chunk;
   ChunkPieces pieces;
-  OrientationRoom room;
   std::vector<PlaceResult> results;
 };
 
@@ -49,8 +56,24 @@ std::size_t slots_for(std::size_t page_places) noexcept {
 
 std::uint64_t worker_bytes(std::size_t page_places) noexcept {
   constexpr std::uint64_t kOrientation = 160;  // of a place: patches and the graph between them
-  return ChunkFitter::bytes(page_places, slots_for(page_places)) +
-         kChunkPlaces * (kOrientation + sizeof(PlaceResult));
+  return ChunkFitter::bytes(page_places, slots_for(page_places)) + kChunkPlaces * kOrientation;
+}
+
+constexpr std::uint64_t kWorkBytes = ScanChunk::kBytes + kChunkPlaces * sizeof(PlaceResult);
+
+/// How many chunks are in memory.
+struct ChunkCounts {
+  std::size_t workers = 0;  ///< threads, each with a chunk
+  std::size_t waiting = 0;  ///< chunks that may wait for their turn
+};
+
+/// Returns how many chunks memory allows. @param budget  charged with everything else
+ChunkCounts count_chunks(const MemoryBudget& budget, std::size_t page_places, unsigned threads) {
+  const std::uint64_t each = worker_bytes(page_places) + kWorkBytes;
+  const std::uint64_t rest = budget.rest("a chunk of points", each);
+  const std::uint64_t workers = std::min<std::uint64_t>(threads, rest / each);
+  const std::uint64_t waiting = std::min(workers - 1, (rest - workers * each) / kWorkBytes);
+  return {static_cast<std::size_t>(workers), static_cast<std::size_t>(waiting)};
 }
 
 /// Reads single results of places in ascending order, through a window of the file.
@@ -86,23 +109,19 @@ class Completion {
         sides_(frame, options.scanners, options.up, options.aerial),
         unit_(frame.unit()) {}
 
-  void run(std::size_t workers, const Executor& executor, Progress& progress) {
-    const std::uint64_t chunks = (spool_.places() + kChunkPlaces - 1) / kChunkPlaces;
-    std::vector<std::unique_ptr<Worker>> all;
-    for (std::size_t i = 0; i < workers; ++i)
-      all.push_back(std::make_unique<Worker>(spool_, slots_for(spool_.index().page_places())));
+  void run(const ChunkCounts& counts, const Executor& executor, Progress& progress) {
+    chunks_ = (spool_.places() + kChunkPlaces - 1) / kChunkPlaces;
+    std::vector<ChunkWork> works(counts.workers + counts.waiting);
+    for (ChunkWork& work : works) free_.push_back(&work);
     progress.begin("normals", spool_.places(), "points");
-    for (std::uint64_t first = 0; first < chunks; first += workers) {
-      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(workers, chunks - first));
-      executor.for_each(count, [&](std::size_t i, unsigned) {
-        Worker& worker = *all[i];
-        worker.fitter.fit(first + i, worker.chunk);
-        orient_chunk(worker.chunk, sides_, sky_, worker.pieces, worker.room);
-        make_results(worker.chunk, worker.pieces, unit_, worker.results);
-        progress.advance(worker.chunk.places.size());
-      });
-      for (std::size_t i = 0; i < count; ++i) keep(*all[i]);
-    }
+    executor.for_each(counts.workers, [&](std::size_t, unsigned) {
+      try {
+        work_on_chunks(progress);
+      } catch (...) {
+        fail();
+        throw;
+      }
+    });
     progress.end();
   }
 
@@ -120,21 +139,71 @@ class Completion {
   }
 
  private:
+  /// Takes chunks until none are left.
+  void work_on_chunks(Progress& progress) {
+    Worker worker(spool_, slots_for(spool_.index().page_places()));
+    while (ChunkWork* const work = take()) {
+      worker.fitter.fit(work->number, work->chunk);
+      orient_chunk(work->chunk, sides_, sky_, work->pieces, worker.room);
+      make_results(work->chunk, work->pieces, unit_, work->results);
+      progress.advance(work->chunk.places.size());
+      keep_in_turn(*work);
+    }
+  }
+
+  /// Returns room for the next chunk, or null when there is none left.
+  ChunkWork* take() {
+    std::unique_lock lock(mutex_);
+    freed_.wait(lock, [this] { return failed_ || taken_ == chunks_ || !free_.empty(); });
+    if (failed_ || taken_ == chunks_) return nullptr;
+    ChunkWork* const work = free_.back();
+    free_.pop_back();
+    work->number = taken_++;
+    return work;
+  }
+
+  /// Keeps a chunk and those that waited for it, unless it must wait itself.
+  void keep_in_turn(ChunkWork& done) {
+    std::unique_lock lock(mutex_);
+    waiting_.emplace(done.number, &done);
+    if (keeping_) return;  // that thread will keep this chunk, too, when it is its turn
+    keeping_ = true;
+    for (auto first = waiting_.begin(); first != waiting_.end() && first->first == kept_;
+         first = waiting_.begin()) {
+      ChunkWork& work = *first->second;
+      waiting_.erase(first);
+      lock.unlock();
+      keep(work);
+      lock.lock();
+      ++kept_;
+      free_.push_back(&work);
+      freed_.notify_one();
+    }
+    keeping_ = false;
+    if (taken_ == chunks_) freed_.notify_all();
+  }
+
+  /// Ends the work of all threads.
+  void fail() {
+    const std::lock_guard lock(mutex_);
+    failed_ = true;
+    freed_.notify_all();
+  }
+
   /// Writes the results of a chunk, and lets its links to earlier chunks vote.
-  void keep(Worker& worker) {
-    ScanChunk& chunk = worker.chunk;
-    results_.write_at(chunk.first * sizeof(PlaceResult), std::as_bytes(std::span(worker.results)));
-    for (const PlaceResult& result : worker.results) ++octaves_[result.octave];
-    islands_.add_chunk(worker.pieces);
+  void keep(ChunkWork& work) {
+    ScanChunk& chunk = work.chunk;
+    results_.write_at(chunk.first * sizeof(PlaceResult), std::as_bytes(std::span(work.results)));
+    for (const PlaceResult& result : work.results) ++octaves_[result.octave];
+    islands_.add_chunk(work.pieces);
     std::ranges::sort(chunk.outer, [](const OuterLink& a, const OuterLink& b) {
       return a.to != b.to ? a.to < b.to : a.from < b.from;
     });
-    const std::uint64_t number = chunk.first / kChunkPlaces;
     ResultWindow earlier(results_, chunk.first);
     std::vector<SignedGraph::Edge> votes;
     for (const OuterLink& link : chunk.outer) {
       const PlaceResult& other = earlier.at(link.to);
-      const std::uint32_t a = islands_.piece(number, worker.pieces.of[link.from]);
+      const std::uint32_t a = islands_.piece(work.number, work.pieces.of[link.from]);
       const std::uint32_t b = islands_.piece(link.to / kChunkPlaces, other.piece);
       if (a == b) continue;
       const PlaceFit& fit = chunk.fits[link.from];
@@ -153,6 +222,15 @@ class Completion {
   double unit_;
   Islands islands_;
   std::array<std::uint64_t, 256> octaves_{};  ///< places by PlaceResult::octave
+
+  std::mutex mutex_;  ///< of what follows
+  std::condition_variable freed_;
+  std::vector<ChunkWork*> free_;
+  std::map<std::uint64_t, ChunkWork*> waiting_;  ///< by number: chunks that are done
+  std::uint64_t chunks_ = 0;                     ///< of the cloud
+  std::uint64_t taken_ = 0, kept_ = 0;           ///< chunks
+  bool keeping_ = false;                         ///< a thread keeps a chunk
+  bool failed_ = false;                          ///< a thread has thrown
 };
 
 /// Merges records and results.
@@ -241,18 +319,21 @@ class CompletedStream final : public ScanStream {
 };
 
 /// Writes all points to the spool, and shows them to the view of the sky, if there is one.
-void fill(ScanSpool& spool, SkyView* sky, PointStream& sorted, Progress& progress,
-          ScanReport& report) {
+void fill(ScanSpool& spool, SkyView* sky, PointStream& sorted, const Executor& executor,
+          Progress& progress, ScanReport& report) {
   progress.begin("spool", 0, "points");
-  std::vector<PointRecord> block(kReadRecords);
+  std::vector<PointRecord> block(kSpoolRecords);
   while (const std::size_t count = sorted.next(block)) {
-    const auto records = std::span(block).first(count);
-    spool.add(records);
+    const auto records = std::span<const PointRecord>(block).first(count);
+    executor.for_each(3, [&](std::size_t part, unsigned) {
+      if (part == 0) spool.add_records(records);
+      if (part == 1) spool.add_places(records);
+      if (part == 2 && sky != nullptr) {
+        for (const PointRecord& record : records) sky->add(position_of(record.key));
+      }
+    });
     for (const PointRecord& record : records)
       report.normals += (record.flags & kUnknownNormal) != 0;
-    for (const PointRecord& record : records) {
-      if (sky != nullptr) sky->add(position_of(record.key));
-    }
     progress.advance(count);
   }
   spool.finish();
@@ -273,20 +354,17 @@ std::unique_ptr<ScanStream> complete_scan(PointStream& sorted, const Frame& fram
   auto spool = std::make_unique<ScanSpool>(options.temp_dirs, index_bytes);
   // The sky tells sides where no scanner does.
   const auto sky = options.scanners.empty() ? std::make_unique<SkyView>() : nullptr;
-  fill(*spool, sky.get(), sorted, progress, report);
+  fill(*spool, sky.get(), sorted, executor, progress, report);
   // Work on as many chunks at once as memory allows.
   MemoryBudget budget(options.memory_bytes, "completing a scan");
   budget.charge("the index of points", index_bytes);
   if (sky) budget.charge("the view of the sky", SkyView::kBytes);
   budget.charge("buffers", std::uint64_t{2} << 20);
-  const std::uint64_t each = worker_bytes(spool->index().page_places());
-  const std::uint64_t rest = budget.rest("a chunk of points", each);
-  const auto workers =
-      static_cast<std::size_t>(std::min<std::uint64_t>(executor.threads(), rest / each));
+  const ChunkCounts counts = count_chunks(budget, spool->index().page_places(), executor.threads());
   auto results = std::make_unique<TempFile>(options.temp_dirs.back());
   Completion completion(*spool, sky.get(), *results, options, frame);
   if (sky && report.normals > 0) sky->finish(completion.sides().up());
-  completion.run(workers, executor, progress);
+  completion.run(counts, executor, progress);
   spool->discard_places();
   // Settle the sides.
   auto islands = std::make_unique<Islands>(std::move(completion.islands()));

@@ -15,8 +15,12 @@ ScanSpool::ScanSpool(const std::vector<std::filesystem::path>& directories,
   pending_.reserve(kPending);
 }
 
-void ScanSpool::add(std::span<const PointRecord> records) {
+void ScanSpool::add_records(std::span<const PointRecord> records) {
   record_file_.write_at(records_ * sizeof(PointRecord), std::as_bytes(records));
+  records_ += records.size();
+}
+
+void ScanSpool::add_places(std::span<const PointRecord> records) {
   for (const PointRecord& record : records) {
     if (index_.places() > 0 && record.key == last_) continue;
     last_ = record.key;
@@ -24,7 +28,6 @@ void ScanSpool::add(std::span<const PointRecord> records) {
     pending_.push_back({last_, std::bit_cast<std::uint32_t>(record.normal), record.flags & 1U});
     if (pending_.size() == kPending) write_places();
   }
-  records_ += records.size();
 }
 
 void ScanSpool::finish() {

@@ -25,7 +25,10 @@ static_assert(sizeof(Place) == 24 && std::is_trivially_copyable_v<Place>);
 
 /// Two temporary files without names: the records in their order, and the places in theirs.
 ///
-/// Threads: after finish(), const calls may be made concurrently.
+/// All records are given to add_records() and to add_places(), block by block.
+///
+/// Threads: one may call add_records() while another calls add_places(). After finish(), const
+/// calls may be made concurrently.
 class ScanSpool {
  public:
   /// @param directories  of temporary files, at least one
@@ -34,7 +37,9 @@ class ScanSpool {
   ScanSpool(const std::vector<std::filesystem::path>& directories, std::uint64_t index_bytes);
 
   /// Adds the next records, sorted by key. @throws std::system_error
-  void add(std::span<const PointRecord> records);
+  void add_records(std::span<const PointRecord> records);
+  /// Adds the places of the next records, sorted by key. @throws std::system_error
+  void add_places(std::span<const PointRecord> records);
   /// Writes what is still in memory, and completes the index. @throws std::system_error
   void finish();
 

@@ -86,7 +86,8 @@ RawScan raw_scan(const TrueCloud& cloud, std::uint32_t scanner) {
 
 ScanSpool spool_of(const RawScan& scan, std::uint64_t index_bytes) {
   ScanSpool spool({std::filesystem::temp_directory_path()}, index_bytes);
-  spool.add(scan.records);
+  spool.add_records(scan.records);
+  spool.add_places(scan.records);
   spool.finish();
   return spool;
 }
