@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "engine/base/stream.h"
@@ -16,5 +17,10 @@ namespace ptc {
 
 /// Reads and drops the next `count` points of a stream, or all that are left.
 void pass_over(PointStream& points, std::uint64_t count);
+
+/// Reads the next points of a stream on a thread of its own, while the caller works on those
+/// before. Memory: two blocks of 2^14 records.
+/// @param points  must outlive the returned stream, and is read by it alone
+[[nodiscard]] std::unique_ptr<PointStream> read_ahead(PointStream& points);
 
 }  // namespace ptc

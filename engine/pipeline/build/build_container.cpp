@@ -405,7 +405,10 @@ class Build {
     StreamChain chain(points.sorter->finish(needed(place.points)));
     if (plan.scan) complete(chain, points);
     join(chain, plan.frame, [&] { return std::make_unique<ContainerPoints>(*scene_); });
-    if (marks) chain.add(marks->tap(chain.last()));
+    if (marks) {
+      chain.add(marks->tap(chain.last()));
+      read_ahead_of(chain);
+    }
     if (whole) pass_over(chain.last(), place.points);
     if (is_rounded(request_.profile))
       chain.add(round_points(chain.last(), plan.frame.unit(), executor_, place.last_key));
@@ -436,6 +439,10 @@ class Build {
   class StreamChain {
    public:
     explicit StreamChain(std::unique_ptr<PointStream> first) { add(std::move(first)); }
+    /// Ends the streams from the last one on, because a stream may be read until it ends.
+    ~StreamChain() {
+      while (!streams_.empty()) streams_.pop_back();
+    }
     void add(std::unique_ptr<PointStream> next) { streams_.push_back(std::move(next)); }
     [[nodiscard]] PointStream& last() const { return *streams_.back(); }
 
@@ -450,6 +457,11 @@ class Build {
     scan.temp_dirs = temp_dirs(request_.run, target_);
     chain.add(marked_points(
         complete_scan(chain.last(), points.plan.frame, scan, executor_, progress_, scan_)));
+  }
+
+  /// Lets another thread read what the chain yields, where there is one.
+  void read_ahead_of(StreamChain& chain) const {
+    if (executor_.threads() > 1) chain.add(read_ahead(chain.last()));
   }
 
   /// Adds the stages that merge sorted points with those of the scene and that drop duplicates.
@@ -476,6 +488,7 @@ class Build {
       StreamChain chain(sorts.finish(group));
       join(chain, plan.frame, [&] { return container_attributes(*scene_, attributes, group); });
       if (marks) chain.add(marks->put_into(&chain.last(), number, channels));
+      read_ahead_of(chain);
       write_attribute_pages(chain.last(), number, channels, points, writer);
     }
     if (!marks || channels.empty() || channels.back().group < number) return;
