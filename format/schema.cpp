@@ -333,4 +333,19 @@ void fill_void(std::span<const Channel> channels, std::uint8_t group,
   }
 }
 
+bool is_void(std::span<const Channel> channels, std::uint8_t group,
+             std::span<const std::byte> payload) {
+  const std::size_t points = payload.size() / group_point_bytes(channels, group);
+  for (const Channel& channel : channels) {
+    if (channel.group != group) continue;
+    const std::size_t bytes = channel.component_bytes();
+    const std::uint64_t bits = channel.no_value.value_or(0);
+    for (std::size_t i = 0; i < points * channel.components; ++i) {
+      if (std::memcmp(payload.data() + i * bytes, &bits, bytes) != 0) return false;
+    }
+    payload = payload.subspan(points * channel.components * bytes);
+  }
+  return true;
+}
+
 }  // namespace ptc

@@ -108,5 +108,9 @@ struct Meta {
 /// Fills the payload of an attribute page whose values are all unknown (spec/points.md#void-pages).
 /// @param payload  a whole number of points of the group
 void fill_void(std::span<const Channel> channels, std::uint8_t group, std::span<std::byte> payload);
+/// Says whether all values of an attribute page are unknown.
+/// @param payload  a whole number of points of the group
+[[nodiscard]] bool is_void(std::span<const Channel> channels, std::uint8_t group,
+                           std::span<const std::byte> payload);
 
 }  // namespace ptc

@@ -171,9 +171,7 @@ void ContainerWriter::write_attributes(std::uint8_t group, std::span<const std::
                             .group = group,
                             .rank = reserve_page(PageType::attribute, group),
                             .record_count = count};
-  std::vector<std::byte> unknown(payload.size());
-  fill_void(channels, group, unknown);
-  if (std::ranges::equal(payload, unknown)) return write_void_page(summary);
+  if (is_void(channels, group, payload)) return write_void_page(summary);
   write_page(summary, payload, packed_group_columns(channels, group));
 }
 

@@ -427,6 +427,7 @@ TEST_CASE("meta: a void page has the value for not known in every channel, or 0"
   channels[3].no_value = 0x0123456789abcdef;
   Bytes payload(3 * (4 + 6 + 8), std::byte{0xee});
   fill_void(channels, 2, payload);
+  CHECK(is_void(channels, 2, payload));
   for (std::size_t i = 0; i < 3; ++i) {
     CHECK(test::get<std::uint32_t>(payload, 4 * i) == 0x7fc00000);
     CHECK(test::get<std::uint64_t>(payload, 30 + 8 * i) == 0x0123456789abcdef);
@@ -436,6 +437,20 @@ TEST_CASE("meta: a void page has the value for not known in every channel, or 0"
   Bytes bytes(10, std::byte{0xee});
   fill_void(channels, 1, bytes);
   CHECK(bytes == Bytes(10));
+  CHECK(is_void(channels, 1, bytes));
+}
+
+TEST_CASE("meta: a page with one known value is not void", "[format][meta]") {
+  std::vector<Channel> channels{{"a", ChannelType::u16, 1, 1}, {"b", ChannelType::u8, 3, 1}};
+  channels[0].no_value = 0x1234;
+  Bytes payload(4 * (2 + 3));
+  fill_void(channels, 1, payload);
+  for (std::byte& b : payload) {
+    b ^= std::byte{1};
+    CHECK_FALSE(is_void(channels, 1, payload));
+    b ^= std::byte{1};
+  }
+  CHECK(is_void(channels, 1, payload));
 }
 
 TEST_CASE("text: UTF-8 is well-formed as RFC 3629 defines it", "[format][meta]") {
