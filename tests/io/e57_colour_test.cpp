@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/io/cloud/points.h"
 #include "tests/io/e57_file.h"
 #include "tests/io/files.h"
 
@@ -104,13 +105,13 @@ TEST_CASE("e57: stored colours are scaled by their limits", "[io][e57]") {
            limits("0", "255"));
   CHECK(wide.surfels[0].albedo == glm::vec3(linear(0.2), 1, 1));  // above the limit: as the limit
   CHECK(wide.channel("rgb").type == ChannelType::u16);
-  CHECK(wide.channel("rgb").scale == 257);
+  CHECK(wide.channel("rgb").scale == kByteScale);
   CHECK(wide.value<std::uint16_t>(0, "rgb", 2) == 300);
   const Cloud ten =
       read("Integer minimum=\"0\" maximum=\"1023\"", "", 1,
            {raw(std::uint16_t{1023}), raw(std::uint16_t{0}), raw(std::uint16_t{341})});
   CHECK(ten.surfels[0].albedo == glm::vec3(1, 0, linear(341.0 / 1023)));
-  CHECK(ten.channel("rgb").scale == 65535.0 / 1023);
+  CHECK(ten.channel("rgb").scale == 1.0 / 1023);
   const Cloud floats = read("Float precision=\"single\"", "", 1, {raw(0.5F), raw(NAN), raw(1.0F)});
   CHECK(floats.surfels[0].albedo == glm::vec3(0.5F));  // not a number: no colour
   CHECK(floats.channel("rgb").type == ChannelType::f32);
@@ -118,11 +119,29 @@ TEST_CASE("e57: stored colours are scaled by their limits", "[io][e57]") {
   CHECK(shifted.surfels[0].albedo == glm::vec3(0, 1, linear(0.5)));
   CHECK(shifted.channel("rgb").scale == Approx(0.1));
   CHECK(shifted.channel("rgb").offset == Approx(-1));
+  const Cloud narrow = read(kByte, "", 1, {"\x7f", "\x40", "\xff"}, limits("0", "127"));
+  CHECK(narrow.surfels[0].albedo == glm::vec3(1, linear(64.0 / 127), 1));
+  CHECK(narrow.channel("rgb").scale == 1.0 / 127);  // white is 1, not 255
+  CHECK(narrow.channel("rgb").role == ChannelRole::colour);
   const Cloud tiny = read("Float", "", 1, {raw(0.0), raw(0.0), raw(0.0)}, limits("0", "5e-324"));
   CHECK(tiny.channel("rgb").scale == 1);
   const Cloud huge = read("ScaledInteger minimum=\"0\" maximum=\"255\" scale=\"1e-300\"", "", 1,
                           {"\x01", "\x02", "\x03"}, limits("0", "1e308"));
   CHECK(huge.channel("rgb").scale == 1e-300);  // not 0, as a product of both would be
+}
+
+TEST_CASE("e57: a colour whose limits its channel cannot state is no colour there", "[io][e57]") {
+  // White is 1, but without a scale it would be 255.
+  const Cloud cloud = read(kByte, "", 1, {"\x01", std::string(1, '\0'), "\x01"}, limits("0", "1"));
+  CHECK(cloud.surfels[0].albedo == glm::vec3(1, 0, 1));
+  const Channel& rgb = cloud.channel("rgb");
+  CHECK(rgb.type == ChannelType::u8);
+  CHECK(rgb.scale == 1);
+  CHECK(rgb.role == ChannelRole::value);
+  CHECK(rgb.colour_space == ColourSpace::none);
+  CHECK(cloud.value<std::uint8_t>(0, "rgb", 0) == 1);
+  CHECK(cloud.info.notes ==
+        std::vector<std::string>{"Channel rgb has the numbers of the file without their limits."});
 }
 
 TEST_CASE("e57: a point may have no colour", "[io][e57]") {
@@ -153,6 +172,7 @@ TEST_CASE("e57: scans may have other colours or none", "[io][e57]") {
   CHECK(cloud.surfels[2].albedo == glm::vec3(0.5F));
   CHECK(cloud.channel("rgb").type == ChannelType::u16);
   CHECK(cloud.channel("rgb").scale == 1);
+  CHECK(cloud.channel("rgb").role == ChannelRole::value);
   CHECK(cloud.value<std::uint16_t>(0, "rgb", 1) == 51);
   CHECK(cloud.value<std::uint16_t>(1, "rgb", 1) == 13107);
   CHECK(cloud.value<std::uint16_t>(2, "rgb", 1) == 0);

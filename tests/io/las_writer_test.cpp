@@ -177,6 +177,8 @@ TEST_CASE("las writer: what is not known is as in a file without the channel",
   CHECK(las.point<std::uint16_t>(0, 30) == 35199);
   CHECK(las.point<std::uint16_t>(0, 32) == 65535);
   CHECK(las.point<std::uint16_t>(0, 34) == 0);
+  CHECK(standard(1 / 255.0).point<std::uint16_t>(0, 30) == 35199);
+  info.text["las.header"] = "{}";
   const Las bytes = standard(1 / 255.0);
   CHECK(bytes.point<std::uint16_t>(0, 30) == 137);
   CHECK(bytes.point<std::uint16_t>(0, 32) == 255);
@@ -268,6 +270,25 @@ TEST_CASE("las writer: more extra bytes than one record can describe are refused
   info.has_radius = true;
   CHECK_THROWS_AS(create_points(scratch / "a.las", OutputFormat::las, info), RequestError);
   CHECK(scratch.listing().empty());
+}
+
+TEST_CASE("las writer: bytes in fields of 16 bits are widened unless they come from a LAS file",
+          "[io][writers][las]") {
+  const std::vector<Surfel> surfels = surfels_of(1);
+  PointWriteInfo info = plain_info(surfels);
+  info.channels = {stored_colour(ChannelType::u16)};
+  info.channels[0].scale = 1 / 255.0;
+  std::vector<std::byte> row;
+  for (const int v : {255, 51, 300})
+    append_value(row, static_cast<std::uint16_t>(v));  // 300: above
+  const auto colour = [&] {
+    const Las las = written(info, surfels, row);
+    return std::array{las.point<std::uint16_t>(0, 30), las.point<std::uint16_t>(0, 32),
+                      las.point<std::uint16_t>(0, 34)};
+  };
+  CHECK(colour() == std::array<std::uint16_t, 3>{65535, 13107, 65535});
+  info.text["las.header"] = "{}";
+  CHECK(colour() == std::array<std::uint16_t, 3>{255, 51, 255});
 }
 
 TEST_CASE("las writer: a colour from a channel takes the place of the stored one, which is kept",

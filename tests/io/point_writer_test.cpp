@@ -216,6 +216,20 @@ TEST_CASE("point writers: where the stored colour is not known, viewers show the
   }
 }
 
+TEST_CASE("point writers: a surface's colour with a scale is shown with white at 1",
+          "[io][writers]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(1);
+  PointWriteInfo info = plain_info(surfels);
+  info.channels = {channel("paint", ChannelType::u8, 3, ChannelRole::colour)};
+  info.channels[0].colour_space = ColourSpace::srgb;
+  info.channels[0].scale = 1 / 5.0;
+  info.colour_from = "paint";
+  write_points(scratch / "a", OutputFormat::ply, info, surfels,
+               {std::byte{5}, std::byte{1}, std::byte{0}});
+  CHECK(slurp(scratch / "a").ends_with(std::string("\xff\x33\0\x05\x01\0", 6)));
+}
+
 TEST_CASE("point writers: losses tell what is rounded, by how much, and what is missing",
           "[io][writers]") {
   PointWriteInfo info = plain_info(surfels_of(2));

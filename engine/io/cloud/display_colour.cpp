@@ -44,7 +44,9 @@ std::array<std::uint16_t, 3> to_srgb(const glm::vec3& light, double white) {
 }  // namespace
 
 DisplayColour::DisplayColour(const PointWriteInfo& info)
-    : chosen_(!info.colour_from.empty()), surfels_have_albedo_(info.has_albedo) {
+    : chosen_(!info.colour_from.empty()),
+      surfels_have_albedo_(info.has_albedo),
+      bytes_stay_(info.text.contains("las.header")) {
   if (info.has_albedo) kind_ = Kind::albedo;
   source_ = find_channel(info, chosen_ ? info.colour_from : "rgb");
   if (!source_) return;
@@ -61,11 +63,8 @@ glm::vec3 DisplayColour::linear(const Surfel& surfel, const std::byte* row) cons
     return surfel.albedo;
   const std::array<std::uint16_t, 3> stored = stored_values(surfel, row);
   glm::vec3 light;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double white = source_->channel.scale == kByteScale ? 255 : 65535;
-    light[static_cast<int>(i)] =
-        static_cast<float>(srgb_to_linear(std::min(stored[i] / white, 1.0)));
-  }
+  for (std::size_t i = 0; i < 3; ++i)
+    light[static_cast<int>(i)] = static_cast<float>(srgb_to_linear(stored[i] / stored_white()));
   return light;
 }
 
@@ -103,15 +102,20 @@ bool DisplayColour::knows(const std::byte* row) const noexcept {
 
 std::array<std::uint16_t, 3> DisplayColour::stored_values(const Surfel& surfel,
                                                           const std::byte* row) const {
-  if (!knows(row))
-    return to_srgb(surfel.albedo, source_->channel.scale == kByteScale ? 255 : 65535);
-  const bool bytes = source_->channel.type == ChannelType::u8;
+  if (!knows(row)) return to_srgb(surfel.albedo, stored_white());
+  const bool wide = source_->channel.type == ChannelType::u16 && source_->channel.scale == 1;
+  const std::int64_t most = wide ? 65535 : 255;
+  const std::int64_t factor = static_cast<std::int64_t>(stored_white()) / most;
   std::array<std::uint16_t, 3> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t value = load_integer(source_->channel.type, source_->at(row, i));
-    values[i] = static_cast<std::uint16_t>(bytes ? 257 * value : value);
+    values[i] = static_cast<std::uint16_t>(factor * std::min(value, most));
   }
   return values;
+}
+
+double DisplayColour::stored_white() const noexcept {
+  return bytes_stay_ && source_->channel.scale == kByteScale ? 255 : 65535;
 }
 
 glm::vec3 DisplayColour::shown_light(const std::byte* row) const {
@@ -124,6 +128,12 @@ glm::vec3 DisplayColour::shown_light(const std::byte* row) const {
     return glm::vec3(to_share(covers ? 1 - number(0) : number(0)));
   }
   const glm::dvec3 light(number(0), number(1), number(2));
+  if (channel.colour_space == ColourSpace::srgb) {  // of a surface, with a scale: white is 1
+    const auto linear = [](double value) {
+      return static_cast<float>(srgb_to_linear(static_cast<double>(to_share(value))));
+    };
+    return {linear(light.r), linear(light.g), linear(light.b)};
+  }
   const double luminance = 0.2126 * light.r + 0.7152 * light.g + 0.0722 * light.b;  // Rec. 709
   const double factor = luminance > 0 ? 1 / (1 + luminance) : 1;
   return {to_share(factor * light.r), to_share(factor * light.g), to_share(factor * light.b)};

@@ -42,8 +42,9 @@ class DisplayColour {
   [[nodiscard]] std::array<std::uint8_t, 3> bytes(const Surfel& surfel, const std::byte* row) const;
   /// Returns channels without the one whose values bytes() has.
   [[nodiscard]] std::vector<RowChannel> without_bytes(std::vector<RowChannel> channels) const;
-  /// Returns the values of stored(), 257-fold if they have 8 bits. Bytes in fields of 16 bits stay
-  /// as they are. Where they are not known, the albedo takes their place.
+  /// Returns the values of stored(), those of 8 bits 257-fold, so that 65535 is white. Points that
+  /// come from a LAS file with bytes in its fields of 16 bits keep those. Where values are not
+  /// known, the albedo takes their place.
   [[nodiscard]] std::array<std::uint16_t, 3> stored_values(const Surfel& surfel,
                                                            const std::byte* row) const;
 
@@ -52,11 +53,14 @@ class DisplayColour {
 
   /// Says whether the numbers of stored() are known of a point.
   [[nodiscard]] bool knows(const std::byte* row) const noexcept;
+  /// Returns which of stored_values() is white.
+  [[nodiscard]] double stored_white() const noexcept;
   [[nodiscard]] glm::vec3 shown_light(const std::byte* row) const;
 
   Kind kind_ = Kind::none;
   bool chosen_;  // PointWriteInfo::colour_from names the source
   bool surfels_have_albedo_;
+  bool bytes_stay_;                   // the points come from a LAS file
   std::optional<RowChannel> source_;  // of the kinds stored and shown
 };
 

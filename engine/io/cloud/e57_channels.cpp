@@ -276,12 +276,8 @@ void E57Channels::gather_scan(const E57Scan& scan, const E57Roles& roles, const 
 }
 
 void E57Channels::add_colours(const E57Document& document) {
-  Channel rgb;
-  rgb.name = "rgb";
-  rgb.components = 3;
-  rgb.role = ChannelRole::colour;
-  rgb.colour_space = ColourSpace::srgb;
-  colours_.describe(rgb, false);
+  Channel numbers{.name = "rgb", .components = 3};
+  colours_.describe(numbers, false);
 
   // Find the limits of colours that hold for all scans.
   std::optional<E57Limits> common;  // at least one scan has colours
@@ -297,15 +293,23 @@ void E57Channels::add_colours(const E57Document& document) {
     }
   }
 
-  // Scale stored values so that the limits are 0 and the most of the type, or 0 and 1.
-  const double most = rgb.type == ChannelType::u8 ? 255 : rgb.type == ChannelType::u16 ? 65535 : 1;
-  const double stretch = most / (common->high - common->low);
-  const double scale = rgb.scale * stretch;
-  const double offset = (rgb.offset - common->low) * stretch;
-  differ = differ || scale == 0 || !std::isfinite(scale) || !std::isfinite(offset);
-  if (!differ) {
-    rgb.scale = scale;
-    rgb.offset = offset;
+  // Let the limits mean 0 and 1. Numbers of 8 and 16 bits that end at the most of their type need
+  // no scale, and all others of unsigned types do: without one they would mean just that.
+  Channel colour = numbers;
+  colour.role = ChannelRole::colour;
+  colour.colour_space = ColourSpace::srgb;
+  const double most = numbers.type == ChannelType::u8    ? 255
+                      : numbers.type == ChannelType::u16 ? 65535
+                                                         : 0;
+  const bool is_plain = numbers.scale == 1 && numbers.offset == 0;
+  const bool fills_type = is_plain && common->low == 0 && common->high == most;
+  if (!fills_type) {
+    const double range = common->high - common->low;
+    colour.scale = numbers.scale / range;
+    colour.offset = (numbers.offset - common->low) / range;
+    const bool is_unsigned = colours_.kind == Union::Kind::integer && colours_.low >= 0;
+    differ = differ || (is_unsigned && colour.scale == 1 && colour.offset == 0) ||
+             colour.scale == 0 || !std::isfinite(colour.scale) || !std::isfinite(colour.offset);
   }
   if (differ) notes_.emplace_back("Channel rgb has the numbers of the file without their limits.");
   if (assumed) {
@@ -315,7 +319,7 @@ void E57Channels::add_colours(const E57Document& document) {
   if (colours_.scans < scans_) {
     notes_.emplace_back("Channel rgb is 0 where a scan has no colours.");
   }
-  channels_.push_back(std::move(rgb));
+  channels_.push_back(differ ? std::move(numbers) : std::move(colour));
 }
 
 void E57Channels::add_fields() {
