@@ -8,6 +8,7 @@
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/level_source.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/store/box_pages.h"
 
 namespace ptc {
@@ -102,6 +103,7 @@ PointFile open_point_input(const std::filesystem::path& path, const Selection& s
                        path.string() + ": only a container has levels: build one from the cloud");
   }
   PointFile file = open_points(path);
+  file.info.channels = join_shading(std::move(file.info.channels));
   if (selection.takes_all() && !selection.channels) return file;
   PointFileInfo& info = file.info;
   file.source = select_points(std::move(file.source), info.channels, selection, path);

@@ -103,6 +103,38 @@ class RoundTrip(ProgramTest):
                 self.assertGreater(moved, 0)
         self.assertNotIn("\n  rounded ", self.succeed("ptcinfo", exact).stdout)
 
+    def channels_of(self, path):
+        return json.loads(self.succeed("ptcinfo", path, "--json").stdout)["channels"]
+
+    def test_a_shading_that_is_read_again_is_known_and_replaced(self):
+        for ending in ("las", "ply", "pcd", "xyz"):
+            lit, again, built = (self.here / f"{name}.{ending}" for name in ("lit", "again", "built"))
+            self.succeed("ptcshade", self.cloud, "--check", "9", "-o", lit)
+            # The channels are what they were, and a shading of the cloud or its container replaces them
+            self.succeed("ptcbuild", lit, "--profile", "exact", "-o", self.here / "lit.ptcx")
+            known = {c["name"]: c for c in self.channels_of(self.here / "lit.ptcx")}
+            self.assertEqual((known["sky"]["components"], known["sky"]["role"]), (3, "colour"))
+            self.assertEqual((known["bent_normal"]["components"], known["bent_normal"]["role"]), (3, "direction"))
+            self.assertNotIn("sky_r", known)
+            self.succeed("ptcverify", self.here / "lit.ptcx")
+            self.succeed("ptcshade", lit, "--check", "9", "--estimate", "-o", again)
+            self.succeed("ptcconvert", again, again.with_suffix(".ply"), "--channels", "occlusion,occlusion_error")
+            self.succeed("ptcshade", self.here / "lit.ptcx", "--check", "9", "-o", self.here / "again.ptcx")
+            self.succeed("ptcverify", self.here / "again.ptcx")
+            names = [c["name"] for c in self.channels_of(self.here / "again.ptcx")]
+            self.assertEqual(sorted(names), sorted(known))
+            self.succeed("ptcconvert", self.here / "again.ptcx", built)
+            self.assertFalse([n for n in names if n.startswith(("occlusion_", "sky_"))])
+
+    def test_one_column_with_a_name_of_shading_is_kept_beside_it(self):
+        own = self.here / "own.xyz"
+        own.write_text("# x y z occlusion sky_r sky_g sky_b\n" +
+                       "".join(f"{i % 9} {i // 9} 0 0.5 1 2 3\n" for i in range(81)))
+        self.succeed("ptcshade", own, "--check", "9", "-o", self.here / "own.ply")
+        names, points = read_ply(self.here / "own.ply")
+        self.assertEqual({p[names.index("occlusion_2")] for p in points}, {0.5})
+        self.assertIn("occlusion", names)
+
     def test_recoding_twice_gives_the_same_bytes(self):
         for name in ("a.ptcx", "b.ptcx"):
             self.succeed("ptcconvert", self.scene, self.here / name, "--profile", "raw")

@@ -118,9 +118,11 @@ bool same_but_for_group(Channel a, const Channel& b) {
 }
 
 std::size_t AttributePlan::add_channel(Channel channel, bool taken) {
-  // Put the channel behind the last one, or into a new group
+  // Put the channel behind the last one, or into a new group. Those of a shading have groups of
+  // their own, because the next shading replaces them
   const std::size_t bytes = channel.bytes();
-  if (group_bytes_.empty() || group_bytes_.back() + bytes > kGroupBytes) {
+  if (group_bytes_.empty() || group_bytes_.back() + bytes > kGroupBytes ||
+      is_shading(channels_.back()) != is_shading(channel)) {
     if (group_bytes_.size() == kMaxGroups)
       throw RequestError("inputs", "the inputs have more channels than a container can hold");
     group_bytes_.push_back(0);
@@ -145,9 +147,10 @@ void AttributePlan::set_no_value(std::size_t channel, std::uint64_t bits) {
 std::size_t AttributePlan::join(const Channel& channel, bool taken, const Input& input) {
   // Look for the same channel of an earlier input, then for a name that is free
   Channel wanted = channel;
-  const std::vector<Channel> shaded = shading_channels(true);
+  const std::vector<Channel> added = shading_channels(true);
   for (unsigned number = 2;; ++number) {
-    const bool reserved = std::ranges::find(shaded, wanted.name, &Channel::name) != shaded.end();
+    const bool reserved = std::ranges::find(added, wanted.name, &Channel::name) != added.end() &&
+                          !(input.shaded && is_shading(wanted));
     const auto found = std::ranges::find(channels_, wanted.name, &Channel::name);
     if (!reserved && found == channels_.end()) return add_channel(std::move(wanted), taken);
     const auto at = static_cast<std::size_t>(found - channels_.begin());
@@ -163,7 +166,7 @@ std::size_t AttributePlan::join(const Channel& channel, bool taken, const Input&
 
 std::size_t AttributePlan::add_input(std::span<const Channel> channels,
                                      const std::vector<bool>& taken) {
-  Input input;
+  Input input{.shaded = have_shading(channels)};
   for (std::size_t i = 0; i < channels.size(); ++i) {
     for (const Channel& channel : divided(channels[i])) {
       const std::size_t index = join(channel, !taken.empty() && taken[i], input);

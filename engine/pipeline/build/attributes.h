@@ -61,8 +61,9 @@ class AttributePlan {
   /// A channel that an earlier input has, too, of the same type, meaning and unit, is the same
   /// channel. If only one of the two has a no_value, they are the same channel when that is
   /// usual_no_value() and the points of the other do not have this value. A name that stands for
-  /// another kind of channel, or for a channel of shading, gets a number at its end. A channel of
-  /// more than kGroupBytes becomes several, NAME_0, NAME_1 and so on.
+  /// another kind of channel gets a number at its end, and so does that of a channel of shading
+  /// unless the input has all of them (have_shading()). A channel of more than kGroupBytes becomes
+  /// several, NAME_0, NAME_1 and so on.
   /// @param channels  in the order of a row; their groups mean nothing
   /// @param taken     for each channel, whether a point of the input has usual_no_value() in it;
   ///                  empty: no point has
@@ -111,6 +112,7 @@ class AttributePlan {
     std::vector<Piece> pieces;
     std::size_t row_bytes = 0;
     bool indexed = false;  ///< the input itself says where its points were
+    bool shaded = false;   ///< the input has all channels of an earlier shading
   };
   struct Place {
     std::size_t group, offset;

@@ -185,7 +185,8 @@ struct OpenReceivers {
   [[nodiscard]] std::vector<std::uint8_t> groups_for(const std::filesystem::path& target) const {
     if (!output_format(target)) return rise_groups(container.meta().channels);
     std::vector<std::uint8_t> all(container.groups().begin(), container.groups().end());
-    std::erase_if(all, [](std::uint8_t group) { return group < kFirstInputGroup; });
+    std::erase_if(
+        all, [&](std::uint8_t group) { return holds_shading(container.meta().channels, group); });
     return all;
   }
 

@@ -17,6 +17,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/store/commit.h"
@@ -48,6 +50,28 @@ Channel colour(const char* name, const char* unit) {
           .unit = unit};
 }
 
+/// Joins columns that begin at `first` to a channel that shading adds, in the type that they have.
+/// A channel that is joined already stays as it is. @return whether they are there
+bool join_columns(const Channel& added, std::size_t first, std::vector<Channel>& channels) {
+  const auto left = std::span<const Channel>(channels).subspan(std::min(first, channels.size()));
+  const std::vector<std::string> parts = part_names(added.name, added.components, has_axes(added));
+  const bool joined = !left.empty() && left[0].name == added.name && is_shading(left[0]);
+  const std::size_t columns = joined ? 1 : parts.size();
+  if (left.size() < columns || is_integer(left[0].type) || is_scaled(left[0])) return false;
+  for (std::size_t i = 0; i < columns && !joined; ++i) {
+    Channel alike = left[0];
+    alike.name = parts[i];
+    if (left[i] != alike || alike.components != 1) return false;
+  }
+  Channel whole = added;
+  whole.type = left[0].type;
+  whole.no_value = left[0].no_value;
+  const auto at = channels.begin() + static_cast<std::ptrdiff_t>(first);
+  *at = std::move(whole);
+  channels.erase(at + 1, at + static_cast<std::ptrdiff_t>(columns));
+  return true;
+}
+
 using ShadedValues = std::array<float, kFloats>;
 
 /// Returns the values of a shaded surfel in the order of the channels. The radiance that leaves is
@@ -75,7 +99,8 @@ ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEst
 /// earlier one.
 Meta shaded_meta(const ContainerReader& from, const std::string& settings, bool estimates) {
   Meta meta = from.meta();
-  std::erase_if(meta.channels, [](const Channel& c) { return c.group == kGroup; });
+  std::erase_if(meta.channels,
+                [&](const Channel& c) { return holds_shading(from.meta().channels, c.group); });
   const std::vector<Channel> added = shading_channels(estimates);
   meta.channels.insert(meta.channels.begin(), added.begin(), added.end());
   meta.text["shading"] = settings;
@@ -168,7 +193,9 @@ class ContainerSink : public ShadedSink {
     const std::size_t tail = from_.page_count() - from_.superblock().tail.size();
     for (std::uint32_t page = 0; page < from_.meta_page(); ++page) {
       const DirectoryEntry& entry = from_.entry(page);
-      if (entry.type == PageType::attribute && entry.group == kGroup) continue;
+      const bool replaced =
+          entry.type == PageType::attribute && holds_shading(from_.meta().channels, entry.group);
+      if (replaced) continue;
       const std::uint32_t rank = writer_.reserve_page(entry.type, entry.group);
       if (entry.is_void()) {
         writer_.write_void_page({.type = entry.type,
@@ -222,12 +249,44 @@ std::vector<Channel> shading_channels(bool estimates) {
   return channels;
 }
 
+bool is_shading(const Channel& channel) {
+  return std::ranges::any_of(shading_channels(true), [&](const Channel& added) {
+    return channel.name == added.name && channel.components == added.components;
+  });
+}
+
+bool have_shading(std::span<const Channel> channels) {
+  return std::ranges::all_of(shading_channels(false), [&](const Channel& added) {
+    const auto found = std::ranges::find(channels, added.name, &Channel::name);
+    return found != channels.end() && is_shading(*found);
+  });
+}
+
+std::vector<Channel> join_shading(std::vector<Channel> channels) {
+  std::vector<Channel> joined = channels;
+  const std::vector<Channel> added = shading_channels(true);
+  const auto starts = [&](const Channel& channel) { return channel.name == added[0].name; };
+  auto at = static_cast<std::size_t>(std::ranges::find_if(joined, starts) - joined.begin());
+  for (const Channel& channel : added) {
+    if (join_columns(channel, at, joined)) ++at;
+  }
+  return have_shading(joined) ? joined : channels;
+}
+
+bool holds_shading(std::span<const Channel> channels, std::uint8_t group) {
+  return group == kGroup || std::ranges::all_of(channels, [&](const Channel& channel) {
+           return channel.group != group || is_shading(channel);
+         });
+}
+
 PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t points,
                              const std::string& settings, const std::string& colour_from,
                              std::optional<OutputFormat> format) {
   PointWriteInfo info = describe_points(receivers, {.colour_from = colour_from}, format);
   info.count = points;
-  std::erase_if(info.channels, [](const Channel& c) { return c.group == kGroup; });
+  std::erase_if(info.channels, [&](const Channel& c) {
+    return holds_shading(receivers.meta().channels, c.group);
+  });
   info.text["shading"] = settings;
   return info;
 }
@@ -252,7 +311,7 @@ void check_shaded_sink(const std::filesystem::path& target, const ContainerReade
   }
   for (const Channel& added : shading_channels(estimates)) {
     const auto clashes = [&](const Channel& c) {
-      return c.group != kGroup && c.name == added.name;
+      return c.name == added.name && !holds_shading(receivers.meta().channels, c.group);
     };
     if (std::ranges::none_of(receivers.meta().channels, clashes)) continue;
     throw DataError(file + ": its channel " + added.name +
