@@ -19,6 +19,7 @@
 #include "tools/common.h"
 #include "tools/option_text.h"
 #include "tools/options.h"
+#include "tools/scene_options.h"
 
 namespace ptc {
 namespace {
@@ -183,8 +184,11 @@ void SceneArguments::apply(LightingRequest& request, const std::filesystem::path
   request.scene_names = files_->names();
   request.sampling.count = points_;
   request.up = up_;
-  if (is_container_alone(request))
+  if (is_container_alone(request)) {
     note_unused(command_->app(), {"--up"}, "the scene is a container", progress);
+  } else {
+    note_unknown_up(files_->paths(), up_, progress);
+  }
   if (std::ranges::all_of(files_->paths(), holds_points))
     note_unused(command_->app(), {"--points"}, "no file of the scene is a mesh", progress);
 }

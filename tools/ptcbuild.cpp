@@ -211,6 +211,7 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
     throw CLI::ExcludesError("--city", "lights: the city has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);
   note_options_of_meshes(arguments, command.app(), progress);
+  if (request.append.empty()) ptc::note_unknown_up(request.inputs, request.up, progress);
   const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
 
   // Report.

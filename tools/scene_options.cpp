@@ -158,6 +158,20 @@ glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files, const std
   return {0, 1, 0};
 }
 
+void note_unknown_up(const std::vector<std::filesystem::path>& files, const std::string& axis,
+                     Progress& progress) {
+  if (!axis.empty()) return;
+  std::filesystem::path silent;
+  for (const std::filesystem::path& file : files) {
+    if (!holds_points(file)) continue;
+    if (open_point_input(file).info.text.contains(kUpKey)) return;
+    if (silent.empty() && !is_container(file)) silent = file;
+  }
+  if (silent.empty()) return;
+  progress.note(silent.filename().string() +
+                ": the file does not say which axis is up, y is taken; --up z if it is z");
+}
+
 void add_light_sampling(CLI::App& app, LightSampling& sampling) {
   constexpr std::uint64_t kMax = 1 << 16;
   add_integer(app, "--sun-rays", sampling.sun_rays, 1, kMax,

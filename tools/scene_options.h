@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "engine/base/progress.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/lights.h"
 
@@ -51,6 +52,13 @@ class LightArguments {
 /// @throws DataError, FormatError, std::system_error when a file cannot be read
 [[nodiscard]] glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files,
                                     const std::string& axis = {});
+
+/// Notes that the y axis is taken as up because no file of a scene says which one is, naming the
+/// first cloud among them. Containers and meshes need no note: y is up unless they say otherwise.
+/// @param axis  as for up_of_files(); there is no note where it is given
+/// @throws as up_of_files()
+void note_unknown_up(const std::vector<std::filesystem::path>& files, const std::string& axis,
+                     Progress& progress);
 
 /// Declares --sun-rays, --sky-rays and --area-rays.
 void add_light_sampling(CLI::App& app, LightSampling& sampling);
