@@ -117,7 +117,7 @@ class Facts(ProgramTest):
         self.assertLess(told.index("temporary files"), told.index("partition"))
         self.assertEqual(self.succeed(*command, "--quiet").stderr, "")
         self.assertFalse([*first.iterdir(), *second.iterdir()])
-        self.assertEqual(self.succeed("ptcbuild", self.cloud, "-o", self.here / "o.ptcx").stderr, "")
+        self.assertEqual(self.succeed("ptcbuild", self.cloud, "--up", "y", "-o", self.here / "o.ptcx").stderr, "")
 
     def test_what_the_disks_have_no_room_for_is_refused_with_both_figures(self):
         for options in (["--city", "80G"], ["--city", "80G", "--temp", "/dev/shm"]):
@@ -167,7 +167,7 @@ class Facts(ProgramTest):
             self.assertEqual((result.stdout, result.stderr), ("", ""))
 
     def test_progress_without_a_terminal_is_plain_lines(self):
-        for command in (["ptcverify", self.scene], ["ptcbuild", self.cloud, "-o", self.here / "o.ptcx"],
+        for command in (["ptcverify", self.scene], ["ptcbuild", self.cloud, "--up", "y", "-o", self.here / "o.ptcx"],
                         ["ptcshade", self.scene, "-o", self.here / "o.ply"]):
             text = self.succeed(*command, "--progress").stderr
             self.assertGreaterEqual(len(text.splitlines()), 2)
