@@ -113,9 +113,6 @@ inline constexpr double kMostMove = 1e-4;
 void add_float_positions(std::vector<std::string>& losses, double error);
 /// Says which channels are rounded where a file has floating-point numbers of `digits` bits.
 void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo& info, int digits);
-/// Says whether the stored values of a channel are not what they mean: scale and offset apply to
-/// them. Bytes of a colour in wider fields count as they are.
-[[nodiscard]] bool is_scaled(const Channel& channel) noexcept;
 /// Says which channels a format cannot scale on reading.
 void add_unscaled_channels(std::vector<std::string>& losses, const PointWriteInfo& info);
 /// Says that the coordinate reference system is not kept, if there is one.

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "engine/io/cloud/packed_number.h"
+#include "engine/io/cloud/points.h"
 #include "format/bytes.h"
 
 namespace ptc {
@@ -95,6 +96,11 @@ bool has_axes(const Channel& channel) noexcept {
 
 bool is_integer(ChannelType type) noexcept {
   return type != ChannelType::half && type != ChannelType::f32 && type != ChannelType::f64;
+}
+
+bool is_scaled(const Channel& channel) noexcept {
+  const bool shown = channel.role == ChannelRole::colour && channel.scale == kByteScale;
+  return (channel.scale != 1 && !shown) || channel.offset != 0;
 }
 
 std::int64_t load_integer(ChannelType type, const std::byte* at) noexcept {

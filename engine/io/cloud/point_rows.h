@@ -58,6 +58,10 @@ struct RowChannel {
 /// Says whether a type holds integers.
 [[nodiscard]] bool is_integer(ChannelType type) noexcept;
 
+/// Says whether the stored values of a channel are not what they mean: scale and offset apply to
+/// them. Bytes of a colour in wider fields count as they are.
+[[nodiscard]] bool is_scaled(const Channel& channel) noexcept;
+
 /// Returns the integer that lies at `at`, cut to the range of the result; `type` is an integer one.
 [[nodiscard]] std::int64_t load_integer(ChannelType type, const std::byte* at) noexcept;
 

@@ -277,11 +277,6 @@ void add_rounded_channels(std::vector<std::string>& losses, const PointWriteInfo
   }
 }
 
-bool is_scaled(const Channel& channel) noexcept {
-  const bool shown = channel.role == ChannelRole::colour && channel.scale == kByteScale;
-  return (channel.scale != 1 && !shown) || channel.offset != 0;
-}
-
 void add_unscaled_channels(std::vector<std::string>& losses, const PointWriteInfo& info) {
   for (const Channel& channel : info.channels) {
     if (!is_scaled(channel)) continue;
