@@ -8,7 +8,7 @@
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/level_source.h"
 #include "engine/pipeline/scene_record.h"
-#include "engine/pipeline/shade/shaded_sink.h"
+#include "engine/pipeline/shade/shading_channels.h"
 #include "engine/store/box_pages.h"
 
 namespace ptc {

@@ -17,7 +17,7 @@
 
 #include "engine/base/error.h"
 #include "engine/pipeline/build/unknown_values.h"
-#include "engine/pipeline/shade/shaded_sink.h"
+#include "engine/pipeline/shade/shading_channels.h"
 #include "engine/sort/point_streams.h"
 #include "engine/store/attribute_rows.h"
 #include "engine/store/container_points.h"

@@ -29,6 +29,7 @@
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shaded_sink.h"
+#include "engine/pipeline/shade/shading_channels.h"
 #include "engine/pipeline/temporary_container.h"
 #include "engine/shade/lift.h"
 #include "engine/store/attribute_rows.h"

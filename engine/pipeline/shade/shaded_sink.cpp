@@ -17,10 +17,9 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/checked_writer.h"
-#include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
 #include "engine/pipeline/convert/point_files.h"
+#include "engine/pipeline/shade/shading_channels.h"
 #include "engine/store/commit.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
@@ -29,47 +28,11 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint8_t kGroup = 1;  // group of the channels that shading adds
-
 constexpr std::size_t kPlainFloats = 1 + 3 + 3 + 3 + 3;  // values of a point without estimates
 constexpr std::size_t kFloats = kPlainFloats + 2;        // and with both of them
 
 std::size_t floats_of(bool estimates) noexcept {
   return estimates ? kFloats : kPlainFloats;
-}
-
-Channel number(const char* name, const char* unit) {
-  return {.name = name, .unit = unit};
-}
-
-Channel colour(const char* name, const char* unit) {
-  return {.name = name,
-          .components = 3,
-          .role = ChannelRole::colour,
-          .colour_space = ColourSpace::rec709,
-          .unit = unit};
-}
-
-/// Joins columns that begin at `first` to a channel that shading adds, in the type that they have.
-/// A channel that is joined already stays as it is. @return whether they are there
-bool join_columns(const Channel& added, std::size_t first, std::vector<Channel>& channels) {
-  const auto left = std::span<const Channel>(channels).subspan(std::min(first, channels.size()));
-  const std::vector<std::string> parts = part_names(added.name, added.components, has_axes(added));
-  const bool joined = !left.empty() && left[0].name == added.name && is_shading(left[0]);
-  const std::size_t columns = joined ? 1 : parts.size();
-  if (left.size() < columns || is_integer(left[0].type) || is_scaled(left[0])) return false;
-  for (std::size_t i = 0; i < columns && !joined; ++i) {
-    Channel alike = left[0];
-    alike.name = parts[i];
-    if (left[i] != alike || alike.components != 1) return false;
-  }
-  Channel whole = added;
-  whole.type = left[0].type;
-  whole.no_value = left[0].no_value;
-  const auto at = channels.begin() + static_cast<std::ptrdiff_t>(first);
-  *at = std::move(whole);
-  channels.erase(at + 1, at + static_cast<std::ptrdiff_t>(columns));
-  return true;
 }
 
 using ShadedValues = std::array<float, kFloats>;
@@ -191,11 +154,12 @@ class ContainerSink : public ShadedSink {
   void copy_pages() {
     std::vector<std::byte> stored;
     const std::size_t tail = from_.page_count() - from_.superblock().tail.size();
+    std::array<bool, kMaxGroup + 1> replaced{};  // by group
+    for (const std::uint8_t group : from_.groups())
+      replaced[group] = holds_shading(from_.meta().channels, group);
     for (std::uint32_t page = 0; page < from_.meta_page(); ++page) {
       const DirectoryEntry& entry = from_.entry(page);
-      const bool replaced =
-          entry.type == PageType::attribute && holds_shading(from_.meta().channels, entry.group);
-      if (replaced) continue;
+      if (entry.type == PageType::attribute && replaced[entry.group]) continue;
       const std::uint32_t rank = writer_.reserve_page(entry.type, entry.group);
       if (entry.is_void()) {
         writer_.write_void_page({.type = entry.type,
@@ -221,7 +185,8 @@ class ContainerSink : public ShadedSink {
         std::memcpy(payload.data() + 2 * (c * count + i), &half, 2);
       }
     }
-    writer_.write_attributes(kGroup, payload, static_cast<std::uint32_t>(count), meta_.channels);
+    writer_.write_attributes(kShadingGroup, payload, static_cast<std::uint32_t>(count),
+                             meta_.channels);
     written_ += count;
     values_.clear();
   }
@@ -235,49 +200,6 @@ class ContainerSink : public ShadedSink {
 };
 
 }  // namespace
-
-std::vector<Channel> shading_channels(bool estimates) {
-  std::vector<Channel> channels{
-      number("occlusion", "1"),
-      {.name = "bent_normal", .components = 3, .role = ChannelRole::direction, .unit = "1"},
-      colour("irradiance", "W/m^2"),
-      colour("sky", "W/m^2"),
-      colour("indirect", "W/(m^2 sr)")};
-  if (!estimates) return channels;
-  channels.push_back(number("occlusion_error", "1"));
-  channels.push_back(number("irradiance_error", "W/m^2"));
-  return channels;
-}
-
-bool is_shading(const Channel& channel) {
-  return std::ranges::any_of(shading_channels(true), [&](const Channel& added) {
-    return channel.name == added.name && channel.components == added.components;
-  });
-}
-
-bool have_shading(std::span<const Channel> channels) {
-  return std::ranges::all_of(shading_channels(false), [&](const Channel& added) {
-    const auto found = std::ranges::find(channels, added.name, &Channel::name);
-    return found != channels.end() && is_shading(*found);
-  });
-}
-
-std::vector<Channel> join_shading(std::vector<Channel> channels) {
-  std::vector<Channel> joined = channels;
-  const std::vector<Channel> added = shading_channels(true);
-  const auto starts = [&](const Channel& channel) { return channel.name == added[0].name; };
-  auto at = static_cast<std::size_t>(std::ranges::find_if(joined, starts) - joined.begin());
-  for (const Channel& channel : added) {
-    if (join_columns(channel, at, joined)) ++at;
-  }
-  return have_shading(joined) ? joined : channels;
-}
-
-bool holds_shading(std::span<const Channel> channels, std::uint8_t group) {
-  return group == kGroup || std::ranges::all_of(channels, [&](const Channel& channel) {
-           return channel.group != group || is_shading(channel);
-         });
-}
 
 PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t points,
                              const std::string& settings, const std::string& colour_from,

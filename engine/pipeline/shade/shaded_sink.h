@@ -39,24 +39,6 @@ class ShadedSink {
   virtual void finish() = 0;
 };
 
-/// Returns the channels that shading adds to a point, all of group 1 and of type half.
-[[nodiscard]] std::vector<Channel> shading_channels(bool estimates);
-
-/// Says whether a channel has the name and the components of one that shading adds.
-[[nodiscard]] bool is_shading(const Channel& channel);
-
-/// Says whether channels have all that shading adds, but for the estimates: such a set comes from
-/// an earlier shading, while a channel that has the name of one may be of anyone.
-[[nodiscard]] bool have_shading(std::span<const Channel> channels);
-
-/// Joins the columns that shading writes to a file of points, such as sky_r sky_g sky_b, to the
-/// channels that they were. Rows stay as they are.
-/// @return the channels as they are where not all columns of a shading follow one another
-[[nodiscard]] std::vector<Channel> join_shading(std::vector<Channel> channels);
-
-/// Says whether a group holds an earlier shading, which the next one replaces.
-[[nodiscard]] bool holds_shading(std::span<const Channel> channels, std::uint8_t group);
-
 /// Describes shaded points for make_shaded_sink(): those of the receivers, their channels without
 /// those of an earlier shading, and the settings of the shading as a text.
 /// @param points       number of points that will be written

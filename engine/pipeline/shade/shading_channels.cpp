@@ -1,0 +1,92 @@
+#include "engine/pipeline/shade/shading_channels.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "engine/io/cloud/point_rows.h"
+
+namespace ptc {
+namespace {
+
+Channel number(const char* name, const char* unit) {
+  return {.name = name, .unit = unit};
+}
+
+Channel colour(const char* name, const char* unit) {
+  return {.name = name,
+          .components = 3,
+          .role = ChannelRole::colour,
+          .colour_space = ColourSpace::rec709,
+          .unit = unit};
+}
+
+/// Joins columns that begin at `first` to a channel that shading adds, in the type that they have.
+/// A channel that is joined already stays as it is. @return whether they are there
+bool join_columns(const Channel& added, std::size_t first, std::vector<Channel>& channels) {
+  const auto left = std::span<const Channel>(channels).subspan(std::min(first, channels.size()));
+  const std::vector<std::string> parts = part_names(added.name, added.components, has_axes(added));
+  const bool joined = !left.empty() && left[0].name == added.name && is_shading(left[0]);
+  const std::size_t columns = joined ? 1 : parts.size();
+  if (left.size() < columns || is_integer(left[0].type) || is_scaled(left[0])) return false;
+  for (std::size_t i = 0; i < columns && !joined; ++i) {
+    Channel alike = left[0];
+    alike.name = parts[i];
+    if (left[i] != alike || alike.components != 1) return false;
+  }
+  Channel whole = added;
+  whole.type = left[0].type;
+  whole.no_value = left[0].no_value;
+  const auto at = channels.begin() + static_cast<std::ptrdiff_t>(first);
+  *at = std::move(whole);
+  channels.erase(at + 1, at + static_cast<std::ptrdiff_t>(columns));
+  return true;
+}
+
+}  // namespace
+
+std::vector<Channel> shading_channels(bool estimates) {
+  std::vector<Channel> channels{
+      number("occlusion", "1"),
+      {.name = "bent_normal", .components = 3, .role = ChannelRole::direction, .unit = "1"},
+      colour("irradiance", "W/m^2"),
+      colour("sky", "W/m^2"),
+      colour("indirect", "W/(m^2 sr)")};
+  if (!estimates) return channels;
+  channels.push_back(number("occlusion_error", "1"));
+  channels.push_back(number("irradiance_error", "W/m^2"));
+  return channels;
+}
+
+bool is_shading(const Channel& channel) {
+  return std::ranges::any_of(shading_channels(true), [&](const Channel& added) {
+    return channel.name == added.name && channel.components == added.components;
+  });
+}
+
+bool have_shading(std::span<const Channel> channels) {
+  return std::ranges::all_of(shading_channels(false), [&](const Channel& added) {
+    const auto found = std::ranges::find(channels, added.name, &Channel::name);
+    return found != channels.end() && is_shading(*found);
+  });
+}
+
+std::vector<Channel> join_shading(std::vector<Channel> channels) {
+  std::vector<Channel> joined = channels;
+  const std::vector<Channel> added = shading_channels(true);
+  const auto starts = [&](const Channel& channel) { return channel.name == added[0].name; };
+  auto at = static_cast<std::size_t>(std::ranges::find_if(joined, starts) - joined.begin());
+  for (const Channel& channel : added) {
+    if (join_columns(channel, at, joined)) ++at;
+  }
+  return have_shading(joined) ? joined : channels;
+}
+
+bool holds_shading(std::span<const Channel> channels, std::uint8_t group) {
+  return group == kShadingGroup || std::ranges::all_of(channels, [&](const Channel& channel) {
+           return channel.group != group || is_shading(channel);
+         });
+}
+
+}  // namespace ptc
