@@ -47,8 +47,7 @@ struct OuterLink {
 
 /// A chunk of consecutive places, and what is known of them.
 struct ScanChunk {
-  static const std::uint64_t kBytes;  ///< memory of a chunk, at most
-  std::uint64_t first = 0;            ///< number of its first place
+  std::uint64_t first = 0;  ///< number of its first place
   std::vector<Place> places;
   std::vector<LatticePosition> positions;
   std::vector<PlaceBlock> blocks;
@@ -57,7 +56,8 @@ struct ScanChunk {
   std::vector<std::array<std::uint32_t, kLinks>> links;
   std::vector<OuterLink> outer;  ///< links to places of earlier chunks
 };
-inline constexpr std::uint64_t ScanChunk::kBytes =
+/// The memory of a chunk, at most.
+inline constexpr std::uint64_t kChunkBytes =
     kChunkPlaces * (sizeof(Place) + sizeof(LatticePosition) + sizeof(PlaceBlock) +
                     sizeof(PlaceFit) + kLinks * sizeof(std::uint32_t) + 2 * sizeof(OuterLink) + 4);
 

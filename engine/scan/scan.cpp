@@ -33,14 +33,6 @@ constexpr std::size_t kSpoolRecords = std::size_t{1} << 14;  // that are written
 constexpr std::uint64_t kScatter = 10;  // quarters of an octave beyond the usual spacing, from
                                         // which a point that is on no surface is an outlier
 
-/// What a thread needs beside the chunk that it works on.
-struct Worker {
-  Worker(const ScanSpool& spool, std::size_t slots) : fitter(spool, slots) {}
-
-  ChunkFitter fitter;
-  OrientationRoom room;
-};
-
 /// A chunk, and what comes of it.
 struct ChunkWork {
   std::uint64_t number = 0;
@@ -59,7 +51,7 @@ std::uint64_t worker_bytes(std::size_t page_places) noexcept {
   return ChunkFitter::bytes(page_places, slots_for(page_places)) + kChunkPlaces * kOrientation;
 }
 
-constexpr std::uint64_t kWorkBytes = ScanChunk::kBytes + kChunkPlaces * sizeof(PlaceResult);
+constexpr std::uint64_t kWorkBytes = kChunkBytes + kChunkPlaces * sizeof(PlaceResult);
 
 /// How many chunks are in memory.
 struct ChunkCounts {
@@ -141,10 +133,11 @@ class Completion {
  private:
   /// Takes chunks until none are left.
   void work_on_chunks(Progress& progress) {
-    Worker worker(spool_, slots_for(spool_.index().page_places()));
+    ChunkFitter fitter(spool_, slots_for(spool_.index().page_places()));
+    OrientationRoom room;
     while (ChunkWork* const work = take()) {
-      worker.fitter.fit(work->number, work->chunk);
-      orient_chunk(work->chunk, sides_, sky_, work->pieces, worker.room);
+      fitter.fit(work->number, work->chunk);
+      orient_chunk(work->chunk, sides_, sky_, work->pieces, room);
       make_results(work->chunk, work->pieces, unit_, work->results);
       progress.advance(work->chunk.places.size());
       keep_in_turn(*work);
@@ -177,10 +170,9 @@ class Completion {
       lock.lock();
       ++kept_;
       free_.push_back(&work);
-      freed_.notify_one();
+      freed_.notify_all();
     }
     keeping_ = false;
-    if (taken_ == chunks_) freed_.notify_all();
   }
 
   /// Ends the work of all threads.
