@@ -183,6 +183,24 @@ void append_text(std::vector<std::byte>& out, std::string_view text) {
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
+/// Calls visit(value, bytes that stand for "not known", their number) for the values of an
+/// attribute page until it returns false. @return whether it never does
+template <class Byte, class Visit>
+bool all_unknown(std::span<const Channel> channels, std::uint8_t group, std::span<Byte> payload,
+                 const Visit& visit) {
+  const std::size_t points = payload.size() / group_point_bytes(channels, group);
+  Byte* value = payload.data();
+  for (const Channel& channel : channels) {
+    if (channel.group != group) continue;
+    const std::size_t bytes = channel.component_bytes();
+    const std::uint64_t bits = channel.no_value.value_or(0);
+    for (std::size_t i = 0; i < points * channel.components; ++i, value += bytes) {
+      if (!visit(value, &bits, bytes)) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 std::size_t row_bytes(std::span<const Channel> channels) noexcept {
@@ -322,30 +340,19 @@ std::size_t group_point_bytes(std::span<const Channel> channels, std::uint8_t gr
 
 void fill_void(std::span<const Channel> channels, std::uint8_t group,
                std::span<std::byte> payload) {
-  const std::size_t points = payload.size() / group_point_bytes(channels, group);
-  for (const Channel& channel : channels) {
-    if (channel.group != group) continue;
-    const std::size_t bytes = channel.component_bytes();
-    const std::uint64_t bits = channel.no_value.value_or(0);
-    for (std::size_t i = 0; i < points * channel.components; ++i)
-      std::memcpy(payload.data() + i * bytes, &bits, bytes);
-    payload = payload.subspan(points * channel.components * bytes);
-  }
+  all_unknown(channels, group, payload,
+              [](std::byte* value, const void* unknown, std::size_t size) {
+                std::memcpy(value, unknown, size);
+                return true;
+              });
 }
 
 bool is_void(std::span<const Channel> channels, std::uint8_t group,
              std::span<const std::byte> payload) {
-  const std::size_t points = payload.size() / group_point_bytes(channels, group);
-  for (const Channel& channel : channels) {
-    if (channel.group != group) continue;
-    const std::size_t bytes = channel.component_bytes();
-    const std::uint64_t bits = channel.no_value.value_or(0);
-    for (std::size_t i = 0; i < points * channel.components; ++i) {
-      if (std::memcmp(payload.data() + i * bytes, &bits, bytes) != 0) return false;
-    }
-    payload = payload.subspan(points * channel.components * bytes);
-  }
-  return true;
+  return all_unknown(channels, group, payload,
+                     [](const std::byte* value, const void* unknown, std::size_t size) {
+                       return std::memcmp(value, unknown, size) == 0;
+                     });
 }
 
 }  // namespace ptc
