@@ -9,6 +9,7 @@
 // picture of a sky is read later, by sky(): a wrong picture is invalid data.
 #include "tools/scene_options.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -43,6 +44,18 @@ CLI::Option* add_repeated(CLI::App& app, const std::string& name,
                           const std::string& description) {
   return app.add_option_function<std::vector<std::string>>(name, set, description)
       ->allow_extra_args(false);
+}
+
+using Texts = std::map<std::string, std::string>;
+
+/// Returns the texts of the first cloud that says which axis is up; none where no one does.
+Texts text_with_up(const std::vector<std::filesystem::path>& files) {
+  for (const std::filesystem::path& file : files) {
+    if (!holds_points(file)) continue;
+    Texts text = open_point_input(file).info.text;
+    if (text.contains(kUpKey)) return text;
+  }
+  return {};
 }
 
 }  // namespace
@@ -149,26 +162,15 @@ Sky LightArguments::sky() const {
 }
 
 glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files, const std::string& axis) {
-  if (!axis.empty()) return up_of({{kUpKey, axis}});
-  for (const std::filesystem::path& file : files) {
-    if (!holds_points(file)) continue;
-    const std::map<std::string, std::string> text = open_point_input(file).info.text;
-    if (text.contains(kUpKey)) return up_of(text);
-  }
-  return {0, 1, 0};
+  return up_of(axis.empty() ? text_with_up(files) : Texts{{kUpKey, axis}});
 }
 
 void note_unknown_up(const std::vector<std::filesystem::path>& files, const std::string& axis,
                      Progress& progress) {
-  if (!axis.empty()) return;
-  std::filesystem::path silent;
-  for (const std::filesystem::path& file : files) {
-    if (!holds_points(file)) continue;
-    if (open_point_input(file).info.text.contains(kUpKey)) return;
-    if (silent.empty() && !is_container(file)) silent = file;
-  }
-  if (silent.empty()) return;
-  progress.note(silent.filename().string() +
+  const auto silent = std::ranges::find_if(
+      files, [](const auto& file) { return holds_points(file) && !is_container(file); });
+  if (silent == files.end() || !axis.empty() || !text_with_up(files).empty()) return;
+  progress.note(silent->filename().string() +
                 ": the file does not say which axis is up, y is taken; --up z if it is z");
 }
 
