@@ -37,7 +37,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kWriteBackBytes = std::uint64_t{8} << 20;
+constexpr std::uint64_t kWriteBackBytes = std::uint64_t{8} << 20;  // told to the disk at once
 constexpr auto kOffsetLimit = static_cast<std::uint64_t>(std::numeric_limits<off_t>::max());
 
 [[noreturn]] void fail(int error, const char* call, const std::filesystem::path& path) {
