@@ -23,7 +23,7 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/scene/procedural/city.h"
 #include "engine/sort/external_sort.h"
-#include "tools/bench/experiments/python_run.h"
+#include "tools/bench/experiments/rival_run.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 

@@ -2,10 +2,11 @@
 //
 //   mesh --> random points, true normals --> noise --> sorted records --> complete_scan() -->
 //   angles
-//                                                 `--> file of numbers --> Open3D ---------> angles
+//                                                 `--> file of numbers --> Open3D, PCL ----> angles
 //
-// Open3D runs in an interpreter of its own, on the same points in the same order. It reads them
-// from a file and writes its normals to another; what is timed are its two calls.
+// Open3D runs in an interpreter of its own, PCL in a program of its own, on the same points in the
+// same order. They read them from a file and write their normals to another; what is timed are
+// their calls.
 #include "tools/bench/experiments/scan_bench.h"
 
 #include <algorithm>
@@ -23,7 +24,7 @@
 #include "engine/scan/scan.h"
 #include "format/checksum.h"
 #include "format/scalar.h"
-#include "tools/bench/experiments/python_run.h"
+#include "tools/bench/experiments/rival_run.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/sampled_cloud.h"
@@ -179,15 +180,19 @@ void write_bytes(const std::filesystem::path& path, const void* data, std::size_
   if (!out) throw std::system_error(errno, std::generic_category(), "write " + path.string());
 }
 
-ScanRow measure_open3d(const SampledCloud& cloud, const ScanBenchOptions& options,
-                       const std::filesystem::path& work) {
+/// Measures a library that runs in another program.
+/// @param call  runs it once with the names of two files, the points and the normals that it
+///              writes, and returns the facts that it tells
+template <class Call>
+ScanRow measure_rival(const std::string& method, const SampledCloud& cloud,
+                      const ScanBenchOptions& options, const std::filesystem::path& work,
+                      const Call& call) {
   const WorkFile points(work, "-points"), result(work, "-normals");
   write_bytes(points.path(), cloud.positions.data(), cloud.positions.size() * sizeof(glm::dvec3));
-  ScanRow row{.method = "Open3D, 30 neighbours"};
+  ScanRow row{.method = method};
   std::vector<double> cpu, normals_cpu;
   for (unsigned i = 0; i < options.repeats; ++i) {
-    const auto facts = run_python(options.python, work, kOpen3d,
-                                  {points.path().string(), result.path().string()}, "Open3D");
+    const nlohmann::json facts = call(points.path().string(), result.path().string());
     cpu.push_back(facts.at("all").get<double>());
     normals_cpu.push_back(facts.at("normals").get<double>());
     row.resident_bytes = std::max(row.resident_bytes, facts.at("bytes").get<std::uint64_t>());
@@ -196,10 +201,31 @@ ScanRow measure_open3d(const SampledCloud& cloud, const ScanBenchOptions& option
   std::ifstream in(result.path(), std::ios::binary);
   in.read(reinterpret_cast<char*>(normals.data()),
           static_cast<std::streamsize>(normals.size() * sizeof(glm::vec3)));
-  if (!in) throw DataError("scan: Open3D wrote too few normals");
+  if (!in) throw DataError("scan: " + method + " wrote too few normals");
   judge(row, cloud, normals);
   row.cpu = spread_of(cpu);
   row.normals_us = 1e6 * spread_of(normals_cpu).median / static_cast<double>(row.points);
+  return row;
+}
+
+ScanRow measure_open3d(const SampledCloud& cloud, const ScanBenchOptions& options,
+                       const std::filesystem::path& work) {
+  return measure_rival(
+      "Open3D, 30 neighbours", cloud, options, work,
+      [&](const std::string& points, const std::string& normals) {
+        return run_python(options.python, work, kOpen3d, {points, normals}, "Open3D");
+      });
+}
+
+/// PCL turns normals to one point of view, which tells no side of a closed surface.
+ScanRow measure_pcl(const SampledCloud& cloud, const ScanBenchOptions& options,
+                    const std::filesystem::path& work) {
+  ScanRow row =
+      measure_rival("PCL, 30 neighbours", cloud, options, work,
+                    [&](const std::string& points, const std::string& normals) {
+                      return run_rival({options.pcl.string(), points, normals}, work, "PCL");
+                    });
+  row.flipped = kNone;
   return row;
 }
 
@@ -216,6 +242,7 @@ SceneScans measure_scans(const SceneChoice& choice, const ScanBenchOptions& opti
     const SampledCloud cloud = sample(rays, options.points, noise);
     std::vector<ScanRow> rows{measure_ptcx(cloud, options, work, run)};
     if (!options.python.empty()) rows.push_back(measure_open3d(cloud, options, work));
+    if (!options.pcl.empty()) rows.push_back(measure_pcl(cloud, options, work));
     for (ScanRow& row : rows) {
       row.scene = choice.name;
       row.noise = noise;

@@ -20,6 +20,7 @@ struct ScanBenchOptions {
   std::uint64_t points = 1'000'000;
   std::vector<double> noises{0, 0.5};  ///< Gaussian noise along each axis, in spacings
   std::filesystem::path python;        ///< an interpreter that has Open3D; empty: none
+  std::filesystem::path pcl;           ///< the program pcl_normals; empty: none
   unsigned repeats = 5;
 };
 
@@ -31,7 +32,7 @@ struct ScanRow {
   Spread cpu;                 ///< seconds of all threads, all that the method does
   double normals_us = kNone;  ///< CPU time a point of normals alone, where it is known
   double median = 0, mean = 0, percentile_95 = 0;
-  double flipped = 0;                ///< share of normals on the wrong side
+  double flipped = kNone;            ///< share of normals on the wrong side, where sides are told
   double area = kNone;               ///< sum of 2 r^2 over the area of the mesh
   std::uint64_t outliers = 0;        ///< points that are marked
   std::uint64_t resident_bytes = 0;  ///< maximum during a run, less those before it

@@ -14,7 +14,8 @@ constexpr char kReading[] =
     "to the wrong side of it, which says something only of closed meshes. Times are CPU times of "
     "all threads together. Those of ptcx are of all it does: temporary files, normals, sides, "
     "radii and outliers; sorting is not part of them. Those of Open3D are of estimate_normals with "
-    "30 neighbours and orient_normals_consistent_tangent_plane with 15. Area is the sum of 2 r^2 "
+    "30 neighbours and orient_normals_consistent_tangent_plane with 15, those of PCL of "
+    "NormalEstimation with 30, which tells no sides. Area is the sum of 2 r^2 "
     "over that of the mesh. The result of ptcx was checked to have the same bytes under another "
     "cap and with another number of threads.";
 
@@ -85,6 +86,9 @@ Experiment make_scan_experiment() {
     d.repeats(options->repeats, 1);
     d.file("--python", options->python,
            "A Python interpreter with the package open3d, which is then measured, too");
+    d.file("--pcl", options->pcl,
+           "The program pcl_normals, which is built where PCL is installed; PCL is then measured, "
+           "too");
   };
   const auto run = [=](const Bench& b) {
     return measure_scenes(*scenes, options->repeats, b, [&](const SceneChoice& choice) {
