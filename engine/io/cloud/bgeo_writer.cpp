@@ -28,6 +28,7 @@
 #include "engine/io/cloud/display_colour.h"
 #include "engine/io/cloud/geo_header.h"
 #include "engine/io/cloud/point_rows.h"
+#include "engine/io/cloud/rounding.h"
 #include "engine/io/file/buffered_output.h"
 
 namespace ptc {

@@ -20,6 +20,7 @@
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/las_plan.h"
 #include "engine/io/cloud/packed_number.h"
+#include "engine/io/cloud/rounding.h"
 #include "engine/io/file/buffered_output.h"
 
 namespace ptc {

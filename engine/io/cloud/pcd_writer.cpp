@@ -18,6 +18,7 @@
 #include "engine/io/cloud/display_colour.h"
 #include "engine/io/cloud/pcd_header.h"
 #include "engine/io/cloud/point_rows.h"
+#include "engine/io/cloud/rounding.h"
 #include "engine/io/file/buffered_output.h"
 
 namespace ptc {

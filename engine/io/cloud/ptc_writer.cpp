@@ -18,6 +18,7 @@
 #include "engine/io/cloud/packed_normal.h"
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/point_rows.h"
+#include "engine/io/cloud/rounding.h"
 #include "engine/io/file/buffered_output.h"
 
 namespace ptc {

@@ -9,9 +9,9 @@
 #include <glm/vec3.hpp>
 
 #include "engine/base/surfel.h"
-#include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
+#include "engine/io/cloud/rounding.h"
 
 namespace ptc {
 

@@ -17,6 +17,7 @@
 #include <set>
 
 #include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/rounding.h"
 #include "engine/io/text/text.h"
 
 namespace ptc {

@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "engine/io/cloud/checked_writer.h"
 #include "engine/io/cloud/point_survey.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/cloud/rounding.h"
 #include "engine/io/cloud/rounding_survey.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
