@@ -69,6 +69,52 @@ class Formats(ProgramTest):
             wanted = [int(0.25 * i + 0.5) for i in range(500)]
             self.assertEqual(sorted(values) if name == "d.las" else values, wanted, name)
 
+    def write_las(self, path, sizes):
+        """Writes a LAS of 400 points of a plane with a record of each size. Returns the bytes of the records."""
+        records = b"".join(struct.pack("<H16sHH32s", 0, b"someone", i, size, b"of a test") +
+                           bytes((k * k >> 7) & 255 for k in range(size)) for i, size in enumerate(sizes))
+        head = bytearray(375)
+        head[:4], head[24], head[25] = b"LASF", 1, 4
+        struct.pack_into("<HIIBH", head, 94, 375, 375 + len(records), len(sizes), 6, 30)
+        struct.pack_into("<6d", head, 131, 0.01, 0.01, 0.01, 0, 0, 0)
+        struct.pack_into("<6d", head, 179, 0.19, 0, 0.19, 0, 0, 0)
+        struct.pack_into("<Q", head, 247, 400)
+        points = b"".join(struct.pack("<iii18x", i % 20, i // 20, 0) for i in range(400))
+        path.write_bytes(bytes(head) + records + points)
+        return records
+
+    def records_of(self, path):
+        """Returns the bytes between the header and the points of a LAS file, without those of its extra bytes."""
+        data = path.read_bytes()
+        begin, count = struct.unpack_from("<II", data, 96)
+        kept, at = b"", 375
+        for _ in range(count):
+            user, number, size = struct.unpack_from("<16sHH", data, at + 2)
+            if (user.rstrip(b"\0"), number) != (b"LASF_Spec", 4):
+                kept += data[at:at + 54 + size]
+            at += 54 + size
+        self.assertEqual(at, begin)
+        return kept
+
+    def test_long_records_of_las_come_out_again_and_a_container_keeps_16_kib(self):
+        las, out, scene = self.here / "a.las", self.here / "b.las", self.here / "a.ptcx"
+        sizes = [20000, 60000, 700, 65535, 20000, 60000, 15000, 900]
+        records = self.write_las(las, sizes)
+        self.assertEqual(self.succeed("ptcconvert", las, out).stderr, "")
+        self.assertEqual(self.records_of(out), records)
+        self.assertIn("nothing would be lost", self.succeed("ptcconvert", las, out, "--dry-run").stdout)
+        # A container has no room for them, and says so
+        left_out = [i for i, size in enumerate(sizes) if size > 15000 or i == 7]
+        for command in (["ptcbuild", las, "-o", scene], ["ptcconvert", las, scene]):
+            said = self.succeed(*command).stderr
+            for i in left_out:
+                self.assertIn(f"a.las: The record {i} of the user 'someone', {sizes[i]} bytes, is left out: "
+                              "a container keeps only 16 KiB of records.\n", said)
+            self.assertEqual(said.count("left out"), len(left_out))
+            self.succeed("ptcverify", scene)
+            self.succeed("ptcconvert", scene, out)
+            self.assertEqual(len(self.records_of(out)), 2 * 54 + 700 + 15000)
+
     def test_damage_that_is_tolerated_does_not_keep_channels_from_being_measured(self):
         scene, broken = self.here / "a.ptcx", self.here / "b.ptcx"
         self.succeed("ptcbuild", self.scan, "--page-size", "4K", "-o", scene)

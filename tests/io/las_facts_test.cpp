@@ -10,6 +10,7 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/las_crs.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "tests/io/files.h"
 #include "tests/io/las_files.h"
 
@@ -389,24 +390,69 @@ TEST_CASE("las: the texts las.header and las.vlrs keep what a writer needs", "[i
   CHECK(bytes == first + last);
 }
 
-TEST_CASE("las: records beyond 16 KiB are left out and named, with their bytes",
+TEST_CASE("las: records of every length that a VLR has are kept, up to 1 MiB in all",
           "[io][points][las]") {
   const test::TemporaryDirectory scratch;
+  constexpr std::size_t kMiB = 1'048'576;
   LasFile file = one_point(6);
-  file.vlrs = {las_vlr("a", 1, std::string(16'384 - 54, 'x'))};
-  CHECK(read_las(scratch, file.bytes()).info.notes.empty());
-  file.vlrs.push_back(las_vlr("b", 2, ""));
-  file.evlrs = {las_vlr("LASF_Projection", 2112, std::string(70'000, ' '), true)};
-  for (int i = 0; i < 3; ++i) file.vlrs.push_back(las_vlr("c\x1b", 7, "12345"));
-  const PointFileInfo info = read_las(scratch, file.bytes()).info;
-  const std::string end = " left out: only 16 KiB of records are kept.";
-  CHECK(info.notes == std::vector<std::string>{
-                          "The record 2112 of the user 'LASF_Projection', 70000 bytes, is" + end,
-                          "The record 2 of the user 'b', 0 bytes, is" + end,
-                          "3 records 7 of the user 'c\\x1b', 15 bytes in all, are" + end});
-  CHECK(info.text.at("las.vlrs").size() == (16'384 + 2) / 3 * 4);
-  for (unsigned i = 0; i < 9; ++i) file.vlrs.push_back(las_vlr("d", i, ""));
+  std::size_t bytes = 0;
+  const auto add = [&](const char* user, unsigned number, std::size_t size, bool extended = false) {
+    (extended ? file.evlrs : file.vlrs)
+        .push_back(las_vlr(user, number, std::string(size, 'x'), extended));
+    if (size <= 65'535) bytes += 54 + size;
+  };
+  for (unsigned i = 0; i < 15; ++i) add("a", i, 65'535);
+  add("a", 15, kMiB - bytes - 54);
+  const PointFileInfo full = read_las(scratch, file.bytes()).info;
+  CHECK(full.notes.empty());
+  CHECK(full.text.at("las.vlrs").size() == (kMiB + 2) / 3 * 4);
+
+  // What is behind them, or longer, is left out and named, with its bytes
+  add("b", 2, 0);
+  add("LASF_Projection", 2112, 65'536, true);
+  for (int i = 0; i < 3; ++i) add("c\x1b", 7, 5);
+  const PointFileInfo more = read_las(scratch, file.bytes()).info;
+  const std::string end = " left out: only 1 MiB of records is kept.";
+  CHECK(more.notes ==
+        std::vector<std::string>{"The record 2112 of the user 'LASF_Projection', 65536 bytes, is "
+                                 "left out: no record of more than 65,535 bytes is kept.",
+                                 "The record 2 of the user 'b', 0 bytes, is" + end,
+                                 "3 records 7 of the user 'c\\x1b', 15 bytes in all, are" + end});
+  CHECK(more.text.at("las.vlrs") == full.text.at("las.vlrs"));
+  for (unsigned i = 0; i < 9; ++i) add("d", i, 0);
   const auto notes = read_las(scratch, file.bytes()).info.notes;
-  REQUIRE(notes.size() == 9);
-  CHECK(notes.back() == "Records of 4 more kinds are left out.");
+  REQUIRE(notes.size() == 10);
+  CHECK(notes.back() == "Records of 3 more kinds are left out.");
+}
+
+TEST_CASE("las: records are shortened to those that fit, and the others are named",
+          "[io][points][las]") {
+  const auto text = [](const std::vector<std::string>& records) {
+    std::string all;
+    for (const std::string& record : records) all += record;
+    return encode_vlrs(std::as_bytes(std::span(all)));
+  };
+  const std::string first = las_vlr("a", 1, std::string(46, 'x'));
+  const std::string large = las_vlr("a", 2, std::string(1000, 'y'));
+  const std::string last = las_vlr("b", 3, "");
+  const std::string whole = text({first, large, last});
+  for (const std::size_t most : {std::size_t{1208}, std::size_t{1 << 14}}) {
+    CHECK(shorten_vlrs(whole, most, "why").text == whole);
+    CHECK(shorten_vlrs(whole, most, "why").notes.empty());
+  }
+  const auto shorter = [&](std::size_t most) { return shorten_vlrs(whole, most, "why"); };
+  CHECK(shorter(1207).text == text({first, large}));
+  CHECK(shorter(154).text == text({first, last}));
+  CHECK(shorter(154).notes ==
+        std::vector<std::string>{"The record 2 of the user 'a', 1000 bytes, is left out: why."});
+  CHECK(shorter(153).text == text({first}));
+  CHECK(shorter(99).text == text({last}));
+  CHECK(shorter(53).text.empty());
+  CHECK(shorter(53).notes.size() == 3);
+  // A damaged text is left alone where it is short
+  for (const std::string& damaged : {whole + "AAAA", std::string(2000, '?')}) {
+    CHECK(shorten_vlrs(damaged, 2000, "why").text == damaged);
+    CHECK(shorten_vlrs(damaged, 1207, "why").text.empty());
+    CHECK(shorten_vlrs(damaged, 1207, "why").notes.size() == 1);
+  }
 }

@@ -339,6 +339,34 @@ TEST_CASE("las writer: surfels and channels come back from a file as they went i
   }
 }
 
+TEST_CASE("las writer: long records of a LAS file are those of the file that is written",
+          "[io][writers][las]") {
+  const test::TemporaryDirectory scratch;
+  LasFile file{.minor = 4, .format = 6, .record_bytes = 30, .points = 1};
+  file.records = las_point(1, 2, 3) + std::string(10, '\0');
+  std::string all;
+  for (const unsigned size : {20'000U, 60'000U, 0U, 65'535U, 20'001U, 60'001U}) {
+    std::string payload(size, '\0');
+    for (std::size_t i = 0; i < size; ++i) payload[i] = static_cast<char>(i * i >> 7);
+    const auto number = static_cast<unsigned>(file.vlrs.size());
+    file.vlrs.push_back(las_vlr("someone", number, payload));
+    all += file.vlrs.back();
+  }
+  file.evlrs = {las_vlr("someone", 9, std::string(60'000, 'e'), true)};
+  all += las_vlr("someone", 9, std::string(60'000, 'e'));
+  const LasCloud cloud = read_las(scratch.file("a.las", file.bytes()));
+  CHECK(cloud.info.notes.empty());
+  PointWriteInfo info = plain_info(cloud.surfels);
+  info.channels = cloud.info.channels;
+  info.text = cloud.info.text;
+  std::vector<std::byte> rows(cloud.rows.size());
+  std::memcpy(rows.data(), cloud.rows.data(), rows.size());
+  const Las las = written(info, cloud.surfels, rows);
+  CHECK(las.at<std::uint32_t>(100) == 7);
+  CHECK(las.points_begin() == 375 + all.size());
+  CHECK(las.bytes.substr(375, all.size()) == all);
+}
+
 TEST_CASE("las writer: extra bytes keep the names and descriptions that they had in a LAS file",
           "[io][writers][las]") {
   const test::TemporaryDirectory scratch;

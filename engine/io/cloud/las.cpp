@@ -13,7 +13,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <map>
 #include <optional>
 #include <utility>
 
@@ -24,12 +23,12 @@
 #include "engine/io/cloud/las_header.h"
 #include "engine/io/cloud/las_records.h"
 #include "engine/io/cloud/las_texts.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/surfel_check.h"
 #include "engine/io/image/srgb.h"
 #include "engine/io/laz/layout.h"
-#include "format/text.h"
 
 namespace ptc {
 namespace {
@@ -218,36 +217,8 @@ class LasSource : public PointSource {
                           : colours_ == Colours::sixteen_bits ? 16
                                                               : 0;
     info.text["las.header"] = make_las_header_text(header_, bits);
-    LasRecordsText records = make_las_records_text(file_, header_);
-    if (!records.base64.empty()) info.text["las.vlrs"] = std::move(records.base64);
-    note_lost(records.left_out, info.notes);
-  }
-
-  // Names the records that are left out, those of one kind together; the first few kinds of many.
-  static void note_lost(std::span<const LasRecord> lost, std::vector<std::string>& notes) {
-    constexpr std::size_t kMostNamed = 8;
-    std::map<std::pair<std::string, unsigned>, std::pair<std::size_t, std::uint64_t>> kinds;
-    for (const LasRecord& record : lost) {
-      auto& [count, bytes] = kinds[{record.user, record.number}];
-      ++count;
-      bytes += record.bytes;
-    }
-    std::size_t named = 0;
-    for (const auto& [kind, sum] : kinds) {
-      if (named++ == kMostNamed) {
-        notes.push_back("Records of " + std::to_string(kinds.size() - kMostNamed) +
-                        " more kinds are left out.");
-        break;
-      }
-      const auto& [count, bytes] = sum;
-      const std::string what =
-          std::to_string(kind.second) + " of the user '" + printable(kind.first) + "', ";
-      const std::string size = std::to_string(bytes) + " bytes";
-      notes.push_back((count == 1
-                           ? "The record " + what + size + ", is"
-                           : std::to_string(count) + " records " + what + size + " in all, are") +
-                      " left out: only 16 KiB of records are kept.");
-    }
+    std::string records = make_las_records_text(file_, header_, info.notes);
+    if (!records.empty()) info.text[kLasRecordsKey] = std::move(records);
   }
 
   [[noreturn]] void fail(const std::string& rule) const {

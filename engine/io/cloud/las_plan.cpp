@@ -2,9 +2,10 @@
 //
 // A cloud that came from LAS carries two texts. `las.header` is a JSON object with the members
 // format, record_length, scale, offset, system or system_id, software (bytes as code points), day,
-// year, encoding or global_encoding, file_source_id and guid (32 hexadecimal digits); `las.vlrs` is
-// base64 of the variable length records as they lay in the file. Both may come from a file of
-// anyone, so nothing in them is taken for granted: what is not of the expected form is passed over.
+// year, encoding or global_encoding, file_source_id and guid (32 hexadecimal digits); `las.vlrs`
+// (las_vlrs.h) has the variable length records as they lay in the file. Both may come from a file
+// of anyone, so nothing in them is taken for granted: what is not of the expected form is passed
+// over.
 //
 // Other clouds get steps of a power of ten, the finest with which 32 bits suffice:
 //
@@ -21,6 +22,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/laz/layout.h"
 #include "engine/io/text/text.h"
 
@@ -33,7 +35,6 @@ constexpr double kMostStep = std::numeric_limits<std::int32_t>::max();
 constexpr double kStepNoise = 1e-3;               // of a step: what containers round
 constexpr double kStepOfPlace = 1e-3;             // when all points lie in one place
 constexpr std::uint16_t kKeptEncoding = 1U | 8U;  // kind of the times, synthetic return numbers
-constexpr std::size_t kRecordHeadBytes = 54;
 
 // Returns 10^exponent as the nearest double, which std::pow() may miss.
 double power_of_ten(int exponent) {
@@ -133,74 +134,21 @@ void choose_steps(const PointWriteInfo& info, Head& head) {
   }
 }
 
-// Decodes base64 (RFC 4648). @return nothing when the text is not base64
-std::optional<std::string> decode_base64(std::string_view text) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  if (text.size() % 4 != 0) return std::nullopt;
-  for (int i = 0; i < 2 && text.ends_with('='); ++i) text.remove_suffix(1);
-  std::string bytes;
-  std::uint32_t bits = 0;
-  int held = 0;  // bits that are not in `bytes` yet
-  for (const char c : text) {
-    const std::size_t digit = kDigits.find(c);
-    if (digit == std::string_view::npos) return std::nullopt;
-    bits = bits << 6 | static_cast<std::uint32_t>(digit);
-    held += 6;
-    if (held < 8) continue;
-    held -= 8;
-    bytes += static_cast<char>(bits >> held & 0xff);
-  }
-  return bytes;
-}
-
-std::string_view until_zero(std::string_view text) {
-  return text.substr(0, text.find('\0'));
-}
-
 // Says whether a record describes how points are stored in the file that it comes from.
 bool is_about_storage(std::string_view user, unsigned id) {
   if (user == "LASF_Spec") return id == 4 || (id >= 100 && id < 355);  // extra bytes, waveforms
   return user == "laszip encoded" || user == "copc";
 }
 
-// A record of the text `las.vlrs`.
-struct Original {
-  std::string user;
-  unsigned id = 0;
-  std::string bytes;  // with its header
-};
-
-// Takes the text apart. @return nothing when it is damaged
-std::optional<std::vector<Original>> read_originals(std::string_view text) {
-  const std::optional<std::string> decoded = decode_base64(text);
-  if (!decoded) return std::nullopt;
-  std::vector<Original> records;
-  for (std::string_view rest = *decoded; !rest.empty();) {
-    if (rest.size() < kRecordHeadBytes) return std::nullopt;
-    const auto number = [&](std::size_t at) {
-      return static_cast<unsigned>(static_cast<unsigned char>(rest[at])) |
-             static_cast<unsigned>(static_cast<unsigned char>(rest[at + 1])) << 8;
-    };
-    const std::size_t bytes = kRecordHeadBytes + number(20);
-    if (bytes > rest.size()) return std::nullopt;
-    records.push_back({.user = std::string(until_zero(rest.substr(2, 16))),
-                       .id = number(18),
-                       .bytes = std::string(rest.substr(0, bytes))});
-    rest.remove_prefix(bytes);
-  }
-  return records;
-}
-
 // Returns the records that stay true in another file.
-Records kept_records(const std::vector<Original>& originals) {
+Records kept_records(const std::vector<Vlr>& originals) {
   Records kept;
-  for (const Original& record : originals) {
-    if (is_about_storage(record.user, record.id)) continue;
+  for (const Vlr& record : originals) {
+    if (is_about_storage(record.user, record.number)) continue;
     const auto whole = std::as_bytes(std::span(record.bytes));
     kept.bytes.insert(kept.bytes.end(), whole.begin(), whole.end());
-    kept.has_wkt |= record.user == "LASF_Projection" && record.id == 2112;
-    kept.has_geotiff |= record.user == "LASF_Projection" && record.id == 34735;
+    kept.has_wkt |= record.user == "LASF_Projection" && record.number == 2112;
+    kept.has_geotiff |= record.user == "LASF_Projection" && record.number == 34735;
     ++kept.count;
   }
   return kept;
@@ -262,15 +210,16 @@ std::vector<LasName> original_names(const PointWriteInfo& info) {
   header.record_bytes = record_bytes;
 
   // Read the descriptions again, which gives each field the channel that it became
-  const auto text = info.text.find("las.vlrs");
-  const auto originals = text == info.text.end() ? std::nullopt : read_originals(text->second);
+  const auto text = info.text.find(kLasRecordsKey);
+  const auto originals = text == info.text.end() ? std::nullopt : decode_vlrs(text->second);
   if (!originals) return {};
-  const auto describes = [](const Original& record) {
-    return record.user == "LASF_Spec" && record.id == 4 && record.bytes.size() > kRecordHeadBytes;
+  const auto describes = [](const Vlr& record) {
+    return record.user == "LASF_Spec" && record.number == 4 &&
+           record.bytes.size() > kVlrHeaderBytes;
   };
   const auto found = std::ranges::find_if(*originals, describes);
   if (found == originals->end()) return {};
-  return make_las_fields(header, std::as_bytes(std::span(found->bytes)).subspan(kRecordHeadBytes))
+  return make_las_fields(header, std::as_bytes(std::span(found->bytes)).subspan(kVlrHeaderBytes))
       .names;
 }
 
@@ -292,8 +241,8 @@ void Records::add(std::string_view user, std::uint16_t id, std::string_view desc
 
 Records plan_records(const PointWriteInfo& info) {
   Records records;
-  if (const auto text = info.text.find("las.vlrs"); text != info.text.end()) {
-    if (const auto originals = read_originals(text->second)) {
+  if (const auto text = info.text.find(kLasRecordsKey); text != info.text.end()) {
+    if (const auto originals = decode_vlrs(text->second)) {
       records = kept_records(*originals);
     } else {
       records.dropped.push_back("The text las.vlrs is damaged: its records are left out.");

@@ -4,11 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "engine/io/cloud/las_vlrs.h"
+
 namespace ptc {
 namespace {
-
-constexpr std::size_t kMaxKept = std::size_t{1} << 14;  // bytes of records
-constexpr std::size_t kVlrHeader = 54;
 
 // Returns text whose code points are the bytes, as UTF-8.
 std::string bytes_as_code_points(const std::string& bytes) {
@@ -35,22 +34,6 @@ std::string hexadecimal(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-// Source: RFC 4648, section 4.
-std::string encode_base64(std::span<const std::byte> bytes) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      bits = bits << 8 | (k < count ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += k <= count ? kDigits[bits >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
 }  // namespace
 
 std::string make_las_header_text(const LasHeader& header, unsigned colour_bits) {
@@ -71,28 +54,36 @@ std::string make_las_header_text(const LasHeader& header, unsigned colour_bits) 
   return text.dump();
 }
 
-LasRecordsText make_las_records_text(const InputFile& file, const LasHeader& header) {
-  LasRecordsText text;
+std::string make_las_records_text(const InputFile& file, const LasHeader& header,
+                                  std::vector<std::string>& notes) {
   std::vector<std::byte> kept;
+  std::vector<LostVlr> too_long, too_many;
   for (const LasRecord& record : header.records) {
     if (record.user == kLaszipUser || record.user == "copc") continue;
-    if (record.bytes > kMaxKept || kVlrHeader + record.bytes > kMaxKept - kept.size()) {
-      text.left_out.push_back(record);
+    const LostVlr lost{record.user, record.number, record.bytes};
+    if (record.bytes > kMaxVlrPayload) {
+      too_long.push_back(lost);
+      continue;
+    }
+    const std::size_t bytes = kVlrHeaderBytes + static_cast<std::size_t>(record.bytes);
+    if (bytes > kMaxVlrs - kept.size()) {
+      too_many.push_back(lost);
       continue;
     }
     // A record's header begins with a reserved u16, user, number and length; the length has 2
     // bytes, or 8 in an extended record. The description of 32 bytes follows.
     const std::size_t at = kept.size();
-    kept.resize(at + kVlrHeader + static_cast<std::size_t>(record.bytes));
+    kept.resize(at + bytes);
     const auto out = std::span(kept).subspan(at);
     file.read_at(record.offset, out.first(20));
     const auto length = static_cast<std::uint16_t>(record.bytes);
     std::memcpy(out.data() + 20, &length, sizeof length);
     file.read_at(record.payload - 32, out.subspan(22, 32));
-    file.read_at(record.payload, out.subspan(kVlrHeader));
+    file.read_at(record.payload, out.subspan(kVlrHeaderBytes));
   }
-  text.base64 = encode_base64(kept);
-  return text;
+  note_lost_vlrs(too_long, "no record of more than 65,535 bytes is kept", notes);
+  note_lost_vlrs(too_many, "only 1 MiB of records is kept", notes);
+  return encode_vlrs(kept);
 }
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// Internal to the LAS reader and writer: the texts that keep what a LAS header and its records say,
+// Internal to the LAS reader: the texts that keep what a LAS header and its records say,
 // so that the file can be written again.
 //
 // `las.header` is a JSON object. Texts of the header have bytes as code points, so that bytes that
@@ -12,12 +12,9 @@
 //   bits;
 //                                                                       0 where there is no colour
 //
-// `las.vlrs` is base64 (RFC 4648, section 4, padded) of records one after another, each as a VLR: a
-// header of 54 bytes and its payload. An extended record becomes such a record. The records about
-// compression, of users "laszip encoded" and "copc", are not among them.
+// las_vlrs.h describes `las.vlrs`.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -29,13 +26,11 @@ namespace ptc {
 /// @param colour_bits  0, 8 or 16
 [[nodiscard]] std::string make_las_header_text(const LasHeader& header, unsigned colour_bits);
 
-/// The text `las.vlrs`, and what is not in it.
-struct LasRecordsText {
-  std::string base64;               ///< empty when no record is kept
-  std::vector<LasRecord> left_out;  ///< records that do not fit 16 KiB
-};
-
-/// Returns the text `las.vlrs` of a file. @throws std::system_error
-[[nodiscard]] LasRecordsText make_las_records_text(const InputFile& file, const LasHeader& header);
+/// Returns the text `las.vlrs` of a file, empty when no record is kept: payloads have up to
+/// kMaxVlrPayload bytes, and all records together up to kMaxVlrs.
+/// @param notes  gets what is not in it
+/// @throws std::system_error
+[[nodiscard]] std::string make_las_records_text(const InputFile& file, const LasHeader& header,
+                                                std::vector<std::string>& notes);
 
 }  // namespace ptc

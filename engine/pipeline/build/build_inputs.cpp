@@ -19,6 +19,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/build/meshes.h"
@@ -34,6 +35,8 @@ namespace {
 
 constexpr std::size_t kBlock = 1 << 14;       // surfels read from a source at once
 constexpr std::size_t kSampleKeys = 1 << 16;  // positions that the sort's splitters need
+// Bytes of the records of a LAS file, which share the meta page with all that a container records.
+constexpr std::size_t kMaxContainerRecords = std::size_t{1} << 14;
 
 /// Drops every second position of a sample that is twice as large as the sort needs.
 void thin(std::vector<glm::dvec3>& sample) {
@@ -230,6 +233,8 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   for (const auto& input : request.inputs) {
     if (holds_points(input)) inputs.clouds.measure(input, request.selection, from, alone, progress);
   }
+  Progress silent;
+  inputs.clouds.shorten_records(from == BoundsFrom::files ? progress : silent);
   if (inputs.clouds.files.size() > 1) inputs.clouds.text.erase(kViewpointKey);
   if (!request.up.empty()) inputs.clouds.text[kUpKey] = request.up;
   if (inputs.clouds.scan) {
@@ -293,6 +298,17 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
     read_points(file, alone, cloud, progress);
   }
   points += cloud.points;
+}
+
+void Clouds::shorten_records(Progress& progress) {
+  const auto records = text.find(kLasRecordsKey);
+  if (records == text.end()) return;
+  ShortVlrs shorter = shorten_vlrs(records->second, kMaxContainerRecords,
+                                   "a container keeps only 16 KiB of records");
+  const std::string& name = named_by.at(kLasRecordsKey);
+  for (const std::string& note : shorter.notes) progress.note(name + ": " + note);
+  records->second = std::move(shorter.text);
+  if (records->second.empty()) text.erase(records);
 }
 
 /// Reads the points of a cloud and notes what they need.

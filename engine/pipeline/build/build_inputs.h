@@ -62,7 +62,8 @@ struct Clouds {
   bool coloured = false;             ///< one of the files gives colours
   bool emits = false;                ///< a point emits light
   std::vector<glm::dvec3> scanners;  ///< of all files, scene units
-  /// Facts about the files under the keys of spec/points.md#texts, by join_texts().
+  /// Facts about the files under the keys of spec/points.md#texts, by join_texts(). Of the records
+  /// of a LAS file there are as many as a container keeps.
   std::map<std::string, std::string> text;
   std::map<std::string, std::string> named_by;  ///< by key of `text`: the file that it is of
 
@@ -73,6 +74,10 @@ struct Clouds {
   ///         open_point_input()
   void measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
                bool alone, Progress& progress);
+
+  /// Shortens the records of a LAS file to what a container keeps.
+  /// @param progress  gets a note about each kind of records that is left out
+  void shorten_records(Progress& progress);
 
  private:
   void read_points(PointFile& file, bool alone, Cloud& cloud, Progress& progress);
