@@ -5,7 +5,7 @@ import struct
 import subprocess
 import unittest
 
-from programs import BIN, ProgramTest, ball, read_ply, write_ply
+from programs import BIN, SMALL_PICTURE, ProgramTest, ball, read_ply, write_ply
 
 NAMES = ["x", "y", "z", "nx", "ny", "nz", "radius", "intensity", "number"]
 
@@ -114,6 +114,20 @@ class Formats(ProgramTest):
             self.succeed("ptcverify", scene)
             self.succeed("ptcconvert", scene, out)
             self.assertEqual(len(self.records_of(out)), 2 * 54 + 700 + 15000)
+
+    def test_shading_a_las_keeps_its_long_records(self):
+        las, out, other = self.here / "a.las", self.here / "b.las", self.here / "other.las"
+        records = self.write_las(las, [20000, 60000, 700, 65535])
+        short = self.write_las(other, [100])
+        self.succeed("ptcbuild", other, "-o", self.here / "other.ptcx")
+        for words, kept in (([las], records), ([las, "--count", "99"], records), ([las, other], records),
+                            ([other, las], short), ([other, "--receivers", las], records),
+                            ([las, "--receivers", other], short), ([las, "--receivers", self.here / "other.ptcx"], short)):
+            self.assertNotIn("left out", self.succeed("ptcshade", *words, "-o", out).stderr)
+            self.assertEqual(self.records_of(out), kept, words)
+        # A container that is kept leaves them out; a picture has none
+        self.assertEqual(self.succeed("ptcshade", las, "-o", self.here / "b.ptcx").stderr.count("left out"), 3)
+        self.assertNotIn("left out", self.succeed("ptcrender", las, *SMALL_PICTURE, "-o", self.here / "b.png").stderr)
 
     def test_damage_that_is_tolerated_does_not_keep_channels_from_being_measured(self):
         scene, broken = self.here / "a.ptcx", self.here / "b.ptcx"

@@ -247,6 +247,7 @@ class Build {
     // Read and measure the inputs, choose the frame
     BuildInputs inputs =
         read_inputs(request_, bounds_from_, scene_.get(), report_.seconds, progress_);
+    report_.las_records = std::move(inputs.clouds.las_records);
     if (inputs.bounds.empty() && !scene_) {
       std::string names;
       for (const auto& input : request_.inputs) names += input.string() + ": ";

@@ -71,6 +71,9 @@ struct BuildRequest {
   BuildOptions tree;                   ///< the octree's leaves and the order of its pages
   std::uint8_t page_shift = 16;        ///< a page has 2^page_shift bytes, 12 to 20
   Profile profile = Profile::compact;  ///< how points are rounded and compressed
+  /// Notes which records of a LAS file the container leaves out. Whoever writes them elsewhere,
+  /// from BuildReport::las_records, needs no note.
+  bool note_lost_records = true;
   /// Continues an interrupted build of the same request, and leaves files from which another build
   /// can continue if this one is interrupted in turn. Once the points are sorted, an interruption
   /// costs `checkpoint_points` of them and the block that is being built; before that, the sort
@@ -87,7 +90,10 @@ struct BuildReport {
   std::uint64_t resumed_points = 0;  ///< points that an interrupted build had built before
   BuildSpace space;                  ///< bytes on the disks, estimated before the build
   SortStatistics sort;               ///< points that were sorted and bytes that were spilled
-  StageSeconds seconds;              ///< wall time of each stage
+  /// The text `las.vlrs` of the inputs with the records that the container leaves out, too; empty
+  /// when they have none, or when the build continues an interrupted one.
+  std::string las_records;
+  StageSeconds seconds;  ///< wall time of each stage
 };
 
 /// Builds a container and publishes it under the name `target`.

@@ -234,7 +234,8 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
     if (holds_points(input)) inputs.clouds.measure(input, request.selection, from, alone, progress);
   }
   Progress silent;
-  inputs.clouds.shorten_records(from == BoundsFrom::files ? progress : silent);
+  const bool told = from == BoundsFrom::files && request.note_lost_records;
+  inputs.clouds.shorten_records(told ? progress : silent);
   if (inputs.clouds.files.size() > 1) inputs.clouds.text.erase(kViewpointKey);
   if (!request.up.empty()) inputs.clouds.text[kUpKey] = request.up;
   if (inputs.clouds.scan) {
@@ -307,7 +308,7 @@ void Clouds::shorten_records(Progress& progress) {
                                    "a container keeps only 16 KiB of records");
   const std::string& name = named_by.at(kLasRecordsKey);
   for (const std::string& note : shorter.notes) progress.note(name + ": " + note);
-  records->second = std::move(shorter.text);
+  las_records = std::exchange(records->second, std::move(shorter.text));
   if (records->second.empty()) text.erase(records);
 }
 

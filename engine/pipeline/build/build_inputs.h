@@ -66,6 +66,7 @@ struct Clouds {
   /// of a LAS file there are as many as a container keeps.
   std::map<std::string, std::string> text;
   std::map<std::string, std::string> named_by;  ///< by key of `text`: the file that it is of
+  std::string las_records;  ///< all records of the LAS file, once shorten_records() has run
 
   /// Adds a cloud to the others. Reads it to its end, unless all that is asked stands in front of
   /// its points.
@@ -75,7 +76,8 @@ struct Clouds {
   void measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
                bool alone, Progress& progress);
 
-  /// Shortens the records of a LAS file to what a container keeps.
+  /// Moves the records of a LAS file to `las_records`, and shortens them in `text` to what a
+  /// container keeps.
   /// @param progress  gets a note about each kind of records that is left out
   void shorten_records(Progress& progress);
 

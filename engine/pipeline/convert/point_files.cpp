@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/point_survey.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/rounding.h"
@@ -177,6 +178,7 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
                       .has_albedo = !selection.level && has_colours(container.meta().text),
                       .emits = container.header().point_bytes != kPointBytes && !selection.level,
                       .colour_from = options.colour_from};
+  if (!options.las_records.empty()) info.text[kLasRecordsKey] = options.las_records;
   info.bounds = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
   if (!selection.level) {
     info.channels = kept_channels(

@@ -30,6 +30,9 @@ struct PointFileOptions {
   /// Measures for losses() what the format rounds. Without this, it is measured only where the
   /// writer of a cloud chooses its positions by it. All points of a container are read for it.
   bool measure_rounding = false;
+  /// The text `las.vlrs` that is written in place of a container's own, which has room for 16 KiB;
+  /// empty: the container's own.
+  std::string las_records;
   Selection selection;  ///< which points are written, and which channels
   RunOptions run;       ///< memory, threads and temporary directories
 };

@@ -25,7 +25,9 @@ BuiltScene::BuiltScene(const LightingRequest& request, BuildRequest build,
   build.sampling = request.sampling;
   build.up = request.up;
   build.run = request.run;
-  seconds_ = build_container(build, path_, progress).seconds;
+  BuildReport report = build_container(build, path_, progress);
+  seconds_ = std::move(report.seconds);
+  las_records_ = std::move(report.las_records);
 }
 
 void BuiltScene::add_stages(StageSeconds& seconds) const {

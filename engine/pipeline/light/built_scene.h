@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "engine/base/progress.h"
@@ -33,6 +34,8 @@ class BuiltScene {
              const std::filesystem::path& target, Progress& progress);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  /// BuildReport::las_records of the build.
+  [[nodiscard]] const std::string& las_records() const noexcept { return las_records_; }
   /// Adds the stages of the build before those of the run.
   void add_stages(StageSeconds& seconds) const;
 
@@ -40,6 +43,7 @@ class BuiltScene {
   std::filesystem::path path_;
   TemporaryName name_;  // before the build, so that a build that fails leaves nothing
   StageSeconds seconds_;
+  std::string las_records_;
 };
 
 }  // namespace ptc

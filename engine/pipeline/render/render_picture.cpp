@@ -366,8 +366,9 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   // there are clouds beside them.
   check_names(request, targets, request.lights ? request.lights->sky.map_path : "");
   const std::vector<std::filesystem::path> files = scene_files(request);
-  const BuiltScene scene(request, {.backdrop = request.backdrop, .lights = request.lights},
-                         targets.front().path, progress);
+  const BuiltScene scene(
+      request, {.backdrop = request.backdrop, .lights = request.lights, .note_lost_records = false},
+      targets.front().path, progress);
   RenderRequest rendering = request;
   rendering.scene = scene.path();
   rendering.joined.clear();

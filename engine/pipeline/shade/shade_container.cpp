@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
 #include "engine/io/text/text.h"
@@ -146,7 +147,7 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
 struct OpenReceivers {
   OpenReceivers(const ShadeRequest& request, const std::filesystem::path& target,
                 const Lighting& lighting, Progress& progress)
-      : other(open(request, target, progress)),
+      : other(open(request, target, progress, las_records)),
         container(other ? *other : lighting.scene()),
         wanted(std::min(request.count == 0 ? all() : request.count, all())),
         lost(other ? nullptr : lighting.lost()),
@@ -156,6 +157,7 @@ struct OpenReceivers {
   [[nodiscard]] std::uint64_t all() const { return container.superblock().points; }
   [[nodiscard]] PointCursor cursor() const { return {container, groups, wanted, 0, lost}; }
 
+  std::string las_records;                 ///< BuildReport::las_records of a cloud; `other` sets it
   std::unique_ptr<ContainerReader> other;  ///< null: the receivers are the scene's own points
   const ContainerReader& container;
   std::uint64_t wanted;              ///< number of points that were asked for
@@ -167,7 +169,7 @@ struct OpenReceivers {
   /// Opens a container as it is; builds a cloud into a temporary one.
   static std::unique_ptr<ContainerReader> open(const ShadeRequest& request,
                                                const std::filesystem::path& target,
-                                               Progress& progress) {
+                                               Progress& progress, std::string& las_records) {
     if (request.receivers.empty()) return nullptr;
     if (is_container(request.receivers)) {
       return std::make_unique<ContainerReader>(request.receivers);
@@ -175,10 +177,12 @@ struct OpenReceivers {
     const BuildRequest build{.inputs = {request.receivers},
                              .lights = LightRig{},  // receivers need no light of their own
                              .profile = Profile::raw,
+                             .note_lost_records = !output_format(target),
                              .run = request.run};
     return make_temporary_container(
-        roomiest_temp_dir(request.run, target),
-        [&](const std::filesystem::path& path) { build_container(build, path, progress); });
+        roomiest_temp_dir(request.run, target), [&](const std::filesystem::path& path) {
+          las_records = build_container(build, path, progress).las_records;
+        });
   }
 
   /// Returns the groups that are needed: for a file of points all but those of an earlier shading;
@@ -279,8 +283,9 @@ void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, S
 }
 
 /// Shades the points of a container.
+/// @param las_records  BuildReport::las_records of the scene; empty: what its container keeps
 LightingReport shade_points(const ShadeRequest& request, const std::filesystem::path& target,
-                            Progress& progress) {
+                            const std::string& las_records, Progress& progress) {
   // Open the scene and the receivers
   LightingReport report;
   check_target(request, target);
@@ -299,9 +304,11 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   lighting.tune([&] { return pilots_of(receivers, request.lift); });
 
   // Shade all receivers into the target
-  const PointWriteInfo info = shaded_points(receivers.container, receivers.points,
-                                            settings_text(request, lighting.gather()),
-                                            request.colour_from, output_format(target));
+  PointWriteInfo info = shaded_points(receivers.container, receivers.points,
+                                      settings_text(request, lighting.gather()),
+                                      request.colour_from, output_format(target));
+  const std::string& records = receivers.other ? receivers.las_records : las_records;
+  if (!records.empty()) info.text[kLasRecordsKey] = records;
   note_unknown_losses(target, info, progress);
   const std::unique_ptr<ShadedSink> sink =
       make_shaded_sink(target, receivers.container, info, request.estimate);
@@ -318,8 +325,10 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
 }
 
 /// Shades into a temporary copy of the container, and writes its points in the order of the input.
+/// @param las_records  as for shade_points()
 LightingReport shade_in_input_order(const ShadeRequest& request,
-                                    const std::filesystem::path& target, Progress& progress) {
+                                    const std::filesystem::path& target,
+                                    const std::string& las_records, Progress& progress) {
   if (!request.colour_from.empty()) {
     PointWriteInfo info =
         shaded_points(ContainerReader(request.scene), 0, "", request.colour_from, std::nullopt);
@@ -329,11 +338,15 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
   }
   LightingReport report;
   const std::unique_ptr<ContainerReader> shaded = make_temporary_container(
-      roomiest_temp_dir(request.run, target),
-      [&](const std::filesystem::path& path) { report = shade_points(request, path, progress); });
-  const ConvertReport written = container_to_points(
-      *shaded, target,
-      {.original_order = true, .colour_from = request.colour_from, .run = request.run}, progress);
+      roomiest_temp_dir(request.run, target), [&](const std::filesystem::path& path) {
+        report = shade_points(request, path, las_records, progress);
+      });
+  const ConvertReport written = container_to_points(*shaded, target,
+                                                    {.original_order = true,
+                                                     .colour_from = request.colour_from,
+                                                     .las_records = las_records,
+                                                     .run = request.run},
+                                                    progress);
   report.seconds.insert(report.seconds.end(), written.seconds.begin(), written.seconds.end());
   return report;
 }
@@ -343,22 +356,24 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
 LightingReport shade_container(const ShadeRequest& request, const std::filesystem::path& target,
                                Progress& progress) {
   if (is_container_alone(request)) {
-    return request.original_order ? shade_in_input_order(request, target, progress)
-                                  : shade_points(request, target, progress);
+    return request.original_order ? shade_in_input_order(request, target, "", progress)
+                                  : shade_points(request, target, "", progress);
   }
   // Build a temporary container of clouds and meshes; points go out in the order in which they came
   const bool in_order = output_format(target).has_value() && request.receivers.empty() &&
                         request.count == 0 &&
                         std::ranges::all_of(scene_files(request), holds_points);
-  const BuiltScene scene(
-      request,
-      {.original_order = in_order, .profile = in_order ? Profile::exact : Profile::compact}, target,
-      progress);
+  const BuiltScene scene(request,
+                         {.original_order = in_order,
+                          .profile = in_order ? Profile::exact : Profile::compact,
+                          .note_lost_records = !output_format(target)},
+                         target, progress);
   ShadeRequest shading = request;
   shading.scene = scene.path();
   shading.joined.clear();
-  LightingReport report = in_order ? shade_in_input_order(shading, target, progress)
-                                   : shade_points(shading, target, progress);
+  LightingReport report = in_order
+                              ? shade_in_input_order(shading, target, scene.las_records(), progress)
+                              : shade_points(shading, target, scene.las_records(), progress);
   scene.add_stages(report.seconds);
   return report;
 }
