@@ -129,6 +129,27 @@ class Formats(ProgramTest):
         self.assertEqual(self.succeed("ptcshade", las, "-o", self.here / "b.ptcx").stderr.count("left out"), 3)
         self.assertNotIn("left out", self.succeed("ptcrender", las, *SMALL_PICTURE, "-o", self.here / "b.png").stderr)
 
+    def test_an_intensity_that_is_scaled_by_the_values_of_one_file_is_noted(self):
+        def tile(name, values):
+            path = self.here / name
+            path.write_text(f"{len(values)}\n" + "".join(f"{i % 9} {i // 9} {i % 2} {v}\n" for i, v in enumerate(values)))
+            return path
+        dark, bright = tile("dark.pts", range(-1600, -1519)), tile("bright.pts", range(81))
+        wide, out = tile("wide.pts", range(-9000, -8919)), self.here / "o.las"
+        alike = "Another file may be scaled otherwise, by its own values; files that are joined are scaled alike."
+        said = f"o.las: Values of the channel intensity, from -1600 to -1520, become 16 (v + 2048). {alike}\n"
+        self.assertIn(said, self.succeed("ptcconvert", dark, out).stderr)
+        self.assertIn(said, self.succeed("ptcshade", dark, "-o", out).stderr)
+        self.assertIn(alike, self.succeed("ptcconvert", wide, out).stderr)
+        self.assertEqual(self.succeed("ptcconvert", bright, out).stderr, "")
+        self.assertEqual(self.succeed("ptcconvert", dark, self.here / "o.ply").stderr, "")
+        self.succeed("ptcbuild", dark, bright, "--original-order", "-o", self.here / "a.ptcx")
+        self.succeed("ptcconvert", self.here / "a.ptcx", out, "--original-order")
+        data = out.read_bytes()
+        (begin,), (size,) = struct.unpack_from("<I", data, 96), struct.unpack_from("<H", data, 105)
+        values = [struct.unpack_from("<H", data, begin + i * size + 12)[0] for i in range(162)]
+        self.assertEqual(values, [16 * (v + 2048) for v in (*range(-1600, -1519), *range(81))])
+
     def test_damage_that_is_tolerated_does_not_keep_channels_from_being_measured(self):
         scene, broken = self.here / "a.ptcx", self.here / "b.ptcx"
         self.succeed("ptcbuild", self.scan, "--page-size", "4K", "-o", scene)

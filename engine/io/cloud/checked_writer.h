@@ -71,6 +71,8 @@ class CheckedWriter : public PointWriter {
 
 /// Says whether a channel has the colour Cd as a BGEO had it, which becomes Cd again.
 [[nodiscard]] bool is_linear_colour(const Channel& channel) noexcept;
+/// Returns what scaling_notes() says of LAS.
+[[nodiscard]] std::vector<std::string> las_scaling_notes(const PointWriteInfo& info);
 /// Returns what unknown_losses() says of LAS.
 [[nodiscard]] std::vector<std::string> las_unknown_losses(const PointWriteInfo& info);
 /// Says that points whose stored colour is not known get that of their albedo.

@@ -99,11 +99,13 @@ void scale_intensity(PlacedChannel& placed, const ValueRange& range) {
   } else if (range.low >= -2048 && range.high <= 2047) {
     append(placed, 16, 16 * 2048);
     placed.loss = fmt::format("{} become 16 (v + 2048){}.", subject, rounded);
+    placed.by_values = true;
   } else {
     const double side = range.high - range.low;
     const double factor = side > 0 && std::isfinite(side) ? kMostWord / side : 0;
     append(placed, factor, factor == 0 ? 0 : -range.low * factor);
     placed.loss = subject + " are spread over 0 to 65535 and are rounded.";
+    placed.by_values = true;
   }
 }
 

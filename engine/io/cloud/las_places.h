@@ -42,6 +42,8 @@ struct PlacedChannel {
   double low = 0;    ///< the least value of the place
   double high = 0;   ///< the greatest one
   std::string loss;  ///< what is not kept of the values, a sentence; empty when all is
+  /// The values that were measured chose factor and shift, so another file may get others.
+  bool by_values = false;
 
   /// Returns the value of the place for a point of which it is known; 0 for NaN.
   [[nodiscard]] double value(const std::byte* row) const noexcept;

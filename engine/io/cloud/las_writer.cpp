@@ -272,6 +272,17 @@ std::vector<std::string> las_unknown_losses(const PointWriteInfo& info) {
   return sentences;
 }
 
+std::vector<std::string> las_scaling_notes(const PointWriteInfo& info) {
+  std::vector<std::string> sentences;
+  for (const las::PlacedChannel& field : las::Layout(info).fields) {
+    if (!field.by_values) continue;
+    sentences.push_back(field.loss +
+                        " Another file may be scaled otherwise, by its own values; files that are "
+                        "joined are scaled alike.");
+  }
+  return sentences;
+}
+
 std::vector<std::string> las_losses(const PointWriteInfo& info) {
   std::vector<std::string> sentences;
   const las::Head head = las::plan_head(info);

@@ -162,6 +162,10 @@ std::vector<std::string> unknown_losses(OutputFormat format, const PointWriteInf
   return sentences;
 }
 
+std::vector<std::string> scaling_notes(OutputFormat format, const PointWriteInfo& info) {
+  return format == OutputFormat::las ? las_scaling_notes(info) : std::vector<std::string>();
+}
+
 std::optional<OutputFormat> output_format(const std::filesystem::path& path) {
   using enum OutputFormat;
   constexpr std::array<std::pair<std::string_view, OutputFormat>, 11> kEndings{{

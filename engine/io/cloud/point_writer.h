@@ -138,6 +138,11 @@ void check_colour_from(OutputFormat format, const PointWriteInfo& info);
 [[nodiscard]] std::vector<std::string> unknown_losses(OutputFormat format,
                                                       const PointWriteInfo& info);
 
+/// Returns which channels a file of this format scales by the values of these points, so that those
+/// of another file may be scaled otherwise, a note each.
+[[nodiscard]] std::vector<std::string> scaling_notes(OutputFormat format,
+                                                     const PointWriteInfo& info);
+
 /// Returns the format that the ending of a name stands for; nothing for an ending that names no
 /// format of points.
 /// @throws RequestError about `target` for .laz, which is only read

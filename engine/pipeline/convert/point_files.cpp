@@ -35,7 +35,7 @@ OutputFormat format_of(const std::filesystem::path& target) {
 /// Copies all points of a source to a file.
 void copy_points(PointSource& source, const std::filesystem::path& target, OutputFormat format,
                  const PointWriteInfo& info, Progress& progress) {
-  note_unknown_losses(target, info, progress);
+  note_changed_values(target, info, progress);
   const std::unique_ptr<PointWriter> writer = create_points(target, format, info);
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = source.next(block)) {
@@ -157,10 +157,12 @@ void compare_written(const std::filesystem::path& target, OutputFormat format,
 
 }  // namespace
 
-void note_unknown_losses(const std::filesystem::path& target, const PointWriteInfo& info,
+void note_changed_values(const std::filesystem::path& target, const PointWriteInfo& info,
                          Progress& progress) {
   const std::optional<OutputFormat> format = output_format(target);
   if (!format) return;
+  for (const std::string& sentence : scaling_notes(*format, info))
+    progress.note(target.filename().string() + ": " + sentence);
   for (const std::string& sentence : unknown_losses(*format, info))
     progress.note(target.filename().string() + ": " + sentence);
 }

@@ -38,8 +38,9 @@ struct PointFileOptions {
 };
 
 /// Notes what becomes of values that stand for "not known" in a file of points that is about to be
-/// written (unknown_losses()). Nothing for a target that is a container.
-void note_unknown_losses(const std::filesystem::path& target, const PointWriteInfo& info,
+/// written (unknown_losses()), and what is scaled by the values of its points (scaling_notes()).
+/// Nothing for a target that is a container.
+void note_changed_values(const std::filesystem::path& target, const PointWriteInfo& info,
                          Progress& progress);
 
 /// Describes the points of a container for a writer. They are read when a selection must be

@@ -309,7 +309,7 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
                                       request.colour_from, output_format(target));
   const std::string& records = receivers.other ? receivers.las_records : las_records;
   if (!records.empty()) info.text[kLasRecordsKey] = records;
-  note_unknown_losses(target, info, progress);
+  note_changed_values(target, info, progress);
   const std::unique_ptr<ShadedSink> sink =
       make_shaded_sink(target, receivers.container, info, request.estimate);
   {
