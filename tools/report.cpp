@@ -34,6 +34,7 @@ ordered_json facts_of(const CheckError& error) {
           {"irradiance_bias", error.irradiance_bias},
           {"irradiance_mean", error.irradiance_mean},
           {"irradiance_noise", error.irradiance_noise},
+          {"sky_mean", error.sky_mean},
           {"relative", error.relative()}};
 }
 

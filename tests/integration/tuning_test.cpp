@@ -94,6 +94,25 @@ TEST_CASE("error sums: the noise of the rays is separated from the error of the 
   CHECK(ErrorSums().error().relative() == 0);
 }
 
+TEST_CASE("error: where little of the sky is seen, its light is off by more than occlusion",
+          "[integration][error]") {
+  // 2 % of the sky are open, and occlusion is off by half a percent of itself.
+  CheckError e{.occlusion_rms = 0.005, .occlusion_mean = 0.98, .occlusion_noise = 0.001};
+  CHECK(e.relative() == Approx(0.005 / 0.98));  // no sky
+  e.sky_mean = 0.02;
+  CHECK(e.relative() == Approx(0.25));
+  CHECK(e.relative_noise() == Approx(0.05));
+  e.irradiance_mean = 0.02;  // half of the light comes from surfaces
+  CHECK(e.relative() == Approx(0.125));
+  e.irradiance_mean = 200;  // a lamp outshines it
+  CHECK(e.relative() == Approx(0.005 / 0.98));
+  // By rays, over the colours
+  ErrorSums sums;
+  sums.add({}, {.sky = {1, 2, 3}}, {.sky = {3, 2, 1}});
+  sums.add(sums);
+  CHECK(sums.error().sky_mean == Approx(2));
+}
+
 TEST_CASE("tuning: pilots fit into every run and are a small part of a long one",
           "[integration][error]") {
   CHECK(plan_pilots(0).count == 0);

@@ -16,15 +16,24 @@ struct CheckError {
   double irradiance_bias = 0;   ///< mean, over irradiance_mean
   double irradiance_mean = 0;   ///< mean irradiance by the rays over receivers and RGB, W / m^2
   double irradiance_noise = 0;  ///< root mean square error of the rays, over irradiance_mean
+  double sky_mean = 0;          ///< mean light from the sky by the rays, as irradiance_mean
 
-  /// The error that a user asks for: the larger of the errors of occlusion and irradiance, each
-  /// over its mean. Occlusion alone counts where no light arrives.
-  [[nodiscard]] double relative() const noexcept {
-    return std::max(occlusion_mean > 0 ? occlusion_rms / occlusion_mean : 0.0, irradiance_rms);
-  }
+  /// The error that a user asks for: the largest of the errors of occlusion and irradiance, each
+  /// over its mean, and of the light that the sky sends through what is open, over the mean light.
+  /// Occlusion alone counts where no light arrives.
+  [[nodiscard]] double relative() const noexcept { return largest(occlusion_rms, irradiance_rms); }
   /// The noise of the rays, measured as relative() measures the error.
   [[nodiscard]] double relative_noise() const noexcept {
-    return std::max(occlusion_mean > 0 ? occlusion_noise / occlusion_mean : 0.0, irradiance_noise);
+    return largest(occlusion_noise, irradiance_noise);
+  }
+
+ private:
+  /// An error of occlusion is one of what is open, and of the sky's light as that of a white sky:
+  /// the noise of rays at a picture with a sun would hide it.
+  [[nodiscard]] double largest(double occlusion, double irradiance) const noexcept {
+    const double light = sky_mean + irradiance_mean, open = 1 - occlusion_mean;
+    const double of_sky = light > 0 && open > 0 ? occlusion / open * sky_mean / light : 0.0;
+    return std::max({occlusion_mean > 0 ? occlusion / occlusion_mean : 0.0, irradiance, of_sky});
   }
 };
 

@@ -36,6 +36,7 @@ void ErrorSums::add(const Shading& ours, const Shading& a, const Shading& b) {
   for (int c = 0; c < 3; ++c) {
     irradiance_.add(value(ours.irradiance[c]), value(a.irradiance[c]), value(b.irradiance[c]),
                     1.0 / 3);
+    sky_ += (value(a.sky[c]) + value(b.sky[c])) / 6;
   }
 }
 
@@ -43,6 +44,7 @@ void ErrorSums::add(const ErrorSums& other) {
   receivers_ += other.receivers_;
   occlusion_.add(other.occlusion_);
   irradiance_.add(other.irradiance_);
+  sky_ += other.sky_;
 }
 
 CheckError ErrorSums::error() const {
@@ -52,7 +54,8 @@ CheckError ErrorSums::error() const {
                .occlusion_bias = occlusion_.difference / receivers_,
                .occlusion_mean = occlusion_.mean / receivers_,
                .occlusion_noise = rms(occlusion_.noise),
-               .irradiance_mean = irradiance_.mean / receivers_};
+               .irradiance_mean = irradiance_.mean / receivers_,
+               .sky_mean = sky_ / receivers_};
   if (e.irradiance_mean > 0) {
     e.irradiance_rms = rms(irradiance_.square) / e.irradiance_mean;
     e.irradiance_bias = irradiance_.difference / receivers_ / e.irradiance_mean;

@@ -43,6 +43,7 @@ class ErrorSums {
 
   double receivers_ = 0;
   Quantity occlusion_, irradiance_;
+  double sky_ = 0;  ///< light from the sky by the rays, mean over RGB, summed
 };
 
 }  // namespace ptc

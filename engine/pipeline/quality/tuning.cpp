@@ -58,7 +58,7 @@ class Tuner {
   /// asked for. That is enough: noise is averaged out over some hundred receivers.
   /// @return  number of rays of each of the two results of a receiver
   unsigned trace_for(double asked, Progress& progress) {
-    StreamedRays discs(scene_, options_.gather.sides, {}, options_.cache_bytes);
+    StreamedRays discs(scene_, options_.gather.sides, options_.sky, options_.cache_bytes);
     unsigned side = kFirstSide;
     trace(discs, side, progress);
     const double noise = noise_of_half();
@@ -259,7 +259,7 @@ std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& o
                              Progress& progress) {
   Tuner tuner(scene, options, pilots, executor);
   {
-    StreamedRays discs(scene, options.gather.sides, {}, options.cache_bytes);
+    StreamedRays discs(scene, options.gather.sides, options.sky, options.cache_bytes);
     tuner.trace(discs, static_cast<unsigned>(std::sqrt(static_cast<double>(rays))), progress);
   }
   tuner.begin_shading();
