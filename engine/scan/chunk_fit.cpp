@@ -6,15 +6,16 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kFew = 16;    // neighbours of a clean surface
-constexpr std::size_t kMany = 48;   // neighbours where few do not do
-constexpr std::size_t kTried = 16;  // of so many blocks one tells whether few will do
-constexpr float kNoisy = 0.12F;     // noise in units of the spacing, from which many are taken
-constexpr float kLine = 0.25F;  // width in units of the length, below which neighbours are a line
+constexpr std::size_t kFew = kFewNeighbours;  // of a clean surface
+constexpr std::size_t kMany = 48;             // neighbours where few do not do
+constexpr std::size_t kTried = 16;            // of so many blocks one tells whether few will do
+constexpr float kNoisy = 0.12F;  // noise in units of the spacing, from which many are taken
+constexpr float kLine = 0.25F;   // width in units of the length, below which neighbours are a line
 
 /// Says whether a fit is to be repeated with more neighbours.
-bool wants_more(const PlaceFit& fit, float width) noexcept {
-  return fit.count == kFew && (fit.noise > kNoisy * fit.spread || width < kLine);
+/// @param noise  RMS distance of its neighbours from its surface
+bool wants_more(const PlaceFit& fit, float noise, float width) noexcept {
+  return fit.count == kFew && (noise > kNoisy * fit.spread || width < kLine);
 }
 
 }  // namespace
@@ -54,9 +55,9 @@ void ChunkFitter::fit(std::uint64_t number, ScanChunk& chunk) {
   choose(true);
   fit_all(chunk, chosen, kFew, reach_few_);
   const auto tried = std::ranges::count(chosen, 1);
-  const auto wanting = std::ranges::count(chunk.fits, true, &PlaceFit::wants_more);
-  if (2 * wanting > tried) {
-    // Most of them want more, so all get more.
+  const auto scattered = std::ranges::count(chunk.fits, true, &PlaceFit::scattered);
+  if (2 * scattered > tried) {
+    // The cloud is noisy, where planes through few points are found by chance. All get more.
     std::ranges::fill(chosen, 1);
   } else {
     // Fit the others, and repeat those that want more.
@@ -154,7 +155,8 @@ void ChunkFitter::flush(ScanChunk& chunk) {
     fit.aside = from.aside[lane];
     fit.gap = reach * from.gap[lane];
     fit.count = static_cast<std::uint8_t>(batch.rows.count[lane]);
-    fit.wants_more = wants_more(fit, from.width[lane]);
+    fit.wants_more = wants_more(fit, fit.noise, from.width[lane]);
+    fit.scattered = wants_more(fit, reach * from.scatter[lane], from.width[lane]);
   }
   batch.lanes = 0;
   batch.rows.rows = 0;

@@ -35,6 +35,7 @@ struct PlaceFit {
   float gap = 0;            ///< see FitLanes::gap
   std::uint8_t count = 0;   ///< neighbours
   bool wants_more = false;  ///< more neighbours would give a better fit
+  bool scattered = false;   ///< the same of the surface through all neighbours
   std::array<float, 6> directions{};  ///< see FitLanes::directions
 };
 

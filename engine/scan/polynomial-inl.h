@@ -16,7 +16,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 
-constexpr int kFits = 2;            // the first with equal weights
 constexpr float kTolerance = 6;     // (c s)^2 over s^2 of the weights
 constexpr float kCurvature = 0.3F;  // usual even terms, for the ridge
 constexpr float kBetter = 0.1F;     // mean square of a half, in that of all, which is far better
@@ -189,47 +188,62 @@ HWY_INLINE void prefer_half(const FitBatch& batch, std::size_t lane, const Frame
   }
 }
 
+/// Returns the height of the polynomial.
+HWY_INLINE V height_at(const V* unknown, V u, V v) {
+  const V along_u = mul_add(unknown[kUU], u, mul_add(unknown[kUV], v, unknown[kU]));
+  const V along_v = mul_add(unknown[kVV], v, unknown[kV]);
+  return mul_add(along_u, u, mul_add(along_v, v, unknown[kOne]));
+}
+
+/// Puts the offsets into the frame of the plane.
+HWY_INLINE void turn_rows(const FitBatch& batch, std::size_t lane, const Plane& plane,
+                          FrameRows& rows) {
+  const F f;
+  for (std::size_t row = 0; row < batch.rows; ++row) {
+    const V p[3] = {hn::Load(f, batch.x[row] + lane), hn::Load(f, batch.y[row] + lane),
+                    hn::Load(f, batch.z[row] + lane)};
+    hn::Store(dot(p, plane.axis[2]), f, rows.u[row] + lane);
+    hn::Store(dot(p, plane.axis[1]), f, rows.v[row] + lane);
+    hn::Store(dot(p, plane.axis[0]), f, rows.w[row] + lane);
+  }
+}
+
+/// Fits the polynomial to neighbours, which count less the farther they are from the polynomial
+/// before it.
+/// @param square   mean square of the distances from the one before
+/// @param unknown  of the one before; is replaced
+/// @param alike    there was none before, and all count alike
+/// @return the mean square of the distances from the surface
+HWY_INLINE V fit_weighted(const FitBatch& batch, std::size_t lane, const FrameRows& rows, V square,
+                          V* unknown, bool alike = false) {
+  const F f;
+  const V count = hn::Load(f, batch.count + lane);
+  const V limit = hn::Div(set(1), mul_add(square, set(kTolerance), set(1e-14F)));
+  Moments sums;
+  sums.clear();
+  for (std::size_t row = 0; row < batch.rows; ++row) {
+    V weight = hn::IfThenElseZero(hn::Lt(set(static_cast<float>(row)), count), set(1));
+    const V u = hn::Load(f, rows.u[row] + lane), v = hn::Load(f, rows.v[row] + lane);
+    const V w = hn::Load(f, rows.w[row] + lane);
+    if (!alike) {
+      const V off = hn::Sub(w, height_at(unknown, u, v));
+      const V ratio = mul_add(mul(off, off), limit, set(1));
+      weight = hn::Div(weight, mul(ratio, ratio));
+    }
+    sums.add(weight, u, v, w);
+  }
+  solve(sums, mul(square, set(1 / (kCurvature * kCurvature))), unknown);
+  return mean_square(sums, unknown, count);
+}
+
 /// Fits the polynomial. @param rows  receives the offsets in the frame of the plane
 /// @return the mean square of the distances from the surface
 HWY_INLINE V fit_polynomial(const FitBatch& batch, std::size_t lane, const Plane& plane,
                             FrameRows& rows, V* unknown) {
-  const F f;
-  const V count = hn::Load(f, batch.count + lane);
-  V square = hn::Zero(f);
-  for (int fit = 0; fit < kFits; ++fit) {
-    Moments sums;
-    sums.clear();
-    const V limit = hn::Div(set(1), mul_add(square, set(kTolerance), set(1e-14F)));
-    for (std::size_t row = 0; row < batch.rows; ++row) {
-      V weight = hn::IfThenElseZero(hn::Lt(set(static_cast<float>(row)), count), set(1));
-      V u, v, w;
-      if (fit == 0) {
-        const V p[3] = {hn::Load(f, batch.x[row] + lane), hn::Load(f, batch.y[row] + lane),
-                        hn::Load(f, batch.z[row] + lane)};
-        u = dot(p, plane.axis[2]);
-        v = dot(p, plane.axis[1]);
-        w = dot(p, plane.axis[0]);
-        hn::Store(u, f, rows.u[row] + lane);
-        hn::Store(v, f, rows.v[row] + lane);
-        hn::Store(w, f, rows.w[row] + lane);
-      } else {
-        u = hn::Load(f, rows.u[row] + lane);
-        v = hn::Load(f, rows.v[row] + lane);
-        w = hn::Load(f, rows.w[row] + lane);
-        const V along_u = mul_add(unknown[kUU], u, mul_add(unknown[kUV], v, unknown[kU]));
-        const V along_v = mul_add(unknown[kVV], v, unknown[kV]);
-        const V height = mul_add(along_u, u, mul_add(along_v, v, unknown[kOne]));
-        const V off = hn::Sub(w, height);
-        const V ratio = mul_add(mul(off, off), limit, set(1));
-        weight = hn::Div(weight, mul(ratio, ratio));
-      }
-      sums.add(weight, u, v, w);
-    }
-    solve(sums, mul(square, set(1 / (kCurvature * kCurvature))), unknown);
-    square = mean_square(sums, unknown, count);
-    if (fit == 0) prefer_half(batch, lane, rows, unknown, square);
-  }
-  return square;
+  turn_rows(batch, lane, plane, rows);
+  V square = fit_weighted(batch, lane, rows, hn::Zero(F()), unknown, true);
+  prefer_half(batch, lane, rows, unknown, square);
+  return fit_weighted(batch, lane, rows, square, unknown);
 }
 
 }  // namespace ptc::HWY_NAMESPACE

@@ -22,6 +22,10 @@
 //                      |         \ .
 //                      |          \  .  on another face
 //
+// Where a plane through the point has more neighbours on it than the polynomial, as on a strip
+// between two edges, the fit begins again from that plane (common_plane-inl.h). Only few neighbours
+// are searched for such a plane: many are taken where noise hides it.
+//
 // Lanes are neighbourhoods; a loop goes over their neighbours. Nothing passes between lanes, so the
 // width of vectors does not change a bit.
 #include "engine/scan/surface_fit.h"
@@ -32,6 +36,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "engine/scan/common_plane-inl.h"
 #include "engine/scan/polynomial-inl.h"
 #include "engine/scan/principal_plane-inl.h"
 
@@ -122,9 +127,12 @@ void fit_lanes(const FitBatch& batch, FitLanes& out) {
   const F f;
   FrameRows rows;
   for (std::size_t lane = 0; lane < kFitLanes; lane += hn::Lanes(f)) {
-    const Plane plane = find_plane(batch, lane);
+    Plane plane = find_plane(batch, lane);
     V unknown[kUnknowns];
-    const V square = fit_polynomial(batch, lane, plane, rows, unknown);
+    V square = fit_polynomial(batch, lane, plane, rows, unknown);
+    hn::Store(hn::Sqrt(square), f, out.scatter + lane);
+    if (batch.rows <= kFewNeighbours)
+      prefer_common_plane(batch, lane, plane, rows, unknown, square);
     store_normal(plane, unknown, lane, out);
     measure_directions(batch, lane, plane, rows, out);
     // Describe the neighbourhood. Over a disc of radius p, the mean squares along both axes are

@@ -7,6 +7,8 @@ namespace ptc {
 
 inline constexpr std::size_t kFitLanes = 16;        ///< neighbourhoods that are fitted together
 inline constexpr std::size_t kMostNeighbours = 64;  ///< the point itself not counted
+/// The greatest number of neighbours of which a part may be enough: those on one plane.
+inline constexpr std::size_t kFewNeighbours = 16;
 
 /// Neighbourhoods, one for each lane. Offsets are relative to the point, in units of its reach, the
 /// distance of its farthest neighbour.
@@ -23,6 +25,7 @@ struct FitBatch {
 struct FitLanes {
   alignas(64) float normal[3][kFitLanes];  ///< unit, of either side
   alignas(64) float noise[kFitLanes];      ///< RMS distance of neighbours from the surface
+  alignas(64) float scatter[kFitLanes];    ///< the same from the surface through all neighbours
   alignas(64) float offset[kFitLanes];     ///< from the point along the normal to the surface
   alignas(64) float nearest[kFitLanes];    ///< distance of the nearest neighbour
   alignas(64) float spread[kFitLanes];     ///< spacing, from how widely the neighbours spread
@@ -37,7 +40,8 @@ struct FitLanes {
 };
 
 /// Fits a quadratic surface to each neighbourhood, by weights that fall with the distance from the
-/// surface. All instruction sets give the same bits.
+/// surface; where there are few, to the most of them that lie on one plane with the point, if the
+/// surface through all has fewer on it. All instruction sets give the same bits.
 void fit_surfaces(const FitBatch& batch, FitLanes& out) noexcept;
 
 }  // namespace ptc

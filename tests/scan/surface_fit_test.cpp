@@ -98,6 +98,28 @@ TEST_CASE("surface fit: a few points off the surface do not turn the normal", "[
     CHECK(angle_to(*fit, lane, {0, 0, 1}) < 2);  // with equal weights up to 5
 }
 
+TEST_CASE("surface fit: a strip between two edges has its own normal", "[scan][fit]") {
+  // The front of a slab, 0.7 high, with 7 of 16 points; the others lie on its top and its bottom
+  const auto batch = std::make_unique<FitBatch>();
+  const auto fit = std::make_unique<FitLanes>();
+  Random random(7);
+  for (std::size_t lane = 0; lane < kFitLanes; ++lane) {
+    const auto along = [&] { return 1.6 * random.uniform() - 0.8; };
+    for (int i = 0; i < 16; ++i) {
+      const double depth = 0.6 * random.uniform();
+      const glm::dvec3 front(0, along(), 0.7 * random.uniform() - 0.35);
+      const glm::dvec3 side(depth, along(), i % 2 == 0 ? 0.35 : -0.35);
+      add(*batch, lane, i % 5 < 2 ? front : side);
+    }
+  }
+  fit_surfaces(*batch, *fit);
+  for (std::size_t lane = 0; lane < kFitLanes; ++lane) {
+    CHECK(angle_to(*fit, lane, {1, 0, 0}) < 4);
+    CHECK(fit->noise[lane] < 0.02F);
+    CHECK(fit->scatter[lane] >= fit->noise[lane]);
+  }
+}
+
 TEST_CASE("surface fit: three points, one or none give finite numbers", "[scan][fit]") {
   const auto batch = std::make_unique<FitBatch>();
   const auto fit = std::make_unique<FitLanes>();
