@@ -143,6 +143,7 @@ void ChunkFitter::flush(ScanChunk& chunk) {
     const float reach = batch.reach[lane];
     for (std::size_t k = 0; k < 3; ++k) {
       fit.normal[k] = from.normal[k][lane];
+      fit.broad[k] = from.broad[k][lane];
       fit.to_surface[k] = reach * from.offset[lane] * fit.normal[k];
     }
     for (std::size_t k = 0; k < 6; ++k) fit.directions[k] = from.directions[k][lane];

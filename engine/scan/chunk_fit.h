@@ -24,6 +24,7 @@ inline constexpr std::uint32_t kNoLink = 0xffffffff;
 /// What the neighbours of a place say about it. Lengths are in lattice units.
 struct PlaceFit {
   std::array<float, 3> normal{};      ///< unit, of either side
+  std::array<float, 3> broad{};       ///< normal of the surface through all neighbours
   float reach = 0;                    ///< distance of the farthest neighbour; 0: there is none
   float noise = 0;                    ///< RMS distance of neighbours from the surface
   float offset = 0;                   ///< distance of the place from the surface, not negative

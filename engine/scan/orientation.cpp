@@ -168,12 +168,21 @@ class ChunkOrientation {
     return high - low < std::min(kSheet * width + 4 * noise, kNoisySheet * width);
   }
 
+  /// Returns the normal of a place that votes. That of the surface through all neighbours leads
+  /// around an edge, where faces that meet there say little of each other's sides.
+  Vec3 voting_normal(std::uint32_t i) const {
+    const PlaceFit& fit = chunk_.fits[i];
+    if (room_.known[i] != 0) return fit.normal;
+    Vec3 normal = fit.broad;
+    if (dot(normal, fit.normal) < 0) flip(normal);
+    return normal;
+  }
+
   /// Computes the votes of all links of which one end at least is unknown.
   void count_votes() {
     std::vector<LinkEnd>& ends = room_.ends;
     ends.resize(count_);
-    for (std::uint32_t i = 0; i < count_; ++i)
-      ends[i] = {chunk_.fits[i].normal, chunk_.fits[i].noise};
+    for (std::uint32_t i = 0; i < count_; ++i) ends[i] = {voting_normal(i), chunk_.fits[i].noise};
     room_.votes.assign(count_, {});
     with_instructions(widest_instructions(), [this, &ends] {
       for (std::uint32_t i = 0; i < count_; ++i) {

@@ -104,9 +104,9 @@ HWY_INLINE void measure_directions(const FitBatch& batch, std::size_t lane, cons
   }
 }
 
-/// Stores the normal: the gradient of the polynomial, or the plane's where that is steep.
+/// Stores a normal: the gradient of the polynomial, or the plane's where that is steep.
 HWY_INLINE void store_normal(const Plane& plane, const V* unknown, std::size_t lane,
-                             FitLanes& out) {
+                             float (&out)[3][kFitLanes]) {
   const F f;
   const V steepness = mul_add(unknown[kU], unknown[kU], mul(unknown[kV], unknown[kV]));
   const auto usable = hn::Le(steepness, set(4));
@@ -118,7 +118,7 @@ HWY_INLINE void store_normal(const Plane& plane, const V* unknown, std::size_t l
         hn::Sub(hn::Sub(plane.axis[0][k], mul(b, plane.axis[2][k])), mul(c, plane.axis[1][k]));
   }
   const V scale = hn::Div(set(1), hn::Sqrt(hn::Max(dot(normal, normal), set(1e-20F))));
-  for (int k = 0; k < 3; ++k) hn::Store(mul(normal[k], scale), f, out.normal[k] + lane);
+  for (int k = 0; k < 3; ++k) hn::Store(mul(normal[k], scale), f, out[k] + lane);
 }
 
 }  // namespace
@@ -130,10 +130,11 @@ void fit_lanes(const FitBatch& batch, FitLanes& out) {
     Plane plane = find_plane(batch, lane);
     V unknown[kUnknowns];
     V square = fit_polynomial(batch, lane, plane, rows, unknown);
+    store_normal(plane, unknown, lane, out.broad);
     hn::Store(hn::Sqrt(square), f, out.scatter + lane);
     if (batch.rows <= kFewNeighbours)
       prefer_common_plane(batch, lane, plane, rows, unknown, square);
-    store_normal(plane, unknown, lane, out);
+    store_normal(plane, unknown, lane, out.normal);
     measure_directions(batch, lane, plane, rows, out);
     // Describe the neighbourhood. Over a disc of radius p, the mean squares along both axes are
     // p^2 / 4; with n neighbours, the spacing is p sqrt(pi / n).

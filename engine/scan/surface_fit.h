@@ -25,7 +25,8 @@ struct FitBatch {
 struct FitLanes {
   alignas(64) float normal[3][kFitLanes];  ///< unit, of either side
   alignas(64) float noise[kFitLanes];      ///< RMS distance of neighbours from the surface
-  alignas(64) float scatter[kFitLanes];    ///< the same from the surface through all neighbours
+  alignas(64) float broad[3][kFitLanes];   ///< normal of the surface through all neighbours
+  alignas(64) float scatter[kFitLanes];    ///< RMS distance of neighbours from it
   alignas(64) float offset[kFitLanes];     ///< from the point along the normal to the surface
   alignas(64) float nearest[kFitLanes];    ///< distance of the nearest neighbour
   alignas(64) float spread[kFitLanes];     ///< spacing, from how widely the neighbours spread
