@@ -6,16 +6,15 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kFew = kFewNeighbours;  // of a clean surface
-constexpr std::size_t kMany = 48;             // neighbours where few do not do
-constexpr std::size_t kTried = 16;            // of so many blocks one tells whether few will do
-constexpr float kNoisy = 0.12F;  // noise in units of the spacing, from which many are taken
-constexpr float kLine = 0.25F;   // width in units of the length, below which neighbours are a line
+constexpr std::size_t kMany = 48;   // neighbours where few do not do
+constexpr std::size_t kTried = 16;  // of so many blocks one tells whether few will do
+constexpr float kNoisy = 0.12F;     // noise in units of the spacing, from which many are taken
+constexpr float kLine = 0.25F;  // width in units of the length, below which neighbours are a line
 
 /// Says whether a fit is to be repeated with more neighbours.
 /// @param noise  RMS distance of its neighbours from its surface
 bool wants_more(const PlaceFit& fit, float noise, float width) noexcept {
-  return fit.count == kFew && (noise > kNoisy * fit.spread || width < kLine);
+  return fit.count == kFewNeighbours && (noise > kNoisy * fit.spread || width < kLine);
 }
 
 }  // namespace
@@ -53,7 +52,7 @@ void ChunkFitter::fit(std::uint64_t number, ScanChunk& chunk) {
     }
   };
   choose(true);
-  fit_all(chunk, chosen, kFew, reach_few_);
+  fit_all(chunk, chosen, kFewNeighbours, reach_few_);
   const auto tried = std::ranges::count(chosen, 1);
   const auto scattered = std::ranges::count(chunk.fits, true, &PlaceFit::scattered);
   if (2 * scattered > tried) {
@@ -62,7 +61,7 @@ void ChunkFitter::fit(std::uint64_t number, ScanChunk& chunk) {
   } else {
     // Fit the others, and repeat those that want more.
     choose(false);
-    fit_all(chunk, chosen, kFew, reach_few_);
+    fit_all(chunk, chosen, kFewNeighbours, reach_few_);
     for (std::size_t i = 0; i < count; ++i) chosen[i] = chunk.fits[i].wants_more ? 1 : 0;
   }
   std::erase_if(chunk.outer, [&](const OuterLink& link) { return chosen[link.from] != 0; });

@@ -36,7 +36,7 @@ struct PlaceFit {
   float gap = 0;            ///< see FitLanes::gap
   std::uint8_t count = 0;   ///< neighbours
   bool wants_more = false;  ///< more neighbours would give a better fit
-  bool scattered = false;   ///< the same of the surface through all neighbours
+  bool scattered = false;   ///< the surface through all neighbours is noisy, or they are a line
   std::array<float, 6> directions{};  ///< see FitLanes::directions
 };
 

@@ -1,9 +1,9 @@
 // The plane through a point on which most of its neighbours lie. This file is guarded once for each
 // instruction set.
 //
-// Of a point on a strip, as on the edge of a slab, most neighbours lie on other faces, so no fit to
-// all of them finds its face, nor does one to half of them. But planes through the point and two
-// neighbours pass through further ones by chance alone, unless all three lie on one face:
+// A point on a strip, such as the edge of a slab, has most of its neighbours on other faces, so no
+// fit to all of them finds its face, nor does one to half of them. But planes through the point and
+// two neighbours pass through further ones by chance alone, unless all three lie on one face:
 //
 //          .   .   .   .
 //       .    .   .   .                        a b   the face of x: other points lie in this plane

@@ -7,7 +7,8 @@ namespace ptc {
 
 inline constexpr std::size_t kFitLanes = 16;        ///< neighbourhoods that are fitted together
 inline constexpr std::size_t kMostNeighbours = 64;  ///< the point itself not counted
-/// The greatest number of neighbours of which a part may be enough: those on one plane.
+/// The number of neighbours that is enough for a clean surface. Of so many or fewer, those on one
+/// plane may be enough.
 inline constexpr std::size_t kFewNeighbours = 16;
 
 /// Neighbourhoods, one for each lane. Offsets are relative to the point, in units of its reach, the

@@ -118,7 +118,7 @@ TEST_CASE("orientation: closed surfaces turn outwards", "[scan][orientation]") {
       const Completed completed = complete(scan);
       CAPTURE(count, &cloud == &sphere);
       CHECK(completed.report.islands <= 2);  // points at a corner may stand apart
-      // Of 500 points, up to three lie at edges and have the face of another one
+      // A cloud of 500 points has up to three at its edges that take the face beyond
       CHECK(compare(cloud, scan, completed.records).flipped < (count == 500 ? 0.007 : 0.003));
     }
   }
