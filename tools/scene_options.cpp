@@ -167,9 +167,10 @@ glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files, const std
 
 void note_unknown_up(const std::vector<std::filesystem::path>& files, const std::string& axis,
                      Progress& progress) {
+  if (!axis.empty()) return;
   const auto silent = std::ranges::find_if(
       files, [](const auto& file) { return holds_points(file) && !is_container(file); });
-  if (silent == files.end() || !axis.empty() || !text_with_up(files).empty()) return;
+  if (silent == files.end() || !text_with_up(files).empty()) return;
   progress.note(silent->filename().string() +
                 ": the file does not say which axis is up, y is taken; --up z if it is z");
 }
