@@ -17,9 +17,13 @@ namespace ptc::bench {
 [[nodiscard]] nlohmann::json run_rival(const std::vector<std::string>& command,
                                        const std::filesystem::path& work, const std::string& what);
 
-/// Does the same with a program in Python, in an interpreter of its own.
+/// Runs a program in Python, in an interpreter of its own, and returns what it wrote as JSON into
+/// the file that its last argument names.
+/// @param work       directory for temporary files
 /// @param program    text of the program
 /// @param arguments  of the program, but for the last one
+/// @param what       the library that it runs, for the message
+/// @throws DataError when the program fails; std::system_error
 [[nodiscard]] nlohmann::json run_python(const std::filesystem::path& interpreter,
                                         const std::filesystem::path& work,
                                         const std::string& program,

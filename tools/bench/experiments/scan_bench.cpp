@@ -1,8 +1,8 @@
 // From a mesh to the errors of normals:
 //
-//   mesh --> random points, true normals --> noise --> sorted records --> complete_scan() -->
-//   angles
-//                                                 `--> file of numbers --> Open3D, PCL ----> angles
+//   mesh --> random points, true normals --> noise --> sorted records
+//                                                       |--> complete_scan() -------> angles
+//                                                       `--> file --> Open3D, PCL --> angles
 //
 // Open3D runs in an interpreter of its own, PCL in a program of its own, on the same points in the
 // same order. They read them from a file and write their normals to another; what is timed are
