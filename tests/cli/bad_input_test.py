@@ -13,7 +13,7 @@ class BadInput(ProgramTest):
     """Every kind of bad file, everywhere a program reads one: exit 1, the path, nothing left."""
 
     def consumers(self, kind):
-        """Returns the commands that read a file of a kind, with a placeholder for its name."""
+        """Returns the commands that read a file of a kind, with {} in the place of its name."""
         out = {"ptcx": self.here / "out.ptcx", "ply": self.here / "out.ply",
                "png": self.here / "out.png", "exr": self.here / "out.exr"}
         commands = {

@@ -28,8 +28,8 @@ struct CheckError {
   }
 
  private:
-  /// An error of occlusion is one of what is open, and of the sky's light as that of a white sky:
-  /// the noise of rays at a picture with a sun would hide it.
+  /// Returns the largest of the errors that relative() names. The sky's light is taken to be off by
+  /// as large a share as what is open: rays at a picture with a sun are too noisy to measure it.
   [[nodiscard]] double largest(double occlusion, double irradiance) const noexcept {
     const double light = sky_mean + irradiance_mean, open = 1 - occlusion_mean;
     const double of_sky = light > 0 && open > 0 ? occlusion / open * sky_mean / light : 0.0;
