@@ -8,7 +8,7 @@ include(CMakePackageConfigHelpers)
 find_program(PTC_GZIP gzip REQUIRED)
 
 set(PTC_STORE_LAYERS format base file store)
-set(PTC_LAYERS parallel io scene sort scan octree verify cache shade pipeline)
+set(PTC_LAYERS parallel io scene sort scan octree verify cache shade trace pipeline)
 set(PTC_STORE_HEADERS engine/store/reader.h engine/store/writer.h engine/store/point_scan.h engine/store/container_points.h)
 set(PTC_HEADERS ${PTC_STORE_HEADERS} engine/ptc.h)
 

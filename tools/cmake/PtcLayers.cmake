@@ -13,8 +13,9 @@ set(PTC_LAYERS_engine/octree "format;engine/base;engine/io/file;engine/io;engine
 set(PTC_LAYERS_engine/verify "format;engine/base;engine/parallel;engine/io/file;engine/io;engine/sort;engine/store;engine/octree")
 set(PTC_LAYERS_engine/cache "format;engine/base;engine/io/file;engine/store")
 set(PTC_LAYERS_engine/shade "format;engine/base;engine/io/file;engine/io;engine/store;engine/cache")
+set(PTC_LAYERS_engine/trace "${PTC_LAYERS_engine/shade};engine/shade")
 set(PTC_LAYERS_engine/pipeline
-  "format;engine/base;engine/parallel;engine/io/file;engine/io;engine/scene;engine/sort;engine/scan;engine/store;engine/octree;engine/cache;engine/shade")
+  "format;engine/base;engine/parallel;engine/io/file;engine/io;engine/scene;engine/sort;engine/scan;engine/store;engine/octree;engine/cache;engine/shade;engine/trace")
 set(PTC_LAYERS_engine "${PTC_LAYERS_engine/pipeline};engine/pipeline;engine/verify")
 set(PTC_LAYERS_tools/bench/chart "format;engine/base;engine/io/file;engine/io")
 set(PTC_LAYERS_tools "${PTC_LAYERS_engine/pipeline};engine/verify;engine/pipeline;engine;tools/bench/chart")

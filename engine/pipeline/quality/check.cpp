@@ -2,7 +2,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/pipeline/quality/error_sums.h"
-#include "engine/shade/reference/streamed_rays.h"
+#include "engine/trace/ray_shader.h"
 
 namespace ptc {
 namespace {
@@ -56,11 +56,15 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
 
   // Trace rays at the surfels
   {
-    StreamedRays discs(scene, sides, sky_function(seen.sky), memory_bytes);
-    report.disc_microseconds = cpu_microseconds(
-        receivers_.size(), [&] { discs.trace(twice, half, 0, traced, executor, progress); });
+    RayShader discs(scene,
+                    {.sides = sides,
+                     .sky = sky_function(seen.sky),
+                     .bleeding = seen.paths.bounces > 0,
+                     .memory_bytes = memory_bytes},
+                    executor);
+    report.disc_microseconds =
+        cpu_microseconds(receivers_.size(), [&] { discs.trace(twice, half, 0, traced, progress); });
   }
-  if (seen.paths.bounces == 0) leave_out_bleeding(traced);
   report.discs = errors(results_, traced);
   if (!estimates_.empty()) report.estimate = check_estimates(estimates_, results_, traced);
 

@@ -63,7 +63,7 @@ class CheckSample {
   /// Traces rays at the sampled receivers and compares.
   /// @param scene         the container that the receivers were shaded from
   /// @param sides         sides of the surfels that stop rays
-  /// @param memory_bytes  cap for rays at the surfels, at least StreamedRays::kMinBytes
+  /// @param memory_bytes  cap for rays at the surfels, as RayOptions::memory_bytes
   /// @param progress      advances by one for each half of a receiver's reference: by two for each
   ///                      receiver at the surfels, and by two more at the mesh
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides,

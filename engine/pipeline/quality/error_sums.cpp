@@ -11,10 +11,6 @@ std::vector<Receiver> two_of_each(std::span<const Receiver> receivers) {
   return twice;
 }
 
-void leave_out_bleeding(std::span<Shading> traced) {
-  for (Shading& s : traced) s.irradiance = glm::vec3(0);
-}
-
 void ErrorSums::Quantity::add(double ours, double a, double b, double weight) {
   square += weight * (ours - a) * (ours - b);
   difference += weight * (ours - (a + b) / 2);

@@ -13,9 +13,6 @@ namespace ptc {
 /// their results independent.
 [[nodiscard]] std::vector<Receiver> two_of_each(std::span<const Receiver> receivers);
 
-/// Removes the light from surfaces, because a gather without bleeding is compared with the rest.
-void leave_out_bleeding(std::span<Shading> traced);
-
 /// Sums of errors over receivers, each of which was shaded by the gather and traced twice.
 ///
 /// Let `ours` be the result of the gather and a, b two results by rays that are independent and

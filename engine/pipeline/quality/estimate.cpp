@@ -13,7 +13,7 @@
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/pipeline/quality/error_sums.h"
-#include "engine/shade/reference/streamed_rays.h"
+#include "engine/trace/ray_shader.h"
 
 namespace ptc {
 namespace {
@@ -194,11 +194,12 @@ std::vector<Shading> trace_pilots(const ContainerReader& scene, const ShadeOptio
   const std::vector<Receiver> twice = two_of_each(receivers);
   std::vector<Shading> traced(twice.size());
   {
-    StreamedRays discs(scene, options.gather.sides, {}, options.cache_bytes);
-    discs.trace(twice, (rays + 1) / 2, 0, traced, executor, progress);
+    RayOptions without_sky = ray_options(options);
+    without_sky.sky = {};
+    RayShader discs(scene, without_sky, executor);
+    discs.trace(twice, (rays + 1) / 2, 0, traced, progress);
   }
   return_freed_memory();
-  if (!options.gather.bleeding) leave_out_bleeding(traced);
   return traced;
 }
 

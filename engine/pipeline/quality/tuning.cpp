@@ -14,7 +14,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/pipeline/quality/error_sums.h"
-#include "engine/shade/reference/streamed_rays.h"
+#include "engine/trace/ray_shader.h"
 
 namespace ptc {
 namespace {
@@ -58,7 +58,7 @@ class Tuner {
   /// asked for. That is enough: noise is averaged out over some hundred receivers.
   /// @return  number of rays of each of the two results of a receiver
   unsigned trace_for(double asked, Progress& progress) {
-    StreamedRays discs(scene_, options_.gather.sides, options_.sky, options_.cache_bytes);
+    RayShader discs(scene_, ray_options(options_), executor_);
     unsigned side = kFirstSide;
     trace(discs, side, progress);
     const double noise = noise_of_half();
@@ -72,11 +72,10 @@ class Tuner {
 
   /// Traces all compared receivers.
   /// @param side  side of the square of rays of a result
-  void trace(StreamedRays& discs, unsigned side, Progress& progress) {
+  void trace(RayShader& discs, unsigned side, Progress& progress) {
     const std::vector<Receiver> twice = two_of_each(compared_);
     traced_.resize(twice.size());
-    discs.trace(twice, side * side, 0, traced_, executor_, progress);
-    if (!options_.gather.bleeding) leave_out_bleeding(traced_);
+    discs.trace(twice, side * side, 0, traced_, progress);
   }
 
   /// Frees the memory of the rays and gives it to a page cache. No rays can be traced afterwards.
@@ -259,7 +258,7 @@ std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& o
                              Progress& progress) {
   Tuner tuner(scene, options, pilots, executor);
   {
-    StreamedRays discs(scene, options.gather.sides, options.sky, options.cache_bytes);
+    RayShader discs(scene, ray_options(options), executor);
     tuner.trace(discs, static_cast<unsigned>(std::sqrt(static_cast<double>(rays))), progress);
   }
   tuner.begin_shading();

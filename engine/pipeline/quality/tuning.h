@@ -49,14 +49,14 @@ struct TuningReport {
   std::size_t pilots = 0;        ///< number of receivers compared with rays
   unsigned rays = 0;             ///< rays for each of these receivers
   std::uint64_t shaded = 0;      ///< receivers that were shaded, over all settings that were tried
-  double ray_cpu_seconds = 0;    ///< CPU time of the rays, all threads, loading surfels included
+  double ray_cpu_seconds = 0;    ///< CPU time of the rays, all threads
   double shade_cpu_seconds = 0;  ///< CPU time of the gathers, all threads
 };
 
 /// Compares pilots with rays at the same surfels and finds the cheapest setting that meets `asked`.
 /// The result depends on neither threads nor memory cap.
 /// @param options   options of the run. Only sides and bleeding of its gather count. Its
-///                  cache_bytes, at least StreamedRays::kMinBytes, are the cap of the rays too
+///                  cache_bytes are the cap of the rays too
 /// @param asked     relative error, above 0 and at most 1
 /// @param compared  gets the receivers of the pilots that were compared
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by

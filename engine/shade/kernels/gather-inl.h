@@ -101,6 +101,72 @@ HWY_INLINE Vec unfold(VF u, VF v, float q) {
   return scaled(n, hn::Div(hn::Set(f, 1.0F), hn::Sqrt(dot(n, n))));
 }
 
+/// Returns coordinates of a page relative to a centre.
+///
+///     41                   16 15             0     The centre's half is subtracted from each half
+///     [ upper 26 bits        | lower 16 bits ]     in 32-bit integers, and the differences become
+///                                                  floats.
+///
+/// So the result is rounded relative to its own size, not to the size of the scene. A centre far
+/// outside the frame is clamped to 2^46 units, and what is beyond is subtracted as a float.
+/// @param low     lower 32 bits of the coordinates
+/// @param high10  upper 10 bits of the coordinates
+/// @param centre  lattice units
+HWY_INLINE VF relative(VU low, VU high10, double centre) {
+  const F f;
+  const I i;
+  const U u;
+  const double whole = std::floor(std::clamp(centre, -0x1p46, 0x1p46));
+  const auto integer = static_cast<std::int64_t>(whole);
+  const auto upper = hn::Or(hn::ShiftRight<16>(low), hn::ShiftLeft<16>(high10));
+  const auto lower = hn::And(low, hn::Set(u, 0xffffU));
+  const auto dh =
+      hn::Sub(hn::BitCast(i, upper), hn::Set(i, static_cast<std::int32_t>(integer >> 16)));
+  const auto dl =
+      hn::Sub(hn::BitCast(i, lower), hn::Set(i, static_cast<std::int32_t>(integer & 0xffff)));
+  const auto rest = hn::Sub(hn::ConvertTo(f, dl), hn::Set(f, static_cast<float>(centre - whole)));
+  const auto units = hn::MulAdd(hn::ConvertTo(f, dh), hn::Set(f, 65536.0F), rest);
+  return hn::Mul(units, hn::Set(f, static_cast<float>(SceneScale::kLatticeUnit)));
+}
+
+/// A vector of surfels relative to a centre, in edges of the frame.
+struct PageSurfels {
+  Vec to, normal;
+  VF radius;
+};
+
+/// Loads surfels of a point page (spec/points.md#point-page): a vector of them from number `first`
+/// on.
+/// @param payload  of the page; up to 64 bytes past its end may be read
+/// @param count    number of points on the page
+/// @param centre   lattice units
+/// @param lengths  convert lengths from scene units to edges
+HWY_INLINE PageSurfels load_surfels(const std::byte* payload, std::size_t count, std::size_t first,
+                                    const glm::dvec3& centre, const SceneScale::Factors& lengths) {
+  // Find the columns: one that `bytes_before` bytes of each point precede begins at that times n.
+  const F f;
+  const I i;
+  const U u;
+  const auto word = [&](std::size_t bytes_before) {
+    return hn::LoadU(
+        u, reinterpret_cast<const std::uint32_t*>(payload + bytes_before * count + 4 * first));
+  };
+  const auto high = word(12);
+  const auto ten = hn::Set(u, 1023U);
+  const auto coordinate = [&](std::size_t bytes_before) {
+    const auto bits = hn::LoadU(
+        I16(), reinterpret_cast<const std::int16_t*>(payload + bytes_before * count + 2 * first));
+    return hn::Max(hn::ConvertTo(f, hn::PromoteTo(i, bits)), hn::Set(f, -32767.0F));
+  };
+  return {.to = {relative(word(0), hn::And(high, ten), centre.x),
+                 relative(word(4), hn::And(hn::ShiftRight<10>(high), ten), centre.y),
+                 relative(word(8), hn::And(hn::ShiftRight<20>(high), ten), centre.z)},
+          .normal = unfold(coordinate(20), coordinate(22), 32767),
+          .radius = hn::Min(hn::Mul(hn::Mul(hn::BitCast(f, word(16)), hn::Set(f, lengths[0])),
+                                    hn::Set(f, lengths[1])),
+                            hn::Set(f, SceneScale::kMaxRadius))};
+}
+
 /// Packs colours as encode_rgbe() does, except that a component that rounds up to 256 stays 255.
 HWY_INLINE VU pack_rgbe(VF r, VF g, VF b) {
   const F f;

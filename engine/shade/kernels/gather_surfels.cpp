@@ -33,17 +33,11 @@ HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
 
-/// A vector of surfels relative to a cell's centre, in edges of the frame.
-struct Surfels {
-  Vec to, normal;
-  VF radius;
-};
-
 /// Draws, keeps or drops surfels.
 /// @param wanted  surfels to look at
 /// @param colour  returns their RGBE; is called only when it is needed
 template <class Colour>
-HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const Colour& colour,
+HWY_INLINE void settle(const CellTest& test, const PageSurfels& s, MF wanted, const Colour& colour,
                        CellOutput& out) {
   // Drop what lies under every horizon, and backs where none counts.
   const F f;
@@ -97,68 +91,17 @@ HWY_INLINE void settle(const CellTest& test, const Surfels& s, MF wanted, const 
   left.size += append(rgbe, hn::RebindMask(u, keep), u, left.rgbe.data() + at);
 }
 
-/// Returns coordinates of a page relative to a centre.
-///
-///     41                   16 15             0     The centre's half is subtracted from each half
-///     [ upper 26 bits        | lower 16 bits ]     in 32-bit integers, and the differences become
-///                                                  floats.
-///
-/// So the result is rounded relative to its own size, not to the size of the scene. A centre far
-/// outside the frame is clamped to 2^46 units, and what is beyond is subtracted as a float.
-/// @param low     lower 32 bits of the coordinates
-/// @param high10  upper 10 bits of the coordinates
-/// @param centre  lattice units
-HWY_INLINE VF relative(VU low, VU high10, double centre) {
-  const F f;
-  const I i;
-  const U u;
-  const double whole = std::floor(std::clamp(centre, -0x1p46, 0x1p46));
-  const auto integer = static_cast<std::int64_t>(whole);
-  const auto upper = hn::Or(hn::ShiftRight<16>(low), hn::ShiftLeft<16>(high10));
-  const auto lower = hn::And(low, hn::Set(u, 0xffffU));
-  const auto dh =
-      hn::Sub(hn::BitCast(i, upper), hn::Set(i, static_cast<std::int32_t>(integer >> 16)));
-  const auto dl =
-      hn::Sub(hn::BitCast(i, lower), hn::Set(i, static_cast<std::int32_t>(integer & 0xffff)));
-  const auto rest = hn::Sub(hn::ConvertTo(f, dl), hn::Set(f, static_cast<float>(centre - whole)));
-  const auto units = hn::MulAdd(hn::ConvertTo(f, dh), hn::Set(f, 65536.0F), rest);
-  return hn::Mul(units, hn::Set(f, static_cast<float>(SceneScale::kLatticeUnit)));
-}
-
 }  // namespace
 
 void gather_page_surfels(const std::byte* payload, std::uint32_t count, bool emits,
                          std::uint32_t first, unsigned number, const CellTest& test,
                          CellOutput& out) {
   const F f;
-  const I i;
-  const U u;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
   const std::size_t n = count;
   for (unsigned from = 0; from < number; from += lanes) {
-    // Find the columns: one that `bytes_before` bytes of each point precede begins at that times n.
     const std::size_t k = first + std::size_t{from};
-    const auto word = [&](std::size_t bytes_before) {
-      return hn::LoadU(u,
-                       reinterpret_cast<const std::uint32_t*>(payload + bytes_before * n + 4 * k));
-    };
-    const auto high = word(12);
-    const auto ten = hn::Set(u, 1023U);
-    const glm::dvec3& centre = test.cell.centre;
-    const auto coordinate = [&](std::size_t bytes_before) {
-      const auto bits = hn::LoadU(
-          I16(), reinterpret_cast<const std::int16_t*>(payload + bytes_before * n + 2 * k));
-      return hn::Max(hn::ConvertTo(f, hn::PromoteTo(i, bits)), hn::Set(f, -32767.0F));
-    };
-    // Decode the surfels; their radiance only when it is needed.
-    const Surfels s{
-        .to = {relative(word(0), hn::And(high, ten), centre.x),
-               relative(word(4), hn::And(hn::ShiftRight<10>(high), ten), centre.y),
-               relative(word(8), hn::And(hn::ShiftRight<20>(high), ten), centre.z)},
-        .normal = unfold(coordinate(20), coordinate(22), 32767),
-        .radius = hn::Min(hn::Mul(hn::Mul(hn::BitCast(f, word(16)), hn::Set(f, test.lengths[0])),
-                                  hn::Set(f, test.lengths[1])),
-                          hn::Set(f, SceneScale::kMaxRadius))};
+    const PageSurfels s = load_surfels(payload, count, k, test.cell.centre, test.lengths);
     const auto half = [&](std::size_t bytes_before) {
       return hn::PromoteTo(f, hn::LoadU(F16(), reinterpret_cast<const hwy::float16_t*>(
                                                    payload + bytes_before * n + 2 * k)));
@@ -183,10 +126,10 @@ std::size_t gather_surfels(const NearSurfels& near, std::size_t from, const glm:
     const auto load = [&](const std::vector<float>& column) {
       return hn::LoadU(f, column.data() + from);
     };
-    const Surfels s{.to = {hn::Add(load(near.x), moved.x), hn::Add(load(near.y), moved.y),
-                           hn::Add(load(near.z), moved.z)},
-                    .normal = {load(near.nx), load(near.ny), load(near.nz)},
-                    .radius = load(near.radius)};
+    const PageSurfels s{.to = {hn::Add(load(near.x), moved.x), hn::Add(load(near.y), moved.y),
+                               hn::Add(load(near.z), moved.z)},
+                        .normal = {load(near.nx), load(near.ny), load(near.nz)},
+                        .radius = load(near.radius)};
     settle(
         test, s, hn::FirstN(f, near.size - from),
         [&] { return hn::LoadU(U(), near.rgbe.data() + from); }, out);

@@ -13,36 +13,22 @@
 // frame, as in the gather.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include <glm/geometric.hpp>
 
 #include "engine/base/embree.h"
-#include "engine/base/numbers.h"
 #include "engine/shade/reference/brute_force.h"
 #include "engine/shade/scene_scale.h"
 
 namespace ptc {
-namespace {
-
-/// A stream of uniform numbers in [0, 1): SplitMix64.
-class Uniform {
- public:
-  explicit Uniform(std::uint64_t seed) : state_(seed) {}
-  float operator()() {
-    const std::uint64_t bits = splitmix64(state_);
-    state_ += kSplitMixStep;
-    return static_cast<float>(bits >> 40) * 0x1p-24F;
-  }
-
- private:
-  std::uint64_t state_;
-};
-
-}  // namespace
-
 struct DiscRays::Impl {
+  /// The frame of the numbers that Embree is given, which must stay below 1.8e18.
+  struct Space {
+    glm::dvec3 origin{0};       ///< scene units; rays are exact relative to it
+    SceneScale scale{Frame{}};  ///< unit of length
+  };
+
   /// One ray's state, which Embree hands to the filter.
   struct Context {
     RTCIntersectContext embree;  ///< first, because Embree hands back a pointer to it
@@ -139,8 +125,7 @@ struct DiscRays::Impl {
 };
 
 DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
-                   std::function<glm::vec3(const glm::vec3&)> sky,
-                   const std::optional<Space>& space)
+                   std::function<glm::vec3(const glm::vec3&)> sky)
     : impl_(std::make_unique<Impl>()) {
   // Choose the frame.
   impl_->surfels = surfels;
@@ -148,9 +133,7 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
   impl_->sky = std::move(sky);
   Bounds bounds;
   for (const Surfel& s : surfels) bounds.add(s.position);
-  if (space) {
-    impl_->space = *space;
-  } else if (!bounds.empty()) {
+  if (!bounds.empty()) {
     const glm::dvec3 &low = bounds.low, &high = bounds.high;
     impl_->space = {(low + high) * 0.5,
                     SceneScale(frame_around({low.x, low.y, low.z}, {high.x, high.y, high.z}))};
@@ -182,69 +165,13 @@ DiscRays::DiscRays(std::span<const Surfel> surfels, Sides sides,
 
 DiscRays::~DiscRays() = default;
 
-namespace {
-
-/// Calls body(i, along) for cosine-distributed directions, one in each cell of a square grid of
-/// side x side cells. The same seed gives the same directions.
-template <class Body>
-void for_each_ray(const glm::vec3& n, unsigned side, std::uint64_t seed, const Body& body) {
-  const glm::vec3 tangent =
-      glm::normalize(glm::cross(n, std::abs(n.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
-  const glm::vec3 bitangent = glm::cross(n, tangent);
-  Uniform uniform(seed);
-  for (unsigned j = 0; j < side; ++j) {
-    for (unsigned i = 0; i < side; ++i) {
-      const float u = (static_cast<float>(i) + uniform()) / static_cast<float>(side);
-      const float angle = 2 * kPi * (static_cast<float>(j) + uniform()) / static_cast<float>(side);
-      const float sine = std::sqrt(u);
-      body(std::size_t{j} * side + i, tangent * (sine * std::cos(angle)) +
-                                          bitangent * (sine * std::sin(angle)) +
-                                          n * std::sqrt(std::max(0.0F, 1 - u)));
-    }
-  }
-}
-
-}  // namespace
-
-unsigned DiscRays::side_of(std::size_t rays) noexcept {
-  return static_cast<unsigned>(std::sqrt(static_cast<double>(rays)));
-}
-
-void DiscRays::meet(const Receiver& receiver, std::uint64_t seed, std::span<DiscHit> hits) const {
-  const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, receiver.position);
-  for_each_ray(receiver.normal, side_of(hits.size()), seed,
-               [&](std::size_t i, const glm::vec3& along) { impl_->meet(from, along, hits[i]); });
-}
-
-Shading DiscRays::sum(const Receiver& receiver, std::uint64_t seed, std::span<const DiscHit> hits,
-                      const std::function<glm::vec3(const glm::vec3&)>& sky_at) {
-  const unsigned side = side_of(hits.size());
-  unsigned covered = 0;
-  glm::dvec3 light(0), sky(0), open(0);
-  for_each_ray(receiver.normal, side, seed, [&](std::size_t i, const glm::vec3& along) {
-    if (hits[i].met()) {
-      ++covered;
-      light += hits[i].radiance;
-    } else {
-      open += along;
-      if (sky_at) sky += sky_at(along);
-    }
-  });
-  // Turn the sums into means over the hemisphere, whose cosine-weighted measure is pi.
-  const double count = static_cast<double>(side) * side;
-  Shading shading;
-  shading.occlusion = static_cast<float>(covered / count);
-  shading.irradiance = glm::vec3(light * (std::numbers::pi / count));
-  shading.sky = glm::vec3(sky * (std::numbers::pi / count));
-  const double length = glm::length(open);
-  shading.bent_normal = length > 0 ? glm::vec3(open / length) : receiver.normal;
-  return shading;
-}
-
 Shading DiscRays::trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const {
-  std::vector<DiscHit> hits(std::size_t{side_of(rays)} * side_of(rays));
-  meet(receiver, seed, hits);
-  return sum(receiver, seed, hits, impl_->sky);
+  std::vector<glm::vec3> directions;
+  cosine_directions(receiver.normal, square_side(rays), seed, directions);
+  const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, receiver.position);
+  std::vector<DiscHit> hits(directions.size());
+  for (std::size_t i = 0; i < hits.size(); ++i) impl_->meet(from, directions[i], hits[i]);
+  return sum_rays(receiver, directions, hits, impl_->sky);
 }
 
 }  // namespace ptc

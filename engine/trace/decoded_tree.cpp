@@ -1,0 +1,73 @@
+#include "engine/trace/decoded_tree.h"
+
+#include <algorithm>
+
+#include "engine/trace/trace_kernels.h"
+#include "format/point_page.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+// Places of the tables: what the rays of one origin open, mostly.
+constexpr std::size_t kGroupPlaces = 4096, kLeafPlaces = 4096;
+static_assert(kGroupPlaces * (sizeof(TraceGroup) + 16) + kLeafPlaces * (sizeof(TraceLeaf) + 16) <=
+              DecodedTree::kBytes);
+
+}  // namespace
+
+DecodedTree::DecodedTree(const SceneView& view, PageCache& cache, Sides sides)
+    : scene_(view, cache), sides_(sides), groups_(kGroupPlaces), leaves_(kLeafPlaces) {}
+
+bool DecodedTree::begin(const glm::dvec3& origin, const glm::vec3& axis) {
+  const Frame& frame = view().frame();
+  const glm::dvec3 low(frame.origin[0], frame.origin[1], frame.origin[2]);
+  // Keep far origins within what floats can square.
+  glm::dvec3 place;
+  for (int k = 0; k < 3; ++k) {
+    place[k] = std::clamp(view().scale().length(origin[k] - low[k]), -SceneScale::kMaxDistance,
+                          SceneScale::kMaxDistance) /
+               SceneScale::kLatticeUnit;
+  }
+  if (place == origin_ && axis == axis_) return false;
+  origin_ = place;
+  axis_ = axis;
+  groups_.clear();
+  leaves_.clear();
+  return true;
+}
+
+void DecodedTree::decode_group(std::uint64_t reference, TraceGroup& into) {
+  const ChildRef ref = decode_reference(reference, true);
+  const PinnedGroup found = scene_.group(ref.page, ref.slot);
+  decode_boxes(*found, origin_, into);
+}
+
+void DecodedTree::decode_leaf(std::uint64_t first, std::uint32_t count, TraceLeaf& into) {
+  // Append the points of each page that holds some of the run.
+  const DiscOrigin from{origin_, axis_, view().scale().length_factors(), sides_};
+  const std::uint32_t per_page = view().points_per_page();
+  into.size = 0;
+  for (std::uint32_t done = 0; done < count;) {
+    const auto at = static_cast<std::uint32_t>((first + done) % per_page);
+    const std::uint32_t number = std::min(count - done, per_page - at);
+    const PageGuard page = scene_.points(first + done);
+    decode_discs(page.payload(), page.record_count(), at, number, done, from, into);
+    done += number;
+  }
+}
+
+glm::vec3 DecodedTree::outgoing(std::uint64_t point) {
+  const PageGuard page = scene_.points(point);
+  const PointPage points(page.payload(), page.record_count(), view().point_bytes());
+  const auto at = static_cast<std::uint32_t>(point % view().points_per_page());
+  const Half3 reflected = points.radiance(at), emitted = points.emission(at);
+  glm::vec3 sum;
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    sum[k] = decode_half(reflected[i]) + decode_half(emitted[i]);
+  }
+  return sum;
+}
+
+}  // namespace ptc

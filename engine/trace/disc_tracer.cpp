@@ -1,0 +1,89 @@
+#include "engine/trace/disc_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace ptc {
+
+DiscTracer::DiscTracer(const SceneView& view, PageCache& cache, Sides sides)
+    : tree_(view, cache, sides) {}
+
+/// Says whether no ray can meet a disc of a leaf.
+bool DiscTracer::is_empty(const ChildRef& leaf) {
+  for (std::uint32_t done = 0; done < leaf.point_count; done += kTraceDiscs) {
+    const auto count = std::min<std::uint32_t>(leaf.point_count - done, kTraceDiscs);
+    if (tree_.leaf(leaf.first_point + done, count).size > 0) return false;
+  }
+  return true;
+}
+
+void DiscTracer::begin(const glm::dvec3& origin, const glm::vec3& axis) {
+  if (!tree_.begin(origin, axis) && listed_) return;
+  listed_ = false;
+  items_.clear();
+  opened_.clear();
+  const ChildRef& root = tree_.view().root();
+  if (root.interior) opened_.push_back(root.page | std::uint64_t{root.slot} << 32);
+  WalkLimit limit(tree_.view());
+  // Open what is larger than its distance, breadth first, while the list has room
+  for (std::size_t next = 0; next < opened_.size(); ++next) {
+    limit.take_group();
+    // Copy the group, because to look at a leaf may take its place
+    const TraceGroup group = tree_.group(opened_[next]);
+    for (std::size_t i = 0; i < kTraceLanes; ++i) {
+      if ((group.children >> i & 1) == 0) continue;
+      Item item;
+      for (std::size_t k = 0; k < kBoxColumns; ++k) item.columns[k] = group.columns[k][i];
+      item.reference = group.child[i];
+      item.interior = (group.interior >> i & 1) != 0;
+      // Leave out what lies below the horizon
+      float square = 0, top = 0, extent = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float low = item.columns[kLowX + k], high = item.columns[kHighX + k];
+        const float gap = std::max({low, -high, 0.0F});
+        square += gap * gap;
+        const float along = axis[static_cast<int>(k)];
+        top += std::max(along * low, along * high);
+        extent = std::max(extent, high - low);
+      }
+      if (top <= 0) continue;
+      item.distance = std::sqrt(square);
+      const std::size_t planned = items_.size() + (opened_.size() - next) * kTraceLanes;
+      if (item.interior && extent > item.distance && planned < BoxList::kCapacity - kTraceLanes) {
+        opened_.push_back(item.reference);
+        continue;
+      }
+      if (!item.interior && extent > item.distance &&
+          is_empty(decode_reference(item.reference, false)))
+        continue;
+      items_.push_back(item);
+    }
+  }
+  // Make the list
+  std::ranges::sort(items_, [](const Item& a, const Item& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.reference < b.reference;
+  });
+  words_.resize(items_.size());
+  list_.size = items_.size();
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    for (std::size_t k = 0; k < kBoxColumns; ++k) list_.columns[k][i] = items_[i].columns[k];
+    list_.distance[i] = items_[i].distance;
+    list_.number[i] = static_cast<std::uint32_t>(i << 1 | (items_[i].interior ? 1 : 0));
+    words_[i] = items_[i].reference;
+  }
+  listed_ = true;
+}
+
+void DiscTracer::meet(std::span<const glm::vec3> directions, RaysFor wanted,
+                      std::span<RayHit> hits) {
+  for (std::size_t at = 0; at < directions.size(); at += kTile) {
+    const std::size_t count = std::min(kTile, directions.size() - at);
+    narrow_boxes(list_, directions.subspan(at, count), tile_);
+    trace_rays(tree_, tile_, words_, directions.subspan(at, count), wanted,
+               hits.subspan(at, count));
+  }
+}
+
+}  // namespace ptc

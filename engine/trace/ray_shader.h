@@ -1,0 +1,64 @@
+// Shades receivers by exact rays at the discs of a container of any size, under a memory cap.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/progress.h"
+#include "engine/cache/page_cache.h"
+#include "engine/shade/gather/scene_view.h"
+#include "engine/shade/shader.h"
+#include "engine/trace/disc_tracer.h"
+
+namespace ptc {
+
+/// What rays are to find, and what they may use.
+struct RayOptions {
+  Sides sides = Sides::both;  ///< sides of surfels that stop rays
+  /// Radiance that arrives from a direction (unit) where nothing covers it, W / (m^2 sr); empty:
+  /// none.
+  std::function<glm::vec3(const glm::vec3&)> sky;
+  bool bleeding = true;  ///< false leaves out the light from surfaces, which takes less time
+  /// Cap of the page cache and of what threads decode. Where it is below what these need, they
+  /// take that: PageCache::min_bytes() and DiscTracer::kBytes for each thread.
+  std::uint64_t memory_bytes = std::uint64_t{512} << 20;
+  BackEnd back_end = BackEnd::pread;
+};
+
+/// Returns the options of rays that find what a shader approximates, under the same cap.
+[[nodiscard]] RayOptions ray_options(const ShadeOptions& options);
+
+/// The reference for a gather's own error, and another way to shade.
+///
+/// Results depend on the receivers, the number of rays and the seed alone.
+class RayShader {
+ public:
+  /// @param scene, executor  must outlive this
+  RayShader(const ContainerReader& scene, const RayOptions& options, const Executor& executor);
+  ~RayShader();
+
+  /// Traces stratified, cosine-distributed rays from receivers. Receiver i takes `seed` + i.
+  /// @param rays      number of rays for each receiver, rounded down to a square number
+  /// @param results   as many as receivers, in their order
+  /// @param progress  advances by one for each receiver
+  /// @throws FormatError when a page is damaged; std::system_error
+  void trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
+             std::span<Shading> results, Progress& progress);
+
+ private:
+  struct Worker;
+
+  [[nodiscard]] Worker& worker(unsigned thread);
+
+  const Executor& executor_;
+  SceneView view_;
+  RayOptions options_;
+  std::unique_ptr<PageCache> cache_;
+  std::vector<std::unique_ptr<Worker>> workers_;  ///< by thread, made when first needed
+};
+
+}  // namespace ptc

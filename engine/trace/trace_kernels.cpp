@@ -1,0 +1,406 @@
+// A ray goes down the tree by a stack. Where that is empty it takes the next boxes of the list that
+// it shares with other rays; these are sorted by their distance from the origin, so a ray ends when
+// that passes what it has met.
+//
+//     list     [ box box box box box box box box | box box ...      8 at once
+//                     |           |
+//                     v           v
+//     stack    group or leaf, the nearest on top --> 8 children, or up to 16 discs, at once
+//
+// Where discs overlap, the one of least bumped depth is seen (spec/shading.md#surfels). A bump is
+// behind its disc, so the depth of a box bounds the bumped depth of what is in it.
+#include "engine/trace/trace_kernels.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+// This file is compiled once per instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/trace/trace_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "engine/shade/kernels/gather-inl.h"
+#include "format/node_layout.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ptc::HWY_NAMESPACE {
+namespace {
+
+constexpr float kFarAway = 0x1p100F;       ///< beyond every length
+constexpr float kLeastSlope = 1e-20F;      ///< least |d_k| that a ray is divided by
+constexpr float kLeastSlabSlope = 1e-12F;  ///< least |d . n| that a ray is divided by
+constexpr float kSlack = 1 + 2e-6F;        ///< what rounding may take from a quotient
+
+/// A ray that begins at the origin.
+struct Ray {
+  glm::vec3 along;
+  float inverse[3];  ///< 1 over each component
+  bool negative[3];
+
+  explicit Ray(const glm::vec3& d) : along(d) {
+    for (int k = 0; k < 3; ++k) {
+      negative[k] = std::signbit(d[k]);
+      inverse[k] = 1 / std::copysign(std::max(std::abs(d[k]), kLeastSlope), d[k]);
+    }
+  }
+};
+
+/// Tests up to kTraceLanes boxes.
+/// @param columns  of the boxes, `stride` floats from one column to the next
+/// @param far      the depth that the ray has met something at
+/// @param near     receives the depth at which the ray enters each box
+/// @return         bit i: the ray may meet something in box i
+HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const Ray& ray, float far,
+                               float* near) {
+  const F f;
+  const auto lanes = static_cast<unsigned>(hn::Lanes(f));
+  unsigned met = 0;
+  for (unsigned from = 0; from < kTraceLanes; from += lanes) {
+    const auto load = [&](std::size_t column) {
+      return hn::LoadU(f, columns + column * stride + from);
+    };
+    auto enter = hn::Zero(f), leave = hn::Set(f, far);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto by = hn::Set(f, ray.inverse[k]);
+      const std::size_t first = ray.negative[k] ? kHighX : kLowX,
+                        last = ray.negative[k] ? kLowX : kHighX;
+      enter = hn::Max(enter, hn::Mul(load(first + k), by));
+      leave = hn::Min(leave, hn::Mul(load(last + k), by));
+    }
+    const auto slope = dot({load(kSlabX), load(kSlabY), load(kSlabZ)}, spread(ray.along));
+    const auto by =
+        hn::Div(hn::Set(f, 1.0F),
+                hn::CopySign(hn::Max(hn::Abs(slope), hn::Set(f, kLeastSlabSlope)), slope));
+    const auto a = hn::Mul(load(kSlabLow), by), b = hn::Mul(load(kSlabHigh), by);
+    enter = hn::Max(enter, hn::Min(a, b));
+    leave = hn::Min(leave, hn::Max(a, b));
+    hn::StoreU(enter, f, near + from);
+    met |= bits_of(f, hn::Le(enter, hn::Mul(leave, hn::Set(f, kSlack)))) << from;
+  }
+  return met;
+}
+
+/// Tests the discs of a leaf.
+/// @param first  number of its first point
+/// @return       whether the ray met one that is nearer than `hit`, which it replaces
+HWY_INLINE bool meet_discs(const TraceLeaf& leaf, std::uint64_t first, const Ray& ray,
+                           RaysFor wanted, RayHit& hit) {
+  const F f;
+  const auto lanes = static_cast<unsigned>(hn::Lanes(f));
+  const Vec along = spread(ray.along);
+  bool met = false;
+  for (unsigned from = 0; from < leaf.size; from += lanes) {
+    const auto load = [&](const float* column) { return hn::Load(f, column + from); };
+    const auto height = load(leaf.height);
+    const auto t = hn::Div(height, dot({load(leaf.nx), load(leaf.ny), load(leaf.nz)}, along));
+    const Vec off{hn::MulSub(along.x, t, load(leaf.x)), hn::MulSub(along.y, t, load(leaf.y)),
+                  hn::MulSub(along.z, t, load(leaf.z))};
+    const auto off2 = dot(off, off);
+    const auto depth = hn::MulAdd(load(leaf.bump), off2, t);
+    auto inside = hn::And(hn::Le(off2, load(leaf.radius2)), hn::Gt(t, hn::Zero(f)));
+    inside = hn::And(inside, hn::Le(depth, hn::Set(f, hit.depth)));
+    unsigned bits = bits_of(f, hn::And(inside, hn::FirstN(f, leaf.size - from)));
+    if (bits == 0) continue;
+    alignas(64) float depths[kTraceLanes];
+    hn::Store(depth, f, depths);
+    for (; bits != 0; bits &= bits - 1) {
+      const auto i = static_cast<unsigned>(std::countr_zero(bits));
+      // Of discs at one depth take that of the first point, in whichever order they are met
+      const std::uint64_t point = first + leaf.number[from + i];
+      if (depths[i] > hit.depth || (depths[i] == hit.depth && point > hit.point)) continue;
+      hit = {depths[i], leaf.height[from + i] >= 0, point};
+      met = true;
+      if (wanted == RaysFor::any) return true;
+    }
+  }
+  return met;
+}
+
+/// A node that a ray has yet to look into.
+struct Waiting {
+  std::uint64_t reference;
+  float near;  ///< depth at which the ray enters its box
+  bool interior;
+};
+
+/// The nodes that a ray has yet to look into, the nearest on top.
+class Stack {
+ public:
+  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+  [[nodiscard]] bool has_room() const noexcept { return size_ + kTraceLanes <= kRoom; }
+  Waiting pop() noexcept { return items_[--size_]; }
+  /// Begins to push siblings.
+  void begin() noexcept { floor_ = size_; }
+  /// Pushes a sibling below those that are nearer.
+  void push(const Waiting& item) noexcept {
+    std::size_t at = size_++;
+    for (; at > floor_ && items_[at - 1].near < item.near; --at) items_[at] = items_[at - 1];
+    items_[at] = item;
+  }
+
+ private:
+  /// A path has a group for each level at most, each of which leaves 7 siblings behind.
+  static constexpr std::size_t kRoom = std::size_t{kMaxLevel + 2} * kTraceLanes;
+
+  std::size_t size_ = 0, floor_ = 0;
+  Waiting items_[kRoom];
+};
+
+/// Follows one ray.
+void trace_ray(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+               const Ray& ray, RaysFor wanted, RayHit& hit) {
+  Stack stack;
+  WalkLimit limit(tree.view());
+  alignas(64) float near[kTraceLanes];
+  for (std::size_t at = 0;;) {
+    // Take the next boxes of the list
+    if (stack.empty()) {
+      if (at >= list.size || list.distance[at] > hit.depth) return;
+      unsigned bits =
+          meet_boxes(list.columns[0] + at, BoxList::kCapacity + kTraceLanes, ray, hit.depth, near);
+      bits &= (1U << std::min(list.size - at, kTraceLanes)) - 1;
+      stack.begin();
+      for (; bits != 0; bits &= bits - 1) {
+        const auto i = static_cast<unsigned>(std::countr_zero(bits));
+        const std::uint32_t number = list.number[at + i];
+        stack.push({words[number >> 1], near[i], (number & 1) != 0});
+      }
+      at += kTraceLanes;
+      continue;
+    }
+    const Waiting next = stack.pop();
+    if (next.near > hit.depth) continue;
+    // Look at the children of a group
+    if (next.interior) {
+      limit.take_group();
+      if (!stack.has_room())
+        tree.view().fail("spec/nodes.md#node-level",
+                         "a path has more groups than there are levels");
+      const TraceGroup& group = tree.group(next.reference);
+      unsigned bits =
+          meet_boxes(group.columns[0], kTraceLanes, ray, hit.depth, near) & group.children;
+      stack.begin();
+      for (; bits != 0; bits &= bits - 1) {
+        const auto i = static_cast<unsigned>(std::countr_zero(bits));
+        stack.push({group.child[i], near[i], (group.interior >> i & 1) != 0});
+      }
+      continue;
+    }
+    // Look at the points of a leaf
+    const ChildRef leaf = decode_reference(next.reference, false);
+    limit.take_points(leaf.point_count);
+    for (std::uint32_t done = 0; done < leaf.point_count; done += kTraceDiscs) {
+      const std::uint64_t first = leaf.first_point + done;
+      const auto count = std::min<std::uint32_t>(leaf.point_count - done, kTraceDiscs);
+      if (meet_discs(tree.leaf(first, count), first, ray, wanted, hit) && wanted == RaysFor::any)
+        return;
+    }
+  }
+}
+
+}  // namespace
+
+void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& into) {
+  // Find the cell of the group, relative to the origin
+  const F f;
+  const auto children = static_cast<unsigned>(group.size());
+  into.children = (1U << children) - 1;
+  into.interior = group.interior_mask();
+  for (unsigned i = 0; i < children; ++i) into.child[i] = group.reference(static_cast<int>(i));
+  const LatticePoint lattice = decode_morton(group.cell());
+  const auto edge = static_cast<float>(cell_edge(group.level()) * SceneScale::kLatticeUnit);
+  float corner[3];
+  float size = 3 * edge;
+  for (int k = 0; k < 3; ++k) {
+    corner[k] =
+        static_cast<float>((static_cast<double>(lattice[static_cast<std::size_t>(k)]) - origin[k]) *
+                           SceneScale::kLatticeUnit);
+    size += std::abs(corner[k]);
+  }
+  // Bound each child by its octant, its sphere and its slab
+  const auto unit = hn::Set(f, static_cast<float>(SceneScale::kLatticeUnit)),
+             most = hn::Set(f, 2 * SceneScale::kMaxRadius),
+             middle = hn::Set(f, static_cast<float>(kMeanSteps / 2));
+  for (int from = 0; from < static_cast<int>(kTraceLanes); from += static_cast<int>(hn::Lanes(f))) {
+    const int at = 2 * from;
+    const auto length = [&](const std::byte* column) {
+      return hn::Min(hn::Mul(unit, load_ufloat16(column + at)), most);
+    };
+    const auto share = [&](int k) { return to_float(load_u16(group.facing(k) + at)); };
+    const auto radius = length(group.radius()), thickness = length(group.thickness()),
+               greatest = length(group.greatest());
+    Vec normal{hn::Sub(share(0), share(1)), hn::Sub(share(2), share(3)),
+               hn::Sub(share(4), share(5))};
+    const auto length2 = dot(normal, normal);
+    const auto directed =
+        hn::Gt(length2, hn::Set(f, static_cast<float>(kFacingSteps * kFacingSteps * 1e-6)));
+    normal = scaled(normal, hn::Div(hn::Set(f, 1.0F), hn::Sqrt(length2)));
+    normal = {hn::IfThenElse(directed, normal.x, hn::Set(f, 1.0F)),
+              hn::IfThenElseZero(directed, normal.y), hn::IfThenElseZero(directed, normal.z)};
+    const auto half = hn::IfThenElse(directed, thickness, radius);
+    // Widen every bound by what rounding may take from it
+    const auto rounding =
+        hn::Mul(hn::Set(f, kRounding), hn::Add(radius, hn::Add(greatest, hn::Set(f, size))));
+    const VF normals[3] = {normal.x, normal.y, normal.z};
+    const std::byte* const means[3] = {group.mean_x(), group.mean_y(), group.mean_z()};
+    VF to[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto steps = to_float(load_u16(means[k] + at));
+      const auto base = hn::Set(f, corner[k]), whole = hn::Set(f, edge),
+                 part = hn::Set(f, edge / 2);
+      to[k] = hn::MulAdd(steps, hn::Set(f, edge / static_cast<float>(kMeanSteps)), base);
+      // Where the mean was rounded to the middle of the cell, the octant may be either
+      const auto octant_low = hn::Add(base, hn::IfThenElseZero(hn::Gt(steps, middle), part)),
+                 octant_high = hn::Add(base, hn::IfThenElse(hn::Lt(steps, middle), part, whole));
+      const auto aside =
+          hn::Sqrt(hn::Max(hn::NegMulAdd(normals[k], normals[k], hn::Set(f, 1.0F)), hn::Zero(f)));
+      const auto reach =
+          hn::Min(radius, hn::MulAdd(half, hn::Abs(normals[k]), hn::Mul(radius, aside)));
+      const auto low = hn::Max(hn::Sub(to[k], reach), hn::Sub(octant_low, greatest)),
+                 high = hn::Min(hn::Add(to[k], reach), hn::Add(octant_high, greatest));
+      hn::StoreU(hn::Sub(low, rounding), f, into.columns[kLowX + k] + from);
+      hn::StoreU(hn::Add(high, rounding), f, into.columns[kHighX + k] + from);
+      hn::StoreU(normals[k], f, into.columns[kSlabX + k] + from);
+    }
+    const auto along = dot({to[0], to[1], to[2]}, normal), reach = hn::Add(half, rounding);
+    hn::StoreU(hn::Sub(along, reach), f, into.columns[kSlabLow] + from);
+    hn::StoreU(hn::Add(along, reach), f, into.columns[kSlabHigh] + from);
+  }
+}
+
+void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
+                  unsigned number, unsigned from, const DiscOrigin& origin, TraceLeaf& into) {
+  const F f;
+  const auto lanes = static_cast<unsigned>(hn::Lanes(f));
+  for (unsigned done = 0; done < number; done += lanes) {
+    const PageSurfels s =
+        load_surfels(payload, count, first + done, origin.position, origin.lengths);
+    // Leave out what is below the horizon, and backs that are clear
+    const auto height = dot(s.to, s.normal);
+    const auto back = hn::Ge(height, hn::Zero(f));
+    auto clear = back;
+    if (origin.sides == Sides::both) {
+      const auto reach2 = hn::Mul(hn::Set(f, 4.0F), hn::Mul(s.radius, s.radius));
+      clear = hn::And(back, hn::Lt(dot(s.to, s.to), reach2));
+    }
+    const auto axis = spread(origin.axis);
+    const auto cosine = dot(s.normal, axis);
+    const auto rise = hn::Mul(
+        s.radius, hn::Sqrt(hn::Max(hn::NegMulAdd(cosine, cosine, hn::Set(f, 1.0F)), hn::Zero(f))));
+    const auto size = hn::Add(hn::Abs(s.to.x), hn::Add(hn::Abs(s.to.y), hn::Abs(s.to.z)));
+    const auto top =
+        hn::MulAdd(hn::Set(f, kRounding), hn::Add(size, s.radius), hn::Add(dot(s.to, axis), rise));
+    auto kept = hn::And(hn::Gt(s.radius, hn::Zero(f)), hn::Gt(top, hn::Zero(f)));
+    kept = hn::And(hn::AndNot(clear, kept), hn::FirstN(f, number - done));
+    // Append the rest
+    alignas(64) float columns[9][kTraceLanes];
+    const VF values[9] = {s.to.x,
+                          s.to.y,
+                          s.to.z,
+                          s.normal.x,
+                          s.normal.y,
+                          s.normal.z,
+                          height,
+                          hn::Mul(s.radius, s.radius),
+                          hn::Div(hn::Set(f, kBump), s.radius)};
+    for (int k = 0; k < 9; ++k) hn::Store(values[k], f, columns[k]);
+    float* const to[9] = {into.x,  into.y,      into.z,       into.nx,  into.ny,
+                          into.nz, into.height, into.radius2, into.bump};
+    for (unsigned bits = bits_of(f, kept); bits != 0; bits &= bits - 1) {
+      const auto i = static_cast<unsigned>(std::countr_zero(bits));
+      for (int k = 0; k < 9; ++k) to[k][into.size] = columns[k][i];
+      into.number[into.size++] = static_cast<std::uint8_t>(from + done + i);
+    }
+  }
+}
+
+void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, BoxList& into) {
+  // Bound the directions on each axis, turned so that they do not descend
+  const F f;
+  const U u;
+  struct Axis {
+    bool used;
+    bool turned;
+    float slow, fast;  ///< 1 over the least and the greatest component
+  };
+  std::array<Axis, 3> axes;
+  for (int k = 0; k < 3; ++k) {
+    float low = 1, high = -1;
+    for (const glm::vec3& d : directions) {
+      low = std::min(low, d[k]);
+      high = std::max(high, d[k]);
+    }
+    const bool turned = high <= 0;
+    if (turned) std::swap(low = -low, high = -high);
+    axes[static_cast<std::size_t>(k)] = {low > kLeastSlabSlope, turned, kSlack / low,
+                                         1 / (kSlack * high)};
+  }
+  // Keep the boxes that such directions may meet
+  into.size = 0;
+  for (std::size_t at = 0; at < from.size; at += hn::Lanes(f)) {
+    auto enter = hn::Zero(f), leave = hn::Set(f, kFarAway);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Axis& axis = axes[k];
+      if (!axis.used) continue;
+      auto low = hn::LoadU(f, from.columns[kLowX + k] + at),
+           high = hn::LoadU(f, from.columns[kHighX + k] + at);
+      if (axis.turned) {
+        const auto turned = hn::Neg(low);
+        low = hn::Neg(high);
+        high = turned;
+      }
+      const auto slow = hn::Set(f, axis.slow), fast = hn::Set(f, axis.fast);
+      const auto positive = [&](VF v) { return hn::Gt(v, hn::Zero(f)); };
+      enter = hn::Max(enter, hn::Mul(low, hn::IfThenElse(positive(low), fast, slow)));
+      leave = hn::Min(leave, hn::Mul(high, hn::IfThenElse(positive(high), slow, fast)));
+    }
+    const auto kept = hn::And(hn::Le(enter, leave), hn::FirstN(f, from.size - at));
+    if (hn::AllFalse(f, kept)) continue;
+    for (std::size_t k = 0; k < kBoxColumns; ++k)
+      append(hn::LoadU(f, from.columns[k] + at), kept, f, into.columns[k] + into.size);
+    append(hn::LoadU(f, from.distance + at), kept, f, into.distance + into.size);
+    into.size +=
+        append(hn::LoadU(u, from.number + at), hn::RebindMask(u, kept), u, into.number + into.size);
+  }
+}
+
+void trace_rays(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+                std::span<const glm::vec3> directions, RaysFor wanted, std::span<RayHit> hits) {
+  for (std::size_t i = 0; i < directions.size(); ++i)
+    trace_ray(tree, list, words, Ray(directions[i]), wanted, hits[i]);
+}
+
+}  // namespace ptc::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ptc {
+
+HWY_EXPORT(decode_boxes);
+HWY_EXPORT(decode_discs);
+HWY_EXPORT(narrow_boxes);
+HWY_EXPORT(trace_rays);
+
+void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& into) {
+  HWY_DYNAMIC_DISPATCH(decode_boxes)(group, origin, into);
+}
+
+void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
+                  unsigned number, unsigned from, const DiscOrigin& origin, TraceLeaf& into) {
+  HWY_DYNAMIC_DISPATCH(decode_discs)(payload, count, first, number, from, origin, into);
+}
+
+void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, BoxList& into) {
+  HWY_DYNAMIC_DISPATCH(narrow_boxes)(from, directions, into);
+}
+
+void trace_rays(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+                std::span<const glm::vec3> directions, RaysFor wanted, std::span<RayHit> hits) {
+  HWY_DYNAMIC_DISPATCH(trace_rays)(tree, list, words, directions, wanted, hits);
+}
+
+}  // namespace ptc
+#endif
