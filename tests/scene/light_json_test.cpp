@@ -24,6 +24,9 @@ LightRig random_rig(Random& random) {
     rig.suns.push_back(
         {random.direction(), random_light(random), static_cast<float>(random.between(0, 1.5))});
     rig.points.push_back({random.in_box(-1e9, 1e9), random_light(random)});
+    const auto outer = static_cast<float>(random.between(0.1, 1.5));
+    rig.spots.push_back({random.in_box(-1e9, 1e9), random.direction(), random_light(random),
+                         outer * static_cast<float>(random.between(0, 1)), outer});
   }
   rig.sky.radiance = random_light(random);
   rig.sky.up = random.direction();
@@ -42,12 +45,18 @@ TEST_CASE("light rig: a rig written as JSON is read back exactly", "[scene][ligh
     const LightRig back = light_rig_from_json(to_json(rig));
     REQUIRE(back.suns.size() == rig.suns.size());
     REQUIRE(back.points.size() == rig.points.size());
+    REQUIRE(back.spots.size() == rig.spots.size());
     for (std::size_t k = 0; k < rig.suns.size(); ++k) {
       CHECK(back.suns[k].to_sun == rig.suns[k].to_sun);
       CHECK(back.suns[k].irradiance == rig.suns[k].irradiance);
       CHECK(back.suns[k].angular_radius == rig.suns[k].angular_radius);
       CHECK(back.points[k].position == rig.points[k].position);
       CHECK(back.points[k].intensity == rig.points[k].intensity);
+      CHECK(back.spots[k].position == rig.spots[k].position);
+      CHECK(back.spots[k].direction == rig.spots[k].direction);
+      CHECK(back.spots[k].intensity == rig.spots[k].intensity);
+      CHECK(back.spots[k].inner_angle == rig.spots[k].inner_angle);
+      CHECK(back.spots[k].outer_angle == rig.spots[k].outer_angle);
     }
     CHECK(back.sky.radiance == rig.sky.radiance);
     CHECK(back.sky.up == rig.sky.up);
@@ -61,12 +70,21 @@ TEST_CASE("light rig: an empty object is a rig without lights", "[scene][lights]
   const LightRig rig = light_rig_from_json("{}");
   CHECK(rig.suns.empty());
   CHECK(rig.points.empty());
+  CHECK(rig.spots.empty());
   CHECK(rig.sky.radiance == glm::vec3(0));
+}
+
+TEST_CASE("light rig: without spot lights it has the text that versions before them read",
+          "[scene][lights]") {
+  CHECK(to_json({}) ==
+        R"({"points":[],"sky":{"radiance":[0.0,0.0,0.0],"up":[0.0,1.0,0.0]},"suns":[]})");
 }
 
 TEST_CASE("light rig: directions are normalized", "[scene][lights]") {
   const LightRig rig = light_rig_from_json(
-      "{\"suns\": [{\"to_sun\": [0, 3, 4]}], \"sky\": {\"up\": [0, 0, 1e-30]}}");
+      "{\"suns\": [{\"to_sun\": [0, 3, 4]}], \"spots\": [{\"direction\": [0, -9, 0]}], "
+      "\"sky\": {\"up\": [0, 0, 1e-30]}}");
+  CHECK(rig.spots[0].direction == glm::vec3(0, -1, 0));
   CHECK(rig.suns[0].to_sun == glm::vec3(0, 0.6f, 0.8f));
   CHECK(rig.sky.up == glm::vec3(0, 0, 1));
 }
@@ -113,6 +131,11 @@ TEST_CASE("light rig: JSON that makes no lights is refused with the place", "[sc
   refuses("{\"suns\": [{\"angle\": 1}]}", "angle");
   refuses("{\"points\": [{\"intensity\": [1, 1]}]}", "intensity");
   refuses("{\"points\": [{\"position\": \"here\"}]}", "position");
+  refuses("{\"spots\": [{\"direction\": [0, 0, 0]}]}", "direction");
+  refuses("{\"spots\": [{\"outer_angle\": 0}]}", "outer_angle");
+  refuses("{\"spots\": [{\"outer_angle\": 1.6}]}", "outer_angle");
+  refuses("{\"spots\": [{\"inner_angle\": 0.5, \"outer_angle\": 0.4}]}", "inner_angle");
+  refuses("{\"spots\": [{\"blend\": 1}]}", "blend");
   refuses("{\"sky\": []}", "sky");
   refuses("{\"sky\": {\"radiance\": [1e39, 0, 0]}}", "radiance");
   refuses("{\"sky\": {\"map\": 1}}", "map");

@@ -1,4 +1,4 @@
-// Suns, point lights and the constant sky, compared with formulas.
+// Suns, point lights, spot lights and the constant sky, compared with formulas.
 #include "engine/scene/light/lights.h"
 
 #include <cmath>
@@ -114,6 +114,82 @@ TEST_CASE("point light: an object in between hides the light, one behind it does
   CHECK(light.irradiance({0, 0, 0}, kUp, {}, 1).local.x == Approx(4).epsilon(1e-4));
 }
 
+TEST_CASE("spot light: a plane across the axis gets the intensity over the squared distance",
+          "[scene][lights]") {
+  const Mesh mesh = ground(100);
+  const RayScene scene(mesh);
+  for (const double height : {0.1, 1.0, 10.0, 1000.0}) {
+    for (const float inner : {0.0f, 0.2f, 0.5f}) {
+      LightRig rig;
+      rig.spots.push_back({.position = {0, height, 0},
+                           .intensity = {2, 4, 8},
+                           .inner_angle = inner,
+                           .outer_angle = 0.5f});
+      const auto result = DirectLight(scene, rig).irradiance({0, 0, 0}, kUp, {}, 1);
+      CHECK(static_cast<double>(result.local.x) == Approx(2 / (height * height)).epsilon(1e-6));
+      CHECK(static_cast<double>(result.local.z) == Approx(8 / (height * height)).epsilon(1e-6));
+    }
+  }
+}
+
+TEST_CASE("spot light: between the cones the intensity falls as the squared share of the cosine",
+          "[scene][lights]") {
+  const Mesh mesh = ground(100);
+  const RayScene scene(mesh);
+  const double inner = 0.3;
+  const double outer = 0.8;
+  LightRig rig;
+  rig.spots.push_back({.position = {0, 2, 0},
+                       .direction = {0, -3, 0},  // of any length
+                       .intensity = glm::vec3(5),
+                       .inner_angle = static_cast<float>(inner),
+                       .outer_angle = static_cast<float>(outer)});
+  const DirectLight light(scene, rig);
+  // At a share of the way from the outer to the inner cosine the irradiance is that of a point
+  // light, I cos^3 / h^2, times the square of the share.
+  for (const double share : {0.01, 0.25, 0.5, 0.75, 0.99}) {
+    const double cosine = std::cos(outer) + share * (std::cos(inner) - std::cos(outer));
+    const double aside = 2 * std::tan(std::acos(cosine));
+    const double expected = 5 * cosine * cosine * cosine / 4 * share * share;
+    CHECK(static_cast<double>(light.irradiance({aside, 0, 0}, kUp, {}, 1).local.x) ==
+          Approx(expected).epsilon(1e-4));
+  }
+  // Just within the inner cone it is all, just outside the outer cone and behind it is nothing.
+  const auto at = [&](double angle) {
+    return light.irradiance({2 * std::tan(angle), 0, 0}, kUp, {}, 1).local.x;
+  };
+  CHECK(static_cast<double>(at(0.299)) == Approx(5 * std::pow(std::cos(0.299), 3) / 4));
+  CHECK(at(0.801) == 0);
+  CHECK(at(1.5) == 0);
+  CHECK(light.irradiance({0, 3, 0}, -kUp, {}, 1).local == glm::vec3(0));
+}
+
+TEST_CASE("spot light: a cone without a blend has a hard edge, and none is too narrow",
+          "[scene][lights]") {
+  for (const float angle : {1e-4f, 0.01f, 0.5f, 1.5707963f}) {
+    const SpotLight spot{.direction = {0, 0, 1}, .inner_angle = angle, .outer_angle = angle};
+    const auto share = [&](double of_angle) {
+      const double turned = of_angle * static_cast<double>(angle);
+      return spot_share(spot, {std::sin(turned), 0, std::cos(turned)});
+    };
+    CHECK(share(0) == 1);
+    CHECK(share(0.999) == 1);
+    CHECK(share(1.001) == 0);
+  }
+  CHECK(spot_share({}, {0, 0, 0}) == 0);
+}
+
+TEST_CASE("spot light: an object in between hides the light", "[scene][lights]") {
+  Mesh mesh = ground(10);
+  add_quad(mesh, {-1, 1, 1}, {1, 0, 0}, {0, 0, -2});  // over x from -1 to 0
+  const RayScene scene(mesh);
+  LightRig rig;
+  rig.spots.push_back({.position = {0, 2, 0}});
+  const DirectLight light(scene, rig);
+  CHECK(light.irradiance({-0.1, 0, 0}, kUp, {}, 1).local == glm::vec3(0));
+  CHECK(light.irradiance({0.1, 0, 0}, kUp, {}, 1).local.x > 0.1f);
+}
+
 TEST_CASE("sky: a constant sky gives an open plane pi times its radiance", "[scene][lights]") {
   Random random(2);
   for (int i = 0; i < 20; ++i) {
@@ -181,6 +257,7 @@ TEST_CASE("direct light: the result is finite whatever the arguments", "[scene][
   LightRig rig = one_sun({0, 1, 0}, 0.3f);
   rig.sky.radiance = glm::vec3(1);
   rig.points.push_back({{0, 1, 0}, glm::vec3(1e30f)});
+  rig.spots.push_back({.position = {0, 1, 0}, .intensity = glm::vec3(1e30f)});
   const DirectLight light(scene, rig);
   const float odd[] = {0,
                        1,
@@ -210,6 +287,7 @@ TEST_CASE("direct light: a rig that makes no sense is refused", "[scene][lights]
   const auto refuses = [&](auto&& spoil) {
     LightRig rig = one_sun(kUp, 0);
     rig.points.emplace_back();
+    rig.spots.emplace_back();
     spoil(rig);
     CHECK_THROWS_AS(DirectLight(scene, rig), RequestError);
   };
@@ -219,6 +297,13 @@ TEST_CASE("direct light: a rig that makes no sense is refused", "[scene][lights]
   refuses([](LightRig& r) { r.suns[0].angular_radius = 2; });
   refuses([](LightRig& r) { r.points[0].intensity.x = -1; });
   refuses([&](LightRig& r) { r.points[0].position.x = static_cast<double>(nan); });
+  refuses([](LightRig& r) { r.spots[0].intensity.z = -1; });
+  refuses([](LightRig& r) { r.spots[0].position.y = 1e151; });
+  refuses([](LightRig& r) { r.spots[0].direction = glm::vec3(0); });
+  refuses([](LightRig& r) { r.spots[0].outer_angle = 0; });
+  refuses([](LightRig& r) { r.spots[0].outer_angle = 1.6f; });
+  refuses([](LightRig& r) { r.spots[0].inner_angle = 0.9f; });
+  refuses([&](LightRig& r) { r.spots[0].inner_angle = nan; });
   refuses([](LightRig& r) { r.sky.up = glm::vec3(0); });
   refuses([&](LightRig& r) { r.sky.radiance.x = nan; });
   refuses([](LightRig& r) { r.sky.map = std::make_shared<Image>(Image{2, 2, {}}); });

@@ -1,11 +1,12 @@
-// Direct irradiance at a surface point: suns, point lights, emissive triangles and the sky, each by
-// its own shadow rays.
+// Direct irradiance at a surface point: suns, point lights, spot lights, emissive triangles and the
+// sky, each by its own shadow rays.
 //
 // The irradiance is the integral of radiance times cosine over the hemisphere, and each kind of
 // light has the estimator that suits it:
 //
 //     sun        directions uniform over its projected disc; each stands for an equal share
 //     point      one ray; intensity times cosine over distance squared
+//     spot       as a point light, times the share of its intensity in that direction
 //     emitters   places chosen by what each emitter may give (area_lights.h)
 //     sky        cosine rays, and with a map as many rays by its brightness, combined by the
 //                balance heuristic (Veach and Guibas 1995)
@@ -44,6 +45,7 @@ bool is_finite(const glm::vec3& v) {
 LightRig checked(LightRig rig) {
   check_lights(rig);
   for (Sun& sun : rig.suns) sun.to_sun = glm::normalize(sun.to_sun);
+  for (SpotLight& spot : rig.spots) spot.direction = glm::normalize(spot.direction);
   rig.sky.up = glm::normalize(rig.sky.up);
   return rig;
 }
@@ -105,6 +107,12 @@ glm::vec3 DirectLight::from_point(const PointLight& point, const Place& at) cons
   const double cosine = glm::dot(glm::dvec3(at.normal), offset) / distance;
   if (cosine <= 0 || is_hidden(at, point.position)) return glm::vec3(0);
   return point.intensity * static_cast<float>(cosine / (distance * distance));
+}
+
+glm::vec3 DirectLight::from_spot(const SpotLight& spot, const Place& at) const {
+  const auto share = static_cast<float>(spot_share(spot, at.position));
+  if (share == 0) return glm::vec3(0);
+  return from_point({.position = spot.position, .intensity = share * spot.intensity}, at);
 }
 
 glm::vec3 DirectLight::from_emitters(const Place& at, unsigned rays) const {
@@ -179,6 +187,7 @@ DirectLight::Result DirectLight::irradiance(const glm::dvec3& position, const gl
     result.local += from_sun(rig_.suns[i], at, at.points(kFirstSun + i), sampling.sun_rays);
   }
   for (const PointLight& point : rig_.points) result.local += from_point(point, at);
+  for (const SpotLight& spot : rig_.spots) result.local += from_spot(spot, at);
   result.local += from_emitters(at, sampling.area_rays);
   result.sky = from_sky(at, sampling.sky_rays);
   if (!is_finite(result.local)) result.local = glm::vec3(0);

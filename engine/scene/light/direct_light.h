@@ -28,7 +28,7 @@ class DirectLight {
 
   /// Irradiance at a point, split by where it comes from, W/m^2.
   struct Result {
-    glm::vec3 local{0};  ///< from suns, point lights and emissive triangles
+    glm::vec3 local{0};  ///< from suns, point and spot lights and emissive triangles
     glm::vec3 sky{0};    ///< from the sky
   };
   /// Estimates the irradiance at a point. The estimate is unbiased except for the steps off the
@@ -45,6 +45,7 @@ class DirectLight {
   [[nodiscard]] glm::vec3 from_sun(const Sun& sun, const Place& at, const SquarePoints& points,
                                    unsigned rays) const;
   [[nodiscard]] glm::vec3 from_point(const PointLight& point, const Place& at) const;
+  [[nodiscard]] glm::vec3 from_spot(const SpotLight& spot, const Place& at) const;
   [[nodiscard]] glm::vec3 from_emitters(const Place& at, unsigned rays) const;
   [[nodiscard]] glm::vec3 from_sky(const Place& at, unsigned rays) const;
   [[nodiscard]] glm::vec3 along_sky_ray(const Place& at, const glm::vec3& direction,

@@ -74,6 +74,21 @@ PointLight read_point(const Json& json, const std::string& where) {
   return point;
 }
 
+SpotLight read_spot(const Json& json, const std::string& where) {
+  JsonFields fields(json, where);
+  SpotLight spot;
+  fields.read("position", spot.position, kPlace);
+  fields.read("direction", spot.direction, kFinite);
+  fields.read("intensity", spot.intensity, kLight);
+  fields.read("inner_angle", spot.inner_angle, kAngle);
+  fields.read("outer_angle", spot.outer_angle, kAngle);
+  fields.finish();
+  make_unit(spot.direction, "direction", fields);
+  if (spot.outer_angle == 0) fields.fail("outer_angle must be above 0");
+  if (spot.inner_angle > spot.outer_angle) fields.fail("inner_angle must not be above outer_angle");
+  return spot;
+}
+
 std::uint64_t parse_digest(const std::string& text, const JsonFields& fields) {
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
@@ -119,7 +134,7 @@ void read_list(JsonFields& fields, const char* name, std::vector<Light>& lights,
 }  // namespace
 
 std::string to_json(const LightRig& rig) {
-  // Write the suns and the point lights.
+  // Write the suns, the point lights and the spot lights.
   Json suns = Json::array();
   for (const Sun& sun : rig.suns) {
     suns.push_back({{"to_sun", to_json_array(sun.to_sun)},
@@ -130,6 +145,14 @@ std::string to_json(const LightRig& rig) {
   for (const PointLight& point : rig.points) {
     points.push_back({{"position", to_json_array(point.position)},
                       {"intensity", to_json_array(point.intensity)}});
+  }
+  Json spots = Json::array();
+  for (const SpotLight& spot : rig.spots) {
+    spots.push_back({{"position", to_json_array(spot.position)},
+                     {"direction", to_json_array(spot.direction)},
+                     {"intensity", to_json_array(spot.intensity)},
+                     {"inner_angle", spot.inner_angle},
+                     {"outer_angle", spot.outer_angle}});
   }
   // Write the sky, its map by path and digest.
   Json sky{{"radiance", to_json_array(rig.sky.radiance)}, {"up", to_json_array(rig.sky.up)}};
@@ -143,7 +166,8 @@ std::string to_json(const LightRig& rig) {
     const std::uint64_t digest = rig.sky.map ? image_xxh3(*rig.sky.map) : rig.sky.map_xxh3;
     if (digest != 0) sky["map_xxh3"] = digest_text(digest);
   }
-  const Json json{{"suns", suns}, {"points", points}, {"sky", sky}};
+  Json json{{"suns", suns}, {"points", points}, {"sky", sky}};
+  if (!spots.empty()) json["spots"] = spots;
   require_finite(json);
   return dump_json(json, "light rig");
 }
@@ -154,6 +178,7 @@ LightRig light_rig_from_json(const std::string& text) {
   LightRig rig;
   read_list(fields, "suns", rig.suns, read_sun);
   read_list(fields, "points", rig.points, read_point);
+  read_list(fields, "spots", rig.spots, read_spot);
   if (const Json* sky = fields.find("sky")) rig.sky = read_sky(*sky, "light rig: sky");
   fields.finish();
   return rig;

@@ -22,6 +22,19 @@ bool has_direction(const glm::vec3& v) {
   return std::abs(glm::dot(unit, unit) - 1) < 1e-3F;
 }
 
+// Checks what point lights and spot lights have in common.
+void check_lamp(const glm::dvec3& position, const glm::vec3& intensity, const char* field,
+                const std::string& what) {
+  if (!is_light(intensity)) {
+    throw RequestError(field, "the intensity of a " + what + " is negative or not finite");
+  }
+  const glm::dvec3 away = glm::abs(position);
+  if (!(away.x <= kMaxLightDistance && away.y <= kMaxLightDistance &&
+        away.z <= kMaxLightDistance)) {
+    throw RequestError(field, "a coordinate of a " + what + " is not finite, or beyond 1e150");
+  }
+}
+
 }  // namespace
 
 glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees) {
@@ -29,6 +42,19 @@ glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees) {
   const double elevation = glm::radians(elevation_degrees);
   return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
           std::cos(azimuth) * std::cos(elevation)};
+}
+
+double spot_share(const SpotLight& spot, const glm::dvec3& place) noexcept {
+  const glm::dvec3 offset = place - spot.position;
+  const double distance = glm::length(offset);
+  if (!(distance > 0)) return 0;
+  const double cosine = glm::dot(glm::dvec3(spot.direction), offset) / distance;
+  const double inner = std::cos(static_cast<double>(spot.inner_angle));
+  const double outer = std::cos(static_cast<double>(spot.outer_angle));
+  if (cosine >= inner) return 1;
+  if (cosine <= outer) return 0;
+  const double linear = (cosine - outer) / (inner - outer);
+  return linear * linear;
 }
 
 void check_sky(const Sky& sky, const char* field) {
@@ -53,12 +79,16 @@ void check_lights(const LightRig& rig) {
                     "the radius of a sun is not between 0 and a quarter turn");
   }
   for (const PointLight& point : rig.points) {
-    require_request(is_light(point.intensity), kField,
-                    "the intensity of a point light is negative or not finite");
-    const glm::dvec3 away = glm::abs(point.position);
-    require_request(
-        away.x <= kMaxLightDistance && away.y <= kMaxLightDistance && away.z <= kMaxLightDistance,
-        kField, "a coordinate of a point light is not finite, or beyond 1e150");
+    check_lamp(point.position, point.intensity, kField, "point light");
+  }
+  for (const SpotLight& spot : rig.spots) {
+    check_lamp(spot.position, spot.intensity, kField, "spot light");
+    require_request(has_direction(spot.direction), kField,
+                    "the direction of a spot light is zero or not finite");
+    require_request(spot.outer_angle > 0 && spot.outer_angle < 1.58F, kField,
+                    "the outer cone of a spot light is not above 0 and up to a quarter turn");
+    require_request(spot.inner_angle >= 0 && spot.inner_angle <= spot.outer_angle, kField,
+                    "the inner cone of a spot light is not between 0 and its outer cone");
   }
   check_sky(rig.sky, kField);
 }

@@ -33,6 +33,21 @@ struct PointLight {
   glm::vec3 intensity{1};  ///< W/sr
 };
 
+/// A lamp without extent that shines into a cone (spec/shading.md#spots).
+struct SpotLight {
+  glm::dvec3 position{0};          ///< scene units, each coordinate at most kMaxLightDistance
+  glm::vec3 direction{0, -1, 0};   ///< unit, from the lamp along the axis of the cone
+  glm::vec3 intensity{1};          ///< within the inner cone, W/sr
+  float inner_angle = 0;           ///< radians, from the axis; at most `outer_angle`
+  float outer_angle = 0.7853982f;  ///< radians, from the axis; above 0, at most pi / 2
+};
+
+/// Returns the share of a spot light's intensity that goes towards a place: 1 within the inner
+/// cone, 0 outside the outer cone and at the lamp itself.
+/// Source: glTF 2.0, KHR_lights_punctual, "Inner and Outer Cone Angles".
+/// @param place  scene units
+[[nodiscard]] double spot_share(const SpotLight& spot, const glm::dvec3& place) noexcept;
+
 /// Light that arrives from infinitely far away, from all directions: a constant, or a
 /// latitude-longitude map.
 ///
@@ -68,6 +83,7 @@ struct Sky {
 struct LightRig {
   std::vector<Sun> suns;           ///< any number
   std::vector<PointLight> points;  ///< any number
+  std::vector<SpotLight> spots;    ///< any number
   Sky sky;
 };
 
@@ -93,8 +109,11 @@ void check_lights(const LightRig& rig);
 /// path:
 /// {"suns": [{"to_sun": [x, y, z], "irradiance": [r, g, b], "angular_radius": a}, ...],
 ///  "points": [{"position": [x, y, z], "intensity": [r, g, b]}, ...],
+///  "spots": [{"position": [x, y, z], "direction": [x, y, z], "intensity": [r, g, b],
+///             "inner_angle": a, "outer_angle": a}, ...],
 ///  "sky": {"radiance": [r, g, b], "map": "path", "map_xxh3": "16 hex digits", "up": [x, y, z]}}
-/// A sky with a map gets the digest of that map, not Sky::map_xxh3.
+/// A rig without spot lights has no member "spots", so that versions of PTCX that do not know them
+/// read it. A sky with a map gets the digest of that map, not Sky::map_xxh3.
 /// @throws RequestError when a number is not finite or the path is not UTF-8
 [[nodiscard]] std::string to_json(const LightRig& rig);
 /// Parses the JSON text of a rig. It is the exact inverse of to_json(), except that Sky::map stays
