@@ -108,15 +108,22 @@ std::string options_text(const CLI::App& app) {
 std::string suffixes_text(const CLI::App& app) {
   bool counts = false;
   bool sizes = false;
+  bool lights = false;
   for (const OptionGroup& group : groups_of(app)) {
     for (const OptionText& option : group.options) {
       counts = counts || option.value == "COUNT";
       sizes = sizes || option.value == "SIZE";
+      lights = lights || option.value.ends_with("LIGHT");
     }
   }
   std::string text;
   if (counts) text += "COUNT takes the suffixes k, M and G (powers of 1000).\n";
   if (sizes) text += "SIZE takes the suffixes K, M, G and T (powers of 1024).\n";
+  if (lights) {
+    text +=
+        "LIGHT is R,G,B or one number, in W/sr, or with a unit: W as in Blender, cd as in glTF, or "
+        "lm.\n";
+  }
   return text;
 }
 

@@ -1,6 +1,8 @@
 #include "tools/parse.h"
 
+#include <algorithm>
 #include <map>
+#include <utility>
 
 #include <CLI/Error.hpp>
 
@@ -10,7 +12,7 @@ namespace {
 /// The number that a text spells, times the factor of its suffix if it has one; NaN when the text
 /// is no number or the suffix is unknown.
 double parse_scaled(std::string_view text, const std::map<std::string_view, double>& suffixes) {
-  const std::size_t end = text.find_last_of("0123456789.") + 1;
+  const std::size_t end = unit_begin(text);
   const auto number = parse_number<double>(text.substr(0, end));
   const auto factor = suffixes.find(text.substr(end));
   const bool known = end == text.size() || factor != suffixes.end();
@@ -24,23 +26,30 @@ void refuse(const std::string& option, const std::string& text, const std::strin
   throw CLI::ValidationError(option, "expects " + expected + ", not '" + text + "'");
 }
 
+std::optional<std::vector<double>> split_numbers(std::string_view text) {
+  std::vector<double> numbers;
+  while (true) {
+    const std::size_t comma = text.find(',');
+    const auto number = parse_number<double>(text.substr(0, comma));
+    if (!number) return {};
+    numbers.push_back(*number);
+    if (comma == std::string_view::npos) return numbers;
+    text.remove_prefix(comma + 1);
+  }
+}
+
 std::vector<double> parse_numbers(const std::string& option, const std::string& text,
                                   std::initializer_list<std::size_t> counts,
                                   const std::string& expected) {
-  std::vector<double> numbers;
-  std::string_view rest = text;
-  while (true) {
-    const std::size_t comma = rest.find(',');
-    const auto number = parse_number<double>(rest.substr(0, comma));
-    if (!number) refuse(option, text, expected);
-    numbers.push_back(*number);
-    if (comma == std::string_view::npos) break;
-    rest.remove_prefix(comma + 1);
+  auto numbers = split_numbers(text);
+  if (!numbers || std::ranges::find(counts, numbers->size()) == counts.end()) {
+    refuse(option, text, expected);
   }
-  for (const std::size_t count : counts) {
-    if (numbers.size() == count) return numbers;
-  }
-  refuse(option, text, expected);
+  return *std::move(numbers);
+}
+
+std::size_t unit_begin(std::string_view text) {
+  return text.find_last_of("0123456789.") + 1;
 }
 
 std::uint64_t parse_count(const std::string& option, const std::string& text) {

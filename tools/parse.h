@@ -30,10 +30,16 @@ template <class T>
 [[noreturn]] void refuse(const std::string& option, const std::string& text,
                          const std::string& expected);
 
+/// The finite numbers of a text, separated by commas; empty when a part of it is none.
+[[nodiscard]] std::optional<std::vector<double>> split_numbers(std::string_view text);
+
 /// Finite numbers separated by commas. Refuses a list whose length is none of `counts`.
 [[nodiscard]] std::vector<double> parse_numbers(const std::string& option, const std::string& text,
                                                 std::initializer_list<std::size_t> counts,
                                                 const std::string& expected);
+
+/// Where the unit or the suffix at the end of a text begins: behind its last digit.
+[[nodiscard]] std::size_t unit_begin(std::string_view text);
 
 /// A whole number from 1 to 2^48, with k, M or G for powers of 1000 or without: "250k", "1.5M".
 [[nodiscard]] std::uint64_t parse_count(const std::string& option, const std::string& text);

@@ -36,6 +36,8 @@ constexpr char kExamples[] =
     "  ptcbuild dragon.ply --backdrop -o dragon.ptcx\n"
     "  # Set the number of surfels, the sun and the sky\n"
     "  ptcbuild sponza.obj --points 20M --sun 30,60,4 --sky 0.5,0.6,0.8 -o sponza.ptcx\n"
+    "  # Light a room by a lamp and a spot light\n"
+    "  ptcbuild room.glb --point 0,2,0,60W --spot 2,2,0,0,-1,0,40,0.2,300cd -o room.ptcx\n"
     "  # Build a large cloud on two disks; the same command goes on after an interruption\n"
     "  ptcbuild huge.ply --resume --memory 512M --temp . --temp /scratch -o huge.ptcx\n"
     "  # Build the tiles of a scan, or what another program writes\n"

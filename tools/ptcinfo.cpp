@@ -219,12 +219,13 @@ std::string counted(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-/// The lights of the record: "1 sun, 0 point lights, a sky".
+/// The lights of the record: "1 sun, 0 point lights, 0 spot lights, a sky".
 std::string lights_text(const ordered_json& record, bool emitters) {
   try {
     const ptc::LightRig rig = ptc::light_rig_from_json(record.get<std::string>());
-    std::string text =
-        counted(rig.suns.size(), "sun") + ", " + counted(rig.points.size(), "point light");
+    std::string text = counted(rig.suns.size(), "sun") + ", " +
+                       counted(rig.points.size(), "point light") + ", " +
+                       counted(rig.spots.size(), "spot light");
     if (!rig.sky.map_path.empty()) {
       text += ", the sky of " + quoted(ordered_json(rig.sky.map_path));
     } else {

@@ -1,9 +1,13 @@
-// Suns, point lights, skies and cameras from the command line.
+// Suns, lamps, skies and cameras from the command line.
 //
-//   --sun 30,60,4          azimuth from +z to +x, elevation above the horizon, irradiance
-//   --point 0,3,0,9,9,9    position, intensity
-//   --sky 0.5,0.6,0.8      radiance; one number is grey, any other text names a picture
-//   --camera 0,1,4,0,1,0   position, target
+//   --sun 30,60,4                        azimuth from +z to +x, elevation, irradiance
+//   --point 0,3,0,9,9,9                  position, intensity
+//   --spot 0,3,0,0,-1,0,40,0.2,100W      position, direction, half angle, blend, intensity
+//   --sky 0.5,0.6,0.8                    radiance; any text but numbers names a picture
+//   --camera 0,1,4,0,1,0                 position, target
+//
+// A radiance or an intensity is R,G,B or one number for grey. A unit may follow an irradiance or an
+// intensity: the lights are kept in W/m^2 and W/sr.
 //
 // An option's text is checked as soon as it is parsed, so that a wrong one is a usage error. The
 // picture of a sky is read later, by sky(): a wrong picture is invalid data.
@@ -13,10 +17,15 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 
+#include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/io/image/image.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
@@ -26,16 +35,62 @@
 namespace ptc {
 namespace {
 
+/// The colour of one number, which is grey, or of three.
+glm::vec3 colour_of(std::span<const double> n) {
+  return n.size() == 1 ? glm::vec3(glm::dvec3(n[0])) : glm::vec3(n[0], n[1], n[2]);
+}
+
 /// Three numbers, or one for grey, from 0 to 1e30.
 glm::vec3 parse_colour(const std::string& option, const std::string& text) {
   constexpr char kExpected[] = "R,G,B or one number for grey, from 0 up";
-  const std::vector<double> n = parse_numbers(option, text, {1, 3}, kExpected);
-  const glm::vec3 colour =
-      n.size() == 1 ? glm::vec3(glm::dvec3(n[0])) : glm::vec3(n[0], n[1], n[2]);
+  const glm::vec3 colour = colour_of(parse_numbers(option, text, {1, 3}, kExpected));
   for (int c = 0; c < 3; ++c) {
     if (!(colour[c] >= 0 && colour[c] <= 1e30F)) refuse(option, text, kExpected);
   }
   return colour;
+}
+
+/// The luminous flux of 1 W of light of 555 nm, lm: the definition of the candela, and what
+/// Blender's glTF exporter takes for all light.
+constexpr double kLumensPerWatt = 683;
+
+/// Factors from a unit to the one that a light is kept in, by name; "" is for numbers without one.
+using Units = std::map<std::string_view, double>;
+
+/// Units of intensity in W/sr. Power is that of a lamp that shines in all directions, also that of
+/// a spot light: so Blender and its glTF exporter have it.
+const Units& intensity_units() {
+  static const Units units{{"", 1},
+                           {"W", 0.25 / kPiDouble},
+                           {"lm", 0.25 / kPiDouble / kLumensPerWatt},
+                           {"cd", 1 / kLumensPerWatt}};
+  return units;
+}
+
+/// Units of irradiance in W/m^2.
+const Units& irradiance_units() {
+  static const Units units{{"", 1}, {"lx", 1 / kLumensPerWatt}};
+  return units;
+}
+
+/// The numbers of a light. Those from the index `strength` on lie between 0 and 1e30 and may be
+/// followed by one of `units`; they are returned multiplied by its factor.
+std::vector<double> parse_light(const std::string& option, const std::string& text,
+                                std::initializer_list<std::size_t> counts, std::size_t strength,
+                                const Units& units, const std::string& expected) {
+  const std::size_t end = unit_begin(text);
+  const auto unit = units.find(std::string_view(text).substr(end));
+  auto numbers = split_numbers(std::string_view(text).substr(0, end));
+  if (!numbers || unit == units.end() ||
+      std::ranges::find(counts, numbers->size()) == counts.end() ||
+      (numbers->size() == strength && end != text.size())) {
+    refuse(option, text, expected);
+  }
+  for (double& number : std::span(*numbers).subspan(strength)) {
+    number *= unit->second;
+    if (!(number >= 0 && number <= 1e30)) refuse(option, text, expected);
+  }
+  return *std::move(numbers);
 }
 
 /// Declares an option that takes one value each time that it is given.
@@ -66,8 +121,8 @@ void LightArguments::declare(CLI::App& app) {
       app, "--sun", [this](const std::vector<std::string>& v) { set_suns(v); },
       "Sun: azimuth and elevation in degrees, irradiance [3]; repeatable\n"
       "The elevation is above the horizon, the plane of x and z; +y is up. The azimuth turns from "
-      "+z to +x. The irradiance is that of a surface that faces the sun, in "
-      "W/m^2.")
+      "+z to +x. The irradiance is that of a surface that faces the sun, in W/m^2, or in lux: "
+      "30,60,2000lx. 1 W/m^2 counts as 683 lx.")
       ->type_name("AZ,EL[,E]")
       ->group(kGroup);
   app.add_option_function<std::string>(
@@ -84,8 +139,20 @@ void LightArguments::declare(CLI::App& app) {
       ->group(kGroup);
   add_repeated(
       app, "--point", [this](const std::vector<std::string>& v) { set_points(v); },
-      "Point light: position and intensity in W/sr; repeatable")
-      ->type_name("X,Y,Z,R,G,B")
+      "Point light: position, intensity; repeatable\n"
+      "With the unit W the intensity is that of a lamp of this power in Blender, W/sr times 4 pi; "
+      "lm is the same in lumens, cd is candela, as in glTF. 1 W counts as 683 lm.")
+      ->type_name("X,Y,Z,LIGHT")
+      ->group(kGroup);
+  add_repeated(
+      app, "--spot", [this](const std::vector<std::string>& v) { set_spots(v); },
+      "Spot light: position, direction, angle, blend, intensity; repeatable\n"
+      "X,Y,Z,DX,DY,DZ,ANGLE,BLEND,LIGHT: 0,3,0,0,-1,0,40,0.2,100W shines straight down. The angle "
+      "from the axis to the edge of the cone is in degrees, at most 90: half of Blender's spot "
+      "size. The blend, from 0 to 1, is the share of the angle over which the light fades to the "
+      "edge. The intensity is that on the axis; W and lm are those of a lamp without the cone, as "
+      "in Blender.")
+      ->type_name("X,Y,...,LIGHT")
       ->group(kGroup);
   declare_sky(app);
 }
@@ -113,36 +180,63 @@ void LightArguments::declare_sky(CLI::App& app) {
 
 void LightArguments::set_suns(const std::vector<std::string>& values) {
   constexpr char kExpected[] =
-      "AZ,EL[,E] with an elevation from -90 to 90 and an irradiance from 0 up";
+      "AZ,EL[,E] with an elevation from -90 to 90 and an irradiance from 0 up, with or without the "
+      "unit lx";
   suns_.clear();
   for (const std::string& text : values) {
-    const std::vector<double> n = parse_numbers("--sun", text, {2, 3}, kExpected);
+    const std::vector<double> n =
+        parse_light("--sun", text, {2, 3}, 2, irradiance_units(), kExpected);
     const double strength = n.size() == 3 ? n[2] : 3;
-    if (std::abs(n[1]) > 90 || !(strength >= 0 && strength <= 1e30))
-      refuse("--sun", text, kExpected);
+    if (std::abs(n[1]) > 90) refuse("--sun", text, kExpected);
     suns_.push_back({.to_sun = sun_direction(n[0], n[1]),
                      .irradiance = glm::vec3(static_cast<float>(strength))});
   }
 }
 
 void LightArguments::set_points(const std::vector<std::string>& values) {
-  constexpr char kExpected[] = "X,Y,Z,R,G,B with a position and an intensity from 0 up";
+  constexpr char kExpected[] =
+      "X,Y,Z,R,G,B or X,Y,Z,I, a position and an intensity from 0 up, with or without the unit W, "
+      "lm or cd";
   points_.clear();
   for (const std::string& text : values) {
-    const std::vector<double> n = parse_numbers("--point", text, {6}, kExpected);
-    for (std::size_t c = 3; c < 6; ++c) {
-      if (!(n[c] >= 0 && n[c] <= 1e30)) refuse("--point", text, kExpected);
+    const std::vector<double> n =
+        parse_light("--point", text, {4, 6}, 3, intensity_units(), kExpected);
+    points_.push_back(
+        {.position = {n[0], n[1], n[2]}, .intensity = colour_of(std::span(n).subspan(3))});
+  }
+}
+
+void LightArguments::set_spots(const std::vector<std::string>& values) {
+  constexpr char kExpected[] =
+      "X,Y,Z,DX,DY,DZ,ANGLE,BLEND,R,G,B or one number in place of R,G,B: a direction that is not "
+      "zero, an angle from 0.01 to 90, a blend from 0 to 1 and an intensity from 0 up, with or "
+      "without the unit W, lm or cd";
+  spots_.clear();
+  for (const std::string& text : values) {
+    const std::vector<double> n =
+        parse_light("--spot", text, {9, 11}, 8, intensity_units(), kExpected);
+    const glm::dvec3 direction{n[3], n[4], n[5]};
+    const double length = glm::length(direction);
+    const double degrees = n[6];
+    const double blend = n[7];
+    if (!(length > 0 && std::isfinite(length)) || !(degrees >= 0.01 && degrees <= 90) ||
+        !(blend >= 0 && blend <= 1)) {
+      refuse("--spot", text, kExpected);
     }
-    points_.push_back({.position = {n[0], n[1], n[2]}, .intensity = {n[3], n[4], n[5]}});
+    spots_.push_back({.position = {n[0], n[1], n[2]},
+                      .direction = glm::vec3(direction / length),
+                      .intensity = colour_of(std::span(n).subspan(8)),
+                      .inner_angle = static_cast<float>(glm::radians(degrees * (1 - blend))),
+                      .outer_angle = static_cast<float>(glm::radians(degrees))});
   }
 }
 
 bool LightArguments::given() const noexcept {
-  return !suns_.empty() || !points_.empty() || sky_given();
+  return !suns_.empty() || !points_.empty() || !spots_.empty() || sky_given();
 }
 
 LightRig LightArguments::rig() const {
-  LightRig rig{.suns = suns_, .points = points_, .sky = sky()};
+  LightRig rig{.suns = suns_, .points = points_, .spots = spots_, .sky = sky()};
   for (Sun& sun : rig.suns) {
     sun.irradiance *= sun_colour_;
     sun.angular_radius = static_cast<float>(glm::radians(sun_degrees_ / 2));

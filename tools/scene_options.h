@@ -15,10 +15,11 @@
 
 namespace ptc {
 
-/// The values of --sun, --point, --sky and the options that modify them.
+/// The values of --sun, --point, --spot, --sky and the options that modify them.
 class LightArguments {
  public:
-  /// Declares the options of suns, point lights and the sky. This object must outlive the parsing.
+  /// Declares the options of suns, point lights, spot lights and the sky. This object must outlive
+  /// the parsing.
   void declare(CLI::App& app);
   /// Declares --sky and --sky-scale alone.
   void declare_sky(CLI::App& app);
@@ -36,9 +37,11 @@ class LightArguments {
  private:
   void set_suns(const std::vector<std::string>& values);
   void set_points(const std::vector<std::string>& values);
+  void set_spots(const std::vector<std::string>& values);
 
   std::vector<Sun> suns_;
   std::vector<PointLight> points_;
+  std::vector<SpotLight> spots_;
   glm::vec3 sun_colour_{1};
   double sun_degrees_ = 0.533;
   std::string sky_;

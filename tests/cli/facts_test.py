@@ -35,11 +35,12 @@ class Facts(ProgramTest):
     def test_ptcinfo_prints_what_a_reader_of_its_summary_asks_for(self):
         scene = self.here / "o.ptcx"
         self.succeed("ptcbuild", self.mesh, "--spacing", "0.05", "--sun", "30,60", "--sun", "60,30", "--point=0,2,0,1,1,1",
+                     "--spot=0,2,0,0,-1,0,40,0.2,1,1,1",
                      "-o", scene)
         told = self.succeed("ptcinfo", scene).stdout
         facts = json.loads(self.succeed("ptcinfo", scene, "--json").stdout)
         for line in (f"pages     {facts['pages']} of 65.5 KB", 'inputs    "box.obj"', "spacing   0.05 scene units between surfels of meshes",
-                     "lights    2 suns, 1 point light, no sky", "rounded   position by at most 0.001 of the point's radius, the radius by "
+                     "lights    2 suns, 1 point light, 1 spot light, no sky", "rounded   position by at most 0.001 of the point's radius, the radius by "
                      "1/512 of it, normals by 0.0021 rad, radiance by 1/256 of it"):
             self.assertIn(f"\n  {line}\n", told)
         bounds = re.search(r"\n  bounds    (\S+) (\S+) (\S+) to (\S+) (\S+) (\S+)\n", told).groups()
@@ -48,13 +49,35 @@ class Facts(ProgramTest):
             self.assertAlmostEqual(float(text), value, delta=1e-6)
             self.assertLessEqual(len(text.lstrip("-").replace(".", "").lstrip("0")), 7, text)
         self.succeed("ptcbuild", self.mesh, "--points", "1k", "-o", scene)
-        self.assertIn("lights    1 sun, 0 point lights, a sky\n", self.succeed("ptcinfo", scene).stdout)
+        self.assertIn("lights    1 sun, 0 point lights, 0 spot lights, a sky\n", self.succeed("ptcinfo", scene).stdout)
         far = self.here / "far.ply"
         write_ply(far, [(point[0] + 4.5e6, *point[1:]) for point in ball(100)])
         self.succeed("ptcbuild", far, "-o", scene)
         self.assertRegex(self.succeed("ptcinfo", scene).stdout, r"\n  bounds    4499999\.\d{4,6} -0\.\d+ ")
         for vector in VECTORS.glob("good/*.ptcx"):
             self.assertIn("\n  bounds    ", self.succeed("ptcinfo", vector, "--memory", "1G").stdout)
+
+    def test_lights_are_recorded_in_watts_whatever_their_unit(self):
+        scene = self.here / "o.ptcx"
+
+        def recorded(*options):
+            self.succeed("ptcbuild", self.mesh, "--points", "500", *options, "-o", scene)
+            return json.loads(json.loads(self.succeed("ptcinfo", scene, "--json").stdout)["text"]["lights"])
+
+        sphere = 4 * math.pi
+        for text, intensity in (("2", [2, 2, 2]), ("1,2,3", [1, 2, 3]), ("100W", [100 / sphere] * 3),
+                                ("1,2,4W", [1 / sphere, 2 / sphere, 4 / sphere]), ("683cd", [1, 1, 1]), ("1.5e3cd", [1500 / 683] * 3),
+                                ("800lm", [800 / 683 / sphere] * 3)):
+            lights = recorded("--point", f"0,5,0,{text}", "--spot", f"1,5,0,0,-2,0,40,0.25,{text}")
+            for light in lights["points"] + lights["spots"]:
+                for is_, was in zip(light["intensity"], intensity, strict=True):
+                    self.assertAlmostEqual(is_, was, delta=1e-6 * was)
+        spot = lights["spots"][0]
+        self.assertEqual((spot["position"], spot["direction"]), ([1, 5, 0], [0, -1, 0]))
+        self.assertAlmostEqual(spot["inner_angle"], math.radians(30), places=6)
+        self.assertAlmostEqual(spot["outer_angle"], math.radians(40), places=6)
+        for text, irradiance in (("", 3), (",5", 5), (",683lx", 1), (",1e5lx", 1e5 / 683)):
+            self.assertAlmostEqual(recorded("--sun", f"30,60{text}")["suns"][0]["irradiance"][0], irradiance, delta=1e-6 * irradiance)
 
     def test_ptcinfo_under_a_cap_that_does_not_hold_the_directory_is_refused(self):
         def least_and_pages(points):

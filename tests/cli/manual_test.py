@@ -83,6 +83,13 @@ class Help(unittest.TestCase):
             self.assertGreater(len(entries), 7)
             self.assertEqual([label for label, text in entries if "\n" in text], [], program)
 
+    def test_words_for_values_with_suffixes_or_units_are_explained(self):
+        for program in PROGRAMS:
+            for text in helps_of(program):
+                for word in ("COUNT", "SIZE", "LIGHT"):
+                    used = re.search(rf"^ +--.*\b{word}(  |$)", text, re.MULTILINE) is not None
+                    self.assertEqual(used, f"\n{word} " in text, (program, word))
+
     def test_expert_options_come_last_and_the_others_before_what_all_programs_share(self):
         for program in PROGRAMS:
             for text in helps_of(program):

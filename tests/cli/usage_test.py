@@ -86,7 +86,13 @@ class Usage(ProgramTest):
             "ptcbuild": ["--points=0", "--points=-5", "--points=1.5", "--points=1e99", "--points=x",
                          "--spacing=0", "--spacing=nan", "--spacing=inf", "--sun=1", "--sun=1,91",
                          "--sun=1,2,-3", "--sun=a,b", "--sun-size=-1", "--sun-colour=1,2",
-                         "--point=1,2,3", "--point=0,0,0,1,1,-1", "--sky=1,2", "--sky=-1",
+                         "--point=1,2,3", "--point=0,0,0,1,1,-1", "--point=0,0,0,5kg", "--point=0,0,0W", "--point=0,0,0,1,2W",
+                         "--point=0,0,0,5lx", "--point=0,0,0,5 W", "--point=0,0,0,5W,5W,5W", "--point=0,0,0,-5W", "--point=0,0,0,W",
+                         "--sun=1,2,5W", "--sun=1,2lx", "--sun=1,2,-3lx", "--spot=0,3,0,0,-1,0,40,1,1,1",
+                         "--spot=0,3,0,0,-1,0,40,0.2", "--spot=0,3,0,0,0,0,40,0.2,1", "--spot=0,3,0,0,-1,0,0,0.2,1",
+                         "--spot=0,3,0,0,-1,0,91,0.2,1", "--spot=0,3,0,0,-1,0,40,1.1,1", "--spot=0,3,0,0,-1,0,40,-0.1,1",
+                         "--spot=0,3,0,0,-1,0,40,0.2,-1", "--spot=0,3,0,0,-1,0,40,0.2,1,1,1lx", "--spot=0,3,0,0,1e300,1e300,40,0.2,1",
+                         "--sky=1,2", "--sky=-1",
                          "--sky-scale=-1", "--camera=1,2,3", "--camera=1,2,3,1,2,3", "--fov=40",
                          "--leaf=0", "--leaf=65536", "--levels-per-stream=0", "--codec=lzma",
                          "--page-size=3K", "--page-size=2M", "--sun-rays=0", "--finest=0",
@@ -107,7 +113,7 @@ class Usage(ProgramTest):
                     "ptcconvert": [self.scene, self.here / "o.ptcx"]}
         for program, options in cases.items():
             for option in options:
-                self.fail_with(2, program, *operands[program], option)
+                self.assertIn(option.split("=")[0], self.fail_with(2, program, *operands[program], option))
 
     def test_an_error_stands_for_the_settings_that_trade_time_for_it(self):
         for program, output in (("ptcshade", "o.ply"), ("ptcrender", "o.png")):
@@ -138,6 +144,7 @@ class Usage(ProgramTest):
         self.assertIn("--spacing is too small", self.fail_with(2, *build, "--spacing", "1e-30"))
         self.assertIn("a sun is negative or not finite", self.fail_with(2, *build, "--sun=1,2,1e30", "--sun-colour=1e30"))
         self.assertIn("a point light is not finite", self.fail_with(2, *build, "--point=1e300,0,0,1,1,1"))
+        self.assertIn("a spot light is not finite", self.fail_with(2, *build, "--spot=1e300,0,0,0,-1,0,40,0,1"))
         scene = self.here / "s.ptcx"
         shutil.copy(self.scene, scene)
         message = self.fail_with(2, "ptcbuild", self.cloud, "--append", scene, "--resume", "-o", scene)
