@@ -91,7 +91,7 @@ TEST_CASE("scene: receivers are pixels from the middle of the picture, and point
   const test::TemporaryDirectory dir;
   Progress silent;
   const BenchScene scene(parse_scene("window"), kSmall, dir.path(), {.threads = 1}, silent);
-  REQUIRE(scene.sets().size() == 2);
+  REQUIRE(scene.sets().size() == 3);
   const ReceiverSet& camera = scene.sets()[0];
   CHECK(camera.name == "camera");
   CHECK(camera.receivers.size() == 32 * 18);  // a room: each pixel sees something
@@ -108,5 +108,27 @@ TEST_CASE("scene: receivers are pixels from the middle of the picture, and point
   CHECK(points.receivers.size() == scene.surfels().size());  // fewer than a block: all of them
   for (std::size_t i = 0; i < points.receivers.size(); ++i) {
     REQUIRE(points.receivers[i].normal == scene.surfels()[i].normal);
+  }
+  const ReceiverSet& all = scene.sets()[2];
+  CHECK(all.name == "sparse");
+  CHECK(all.receivers.size() == std::min<std::size_t>(3000, scene.surfels().size()));
+}
+
+TEST_CASE("scene: receivers that lie far apart are spread evenly over the points",
+          "[bench][scene]") {
+  const test::TemporaryDirectory dir;
+  Progress silent;
+  SceneOptions options = kSmall;
+  options.points = 20'000;  // several blocks
+  options.sparse_points = 7;
+  const BenchScene scene(parse_scene("window"), options, dir.path(), {.threads = 1}, silent);
+  const std::size_t points = scene.surfels().size();
+  REQUIRE(points > 3 * Shader::kBlock);
+  const ReceiverSet& sparse = scene.sets().back();
+  REQUIRE(sparse.receivers.size() == 7);
+  for (std::size_t i = 0; i < 7; ++i) {
+    const Surfel& s = scene.surfels()[(2 * i + 1) * points / 14];
+    CHECK(sparse.receivers[i].normal == s.normal);
+    CHECK(glm::distance(sparse.receivers[i].position, s.position) <= static_cast<double>(s.radius));
   }
 }

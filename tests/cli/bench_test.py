@@ -7,7 +7,7 @@ import unittest
 
 from programs import ProgramTest, ball, write_ply
 
-METHODS = ["ptcx", "plain", "embree-discs", "embree-mesh"]
+METHODS = ["ptcx", "ptcx-rays", "plain", "embree-discs", "embree-mesh"]
 
 
 class Bench(ProgramTest):
@@ -30,7 +30,7 @@ class Bench(ProgramTest):
                                "--repeats", "1", "--reference-rays", "4096", *settings, "-o", charts, "--json")
         facts = json.loads((charts / "accuracy.json").read_text())
         self.assertEqual(json.loads(printed.stdout)["rows"], facts["rows"])
-        for place in ("camera", "points"):
+        for place in ("camera", "points", "sparse"):
             for job in ("occlusion", "bleeding"):
                 rows = [r for r in facts["rows"] if r["set"] == place and r["job"] == job]
                 self.assertEqual(sorted({r["method"] for r in rows}), sorted(METHODS))
@@ -43,6 +43,9 @@ class Bench(ProgramTest):
                 rays = [r for r in rows if r["method"] == "embree-discs"]
                 self.assertEqual([r["setting"].split()[0] for r in rays], ["64", "256", "1024", "4096"])
                 self.assertLess(rays[3]["ao_rms"], 0.25 * rays[0]["ao_rms"])
+                own = [r for r in rows if r["method"] == "ptcx-rays"]
+                self.assertEqual([r["setting"] for r in own], ["64 rays", "256 rays", "1024 rays", "4096 rays"])
+                self.assertLess(own[3]["ao_rms"], 0.25 * own[0]["ao_rms"])
                 self.assertTrue(all(r["us_per_receiver"] > 0 for r in rows))
         for note in facts["references"]:  # well below the measured errors
             self.assertLess(note["ao_noise"], 0.005)
@@ -63,7 +66,7 @@ class Bench(ProgramTest):
         self.assertEqual(self.names(facts, "setting"), ["0.02 sr, 0.1 rad, R 16", "0.02 sr, 0.1 rad, R 16, x 1.2"])
         facts = self.measure(self.mesh, "--method", "plain", "--method=embree-mesh", "--points", "2k")
         self.assertEqual(self.names(facts, "method"), ["embree-mesh", "plain"])
-        self.assertEqual(self.names(facts, "set"), ["camera", "points"])
+        self.assertEqual(self.names(facts, "set"), ["camera", "points", "sparse"])
 
     def test_errors_that_were_asked_for_are_met(self):
         charts = self.here / "charts"
@@ -89,7 +92,7 @@ class Bench(ProgramTest):
         lower = [(p[0], p[1], p[2] - 2.2, *p[3:]) for p in ball(600, 2)]
         write_ply(cloud, ball(600) + lower)
         facts = self.measure(cloud)
-        self.assertEqual(self.names(facts, "method"), ["embree-discs", "plain", "ptcx"])
+        self.assertEqual(self.names(facts, "method"), ["embree-discs", "plain", "ptcx", "ptcx-rays"])
         self.assertTrue(all(row["ao_rms_mesh"] is None and row["speedup_mesh"] is None for row in facts["rows"]))
         message = self.fail_with(1, "ptcbench", "accuracy", cloud, "--method", "embree-mesh", "--quick", "--checked",
                                  "10", "-o", self.here / "charts")

@@ -8,6 +8,7 @@
 
 #include "engine/parallel/thread_pool.h"
 #include "engine/shade/reference/brute_force.h"
+#include "engine/shade/reference/cosine_rays.h"
 #include "engine/trace/ray_shader.h"
 #include "tests/shade/gather_scene.h"
 
@@ -137,6 +138,42 @@ TEST_CASE("trace: rays that look for any disc cover what rays for the nearest do
     CHECK(any[i].occlusion == nearest[i].occlusion);
     CHECK(any[i].irradiance == glm::vec3(0));
   }
+}
+
+TEST_CASE("trace: what a ray meets does not depend on the rays beside it", "[trace]") {
+  // Of discs at the same place the first counts, in whichever order a tile meets them
+  std::vector<Surfel> surfels = wild_scene();
+  for (std::size_t i = 0; i < 4000; i += 3) surfels.push_back(surfels[i]);
+  const SceneOnItself scene(surfels, 100);
+  const std::vector<Surfel> stored = load_surfels(*scene.container, 1'000'000);
+  const SceneView view(*scene.container);
+  PageCache cache(*scene.container, {.memory_bytes = 64U << 20});
+  DiscTracer tracer(view, cache, Sides::both);
+  std::vector<glm::vec3> directions;
+  std::size_t met = 0, doubled = 0;
+  for (const Receiver& receiver : scene.receivers) {
+    cosine_directions(receiver.normal, 8, 3, directions);
+    std::vector<RayHit> together(directions.size()), alone(directions.size());
+    tracer.begin(receiver.position, receiver.normal);
+    tracer.meet(directions, RaysFor::nearest, together);
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      tracer.meet(std::span(directions).subspan(i, 1), RaysFor::nearest,
+                  std::span(alone).subspan(i, 1));
+      REQUIRE(alone[i].depth == together[i].depth);
+      REQUIRE(alone[i].point == together[i].point);
+      if (!alone[i].met()) continue;
+      ++met;
+      const auto same = [&](std::size_t a, std::size_t b) {
+        return stored[a].position == stored[b].position && stored[a].normal == stored[b].normal &&
+               stored[a].radius == stored[b].radius;
+      };
+      const std::size_t point = alone[i].point;
+      if (point > 0) CHECK_FALSE(same(point - 1, point));
+      if (point + 1 < stored.size() && same(point, point + 1)) ++doubled;
+    }
+  }
+  CHECK(met > 1000);
+  CHECK(doubled > 100);
 }
 
 TEST_CASE("trace: an empty scene covers nothing", "[trace]") {

@@ -16,11 +16,12 @@
 
 namespace ptc::bench {
 
-/// The methods in the order of charts: the hierarchical gather, the plain gather, Embree's rays at
-/// the same discs, Embree's rays at the mesh.
-inline constexpr std::array kMethods{"ptcx", "plain", "embree-discs", "embree-mesh"};
-/// The sets of receivers: what the pixels of a picture see, and points of the scene itself.
-inline constexpr std::array kSets{"camera", "points"};
+/// The methods in the order of charts: the hierarchical gather, rays through the octree, the plain
+/// gather, Embree's rays at the same discs, Embree's rays at the mesh.
+inline constexpr std::array kMethods{"ptcx", "ptcx-rays", "plain", "embree-discs", "embree-mesh"};
+/// The sets of receivers: what the pixels of a picture see, points of the scene in blocks of
+/// neighbours, and points that lie far apart.
+inline constexpr std::array kSets{"camera", "points", "sparse"};
 
 /// What a method computes: occlusion alone, or occlusion and irradiance together.
 enum class Quantity { occlusion, bleeding };
@@ -40,6 +41,7 @@ struct AccuracyOptions {
   std::vector<float> plain_solid_angles{0.03F, 0.01F};       ///< solid angles of "plain", sr
   std::vector<unsigned> rays{64,   128,  256, 512,
                              1024, 2048, 4096};  ///< Embree's rays per receiver, powers of two
+  std::vector<unsigned> own_rays{64, 256, 1024, 4096};  ///< those of "ptcx-rays", squares
 
   /// Six settings from 0.2 sr to 0.003 sr.
   [[nodiscard]] static std::vector<GatherOptions> default_settings();
@@ -51,7 +53,7 @@ struct AccuracyOptions {
 
 /// The time and the error of one method at one setting on one set of receivers of one scene. Errors
 /// are shares of the mean of a reference, which is many rays at the model that the method shades:
-/// the discs for ptcx, plain and embree-discs, the mesh for embree-mesh.
+/// the mesh for embree-mesh, the discs for all others.
 struct AccuracyRow {
   std::string scene, set, method, setting;
   Quantity job = Quantity::occlusion;

@@ -46,6 +46,7 @@ const std::array<Measure, 4>& measures() {
 /// The name of a method in legends.
 const char* legend_name(std::string_view method) {
   if (method == "ptcx") return "PTCX";
+  if (method == "ptcx-rays") return "PTCX, rays";
   if (method == "plain") return "plain gather";
   return method == "embree-discs" ? "Embree, same discs" : "Embree, mesh";
 }
@@ -95,7 +96,7 @@ std::string percent(double share) {
 constexpr char kReading[] =
     "Markers are medians of all runs, bars reach from the fastest to the slowest run. Labels: "
     "solid "
-    "angle in sr for PTCX and the plain gather, rays per receiver for Embree.\n";
+    "angle in sr for PTCX and the plain gather, rays per receiver for rays.\n";
 
 }  // namespace
 

@@ -12,7 +12,8 @@ namespace {
 
 constexpr char kReading[] =
     "Time per receiver against error. Methods: ptcx is the hierarchical gather at settings from "
-    "coarse to fine; plain is a gather of one receiver at a time; embree-discs and embree-mesh are "
+    "coarse to fine; ptcx-rays are stratified rays through the octree; plain is a gather of one "
+    "receiver at a time; embree-discs and embree-mesh are "
     "Sobol-Owen rays at the same discs and at the mesh with baked light, single or in packets, "
     "whichever is faster. Quantities: occlusion alone (any-hit rays), or bleeding, which is "
     "occlusion and irradiance together. Errors are shares of the mean of a reference, which is "
@@ -125,7 +126,8 @@ Experiment make_accuracy_experiment() {
     d.quick("--setting", options->settings, {all[0], all[2], all[3], all[5]});
     d.words("--method", options->methods, "Measure only this method; repeatable");
     d.words("--set", options->sets,
-            "Shade only these receivers: pixels of a picture, or points of the scene; repeatable");
+            "Shade only these receivers: pixels of a picture, or points of the scene, in blocks of "
+            "neighbours or far apart; repeatable");
     for (const char* name : {"--setting", "--method", "--set"}) d.for_experts(name);
     // Shade the middle of the picture, not a smaller picture: receivers keep their distance, and so
     // their share of common work
@@ -134,6 +136,7 @@ Experiment make_accuracy_experiment() {
     d.quick(scene.window_width, 48);
     d.quick(scene.window_height, 27);
     d.quick(scene.own_points, 8'192);
+    d.quick(scene.sparse_points, 1'000);
     d.quick(options->rays, {64, 256, 1024, 4096});
     d.quick(options->plain_solid_angles, {0.01F});
   };
@@ -154,8 +157,8 @@ Experiment make_accuracy_experiment() {
   return {
       .name = "accuracy",
       .purpose =
-          "Time per receiver against error: PTCX at settings from coarse to fine, a plain gather, "
-          "and Embree on the same discs and on the mesh",
+          "Time per receiver against error: PTCX at settings from coarse to fine and by rays, a "
+          "plain gather, and Embree on the same discs and on the mesh",
       .quick =
           "Under a minute per scene on two cores: 200k points, fewer receivers of each set "
           "(192 x 108 pixels, 8k points), 200 of them checked, 3 runs of fewer settings",

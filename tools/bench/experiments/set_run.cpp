@@ -1,6 +1,6 @@
 // One entry for each method, setting and quantity, and for rays both single and in packets:
 //
-//   trace references -> entries: ptcx, plain, embree-discs, embree-mesh
+//   trace references -> entries: ptcx, ptcx-rays, plain, embree-discs, embree-mesh
 //   repeats times:      run every entry once                      (measure())
 //   then:               rows -> keep faster packets -> errors -> speedups   (rows())
 #include "tools/bench/experiments/set_run.h"
@@ -70,7 +70,7 @@ SetRun::SetRun(const BenchScene& scene, const ReceiverSet& set, const AccuracyOp
   progress.begin(scene_.name() + " " + set_.name + ", references", 0, "rays");
   trace_references(rays);
   progress.end();
-  add_gathers();
+  add_own();
   if (discs_) add_rays("embree-discs", *rays.discs, *discs_);
   if (mesh_ && options_.measures("embree-mesh")) add_rays("embree-mesh", *rays.mesh, *mesh_);
 }
@@ -94,8 +94,9 @@ void SetRun::trace_references(const SceneRays& rays) {
     return rays.oracle->trace(receiver, count, seed);
   };
   // Trace the reference of each model
-  const bool gathers = options_.measures("ptcx") || options_.measures("plain");
-  ours_ = make_reference(set_, checked_, with_window(gathers), trace_oracle, executor_);
+  const bool own =
+      options_.measures("ptcx") || options_.measures("ptcx-rays") || options_.measures("plain");
+  ours_ = make_reference(set_, checked_, with_window(own), trace_oracle, executor_);
   if (rays.discs) discs_ = trace_baseline(*rays.discs, true);
   if (rays.mesh) mesh_ = trace_baseline(*rays.mesh, options_.measures("embree-mesh"));
   has_light_ = std::ranges::any_of(ours_.mean,
@@ -113,7 +114,7 @@ void SetRun::add(std::string method, std::string setting, std::vector<Quantity> 
       std::move(method), std::move(setting), std::move(jobs), &reference, std::move(run), {}, {}}));
 }
 
-void SetRun::add_gathers() {
+void SetRun::add_own() {
   if (options_.measures("ptcx")) {
     for (GatherOptions options : options_.settings) {
       for (const Quantity job : both_jobs()) {
@@ -121,6 +122,15 @@ void SetRun::add_gathers() {
         add("ptcx", setting_text(options), {job}, ours_,
             make_gather(scene_.container(), scene_.lights().sky, set_, checked_, options, cache_,
                         executor_));
+      }
+    }
+  }
+  if (options_.measures("ptcx-rays")) {
+    for (const unsigned rays : options_.own_rays) {
+      for (const Quantity job : both_jobs()) {
+        add("ptcx-rays", fmt::format("{} rays", rays), {job}, ours_,
+            make_own_rays(scene_.container(), scene_.lights().sky, set_, checked_,
+                          job == Quantity::bleeding, rays, executor_));
       }
     }
   }

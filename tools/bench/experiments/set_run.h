@@ -15,7 +15,7 @@ namespace ptc::bench {
 
 /// The ray tracers of one scene. They must outlive the SetRun.
 struct SceneRays {
-  const DiscRays* oracle = nullptr;    ///< the reference of ptcx and plain
+  const DiscRays* oracle = nullptr;    ///< the reference of ptcx, ptcx-rays and plain
   const RayBaseline* discs = nullptr;  ///< null: embree-discs is not measured
   const RayBaseline* mesh = nullptr;   ///< null for a cloud
 };
@@ -36,7 +36,7 @@ class SetRun {
   /// Returns the rows, with errors and speedups. Of single rays and packets only the faster stay.
   /// @pre called once, after measure()
   [[nodiscard]] std::vector<AccuracyRow> rows();
-  /// Describes the reference of ptcx and plain.
+  /// Describes the reference of ptcx, ptcx-rays and plain.
   [[nodiscard]] ReferenceNote note() const;
 
  private:
@@ -46,8 +46,8 @@ class SetRun {
   void trace_references(const SceneRays& rays);
   void add(std::string method, std::string setting, std::vector<Quantity> jobs,
            const Reference& reference, std::unique_ptr<Method> run);
-  /// Adds the settings of ptcx and plain.
-  void add_gathers();
+  /// Adds the settings of ptcx, ptcx-rays and plain.
+  void add_own();
   /// Adds the rays of embree-discs or embree-mesh.
   void add_rays(const std::string& name, const RayBaseline& baseline, const Reference& reference);
   /// The rows with times and without errors.

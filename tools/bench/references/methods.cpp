@@ -1,8 +1,8 @@
-// Three methods behind one interface. The gather shades the whole set, since neighbours share its
-// work; the others shade each receiver by itself, so it is enough to time the checked ones:
+// Methods behind one interface. The gather shades the whole set, since neighbours share its work;
+// the others shade each receiver by itself, so it is enough to time the checked ones:
 //
 //   set      . . . . . . . . . . . . . . . .   GatherMethod times all of them
-//   checked    *     *   *         *     *     PlainMethod and RayMethod time these
+//   checked    *     *   *         *     *     the other methods time these
 //   window           - - - - -                 shaded once more, not timed, by result()
 #include "tools/bench/references/methods.h"
 
@@ -13,6 +13,7 @@
 #include "engine/scene/light/lights.h"
 #include "engine/shade/gather/receiver_cell.h"
 #include "engine/shade/reference/plain_gather.h"
+#include "engine/trace/ray_shader.h"
 
 namespace ptc::bench {
 namespace {
@@ -126,6 +127,46 @@ class PlainMethod : public OneByOne {
   std::vector<std::unique_ptr<PlainGather>> gathers_;
 };
 
+/// Rays through the octree, as --check traces them.
+class OwnRayMethod : public Method {
+ public:
+  OwnRayMethod(const ContainerReader& container, const Sky& sky, const ReceiverSet& set,
+               const Checked& checked, bool bleeding, unsigned rays, const Executor& executor)
+      : set_(set),
+        checked_(checked),
+        rays_(rays),
+        shader_(container,
+                {.sky = sky_function(sky),
+                 .bleeding = bleeding,
+                 .memory_bytes =
+                     PageCache::bytes_for(container, executor.threads(), container.page_count()) +
+                     executor.threads() * DiscTracer::kBytes},
+                executor) {}
+
+  Cost run() override {
+    return timed([&] { last_ = shade_all(checked_.receivers); });
+  }
+  [[nodiscard]] std::size_t receivers() const override { return checked_.receivers.size(); }
+  [[nodiscard]] Shadings result() override { return {last_, shade_all(checked_.window)}; }
+
+ private:
+  std::vector<Shading> shade_all(const std::vector<std::size_t>& indices) {
+    std::vector<Receiver> receivers(indices.size());
+    std::ranges::transform(indices, receivers.begin(),
+                           [&](std::size_t i) { return set_.receivers[i]; });
+    std::vector<Shading> results(indices.size());
+    Progress silent;
+    shader_.trace(receivers, rays_, 0, results, silent);
+    return results;
+  }
+
+  const ReceiverSet& set_;
+  const Checked& checked_;
+  unsigned rays_;
+  RayShader shader_;
+  std::vector<Shading> last_;
+};
+
 /// Rays; the index of a receiver is the seed of its rays.
 class RayMethod : public OneByOne {
  public:
@@ -175,6 +216,12 @@ std::unique_ptr<Method> make_plain(const BenchScene& scene, const ReceiverSet& s
                                    const Checked& checked, const GatherOptions& options,
                                    PageCache& cache, const Executor& executor) {
   return std::make_unique<PlainMethod>(scene, set, checked, options, cache, executor);
+}
+
+std::unique_ptr<Method> make_own_rays(const ContainerReader& container, const Sky& sky,
+                                      const ReceiverSet& set, const Checked& checked, bool bleeding,
+                                      unsigned rays, const Executor& executor) {
+  return std::make_unique<OwnRayMethod>(container, sky, set, checked, bleeding, rays, executor);
 }
 
 std::unique_ptr<Method> make_rays(const RayBaseline& baseline, const ReceiverSet& set,

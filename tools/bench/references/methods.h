@@ -57,6 +57,14 @@ class Method {
                                                  const GatherOptions& options, PageCache& cache,
                                                  const Executor& executor);
 
+/// Makes rays from the checked receivers through the octree, by pages that all stay in memory.
+/// @param bleeding  whether the light of what they meet is looked up, too
+/// @param rays      rays per receiver, a square number
+[[nodiscard]] std::unique_ptr<Method> make_own_rays(const ContainerReader& container,
+                                                    const Sky& sky, const ReceiverSet& set,
+                                                    const Checked& checked, bool bleeding,
+                                                    unsigned rays, const Executor& executor);
+
 /// How a ray tracer shades.
 struct RaySetting {
   RayBaseline::Job job;

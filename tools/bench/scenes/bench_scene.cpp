@@ -208,27 +208,37 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
   sets_.push_back(camera_set(hits, width, height, options));
 }
 
-/// Adds whole blocks of neighbouring points, evenly spread over the scene: the locality is that of
-/// shading all points.
+/// Adds whole blocks of neighbouring points, evenly spread over the scene, whose locality is that
+/// of shading all points; and single points, as evenly spread, which share nothing.
 void BenchScene::add_points(const SceneOptions& options) {
-  ReceiverSet set{.name = "points"};
+  ReceiverSet set{.name = "points"}, sparse{.name = "sparse"};
   const std::uint64_t points = container_->superblock().points;
+  const std::uint64_t spread = std::min(points, options.sparse_points);
   const std::size_t blocks = points / Shader::kBlock;
   const std::size_t wanted =
       std::max<std::size_t>(1, std::min<std::size_t>(blocks, options.own_points / Shader::kBlock));
   ContainerPoints all(*container_);
   std::vector<PointRecord> block(Shader::kBlock);
+  const auto receiver = [&](const PointRecord& point) {
+    return lifted(to_surfel(point, container_->header().frame), options.lift,
+                  container_->header().frame);
+  };
   std::size_t taken = 0;
-  for (std::size_t at = 0; const std::size_t count = all.next(block); ++at) {
-    if (taken == wanted) break;
-    if (blocks > 0 && at != blocks * taken / wanted) continue;  // not the next evenly spread block
-    ++taken;
-    for (std::size_t i = 0; i < count; ++i) {
-      set.receivers.push_back(lifted(to_surfel(block[i], container_->header().frame), options.lift,
-                                     container_->header().frame));
+  std::uint64_t first = 0;
+  for (std::size_t at = 0; const std::size_t count = all.next(block); ++at, first += count) {
+    // Take the next of the points that lie far apart, as many as the block has
+    while (sparse.receivers.size() < spread) {
+      const std::uint64_t next = (2 * sparse.receivers.size() + 1) * points / (2 * spread);
+      if (next >= first + count) break;
+      sparse.receivers.push_back(receiver(block[next - first]));
     }
+    // Take the block if it is the next of those that are evenly spread
+    if (taken == wanted || (blocks > 0 && at != blocks * taken / wanted)) continue;
+    ++taken;
+    for (std::size_t i = 0; i < count; ++i) set.receivers.push_back(receiver(block[i]));
   }
   sets_.push_back(std::move(set));
+  sets_.push_back(std::move(sparse));
 }
 
 }  // namespace ptc::bench

@@ -42,14 +42,15 @@ struct Pixel {
   glm::vec3 direct{0};       ///< emission, and reflected light of suns and lamps
 };
 
-/// The receivers of one kind: what the pixels of a picture see, or points of the scene itself.
+/// The receivers of one kind: what the pixels of a picture see, or points of the scene itself, in
+/// blocks of neighbours or far apart.
 struct ReceiverSet {
-  std::string name;  ///< "camera" or "points"
+  std::string name;  ///< "camera", "points" or "sparse"
   std::vector<Receiver> receivers;
   /// The Pixel::receiver of a pixel that sees nothing.
   static constexpr std::size_t kNone = ~std::size_t{0};
   /// The pixels of a window in the middle of the camera's picture, row by row from the top; empty
-  /// for "points".
+  /// for other sets.
   std::vector<Pixel> window;
   unsigned window_width = 0, window_height = 0;  ///< pixels
 };
@@ -61,12 +62,13 @@ struct SceneOptions {
   unsigned shaded_width = 640,
            shaded_height = 360;  ///< part in the picture's middle that is shaded; 0: none
   unsigned window_width = 128, window_height = 72;  ///< part in its middle for FLIP
-  std::uint64_t own_points = 100'000;  ///< receivers among the scene's points, in blocks
-  float lift = 0.15F;                  ///< value of ShadeRequest::lift
-  bool rays = true;                    ///< load the surfels and the mesh, which rays need
-  Profile profile = Profile::compact;  ///< profile of the container
-  int levels_per_stream = 1;           ///< value of BuildOptions::levels_per_stream
-  std::uint8_t page_shift = 16;        ///< value of BuildRequest::page_shift
+  std::uint64_t own_points = 100'000;   ///< receivers among the scene's points, in blocks
+  std::uint64_t sparse_points = 3'000;  ///< receivers that are spread evenly over its points
+  float lift = 0.15F;                   ///< value of ShadeRequest::lift
+  bool rays = true;                     ///< load the surfels and the mesh, which rays need
+  Profile profile = Profile::compact;   ///< profile of the container
+  int levels_per_stream = 1;            ///< value of BuildOptions::levels_per_stream
+  std::uint8_t page_shift = 16;         ///< value of BuildRequest::page_shift
 };
 
 /// The request for build_container(), together with what belongs to a procedural scene.
@@ -107,7 +109,8 @@ class BenchScene {
   [[nodiscard]] const LightRig& lights() const noexcept { return lit_.lights; }
   /// Distance between neighbouring surfels, scene units.
   [[nodiscard]] double spacing() const;
-  /// The receivers of the camera, where they are asked for, and then those of the scene's points.
+  /// The receivers of the camera, where they are asked for, and then those of the scene's points,
+  /// in blocks and far apart.
   [[nodiscard]] const std::vector<ReceiverSet>& sets() const noexcept { return sets_; }
 
  private:
