@@ -99,7 +99,7 @@ void declare_picture(CLI::App& app, Arguments& arguments) {
       app,
       "Camera position and target [default: from the files]\n"
       "By default the camera is that of the mesh. Without one it is the camera of the build, and "
-      "without that, one that sees the whole scene.");
+      "without that, one that sees the whole scene, or all that stands on the backdrop.");
   ptc::add_integer(app, "--samples", arguments.request.samples, 1, 4096,
                    "Rays for each pixel, a square number")
       ->check(CLI::Validator(

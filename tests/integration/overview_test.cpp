@@ -9,7 +9,10 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/io/image/image.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/render/render_picture.h"
 #include "engine/store/reader.h"
 #include "tests/support/scenes.h"
 
@@ -61,7 +64,40 @@ Camera overview_of(const std::filesystem::path& cloud, const std::vector<glm::dv
   Progress silent;
   build_container({.inputs = {cloud}}, cloud.string() + ".ptcx", silent);
   const ContainerReader scene(cloud.string() + ".ptcx");
-  return overview(scene, up, false, std::array{800U, 500U});
+  return overview(scene, up, {}, std::array{800U, 500U});
+}
+
+/// An octahedron of a green that nothing else has, its corners at the ends of three axes.
+Mesh octahedron(const glm::vec3& axes) {
+  Mesh mesh;
+  mesh.origin = {1e5, 20, -3e4};
+  for (const float side : {-1.0F, 1.0F}) {
+    for (int k = 0; k < 3; ++k) {
+      glm::vec3 corner(0);
+      corner[k] = side * axes[k];
+      mesh.positions.push_back(corner);
+    }
+  }
+  mesh.triangles = {{3, 4, 5}, {4, 0, 5}, {0, 1, 5}, {1, 3, 5},
+                    {4, 3, 2}, {0, 4, 2}, {1, 0, 2}, {3, 1, 2}};
+  mesh.material_of.assign(mesh.triangles.size(), 0);
+  mesh.materials.push_back({.albedo = {0, 1, 0}});
+  return mesh;
+}
+
+/// A picture of a mesh on a backdrop by the default camera, in the colours of its surfaces.
+Image picture_on_backdrop(const Mesh& mesh, const std::filesystem::path& dir) {
+  Progress silent;
+  BuildRequest build{.mesh = std::make_shared<const Mesh>(mesh), .backdrop = true};
+  build.sampling.count = 20'000;
+  build_container(build, dir / "scene.ptcx", silent);
+  RenderRequest render{{.scene = dir / "scene.ptcx"}};
+  render.mesh = build.mesh;
+  render.backdrop = true;
+  render.samples = 1;
+  render.size = {{160, 100}};
+  render_picture(render, std::array{PictureTarget{dir / "albedo.png", "albedo"}}, silent);
+  return read_image(dir / "albedo.png");
 }
 
 }  // namespace
@@ -90,4 +126,43 @@ TEST_CASE("overview: a point that strayed does not shrink the scene", "[integrat
   points.pop_back();
   const Seen seen = seen_of(points, camera);
   CHECK(seen.top - seen.bottom > 2 * 0.7);
+}
+
+TEST_CASE("overview: what stands on a backdrop fills the picture, and all of it is seen",
+          "[integration]") {
+  const TemporaryDirectory dir;
+  const auto axes = GENERATE(glm::vec3(1, 0.7F, 0.4F), glm::vec3(0.2F, 1, 0.3F),
+                             glm::vec3(0.3F, 0.2F, 1), glm::vec3(1, 0.05F, 1));
+  CAPTURE(axes.x, axes.y, axes.z);
+  const Image picture = picture_on_backdrop(octahedron(axes), dir.path());
+  unsigned left = picture.width, right = 0, top = picture.height, bottom = 0;
+  for (unsigned y = 0; y < picture.height; ++y) {
+    for (unsigned x = 0; x < picture.width; ++x) {
+      const glm::vec3& colour = picture.at(x, y);
+      if (colour.g < 0.9F || colour.r > 0.1F) continue;  // ground, wall or sky
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
+    }
+  }
+  REQUIRE(left <= right);
+  CHECK(left > 0);
+  CHECK(right < picture.width - 1);
+  CHECK(top > 0);
+  CHECK(bottom < picture.height - 1);
+  CHECK((right - left > picture.width * 0.75 || bottom - top > picture.height * 0.75));
+}
+
+TEST_CASE("overview: the box before a backdrop is that of the mesh", "[integration]") {
+  Mesh mesh = octahedron({1, 0.7F, 0.4F});
+  const Bounds bounds = mesh.bounds();
+  Progress silent;
+  for (const bool smooth :
+       {false, true}) {  // the backdrop of a mesh with normals has more vertices
+    if (smooth) mesh.normals.assign(mesh.positions.size(), {0, 0, 1});
+    const Bounds box = bounds_before_backdrop(load_meshes({}, &mesh, true, silent));
+    CHECK(box.low == bounds.low);
+    CHECK(box.high == bounds.high);
+  }
 }

@@ -216,6 +216,7 @@ TEST_CASE("pipeline: a picture has the layers it promises, with and without a me
   request.backdrop = true;
   request.samples = 1;
   request.size = {{64, 48}};
+  request.camera = Camera{.position = {2, 1.5, 3.5}, .look_at = {0.5, 0.5, 0.5}};
   const std::vector<PictureTarget> targets{
       {dir / "a.exr"}, {dir / "a.png", "beauty"}, {dir / "o.png", "occlusion"}};
   render_picture(request, targets, silent);

@@ -1,6 +1,7 @@
 #include "engine/pipeline/build/meshes.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <utility>
 
 #include "engine/base/surfel.h"
@@ -9,6 +10,8 @@
 
 namespace ptc {
 namespace {
+
+constexpr std::size_t kBackdropTriangles = 24;  // of its two boxes, the last ones of the mesh
 
 /// Appends a box of 12 triangles whose front sides face outwards.
 /// @param low, high  opposite corners, scene units
@@ -84,6 +87,15 @@ Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* a
   if (joined) check_mesh(mesh, field);  // meshes may lie too far from each other
   if (backdrop && !mesh.triangles.empty()) add_backdrop(mesh, field);
   return mesh;
+}
+
+Bounds bounds_before_backdrop(const Mesh& mesh) {
+  Bounds bounds;
+  for (std::size_t i = 0; i + kBackdropTriangles < mesh.triangles.size(); ++i) {
+    for (const std::uint32_t vertex : mesh.triangles[i])
+      bounds.add(mesh.origin + glm::dvec3(mesh.positions[vertex]));
+  }
+  return bounds;
 }
 
 }  // namespace ptc

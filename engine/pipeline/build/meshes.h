@@ -23,4 +23,7 @@ namespace ptc {
                                std::vector<MeshCamera>* cameras = nullptr,
                                const char* field = "inputs");
 
+/// Returns the box around a mesh of load_meshes() that has a backdrop, without the backdrop.
+[[nodiscard]] Bounds bounds_before_backdrop(const Mesh& mesh);
+
 }  // namespace ptc

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <tuple>
 #include <vector>
 
@@ -53,25 +54,28 @@ std::vector<Part> corners_of(const Bounds& bounds) {
   return parts;
 }
 
-/// Returns the clusters of a level.
-std::vector<Part> clusters_of(const ContainerReader& scene, unsigned level) {
+/// Returns the clusters of a level whose middle lies in a box, or all where there is no box.
+std::vector<Part> clusters_of(const ContainerReader& scene, unsigned level,
+                              const std::optional<Bounds>& box) {
   std::vector<Part> parts;
-  const auto clusters = open_level(scene, level, {});
+  const auto clusters = open_level(scene, level, box);
   std::vector<Surfel> block(kClusters);
   while (const std::size_t count = clusters->next(block)) {
-    for (std::size_t i = 0; i < count; ++i)
-      parts.push_back({block[i].position, glm::dvec3(block[i].normal), block[i].radius});
+    for (const Surfel& cluster : std::span(block).first(count)) {
+      if (box && !box->contains(cluster.position)) continue;
+      parts.push_back({cluster.position, glm::dvec3(cluster.normal), cluster.radius});
+    }
   }
   return parts;
 }
 
 /// Returns the clusters of the first level that has enough of them; none where a page is damaged.
-std::vector<Part> clusters_of(const ContainerReader& scene) {
+std::vector<Part> clusters_of(const ContainerReader& scene, const std::optional<Bounds>& box) {
   std::vector<Part> parts;
   try {
     for (unsigned level = 1; level <= scene.superblock().levels && parts.size() < kClusters;
          ++level)
-      parts = clusters_of(scene, level);
+      parts = clusters_of(scene, level, box);
   } catch (const FormatError&) {
     return {};
   }
@@ -133,24 +137,25 @@ double middle_of(const std::vector<Part>& parts, const glm::dvec3& across,
 
 }  // namespace
 
-Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdrop,
+Camera overview(const ContainerReader& scene, const glm::dvec3& up,
+                const std::optional<Bounds>& subject,
                 const std::optional<std::array<unsigned, 2>>& size) {
   const auto [low, high] = std::tie(scene.superblock().bounds_low, scene.superblock().bounds_high);
-  const Bounds bounds{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+  const Bounds bounds =
+      subject.value_or(Bounds{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}});
   Camera camera;
   if (size) {
     camera.width = (*size)[0];
     camera.height = (*size)[1];
   }
-  std::vector<Part> parts;
-  if (!backdrop) parts = clusters_of(scene);
+  std::vector<Part> parts = clusters_of(scene, subject);
   if (parts.empty()) parts = corners_of(bounds);
   // Measure from the middle of the bounds, where numbers are small
   const glm::dvec3 middle = bounds.low / 2.0 + bounds.high / 2.0;
   for (Part& part : parts) part.middle -= middle;
 
   // Look from above on the side of +z when +y is up, of -y when +z is, of +y when +x is
-  const glm::dvec3 from(0.45, backdrop ? kHeight : height_of(bounds, up), 1);
+  const glm::dvec3 from(0.45, height_of(bounds, up), 1);
   const glm::dvec3 away = glm::normalize(up.z > 0   ? glm::dvec3(from.x, -from.z, from.y)
                                          : up.x > 0 ? glm::dvec3(from.y, from.z, from.x)
                                                     : from);
@@ -171,7 +176,7 @@ Camera overview(const ContainerReader& scene, const glm::dvec3& up, bool backdro
   camera.look_at = middle + axes.right * middle_of(parts, axes.right, axes.forward, wide, depth) +
                    axes.up * middle_of(parts, axes.up, axes.forward, tall, depth) +
                    axes.forward * target;
-  camera.position = camera.look_at - axes.forward * distance * (backdrop ? 0.5 : 1.0);
+  camera.position = camera.look_at - axes.forward * distance;
   return camera;
 }
 

@@ -65,11 +65,12 @@ std::unique_ptr<PrimaryView> view_mesh(const RayScene& scene, const DirectLight&
 }
 
 Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> cameras,
-                      bool backdrop, const std::optional<std::array<unsigned, 2>>& size) {
+                      const std::optional<Bounds>& subject,
+                      const std::optional<std::array<unsigned, 2>>& size) {
   const auto& text = scene.meta().text;
   if (const auto recorded = text.find(kCameraKey); recorded != text.end())
     return camera_from_json(recorded->second);
-  if (cameras.empty()) return overview(scene, up_of(text), backdrop, size);
+  if (cameras.empty()) return overview(scene, up_of(text), subject, size);
   Camera camera;
   const MeshCamera& from = cameras.front();
   const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);

@@ -11,6 +11,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/base/stream.h"
+#include "engine/base/surfel.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
@@ -73,10 +74,11 @@ class PrimaryView {
 
 /// Returns the camera of a request that names none: the one recorded in the container or, without a
 /// record, the first one of the mesh files or, without that, that of overview().
-/// @param backdrop  the scene stands on a backdrop, which is larger and may leave the picture
-/// @param size      width and height of the picture; empty: those of the camera
+/// @param subject  box around what is to fill the picture; empty: the whole scene
+/// @param size     width and height of the picture; empty: those of the camera
 [[nodiscard]] Camera default_camera(const ContainerReader& scene,
-                                    std::span<const MeshCamera> cameras, bool backdrop,
+                                    std::span<const MeshCamera> cameras,
+                                    const std::optional<Bounds>& subject,
                                     const std::optional<std::array<unsigned, 2>>& size);
 
 }  // namespace ptc

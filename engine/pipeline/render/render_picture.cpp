@@ -94,8 +94,14 @@ void load_subject(Subject& subject, const RenderRequest& request, const Containe
     progress.note(
         "the meshes lie outside of the scene: is this the container that was built from them?");
   }
-  subject.camera = request.camera ? *request.camera
-                                  : default_camera(scene, cameras, request.backdrop, request.size);
+  if (request.camera) {
+    subject.camera = *request.camera;
+  } else {
+    std::optional<Bounds> box;
+    if (request.backdrop && !subject.mesh.triangles.empty())
+      box = bounds_before_backdrop(subject.mesh);
+    subject.camera = default_camera(scene, cameras, box, request.size);
+  }
   if (request.size) {
     subject.camera.width = (*request.size)[0];
     subject.camera.height = (*request.size)[1];

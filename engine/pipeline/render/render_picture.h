@@ -40,7 +40,8 @@ struct RenderRequest : LightingRequest {
   std::shared_ptr<const Mesh> mesh;
   bool backdrop = false;  ///< sets the meshes on a ground in front of a red wall
   /// Camera of the picture; empty: the one that the scene was built with or, without that, the
-  /// first one of the mesh files or, without that, one that sees everything.
+  /// first one of the mesh files or, without that, one that sees everything. A backdrop may then
+  /// leave the picture; what stands on it does not.
   std::optional<Camera> camera;
   /// Width and height of the picture in pixels; empty: those of the camera.
   std::optional<std::array<unsigned, 2>> size;

@@ -103,7 +103,7 @@ void write_thumbnail(const ContainerReader& scene, const std::filesystem::path& 
   constexpr glm::vec3 kBackground(0.8F);
   constexpr float kShare = 1.0F / (kSide * kSide);
   const Camera camera =
-      default_camera(scene, {}, false, std::array{kThumbnailWidth, kThumbnailHeight});
+      default_camera(scene, {}, {}, std::array{kThumbnailWidth, kThumbnailHeight});
   const std::unique_ptr<PrimaryView> view = view_of(scene, camera, executor);
   const bool is_lit = scene.superblock().flux != std::array<double, 3>{};
   std::optional<SampledColours> shown;

@@ -170,7 +170,7 @@ void judge_pictures(const ContainerReader& scene, const RayScene& mesh, double s
                     const SpecksOptions& options, const Executor& executor, SpecksRow& row) {
   constexpr unsigned kWidth = 480, kHeight = 270;
   for (const float zoom : {1.0F, 4.0F}) {
-    Camera camera = default_camera(scene, {}, false, std::array{kWidth, kHeight});
+    Camera camera = default_camera(scene, {}, {}, std::array{kWidth, kHeight});
     camera.vertical_fov /= zoom;
     const PicturePair pair(scene, mesh, camera, options.lift, executor);
     row.holes = std::max(row.holes, pair.holes(camera.position, 4 * spacing));

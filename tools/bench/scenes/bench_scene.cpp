@@ -156,8 +156,10 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
   const ContainerReader container(target);
   lit.lights = recorded_lights(container, progress);
   if (!procedural) {
-    lit.camera = default_camera(container, cameras, choice.backdrop,
-                                std::array{options.width, options.height});
+    std::optional<Bounds> subject;
+    if (choice.backdrop) subject = bounds_before_backdrop(lit.mesh);
+    lit.camera =
+        default_camera(container, cameras, subject, std::array{options.width, options.height});
   }
   lit.camera.width = options.width;
   lit.camera.height = options.height;
