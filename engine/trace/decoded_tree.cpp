@@ -10,7 +10,7 @@ namespace ptc {
 namespace {
 
 // Places of the tables: what the rays of one origin open, mostly.
-constexpr std::size_t kGroupPlaces = 4096, kLeafPlaces = 4096;
+constexpr std::size_t kGroupPlaces = 1024, kLeafPlaces = 1024;
 static_assert(kGroupPlaces * (sizeof(TraceGroup) + 16) + kLeafPlaces * (sizeof(TraceLeaf) + 16) <=
               DecodedTree::kBytes);
 

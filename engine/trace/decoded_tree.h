@@ -18,7 +18,7 @@ namespace ptc {
 class DecodedTree {
  public:
   /// Memory of a tree, bytes.
-  static constexpr std::uint64_t kBytes = std::uint64_t{5} << 20;
+  static constexpr std::uint64_t kBytes = std::uint64_t{5} << 18;
 
   /// @param view, cache  must outlive this; of the same container
   /// @param sides        which sides of discs stop rays
