@@ -331,7 +331,7 @@ void add_check_options(CLI::App& app, CheckRequest& check) {
               "Number of receivers to compare with traced rays\n"
               "The report states the error of occlusion and of irradiance at these receivers.")
       ->group("Quality");
-  add_integer(app, "--check-rays", check.rays, 1, 1 << 24, "Rays for each receiver of --check")
+  add_integer(app, "--check-rays", check.rays, 1, 1 << 18, "Rays for each receiver of --check")
       ->group("Quality");
 }
 

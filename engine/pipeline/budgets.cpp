@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/trace/disc_tracer.h"
+
 namespace ptc {
 namespace {
 
@@ -12,6 +14,8 @@ constexpr std::uint64_t kMinCacheBytes = std::uint64_t{16} << 20;
 /// Bytes of the direction buffers and receiver cells' lists of one thread. At most 14 MiB were
 /// measured, with receivers 80 surfels apart in a city of 20 million.
 constexpr std::uint64_t kGatherBytes = std::uint64_t{16} << 20;
+// Rays at the surfels are traced when no gather lives, in what was charged for gathers
+static_assert(DiscTracer::kBytes <= kGatherBytes);
 
 }  // namespace
 

@@ -12,7 +12,7 @@
 namespace ptc {
 
 /// Decodes groups and leaves when they are first asked for, and keeps what was decoded last. So a
-/// page is looked up once for each group that rays of an origin open, not once for each ray.
+/// page is mostly looked up once for each group that rays of an origin open, not once for each ray.
 ///
 /// Threads: one for each thread.   Memory: kBytes.
 class DecodedTree {
@@ -45,7 +45,9 @@ class DecodedTree {
     return leaves_.find(first << 8 | count,
                         [&](TraceLeaf& into) { decode_leaf(first, count, into); });
   }
-  /// Returns the radiance of all light that leaves the front of a point, W / (m^2 sr).
+  /// Returns the radiance of all light that leaves the front of a point, W / (m^2 sr), from its
+  /// page.
+  /// @throws FormatError when the page is damaged
   [[nodiscard]] glm::vec3 outgoing(std::uint64_t point);
 
   [[nodiscard]] const SceneView& view() const noexcept { return scene_.view(); }

@@ -10,7 +10,6 @@ namespace ptc {
 DiscTracer::DiscTracer(const SceneView& view, PageCache& cache, Sides sides)
     : tree_(view, cache, sides) {}
 
-/// Says whether no ray can meet a disc of a leaf.
 bool DiscTracer::is_empty(const ChildRef& leaf) {
   for (std::uint32_t done = 0; done < leaf.point_count; done += kTraceDiscs) {
     const auto count = std::min<std::uint32_t>(leaf.point_count - done, kTraceDiscs);
@@ -55,9 +54,11 @@ void DiscTracer::begin(const glm::dvec3& origin, const glm::vec3& axis) {
         opened_.push_back(item.reference);
         continue;
       }
-      if (!item.interior && extent > item.distance &&
-          is_empty(decode_reference(item.reference, false)))
-        continue;
+      if (!item.interior) {
+        const ChildRef leaf = decode_reference(item.reference, false);
+        limit.take_points(leaf.point_count);
+        if (extent > item.distance && is_empty(leaf)) continue;
+      }
       items_.push_back(item);
     }
   }

@@ -50,7 +50,9 @@ class DiscTracer {
   /// @throws FormatError when a page is damaged
   void meet(std::span<const glm::vec3> directions, RaysFor wanted, std::span<RayHit> hits);
 
-  /// Returns the radiance that a ray which has met a disc sees, W / (m^2 sr).
+  /// Returns the radiance that a ray which has met a disc sees, W / (m^2 sr), from the page of the
+  /// disc's point.
+  /// @throws FormatError when the page is damaged
   [[nodiscard]] glm::vec3 radiance(const RayHit& hit) {
     return hit.back ? glm::vec3(0) : tree_.outgoing(hit.point);
   }
@@ -64,6 +66,7 @@ class DiscTracer {
     bool interior;
   };
 
+  /// Says whether no ray can meet a disc of a leaf.
   [[nodiscard]] bool is_empty(const ChildRef& leaf);
 
   DecodedTree tree_;

@@ -9,9 +9,8 @@
 namespace ptc {
 namespace {
 
-// Cells of the square of rays whose directions make a tile: more of them along the angle, because
-// rings of a square's rays are wider than they are long.
-constexpr unsigned kTileWidth = 4, kTileHeight = DiscTracer::kTile / kTileWidth;
+// Cells of the square of rays whose directions make a tile.
+constexpr unsigned kTileWidth = 8, kTileHeight = DiscTracer::kTile / kTileWidth;
 
 /// Returns the cells of a square, tile after tile.
 std::vector<std::uint32_t> tile_order(unsigned side) {

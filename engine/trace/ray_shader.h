@@ -23,8 +23,8 @@ struct RayOptions {
   /// none.
   std::function<glm::vec3(const glm::vec3&)> sky;
   bool bleeding = true;  ///< false leaves out the light from surfaces, which takes less time
-  /// Cap of the page cache and of what threads decode. Where it is below what these need, they
-  /// take that: PageCache::min_bytes() and DiscTracer::kBytes for each thread.
+  /// Cap of the page cache and of what threads decode. Raised to PageCache::min_bytes() plus
+  /// DiscTracer::kBytes for each thread where it is less.
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;
   BackEnd back_end = BackEnd::pread;
 };
@@ -32,9 +32,10 @@ struct RayOptions {
 /// Returns the options of rays that find what a shader approximates, under the same cap.
 [[nodiscard]] RayOptions ray_options(const ShadeOptions& options);
 
-/// The reference for a gather's own error, and another way to shade.
+/// Shades receivers by rays through the octree: the reference for a gather's own error.
 ///
 /// Results depend on the receivers, the number of rays and the seed alone.
+/// Memory: RayOptions::memory_bytes, and 56 bytes for each ray of a receiver and thread.
 class RayShader {
  public:
   /// @param scene, executor  must outlive this

@@ -10,7 +10,7 @@
 //       |    .-'           |
 //       +------------------+
 //
-// Boxes lie in columns, one for each bound, so that kernels test kLanes of them at once.
+// Boxes lie in columns, one for each bound, so that kernels test kTraceLanes of them at once.
 #pragma once
 
 #include <algorithm>
@@ -64,7 +64,7 @@ struct alignas(64) TraceLeaf {
 
 /// Boxes that many rays share, by ascending distance from the origin.
 ///
-/// Memory: some 60 bytes for each of kCapacity boxes.
+/// Memory: 52 bytes for each of kCapacity boxes.
 struct BoxList {
   static constexpr std::size_t kCapacity = 512;
 

@@ -222,8 +222,12 @@ void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& 
   }
   // Bound each child by its octant, its sphere and its slab
   const auto unit = hn::Set(f, static_cast<float>(SceneScale::kLatticeUnit)),
-             most = hn::Set(f, 2 * SceneScale::kMaxRadius),
-             middle = hn::Set(f, static_cast<float>(kMeanSteps / 2));
+             most = hn::Set(f, 2 * SceneScale::kMaxRadius);
+  // Mean positions above the first are in the upper octants of an axis, those below the second in
+  // the lower ones
+  const auto half_cell = static_cast<float>(kMeanSteps / 2);
+  const float low_half = children > 1 ? half_cell : static_cast<float>(kMeanSteps),
+              high_half = children > 1 ? half_cell : 0;
   for (int from = 0; from < static_cast<int>(kTraceLanes); from += static_cast<int>(hn::Lanes(f))) {
     const int at = 2 * from;
     const auto length = [&](const std::byte* column) {
@@ -252,11 +256,15 @@ void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& 
       const auto base = hn::Set(f, corner[k]), whole = hn::Set(f, edge),
                  part = hn::Set(f, edge / 2);
       to[k] = hn::MulAdd(steps, hn::Set(f, edge / static_cast<float>(kMeanSteps)), base);
-      // Where the mean was rounded to the middle of the cell, the octant may be either
-      const auto octant_low = hn::Add(base, hn::IfThenElseZero(hn::Gt(steps, middle), part)),
-                 octant_high = hn::Add(base, hn::IfThenElse(hn::Lt(steps, middle), part, whole));
-      const auto aside =
-          hn::Sqrt(hn::Max(hn::NegMulAdd(normals[k], normals[k], hn::Set(f, 1.0F)), hn::Zero(f)));
+      // Where the mean was rounded to the middle of the cell, the octant may be either. The one
+      // child of a root that is a leaf has the whole cell
+      const auto upper = hn::Gt(steps, hn::Set(f, low_half)),
+                 lower = hn::Lt(steps, hn::Set(f, high_half));
+      const auto octant_low = hn::Add(base, hn::IfThenElseZero(upper, part)),
+                 octant_high = hn::Add(base, hn::IfThenElse(lower, part, whole));
+      // The sine between normal and axis, from the other two components, because 1 - n_k^2 cancels
+      const VF n1 = normals[(k + 1) % 3], n2 = normals[(k + 2) % 3];
+      const auto aside = hn::Sqrt(hn::MulAdd(n1, n1, hn::Mul(n2, n2)));
       const auto reach =
           hn::Min(radius, hn::MulAdd(half, hn::Abs(normals[k]), hn::Mul(radius, aside)));
       const auto low = hn::Max(hn::Sub(to[k], reach), hn::Sub(octant_low, greatest)),
@@ -288,8 +296,10 @@ void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t f
     }
     const auto axis = spread(origin.axis);
     const auto cosine = dot(s.normal, axis);
-    const auto rise = hn::Mul(
-        s.radius, hn::Sqrt(hn::Max(hn::NegMulAdd(cosine, cosine, hn::Set(f, 1.0F)), hn::Zero(f))));
+    const Vec tilt{hn::NegMulAdd(cosine, axis.x, s.normal.x),
+                   hn::NegMulAdd(cosine, axis.y, s.normal.y),
+                   hn::NegMulAdd(cosine, axis.z, s.normal.z)};
+    const auto rise = hn::Mul(s.radius, hn::Sqrt(dot(tilt, tilt)));
     const auto size = hn::Add(hn::Abs(s.to.x), hn::Add(hn::Abs(s.to.y), hn::Abs(s.to.z)));
     const auto top =
         hn::MulAdd(hn::Set(f, kRounding), hn::Add(size, s.radius), hn::Add(dot(s.to, axis), rise));

@@ -166,15 +166,21 @@ TEST_CASE("spot light: between the cones the intensity falls as the squared shar
 
 TEST_CASE("spot light: a cone without a blend has a hard edge, and none is too narrow",
           "[scene][lights]") {
-  for (const float angle : {1e-4f, 0.01f, 0.5f, 1.5707963f}) {
-    const SpotLight spot{.direction = {0, 0, 1}, .inner_angle = angle, .outer_angle = angle};
-    const auto share = [&](double of_angle) {
-      const double turned = of_angle * static_cast<double>(angle);
-      return spot_share(spot, {std::sin(turned), 0, std::cos(turned)});
-    };
-    CHECK(share(0) == 1);
-    CHECK(share(0.999) == 1);
-    CHECK(share(1.001) == 0);
+  for (const float angle : {2e-4f, 0.01f, 0.5f, 1.5707963f}) {
+    for (const glm::vec3 along : {glm::vec3(0, 0, 1), glm::vec3(1, -1, 1), glm::vec3(1, -2, 1)}) {
+      const SpotLight spot{
+          .direction = glm::normalize(along), .inner_angle = angle, .outer_angle = angle};
+      const glm::dvec3 axis = glm::normalize(glm::dvec3(spot.direction));
+      const glm::dvec3 aside = glm::normalize(glm::cross(axis, glm::dvec3(0, 1, 0.5)));
+      const auto share = [&](double of_angle) {
+        const double turned = of_angle * static_cast<double>(angle);
+        return spot_share(spot, axis * std::cos(turned) + aside * std::sin(turned));
+      };
+      CAPTURE(angle, along.x, along.y);
+      CHECK(share(0) == 1);
+      CHECK(share(0.999) == 1);
+      CHECK(share(1.001) == 0);
+    }
   }
   CHECK(spot_share({}, {0, 0, 0}) == 0);
 }

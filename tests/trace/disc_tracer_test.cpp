@@ -99,6 +99,59 @@ TEST_CASE("trace: so they do in a cloud of discs of all sizes, whatever a leaf h
   }
 }
 
+TEST_CASE("trace: so they do where the root is a leaf", "[trace]") {
+  // A few discs far apart, seen from above: its one child has the whole cell, not an octant
+  std::vector<Surfel> surfels;
+  for (const double x : {0.0, 0.1, 0.2, 0.9}) {
+    Surfel s;
+    s.position = {x, 0.3 * x, 0.1 * x};
+    s.normal = {0, 0, 1};
+    s.radius = 0.05F;
+    s.radiance = glm::vec3(1);
+    surfels.push_back(s);
+  }
+  Scene scene(surfels);
+  for (const Surfel& s : surfels)
+    scene.receivers.push_back({s.position + glm::dvec3(0.01, 0, 0.04), {0, 0, -1}});
+  check_against_embree(scene, scene.receivers, Sides::both, 1e-4);
+}
+
+TEST_CASE("trace: so they do along ground that is hardly tilted", "[trace]") {
+  // Rays at an angle of 0.001 to the ground, from far away: boxes are as thin as its tilt makes
+  // them
+  std::vector<Surfel> surfels;
+  const double tilt = 2.3e-4;
+  for (int j = 0; j < 200; ++j) {
+    for (int i = 0; i < 200; ++i) {
+      Surfel s;
+      s.position = {i * 0.01, j * 0.01, tilt * i * 0.01};
+      s.normal = glm::normalize(glm::vec3(-tilt, 0, 1));
+      s.radius = 0.008F;
+      surfels.push_back(s);
+    }
+  }
+  const Scene scene(surfels);
+  const SceneView view(*scene.container);
+  PageCache cache(*scene.container, {.memory_bytes = 64U << 20});
+  DiscTracer tracer(view, cache, Sides::both);
+  std::mt19937 bits(3);
+  std::uniform_real_distribution<double> uniform(0.1, 1.9);
+  int missed = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const glm::dvec3 target(uniform(bits), uniform(bits), 0);
+    const double turn = 3 * uniform(bits);
+    const glm::dvec3 back(std::cos(turn), std::sin(turn), 0.001);
+    glm::dvec3 origin = target + 2.5 * back;
+    origin.z += tilt * target.x;
+    const glm::vec3 along(-glm::normalize(back));
+    RayHit hit;
+    tracer.begin(origin, along);
+    tracer.meet({&along, 1}, RaysFor::nearest, {&hit, 1});
+    if (!hit.met()) ++missed;
+  }
+  CHECK(missed == 0);
+}
+
 TEST_CASE("trace: far from the origin of its coordinates a scene has the same occlusion",
           "[trace]") {
   std::vector<Surfel> surfels = small_scene(0.05);
@@ -113,7 +166,7 @@ TEST_CASE("trace: far from the origin of its coordinates a scene has the same oc
   CHECK(difference / static_cast<double>(a.size()) < 2e-3);
 }
 
-TEST_CASE("trace: threads, caps and back ends change no bit", "[trace]") {
+TEST_CASE("trace: threads and caps change no bit", "[trace]") {
   const SceneOnItself scene(small_scene(0.01), 400);
   const std::vector<Shading> one = trace(scene, scene.receivers, 100, {});
   const auto check_same = [&](const RayOptions& options, unsigned threads) {

@@ -48,7 +48,9 @@ double spot_share(const SpotLight& spot, const glm::dvec3& place) noexcept {
   const glm::dvec3 offset = place - spot.position;
   const double distance = glm::length(offset);
   if (!(distance > 0)) return 0;
-  const double cosine = glm::dot(glm::dvec3(spot.direction), offset) / distance;
+  // The length of a unit vector of floats is not quite 1, which matters to narrow cones
+  const glm::dvec3 axis(spot.direction);
+  const double cosine = glm::dot(axis, offset) / (distance * glm::length(axis));
   const double inner = std::cos(static_cast<double>(spot.inner_angle));
   const double outer = std::cos(static_cast<double>(spot.outer_angle));
   if (cosine >= inner) return 1;

@@ -39,14 +39,20 @@ void cosine_directions(const glm::vec3& normal, unsigned side, std::uint64_t see
   Uniform uniform(seed);
   directions.clear();
   directions.reserve(std::size_t{side} * side);
+  const auto place = [&](unsigned cell) {  // on an edge of the square [-1, 1]^2
+    return 2 * (static_cast<float>(cell) + uniform()) / static_cast<float>(side) - 1;
+  };
   for (unsigned j = 0; j < side; ++j) {
     for (unsigned i = 0; i < side; ++i) {
-      const float u = (static_cast<float>(i) + uniform()) / static_cast<float>(side);
-      const float angle = 2 * kPi * (static_cast<float>(j) + uniform()) / static_cast<float>(side);
-      const float sine = std::sqrt(u);
-      directions.push_back(tangent * (sine * std::cos(angle)) +
-                           bitangent * (sine * std::sin(angle)) +
-                           normal * std::sqrt(std::max(0.0F, 1 - u)));
+      const float u = place(i), v = place(j);
+      // Squares about the middle become circles: the greater coordinate is the radius, which is the
+      // sine of the angle to the normal, and their ratio the place on an eighth of the circle
+      const bool wide = std::abs(u) > std::abs(v);
+      const float sine = wide ? u : v;
+      const float turn = sine == 0 ? 0 : kPi / 4 * (wide ? v : u) / sine;
+      const float along = sine * std::cos(turn), across = sine * std::sin(turn);
+      directions.push_back(tangent * (wide ? along : across) + bitangent * (wide ? across : along) +
+                           normal * std::sqrt(std::max(0.0F, 1 - sine * sine)));
     }
   }
 }

@@ -27,10 +27,11 @@ struct DiscHit {
 /// Returns the side of the largest square grid of at most this many rays.
 [[nodiscard]] unsigned square_side(std::size_t rays) noexcept;
 
-/// Makes cosine-distributed directions above a normal, one in each cell of a square grid. The same
-/// seed gives the same directions.
-/// @param side        of the square; a row of cells is a wedge about the normal
-/// @param directions  receives side * side of them, row after row
+/// Makes cosine-distributed directions above a normal, one in each cell of a square grid, of which
+/// neighbouring cells have neighbouring directions (the concentric map of Shirley and Chiu 1997).
+/// The same seed gives the same directions.
+/// @param side        of the square
+/// @param directions  receives side * side of them, row after row of the grid
 void cosine_directions(const glm::vec3& normal, unsigned side, std::uint64_t seed,
                        std::vector<glm::vec3>& directions);
 

@@ -11,8 +11,7 @@
 //
 // The filter also lets rays through backs that are clear. All lengths are in edges of the scene's
 // frame, as in the gather.
-#include <algorithm>
-#include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include <glm/geometric.hpp>
@@ -22,6 +21,12 @@
 #include "engine/shade/scene_scale.h"
 
 namespace ptc {
+namespace {
+
+constexpr float kNever = std::numeric_limits<float>::infinity();
+
+}  // namespace
+
 struct DiscRays::Impl {
   /// The frame of the numbers that Embree is given, which must stay below 1.8e18.
   struct Space {
@@ -96,31 +101,30 @@ struct DiscRays::Impl {
     return ray;
   }
 
-  /// Replaces what a ray has met so far where a disc here is nearer.
-  void meet(const glm::vec3& from, const glm::vec3& along, DiscHit& met) const {
+  /// Returns what a ray meets.
+  [[nodiscard]] DiscHit meet(const glm::vec3& from, const glm::vec3& along) const {
     // Find the nearest flat disc.
     Context context{};
     rtcInitIntersectContext(&context.embree);
     context.discs = this;
-    RTCRayHit ray = make_ray(from, along, 0, met.depth);
+    RTCRayHit ray = make_ray(from, along, 0, kNever);
     rtcIntersect1(scene, &context.embree, &ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
     // Find the least bumped depth among the discs just behind it.
     const float t = ray.ray.tfar;
     const float slack = 1e-6F * t;
     const float deepest = t + kBump * radius(ray.hit.primID) + slack;
     context.choose = true;
-    context.best = met.depth;
-    RTCRayHit again = make_ray(from, along, t - slack, std::min(deepest, met.depth));
+    context.best = kNever;
+    RTCRayHit again = make_ray(from, along, t - slack, deepest);
     rtcIntersect1(scene, &context.embree, &again);
     // Take the nearest disc at its deepest where rounding has left the second pass without any.
     if (context.best_disc == RTC_INVALID_GEOMETRY_ID) {
-      if (deepest >= met.depth) return;
       context.best = deepest;
       context.best_disc = ray.hit.primID;
     }
     const Surfel& disc = surfels[context.best_disc];
-    met = {context.best, glm::dot(along, disc.normal) < 0 ? disc.outgoing() : glm::vec3(0)};
+    return {context.best, glm::dot(along, disc.normal) < 0 ? disc.outgoing() : glm::vec3(0)};
   }
 };
 
@@ -170,7 +174,7 @@ Shading DiscRays::trace(const Receiver& receiver, unsigned rays, std::uint64_t s
   cosine_directions(receiver.normal, square_side(rays), seed, directions);
   const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, receiver.position);
   std::vector<DiscHit> hits(directions.size());
-  for (std::size_t i = 0; i < hits.size(); ++i) impl_->meet(from, directions[i], hits[i]);
+  for (std::size_t i = 0; i < hits.size(); ++i) hits[i] = impl_->meet(from, directions[i]);
   return sum_rays(receiver, directions, hits, impl_->sky);
 }
 
