@@ -25,7 +25,7 @@ ModelOptions small() {
   options.scene.shaded_width = 64;
   options.scene.shaded_height = 36;
   options.checked = 40;
-  options.reference_rays = 1024;
+  options.reference_rays = 8192;
   options.repeats = 1;
   options.solid_angles = {0.1F, 0.02F};
   options.study_resolution = 32;

@@ -27,7 +27,7 @@ class Bench(ProgramTest):
         charts = self.here / "charts"
         settings = ["--setting", "0.06,0.3,32", "--setting", "0.005,0.07,32"]
         printed = self.succeed("ptcbench", "accuracy", "fractal", "--quick", "--points", "20k", "--checked", "60",
-                               "--repeats", "1", "--reference-rays", "4096", *settings, "-o", charts, "--json")
+                               "--repeats", "1", "--reference-rays", "8192", *settings, "-o", charts, "--json")
         facts = json.loads((charts / "accuracy.json").read_text())
         self.assertEqual(json.loads(printed.stdout)["rows"], facts["rows"])
         for place in ("camera", "points", "sparse"):
