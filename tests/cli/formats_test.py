@@ -69,8 +69,8 @@ class Formats(ProgramTest):
             wanted = [int(0.25 * i + 0.5) for i in range(500)]
             self.assertEqual(sorted(values) if name == "d.las" else values, wanted, name)
 
-    def write_las(self, path, sizes):
-        """Writes a LAS of 400 points of a plane with a record of each size. Returns the bytes of the records."""
+    def write_las(self, path, sizes, extended=()):
+        """Writes a LAS of 400 points of a plane with a record of each size. Returns the bytes of the records, extended ones last."""
         records = b"".join(struct.pack("<H16sHH32s", 0, b"someone", i, size, b"of a test") +
                            bytes((k * k >> 7) & 255 for k in range(size)) for i, size in enumerate(sizes))
         head = bytearray(375)
@@ -80,13 +80,21 @@ class Formats(ProgramTest):
         struct.pack_into("<6d", head, 179, 0.19, 0, 0.19, 0, 0, 0)
         struct.pack_into("<Q", head, 247, 400)
         points = b"".join(struct.pack("<iii18x", i % 20, i // 20, 0) for i in range(400))
-        path.write_bytes(bytes(head) + records + points)
-        return records
+        more = b"".join(struct.pack("<H16sHQ32s", 0, b"surveyor", i, size, b"extended") +
+                        bytes((k * k >> 5) & 255 for k in range(size)) for i, size in enumerate(extended))
+        if extended:
+            struct.pack_into("<QI", head, 235, 375 + len(records) + len(points), len(extended))
+        path.write_bytes(bytes(head) + records + points + more)
+        return records + more
 
     def records_of(self, path):
-        """Returns the bytes between the header and the points of a LAS file, without those of its extra bytes."""
+        """Returns the bytes between the header and the points of a LAS file, without those of its extra bytes, and those behind the points."""
         data = path.read_bytes()
         begin, count = struct.unpack_from("<II", data, 96)
+        size, = struct.unpack_from("<H", data, 105)
+        behind, extended, points = struct.unpack_from("<QIQ", data, 235)
+        end = begin + points * size
+        self.assertEqual((behind, extended > 0), (end, True) if len(data) > end else (0, False))
         kept, at = b"", 375
         for _ in range(count):
             user, number, size = struct.unpack_from("<16sHH", data, at + 2)
@@ -94,7 +102,7 @@ class Formats(ProgramTest):
                 kept += data[at:at + 54 + size]
             at += 54 + size
         self.assertEqual(at, begin)
-        return kept
+        return kept + data[end:]
 
     def test_long_records_of_las_come_out_again_and_a_container_keeps_16_kib(self):
         las, out, scene = self.here / "a.las", self.here / "b.las", self.here / "a.ptcx"
@@ -114,6 +122,27 @@ class Formats(ProgramTest):
             self.succeed("ptcverify", scene)
             self.succeed("ptcconvert", scene, out)
             self.assertEqual(len(self.records_of(out)), 2 * 54 + 700 + 15000)
+
+    def test_extended_records_of_las_come_out_again_and_what_is_beyond_1_mib_is_named(self):
+        las, out, scene = self.here / "a.las", self.here / "b.las", self.here / "a.ptcx"
+        records = self.write_las(las, [300], [65535, 65536, 700000, 9, 0])
+        self.assertEqual(self.succeed("ptcconvert", las, out).stderr, "")
+        self.assertEqual(self.records_of(out), records)
+        self.assertNotIn("left out", self.succeed("ptcshade", las, "-o", out).stderr)
+        self.assertEqual(self.records_of(out), records)
+        # A container keeps the short ones
+        self.assertEqual(self.succeed("ptcbuild", las, "-o", scene).stderr.count("is left out: a container keeps"), 3)
+        self.succeed("ptcverify", scene)
+        self.succeed("ptcconvert", scene, out)
+        self.assertEqual(self.records_of(out), records[:354] + records[-129:])
+        # Above 1 MiB in all, those that do not fit are named
+        self.write_las(las, [300], [700000, 400000, 9])
+        said = "a.las: The record 1 of the user 'surveyor', 400000 bytes, is left out: only 1 MiB of records is kept.\n"
+        for command in (["ptcconvert", las, out], ["ptcconvert", las, out, "--dry-run"], ["ptcshade", las, "-o", out]):
+            with self.subTest(command):
+                run = self.succeed(*command)
+                self.assertEqual((run.stdout + run.stderr).count(said), 1)
+        self.assertEqual(len(self.records_of(out)), 354 + 700060 + 69)
 
     def test_shading_a_las_keeps_its_long_records(self):
         las, out, other = self.here / "a.las", self.here / "b.las", self.here / "other.las"

@@ -355,9 +355,9 @@ TEST_CASE("las: the texts las.header and las.vlrs keep what a writer needs", "[i
   file.scale = {0.001, 0.01, 1e-7};
   file.offset = {-0.0, 1e7 + 0.1, 3};
   const std::string first = las_vlr("someone", 1, "ab");
-  const std::string last = las_vlr("someone", 2, "xyz");
+  const std::string last = las_vlr("someone", 2, "xyz", true);
   file.vlrs = {first, las_vlr("laszip encoded", 1, "?"), las_vlr("copc", 1, "?")};
-  file.evlrs = {las_vlr("copc", 1000, "?", true), las_vlr("someone", 2, "xyz", true)};
+  file.evlrs = {las_vlr("copc", 1000, "?", true), last};
   const auto text = read_las(scratch, file.bytes()).info.text;
   const auto json = nlohmann::json::parse(text.at("las.header"));
   CHECK(json["version"] == "1.4");
@@ -375,23 +375,27 @@ TEST_CASE("las: the texts las.header and las.vlrs keep what a writer needs", "[i
   CHECK(json["file_source_id"] == 7);
 
   // Decode base64 by bits.
-  const std::string& base64 = text.at("las.vlrs");
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  CHECK(base64.size() % 4 == 0);
-  std::string bytes;
-  std::uint32_t bits = 0;
-  int held = 0;
-  for (const char c : base64.substr(0, base64.find('='))) {
-    bits = bits << 6 | static_cast<std::uint32_t>(kDigits.find(c));
-    held += 6;
-    if (held >= 8) bytes += static_cast<char>(bits >> (held -= 8) & 255);
-  }
-  CHECK(bytes == first + last);
+  const auto decoded = [](const std::string& base64) {
+    constexpr std::string_view kDigits =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    CHECK(base64.size() % 4 == 0);
+    std::string bytes;
+    std::uint32_t bits = 0;
+    int held = 0;
+    for (const char c : base64.substr(0, base64.find('='))) {
+      bits = bits << 6 | static_cast<std::uint32_t>(kDigits.find(c));
+      held += 6;
+      if (held >= 8) bytes += static_cast<char>(bits >> (held -= 8) & 255);
+    }
+    return bytes;
+  };
+  const std::string& both = text.at("las.vlrs");
+  REQUIRE(both.find(',') != std::string::npos);
+  CHECK(decoded(both.substr(0, both.find(','))) == first);
+  CHECK(decoded(both.substr(both.find(',') + 1)) == last);
 }
 
-TEST_CASE("las: records of every length that a VLR has are kept, up to 1 MiB in all",
-          "[io][points][las]") {
+TEST_CASE("las: records of every length are kept, up to 1 MiB in all", "[io][points][las]") {
   const test::TemporaryDirectory scratch;
   constexpr std::size_t kMiB = 1'048'576;
   LasFile file = one_point(6);
@@ -399,30 +403,54 @@ TEST_CASE("las: records of every length that a VLR has are kept, up to 1 MiB in 
   const auto add = [&](const char* user, unsigned number, std::size_t size, bool extended = false) {
     (extended ? file.evlrs : file.vlrs)
         .push_back(las_vlr(user, number, std::string(size, 'x'), extended));
-    if (size <= 65'535) bytes += 54 + size;
+    bytes += (extended ? 60 : 54) + size;
   };
-  for (unsigned i = 0; i < 15; ++i) add("a", i, 65'535);
-  add("a", 15, kMiB - bytes - 54);
+  // Kept whole, and one byte more is too much, whether one record is extended or all are plain
+  for (const bool extended : {true, false}) {
+    file.vlrs.clear();
+    file.evlrs.clear();
+    bytes = 0;
+    for (unsigned i = 0; i < 4; ++i) add("a", i, 65'535);
+    if (extended) {
+      add("a", 15, kMiB - bytes - 60, true);
+    } else {
+      for (unsigned i = 4; i < 15; ++i) add("a", i, 65'535);
+      add("a", 15, kMiB - bytes - 54);
+    }
+    const PointFileInfo info = read_las(scratch, file.bytes()).info;
+    CHECK(info.notes.empty());
+    const auto kept = decode_vlrs(info.text.at("las.vlrs"));
+    REQUIRE(kept);
+    CHECK(kept->size() == file.vlrs.size() + file.evlrs.size());
+    CHECK(kept->back().number == 15);
+    CHECK(kept->back().extended == extended);
+    CHECK(kept->back().bytes == (extended ? file.evlrs : file.vlrs).back());
+    std::string& last = (extended ? file.evlrs : file.vlrs).back();
+    const std::string whole = last;
+    const std::size_t payload = last.size() - (extended ? 60 : 54) + 1;
+    last = las_vlr("a", 15, std::string(payload, 'x'), extended);
+    CHECK(read_las(scratch, file.bytes()).info.notes ==
+          std::vector<std::string>{"The record 15 of the user 'a', " + std::to_string(payload) +
+                                   " bytes, is left out: only 1 MiB of records is kept."});
+    last = whole;
+  }
   const PointFileInfo full = read_las(scratch, file.bytes()).info;
-  CHECK(full.notes.empty());
-  CHECK(full.text.at("las.vlrs").size() == (kMiB + 2) / 3 * 4);
 
-  // What is behind them, or longer, is left out and named, with its bytes
+  // What is behind them is left out and named, with its bytes
   add("b", 2, 0);
   add("LASF_Projection", 2112, 65'536, true);
   for (int i = 0; i < 3; ++i) add("c\x1b", 7, 5);
   const PointFileInfo more = read_las(scratch, file.bytes()).info;
   const std::string end = " left out: only 1 MiB of records is kept.";
-  CHECK(more.notes ==
-        std::vector<std::string>{"The record 2112 of the user 'LASF_Projection', 65536 bytes, is "
-                                 "left out: no record of more than 65,535 bytes is kept.",
-                                 "The record 2 of the user 'b', 0 bytes, is" + end,
-                                 "3 records 7 of the user 'c\\x1b', 15 bytes in all, are" + end});
+  CHECK(more.notes == std::vector<std::string>{
+                          "The record 2112 of the user 'LASF_Projection', 65536 bytes, is" + end,
+                          "The record 2 of the user 'b', 0 bytes, is" + end,
+                          "3 records 7 of the user 'c\\x1b', 15 bytes in all, are" + end});
   CHECK(more.text.at("las.vlrs") == full.text.at("las.vlrs"));
   for (unsigned i = 0; i < 9; ++i) add("d", i, 0);
   const auto notes = read_las(scratch, file.bytes()).info.notes;
-  REQUIRE(notes.size() == 10);
-  CHECK(notes.back() == "Records of 3 more kinds are left out.");
+  REQUIRE(notes.size() == 9);
+  CHECK(notes.back() == "Records of 4 more kinds are left out.");
 }
 
 TEST_CASE("las: records are shortened to those that fit, and the others are named",
@@ -449,6 +477,18 @@ TEST_CASE("las: records are shortened to those that fit, and the others are name
   CHECK(shorter(99).text == text({last}));
   CHECK(shorter(53).text.empty());
   CHECK(shorter(53).notes.size() == 3);
+  // Extended records come last, and count with their longer headers
+  const std::string longer = las_vlr("c", 4, std::string(40, 'z'), true);
+  const std::string mixed =
+      encode_vlrs(std::as_bytes(std::span(first)), std::as_bytes(std::span(longer)));
+  CHECK(mixed == text({first}) + "," + text({longer}));
+  CHECK(shorten_vlrs(mixed, 200, "why").text == mixed);
+  CHECK(shorten_vlrs(mixed, 199, "why").text == text({first}));
+  CHECK(shorten_vlrs(mixed, 199, "why").notes ==
+        std::vector<std::string>{"The record 4 of the user 'c', 40 bytes, is left out: why."});
+  const std::string alone = encode_vlrs({}, std::as_bytes(std::span(longer)));
+  CHECK(shorten_vlrs(alone, 100, "why").text == alone);
+  CHECK(shorten_vlrs(alone, 99, "why").text.empty());
   // A damaged text is left alone where it is short
   for (const std::string& damaged : {whole + "AAAA", std::string(2000, '?')}) {
     CHECK(shorten_vlrs(damaged, 2000, "why").text == damaged);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tests/io/las_files.h"
 #include "tests/io/written_las.h"
 
 using namespace ptc;
@@ -133,6 +134,47 @@ TEST_CASE("las writer: original records are kept, except those about storage",
     CHECK(written(info, surfels).at<std::uint32_t>(100) == 1);
     CHECK_THAT(losses(OutputFormat::las, info).back(), Contains("las.vlrs is damaged"));
   }
+}
+
+TEST_CASE("las writer: extended records of any length lie behind the points",
+          "[io][writers][las]") {
+  std::vector<Surfel> surfels = surfels_of(3);
+  PointWriteInfo info = plain_info(surfels);
+  const std::string plain = record_bytes("somebody", 4, "plain");
+  const std::string first = las_vlr("somebody", 5, std::string(65'536, 'x'), true);
+  const std::string last = las_vlr("LASF_Projection", 2112, "WKT", true);
+  const std::string all = first + las_vlr("LASF_Spec", 4, "old", true) + last;
+  info.text["las.vlrs"] = base64(plain) + "," + base64(all);
+  info.text["crs"] = "PROJCS[...]";
+  const Las las = written(info, surfels);
+  CHECK(las.at<std::uint32_t>(100) == 1);
+  CHECK(las.bytes.substr(375, plain.size()) == plain);
+  CHECK(las.at<std::uint32_t>(243) == 2);
+  CHECK(las.extended_records() == first + last);
+  CHECK(las.encoding() == 16);                         // WKT, of the extended record
+  CHECK(losses(OutputFormat::las, info).size() == 1);  // the steps
+  // Without points they follow the header, and the reader gives them back
+  const test::TemporaryDirectory scratch;
+  info.text["las.vlrs"] = "," + base64(first);
+  info.text.erase("crs");
+  for (const std::size_t count : {std::size_t{0}, std::size_t{3}}) {
+    surfels.resize(count);
+    info.count = count;
+    write_points(scratch / "a.las", OutputFormat::las, info, surfels);
+    CHECK(Las(scratch / "a.las").extended_records() == first);
+    CHECK(read_las(scratch / "a.las").info.text.at("las.vlrs") == info.text["las.vlrs"]);
+    surfels = surfels_of(3);
+  }
+  // Damaged ones are left out whole
+  for (const std::size_t size : {std::size_t{1}, std::size_t{59}, first.size() - 1}) {
+    info.text["las.vlrs"] = base64(plain) + "," + base64(first.substr(0, size));
+    CHECK(written(info, surfels).extended_records().empty());
+    CHECK_THAT(losses(OutputFormat::las, info).back(), Contains("las.vlrs is damaged"));
+  }
+  std::string endless = first;
+  endless.replace(20, 8, 8, static_cast<char>(0xff));  // the size
+  info.text["las.vlrs"] = base64(plain) + "," + base64(endless);
+  CHECK_THAT(losses(OutputFormat::las, info).back(), Contains("las.vlrs is damaged"));
 }
 
 TEST_CASE("las writer: the reference system is a record of WKT, and the header says so",

@@ -352,8 +352,8 @@ TEST_CASE("las writer: long records of a LAS file are those of the file that is 
     file.vlrs.push_back(las_vlr("someone", number, payload));
     all += file.vlrs.back();
   }
-  file.evlrs = {las_vlr("someone", 9, std::string(60'000, 'e'), true)};
-  all += las_vlr("someone", 9, std::string(60'000, 'e'));
+  file.evlrs = {las_vlr("someone", 9, std::string(60'000, 'e'), true),
+                las_vlr("someone", 10, std::string(300'000, 'f'), true)};
   const LasCloud cloud = read_las(scratch.file("a.las", file.bytes()));
   CHECK(cloud.info.notes.empty());
   PointWriteInfo info = plain_info(cloud.surfels);
@@ -362,9 +362,10 @@ TEST_CASE("las writer: long records of a LAS file are those of the file that is 
   std::vector<std::byte> rows(cloud.rows.size());
   std::memcpy(rows.data(), cloud.rows.data(), rows.size());
   const Las las = written(info, cloud.surfels, rows);
-  CHECK(las.at<std::uint32_t>(100) == 7);
+  CHECK(las.at<std::uint32_t>(100) == 6);
   CHECK(las.points_begin() == 375 + all.size());
   CHECK(las.bytes.substr(375, all.size()) == all);
+  CHECK(las.extended_records() == file.evlrs[0] + file.evlrs[1]);
 }
 
 TEST_CASE("las writer: extra bytes keep the names and descriptions that they had in a LAS file",

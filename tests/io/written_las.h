@@ -39,6 +39,21 @@ struct Las {
     CHECK(place == points_begin());
     return {};
   }
+  /// Returns the extended records, headers included, by the fields of the header.
+  [[nodiscard]] std::string extended_records() const {
+    const auto count = at<std::uint32_t>(243);
+    const auto begin = static_cast<std::size_t>(at<std::uint64_t>(235));
+    if (count == 0) {
+      CHECK(begin == 0);
+      return {};
+    }
+    CHECK(begin == points_begin() + at<std::uint64_t>(247) * point_bytes());
+    std::size_t place = begin;
+    for (std::uint32_t i = 0; i < count; ++i)
+      place += 60 + static_cast<std::size_t>(at<std::uint64_t>(place + 20));
+    CHECK(place == bytes.size());
+    return bytes.substr(begin);
+  }
   /// Returns the names of the extra bytes with their types, such as "radius 9".
   [[nodiscard]] std::vector<std::string> extra_names() const {
     const std::string list = record("LASF_Spec", 4);

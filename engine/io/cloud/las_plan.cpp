@@ -1,11 +1,11 @@
-// Decides the head of a LAS file and the records between its header and its points.
+// Decides the head of a LAS file and the records before and behind its points.
 //
 // A cloud that came from LAS carries two texts. `las.header` is a JSON object with the members
 // format, record_length, scale, offset, system or system_id, software (bytes as code points), day,
 // year, encoding or global_encoding, file_source_id and guid (32 hexadecimal digits); `las.vlrs`
-// (las_vlrs.h) has the variable length records as they lay in the file. Both may come from a file
-// of anyone, so nothing in them is taken for granted: what is not of the expected form is passed
-// over.
+// (las_vlrs.h) has its variable length records, extended or not, as they lay there. Both may come
+// from a file of anyone, so nothing in them is taken for granted: what is not of the expected form
+// is passed over.
 //
 // Other clouds get steps of a power of ten, the finest with which 32 bits suffice:
 //
@@ -146,10 +146,11 @@ Records kept_records(const std::vector<Vlr>& originals) {
   for (const Vlr& record : originals) {
     if (is_about_storage(record.user, record.number)) continue;
     const auto whole = std::as_bytes(std::span(record.bytes));
-    kept.bytes.insert(kept.bytes.end(), whole.begin(), whole.end());
+    std::vector<std::byte>& records = record.extended ? kept.extended : kept.bytes;
+    records.insert(records.end(), whole.begin(), whole.end());
+    ++(record.extended ? kept.extended_count : kept.count);
     kept.has_wkt |= record.user == "LASF_Projection" && record.number == 2112;
     kept.has_geotiff |= record.user == "LASF_Projection" && record.number == 34735;
-    ++kept.count;
   }
   return kept;
 }
@@ -214,13 +215,11 @@ std::vector<LasName> original_names(const PointWriteInfo& info) {
   const auto originals = text == info.text.end() ? std::nullopt : decode_vlrs(text->second);
   if (!originals) return {};
   const auto describes = [](const Vlr& record) {
-    return record.user == "LASF_Spec" && record.number == 4 &&
-           record.bytes.size() > kVlrHeaderBytes;
+    return record.user == "LASF_Spec" && record.number == 4 && !record.payload().empty();
   };
   const auto found = std::ranges::find_if(*originals, describes);
   if (found == originals->end()) return {};
-  return make_las_fields(header, std::as_bytes(std::span(found->bytes)).subspan(kVlrHeaderBytes))
-      .names;
+  return make_las_fields(header, std::as_bytes(std::span(found->payload()))).names;
 }
 
 void Records::add(std::string_view user, std::uint16_t id, std::string_view description,

@@ -43,15 +43,17 @@ struct Head {
 /// bits of a double; true where that was not measured, unless the head is that of a LAS file.
 [[nodiscard]] bool moves_positions(const PointWriteInfo& info, const Head& head);
 
-/// The records between the header and the points.
+/// The records between the header and the points, and the extended ones behind the points.
 struct Records {
   std::vector<std::byte> bytes;
   std::uint32_t count = 0;
+  std::vector<std::byte> extended;
+  std::uint32_t extended_count = 0;
   bool has_wkt = false;              ///< one of them names the coordinate reference system as WKT
   bool has_geotiff = false;          ///< one of them names it by keys of GeoTIFF
   std::vector<std::string> dropped;  ///< what is left out, a sentence each
 
-  /// Appends a record (section "Variable Length Records").
+  /// Appends a record that is not extended (section "Variable Length Records").
   void add(std::string_view user, std::uint16_t id, std::string_view description,
            std::string_view content);
 };

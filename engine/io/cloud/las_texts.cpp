@@ -1,7 +1,5 @@
 #include "engine/io/cloud/las_texts.h"
 
-#include <cstring>
-
 #include <nlohmann/json.hpp>
 
 #include "engine/io/cloud/las_vlrs.h"
@@ -56,34 +54,23 @@ std::string make_las_header_text(const LasHeader& header, unsigned colour_bits) 
 
 std::string make_las_records_text(const InputFile& file, const LasHeader& header,
                                   std::vector<std::string>& notes) {
-  std::vector<std::byte> kept;
-  std::vector<LostVlr> too_long, too_many;
+  std::vector<std::byte> kept, kept_extended;
+  std::vector<LostVlr> lost;
   for (const LasRecord& record : header.records) {
     if (record.user == kLaszipUser || record.user == "copc") continue;
-    const LostVlr lost{record.user, record.number, record.bytes};
-    if (record.bytes > kMaxVlrPayload) {
-      too_long.push_back(lost);
+    const std::size_t room = kMaxVlrs - kept.size() - kept_extended.size();
+    const std::uint64_t header_bytes = record.payload - record.offset;
+    if (header_bytes > room || record.bytes > room - header_bytes) {
+      lost.push_back({record.user, record.number, record.bytes});
       continue;
     }
-    const std::size_t bytes = kVlrHeaderBytes + static_cast<std::size_t>(record.bytes);
-    if (bytes > kMaxVlrs - kept.size()) {
-      too_many.push_back(lost);
-      continue;
-    }
-    // A record's header begins with a reserved u16, user, number and length; the length has 2
-    // bytes, or 8 in an extended record. The description of 32 bytes follows.
-    const std::size_t at = kept.size();
-    kept.resize(at + bytes);
-    const auto out = std::span(kept).subspan(at);
-    file.read_at(record.offset, out.first(20));
-    const auto length = static_cast<std::uint16_t>(record.bytes);
-    std::memcpy(out.data() + 20, &length, sizeof length);
-    file.read_at(record.payload - 32, out.subspan(22, 32));
-    file.read_at(record.payload, out.subspan(kVlrHeaderBytes));
+    std::vector<std::byte>& records = record.extended ? kept_extended : kept;
+    const std::size_t at = records.size();
+    records.resize(at + static_cast<std::size_t>(header_bytes + record.bytes));
+    file.read_at(record.offset, std::span(records).subspan(at));
   }
-  note_lost_vlrs(too_long, "no record of more than 65,535 bytes is kept", notes);
-  note_lost_vlrs(too_many, "only 1 MiB of records is kept", notes);
-  return encode_vlrs(kept);
+  note_lost_vlrs(lost, "only 1 MiB of records is kept", notes);
+  return encode_vlrs(kept, kept_extended);
 }
 
 }  // namespace ptc

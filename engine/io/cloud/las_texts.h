@@ -26,8 +26,8 @@ namespace ptc {
 /// @param colour_bits  0, 8 or 16
 [[nodiscard]] std::string make_las_header_text(const LasHeader& header, unsigned colour_bits);
 
-/// Returns the text `las.vlrs` of a file, empty when no record is kept: payloads have up to
-/// kMaxVlrPayload bytes, and all records together up to kMaxVlrs.
+/// Returns the text `las.vlrs` of a file, empty when no record is kept: all records together have
+/// up to kMaxVlrs bytes, and each that does not fit behind those before it is left out.
 /// @param notes  gets what is not in it
 /// @throws std::system_error
 [[nodiscard]] std::string make_las_records_text(const InputFile& file, const LasHeader& header,

@@ -1,6 +1,7 @@
 #include "engine/io/cloud/las_vlrs.h"
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <utility>
 
@@ -11,6 +12,7 @@ namespace {
 
 constexpr std::string_view kDigits =
     "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+constexpr char kExtendedMark = ',';  // stands before extended records
 
 // Decodes base64 (RFC 4648). @return nothing when the text is not base64
 std::optional<std::string> decode_base64(std::string_view text) {
@@ -36,9 +38,7 @@ std::string_view until_zero(std::string_view text) {
   return text.substr(0, text.find('\0'));
 }
 
-}  // namespace
-
-std::string encode_vlrs(std::span<const std::byte> records) {
+std::string encode_base64(std::span<const std::byte> records) {
   std::string text;
   text.reserve((records.size() + 2) / 3 * 4);
   for (std::size_t i = 0; i < records.size(); i += 3) {
@@ -52,23 +52,54 @@ std::string encode_vlrs(std::span<const std::byte> records) {
   return text;
 }
 
-std::optional<std::vector<Vlr>> decode_vlrs(std::string_view text) {
+// Returns how many bytes base64 text stands for.
+std::size_t decoded_bytes(std::string_view text) {
+  const std::size_t padding = text.ends_with("==") ? 2 : text.ends_with('=') ? 1 : 0;
+  return text.size() / 4 * 3 - std::min(padding, text.size() / 4 * 3);
+}
+
+// Returns the two parts of a text: plain records and extended ones.
+std::pair<std::string_view, std::string_view> split(std::string_view text) {
+  const std::size_t comma = text.find(kExtendedMark);
+  if (comma == std::string_view::npos) return {text, {}};
+  return {text.substr(0, comma), text.substr(comma + 1)};
+}
+
+// Appends the records of one part of a text. @return whether the part is sound
+bool decode_part(std::string_view text, bool extended, std::vector<Vlr>& records) {
   const std::optional<std::string> decoded = decode_base64(text);
-  if (!decoded) return std::nullopt;
-  std::vector<Vlr> records;
+  if (!decoded) return false;
+  const std::size_t header_bytes = extended ? kEvlrHeaderBytes : kVlrHeaderBytes;
   for (std::string_view rest = *decoded; !rest.empty();) {
-    if (rest.size() < kVlrHeaderBytes) return std::nullopt;
-    const auto number = [&](std::size_t at) {
-      return static_cast<unsigned>(static_cast<unsigned char>(rest[at])) |
-             static_cast<unsigned>(static_cast<unsigned char>(rest[at + 1])) << 8;
-    };
-    const std::size_t bytes = kVlrHeaderBytes + number(20);
-    if (bytes > rest.size()) return std::nullopt;
+    if (rest.size() < header_bytes) return false;
+    std::uint16_t number = 0;
+    std::uint64_t payload = 0;
+    std::memcpy(&number, rest.data() + 18, sizeof number);
+    std::memcpy(&payload, rest.data() + 20, extended ? 8 : 2);
+    if (payload > rest.size() - header_bytes) return false;
+    const std::size_t bytes = header_bytes + static_cast<std::size_t>(payload);
     records.push_back({.user = std::string(until_zero(rest.substr(2, 16))),
-                       .number = number(18),
-                       .bytes = std::string(rest.substr(0, bytes))});
+                       .number = number,
+                       .bytes = std::string(rest.substr(0, bytes)),
+                       .extended = extended});
     rest.remove_prefix(bytes);
   }
+  return true;
+}
+
+}  // namespace
+
+std::string encode_vlrs(std::span<const std::byte> records, std::span<const std::byte> extended) {
+  std::string text = encode_base64(records);
+  if (!extended.empty()) text += kExtendedMark + encode_base64(extended);
+  return text;
+}
+
+std::optional<std::vector<Vlr>> decode_vlrs(std::string_view text) {
+  const auto [plain, extended] = split(text);
+  std::vector<Vlr> records;
+  if (!decode_part(plain, false, records) || !decode_part(extended, true, records))
+    return std::nullopt;
   return records;
 }
 
@@ -100,22 +131,24 @@ void note_lost_vlrs(std::span<const LostVlr> lost, const std::string& why,
 }
 
 ShortVlrs shorten_vlrs(const std::string& text, std::size_t most, const std::string& why) {
-  const std::size_t padding = text.ends_with("==") ? 2 : text.ends_with('=') ? 1 : 0;
-  if (text.size() / 4 * 3 <= most + padding) return {.text = text, .notes = {}};
+  const auto [plain, extended] = split(text);
+  if (decoded_bytes(plain) + decoded_bytes(extended) <= most) return {.text = text, .notes = {}};
   const std::optional<std::vector<Vlr>> records = decode_vlrs(text);
   if (!records) {
     return {.text = {}, .notes = {"The text las.vlrs is damaged: its records are left out."}};
   }
-  std::string kept;
+  std::string kept, kept_extended;
   std::vector<LostVlr> lost;
   for (const Vlr& record : *records) {
-    if (record.bytes.size() <= most - kept.size()) {
-      kept += record.bytes;
+    if (record.bytes.size() <= most - kept.size() - kept_extended.size()) {
+      (record.extended ? kept_extended : kept) += record.bytes;
     } else {
-      lost.push_back({record.user, record.number, record.bytes.size() - kVlrHeaderBytes});
+      lost.push_back({record.user, record.number, record.payload().size()});
     }
   }
-  ShortVlrs shorter{.text = encode_vlrs(std::as_bytes(std::span(kept))), .notes = {}};
+  ShortVlrs shorter{
+      .text = encode_vlrs(std::as_bytes(std::span(kept)), std::as_bytes(std::span(kept_extended))),
+      .notes = {}};
   note_lost_vlrs(lost, why, shorter.notes);
   return shorter;
 }

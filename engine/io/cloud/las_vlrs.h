@@ -1,11 +1,11 @@
 // The text `las.vlrs`, which keeps the records of a LAS file so that they can be written again.
 //
-// It is base64 (RFC 4648, section 4, padded) of records one after another, each as a VLR:
+// It is base64 (RFC 4648, section 4, padded) of records one after another as they lie in the file:
 //
 //   | 0 u16 | user, 16 bytes | number u16 | size u16 | description, 32 bytes | payload | next ...
 //
-// An extended record becomes such a record. The records about compression, of the users "laszip
-// encoded" and "copc", are not among them.
+// Extended records, whose size is a u64, follow behind a comma, as base64 of their own. The records
+// about compression, of the users "laszip encoded" and "copc", are not among them.
 #pragma once
 
 #include <cstddef>
@@ -20,8 +20,7 @@ namespace ptc {
 
 inline constexpr const char* kLasRecordsKey = "las.vlrs";
 inline constexpr std::size_t kVlrHeaderBytes = 54;
-/// The longest payload of a record of the text, which is that of any VLR.
-inline constexpr std::size_t kMaxVlrPayload = 65535;
+inline constexpr std::size_t kEvlrHeaderBytes = 60;  ///< of an extended record
 /// Most bytes of the records of one file, with their headers, that a reader keeps.
 inline constexpr std::size_t kMaxVlrs = std::size_t{1} << 20;
 
@@ -30,6 +29,12 @@ struct Vlr {
   std::string user;  ///< who defined it, e.g. "LASF_Projection"
   unsigned number = 0;
   std::string bytes;  ///< header and payload
+  bool extended = false;
+
+  /// Returns what follows the header.
+  [[nodiscard]] std::string_view payload() const {
+    return std::string_view(bytes).substr(extended ? kEvlrHeaderBytes : kVlrHeaderBytes);
+  }
 };
 
 /// A record that is not kept.
@@ -40,8 +45,10 @@ struct LostVlr {
 };
 
 /// Encodes records that stand one after another.
-[[nodiscard]] std::string encode_vlrs(std::span<const std::byte> records);
-/// Decodes the text. @return nothing when it is damaged
+/// @param extended  the extended ones
+[[nodiscard]] std::string encode_vlrs(std::span<const std::byte> records,
+                                      std::span<const std::byte> extended = {});
+/// Decodes the text. @return the extended records last; nothing when the text is damaged
 [[nodiscard]] std::optional<std::vector<Vlr>> decode_vlrs(std::string_view text);
 
 /// Adds notes that name the records that are left out, those of one kind together; of many kinds

@@ -1,6 +1,6 @@
 // Writes LAS 1.4.
 //
-//   | header 375 | records: originals, WKT, extra bytes | point | point | ...
+//   | header 375 | records: originals, WKT, extra bytes | point | point | ... | extended originals
 //     ^ again at the end: bounds and counts of returns are known then
 //
 // Points keep the steps of the LAS file that they came from, so each coordinate gets the integer
@@ -89,7 +89,7 @@ class LasWriter : public CheckedWriter {
     append_value(h, head_.year);
     // Say where the points are and how they are laid out
     append_value(h, kHeaderBytes);
-    append_value(h, static_cast<std::uint32_t>(kHeaderBytes + records_.bytes.size()));
+    append_value(h, points_begin());
     append_value(h, records_.count);
     append_value(h, layout_.point_format);
     append_value(h, static_cast<std::uint16_t>(layout_.record_bytes));
@@ -101,10 +101,18 @@ class LasWriter : public CheckedWriter {
       append_value(h, coordinate(totals_.high, i));
       append_value(h, coordinate(totals_.low, i));
     }
-    h.resize(h.size() + 20);  // no waveforms, no extended records
+    append_value(h, std::uint64_t{0});  // no waveforms
+    append_value(h, records_.extended_count > 0 ? points_end() : std::uint64_t{0});
+    append_value(h, records_.extended_count);
     append_value(h, totals_.points);
     for (const std::uint64_t count : totals_.by_return) append_value(h, count);
     return h;
+  }
+  [[nodiscard]] std::uint32_t points_begin() const {
+    return static_cast<std::uint32_t>(kHeaderBytes + records_.bytes.size());
+  }
+  [[nodiscard]] std::uint64_t points_end() const {
+    return points_begin() + announced() * layout_.record_bytes;
   }
   [[nodiscard]] double coordinate(const std::array<std::int32_t, 3>& place, int i) const {
     if (totals_.points == 0) return 0;
@@ -142,6 +150,7 @@ class LasWriter : public CheckedWriter {
   }
 
   void end() override {
+    out_.put(records_.extended.data(), records_.extended.size());
     const std::vector<std::byte> header = make_header();
     out_.put_at(0, header.data(), header.size());
     out_.publish();
