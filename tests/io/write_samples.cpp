@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "engine/io/cloud/formats.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/point_writer.h"
 #include "format/scalar.h"
 
@@ -13,6 +14,20 @@ namespace {
 using namespace ptc;
 
 constexpr int kPoints = 5000;
+
+// Returns an extended record of LAS that is longer than any plain one.
+std::vector<std::byte> long_record() {
+  constexpr std::uint64_t kBytes = 70'000;
+  std::vector<std::byte> record(2);
+  for (const char c : {'p', 'e', 'e', 'r'}) append_value(record, c);
+  record.resize(18);
+  append_value(record, std::uint16_t{7});
+  append_value(record, kBytes);
+  record.resize(kEvlrHeaderBytes);
+  for (std::uint64_t i = 0; i < kBytes; ++i)
+    append_value(record, static_cast<std::uint8_t>(i * i >> 3 & 255));
+  return record;
+}
 
 PointWriteInfo info_of() {
   using enum ChannelType;
@@ -41,7 +56,8 @@ PointWriteInfo info_of() {
                    {.name = "pair", .type = i8, .components = 2}};
   info.text = {{"up", "z"},
                {"metres_per_unit", "0.3048"},
-               {"crs", "LOCAL_CS[\"peer\",UNIT[\"foot\",0.3048]]"}};
+               {"crs", "LOCAL_CS[\"peer\",UNIT[\"foot\",0.3048]]"},
+               {kLasRecordsKey, encode_vlrs({}, long_record())}};
   info.has_normals = info.has_radius = info.has_radiance = info.has_albedo = info.emits = true;
   return info;
 }

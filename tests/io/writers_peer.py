@@ -110,6 +110,9 @@ class Peers(unittest.TestCase):
             self.assertEqual(extra, {"tilt"})
             self.assertTrue(las.header.global_encoding.wkt)
             self.assertIn("LOCAL_CS", [v for v in las.vlrs if v.record_id == 2112][0].string)
+            record, = las.evlrs
+            self.assertEqual((record.user_id, record.record_id), ("peer", 7))
+            self.assertEqual(record.record_data_bytes(), bytes(k * k >> 3 & 255 for k in range(70_000)))
 
     def test_usd_reads_usda_and_usdc(self):
         Usd = optional("pxr.Usd")
