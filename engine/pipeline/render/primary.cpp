@@ -13,6 +13,9 @@
 namespace ptc {
 namespace {
 
+/// Share of the lift by which receivers step back along the ray that found them.
+constexpr float kStepBack = 0.5F;
+
 /// A view by rays: one ray for each sample, lit by shadow rays at the place that it meets.
 class MeshView : public PrimaryView {
  public:
@@ -33,14 +36,18 @@ class MeshView : public PrimaryView {
         scene_.closest(camera_.position, direction, 0, std::numeric_limits<double>::infinity());
     if (!hit) return std::nullopt;
     const float turn = hit->front ? 1.0F : -1.0F;
-    PrimaryHit primary{.position = hit->position,
+    // Step back towards the camera, away from every surface that meets at the place: a receiver in
+    // an edge would else lie behind the discs of the other side, which are clear to it, or look
+    // through the gap that they leave along the edge
+    const glm::dvec3 place = hit->position - glm::dvec3(direction) * double{kStepBack * lift_};
+    PrimaryHit primary{.position = place,
                        .normal = hit->normal * turn,
                        .lift = lift_,
                        .offset_normal = hit->geometric_normal * turn,
                        .albedo = hit->albedo};
     const std::uint64_t seed = std::uint64_t{y} << 32 | x;
     const DirectLight::Result light =
-        light_.irradiance(primary.position + glm::dvec3(primary.offset_normal) * scene_.epsilon(),
+        light_.irradiance(hit->position + glm::dvec3(primary.offset_normal) * scene_.epsilon(),
                           primary.normal, sampling_, seed);
     primary.direct = primary.albedo * light.local * std::numbers::inv_pi_v<float>;
     if (hit->front) primary.direct += hit->emission;
