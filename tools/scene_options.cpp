@@ -277,7 +277,7 @@ void add_light_sampling(CLI::App& app, LightSampling& sampling) {
   add_integer(app, "--sky-rays", sampling.sky_rays, 0, kMax,
               "Shadow rays from each point to the sky")
       ->group(kExpertGroup);
-  add_integer(app, "--area-rays", sampling.area_rays, 0, kMax,
+  add_integer(app, "--area-rays", sampling.area_rays, 1, kMax,
               "Shadow rays from each point to emissive triangles")
       ->group(kExpertGroup);
 }

@@ -79,7 +79,8 @@ RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm:
     if (hit) {
       ++hits;
       if (paths.bounces > 0)
-        result.irradiance += radiance_of(scene, light, *hit, paths, true, splitmix64(seed) + i);
+        result.irradiance +=
+            radiance_of(scene, light, *hit, paths, paths.emission, splitmix64(seed) + i);
     } else {
       result.sky += light.rig().sky.at(direction);
     }

@@ -22,6 +22,9 @@ struct LightPaths {
   /// The maximum number of reflections on the way to the receiver. 0 leaves out all light from
   /// surfaces, the light that they emit as well.
   unsigned bounces = 1;
+  /// Whether the surfaces that the receiver sees add what they emit. False where the emitters'
+  /// light at the receiver is asked of DirectLight, so that it would count twice.
+  bool emission = true;
 };
 
 /// Traces stratified cosine rays from a receiver.

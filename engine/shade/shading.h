@@ -74,6 +74,9 @@ struct GatherOptions {
   Sides sides = Sides::both;  ///< sides of surfels that stop light
   Surroundings around;        ///< what occlusion, bent normal and sky are about
   bool bleeding = true;       ///< false leaves out the light from surfaces, which takes less time
+  /// Whether what surfaces emit is part of their light. False where emitters light the receivers
+  /// otherwise (spec/shading.md#emission).
+  bool emission = true;
 };
 
 // Constants of the disc that stands for a cluster (spec/shading.md#splats).

@@ -57,11 +57,11 @@ void DecodedTree::decode_leaf(std::uint64_t first, std::uint32_t count, TraceLea
   }
 }
 
-glm::vec3 DecodedTree::outgoing(std::uint64_t point) {
+glm::vec3 DecodedTree::outgoing(std::uint64_t point, bool emission) {
   const PageGuard page = scene_.points(point);
   const PointPage points(page.payload(), page.record_count(), view().point_bytes());
   const auto at = static_cast<std::uint32_t>(point % view().points_per_page());
-  const Half3 reflected = points.radiance(at), emitted = points.emission(at);
+  const Half3 reflected = points.radiance(at), emitted = emission ? points.emission(at) : Half3{};
   glm::vec3 sum;
   for (int k = 0; k < 3; ++k) {
     const auto i = static_cast<std::size_t>(k);

@@ -45,10 +45,11 @@ class DecodedTree {
     return leaves_.find(first << 8 | count,
                         [&](TraceLeaf& into) { decode_leaf(first, count, into); });
   }
-  /// Returns the radiance of all light that leaves the front of a point, W / (m^2 sr), from its
+  /// Returns the radiance of the light that leaves the front of a point, W / (m^2 sr), from its
   /// page.
+  /// @param emission  whether what the point emits is part of it
   /// @throws FormatError when the page is damaged
-  [[nodiscard]] glm::vec3 outgoing(std::uint64_t point);
+  [[nodiscard]] glm::vec3 outgoing(std::uint64_t point, bool emission);
 
   [[nodiscard]] const SceneView& view() const noexcept { return scene_.view(); }
   /// Returns the axis that begin() was given.

@@ -52,9 +52,10 @@ class DiscTracer {
 
   /// Returns the radiance that a ray which has met a disc sees, W / (m^2 sr), from the page of the
   /// disc's point.
+  /// @param emission  whether what the disc emits is part of it
   /// @throws FormatError when the page is damaged
-  [[nodiscard]] glm::vec3 radiance(const RayHit& hit) {
-    return hit.back ? glm::vec3(0) : tree_.outgoing(hit.point);
+  [[nodiscard]] glm::vec3 radiance(const RayHit& hit, bool emission = true) {
+    return hit.back ? glm::vec3(0) : tree_.outgoing(hit.point, emission);
   }
 
  private:

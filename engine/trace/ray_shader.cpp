@@ -42,6 +42,7 @@ RayOptions ray_options(const ShadeOptions& options) {
   return {.sides = options.gather.sides,
           .sky = options.sky,
           .bleeding = options.gather.bleeding,
+          .emission = options.gather.emission,
           .memory_bytes = options.cache_bytes,
           .back_end = options.back_end};
 }
@@ -100,8 +101,9 @@ void RayShader::trace(std::span<const Receiver> receivers, unsigned rays, std::u
     for (std::size_t i = 0; i < order.size(); ++i) {
       const RayHit& hit = own.hits[i];
       if (hit.met())
-        own.seen[order[i]] = {hit.depth,
-                              options_.bleeding ? own.tracer.radiance(hit) : glm::vec3(0)};
+        own.seen[order[i]] = {hit.depth, options_.bleeding
+                                             ? own.tracer.radiance(hit, options_.emission)
+                                             : glm::vec3(0)};
     }
     results[index] = sum_rays(receiver, own.directions, own.seen, options_.sky);
     progress.advance(1);

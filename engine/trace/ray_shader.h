@@ -23,6 +23,7 @@ struct RayOptions {
   /// none.
   std::function<glm::vec3(const glm::vec3&)> sky;
   bool bleeding = true;  ///< false leaves out the light from surfaces, which takes less time
+  bool emission = true;  ///< as GatherOptions::emission
   /// Cap of the page cache and of what threads decode. Raised to PageCache::min_bytes() plus
   /// DiscTracer::kBytes for each thread where it is less.
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;

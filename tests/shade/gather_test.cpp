@@ -256,6 +256,25 @@ TEST_CASE("gather: light that surfels emit counts as light that they reflect",
   }
 }
 
+TEST_CASE("gather: without emission, surfels that emit shine as if they did not",
+          "[shade][gather]") {
+  std::vector<Surfel> surfels = small_scene(0.05);
+  Scene plain(surfels);
+  for (std::size_t i = 0; i < surfels.size(); i += 3) surfels[i].emission = {2, 1, 0.5F};
+  Scene lit(surfels);
+  for (Scene* scene : {&plain, &lit}) add_floor_receivers(scene->receivers, 0.05);
+  ShadeOptions options;
+  options.gather.emission = false;
+  const std::vector<Shading> wanted = plain.shade(), found = lit.shade(options), all = lit.shade();
+  bool brighter = false;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    REQUIRE(found[i].irradiance == wanted[i].irradiance);
+    REQUIRE(found[i].occlusion == wanted[i].occlusion);
+    brighter |= all[i].irradiance.r > 2 * wanted[i].irradiance.r;
+  }
+  CHECK(brighter);
+}
+
 TEST_CASE("gather: every instruction set of the machine gives the same shading",
           "[shade][gather]") {
   Scene scene(small_scene(0.05));

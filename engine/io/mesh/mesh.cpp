@@ -109,6 +109,11 @@ Bounds Mesh::bounds() const {
   return bounds;
 }
 
+bool Mesh::emits() const {
+  return std::ranges::any_of(materials,
+                             [](const Material& m) { return m.emission != glm::vec3(0); });
+}
+
 MeshFile read_mesh(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
   const std::string unpacked = extension == ".gz" ? lower_extension(path.stem()) : extension;

@@ -46,6 +46,8 @@ struct Mesh {
 
   /// Returns the box around all vertices in world coordinates.
   [[nodiscard]] Bounds bounds() const;
+  /// Returns whether a material emits light.
+  [[nodiscard]] bool emits() const;
 };
 
 /// A camera that a mesh file defines.

@@ -175,11 +175,6 @@ BuildInputs lay_city(std::uint64_t points) {
   return {.bounds = bounds, .sample = sample_ground(bounds), .lights = city_lights()};
 }
 
-bool has_emitters(const Mesh& mesh) {
-  return std::ranges::any_of(mesh.materials,
-                             [](const Material& m) { return m.emission != glm::vec3(0); });
-}
-
 /// Adds the channels of a container to a plan, as input 0.
 /// @param clouds  that are added to its points
 void plan_scene(const ContainerReader& scene, const Clouds& clouds, bool meshes,
@@ -256,7 +251,13 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
     inputs.lights = cloud_rig(up_of(inputs.clouds.text));
   }
   if (mesh.triangles.empty()) return inputs;
-  inputs.emitters = has_emitters(mesh);
+  inputs.emitters = mesh.emits();
+  // Cast rays at emitters where they reach all points. Those of clouds are not lit by rays, so that
+  // the gather brings them the light of emitters
+  inputs.rays_at_emitters =
+      inputs.emitters && request.sampling.lights.area_rays > 0 &&
+      (inputs.clouds.points == 0 || inputs.clouds.text.contains(kEmittersKey)) &&
+      (!scene || lit_by_emitters(*scene));
   if (!request.lights && !inputs.clouds.text[kLightsKey].empty()) {
     static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(request.inputs.front())));
   } else if (!request.lights && !inputs.emitters) {
@@ -377,7 +378,9 @@ double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame
   if (const LitMesh* lit = inputs.lit.get()) {
     spacing = request.sampling.spacing > 0 ? request.sampling.spacing
                                            : spacing_for(lit->mesh, request.sampling.count);
-    feeder.feed(*sample_mesh(lit->light, lit->rays, request.sampling, executor));
+    SamplingOptions sampling = request.sampling;
+    if (!inputs.rays_at_emitters) sampling.lights.area_rays = 0;
+    feeder.feed(*sample_mesh(lit->light, lit->rays, sampling, executor));
   }
   inputs.lit.reset();
   return spacing;

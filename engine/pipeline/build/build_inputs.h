@@ -103,8 +103,9 @@ struct BuildInputs {
   Clouds clouds;
   AttributePlan attributes;  ///< the channels of the scene that is appended to, and of the clouds
   LightRig lights;
-  bool emitters = false;         ///< at least one material emits light
-  std::unique_ptr<LitMesh> lit;  ///< null when the inputs have no triangles
+  bool emitters = false;          ///< at least one material emits light
+  bool rays_at_emitters = false;  ///< and lights the surfels of the meshes by rays
+  std::unique_ptr<LitMesh> lit;   ///< null when the inputs have no triangles
 };
 
 /// Reads the meshes and measures the clouds of a request.

@@ -32,7 +32,7 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs) {
   if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
   meta.text[kInputsKey] = names;
   meta.text[kLightsKey] = lights_record(inputs.lights);
-  if (inputs.emitters && request.sampling.lights.area_rays > 0) meta.text[kEmittersKey] = "baked";
+  if (inputs.rays_at_emitters) meta.text[kEmittersKey] = "baked";
   if (inputs.clouds.unlit && !inputs.lit) meta.text[kSkyLightKey] = "gathered";
   const bool assumed = inputs.clouds.points > 0 && !inputs.clouds.coloured && !inputs.lit;
   if (assumed) meta.text[kAlbedoKey] = kAssumed;

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/io/cloud/record.h"
 #include "engine/octree/build_pages.h"
@@ -23,13 +22,13 @@ namespace {
 constexpr std::size_t kBatch = 16 * Shader::kBlock;  // points in memory at once
 
 /// Returns the coarser settings of the bounces before the last: a receiver sees many points, and
-/// their errors average out over them.
+/// their errors average out over them. The resolution stays, because thin things that are drawn too
+/// wide hide too much of what they light, everywhere alike.
 GatherOptions coarser(const GatherOptions& gather) {
   GatherOptions coarse = gather;
   coarse.around = {};
   coarse.solid_angle *= 3;
   coarse.parallax *= 2;
-  coarse.resolution = std::max(16U, gather.resolution / 32 * 16);
   return coarse;
 }
 
@@ -110,16 +109,12 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
                                               const BounceOptions& options,
                                               const Executor& executor, LightingReport& report,
                                               Progress& progress) {
-  if (options.bounces > 1 && lit_by_emitters(scene)) {
-    throw RequestError("bounces",
-                       "`bounces` above 1 would count the light of the scene's emissive triangles "
-                       "twice: build the container with `sampling.lights.area_rays` 0");
-  }
-
-  // Shade the points more coarsely than the receivers, by the light of surfaces alone
+  // Shade the points more coarsely than the receivers, by the light of surfaces alone: that of
+  // emitters which lit the points is in their radiance
   ShadeOptions shade = options.shade;
   shade.sky = {};
   shade.gather = coarser(shade.gather);
+  shade.gather.emission = !lit_by_emitters(scene);
   shade.variants = 1;
 
   // Write one container for each bounce but the last, each lit by the one before

@@ -39,8 +39,7 @@ void charge_bounces(MemoryBudget& budget, const ContainerReader& scene, unsigned
 /// the last, and at most two exist at once. The result depends on neither threads nor memory cap.
 /// @param report  gets the wall time and the CPU time of every pass
 /// @return        null for fewer than two bounces: receivers look at the scene itself
-/// @throws RequestError when emissive triangles lit the surfels, because their light would count
-///         twice; FormatError, std::system_error
+/// @throws FormatError, std::system_error
 /// Memory: the cache of `shade`, what charge_bounces() charges, and buffers within kBufferBytes.
 [[nodiscard]] std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
                                                             const BounceOptions& options,

@@ -117,7 +117,7 @@ Lighting::Lighting(const LightingRequest& request, LightingReport& report, Progr
 
 Lighting::~Lighting() = default;
 
-void Lighting::prepare(MemoryBudget budget, const Sky& sky, unsigned variants,
+void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
                        const std::filesystem::path& target) {
   charge_bounces(budget, scene_, request_.bounces, executor_.threads());
   options_ = {
@@ -135,6 +135,7 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, unsigned variants,
   // Without light on any surface there is none to gather
   const bool is_lit = scene_.superblock().flux != std::array<double, 3>{};
   options_.gather.bleeding = request_.bounces > 0 && is_lit;
+  options_.gather.emission = emission;
   bounced_ = bounce_light(
       scene_, {request_.bounces, options_, request_.lift, roomiest_temp_dir(request_.run, target)},
       executor_, report_, progress_);
@@ -201,8 +202,7 @@ void Lighting::check(const CheckScene& seen) {
   if (request_.check.receivers == 0) return;
   const std::uint64_t references = (seen.mesh ? 4 : 2) * std::uint64_t{request_.check.receivers};
   const Stage stage(report_.seconds, progress_, "check", references, "references");
-  report_.check = sample_->compare(lit(), request_.gather.sides, seen, options_.cache_bytes,
-                                   executor_, progress_);
+  report_.check = sample_->compare(lit(), ray_options(options_), seen, executor_, progress_);
 }
 
 }  // namespace ptc

@@ -120,12 +120,14 @@ class Lighting {
   /// Gives the rest of the budget to the page cache, then shades the bounces before the last.
   /// @param budget    already charged with everything else that the caller takes
   /// @param sky       sky that lights the receivers
+  /// @param emission  whether receivers gather what surfaces emit; false where the light of
+  /// emitters
+  ///                  reaches them otherwise
   /// @param variants  as ShadeOptions::variants
   /// @param target    output of the run; its directory gets temporary files when the request names
   ///                  no directories for them
-  /// @throws LimitError when the cap is too small; RequestError when further bounces would count
-  ///         light twice; FormatError, std::system_error
-  void prepare(MemoryBudget budget, const Sky& sky, unsigned variants,
+  /// @throws LimitError when the cap is too small; FormatError, std::system_error
+  void prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
                const std::filesystem::path& target);
 
   /// Chooses the settings and prepares the estimates, as far as the request asks for them.

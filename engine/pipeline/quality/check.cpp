@@ -44,8 +44,8 @@ void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shadi
   }
 }
 
-CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, const CheckScene& seen,
-                                 std::uint64_t memory_bytes, const Executor& executor,
+CheckReport CheckSample::compare(const ContainerReader& scene, const RayOptions& options,
+                                 const CheckScene& seen, const Executor& executor,
                                  Progress& progress) const {
   // Shoot half of the rays from each of two copies: independent halves give the noise of the rays
   CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
@@ -56,12 +56,7 @@ CheckReport CheckSample::compare(const ContainerReader& scene, Sides sides, cons
 
   // Trace rays at the surfels
   {
-    RayShader discs(scene,
-                    {.sides = sides,
-                     .sky = sky_function(seen.sky),
-                     .bleeding = seen.paths.bounces > 0,
-                     .memory_bytes = memory_bytes},
-                    executor);
+    RayShader discs(scene, options, executor);
     report.disc_microseconds =
         cpu_microseconds(receivers_.size(), [&] { discs.trace(twice, half, 0, traced, progress); });
   }

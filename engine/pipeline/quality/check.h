@@ -14,6 +14,7 @@
 #include "engine/scene/mesh_reference.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
+#include "engine/trace/ray_shader.h"
 
 namespace ptc {
 
@@ -38,9 +39,8 @@ struct CheckReport {
   double mesh_microseconds = 0;           ///< CPU time of one receiver's rays at the mesh
 };
 
-/// The light and the mesh that the rays of a check meet, besides the surfels of the scene.
+/// The mesh that the rays of a check meet, besides the surfels of the scene, and its light.
 struct CheckScene {
-  const Sky& sky;
   const RayScene* mesh = nullptr;      ///< mesh of the picture; null: no rays at a mesh
   const DirectLight* light = nullptr;  ///< direct light at the mesh
   LightPaths paths;                    ///< paths of the light that rays at the mesh follow
@@ -61,14 +61,13 @@ class CheckSample {
            std::span<const ErrorEstimate> estimates = {});
 
   /// Traces rays at the sampled receivers and compares.
-  /// @param scene         the container that the receivers were shaded from
-  /// @param sides         sides of the surfels that stop rays
-  /// @param memory_bytes  cap for rays at the surfels, as RayOptions::memory_bytes
-  /// @param progress      advances by one for each half of a receiver's reference: by two for each
-  ///                      receiver at the surfels, and by two more at the mesh
-  [[nodiscard]] CheckReport compare(const ContainerReader& scene, Sides sides,
-                                    const CheckScene& seen, std::uint64_t memory_bytes,
-                                    const Executor& executor, Progress& progress) const;
+  /// @param scene     the container that the receivers were shaded from
+  /// @param options   of the rays at the surfels
+  /// @param progress  advances by one for each half of a receiver's reference: by two for each
+  ///                  receiver at the surfels, and by two more at the mesh
+  [[nodiscard]] CheckReport compare(const ContainerReader& scene, const RayOptions& options,
+                                    const CheckScene& seen, const Executor& executor,
+                                    Progress& progress) const;
 
  private:
   CheckRequest request_;

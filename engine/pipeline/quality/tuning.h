@@ -23,13 +23,14 @@ struct Rung {
   double usual_error;           ///< mean over three scenes, as CheckError::relative()
 
   /// Returns the options of a gather with this setting.
-  /// @param run  options of the run, which keep their sides and bleeding
+  /// @param run  options of the run, which keep their sides and the light that they are about
   [[nodiscard]] GatherOptions options(const GatherOptions& run) const {
     return {.solid_angle = solid_angle,
             .parallax = parallax,
             .resolution = resolution,
             .sides = run.sides,
-            .bleeding = run.bleeding};
+            .bleeding = run.bleeding,
+            .emission = run.emission};
   }
 };
 
@@ -55,8 +56,9 @@ struct TuningReport {
 
 /// Compares pilots with rays at the same surfels and finds the cheapest setting that meets `asked`.
 /// The result depends on neither threads nor memory cap.
-/// @param options   options of the run. Only sides and bleeding of its gather count. Its
-///                  cache_bytes are the cap of the rays too
+/// @param options   options of the run. Of its gather, only the sides and the light that it is
+/// about
+///                  count. Its cache_bytes are the cap of the rays too
 /// @param asked     relative error, above 0 and at most 1
 /// @param compared  gets the receivers of the pilots that were compared
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by

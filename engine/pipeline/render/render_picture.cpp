@@ -48,6 +48,7 @@ struct Subject {
   Mesh mesh;          ///< empty: the camera sees the surfels
   std::unique_ptr<RayScene> rays;
   std::unique_ptr<DirectLight> light;
+  bool rays_at_emitters = false;  ///< those of the mesh light it by rays, and not by the gather
   std::unique_ptr<PrimaryView> view;
 
   [[nodiscard]] std::uint64_t pixels() const { return std::uint64_t{camera.width} * camera.height; }
@@ -116,8 +117,12 @@ void make_mesh_view(Subject& subject, const RenderRequest& request, const Contai
   subject.rays = std::make_unique<RayScene>(subject.mesh);
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
   return_freed_memory();  // that reading the files and building the ray scene took
+  // The light that emitters gave to surfaces is in their radiance already, or else is gathered
+  subject.rays_at_emitters = lit_by_emitters(scene) && subject.mesh.emits();
+  LightSampling sampling = request.light_sampling;
+  if (!subject.rays_at_emitters) sampling.area_rays = 0;
   subject.view =
-      view_mesh(*subject.rays, *subject.light, request.light_sampling, subject.camera, subject.side,
+      view_mesh(*subject.rays, *subject.light, sampling, subject.camera, subject.side,
                 lift_height(static_cast<float>(surfel_radius), request.lift, scene.header().frame));
 }
 
@@ -337,7 +342,8 @@ LightingReport render_container(const RenderRequest& request,
   if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
 
   // Divide the memory, shade earlier bounces, choose the settings
-  lighting.prepare(picture_budget(request, subject), lights.sky,
+  const bool by_emitters = sees_mesh ? subject.rays_at_emitters : lit_by_emitters(lighting.scene());
+  lighting.prepare(picture_budget(request, subject), lights.sky, !by_emitters,
                    std::min(request.samples, kMaxVariants), targets.front().path);
   if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
   Film film(subject.camera.width, subject.camera.height, request.estimate);
@@ -353,12 +359,12 @@ LightingReport render_container(const RenderRequest& request,
   film.write(targets, request.exposure);
 
   // Compare some of the pixels with rays
-  const bool area_rays = lit_by_emitters(lighting.scene());
-  const LightSampling sampling{.sun_rays = 1, .area_rays = area_rays ? 1U : 0U, .sky_rays = 1};
-  lighting.check({.sky = lights.sky,
-                  .mesh = subject.rays.get(),
+  const LightSampling sampling{.sun_rays = 1, .area_rays = 1, .sky_rays = 1};
+  lighting.check({.mesh = subject.rays.get(),
                   .light = subject.light.get(),
-                  .paths = {sampling, request.bounces}});
+                  .paths = {.sampling = sampling,
+                            .bounces = request.bounces,
+                            .emission = !subject.rays_at_emitters}});
   return report;
 }
 

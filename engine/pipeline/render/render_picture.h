@@ -48,9 +48,9 @@ struct RenderRequest : LightingRequest {
   unsigned samples = 4;  ///< samples of each pixel, a square number
   /// Lights of the meshes and of the sky; empty: those that the scene was built with.
   std::optional<LightRig> lights;
-  /// Shadow rays of each sample at a mesh. Emissive triangles are surfels too, so the gather brings
-  /// their light already; area rays would add it a second time.
-  LightSampling light_sampling{.sun_rays = 4, .area_rays = 0, .sky_rays = 0};
+  /// Shadow rays of each sample at a mesh. Its emitters are asked where they lit the surfels, too;
+  /// else the gather brings their light, and no ray is cast at them.
+  LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
   float exposure = 0;  ///< stops by which a .png of light is brightened
 };
 

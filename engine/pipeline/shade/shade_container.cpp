@@ -300,7 +300,9 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   MemoryBudget budget = budget_of(request.run.memory_bytes, "shading");
   if (receivers.other) charge_directory(budget, *receivers.other);
   budget.charge("the output's directory", sink_bytes(target, receivers.container));
-  lighting.prepare(std::move(budget), sky, 1, target);
+  // The light that emitters gave the scene's own points is in their radiance
+  const bool emission = receivers.other || !lit_by_emitters(lighting.scene());
+  lighting.prepare(std::move(budget), sky, emission, 1, target);
   lighting.tune([&] { return pilots_of(receivers, request.lift); });
 
   // Shade all receivers into the target
@@ -320,7 +322,7 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   sink->finish();
 
   // Compare a sample of the receivers with rays
-  lighting.check({.sky = sky, .paths = {.bounces = request.bounces}});
+  lighting.check({});
   return report;
 }
 

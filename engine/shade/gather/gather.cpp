@@ -153,6 +153,7 @@ const DirectionBuffer& Gather::collect(const ReceiverCell& cell, const Direction
       .inflation = options_.inflation,
       .sides = options_.sides,
       .bleeding = options_.bleeding,
+      .emission = options_.emission,
       .last = left == nullptr,
       .damaged = scene_.view().lost() != nullptr};
   CellOutput out{queue_, left, payloads_};

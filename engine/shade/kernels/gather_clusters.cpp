@@ -340,7 +340,7 @@ class GroupLanes {
       const GroupView& group = lanes.group_;
       const VU reflected =
           of_face(group.radiance(2 * axis), group.radiance(2 * axis + 1), negative);
-      if (!group.emits()) return reflected;
+      if (!group.emits() || !lanes.test_.emission) return reflected;
       return sum_rgbe(reflected,
                       of_face(group.emission(2 * axis), group.emission(2 * axis + 1), negative));
     }
@@ -399,10 +399,11 @@ class PayloadLanes {
 };
 
 /// Returns the payload of a child of a group.
-ClusterPayload payload_of(const GroupView& group, int i, bool closed) {
+/// @param emission  whether its colours have what it emits
+ClusterPayload payload_of(const GroupView& group, int i, bool closed, bool emission) {
   ClusterPayload payload;
   for (int k = 0; k < 6; ++k) {
-    payload.rgbe[k] = outgoing_rgbe(group, k, i);
+    payload.rgbe[k] = outgoing_rgbe(group, k, i, emission);
     payload.share[k] = static_cast<float>(GroupView::u16_at(group.facing(k), i)) * kPerFacingStep;
   }
   payload.area = decode_ufloat16(GroupView::u16_at(group.area(), i));
@@ -445,7 +446,8 @@ unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& t
     for (std::uint32_t count = 0; rest != 0; rest &= rest - 1) {
       const int lane = std::countr_zero(rest);
       index[lane] = next + count++;
-      out.payloads.push_back(payload_of(group, first + lane, (closed >> (first + lane) & 1) != 0));
+      out.payloads.push_back(
+          payload_of(group, first + lane, (closed >> (first + lane) & 1) != 0, test.emission));
     }
     out.left->clusters.make_room(kListLanes);
     leave(out.left->clusters, verdict.keep, c, d, hn::LoadU(u, index));

@@ -44,6 +44,7 @@ struct CellTest {
   float inflation = 1;        ///< GatherOptions::inflation
   Sides sides = Sides::both;  ///< sides of surfels that stop light
   bool bleeding = true;       ///< whether colours are wanted
+  bool emission = true;       ///< whether what surfels emit is part of their colours
   bool last = false;          ///< whether everything is settled and nothing left to children
   bool damaged = false;       ///< whether some clusters may be closed: drawn, and never opened
 };

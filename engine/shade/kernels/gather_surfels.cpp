@@ -109,7 +109,7 @@ void gather_page_surfels(const std::byte* payload, std::uint32_t count, bool emi
     settle(
         test, s, hn::FirstN(f, number - from),
         [&] {
-          if (!emits) return pack_rgbe(half(24), half(26), half(28));
+          if (!emits || !test.emission) return pack_rgbe(half(24), half(26), half(28));
           return pack_rgbe(hn::Add(half(24), half(34)), hn::Add(half(26), half(36)),
                            hn::Add(half(28), half(38)));
         },

@@ -1,0 +1,211 @@
+// Pictures of rooms, lit in every way, against paths on the mesh: each photon counts once.
+#include <cmath>
+#include <numbers>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
+
+#include "engine/io/image/image.h"
+#include "engine/parallel/thread_pool.h"
+#include "engine/ptc.h"
+#include "engine/scene/light/direct_light.h"
+#include "engine/scene/mesh_reference.h"
+#include "engine/scene/ray_scene.h"
+#include "tests/support/temporary_directory.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+constexpr unsigned kSide = 32;      // pixels along the edges of a picture
+constexpr unsigned kPathRays = 64;  // of the paths' first hits, for each half and pixel
+constexpr unsigned kSamples = 4;    // of a pixel, as RenderRequest has it
+
+enum Materials : std::uint16_t { kWhite, kRed, kGreen, kLamp };
+
+void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v,
+              std::uint16_t material) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), {corner, corner + u, corner + u + v, corner + v});
+  mesh.triangles.insert(mesh.triangles.end(),
+                        {{first, first + 1, first + 2}, {first, first + 2, first + 3}});
+  mesh.material_of.insert(mesh.material_of.end(), {material, material});
+}
+
+/// A block whose sides face outwards.
+void add_block(Mesh& mesh, const glm::vec3& low, const glm::vec3& size, std::uint16_t material) {
+  const glm::vec3 x(size.x, 0, 0), y(0, size.y, 0), z(0, 0, size.z), high = low + size;
+  add_quad(mesh, low, y, x, material);
+  add_quad(mesh, low, z, y, material);
+  add_quad(mesh, low, x, z, material);
+  add_quad(mesh, high, -x, -y, material);
+  add_quad(mesh, high, -y, -z, material);
+  add_quad(mesh, high, -z, -x, material);
+}
+
+/// A room of 2 x 2 x 2 with a red and a green wall and two blocks, open towards +z.
+Mesh room(const glm::vec3& emission) {
+  Mesh mesh;
+  mesh.materials = {{.name = "white", .albedo = glm::vec3(0.75F)},
+                    {.name = "red", .albedo = {0.6F, 0.05F, 0.05F}},
+                    {.name = "green", .albedo = {0.1F, 0.5F, 0.1F}},
+                    {.name = "lamp", .albedo = glm::vec3(0.5F), .emission = emission}};
+  const glm::vec3 x(2, 0, 0), y(0, 2, 0), z(0, 0, 2);
+  add_quad(mesh, {0, 0, 0}, z, x, kWhite);
+  add_quad(mesh, {0, 2, 0}, x, z, kWhite);
+  add_quad(mesh, {0, 0, 0}, x, y, kWhite);
+  add_quad(mesh, {0, 0, 0}, y, z, kRed);
+  add_quad(mesh, {2, 0, 0}, z, y, kGreen);
+  add_block(mesh, {0.4F, 0, 0.4F}, {0.5F, 1.1F, 0.5F}, kWhite);
+  add_block(mesh, {1.1F, 0, 1}, {0.5F, 0.5F, 0.5F}, kWhite);
+  return mesh;
+}
+
+/// A picture by paths: two independent halves of each pixel, and whether it sees an emitter.
+struct Traced {
+  std::vector<glm::vec3> a, b;
+  std::vector<bool> emits;
+};
+
+/// Renders a picture by paths on the mesh, with the rays of the camera that render_picture() has.
+Traced trace_picture(const Mesh& mesh, const LightRig& rig, const Camera& camera,
+                     unsigned bounces) {
+  const RayScene scene(mesh);
+  const DirectLight light(scene, rig);
+  const LightPaths paths{{1, 1, 1}, bounces, false};
+  Traced traced;
+  for (auto* half : {&traced.a, &traced.b}) half->resize(std::size_t{kSide} * kSide);
+  traced.emits.resize(std::size_t{kSide} * kSide);
+  const ThreadPool executor(0);
+  std::vector<char> emits(traced.emits.size());
+  executor.for_each(traced.a.size(), [&](std::size_t pixel, unsigned) {
+    for (unsigned s = 0; s < kSamples; ++s) {
+      const auto place = [&](std::size_t at, unsigned sub) {
+        return static_cast<float>(at) + (static_cast<float>(sub) + 0.5F) / 2;
+      };
+      const glm::vec3 along =
+          camera.direction(place(pixel % kSide, s % 2), place(pixel / kSide, s / 2));
+      const auto hit =
+          scene.closest(camera.position, along, 0, std::numeric_limits<double>::infinity());
+      emits[pixel] |= !hit;
+      if (!hit) continue;
+      emits[pixel] |= hit->emission != glm::vec3(0);
+      const float turn = hit->front ? 1.0F : -1.0F;
+      for (auto* half : {&traced.a, &traced.b}) {
+        const std::uint64_t seed = (pixel * kSamples + s) * 2 + (half == &traced.a ? 0 : 1);
+        const glm::dvec3 at =
+            hit->position + glm::dvec3(turn * hit->geometric_normal) * scene.epsilon();
+        const DirectLight::Result direct =
+            light.irradiance(at, turn * hit->normal, {16, 64, 0}, 77 * seed);
+        const RayTraced rest =
+            trace_mesh(scene, light, hit->position, turn * hit->normal, kPathRays, paths, seed);
+        (*half)[pixel] += hit->albedo * (std::numbers::inv_pi_v<float> / kSamples) *
+                          (direct.local + rest.sky + rest.irradiance);
+      }
+    }
+  });
+  traced.emits.assign(emits.begin(), emits.end());
+  return traced;
+}
+
+/// The errors of a picture over the pixels that see no emitter, over the mean of the paths.
+struct Errors {
+  double bias = 0, rms = 0;
+};
+
+/// A camera before the open front of room().
+Camera before() {
+  return {.position = {1, 1, 5.2},
+          .look_at = {1, 1, 0},
+          .vertical_fov = 0.6F,
+          .width = kSide,
+          .height = kSide};
+}
+
+/// Builds a scene with default options, renders it with 8 bounces, and compares it with paths.
+Errors compare(const Mesh& mesh, const LightRig& rig, const Camera& camera) {
+  const TemporaryDirectory dir;
+  Progress silent;
+  BuildRequest build{.mesh = std::make_shared<const Mesh>(mesh), .lights = rig};
+  build.sampling.count = 300'000;
+  build_container(build, dir / "room.ptcx", silent);
+  RenderRequest request{{.scene = dir / "room.ptcx", .bounces = 8}};
+  request.mesh = build.mesh;
+  request.lights = rig;
+  request.camera = camera;
+  render_picture(request, std::array{PictureTarget{dir / "room.exr"}}, silent);
+  const Image ours = read_image(dir / "room.exr");
+  const Traced traced = trace_picture(mesh, rig, camera, 8);
+  double sum = 0, difference = 0, square = 0, count = 0;
+  for (std::size_t i = 0; i < ours.pixels.size(); ++i) {
+    if (traced.emits[i]) continue;
+    for (int c = 0; c < 3; ++c) {
+      const double a = static_cast<double>(traced.a[i][c]), b = static_cast<double>(traced.b[i][c]),
+                   o = static_cast<double>(ours.pixels[i][c]);
+      sum += 0.5 * (a + b);
+      difference += o - 0.5 * (a + b);
+      square += (o - a) * (o - b);
+      count += 1;
+    }
+  }
+  return {difference / sum, std::sqrt(std::max(0.0, square / count)) / (sum / count)};
+}
+
+/// The errors that a picture may have: those that the project asks for, where a test has no others.
+struct Bounds {
+  double bias = 0.01, rms = 0.05;
+};
+
+void check_errors(const Mesh& mesh, const LightRig& rig, const Camera& camera = before(),
+                  const Bounds& bounds = {}) {
+  const Errors errors = compare(mesh, rig, camera);
+  INFO("mean off by " << 100 * errors.bias << " %, RMS " << 100 * errors.rms << " %");
+  CHECK(std::abs(errors.bias) < bounds.bias);
+  CHECK(errors.rms < bounds.rms);
+}
+
+}  // namespace
+
+TEST_CASE("lit rooms: a lamp counts once, at any distance from its ceiling",
+          "[integration][lit-rooms]") {
+  const double spacing = 0.0095;  // of 300,000 surfels
+  for (const double spacings : {0.1, 1.0, 10.0, 100.0}) {
+    Mesh mesh = room({17, 12, 4});
+    const auto height = static_cast<float>(2 - spacings * spacing);
+    add_quad(mesh, {0.95F, height, 0.95F}, {0.5F, 0, 0}, {0, 0, 0.4F}, kLamp);
+    INFO(spacings << " spacings below the ceiling");
+    check_errors(mesh, {});
+  }
+}
+
+TEST_CASE("lit rooms: a tube lights a room", "[integration][lit-rooms]") {
+  Mesh mesh = room(glm::vec3(40));
+  constexpr int kSides = 12;
+  const auto corner = [](int i) {
+    const double angle = 2 * std::numbers::pi * i / kSides;
+    return glm::vec3(0.3, 1.8 + 0.02 * std::sin(angle), 0.7 + 0.02 * std::cos(angle));
+  };
+  for (int i = 0; i < kSides; ++i)
+    add_quad(mesh, corner(i), {1.4F, 0, 0}, corner(i + 1) - corner(i), kLamp);
+  // The tube is drawn too wide, and hides too much of the ceiling that it lights
+  check_errors(mesh, {}, before(), {.bias = 0.015});
+}
+
+TEST_CASE("lit rooms: light of the sky comes in through a window", "[integration][lit-rooms]") {
+  // Close the front, and leave a window in the right wall
+  Mesh mesh = room(glm::vec3(0));
+  mesh.triangles.resize(8);
+  mesh.material_of.resize(8);
+  add_quad(mesh, {2, 0, 0}, {0, 0, 2}, {0, 0.7F, 0}, kGreen);
+  add_quad(mesh, {2, 1.5F, 0}, {0, 0, 2}, {0, 0.5F, 0}, kGreen);
+  add_quad(mesh, {2, 0.7F, 0}, {0, 0, 0.6F}, {0, 0.8F, 0}, kGreen);
+  add_quad(mesh, {2, 0.7F, 1.5F}, {0, 0, 0.5F}, {0, 0.8F, 0}, kGreen);
+  add_quad(mesh, {0, 0, 2}, {0, 2, 0}, {2, 0, 0}, kWhite);
+  add_block(mesh, {0.4F, 0, 0.4F}, {0.5F, 1.1F, 0.5F}, kWhite);
+  Camera within = before();
+  within.position = {1, 1, 1.95};
+  within.vertical_fov = 1.5F;
+  // What the camera sees gathers the sky, of which the window's borders hide too much
+  check_errors(mesh, {.sky = {.radiance = {3, 4, 5}}}, within, {.bias = 0.045, .rms = 0.1});
+}
