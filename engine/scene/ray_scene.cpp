@@ -102,10 +102,11 @@ void check_material(const Material& material, const char* field) {
     require_request(material.emission[k] >= 0 && std::isfinite(material.emission[k]), field,
                     "mesh: the emission of a material is negative or not finite");
   }
-  const Image* const image = material.texture.get();
-  require_request(
-      image == nullptr || image->pixels.size() == std::size_t{image->width} * image->height, field,
-      "mesh: a texture has another number of pixels than its size says");
+  for (const Image* const image : {material.texture.get(), material.emission_texture.get()}) {
+    require_request(
+        image == nullptr || image->pixels.size() == std::size_t{image->width} * image->height,
+        field, "mesh: a texture has another number of pixels than its size says");
+  }
 }
 
 }  // namespace
@@ -149,9 +150,10 @@ struct RayScene::Impl {
   // Returns the interpolated normal, mirrored where it points to the back of the triangle.
   [[nodiscard]] glm::dvec3 shading_normal(const std::array<std::uint32_t, 3>& corners, double u,
                                           double v, const glm::dvec3& geometric) const;
-  [[nodiscard]] glm::vec3 albedo(const Material& material,
-                                 const std::array<std::uint32_t, 3>& corners, float u,
-                                 float v) const;
+  // Returns the colour of a texture at a place on a triangle; white without a texture.
+  [[nodiscard]] glm::vec3 texture_at(const Image* texture,
+                                     const std::array<std::uint32_t, 3>& corners, float u,
+                                     float v) const;
 
   const Mesh& mesh;
   std::atomic<std::int64_t> bytes = 0;  // that Embree holds, as its monitor reports them
@@ -251,13 +253,13 @@ glm::dvec3 RayScene::Impl::shading_normal(const std::array<std::uint32_t, 3>& co
   return side < 0 ? normal - 2 * side * geometric : normal;  // mirror it at the surface
 }
 
-glm::vec3 RayScene::Impl::albedo(const Material& material,
-                                 const std::array<std::uint32_t, 3>& corners, float u,
-                                 float v) const {
-  if (!material.texture || mesh.uvs.empty()) return material.albedo;
+glm::vec3 RayScene::Impl::texture_at(const Image* texture,
+                                     const std::array<std::uint32_t, 3>& corners, float u,
+                                     float v) const {
+  if (texture == nullptr || mesh.uvs.empty()) return glm::vec3(1);
   const glm::vec2 uv =
       (1 - u - v) * mesh.uvs[corners[0]] + u * mesh.uvs[corners[1]] + v * mesh.uvs[corners[2]];
-  return material.albedo * sample_texture(*material.texture, uv);
+  return sample_texture(*texture, uv);
 }
 
 RayScene::RayScene(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
@@ -321,8 +323,9 @@ SurfaceHit RayScene::surface(std::uint32_t triangle, float u, float v) const {
   hit.position = mesh.origin + (a + u_wide * ab + v_wide * ac);
   hit.geometric_normal = glm::vec3(geometric);
   hit.normal = glm::vec3(impl_->shading_normal(corners, u_wide, v_wide, geometric));
-  hit.albedo = impl_->albedo(material, corners, u, v);
-  hit.emission = material.emission;
+  hit.albedo = material.albedo * impl_->texture_at(material.texture.get(), corners, u, v);
+  hit.emission =
+      material.emission * impl_->texture_at(material.emission_texture.get(), corners, u, v);
   return hit;
 }
 

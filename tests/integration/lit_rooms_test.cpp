@@ -192,6 +192,24 @@ TEST_CASE("lit rooms: a tube lights a room", "[integration][lit-rooms]") {
   check_errors(mesh, {}, before(), {.bias = 0.015});
 }
 
+TEST_CASE("lit rooms: a lamp with a texture lights what is near each part of it",
+          "[integration][lit-rooms]") {
+  // A panel that stands beside the blocks, bright in one corner and black elsewhere
+  Mesh mesh = room(glm::vec3(60));
+  mesh.uvs.resize(mesh.positions.size(), glm::vec2(0));
+  add_quad(mesh, {1.9F, 0.05F, 0.3F}, {0, 0, 1.2F}, {0, 1.2F, 0}, kLamp);
+  mesh.uvs.insert(mesh.uvs.end(), {{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+  Image picture{.width = 32, .height = 32};
+  for (unsigned y = 0; y < 32; ++y) {
+    for (unsigned x = 0; x < 32; ++x) {
+      const bool bright = x >= 22 && x < 30 && y >= 20 && y < 28;
+      picture.pixels.push_back(bright ? glm::vec3(1, 0.7F, 0.4F) : glm::vec3(0.002F));
+    }
+  }
+  mesh.materials[kLamp].emission_texture = std::make_shared<const Image>(picture);
+  check_errors(mesh, {});
+}
+
 TEST_CASE("lit rooms: light of the sky comes in through a window", "[integration][lit-rooms]") {
   // Close the front, and leave a window in the right wall
   Mesh mesh = room(glm::vec3(0));

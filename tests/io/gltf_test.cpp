@@ -210,11 +210,19 @@ TEST_CASE("gltf: materials have factor, texture, emission and sides", "[io][gltf
   CHECK(file.mesh.uvs[file.mesh.triangles[0][1]] == glm::vec2(1, 1));
   CHECK(file.warnings.empty());
 
-  // An emission texture is replaced by its mean, in a bufferView and in a data URI alike.
+  // An emission texture lies where the base colour does, or is replaced by its mean, in a
+  // bufferView and in a data URI alike.
   const std::string png = slurp(files.scratch.path() / "t.png");
   json["images"] = Json::array({{{"uri", "data:image/png;base64," + base64(png)}}});
   json["materials"][0]["emissiveTexture"] = {{"index", 0}};
+  const MeshFile textured = files.read(json);
+  CHECK(textured.mesh.materials[0].emission == glm::vec3(20, 10, 0));
+  REQUIRE(textured.mesh.materials[0].emission_texture);
+  CHECK(textured.mesh.materials[0].emission_texture->width == 2);
+  CHECK(textured.warnings.empty());
+  json["materials"][0]["emissiveTexture"]["texCoord"] = 1;
   const MeshFile lit = files.read(json);
+  CHECK_FALSE(lit.mesh.materials[0].emission_texture);
   CHECK(lit.mesh.materials[0].emission == glm::vec3(10, 0, 0));
   CHECK(lit.mesh.materials[0].texture->width == 2);
   CHECK(lit.warnings.size() == 1);
@@ -316,8 +324,9 @@ TEST_CASE("gltf: 30,000 materials that emit by one texture compute its mean once
   Json primitive = json["meshes"][0]["primitives"][0];
   json["meshes"][0]["primitives"] = Json::array();
   for (int i = 0; i < 30'000; ++i) {
-    json["materials"].push_back(
-        {{"emissiveFactor", {1, 1, 1}}, {"emissiveTexture", {{"index", 0}}}});
+    json["materials"].push_back({{"emissiveFactor", {1, 1, 1}},
+                                 {"emissiveTexture", {{"index", 0}, {"texCoord", 1}}},
+                                 {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
     primitive["material"] = i;
     json["meshes"][0]["primitives"].push_back(primitive);
   }

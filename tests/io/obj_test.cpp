@@ -72,15 +72,17 @@ TEST_CASE("obj: materials come from the library, textures from files next to it"
   scratch.file("a b.mtl",
                "Kd 9 9 9\nnewmtl red wall\nKd 0.5 0.25 2\nmap_Kd -s 1 1 -o 0.5 -bm 2 my red.png\n"
                "newmtl lamp # a comment\nKd 0.1\nKe 17 12 4\nillum 2\n"
-               "newmtl odd\nKd spectral file.rfl\nmap_Ke a.png\nmap_Kd none.png\n"
+               "newmtl odd\nKd spectral file.rfl\nmap_Ke none.png\nmap_Kd none.png\n"
+               "newmtl screen\nmap_Ke my red.png\nnewmtl dim\nmap_Ke my red.png\nKe 0.5 0.5 0.5\n"
                "newmtl lamp\nKe 0 0 0\n");
   const MeshFile file = read(scratch, kSquare +
                                           "mtllib a b.mtl\nf 1 2 3\nusemtl red wall\nf 1 2 3\n"
                                           "usemtl lamp\nf 1 2 4\nusemtl missing\nf 1 3 4\n"
-                                          "usemtl lamp\nf 2 3 4\nusemtl odd\nf 2 3 4\n");
+                                          "usemtl lamp\nf 2 3 4\nusemtl odd\nf 2 3 4\n"
+                                          "usemtl screen\nf 1 2 3\nusemtl dim\nf 1 2 3\n");
   const Mesh& mesh = file.mesh;
-  CHECK(mesh.material_of == std::vector<std::uint16_t>{0, 1, 2, 3, 2, 4});
-  REQUIRE(mesh.materials.size() == 5);
+  CHECK(mesh.material_of == std::vector<std::uint16_t>{0, 1, 2, 3, 2, 4, 5, 6});
+  REQUIRE(mesh.materials.size() == 7);
   CHECK(mesh.materials[0].albedo == glm::vec3(0.5F));
   CHECK(mesh.materials[1].name == "red wall");
   CHECK(mesh.materials[1].albedo == glm::vec3(0.5F, 0.25F, 1));
@@ -89,12 +91,18 @@ TEST_CASE("obj: materials come from the library, textures from files next to it"
   CHECK(mesh.materials[2].albedo == glm::vec3(0.1F));
   CHECK(mesh.materials[2].emission == glm::vec3(17, 12, 4));
   CHECK_FALSE(mesh.materials[4].texture);
+  CHECK_FALSE(mesh.materials[4].emission_texture);
+  CHECK(mesh.materials[4].emission == glm::vec3(0));
+  CHECK(mesh.materials[5].emission == glm::vec3(1));
+  REQUIRE(mesh.materials[5].emission_texture);
+  CHECK(mesh.materials[5].emission_texture->at(0, 0) == glm::vec3(1, 0, 0));
+  CHECK(mesh.materials[6].emission == glm::vec3(0.5F));
+  CHECK(mesh.materials[6].emission_texture == mesh.materials[5].emission_texture);
   std::string warnings;
   for (const std::string& warning : file.warnings) warnings += warning + "\n";
-  CHECK(file.warnings.size() == 4);
+  CHECK(file.warnings.size() == 3);
   CHECK_THAT(warnings, Contains("a colour that is not R G B is left out") &&
-                           Contains("a b.mtl: line 10") && Contains("an emission map (map_Ke)") &&
-                           Contains("a b.mtl: line 11") &&
+                           Contains("a b.mtl: line 10") &&
                            Contains("a texture is left out and the plain colour of its material is "
                                     "used: none.png: No such file") &&
                            Contains("a material is not defined and becomes plain grey: 'missing'"));

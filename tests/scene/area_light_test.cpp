@@ -7,6 +7,7 @@
 #include "engine/base/numbers.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
+#include "engine/scene/texture.h"
 #include "tests/scene/meshes.h"
 
 using namespace ptc;
@@ -125,6 +126,42 @@ TEST_CASE("area light: an object in between hides the lamp", "[scene][lights]") 
   const double whole = kPiDouble * 4 * corner_factor(1, 1, 2);
   CHECK(irradiance(light, {0, 0, 0}, kUp, 400).mean == Approx(whole / 2).epsilon(0.03));
   CHECK(light.irradiance({-3, 0, 0}, kUp, {}, 1).local == glm::vec3(0));
+}
+
+TEST_CASE("area light: the texture of a lamp lights as all of its parts do", "[scene][lights]") {
+  // A lamp of 2 x 2 at height 1 over a floor, whose texture is bright in one corner
+  Mesh mesh;
+  mesh.materials = {{.emission = glm::vec3(10)}};
+  add_quad(mesh, {-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
+  mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
+  Image picture{.width = 8, .height = 8, .pixels = std::vector<glm::vec3>(64, glm::vec3(0))};
+  picture.pixels[8 * 1 + 6] = {1, 0.5F, 0.25F};
+  picture.pixels[8 * 6 + 1] = glm::vec3(0.25F);
+  mesh.materials[0].emission_texture = std::make_shared<const Image>(picture);
+  const RayScene scene(mesh);
+  const DirectLight light(scene, {});
+  for (const glm::dvec3 at : {glm::dvec3(0.7, 0, 0.6), glm::dvec3(-0.6, 0.8, -0.7)}) {
+    // Integrate over the lamp, place by place
+    constexpr int kSteps = 400;
+    glm::dvec3 wanted(0);
+    for (int j = 0; j < kSteps; ++j) {
+      for (int i = 0; i < kSteps; ++i) {
+        const double u = (i + 0.5) / kSteps, v = (j + 0.5) / kSteps;
+        const glm::dvec3 to = glm::dvec3(2 * u - 1, 1, 2 * v - 1) - at;
+        const double d2 = glm::dot(to, to);
+        wanted += 10.0 * glm::dvec3(sample_texture(picture, glm::vec2(u, v))) *
+                  (to.y * to.y / (d2 * d2) * 4 / (kSteps * kSteps));
+      }
+    }
+    glm::dvec3 mean(0);
+    for (std::uint64_t seed = 0; seed < 4000; ++seed) {
+      mean += glm::dvec3(light.irradiance(at, {0, 1, 0}, {0, 64, 0}, seed).local) / 4000.0;
+    }
+    INFO(at.x << ": " << mean.r << " of " << wanted.r);
+    for (int c = 0; c < 3; ++c) CHECK(mean[c] == Approx(wanted[c]).epsilon(0.01));
+  }
+  // What a ray meets emits what the texture has there
+  CHECK(scene.surface(0, 0.5F, 0.5F).emission == 10.0F * sample_texture(picture, {1, 0.5F}));
 }
 
 TEST_CASE("area light: lamps of different power add up", "[scene][lights]") {

@@ -24,8 +24,11 @@ struct Material {
   std::string name;                      ///< as the file has it; may be empty
   glm::vec3 albedo{0.5f};                ///< linear RGB; multiplied by the texture if there is one
   std::shared_ptr<const Image> texture;  ///< linear RGB, row 0 at the top, repeats; may be null
-  glm::vec3 emission{0};                 ///< radiance of the front side, RGB, W / (m^2 sr)
-  bool double_sided = false;             ///< the back reflects as the front does (glTF)
+  /// Radiance of the front side, RGB, W / (m^2 sr); multiplied by `emission_texture` if there is
+  /// one.
+  glm::vec3 emission{0};
+  std::shared_ptr<const Image> emission_texture;  ///< as `texture`
+  bool double_sided = false;                      ///< the back reflects as the front does (glTF)
 };
 
 /// The maximum number of materials of a mesh.
@@ -74,7 +77,8 @@ struct MeshFile {
 /// even concave ones. Degenerate triangles and vertices without a triangle are dropped. Every index
 /// is checked. If only some triangles have normals, the others get flat ones.
 ///
-/// Albedo is Kd of MTL and the base colour of glTF, both linear. A texture that is missing or
+/// Albedo is Kd of MTL and the base colour of glTF, emission Ke and emissiveFactor, all linear,
+/// with their textures. A map_Ke without Ke is the emission itself. A texture that is missing or
 /// damaged causes a warning, and the plain colour takes its place. Vertex colours, skins and morph
 /// targets are left out.
 /// @throws DataError when the file is not a mesh, has no triangle, or has a position that is not

@@ -62,13 +62,20 @@ const Json* extension(const Json& object, const char* name) {
   return extensions == nullptr ? nullptr : member(*extensions, name);
 }
 
-// A material of the file, and how its texture is mapped.
-struct GltfMaterial {
-  std::size_t index = 0;     // of the material in the soup
+// How a texture lies on a surface.
+struct TexturePlace {
   std::uint64_t uv_set = 0;  // N of the attribute TEXCOORD_N
-  glm::dvec2 uv_offset{0};
-  glm::dvec2 uv_scale{1};
-  double uv_rotation = 0;
+  glm::dvec2 offset{0};
+  glm::dvec2 scale{1};
+  double rotation = 0;
+
+  bool operator==(const TexturePlace&) const = default;
+};
+
+// A material of the file, and how its textures lie on it.
+struct GltfMaterial {
+  std::size_t index = 0;  // of the material in the soup
+  TexturePlace place;
 };
 
 class GltfMesh {
@@ -235,18 +242,18 @@ class GltfMesh {
   }
 
   void add_uvs(const Json& attributes, std::size_t count, const GltfMaterial& material) {
-    const std::string key = "TEXCOORD_" + std::to_string(material.uv_set);
+    const std::string key = "TEXCOORD_" + std::to_string(material.place.uv_set);
     const auto index = document_.unsigned_at(attributes, key.c_str());
     if (!index) return;
     has_uvs_ = true;
     const auto uvs = document_.read_accessor(*index, 2, count);
-    const double cosine = std::cos(material.uv_rotation);
-    const double sine = std::sin(material.uv_rotation);
+    const double cosine = std::cos(material.place.rotation);
+    const double sine = std::sin(material.place.rotation);
     for (std::size_t i = 0; i < uvs.count; ++i) {
       const glm::dvec2 scaled =
-          material.uv_scale * glm::dvec2(uvs.values[2 * i], uvs.values[2 * i + 1]);
-      const double u = material.uv_offset.x + cosine * scaled.x + sine * scaled.y;
-      const double v = material.uv_offset.y - sine * scaled.x + cosine * scaled.y;
+          material.place.scale * glm::dvec2(uvs.values[2 * i], uvs.values[2 * i + 1]);
+      const double u = material.place.offset.x + cosine * scaled.x + sine * scaled.y;
+      const double v = material.place.offset.y - sine * scaled.x + cosine * scaled.y;
       soup_.uvs.emplace_back(u, 1 - v);  // v of glTF grows downwards
     }
   }
@@ -305,7 +312,7 @@ class GltfMesh {
     } else if (const Json* const pbr = member(json, "pbrMetallicRoughness")) {
       read_base(*pbr, "baseColorFactor", "baseColorTexture", material, made);
     }
-    read_emission(json, material);
+    read_emission(json, material, made);
   }
 
   void read_base(const Json& json, const char* factor, const char* texture, Material& material,
@@ -319,20 +326,27 @@ class GltfMesh {
     const Json* const info = member(json, texture);
     if (info == nullptr) return;
     material.texture = load_texture(*info);
-    made.uv_set = document_.unsigned_at(*info, "texCoord").value_or(0);
-    const Json* const transform = extension(*info, "KHR_texture_transform");
-    if (transform == nullptr) return;
-    made.uv_set = document_.unsigned_at(*transform, "texCoord").value_or(made.uv_set);
-    made.uv_rotation = document_.number_at(*transform, "rotation", 0);
-    if (const auto o = document_.numbers_at<2>(*transform, "offset"))
-      made.uv_offset = {(*o)[0], (*o)[1]};
-    if (const auto s = document_.numbers_at<2>(*transform, "scale"))
-      made.uv_scale = {(*s)[0], (*s)[1]};
+    made.place = place_of(*info);
   }
 
-  // Reads the emission. An emission texture is replaced by its mean, so that the emitted power is
-  // right.
-  void read_emission(const Json& json, Material& material) {
+  // Reads which texture coordinates a texture has, and how they are transformed.
+  [[nodiscard]] TexturePlace place_of(const Json& info) const {
+    TexturePlace place{.uv_set = document_.unsigned_at(info, "texCoord").value_or(0)};
+    const Json* const transform = extension(info, "KHR_texture_transform");
+    if (transform == nullptr) return place;
+    place.uv_set = document_.unsigned_at(*transform, "texCoord").value_or(place.uv_set);
+    place.rotation = document_.number_at(*transform, "rotation", 0);
+    if (const auto o = document_.numbers_at<2>(*transform, "offset"))
+      place.offset = {(*o)[0], (*o)[1]};
+    if (const auto s = document_.numbers_at<2>(*transform, "scale"))
+      place.scale = {(*s)[0], (*s)[1]};
+    return place;
+  }
+
+  // Reads the emission. A mesh has one set of texture coordinates: where the emission texture lies
+  // on another than that of the base colour, it is replaced by its mean, so that the emitted power
+  // is right.
+  void read_emission(const Json& json, Material& material, GltfMaterial& made) {
     const auto factor = document_.numbers_at<3>(json, "emissiveFactor");
     if (!factor) return;
     double strength = 1;
@@ -342,9 +356,13 @@ class GltfMesh {
     glm::dvec3 mean(1);
     const Json* const info = member(json, "emissiveTexture");
     const auto image = info == nullptr ? nullptr : load_texture(*info);
-    if (image) {
+    if (image && (!material.texture || place_of(*info) == made.place)) {
+      material.emission_texture = image;
+      made.place = place_of(*info);
+    } else if (image) {
       mean = mean_of(image);
-      warnings_.add(kEmissionAveraged, "material '" + material.name + "'");
+      warnings_.add(kEmissionAveraged, "material '" + material.name +
+                                           "', whose base colour lies on other coordinates");
     }
     for (int i = 0; i < 3; ++i) {
       const double value = (*factor)[static_cast<std::size_t>(i)] * strength * mean[i];

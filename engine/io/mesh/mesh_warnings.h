@@ -19,9 +19,6 @@ struct WarningKind {
 inline constexpr WarningKind kTextureLeftOut{
     "a texture is left out and the plain colour of its material is used",
     "textures are left out and the plain colours of their materials are used"};
-inline constexpr WarningKind kEmissionMapLeftOut{
-    "an emission map (map_Ke) is left out and the emission Ke of its material is used",
-    "emission maps (map_Ke) are left out and the emissions Ke of their materials are used"};
 inline constexpr WarningKind kEmissionAveraged{"an emission texture is replaced by its mean",
                                                "emission textures are replaced by their means"};
 inline constexpr WarningKind kColourLeftOut{

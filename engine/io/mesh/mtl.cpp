@@ -37,6 +37,7 @@ class MtlReader {
     const auto [at, is_new] = materials_.try_emplace(name);
     current_ = is_new ? &at->second : nullptr;
     if (is_new) current_->name = name;
+    emission_given_ = false;
   }
 
   void set(std::string_view keyword, Words& words) {
@@ -44,11 +45,15 @@ class MtlReader {
       read_colour(words, 1, current_->albedo);
     } else if (keyword == "Ke") {
       read_colour(words, std::numeric_limits<float>::max(), current_->emission);
+      emission_given_ = true;
     } else if (keyword == "map_Kd") {
       const std::string name = file_name(words);
       if (!name.empty()) current_->texture = textures_.load(name);
     } else if (keyword == "map_Ke") {
-      warnings_.add(kEmissionMapLeftOut, place());
+      const std::string name = file_name(words);
+      if (!name.empty()) current_->emission_texture = textures_.load(name);
+      // A map alone is the emission
+      if (current_->emission_texture && !emission_given_) current_->emission = glm::vec3(1);
     }
   }
 
@@ -96,6 +101,7 @@ class MtlReader {
   std::map<std::string, Material>& materials_;
   MeshWarnings& warnings_;
   Material* current_ = nullptr;
+  bool emission_given_ = false;  // Ke of the current material
 };
 
 }  // namespace

@@ -166,18 +166,14 @@ Place sample_place(const View& view, const glm::dvec3& normal, const glm::vec2& 
 }  // namespace
 
 AreaLights::AreaLights(const Mesh& mesh) {
-  // Collect the triangles that emit, and their power up to a factor.
+  // Collect the emitters, and their power up to a factor.
   std::vector<double> power;
   double total = 0;
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const glm::vec3& radiance = mesh.materials[mesh.material_of[i]].emission;
-    const auto& c = mesh.triangles[i];
-    const Emitter emitter{{mesh.positions[c[0]], mesh.positions[c[1]], mesh.positions[c[2]]},
-                          radiance};
+  for (const Emitter& emitter : emitters_of(mesh)) {
     const glm::dvec3 a(emitter.corner[0]);
     const double area = glm::length(
         glm::cross(glm::dvec3(emitter.corner[1]) - a, glm::dvec3(emitter.corner[2]) - a));
-    const double given = area * brightness(radiance);
+    const double given = area * brightness(emitter.radiance);
     if (!(given > 0) || !std::isfinite(given)) continue;
     emitters_.push_back(emitter);
     power.push_back(given);

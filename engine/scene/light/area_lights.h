@@ -7,15 +7,10 @@
 #include <glm/vec3.hpp>
 
 #include "engine/io/mesh/mesh.h"
+#include "engine/scene/light/emitters.h"
 #include "engine/scene/sampling/low_discrepancy.h"
 
 namespace ptc {
-
-/// A triangle that emits on its front side. Coordinates are relative to Mesh::origin.
-struct Emitter {
-  glm::vec3 corner[3];    ///< counter-clockwise as seen from the emitting side
-  glm::vec3 radiance{0};  ///< W/(m^2 sr)
-};
 
 /// A place on an emitter that a shadow ray aims at.
 struct EmitterSample {
