@@ -231,6 +231,25 @@ ordered_json facts_of(const LightingReport& report) {
   return facts;
 }
 
+ordered_json facts_of(const LightReport& report) {
+  return {{"points", report.points},
+          {"emitters", report.emitters},
+          {"shadow_rays", report.rays},
+          {"ray_cpu_seconds", report.ray_cpu_seconds},
+          {"sky_cpu_seconds", report.sky_cpu_seconds},
+          {"gather", facts_of(report.gather)},
+          {"cache", facts_of(report.cache)},
+          {"seconds", facts_of(report.seconds)}};
+}
+
+std::string light_text(const std::string& output, const LightReport& report) {
+  std::string text =
+      fmt::format("{}: {} points, {} shadow rays, {:.2f} s\n{}", output, report.points, report.rays,
+                  total_seconds(report.seconds), stages_text(report.seconds));
+  if (report.emitters > 0) text += fmt::format("  {} surfels emit light\n", report.emitters / 2);
+  return text;
+}
+
 std::string shade_text(const std::string& output, const LightingReport& report) {
   std::string text = fmt::format("{}: {} receivers, {:.2f} s, {:.2f} % cache hits\n{}", output,
                                  report.receivers, total_seconds(report.seconds),

@@ -27,7 +27,12 @@ namespace ptc {
 /// All facts of a shading or rendering, with those of its tuning, check and damage if there are
 /// any.
 [[nodiscard]] nlohmann::ordered_json facts_of(const LightingReport& report);
+/// All facts of a lighting.
+[[nodiscard]] nlohmann::ordered_json facts_of(const LightReport& report);
 
+/// The summary of a lighting: "lit.ptcx: 1000 points, 4000 shadow rays, 1.20 s", the stages, and a
+/// line on what emits light.
+[[nodiscard]] std::string light_text(const std::string& output, const LightReport& report);
 /// The summary of a shading or rendering: "lit.ply: 1000 receivers, 1.20 s, 99.10 % cache hits",
 /// the stages, and a line each for damage, tuning and check if there are any.
 [[nodiscard]] std::string shade_text(const std::string& output, const LightingReport& report);

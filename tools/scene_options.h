@@ -63,7 +63,9 @@ class LightArguments {
 void note_unknown_up(const std::vector<std::filesystem::path>& files, const std::string& axis,
                      Progress& progress);
 
-/// Declares --sun-rays, --sky-rays and --area-rays.
+/// Declares --sun-rays and --area-rays.
+void add_shadow_rays(CLI::App& app, LightSampling& sampling);
+/// Declares --sun-rays, --area-rays and --sky-rays.
 void add_light_sampling(CLI::App& app, LightSampling& sampling);
 
 /// The values of --camera, --fov and --size.

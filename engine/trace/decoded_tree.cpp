@@ -17,42 +17,60 @@ static_assert(kGroupPlaces * (sizeof(TraceGroup) + 16) + kLeafPlaces * (sizeof(T
 }  // namespace
 
 DecodedTree::DecodedTree(const SceneView& view, PageCache& cache, Sides sides)
-    : scene_(view, cache), sides_(sides), groups_(kGroupPlaces), leaves_(kLeafPlaces) {}
+    : scene_(view, cache),
+      starts_{.lengths = view.scale().length_factors(), .sides = sides},
+      groups_(kGroupPlaces),
+      leaves_(kLeafPlaces) {}
 
-bool DecodedTree::begin(const glm::dvec3& origin, const glm::vec3& axis) {
+glm::dvec3 DecodedTree::lattice(const glm::dvec3& position) const {
   const Frame& frame = view().frame();
   const glm::dvec3 low(frame.origin[0], frame.origin[1], frame.origin[2]);
   // Keep far origins within what floats can square.
   glm::dvec3 place;
   for (int k = 0; k < 3; ++k) {
-    place[k] = std::clamp(view().scale().length(origin[k] - low[k]), -SceneScale::kMaxDistance,
+    place[k] = std::clamp(view().scale().length(position[k] - low[k]), -SceneScale::kMaxDistance,
                           SceneScale::kMaxDistance) /
                SceneScale::kLatticeUnit;
   }
-  if (place == origin_ && axis == axis_) return false;
-  origin_ = place;
-  axis_ = axis;
+  return place;
+}
+
+bool DecodedTree::begin(const glm::dvec3& origin, const glm::vec3& axis) {
+  const glm::dvec3 place = lattice(origin);
+  if (!starts_.around && place == starts_.origin && axis == starts_.axis) return false;
+  starts_.origin = place;
+  starts_.axis = axis;
+  starts_.around = false;
+  starts_.reach = 0;
   groups_.clear();
   leaves_.clear();
   return true;
 }
 
+void DecodedTree::begin_around(const glm::dvec3& origin, float reach) {
+  starts_.origin = lattice(origin);
+  starts_.axis = glm::vec3(0);
+  starts_.around = true;
+  starts_.reach = reach;
+  groups_.clear();
+  leaves_.clear();
+}
+
 void DecodedTree::decode_group(std::uint64_t reference, TraceGroup& into) {
   const ChildRef ref = decode_reference(reference, true);
   const PinnedGroup found = scene_.group(ref.page, ref.slot);
-  decode_boxes(*found, origin_, into);
+  decode_boxes(*found, starts_, into);
 }
 
 void DecodedTree::decode_leaf(std::uint64_t first, std::uint32_t count, TraceLeaf& into) {
   // Append the points of each page that holds some of the run.
-  const DiscOrigin from{origin_, axis_, view().scale().length_factors(), sides_};
   const std::uint32_t per_page = view().points_per_page();
   into.size = 0;
   for (std::uint32_t done = 0; done < count;) {
     const auto at = static_cast<std::uint32_t>((first + done) % per_page);
     const std::uint32_t number = std::min(count - done, per_page - at);
     const PageGuard page = scene_.points(first + done);
-    decode_discs(page.payload(), page.record_count(), at, number, done, from, into);
+    decode_discs(page.payload(), page.record_count(), at, number, done, starts_, into);
     done += number;
   }
 }

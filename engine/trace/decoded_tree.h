@@ -30,6 +30,10 @@ class DecodedTree {
   ///                wholly below that horizon are left out
   /// @return        false when rays started there already, so that all is as it was
   bool begin(const glm::dvec3& origin, const glm::vec3& axis);
+  /// Chooses a place around which rays of any direction start.
+  /// @param origin  scene units
+  /// @param reach   how far from there they start at most, edges
+  void begin_around(const glm::dvec3& origin, float reach);
 
   /// Returns a group.
   /// @param reference  of an interior node, as it is stored (spec/nodes.md#node-group)
@@ -52,17 +56,15 @@ class DecodedTree {
   [[nodiscard]] glm::vec3 outgoing(std::uint64_t point, bool emission);
 
   [[nodiscard]] const SceneView& view() const noexcept { return scene_.view(); }
-  /// Returns the axis that begin() was given.
-  [[nodiscard]] const glm::vec3& axis() const noexcept { return axis_; }
+  [[nodiscard]] Sides sides() const noexcept { return starts_.sides; }
 
  private:
+  [[nodiscard]] glm::dvec3 lattice(const glm::dvec3& position) const;
   void decode_group(std::uint64_t reference, TraceGroup& into);
   void decode_leaf(std::uint64_t first, std::uint32_t count, TraceLeaf& into);
 
   SceneReader scene_;
-  Sides sides_;
-  glm::dvec3 origin_{0};  ///< lattice units
-  glm::vec3 axis_{0};
+  RayStarts starts_;
   DecodedTable<TraceGroup> groups_;
   DecodedTable<TraceLeaf> leaves_;
 };

@@ -33,7 +33,7 @@ void DiscTracer::begin(const glm::dvec3& origin, const glm::vec3& axis) {
     const TraceGroup group = tree_.group(opened_[next]);
     for (std::size_t i = 0; i < kTraceLanes; ++i) {
       if ((group.children >> i & 1) == 0) continue;
-      Item item;
+      ListedBox item;
       for (std::size_t k = 0; k < kBoxColumns; ++k) item.columns[k] = group.columns[k][i];
       item.reference = group.child[i];
       item.interior = (group.interior >> i & 1) != 0;
@@ -62,18 +62,7 @@ void DiscTracer::begin(const glm::dvec3& origin, const glm::vec3& axis) {
       items_.push_back(item);
     }
   }
-  // Make the list
-  std::ranges::sort(items_, [](const Item& a, const Item& b) {
-    return a.distance != b.distance ? a.distance < b.distance : a.reference < b.reference;
-  });
-  words_.resize(items_.size());
-  list_.size = items_.size();
-  for (std::size_t i = 0; i < items_.size(); ++i) {
-    for (std::size_t k = 0; k < kBoxColumns; ++k) list_.columns[k][i] = items_[i].columns[k];
-    list_.distance[i] = items_[i].distance;
-    list_.number[i] = static_cast<std::uint32_t>(i << 1 | (items_[i].interior ? 1 : 0));
-    words_[i] = items_[i].reference;
-  }
+  make_list(items_, list_, words_);
   listed_ = true;
 }
 

@@ -59,19 +59,11 @@ class DiscTracer {
   }
 
  private:
-  /// A box of the list before it is sorted.
-  struct Item {
-    float distance;
-    float columns[kBoxColumns];
-    std::uint64_t reference;
-    bool interior;
-  };
-
   /// Says whether no ray can meet a disc of a leaf.
   [[nodiscard]] bool is_empty(const ChildRef& leaf);
 
   DecodedTree tree_;
-  std::vector<Item> items_;
+  std::vector<ListedBox> items_;
   std::vector<std::uint64_t> opened_;  ///< references of groups to look at
   std::vector<std::uint64_t> words_;   ///< references of the list's boxes
   BoxList list_, tile_;

@@ -20,7 +20,28 @@
 #include <memory>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
+#include "engine/shade/scene_scale.h"
+#include "engine/shade/shading.h"
+
 namespace ptc {
+
+/// Radius of a disc as shadow rays meet it, over its own. In the edges of a room the discs of both
+/// walls leave slivers free, through which a sun would shine everywhere in it.
+inline constexpr float kRim = 1.2F;
+
+/// Where the rays start for which a tree is decoded: at one place, or around it.
+struct RayStarts {
+  glm::dvec3 origin{0};               ///< lattice units
+  glm::vec3 axis{0};                  ///< discs below the horizon of this normal are left out
+  SceneScale::Factors lengths{1, 1};  ///< convert lengths from scene units to edges
+  Sides sides = Sides::both;          ///< which sides stop rays
+  /// Shadow rays start around the origin: each finds itself which backs are clear, and discs have a
+  /// rim of kRim.
+  bool around = false;
+  float reach = 0;  ///< how far from the origin rays start at most, edges
+};
 
 /// Boxes or discs that a kernel tests at once, at most.
 inline constexpr std::size_t kTraceLanes = 8;
@@ -73,6 +94,32 @@ struct BoxList {
   std::uint32_t number[kCapacity + kTraceLanes];  ///< index into the words of the whole list
   std::size_t size = 0;
 };
+
+/// A box on its way to a list.
+struct ListedBox {
+  float distance;  ///< of its nearest point, before which no ray enters it
+  float columns[kBoxColumns];
+  std::uint64_t reference;
+  bool interior;
+};
+
+/// Sorts boxes and makes a list of them.
+/// @param boxes  at most BoxList::kCapacity
+/// @param words  gets their references, by which rays follow them (trace_kernels.h)
+inline void make_list(std::vector<ListedBox>& boxes, BoxList& list,
+                      std::vector<std::uint64_t>& words) {
+  std::ranges::sort(boxes, [](const ListedBox& a, const ListedBox& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.reference < b.reference;
+  });
+  words.resize(boxes.size());
+  list.size = boxes.size();
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for (std::size_t k = 0; k < kBoxColumns; ++k) list.columns[k][i] = boxes[i].columns[k];
+    list.distance[i] = boxes[i].distance;
+    list.number[i] = static_cast<std::uint32_t>(i << 1 | (boxes[i].interior ? 1 : 0));
+    words[i] = boxes[i].reference;
+  }
+}
 
 /// What was decoded last: a table with one place for each hash, as caches of processors have. What
 /// is decoded depends on its key alone, so it does not matter what is still there.

@@ -36,6 +36,7 @@ constexpr float kSlack = 1 + 2e-6F;        ///< what rounding may take from a qu
 
 /// A ray that begins at the origin.
 struct Ray {
+  static constexpr bool kOffset = false;
   glm::vec3 along;
   float inverse[3];  ///< 1 over each component
   bool negative[3];
@@ -48,12 +49,23 @@ struct Ray {
   }
 };
 
+/// A ray that begins beside the origin.
+struct OffsetRay : Ray {
+  static constexpr bool kOffset = true;
+  glm::vec3 from;
+  Sides sides;  ///< which sides stop the ray
+
+  OffsetRay(const ShadowRay& ray, Sides stopping)
+      : Ray(ray.direction), from(ray.origin), sides(stopping) {}
+};
+
 /// Tests up to kTraceLanes boxes.
 /// @param columns  of the boxes, `stride` floats from one column to the next
 /// @param far      the depth that the ray has met something at
 /// @param near     receives the depth at which the ray enters each box
 /// @return         bit i: the ray may meet something in box i
-HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const Ray& ray, float far,
+template <class R>
+HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const R& ray, float far,
                                float* near) {
   const F f;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
@@ -67,14 +79,27 @@ HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const R
       const auto by = hn::Set(f, ray.inverse[k]);
       const std::size_t first = ray.negative[k] ? kHighX : kLowX,
                         last = ray.negative[k] ? kLowX : kHighX;
-      enter = hn::Max(enter, hn::Mul(load(first + k), by));
-      leave = hn::Min(leave, hn::Mul(load(last + k), by));
+      auto a = load(first + k), b = load(last + k);
+      if constexpr (R::kOffset) {
+        const auto begin = hn::Set(f, ray.from[static_cast<int>(k)]);
+        a = hn::Sub(a, begin);
+        b = hn::Sub(b, begin);
+      }
+      enter = hn::Max(enter, hn::Mul(a, by));
+      leave = hn::Min(leave, hn::Mul(b, by));
     }
-    const auto slope = dot({load(kSlabX), load(kSlabY), load(kSlabZ)}, spread(ray.along));
+    const Vec slab{load(kSlabX), load(kSlabY), load(kSlabZ)};
+    const auto slope = dot(slab, spread(ray.along));
     const auto by =
         hn::Div(hn::Set(f, 1.0F),
                 hn::CopySign(hn::Max(hn::Abs(slope), hn::Set(f, kLeastSlabSlope)), slope));
-    const auto a = hn::Mul(load(kSlabLow), by), b = hn::Mul(load(kSlabHigh), by);
+    auto low = load(kSlabLow), high = load(kSlabHigh);
+    if constexpr (R::kOffset) {
+      const auto begin = dot(slab, spread(ray.from));
+      low = hn::Sub(low, begin);
+      high = hn::Sub(high, begin);
+    }
+    const auto a = hn::Mul(low, by), b = hn::Mul(high, by);
     enter = hn::Max(enter, hn::Min(a, b));
     leave = hn::Min(leave, hn::Max(a, b));
     hn::StoreU(enter, f, near + from);
@@ -119,6 +144,35 @@ HWY_INLINE bool meet_discs(const TraceLeaf& leaf, std::uint64_t first, const Ray
   return met;
 }
 
+/// Tests whether a ray that begins beside the origin meets a disc of a leaf within `length`. Backs
+/// within two of their radii of its beginning are clear.
+HWY_INLINE bool meet_discs(const TraceLeaf& leaf, const OffsetRay& ray, float length) {
+  const F f;
+  const auto lanes = static_cast<unsigned>(hn::Lanes(f));
+  const Vec along = spread(ray.along), from = spread(ray.from);
+  for (unsigned at = 0; at < leaf.size; at += lanes) {
+    const auto load = [&](const float* column) { return hn::Load(f, column + at); };
+    const Vec to{hn::Sub(load(leaf.x), from.x), hn::Sub(load(leaf.y), from.y),
+                 hn::Sub(load(leaf.z), from.z)};
+    const Vec normal{load(leaf.nx), load(leaf.ny), load(leaf.nz)};
+    const auto height = dot(to, normal), radius2 = load(leaf.radius2);
+    const auto t = hn::Div(height, dot(normal, along));
+    const Vec off{hn::MulSub(along.x, t, to.x), hn::MulSub(along.y, t, to.y),
+                  hn::MulSub(along.z, t, to.z)};
+    const auto off2 = dot(off, off);
+    const auto depth = hn::MulAdd(load(leaf.bump), off2, t);
+    auto hides = hn::And(hn::Le(off2, radius2), hn::Gt(t, hn::Zero(f)));
+    hides = hn::And(hides, hn::Le(depth, hn::Set(f, length)));
+    auto clear = hn::Ge(height, hn::Zero(f));
+    if (ray.sides == Sides::both) {
+      clear = hn::And(clear, hn::Lt(dot(to, to), hn::Mul(hn::Set(f, 4 / (kRim * kRim)), radius2)));
+    }
+    hides = hn::And(hn::AndNot(clear, hides), hn::FirstN(f, leaf.size - at));
+    if (!hn::AllFalse(f, hides)) return true;
+  }
+  return false;
+}
+
 /// A node that a ray has yet to look into.
 struct Waiting {
   std::uint64_t reference;
@@ -150,17 +204,21 @@ class Stack {
 };
 
 /// Follows one ray.
-void trace_ray(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-               const Ray& ray, RaysFor wanted, RayHit& hit) {
+/// @param far        returns the depth beyond which the ray looks for nothing
+/// @param meet_leaf  looks at up to kTraceDiscs points, and returns whether the ray ends there:
+///                   meet_leaf(leaf, number of its first point)
+template <class R, class Far, class MeetLeaf>
+HWY_INLINE void follow(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+                       const R& ray, const Far& far, const MeetLeaf& meet_leaf) {
   Stack stack;
   WalkLimit limit(tree.view());
   alignas(64) float near[kTraceLanes];
   for (std::size_t at = 0;;) {
     // Take the next boxes of the list
     if (stack.empty()) {
-      if (at >= list.size || list.distance[at] > hit.depth) return;
+      if (at >= list.size || list.distance[at] > far()) return;
       unsigned bits =
-          meet_boxes(list.columns[0] + at, BoxList::kCapacity + kTraceLanes, ray, hit.depth, near);
+          meet_boxes(list.columns[0] + at, BoxList::kCapacity + kTraceLanes, ray, far(), near);
       bits &= (1U << std::min(list.size - at, kTraceLanes)) - 1;
       stack.begin();
       for (; bits != 0; bits &= bits - 1) {
@@ -172,7 +230,7 @@ void trace_ray(DecodedTree& tree, const BoxList& list, std::span<const std::uint
       continue;
     }
     const Waiting next = stack.pop();
-    if (next.near > hit.depth) continue;
+    if (next.near > far()) continue;
     // Look at the children of a group
     if (next.interior) {
       limit.take_group();
@@ -180,8 +238,7 @@ void trace_ray(DecodedTree& tree, const BoxList& list, std::span<const std::uint
         tree.view().fail("spec/nodes.md#node-level",
                          "a path has more groups than there are levels");
       const TraceGroup& group = tree.group(next.reference);
-      unsigned bits =
-          meet_boxes(group.columns[0], kTraceLanes, ray, hit.depth, near) & group.children;
+      unsigned bits = meet_boxes(group.columns[0], kTraceLanes, ray, far(), near) & group.children;
       stack.begin();
       for (; bits != 0; bits &= bits - 1) {
         const auto i = static_cast<unsigned>(std::countr_zero(bits));
@@ -195,15 +252,23 @@ void trace_ray(DecodedTree& tree, const BoxList& list, std::span<const std::uint
     for (std::uint32_t done = 0; done < leaf.point_count; done += kTraceDiscs) {
       const std::uint64_t first = leaf.first_point + done;
       const auto count = std::min<std::uint32_t>(leaf.point_count - done, kTraceDiscs);
-      if (meet_discs(tree.leaf(first, count), first, ray, wanted, hit) && wanted == RaysFor::any)
-        return;
+      if (meet_leaf(tree.leaf(first, count), first)) return;
     }
   }
 }
 
+void trace_ray(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+               const Ray& ray, RaysFor wanted, RayHit& hit) {
+  follow(
+      tree, list, words, ray, [&] { return hit.depth; },
+      [&](const TraceLeaf& leaf, std::uint64_t first) {
+        return meet_discs(leaf, first, ray, wanted, hit) && wanted == RaysFor::any;
+      });
+}
+
 }  // namespace
 
-void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& into) {
+void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& into) {
   // Find the cell of the group, relative to the origin
   const F f;
   const auto children = static_cast<unsigned>(group.size());
@@ -213,11 +278,11 @@ void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& 
   const LatticePoint lattice = decode_morton(group.cell());
   const auto edge = static_cast<float>(cell_edge(group.level()) * SceneScale::kLatticeUnit);
   float corner[3];
-  float size = 3 * edge;
+  float size = 3 * edge + starts.reach;
   for (int k = 0; k < 3; ++k) {
-    corner[k] =
-        static_cast<float>((static_cast<double>(lattice[static_cast<std::size_t>(k)]) - origin[k]) *
-                           SceneScale::kLatticeUnit);
+    corner[k] = static_cast<float>(
+        (static_cast<double>(lattice[static_cast<std::size_t>(k)]) - starts.origin[k]) *
+        SceneScale::kLatticeUnit);
     size += std::abs(corner[k]);
   }
   // Bound each child by its octant, its sphere and its slab
@@ -234,8 +299,15 @@ void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& 
       return hn::Min(hn::Mul(unit, load_ufloat16(column + at)), most);
     };
     const auto share = [&](int k) { return to_float(load_u16(group.facing(k) + at)); };
-    const auto radius = length(group.radius()), thickness = length(group.thickness()),
-               greatest = length(group.greatest());
+    auto radius = length(group.radius()), thickness = length(group.thickness()),
+         greatest = length(group.greatest());
+    if (starts.around) {
+      // A rim is thicker than its disc only as far as that is tilted
+      const auto rim = hn::Mul(greatest, hn::Set(f, kRim - 1));
+      radius = hn::Add(radius, rim);
+      thickness = hn::Mul(thickness, hn::Set(f, kRim));
+      greatest = hn::Add(greatest, rim);
+    }
     Vec normal{hn::Sub(share(0), share(1)), hn::Sub(share(2), share(3)),
                hn::Sub(share(4), share(5))};
     const auto length2 = dot(normal, normal);
@@ -280,21 +352,22 @@ void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& 
 }
 
 void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                  unsigned number, unsigned from, const DiscOrigin& origin, TraceLeaf& into) {
+                  unsigned number, unsigned from, const RayStarts& starts, TraceLeaf& into) {
   const F f;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
   for (unsigned done = 0; done < number; done += lanes) {
-    const PageSurfels s =
-        load_surfels(payload, count, first + done, origin.position, origin.lengths);
+    const PageSurfels s = load_surfels(payload, count, first + done, starts.origin, starts.lengths);
     // Leave out what is below the horizon, and backs that are clear
     const auto height = dot(s.to, s.normal);
     const auto back = hn::Ge(height, hn::Zero(f));
     auto clear = back;
-    if (origin.sides == Sides::both) {
+    if (starts.around) {
+      clear = hn::Lt(s.radius, hn::Zero(f));  // each ray finds out itself
+    } else if (starts.sides == Sides::both) {
       const auto reach2 = hn::Mul(hn::Set(f, 4.0F), hn::Mul(s.radius, s.radius));
       clear = hn::And(back, hn::Lt(dot(s.to, s.to), reach2));
     }
-    const auto axis = spread(origin.axis);
+    const auto axis = spread(starts.axis);
     const auto cosine = dot(s.normal, axis);
     const Vec tilt{hn::NegMulAdd(cosine, axis.x, s.normal.x),
                    hn::NegMulAdd(cosine, axis.y, s.normal.y),
@@ -306,6 +379,7 @@ void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t f
     auto kept = hn::And(hn::Gt(s.radius, hn::Zero(f)), hn::Gt(top, hn::Zero(f)));
     kept = hn::And(hn::AndNot(clear, kept), hn::FirstN(f, number - done));
     // Append the rest
+    const auto rim = hn::Mul(s.radius, hn::Set(f, starts.around ? kRim : 1));
     alignas(64) float columns[9][kTraceLanes];
     const VF values[9] = {s.to.x,
                           s.to.y,
@@ -314,7 +388,7 @@ void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t f
                           s.normal.y,
                           s.normal.z,
                           height,
-                          hn::Mul(s.radius, s.radius),
+                          hn::Mul(rim, rim),
                           hn::Div(hn::Set(f, kBump), s.radius)};
     for (int k = 0; k < 9; ++k) hn::Store(values[k], f, columns[k]);
     float* const to[9] = {into.x,  into.y,      into.z,       into.nx,  into.ny,
@@ -383,6 +457,66 @@ void trace_rays(DecodedTree& tree, const BoxList& list, std::span<const std::uin
     trace_ray(tree, list, words, Ray(directions[i]), wanted, hits[i]);
 }
 
+void trace_shadows(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+                   std::span<const ShadowRay> rays, std::span<const std::uint32_t> chosen,
+                   std::span<std::uint8_t> hidden) {
+  for (const std::uint32_t i : chosen) {
+    const OffsetRay ray(rays[i], tree.sides());
+    const float length = rays[i].length;
+    hidden[i] = 0;
+    follow(
+        tree, list, words, ray, [&] { return length; },
+        [&](const TraceLeaf& leaf, std::uint64_t /*first*/) {
+          if (!meet_discs(leaf, ray, length)) return false;
+          hidden[i] = 1;
+          return true;
+        });
+  }
+}
+
+unsigned meet_shaft(const TraceGroup& group, const Shaft& shaft, float* near) {
+  const F f;
+  const auto lanes = static_cast<unsigned>(hn::Lanes(f));
+  const Vec axes[3] = {spread(shaft.axes[0]), spread(shaft.axes[1]), spread(shaft.axes[2])};
+  unsigned met = 0;
+  for (unsigned from = 0; from < kTraceLanes; from += lanes) {
+    // Project the boxes on the axes of the shaft
+    VF middle[3], half[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto low = hn::Load(f, group.columns[kLowX + k] + from),
+                 high = hn::Load(f, group.columns[kHighX + k] + from);
+      middle[k] = hn::Mul(hn::Set(f, 0.5F), hn::Add(low, high));
+      half[k] = hn::Mul(hn::Set(f, 0.5F), hn::Sub(high, low));
+    }
+    VF low[3], high[3];
+    for (int k = 0; k < 3; ++k) {
+      const Vec& axis = axes[k];
+      const auto at = dot({middle[0], middle[1], middle[2]}, axis);
+      const auto reach = hn::Mul(
+          dot({half[0], half[1], half[2]}, {hn::Abs(axis.x), hn::Abs(axis.y), hn::Abs(axis.z)}),
+          hn::Set(f, kSlack));
+      low[k] = hn::Sub(at, reach);
+      high[k] = hn::Add(at, reach);
+    }
+    // Compare them with the shaft between the depths at which it passes each box
+    const auto enter = hn::Max(hn::Zero(f), hn::Sub(low[2], hn::Set(f, shaft.high[2])));
+    const auto leave = hn::Sub(high[2], hn::Set(f, shaft.low[2]));
+    auto kept = hn::And(hn::Ge(leave, hn::Zero(f)), hn::Le(enter, hn::Set(f, shaft.depth)));
+    for (int k = 0; k < 2; ++k) {
+      const auto slope_low = hn::Set(f, shaft.slope_low[k]),
+                 slope_high = hn::Set(f, shaft.slope_high[k]);
+      const auto least = hn::Add(hn::Set(f, shaft.low[k]),
+                                 hn::Min(hn::Mul(slope_low, enter), hn::Mul(slope_low, leave))),
+                 most = hn::Add(hn::Set(f, shaft.high[k]),
+                                hn::Max(hn::Mul(slope_high, enter), hn::Mul(slope_high, leave)));
+      kept = hn::And(kept, hn::And(hn::Le(low[k], most), hn::Ge(high[k], least)));
+    }
+    hn::StoreU(enter, f, near + from);
+    met |= bits_of(f, kept) << from;
+  }
+  return met & group.children;
+}
+
 }  // namespace ptc::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -393,14 +527,16 @@ HWY_EXPORT(decode_boxes);
 HWY_EXPORT(decode_discs);
 HWY_EXPORT(narrow_boxes);
 HWY_EXPORT(trace_rays);
+HWY_EXPORT(trace_shadows);
+HWY_EXPORT(meet_shaft);
 
-void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& into) {
-  HWY_DYNAMIC_DISPATCH(decode_boxes)(group, origin, into);
+void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& into) {
+  HWY_DYNAMIC_DISPATCH(decode_boxes)(group, starts, into);
 }
 
 void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                  unsigned number, unsigned from, const DiscOrigin& origin, TraceLeaf& into) {
-  HWY_DYNAMIC_DISPATCH(decode_discs)(payload, count, first, number, from, origin, into);
+                  unsigned number, unsigned from, const RayStarts& starts, TraceLeaf& into) {
+  HWY_DYNAMIC_DISPATCH(decode_discs)(payload, count, first, number, from, starts, into);
 }
 
 void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, BoxList& into) {
@@ -410,6 +546,16 @@ void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, Bo
 void trace_rays(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
                 std::span<const glm::vec3> directions, RaysFor wanted, std::span<RayHit> hits) {
   HWY_DYNAMIC_DISPATCH(trace_rays)(tree, list, words, directions, wanted, hits);
+}
+
+void trace_shadows(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+                   std::span<const ShadowRay> rays, std::span<const std::uint32_t> chosen,
+                   std::span<std::uint8_t> hidden) {
+  HWY_DYNAMIC_DISPATCH(trace_shadows)(tree, list, words, rays, chosen, hidden);
+}
+
+unsigned meet_shaft(const TraceGroup& group, const Shaft& shaft, float* near) {
+  return HWY_DYNAMIC_DISPATCH(meet_shaft)(group, shaft, near);
 }
 
 }  // namespace ptc

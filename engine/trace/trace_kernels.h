@@ -31,28 +31,54 @@ struct RayHit {
 enum class RaysFor : bool { nearest, any };
 
 /// Decodes the children of a group.
-/// @param origin  lattice units
-void decode_boxes(const GroupView& group, const glm::dvec3& origin, TraceGroup& into);
+void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& into);
 
-/// Where discs are decoded for.
-struct DiscOrigin {
-  glm::dvec3 position{0};             ///< lattice units
-  glm::vec3 axis{0};                  ///< discs below the horizon of this normal are left out
-  SceneScale::Factors lengths{1, 1};  ///< convert lengths from scene units to edges
-  Sides sides = Sides::both;          ///< which sides stop rays
-};
-
-/// Appends surfels of a point page to a leaf, but for those that no ray from the origin can meet.
+/// Appends surfels of a point page to a leaf, but for those that no ray can meet.
 /// @param payload  of the page; up to 64 bytes past its end may be read
 /// @param count    number of points on the page
 /// @param first    index of the first surfel on the page
 /// @param number   how many surfels; with those of `from` at most kTraceDiscs
 /// @param from     number of the first surfel in its leaf
 void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                  unsigned number, unsigned from, const DiscOrigin& origin, TraceLeaf& into);
+                  unsigned number, unsigned from, const RayStarts& starts, TraceLeaf& into);
 
 /// Chooses from a list the boxes that rays of a few directions may meet, in the same order.
 void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, BoxList& into);
+
+/// A ray from a surface towards a light, relative to the origin of a tree.
+struct ShadowRay {
+  glm::vec3 origin{0};                                    ///< edges of the frame
+  glm::vec3 direction{0};                                 ///< unit
+  float length = std::numeric_limits<float>::infinity();  ///< up to the light, edges
+};
+
+/// Bounds rays that have about the same direction: at the depth s along the third axis, behind
+/// where it began, a ray lies between low + slope_low s and high + slope_high s on the others.
+///
+///                          .-'|
+///           .---------.-'     |        ^ axes[0]
+///     rays  |     .-'       .-'        |
+///     begin '-.-'-------.-'            +---> axes[2]
+struct Shaft {
+  glm::vec3 axes[3];                  ///< unit, at right angles
+  float low[3], high[3];              ///< where rays begin, along each axis
+  float slope_low[2], slope_high[2];  ///< change along the first two axes for each unit of depth
+  float depth;                        ///< greatest depth of any ray, edges
+};
+
+/// Tests the children of a group against a shaft.
+/// @param near  gets kTraceLanes depths, before which no ray enters the boxes
+/// @return      bit i: rays may meet something in child i
+[[nodiscard]] unsigned meet_shaft(const TraceGroup& group, const Shaft& shaft, float* near);
+
+/// Finds out which rays something hides from their lights.
+/// @param list    boxes that hold everything the rays can meet, and words as for trace_rays()
+/// @param chosen  indices of the rays
+/// @param hidden  by index of the ray; gets 1 or 0
+/// @throws as trace_rays()
+void trace_shadows(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
+                   std::span<const ShadowRay> rays, std::span<const std::uint32_t> chosen,
+                   std::span<std::uint8_t> hidden);
 
 /// Follows one ray after the other down the tree.
 /// @param list   boxes that hold everything the rays can meet, from narrow_boxes()

@@ -111,6 +111,7 @@ class Facts(ProgramTest):
                 (["ptcbuild", self.mesh, "--points", "1k", "-o", self.here / "o.ptcx"],
                  {"points", "nodes", "bytes", "pages", "sort"}),
                 (["ptcshade", self.scene, "-o", self.here / "o.ply"], {"receivers", "gather", "cache"}),
+                (["ptclight", self.scene, "--sun", "30,60", "-o", self.here / "o.ptcx"], {"points", "shadow_rays", "cache"}),
                 (["ptcrender", self.scene, *picture], {"receivers", "gather", "cache"}),
                 (["ptcconvert", self.scene, self.here / "p.ptcx"], {"points", "nodes", "bytes", "pages"}),
                 (["ptcverify", self.scene], {"points", "nodes", "bytes", "pages"})):
@@ -460,6 +461,7 @@ class Verify(ProgramTest):
 class Determinism(ProgramTest):
     def test_threads_and_caps_do_not_change_what_is_written(self):
         for program, operands, name in (("ptcbuild", [self.mesh, "--points", "4k"], "o.ptcx"),
+                                        ("ptclight", [self.scene, "--sun", "30,60", "--sky", "0.5"], "o.ptcx"),
                                         ("ptcshade", [self.scene], "o.ptcx"),
                                         ("ptcshade", [self.scene], "o.ply"),
                                         ("ptcshade", [self.scene, "--bounces", "3"], "o.ptcx")):

@@ -73,6 +73,7 @@ class Usage(ProgramTest):
                         "ptcconvert": [self.scene, self.here / "o.ply"],
                         "ptcrender": [self.scene, "-o", self.here / "o.png"],
                         "ptcshade": [self.scene, "-o", self.here / "o.ply"],
+                        "ptclight": [self.scene, "-o", self.here / "o.ptcx"],
                         "ptcbuild": [self.cloud, "-o", self.here / "o.ptcx"],
                         "ptcbench": ["accuracy", self.mesh, "-o", self.here / "o"]}[program]
             for option, value in (("--memory", "much"), ("--memory", "0"), ("--memory", "-1"),
@@ -97,6 +98,8 @@ class Usage(ProgramTest):
                          "--leaf=0", "--leaf=65536", "--levels-per-stream=0", "--codec=lzma",
                          "--page-size=3K", "--page-size=2M", "--sun-rays=0", "--finest=0",
                          "--city=5", "--output=", "--checkpoint=1M", "--resume=x"],
+            "ptclight": ["--sun=1", "--point=1,2,3", "--spot=1", "--sky=-1", "--solid-angle=0", "--lift=-1", "--area-rays=0",
+                         "--sun-rays=0", "--io=mail", "--output=o.ply"],
             "ptcshade": ["--solid-angle=0", "--parallax=-1", "--inflation=nan",
                          "--inflation=0", "--resolution=7", "--resolution=65", "--sides=back",
                          "--lift=-1", "--bounces=-1", "--bounces=1.5", "--bounces=1001", "--io=mail", "--check=-1", "--check-rays=0",
@@ -108,6 +111,7 @@ class Usage(ProgramTest):
             "ptcconvert": ["--codec=", "--page-size=64"],
         }
         operands = {"ptcbuild": [self.mesh, "-o", self.here / "o.ptcx"],
+                    "ptclight": [self.scene, "-o", self.here / "o.ptcx"],
                     "ptcshade": [self.scene, "-o", self.here / "o.ply"],
                     "ptcrender": [self.scene, "-o", self.here / "o.png"],
                     "ptcconvert": [self.scene, self.here / "o.ptcx"]}

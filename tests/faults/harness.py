@@ -69,6 +69,7 @@ SCENARIOS = [
     Scenario("shade mapped", "ptcshade {in}/ball.ptcx -o {out}/o.ply --threads 1 --io mmap", "o.ply"),
     Scenario("shade bounces", "ptcshade {in}/ball.ptcx -o {out}/o.ptcx --threads 2 --bounces 2 --temp {in}/temp",
              "o.ptcx"),
+    Scenario("light", "ptclight {in}/ball.ptcx --sun 30,60 --sky 0.5 -o {out}/o.ptcx --threads 1", "o.ptcx"),
     Scenario("render", "ptcrender {in}/ball.ptcx -o {out}/o.exr --size 24x16 --samples 1 --threads 1"
              " --camera 0,0,3,0,0,0", "o.exr"),
     Scenario("convert to cloud", "ptcconvert {in}/ball.ptcx {out}/o.ply --threads 1", "o.ply"),

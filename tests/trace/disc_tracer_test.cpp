@@ -11,6 +11,7 @@
 #include "engine/shade/reference/cosine_rays.h"
 #include "engine/trace/ray_shader.h"
 #include "tests/shade/gather_scene.h"
+#include "tests/trace/wild_scene.h"
 
 using namespace ptc;
 using namespace ptc::test;
@@ -64,22 +65,6 @@ struct SceneOnItself : Scene {
     }
   }
 };
-
-/// Discs of all sizes, turned at random, some of them at the same place.
-std::vector<Surfel> wild_scene() {
-  std::mt19937 bits(5);
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  std::vector<Surfel> surfels;
-  for (int i = 0; i < 4000; ++i) {
-    Surfel s;
-    s.position = {uniform(bits), uniform(bits), uniform(bits)};
-    s.normal = glm::normalize(glm::vec3(uniform(bits), uniform(bits), uniform(bits) + 0.01));
-    s.radius = static_cast<float>(0.1 * std::pow(2.0, 6 * uniform(bits) - 4));
-    s.radiance = glm::vec3(0.1F * static_cast<float>(i % 11));
-    for (int copies = i % 500 == 0 ? 40 : 1; copies > 0; --copies) surfels.push_back(s);
-  }
-  return surfels;
-}
 
 }  // namespace
 

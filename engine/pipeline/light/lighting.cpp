@@ -19,39 +19,6 @@
 namespace ptc {
 namespace {
 
-/// @throws RequestError when a setting of the gather, the error asked for or the lift is out of
-///         range
-void check_ranges(const LightingRequest& request) {
-  constexpr unsigned kMaxRays = 1 << 24, kMaxBounces = 1000;
-  const auto is_positive = [](float value) { return std::isfinite(value) && value > 0; };
-  const GatherOptions& gather = request.gather;
-  require_request(is_positive(gather.solid_angle), "gather.solid_angle",
-                  "`gather.solid_angle` is not above 0 and finite");
-  require_request(std::isfinite(gather.parallax) && gather.parallax >= 0, "gather.parallax",
-                  "`gather.parallax` is not 0 or more and finite");
-  require_request(is_positive(gather.inflation), "gather.inflation",
-                  "`gather.inflation` is not above 0 and finite");
-  require_request(gather.resolution >= 16 && gather.resolution <= 64 && gather.resolution % 16 == 0,
-                  "gather.resolution", "`gather.resolution` is not 16, 32, 48 or 64");
-  const Surroundings& around = gather.around;
-  require_request(around.cone > 0 && around.cone <= 1.5707964F, "gather.around.cone",
-                  "`gather.around.cone` is not above 0 and at most pi / 2");
-  require_request(around.distance > 0, "gather.around.distance",
-                  "`gather.around.distance` is not above 0");
-  require_request(around.diagonals >= 0 && std::isfinite(around.diagonals),
-                  "gather.around.diagonals",
-                  "`gather.around.diagonals` is not 0 or more and finite");
-  require_request(around.falloff <= 8, "gather.around.falloff",
-                  "`gather.around.falloff` is above 8");
-  require_request(!request.error || (*request.error > 0 && *request.error <= 1), "error",
-                  "`error` is not above 0 and at most 1");
-  require_request(request.check.rays >= 1 && request.check.rays <= kMaxRays, "check.rays",
-                  "`check.rays` is not 1 to 16777216");
-  require_request(request.bounces <= kMaxBounces, "bounces", "`bounces` is above 1000");
-  require_request(std::isfinite(request.lift) && request.lift >= 0, "lift",
-                  "`lift` is not 0 or more and finite");
-}
-
 /// @throws RequestError when parts of the request exclude each other
 void check_combination(const LightingRequest& request) {
   const bool traces_rays = request.error || request.check.receivers > 0;
@@ -104,6 +71,37 @@ const LightingRequest& checked(const LightingRequest& request) {
 }
 
 }  // namespace
+
+void check_ranges(const LightingRequest& request) {
+  constexpr unsigned kMaxRays = 1 << 24, kMaxBounces = 1000;
+  const auto is_positive = [](float value) { return std::isfinite(value) && value > 0; };
+  const GatherOptions& gather = request.gather;
+  require_request(is_positive(gather.solid_angle), "gather.solid_angle",
+                  "`gather.solid_angle` is not above 0 and finite");
+  require_request(std::isfinite(gather.parallax) && gather.parallax >= 0, "gather.parallax",
+                  "`gather.parallax` is not 0 or more and finite");
+  require_request(is_positive(gather.inflation), "gather.inflation",
+                  "`gather.inflation` is not above 0 and finite");
+  require_request(gather.resolution >= 16 && gather.resolution <= 64 && gather.resolution % 16 == 0,
+                  "gather.resolution", "`gather.resolution` is not 16, 32, 48 or 64");
+  const Surroundings& around = gather.around;
+  require_request(around.cone > 0 && around.cone <= 1.5707964F, "gather.around.cone",
+                  "`gather.around.cone` is not above 0 and at most pi / 2");
+  require_request(around.distance > 0, "gather.around.distance",
+                  "`gather.around.distance` is not above 0");
+  require_request(around.diagonals >= 0 && std::isfinite(around.diagonals),
+                  "gather.around.diagonals",
+                  "`gather.around.diagonals` is not 0 or more and finite");
+  require_request(around.falloff <= 8, "gather.around.falloff",
+                  "`gather.around.falloff` is above 8");
+  require_request(!request.error || (*request.error > 0 && *request.error <= 1), "error",
+                  "`error` is not above 0 and at most 1");
+  require_request(request.check.rays >= 1 && request.check.rays <= kMaxRays, "check.rays",
+                  "`check.rays` is not 1 to 16777216");
+  require_request(request.bounces <= kMaxBounces, "bounces", "`bounces` is above 1000");
+  require_request(std::isfinite(request.lift) && request.lift >= 0, "lift",
+                  "`lift` is not 0 or more and finite");
+}
 
 Lighting::Lighting(const LightingRequest& request, LightingReport& report, Progress& progress)
     : request_(checked(request)),

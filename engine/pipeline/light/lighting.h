@@ -66,6 +66,11 @@ struct LightingRequest {
   RunOptions run;      ///< memory, threads and temporary directories
 };
 
+/// Checks the numbers of a request, each for itself.
+/// @throws RequestError when a setting of the gather, the error asked for or the lift is out of
+///         range
+void check_ranges(const LightingRequest& request);
+
 /// The damage of a scene that was shaded past damaged pages (spec/shading.md#damage).
 struct DamageReport {
   /// Damaged pages that the run needed, by number, with the rule that each breaks.

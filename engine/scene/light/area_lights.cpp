@@ -26,6 +26,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -165,23 +166,29 @@ Place sample_place(const View& view, const glm::dvec3& normal, const glm::vec2& 
 
 }  // namespace
 
-AreaLights::AreaLights(const Mesh& mesh) {
-  // Collect the emitters, and their power up to a factor.
-  std::vector<double> power;
-  double total = 0;
-  for (const Emitter& emitter : emitters_of(mesh)) {
+AreaLights::AreaLights(std::vector<Emitter> emitters) : emitters_(std::move(emitters)) {
+  // Keep the emitters that give light, and their power up to a factor.
+  const auto given = [](const Emitter& emitter) {
     const glm::dvec3 a(emitter.corner[0]);
     const double area = glm::length(
         glm::cross(glm::dvec3(emitter.corner[1]) - a, glm::dvec3(emitter.corner[2]) - a));
-    const double given = area * brightness(emitter.radiance);
-    if (!(given > 0) || !std::isfinite(given)) continue;
-    emitters_.push_back(emitter);
-    power.push_back(given);
-    total += given;
+    return area * brightness(emitter.radiance);
+  };
+  std::erase_if(emitters_, [&](const Emitter& emitter) {
+    const double power = given(emitter);
+    return !(power > 0) || !std::isfinite(power);
+  });
+  std::vector<double> power;
+  power.reserve(emitters_.size());
+  double total = 0;
+  for (const Emitter& emitter : emitters_) {
+    power.push_back(given(emitter));
+    total += power.back();
   }
   // Divide the emitters into those below and above the mean power, which is 1 column.
   const std::size_t count = emitters_.size();
   table_.resize(count);
+  share_.reserve(count);
   std::vector<std::uint32_t> small, large;
   for (std::size_t i = 0; i < count; ++i) {
     share_.push_back(static_cast<float>(power[i] / total));
@@ -234,7 +241,8 @@ void AreaLights::choose_by_power(const glm::vec3& position, const glm::vec3& nor
 }
 
 void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsigned count,
-                        std::uint64_t seed, std::vector<EmitterSample>& out) const {
+                        std::uint64_t seed, std::uint32_t first,
+                        std::vector<EmitterSample>& out) const {
   // Find the candidates.
   out.clear();
   thread_local std::vector<Choice> choices;
@@ -249,7 +257,7 @@ void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsi
   const SquarePoints points(seed);
   const double total = choices.back().sum;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const double wanted = points.line(i) * total;
+    const double wanted = points.line(first + i) * total;
     const auto chosen = std::min(
         std::upper_bound(choices.begin(), choices.end(), wanted,
                          [](double value, const Choice& choice) { return value < choice.sum; }),
@@ -257,7 +265,7 @@ void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsi
     const Emitter& emitter = emitters_[chosen->emitter];
     View view;
     if (!look_at(emitter, position, view)) continue;
-    const Place place = sample_place(view, glm::dvec3(normal), points.square(i));
+    const Place place = sample_place(view, glm::dvec3(normal), points.square(first + i));
     if (!(place.weight > 0)) continue;
     const double scale = place.weight / chosen->expected * total / count;
     out.push_back({position + glm::vec3(place.offset), glm::vec3(view.normal),

@@ -1,4 +1,4 @@
-// The emissive triangles of a mesh as lights: places on them that shadow rays aim at.
+// Emissive triangles as lights: places on them that shadow rays aim at.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,6 @@
 
 #include <glm/vec3.hpp>
 
-#include "engine/io/mesh/mesh.h"
 #include "engine/scene/light/emitters.h"
 #include "engine/scene/sampling/low_discrepancy.h"
 
@@ -14,12 +13,12 @@ namespace ptc {
 
 /// A place on an emitter that a shadow ray aims at.
 struct EmitterSample {
-  glm::vec3 position{0};    ///< relative to Mesh::origin
+  glm::vec3 position{0};    ///< relative to the origin of the emitters
   glm::vec3 normal{0};      ///< unit, of the emitting side
   glm::vec3 irradiance{0};  ///< contribution of this sample when nothing is in between, W/m^2
 };
 
-/// Chooses shadow ray targets on the emissive triangles of a mesh.
+/// Chooses shadow ray targets on emissive triangles.
 ///
 /// Emitters are chosen in proportion to what each may give to the point: its brightness times its
 /// solid angle times the cosine there. When there are at most 64 emitters, all of them are
@@ -27,20 +26,21 @@ struct EmitterSample {
 /// sampling: Talbot, Cline and Egbert 2005).
 class AreaLights {
  public:
-  /// Collects the emitters of a mesh. The mesh is not used afterwards.
-  explicit AreaLights(const Mesh& mesh);
+  explicit AreaLights(std::vector<Emitter> emitters);
 
   /// Reports whether no triangle emits.
   [[nodiscard]] bool empty() const noexcept { return emitters_.empty(); }
   /// Draws samples whose irradiances, summed over those that the point sees, are an unbiased
   /// estimate of the light of all emitters.
-  /// @param position  relative to Mesh::origin
+  /// @param position  relative to the origin of the emitters
   /// @param normal    unit
   /// @param count     wanted samples
+  /// @param first     number of the first sample among all of the seed, a multiple of `count`:
+  ///                  points that share a seed have samples that are spread together
   /// @param out       is overwritten; it holds fewer than `count` samples when some cannot give
   ///                  light
   void sample(const glm::vec3& position, const glm::vec3& normal, unsigned count,
-              std::uint64_t seed, std::vector<EmitterSample>& out) const;
+              std::uint64_t seed, std::uint32_t first, std::vector<EmitterSample>& out) const;
 
  private:
   /// A candidate for the choice at one point.

@@ -6,11 +6,10 @@
 
 #include <glm/vec3.hpp>
 
-#include "engine/scene/light/area_lights.h"
+#include "engine/scene/light/light_rays.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/light/sky_map.h"
 #include "engine/scene/ray_scene.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 
 namespace ptc {
 
@@ -38,23 +37,18 @@ class DirectLight {
   [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::vec3& normal,
                                   const LightSampling& sampling, std::uint64_t seed) const;
   /// Returns the rig with its directions normalised.
-  [[nodiscard]] const LightRig& rig() const noexcept { return rig_; }
+  [[nodiscard]] const LightRig& rig() const noexcept { return rays_.rig(); }
 
  private:
   struct Place;
-  [[nodiscard]] glm::vec3 from_sun(const Sun& sun, const Place& at, const SquarePoints& points,
-                                   unsigned rays) const;
-  [[nodiscard]] glm::vec3 from_point(const PointLight& point, const Place& at) const;
-  [[nodiscard]] glm::vec3 from_spot(const SpotLight& spot, const Place& at) const;
-  [[nodiscard]] glm::vec3 from_emitters(const Place& at, unsigned rays) const;
+  [[nodiscard]] glm::vec3 from_lights(const Place& at, const LightSampling& sampling) const;
   [[nodiscard]] glm::vec3 from_sky(const Place& at, unsigned rays) const;
   [[nodiscard]] glm::vec3 along_sky_ray(const Place& at, const glm::vec3& direction,
                                         float cosine_rays, float map_rays, float map_density) const;
   [[nodiscard]] bool is_hidden(const Place& at, const glm::dvec3& end) const;
 
   const RayScene& scene_;
-  LightRig rig_;
-  AreaLights area_;
+  LightRays rays_;
   std::optional<SkyDensity> sky_density_;  ///< set when the sky has a map that gives light
   bool sky_is_black_ = true;
 };

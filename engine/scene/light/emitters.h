@@ -9,7 +9,8 @@
 
 namespace ptc {
 
-/// A triangle that emits on its front side. Coordinates are relative to Mesh::origin.
+/// A triangle that emits on its front side. Coordinates are relative to Mesh::origin, or to the
+/// origin of a LightRays.
 struct Emitter {
   glm::vec3 corner[3];    ///< counter-clockwise as seen from the emitting side
   glm::vec3 radiance{0};  ///< W/(m^2 sr)

@@ -1,0 +1,153 @@
+#include "engine/pipeline/light/disc_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include "engine/base/basis.h"
+#include "engine/io/cloud/record.h"
+#include "engine/shade/lift.h"
+#include "engine/store/container_points.h"
+
+namespace ptc {
+namespace {
+
+constexpr unsigned kPlaces = 4;           // of a surfel that are lit
+constexpr std::size_t kNeighbours = 64;   // surfels whose rays are traced together
+constexpr float kQuarter = 0.353553391F;  // of the edge of the square that a disc of radius 1 has
+
+/// Returns a share of the rays of a surfel, rounded up.
+unsigned share(unsigned rays) {
+  return (rays + kPlaces - 1) / kPlaces;
+}
+
+/// Returns the place of a quarter of a surfel's cell, relative to its centre, scene units.
+glm::vec3 quarter(const Surfel& surfel, const Basis& basis, unsigned place) {
+  const float step = kQuarter * surfel.radius;
+  return basis.x * ((place & 1) != 0 ? step : -step) + basis.y * ((place & 2) != 0 ? step : -step);
+}
+
+}  // namespace
+
+/// What a thread needs.
+struct DiscLight::Worker {
+  Worker(const SceneView& view, PageCache& cache, Sides sides) : tracer(view, cache, sides) {}
+
+  ShadowTracer tracer;
+  std::vector<LightRay> drawn;         ///< of a place
+  std::vector<ShadowRay> rays;         ///< of neighbours
+  std::vector<glm::vec3> brings;       ///< irradiance of each ray
+  std::vector<std::uint32_t> surfels;  ///< the surfel of each ray
+  std::vector<std::uint8_t> hidden;    ///< for each ray
+  std::uint64_t count = 0;             ///< rays so far
+};
+
+DiscLight::DiscLight(const SceneView& view, PageCache& cache, const LightRays& rays,
+                     const LightSampling& sampling, Sides sides, const Executor& executor)
+    : view_(view),
+      cache_(cache),
+      rays_(rays),
+      sampling_{.sun_rays = share(sampling.sun_rays), .area_rays = share(sampling.area_rays)},
+      sides_(sides),
+      executor_(executor),
+      workers_(executor.threads()) {}
+
+DiscLight::~DiscLight() = default;
+
+std::uint64_t DiscLight::rays() const noexcept {
+  std::uint64_t sum = 0;
+  for (const auto& worker : workers_) sum += worker ? worker->count : 0;
+  return sum;
+}
+
+void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
+                            std::span<const float> heights, std::uint64_t first,
+                            std::span<glm::vec3> out) const {
+  // Trace around the middle of the block
+  Bounds bounds;
+  double highest = 0;
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    bounds.add(surfels[i].position);
+    highest = std::max(highest, static_cast<double>(heights[i] + surfels[i].radius));
+  }
+  const glm::dvec3 middle = 0.5 * bounds.low + 0.5 * bounds.high;
+  const SceneScale& scale = view_.scale();
+  const double reach = std::min(scale.length(0.5 * glm::length(bounds.high - bounds.low) + highest),
+                                SceneScale::kMaxDistance);
+  own.tracer.begin(middle, static_cast<float>(reach));
+  for (std::size_t from = 0; from < surfels.size(); from += kNeighbours) {
+    // Draw the rays of some neighbours
+    own.rays.clear();
+    own.brings.clear();
+    own.surfels.clear();
+    const std::size_t to = std::min(from + kNeighbours, surfels.size());
+    for (std::size_t i = from; i < to; ++i) {
+      const Surfel& surfel = surfels[i];
+      out[i] = glm::vec3(0);
+      if (!(surfel.radius > 0)) continue;
+      const Basis basis(surfel.normal);
+      for (unsigned place = 0; place < kPlaces; ++place) {
+        const glm::dvec3 position = surfel.position + glm::dvec3(quarter(surfel, basis, place));
+        const glm::dvec3 start = position + glm::dvec3(surfel.normal * heights[i]);
+        const glm::vec3 origin = scale.way(middle, start);
+        rays_.draw(position, surfel.normal, sampling_, first + i, place, own.drawn);
+        for (const LightRay& ray : own.drawn) {
+          ShadowRay shadow{.origin = origin, .direction = ray.direction};
+          if (ray.ends) {
+            const glm::dvec3 way = ray.end - start;
+            const double distance = glm::length(way);
+            if (!(distance > 0)) continue;
+            shadow.direction = glm::vec3(way / distance);
+            shadow.length = static_cast<float>(std::min(scale.length(distance), 0x1p100));
+          }
+          own.rays.push_back(shadow);
+          own.brings.push_back(ray.irradiance / static_cast<float>(kPlaces));
+          own.surfels.push_back(static_cast<std::uint32_t>(i));
+        }
+      }
+    }
+    // Sum up what nothing hides
+    own.hidden.resize(own.rays.size());
+    own.tracer.test(own.rays, own.hidden);
+    own.count += own.rays.size();
+    for (std::size_t ray = 0; ray < own.rays.size(); ++ray) {
+      if (own.hidden[ray] == 0) out[own.surfels[ray]] += own.brings[ray];
+    }
+  }
+}
+
+void DiscLight::irradiance(std::span<const Surfel> surfels, std::span<const float> heights,
+                           std::uint64_t first, std::span<glm::vec3> out) {
+  const std::size_t blocks = (surfels.size() + kBlock - 1) / kBlock;
+  executor_.for_each(blocks, [&](std::size_t block, unsigned thread) {
+    if (!workers_[thread]) workers_[thread] = std::make_unique<Worker>(view_, cache_, sides_);
+    const std::size_t from = block * kBlock, count = std::min(kBlock, surfels.size() - from);
+    light_block(*workers_[thread], surfels.subspan(from, count), heights.subspan(from, count),
+                first + from, out.subspan(from, count));
+  });
+}
+
+std::vector<Emitter> emitting_surfels(const ContainerReader& container, const glm::dvec3& origin,
+                                      float lift) {
+  std::vector<Emitter> emitters;
+  if (container.header().point_bytes == kPointBytes) return emitters;
+  const Frame& frame = container.header().frame;
+  ContainerPoints points(container);
+  std::vector<PointRecord> block(DiscLight::kBlock);
+  while (const std::size_t count = points.next(block)) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (block[i].emission == Half3{} || !(block[i].radius > 0)) continue;
+      const Surfel surfel = to_surfel(block[i], frame);
+      const Basis basis(surfel.normal);
+      const glm::vec3 centre(lifted(surfel, lift, frame).position - origin);
+      // The corners of its cell lie on the rim of the disc
+      const glm::vec3 a = basis.x * surfel.radius, b = basis.y * surfel.radius;
+      emitters.push_back({{centre + a, centre + b, centre - a}, surfel.emission});
+      emitters.push_back({{centre - a, centre - b, centre + a}, surfel.emission});
+    }
+  }
+  return emitters;
+}
+
+}  // namespace ptc

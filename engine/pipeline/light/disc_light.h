@@ -1,0 +1,85 @@
+// The light that reaches the points of a container straight from suns, lamps and emitters, by
+// shadow rays at its discs (spec/shading.md#relighting).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "engine/base/executor.h"
+#include "engine/base/surfel.h"
+#include "engine/cache/page_cache.h"
+#include "engine/scene/light/light_rays.h"
+#include "engine/shade/gather/scene_view.h"
+#include "engine/shade/shading.h"
+#include "engine/trace/shadow_tracer.h"
+
+namespace ptc {
+
+/// Lights surfels by shadow rays.
+///
+/// Four places of a surfel's square cell are lit, and share its rays: so the border of a shadow is
+/// as wide as the surfels along it are.
+///
+///     +-------+
+///     | o | o |     Each place rises off the surfel as a receiver does.
+///     |---+---|
+///     | o | o |
+///     +-------+
+///
+/// Results depend on the surfels, their numbers and the rays alone.
+/// Memory: ShadowTracer::kBytes and about 256 KiB for each thread.
+class DiscLight {
+ public:
+  /// Surfels that one thread lights together, at least.
+  static constexpr std::size_t kBlock = 4096;
+  /// Memory for each thread, bytes.
+  static constexpr std::uint64_t kBytes = ShadowTracer::kBytes + (std::uint64_t{1} << 18);
+
+  /// @param view, cache  must outlive this; of the same container
+  /// @param rays         must outlive this
+  /// @param sampling     rays of each surfel; sky_rays is not used
+  DiscLight(const SceneView& view, PageCache& cache, const LightRays& rays,
+            const LightSampling& sampling, Sides sides, const Executor& executor);
+  ~DiscLight();
+
+  /// Returns the irradiance of surfels, W/m^2.
+  /// @param surfels  neighbours side by side
+  /// @param heights  for each surfel: how far its receivers rise above it, scene units
+  /// @param first    number of the first surfel, which with the others fixes the sample points
+  /// @param out      for each surfel
+  /// @throws FormatError when a page is damaged; std::system_error
+  void irradiance(std::span<const Surfel> surfels, std::span<const float> heights,
+                  std::uint64_t first, std::span<glm::vec3> out);
+
+  /// Number of shadow rays so far.
+  [[nodiscard]] std::uint64_t rays() const noexcept;
+
+ private:
+  struct Worker;
+
+  void light_block(Worker& worker, std::span<const Surfel> surfels, std::span<const float> heights,
+                   std::uint64_t first, std::span<glm::vec3> out) const;
+
+  const SceneView& view_;
+  PageCache& cache_;
+  const LightRays& rays_;
+  LightSampling sampling_;  ///< of each place
+  Sides sides_;
+  const Executor& executor_;
+  std::vector<std::unique_ptr<Worker>> workers_;  ///< by thread, made when first needed
+};
+
+/// Returns the emitting surfels of a container as triangles: two for the square cell of each, at
+/// the height of a receiver, so that rays which end there do not meet the surfel itself.
+/// @param origin  to which they are relative, scene units
+/// @param lift    height over the radius of a surfel
+/// @throws FormatError when a page is damaged; std::system_error
+/// Memory: 48 bytes for each triangle.
+[[nodiscard]] std::vector<Emitter> emitting_surfels(const ContainerReader& container,
+                                                    const glm::dvec3& origin, float lift);
+
+}  // namespace ptc

@@ -1,0 +1,317 @@
+// Points are read in Z-order, lit in batches and written in the same order. Pages of channels are
+// copied as they are stored: they belong to points by number, and no point changes its number.
+#include "engine/pipeline/light/light_container.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/base/memory.h"
+#include "engine/io/cloud/record.h"
+#include "engine/octree/build_pages.h"
+#include "engine/octree/rounding.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/build/append.h"
+#include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/point_marks.h"
+#include "engine/pipeline/light/built_scene.h"
+#include "engine/pipeline/light/disc_light.h"
+#include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/shade/shading_channels.h"
+#include "engine/shade/lift.h"
+#include "engine/shade/shader.h"
+#include "engine/store/attribute_rows.h"
+#include "engine/store/commit.h"
+#include "engine/store/container_points.h"
+#include "engine/store/writer.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kBatch = 16 * Shader::kBlock;  // points in memory at once
+static_assert(kBatch % DiscLight::kBlock == 0);
+
+/// How far receivers rise above the points of a container, in their order.
+class Rises {
+ public:
+  explicit Rises(const ContainerReader& container)
+      : rows_(container, rise_groups(container.meta().channels)),
+        rise_(rows_.channels()),
+        per_page_(points_per_page(container.header())) {}
+
+  /// Returns the rise of a point, in radii; 0 without the channel. Points are asked for in order.
+  [[nodiscard]] float radii(std::uint64_t point, std::uint64_t points) {
+    if (rows_.row_bytes() == 0) return 0;
+    const std::uint64_t page = point / per_page_, first = page * per_page_;
+    if (page != page_) {
+      page_ = page;
+      page_rows_ = rows_.read(static_cast<std::size_t>(page),
+                              static_cast<std::uint32_t>(std::min(per_page_, points - first)));
+    }
+    return rise_.radii(page_rows_.data() + (point - first) * rows_.row_bytes());
+  }
+
+ private:
+  AttributeRows rows_;
+  RisePlace rise_;
+  std::uint64_t per_page_;
+  std::uint64_t page_ = ~std::uint64_t{0};  // whose rows these are
+  std::span<const std::byte> page_rows_;
+};
+
+/// The points of a scene with the light of a rig in place of their own, kBatch at a time.
+class LitPoints : public PointStream {
+ public:
+  /// @param sky  null: the sky is black
+  LitPoints(const ContainerReader& scene, DiscLight* lights, Shader* sky, float lift,
+            LightReport& report, Progress& progress)
+      : frame_(scene.header().frame),
+        all_(scene.superblock().points),
+        points_(scene),
+        rises_(scene),
+        lights_(lights),
+        sky_(sky),
+        lift_(lift),
+        report_(report),
+        progress_(progress),
+        records_(kBatch),
+        surfels_(kBatch),
+        receivers_(sky ? kBatch : 0),
+        heights_(kBatch),
+        direct_(kBatch),
+        shading_(sky ? kBatch : 0) {}
+
+  std::size_t next(std::span<PointRecord> out) override {
+    if (at_ == count_) light_batch();
+    const std::size_t count = std::min(out.size(), count_ - at_);
+    std::copy_n(records_.begin() + static_cast<std::ptrdiff_t>(at_), count, out.begin());
+    at_ += count;
+    return count;
+  }
+
+ private:
+  void light_batch() {
+    // Read the next points
+    at_ = 0;
+    count_ = points_.next(records_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      surfels_[i] = to_surfel(records_[i], frame_);
+      const float lift = std::max(lift_, rises_.radii(first_ + i, all_));
+      heights_[i] = lift_height(surfels_[i].radius, lift, frame_);
+      direct_[i] = glm::vec3(0);
+      if (sky_) receivers_[i] = lifted(surfels_[i], lift, frame_);
+    }
+    // Light them
+    const double begin = ptc::cpu_seconds();
+    if (lights_) {
+      lights_->irradiance(std::span(surfels_).first(count_), std::span(heights_).first(count_),
+                          first_, std::span(direct_).first(count_));
+    }
+    const double middle = ptc::cpu_seconds();
+    report_.ray_cpu_seconds += middle - begin;
+    Progress silent;
+    if (sky_) {
+      sky_->shade(std::span(receivers_).first(count_), std::span(shading_).first(count_), silent);
+      report_.sky_cpu_seconds += ptc::cpu_seconds() - middle;
+    }
+    progress_.advance(count_);
+    // Set what they reflect
+    for (std::size_t i = 0; i < count_; ++i) {
+      PointRecord& record = records_[i];
+      const glm::vec3 light = direct_[i] + (sky_ ? shading_[i].sky : glm::vec3(0));
+      for (int c = 0; c < 3; ++c) {
+        const float reflects = static_cast<float>(record.albedo[static_cast<std::size_t>(c)]) *
+                               (std::numbers::inv_pi_v<float> / 255);
+        record.radiance[static_cast<std::size_t>(c)] =
+            encode_half(reflects * std::max(0.0F, light[c]));
+      }
+    }
+    first_ += count_;
+  }
+
+  Frame frame_;
+  std::uint64_t all_;
+  ContainerPoints points_;
+  Rises rises_;
+  DiscLight* lights_;
+  Shader* sky_;
+  float lift_;
+  LightReport& report_;
+  Progress& progress_;
+  std::vector<PointRecord> records_;
+  std::vector<Surfel> surfels_;
+  std::vector<Receiver> receivers_;
+  std::vector<float> heights_;
+  std::vector<glm::vec3> direct_;
+  std::vector<Shading> shading_;
+  std::uint64_t first_ = 0;         // number of the first point of the batch
+  std::size_t count_ = 0, at_ = 0;  // points of the batch, and the next one to hand out
+};
+
+/// Returns the record of a scene that these lights lit.
+Meta lit_meta(const ContainerReader& scene, const LightRig& rig, bool emitters) {
+  Meta meta = scene.meta();
+  std::erase_if(meta.channels,
+                [&](const Channel& c) { return holds_shading(scene.meta().channels, c.group); });
+  meta.text.erase("shading");
+  meta.text.erase(kSkyLightKey);
+  meta.text.erase(kEmittersKey);
+  meta.text[kLightsKey] = lights_record(rig);
+  if (emitters) meta.text[kEmittersKey] = "baked";
+  return meta;
+}
+
+/// Copies the pages of all channels but those of a shading.
+void copy_channels(const ContainerReader& from, ContainerWriter& writer) {
+  std::vector<std::byte> stored;
+  for (std::uint32_t page = 0; page < from.meta_page(); ++page) {
+    const DirectoryEntry& entry = from.entry(page);
+    if (entry.type != PageType::attribute || holds_shading(from.meta().channels, entry.group))
+      continue;
+    const std::uint32_t rank = writer.reserve_page(entry.type, entry.group);
+    if (entry.is_void()) {
+      writer.write_void_page({.type = entry.type,
+                              .group = entry.group,
+                              .rank = rank,
+                              .record_count = entry.record_count});
+      continue;
+    }
+    const PageHeader header = from.read_stored_page(page, stored);
+    writer.write_stored_page(summary_of(header), header.coding, header.raw_bytes, stored);
+  }
+}
+
+void check_scene(const ContainerReader& scene, const Meta& meta) {
+  at_offset(scene.file(), 0, [&] { check_copyable(scene.header()); });
+  if (!scene.parts().empty()) {
+    throw DataError(scene.path().string() +
+                    ": the surfels of a scene of parts cannot be lit: make it one file first with "
+                    "ptcconvert");
+  }
+  check_meta(meta, scene.header().page_shift, scene.header().point_bytes);
+}
+
+Uuid lit_uuid(const ContainerReader& scene, const LightRequest& request, const std::string& rig) {
+  const GatherOptions& g = request.gather;
+  std::string text(reinterpret_cast<const char*>(scene.header().uuid.data()), sizeof(Uuid));
+  text += fmt::format("lit {} {} {} {} {} {} {} {} {}", g.solid_angle, g.parallax, g.inflation,
+                      g.resolution, static_cast<int>(g.sides), request.lift,
+                      request.light_sampling.sun_rays, request.light_sampling.area_rays, rig);
+  return uuid_of(std::as_bytes(std::span(text)));
+}
+
+/// Lights the points of a container.
+LightReport light_points(const LightRequest& request, const std::filesystem::path& target,
+                         Progress& progress) {
+  // Open the scene, and choose the lights
+  LightReport report;
+  const ThreadPool executor(request.run.threads);
+  const ContainerReader scene(request.scene);
+  const LightRig rig =
+      normalised(request.lights ? *request.lights : recorded_lights(scene, progress));
+  const bool emits = scene.superblock().points > 0 && scene.header().point_bytes != kPointBytes;
+  const Meta planned = lit_meta(scene, rig, true);
+  check_scene(scene, planned);
+  if (planned.channels.size() < scene.meta().channels.size())
+    progress.note(
+        "the channels of an earlier shading are left out, because they are of other light");
+
+  // Collect what emits
+  const glm::dvec3 origin(scene.superblock().bounds_low[0], scene.superblock().bounds_low[1],
+                          scene.superblock().bounds_low[2]);
+  std::vector<Emitter> emitters;
+  if (emits && request.light_sampling.area_rays > 0)
+    emitters = emitting_surfels(scene, origin, request.lift);
+  report.emitters = emitters.size();
+  const LightRays rays(rig, std::move(emitters), origin, 0);
+
+  // Divide the memory
+  MemoryBudget budget = budget_of(request.run.memory_bytes, "lighting");
+  budget.charge("emitters", 160 * report.emitters);
+  budget.charge("the output's directory",
+                ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift,
+                                              executor.threads()) +
+                    held_pages_bytes(scene.header().page_shift));
+  const auto sky = sky_function(rig.sky);
+  const bool by_rays = !rays.empty();
+  if (by_rays) budget.charge("shadow rays", DiscLight::kBytes * executor.threads());
+  const unsigned readers = executor.threads() * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));
+  std::unique_ptr<PageCache> cache;
+  if (readers > 0) {
+    cache = std::make_unique<PageCache>(
+        scene, CacheOptions{.memory_bytes = cache_bytes_left(std::move(budget), scene, readers,
+                                                             request.back_end),
+                            .threads = readers,
+                            .back_end = request.back_end});
+  }
+
+  // Light all points into the target
+  const SceneView view(scene);
+  std::unique_ptr<DiscLight> lights;
+  std::unique_ptr<Shader> shader;
+  if (by_rays) {
+    lights = std::make_unique<DiscLight>(view, *cache, rays, request.light_sampling,
+                                         request.gather.sides, executor);
+  }
+  if (sky) {
+    ShadeOptions shade{.gather = request.gather, .sky = sky, .cache = cache.get()};
+    shade.gather.bleeding = false;
+    shader = std::make_unique<Shader>(scene, shade, executor);
+  }
+  BuildRequest like;
+  adopt_profile(like, scene);
+  {
+    const Superblock& from = scene.superblock();
+    const Stage stage(report.seconds, progress, "light", from.points, "points");
+    LitPoints points(scene, lights.get(), shader.get(), request.lift, report, progress);
+    const std::unique_ptr<PointStream> rounded =
+        is_rounded(like.profile) ? round_points(points, scene.header().frame.unit(), executor)
+                                 : nullptr;
+    PointStream& last = rounded ? *rounded : static_cast<PointStream&>(points);
+    ContainerWriter writer(target, {.page_shift = scene.header().page_shift,
+                                    .codec = codec_of(like.profile),
+                                    .uuid = lit_uuid(scene, request, planned.text.at(kLightsKey)),
+                                    .frame = scene.header().frame,
+                                    .point_bytes = scene.header().point_bytes,
+                                    .source = &scene.file()});
+    Progress silent;
+    const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
+    const Superblock made = build_pages(last, writer, tree, executor, silent);
+    copy_channels(scene, writer);
+    writer.finish(lit_meta(scene, rig, report.emitters > 0), made);
+  }
+  report.points = scene.superblock().points;
+  if (lights) report.rays = lights->rays();
+  if (shader) report.gather = shader->counts();
+  lights.reset();
+  if (shader) report.cache = shader->cache_statistics();
+  return report;
+}
+
+}  // namespace
+
+LightReport light_container(const LightRequest& request, const std::filesystem::path& target,
+                            Progress& progress) {
+  check_ranges(request);
+  if (request.lights) check_lights(*request.lights);
+  if (is_container_alone(request)) return light_points(request, target, progress);
+  // Build a temporary container of clouds and meshes, without light
+  const BuiltScene scene(request, {.lights = LightRig{}, .note_lost_records = true}, target,
+                         progress);
+  LightRequest lighting = request;
+  lighting.scene = scene.path();
+  lighting.joined.clear();
+  LightReport report = light_points(lighting, target, progress);
+  scene.add_stages(report.seconds);
+  return report;
+}
+
+}  // namespace ptc

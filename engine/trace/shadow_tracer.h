@@ -1,0 +1,65 @@
+// Shadow rays from many neighbouring places at the discs of a container, through its octree.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "engine/trace/decoded_tree.h"
+#include "engine/trace/trace_kernels.h"
+
+namespace ptc {
+
+/// Finds out which rays from places that lie close together are hidden from their lights.
+///
+/// Rays that have about the same direction make a beam. The tree is walked once for a beam, and
+/// what the beam may pass is opened until it is no larger than the beam is wide; the rays begin at
+/// these boxes:
+///
+///     places   ._._._._.          one walk for all rays of the beam, then
+///               \ \ \ \ \         some 40 boxes for each ray
+///                \ \ \ \ \  light
+///
+/// The answer for a ray depends on the ray and on the place around which rays start: not on the
+/// cap, the threads or the other rays.
+///
+/// Threads: one tracer for each thread.   Memory: kBytes.
+class ShadowTracer {
+ public:
+  /// Rays of a beam, at most.
+  static constexpr std::size_t kBeam = 256;
+  /// Memory of a tracer, bytes.
+  static constexpr std::uint64_t kBytes = DecodedTree::kBytes + (std::uint64_t{1} << 18);
+
+  /// @param view, cache  must outlive this; of the same container
+  /// @param sides        which sides of discs stop rays
+  ShadowTracer(const SceneView& view, PageCache& cache, Sides sides);
+
+  /// Chooses the place around which the next rays start.
+  /// @param origin  scene units
+  /// @param reach   how far from there they start at most, edges of the frame
+  void begin(const glm::dvec3& origin, float reach) { tree_.begin_around(origin, reach); }
+
+  /// Tests rays. Those that follow one another should start at neighbouring places.
+  /// @param hidden  for each ray: gets 1 when a disc lies before its end, else 0
+  /// @throws FormatError when a page is damaged
+  void test(std::span<const ShadowRay> rays, std::span<std::uint8_t> hidden);
+
+ private:
+  void trace_beam(std::span<const ShadowRay> rays, std::span<const std::uint32_t> beam,
+                  std::span<std::uint8_t> hidden);
+  void list_from_root();
+  void list_along(const Shaft& shaft);
+
+  DecodedTree tree_;
+  std::vector<std::uint32_t> order_;  ///< indices of rays, by direction
+  std::vector<std::uint32_t> keys_;   ///< of the rays, which order them
+  std::vector<ListedBox> items_;
+  std::vector<std::uint64_t> opened_;  ///< references of groups to look at
+  std::vector<std::uint64_t> words_;   ///< references of the list's boxes
+  BoxList list_;
+};
+
+}  // namespace ptc
