@@ -22,8 +22,11 @@ constexpr char kPurpose[] =
     "Meshes are sampled into surfels: small discs with a position, a normal, a radius, a colour "
     "and the light that they reflect. Suns, point lights, the sky and emissive triangles light "
     "them by shadow rays. Clouds keep their points, everything that is recorded of each point, and "
-    "the light that they come with; without light they get a white sky. Missing normals and radii "
-    "are estimated from the neighbours.\n"
+    "the light that they come with, unless light options say otherwise; without light they get a "
+    "white sky. Missing normals and radii are estimated from the neighbours. Where clouds get "
+    "lamps, "
+    "and where lamps of one input shine on points of another, all points are lit by rays at the "
+    "discs once they are there.\n"
     "\n"
     "All points are sorted along the Z-curve within the cap on memory, and an octree is built over "
     "them. What does not fit in memory goes through temporary files in the directory of the "
@@ -187,10 +190,11 @@ void adopt_settings(Arguments& arguments, ptc::Command& command) {
 void note_options_of_meshes(const Arguments& arguments, const CLI::App& app,
                             ptc::Progress& progress) {
   if (!std::ranges::all_of(arguments.request.inputs, ptc::holds_points)) return;
-  ptc::note_unused(app,
-                   {"--points", "--spacing", "--backdrop", "--pixels-per-surfel", "--finest",
-                    "--sun-rays", "--sky-rays", "--area-rays"},
-                   "no input is a mesh", progress);
+  std::vector<std::string> options{"--points", "--spacing", "--backdrop", "--pixels-per-surfel",
+                                   "--finest", "--sky-rays"};
+  // Lamps light clouds, too
+  if (!arguments.lights.given()) options.insert(options.end(), {"--sun-rays", "--area-rays"});
+  ptc::note_unused(app, options, "no input is a mesh", progress);
 }
 
 /// Builds the container and reports it.

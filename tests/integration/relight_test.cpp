@@ -152,6 +152,31 @@ Difference compare_with_mesh(const Mesh& mesh, const LightRig& rig, const LightS
   return d;
 }
 
+/// A floor of 2 x 2 from x on, and a lamp of 0.5 x 0.5 above it if it shines.
+Mesh floor_and_lamp(float x, float emission) {
+  Mesh mesh;
+  mesh.materials = {{.name = "grey", .albedo = glm::vec3(0.5F)},
+                    {.name = "lamp", .albedo = glm::vec3(0), .emission = glm::vec3(emission)}};
+  add_quad(mesh, {x, 0, -1}, {0, 0, 2}, {2, 0, 0}, 0);
+  if (emission > 0) add_quad(mesh, {x + 0.75F, 1, -0.25F}, {0.5F, 0, 0}, {0, 0, 0.5F}, 1);
+  return mesh;
+}
+
+/// The mean irradiance of the surfels that look up, left and right of x = 2.
+struct Halves {
+  double left = 0, right = 0;
+};
+Halves halves_of(const std::filesystem::path& path) {
+  Halves sum, count;
+  for (const Surfel& s : points_of(path)) {
+    if (s.normal.y < 0.9F) continue;
+    const double light = static_cast<double>(kPiFloat * s.radiance.g / s.albedo.g);
+    (s.position.x < 2 ? sum.left : sum.right) += light;
+    (s.position.x < 2 ? count.left : count.right) += 1;
+  }
+  return {sum.left / count.left, sum.right / count.right};
+}
+
 }  // namespace
 
 TEST_CASE("relight: a plane is lit evenly, down to grazing light", "[integration][relight]") {
@@ -390,4 +415,102 @@ TEST_CASE("relight: a container may be lit in its own place", "[integration][rel
   relight(dir / "scene.ptcx", dir / "other.ptcx", one_sun({0, 1, 0}));
   relight(dir / "scene.ptcx", dir / "scene.ptcx", one_sun({0, 1, 0}));
   CHECK(bytes_of(dir / "scene.ptcx") == bytes_of(dir / "other.ptcx"));
+}
+
+TEST_CASE("relight: of joined and appended scenes every point gets the light of every lamp",
+          "[integration][relight]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  const auto build = [&](const Mesh& mesh, const std::string& name,
+                         const std::filesystem::path& append = {}) {
+    BuildRequest request{.mesh = std::make_shared<const Mesh>(mesh), .append = append};
+    request.sampling.spacing = 0.02;
+    if (append.empty()) request.lights = LightRig{};
+    build_container(request, dir / name, silent);
+  };
+  const auto join = [&](const std::vector<std::filesystem::path>& inputs, const std::string& name) {
+    build_container(BuildRequest{.inputs = inputs}, dir / name, silent);
+  };
+  // One mesh of both floors, of which the left one has a lamp
+  const auto whole = [&](float left, float right, const std::string& name) {
+    Mesh mesh = floor_and_lamp(0, left);
+    append_mesh(mesh, floor_and_lamp(2, right), glm::dmat4(1), "mesh");
+    build(mesh, name);
+    return halves_of(dir / name);
+  };
+  const auto check = [&](const std::string& name, const Halves& expected) {
+    INFO(name);
+    const Halves found = halves_of(dir / name);
+    CHECK(found.left == Approx(expected.left).epsilon(0.02));
+    CHECK(found.right == Approx(expected.right).epsilon(0.02));
+    CHECK(lit_by_emitters(ContainerReader(dir / name)));
+  };
+  const Halves one = whole(5, 0, "one.ptcx"), two = whole(5, 5, "two.ptcx");
+  CHECK(one.right > 0.05);
+  CHECK(two.left > 1.1 * one.left);
+  build(floor_and_lamp(0, 5), "lit.ptcx");
+  build(floor_and_lamp(2, 0), "dark.ptcx");
+  build(floor_and_lamp(2, 5), "other.ptcx");
+
+  build(floor_and_lamp(2, 0), "a.ptcx", dir / "lit.ptcx");  // a mesh without a lamp
+  check("a.ptcx", one);
+  build(floor_and_lamp(2, 5), "b.ptcx", dir / "lit.ptcx");  // with another
+  check("b.ptcx", two);
+  build(floor_and_lamp(0, 5), "c.ptcx", dir / "dark.ptcx");
+  check("c.ptcx", one);
+  join({dir / "lit.ptcx", dir / "dark.ptcx"}, "d.ptcx");  // containers
+  check("d.ptcx", one);
+  join({dir / "dark.ptcx", dir / "lit.ptcx"}, "e.ptcx");
+  check("e.ptcx", one);
+  join({dir / "lit.ptcx", dir / "other.ptcx"}, "f.ptcx");
+  check("f.ptcx", two);
+  BuildRequest appended{.inputs = {dir / "lit.ptcx"}, .append = dir / "dark.ptcx"};
+  build_container(appended, dir / "g.ptcx", silent);
+  check("g.ptcx", one);
+  join({dir / "lit.ptcx"}, "h.ptcx");  // one alone stays as it was built
+  const Halves alone = halves_of(dir / "h.ptcx"), before = halves_of(dir / "lit.ptcx");
+  CHECK(alone.left == Approx(before.left).epsilon(1e-6));
+  CHECK(lit_by_emitters(ContainerReader(dir / "h.ptcx")));
+}
+
+TEST_CASE("relight: a build of a cloud with lamps lights it, and a mesh beside a cloud, too",
+          "[integration][relight]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  std::string text;
+  for (int i = 0; i < 10'000; ++i)
+    text += std::to_string(0.01 * (i % 100)) + " 0 " + std::to_string(0.01 * (i / 100)) + "\n";
+  const std::filesystem::path cloud = dir.file("cloud.xyz", text);
+  BuildRequest build{.inputs = {cloud}, .up = "y", .lights = one_sun({0, 1, 0})};
+  build_container(build, dir / "cloud.ptcx", silent);
+  double sum = 0;
+  const std::vector<double> light = irradiances(dir / "cloud.ptcx");
+  for (const double e : light) sum += e / static_cast<double>(light.size());
+  CHECK(sum == Approx(3).epsilon(0.01));
+  CHECK_FALSE(sky_is_gathered(ContainerReader(dir / "cloud.ptcx")));
+  build.resume = true;
+  CHECK_THROWS_AS(build_container(build, dir / "again.ptcx", silent), RequestError);
+
+  // A mesh above half of the cloud, in the same sun, shades that half
+  Mesh roof;
+  roof.materials = {{.name = "grey", .albedo = glm::vec3(0.5F)}};
+  add_quad(roof, {0, 0.5F, 0}, {0, 0, 1}, {0.5F, 0, 0}, 0);
+  build.resume = false;
+  build.mesh = std::make_shared<const Mesh>(roof);
+  build.sampling.spacing = 0.01;
+  build_container(build, dir / "both.ptcx", silent);
+  double dark = 0, bright = 0, on_roof = 0;
+  for (const Surfel& s : points_of(dir / "both.ptcx")) {
+    const double e = static_cast<double>(kPiFloat * s.radiance.g / s.albedo.g);
+    if (s.position.y > 0.25) {
+      on_roof = std::max(on_roof, e);
+    } else if (s.position.x < 0.45 && s.position.x > 0.03 && std::abs(s.position.z - 0.5) < 0.47) {
+      dark = std::max(dark, e);
+    } else if (s.position.x > 0.55) {
+      bright = std::max(bright, e);
+    }
+  }
+  CHECK(dark < 0.01);
+  CHECK(bright == Approx(3).epsilon(0.02));
+  CHECK(on_roof == Approx(3).epsilon(0.02));
 }

@@ -43,8 +43,10 @@
 #include "engine/pipeline/build/build_record.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/resume.h"
+#include "engine/pipeline/light/light_container.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/temporary_container.h"
 #include "engine/scan/scan.h"
 #include "engine/sort/external_sort.h"
 #include "engine/sort/point_streams.h"
@@ -109,18 +111,21 @@ class Build {
     }
 
     // Sort the points, or reopen the sorted ones, and build the container
-    const bool goes_on = resumption_ && resumption_->plan();
-    SortedPoints points = goes_on ? SortedPoints{} : sort();
-    try {
-      if (goes_on) points = take_up();
-      build(points);
-    } catch (const DataError& error) {  // a kept file changed since it was written
-      if (resumption_) resumption_->refuse(error);
-      throw;
+    {
+      const bool goes_on = resumption_ && resumption_->plan();
+      SortedPoints points = goes_on ? SortedPoints{} : sort();
+      try {
+        if (goes_on) points = take_up();
+        build(points);
+      } catch (const DataError& error) {  // a kept file changed since it was written
+        if (resumption_) resumption_->refuse(error);
+        throw;
+      }
+      report_.sort = points.sorter->statistics();
     }
 
-    // Complete the report, remove what was kept
-    report_.sort = points.sorter->statistics();
+    // Light the points, complete the report, remove what was kept
+    if (unlit_) light();
     if (resumption_) resumption_->remove();
     tell_scan();
     return std::move(report_);
@@ -261,6 +266,7 @@ class Build {
         if (!texts.contains(key)) inputs.clouds.text.erase(key);
       }
     }
+    if (inputs.relight) light_later(inputs);
     Meta meta = make_meta(request_, inputs);
     if (inputs.clouds.scan && inputs.clouds.points > 0) add_marks(meta);
     check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);
@@ -313,6 +319,41 @@ class Build {
                                     points.plan.meta, scene_ ? scene_->header().uuid : Uuid{});
     if (resumption_) resumption_->keep(points.plan, *points.sorter, *points.attributes);
     return points;
+  }
+
+  /// Lets the points go into a temporary container first.
+  void light_later(const BuildInputs& inputs) {
+    if (request_.resume) {
+      throw RequestError(
+          "resume",
+          "`resume` is for builds of one stage, and these points are lit when all of "
+          "them are there: build without `resume`");
+    }
+    rig_ = inputs.lights;
+    // The picture of a scene's sky is not loaded where no mesh needs it
+    if (scene_ && !has_meshes()) rig_ = recorded_lights(*scene_, progress_);
+    unlit_path_ = temporary_container_path(roomiest_temp_dir(request_.run, target_));
+    unlit_ = std::make_unique<TemporaryName>(unlit_path_);
+    if (scene_) {
+      progress_.note("the points of " + scene_->path().filename().string() +
+                     " are lit anew together with those that are added, because lamps of one would "
+                     "not light the other");
+    }
+  }
+
+  /// Lights the points of the temporary container into the target.
+  void light() {
+    LightRequest lighting{{.scene = unlit_path_, .run = request_.run}};
+    if (scene_) {
+      lighting.replaces = &scene_->file();
+      const std::uint64_t open = ContainerReader::kMaxPageBytes * scene_->page_count();
+      lighting.run.memory_bytes -= std::min(open, lighting.run.memory_bytes - 1);
+    }
+    lighting.lights = rig_;
+    lighting.light_sampling = request_.sampling.lights;
+    LightReport lit = light_container(lighting, target_, progress_);
+    report_.superblock = ContainerReader(target_).superblock();
+    report_.seconds.insert(report_.seconds.end(), lit.seconds.begin(), lit.seconds.end());
   }
 
   /// Reports the disk space of the build, and refuses the build when there is too little.
@@ -390,8 +431,9 @@ class Build {
     const Stage stage(report_.seconds, progress_, "sort and build", all, "points");
     const Checkpoint* const from =
         resumption_ && resumption_->checkpoint() ? &*resumption_->checkpoint() : nullptr;
-    ContainerWriter writer = from ? ContainerWriter(target_, writer_options(plan), from->writer)
-                                  : ContainerWriter(target_, writer_options(plan));
+    const std::filesystem::path& target = unlit_ ? unlit_path_ : target_;
+    ContainerWriter writer = from ? ContainerWriter(target, writer_options(plan), from->writer)
+                                  : ContainerWriter(target, writer_options(plan));
     const BuildPlace place = from ? from->place : BuildPlace{};
     progress_.advance(place.points);
 
@@ -531,6 +573,10 @@ class Build {
   ScanReport scan_;
   std::unique_ptr<ContainerReader> scene_;  ///< container that is appended to; null: none
   std::unique_ptr<Resumption> resumption_;
+  /// The container of points that light() lights; null: they are lit already.
+  std::filesystem::path unlit_path_;
+  std::unique_ptr<TemporaryName> unlit_;
+  LightRig rig_;  ///< for light()
 };
 
 }  // namespace

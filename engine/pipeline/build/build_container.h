@@ -37,7 +37,8 @@ namespace ptc {
 /// Everything that the bytes of a container follow from, and the resources for building it.
 ///
 /// Surfels come from `inputs` and `mesh` together, or from `city_points`. Meshes are sampled and
-/// lit; clouds keep their own points and the light that their files give them.
+/// lit; clouds keep their own points and the light that their files give them, unless `lights` or
+/// meshes bring them other.
 struct BuildRequest {
   /// Mesh files, clouds and containers, in any mixture. Normals and radii that a cloud lacks are
   /// estimated. Containers give their points with all channels, and without `lights` their lights.
@@ -48,11 +49,12 @@ struct BuildRequest {
   std::shared_ptr<const Mesh> mesh;
   /// Number of points of the procedural city, which is built in place of inputs; 0: no city.
   std::uint64_t city_points = 0;
-  /// A container to which the inputs are appended; empty: none. Its points keep their order and
-  /// their light and are not sorted again. The cube of the scene doubles until it holds all points;
-  /// if it does, the old points move by less than one unit of the new lattice. The lights that the
-  /// container records replace `lights`. Excludes `city_points`; it may be the target itself,
-  /// except with `resume`.
+  /// A container to which the inputs are appended; empty: none. Its points keep their order and are
+  /// not sorted again. They keep their light unless lamps of either side would light the points of
+  /// one side alone (spec/shading.md#mixed-light). The cube of the scene doubles until it holds all
+  /// points; if it does, the old points move by less than one unit of the new lattice. The lights
+  /// that the container records replace `lights`. Excludes `city_points`; it may be the target
+  /// itself, except with `resume`.
   std::filesystem::path append;
   /// Records the place that each point had in its input, as the channel original_index, so that
   /// points can be written in that order again.

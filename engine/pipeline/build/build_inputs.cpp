@@ -221,6 +221,29 @@ void plan_channels(const BuildRequest& request, const ContainerReader* scene, bo
   mark_unknown_values(plan, sources, progress);
 }
 
+/// Says which points are lit how, once all inputs are known.
+void plan_light(const BuildRequest& request, const ContainerReader* scene, bool meshes,
+                BuildInputs& inputs) {
+  const Clouds& clouds = inputs.clouds;
+  const bool has_clouds = clouds.points > 0, has_scene = scene && scene->superblock().points > 0;
+  const auto files =
+      std::ranges::count_if(clouds.files, [](const Clouds::Cloud& c) { return c.points > 0; });
+  const bool several = files + (meshes ? 1 : 0) + (has_scene ? 1 : 0) > 1;
+  // Emitters light by rays what they were built with: other points would stay without their light
+  const bool baked = clouds.text.contains(kEmittersKey) || (has_scene && lit_by_emitters(*scene));
+  // Points that wait for the sky alone may stand beside others that were lit
+  const bool scene_waits = has_scene && sky_is_gathered(*scene);
+  const bool waiting = (has_clouds && clouds.unlit) || scene_waits,
+             lit = meshes || (has_scene && !scene_waits);
+  const bool lamps =
+      request.lights && !(request.lights->suns.empty() && request.lights->points.empty() &&
+                          request.lights->spots.empty());
+  inputs.relight = (several && baked) || (several && inputs.emitters && !has_clouds) ||
+                   (waiting && lit) || (has_clouds && lamps && !scene);
+  inputs.rays_at_emitters = inputs.emitters && request.sampling.lights.area_rays > 0 && !several;
+  if (several) inputs.clouds.text.erase(kEmittersKey);
+}
+
 BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
                        Progress& progress) {
   BuildInputs inputs;
@@ -250,14 +273,9 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   } else if (inputs.clouds.unlit) {
     inputs.lights = cloud_rig(up_of(inputs.clouds.text));
   }
-  if (mesh.triangles.empty()) return inputs;
   inputs.emitters = mesh.emits();
-  // Cast rays at emitters where they reach all points. Those of clouds are not lit by rays, so that
-  // the gather brings them the light of emitters
-  inputs.rays_at_emitters =
-      inputs.emitters && request.sampling.lights.area_rays > 0 &&
-      (inputs.clouds.points == 0 || inputs.clouds.text.contains(kEmittersKey)) &&
-      (!scene || lit_by_emitters(*scene));
+  plan_light(request, scene, !mesh.triangles.empty(), inputs);
+  if (mesh.triangles.empty()) return inputs;
   if (!request.lights && !inputs.clouds.text[kLightsKey].empty()) {
     static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(request.inputs.front())));
   } else if (!request.lights && !inputs.emitters) {
@@ -266,7 +284,8 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   inputs.bounds.add(mesh.bounds());
   const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
   inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
-  inputs.lit = std::make_unique<LitMesh>(std::move(mesh), inputs.lights);
+  inputs.lit =
+      std::make_unique<LitMesh>(std::move(mesh), inputs.relight ? LightRig{} : inputs.lights);
   return_freed_memory();  // that reading the files and building the ray scene took
   return inputs;
 }

@@ -105,7 +105,10 @@ struct BuildInputs {
   LightRig lights;
   bool emitters = false;          ///< at least one material emits light
   bool rays_at_emitters = false;  ///< and lights the surfels of the meshes by rays
-  std::unique_ptr<LitMesh> lit;   ///< null when the inputs have no triangles
+  /// Whether the points are lit once all of them are in the container, since not every one of them
+  /// has the light of all lamps yet (spec/shading.md#mixed-light). Meshes then stay dark at first.
+  bool relight = false;
+  std::unique_ptr<LitMesh> lit;  ///< null when the inputs have no triangles
 };
 
 /// Reads the meshes and measures the clouds of a request.

@@ -281,7 +281,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                                     .uuid = lit_uuid(scene, request, planned.text.at(kLightsKey)),
                                     .frame = scene.header().frame,
                                     .point_bytes = scene.header().point_bytes,
-                                    .source = &scene.file()});
+                                    .source = request.replaces ? request.replaces : &scene.file()});
     Progress silent;
     const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
     const Superblock made = build_pages(last, writer, tree, executor, silent);
