@@ -211,8 +211,7 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   request.input_names = inputs.names();
   request.sampling.camera = arguments.camera.camera();
   if (arguments.lights.given() || arguments.no_default_lights)
-    request.lights = arguments.lights.rig();
-  if (request.lights) request.lights->sky.up = ptc::up_of_files(request.inputs, request.up);
+    request.lights = arguments.lights.rig(ptc::up_of_files(request.inputs, request.up));
   if (request.city_points > 0 && arguments.lights.given())
     throw CLI::ExcludesError("--city", "lights: the city has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);

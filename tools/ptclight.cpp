@@ -50,10 +50,9 @@ int main(int argc, char** argv) {
 
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     request.run = command.run_options();
-    if (lights.given()) request.lights = lights.rig();
     scene.apply(request, output, progress);
-    if (request.lights)
-      request.lights->sky.up = ptc::up_of_files(ptc::scene_files(request), request.up);
+    if (lights.given())
+      request.lights = lights.rig(ptc::up_of_files(ptc::scene_files(request), request.up));
     const ptc::LightReport report = ptc::light_container(request, output, progress);
     nlohmann::ordered_json facts{{"output", output.string()}};
     facts.update(ptc::facts_of(report));

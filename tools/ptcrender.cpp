@@ -140,10 +140,9 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   arguments.scene.apply(request, arguments.outputs.front(), progress);
   request.camera = arguments.camera.camera();
   request.size = arguments.camera.size();
-  if (arguments.lights.given()) request.lights = arguments.lights.rig();
-  if (request.lights || request.camera) {
+  if (arguments.lights.given() || request.camera) {
     const glm::vec3 up = ptc::up_of_files(ptc::scene_files(request), request.up);
-    if (request.lights) request.lights->sky.up = up;
+    if (arguments.lights.given()) request.lights = arguments.lights.rig(up);
     if (request.camera) request.camera->up = up;
   }
   std::vector<ptc::PictureTarget> targets = arguments.layers;

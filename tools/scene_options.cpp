@@ -122,8 +122,10 @@ void LightArguments::declare(CLI::App& app) {
   add_repeated(
       app, "--sun", [this](const std::vector<std::string>& v) { set_suns(v); },
       "Sun: azimuth and elevation in degrees, irradiance [3]; repeatable\n"
-      "The elevation is above the horizon, the plane of x and z; +y is up. The azimuth turns from "
-      "+z to +x. The irradiance is that of a surface that faces the sun, in W/m^2, or in lux: "
+      "The elevation is above the horizon. The azimuth turns from +z to +x where y is up; where z "
+      "is "
+      "up, as in most scans, from +y to +x: from north to east. The irradiance is that of a "
+      "surface that faces the sun, in W/m^2, or in lux: "
       "30,60,2000lx. 1 W/m^2 counts as 683 lx.")
       ->type_name("AZ,EL[,E]")
       ->group(kGroup);
@@ -190,8 +192,7 @@ void LightArguments::set_suns(const std::vector<std::string>& values) {
         parse_light("--sun", text, {2, 3}, 2, irradiance_units(), kExpected);
     const double strength = n.size() == 3 ? n[2] : 3;
     if (std::abs(n[1]) > 90) refuse("--sun", text, kExpected);
-    suns_.push_back({.to_sun = sun_direction(n[0], n[1]),
-                     .irradiance = glm::vec3(static_cast<float>(strength))});
+    suns_.push_back({n[0], n[1], static_cast<float>(strength)});
   }
 }
 
@@ -237,11 +238,13 @@ bool LightArguments::given() const noexcept {
   return !suns_.empty() || !points_.empty() || !spots_.empty() || sky_given();
 }
 
-LightRig LightArguments::rig() const {
-  LightRig rig{.suns = suns_, .points = points_, .spots = spots_, .sky = sky()};
-  for (Sun& sun : rig.suns) {
-    sun.irradiance *= sun_colour_;
-    sun.angular_radius = static_cast<float>(glm::radians(sun_degrees_ / 2));
+LightRig LightArguments::rig(const glm::vec3& up) const {
+  LightRig rig{.points = points_, .spots = spots_, .sky = sky()};
+  rig.sky.up = up;
+  for (const SunPlace& sun : suns_) {
+    rig.suns.push_back({.to_sun = sun_direction(sun.azimuth, sun.elevation, up),
+                        .irradiance = sun.irradiance * sun_colour_,
+                        .angular_radius = static_cast<float>(glm::radians(sun_degrees_ / 2))});
   }
   return rig;
 }

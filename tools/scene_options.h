@@ -29,8 +29,9 @@ class LightArguments {
   /// True when --sky was given.
   [[nodiscard]] bool sky_given() const noexcept { return !sky_.empty(); }
   /// The lights that were given. Reads the picture of the sky.
+  /// @param up  the axis that points up
   /// @throws DataError when the file of the sky is not a picture
-  [[nodiscard]] LightRig rig() const;
+  [[nodiscard]] LightRig rig(const glm::vec3& up) const;
   /// The sky that was given, black without one. Reads its picture as rig() does.
   [[nodiscard]] Sky sky() const;
 
@@ -39,7 +40,11 @@ class LightArguments {
   void set_points(const std::vector<std::string>& values);
   void set_spots(const std::vector<std::string>& values);
 
-  std::vector<Sun> suns_;
+  struct SunPlace {
+    double azimuth, elevation;  ///< degrees
+    float irradiance;           ///< W/m^2
+  };
+  std::vector<SunPlace> suns_;
   std::vector<PointLight> points_;
   std::vector<SpotLight> spots_;
   glm::vec3 sun_colour_{1};

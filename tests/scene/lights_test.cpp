@@ -27,6 +27,21 @@ LightRig one_sun(const glm::vec3& to_sun, float radius) {
 
 }  // namespace
 
+TEST_CASE("sun: azimuth and elevation follow the axis that points up", "[scene][lights]") {
+  const auto check = [](const glm::vec3& up, const glm::vec3& at_0, const glm::vec3& at_90) {
+    CHECK(glm::distance(sun_direction(0, 0, up), at_0) < 1e-6F);
+    CHECK(glm::distance(sun_direction(90, 0, up), at_90) < 1e-6F);
+    CHECK(glm::distance(sun_direction(17, 90, up), up) < 1e-6F);
+    CHECK(glm::dot(sun_direction(200, 30, up), up) == Approx(0.5));
+    const LightRig rig = default_rig(up);
+    CHECK(glm::dot(rig.suns.at(0).to_sun, up) > 0.7F);
+    CHECK(rig.sky.up == up);
+  };
+  check({0, 1, 0}, {0, 0, 1}, {1, 0, 0});
+  check({0, 0, 1}, {0, 1, 0}, {1, 0, 0});
+  check({1, 0, 0}, {0, 1, 0}, {0, 0, 1});
+}
+
 TEST_CASE("sun: a plane gets the sun's irradiance times the cosine", "[scene][lights]") {
   const Mesh mesh = ground(10);
   const RayScene scene(mesh);

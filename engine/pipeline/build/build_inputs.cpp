@@ -279,7 +279,7 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   if (!request.lights && !inputs.clouds.text[kLightsKey].empty()) {
     static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(request.inputs.front())));
   } else if (!request.lights && !inputs.emitters) {
-    inputs.lights = default_rig();
+    inputs.lights = default_rig(up_of(inputs.clouds.text));
   }
   inputs.bounds.add(mesh.bounds());
   const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);

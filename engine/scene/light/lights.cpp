@@ -37,11 +37,14 @@ void check_lamp(const glm::dvec3& position, const glm::vec3& intensity, const ch
 
 }  // namespace
 
-glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees) {
+glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees, const glm::vec3& up) {
   const double azimuth = glm::radians(azimuth_degrees);
   const double elevation = glm::radians(elevation_degrees);
-  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
-          std::cos(azimuth) * std::cos(elevation)};
+  const double rise = std::sin(elevation), ahead = std::cos(azimuth) * std::cos(elevation),
+               aside = std::sin(azimuth) * std::cos(elevation);
+  if (up.z > 0.5F) return {aside, ahead, rise};
+  if (up.x > 0.5F) return {rise, ahead, aside};
+  return {aside, rise, ahead};
 }
 
 double spot_share(const SpotLight& spot, const glm::dvec3& place) noexcept {
@@ -95,10 +98,10 @@ void check_lights(const LightRig& rig) {
   check_sky(rig.sky, kField);
 }
 
-LightRig default_rig() {
+LightRig default_rig(const glm::vec3& up) {
   LightRig rig;
-  rig.suns.push_back({.to_sun = sun_direction(40, 50), .irradiance = glm::vec3(3)});
-  rig.sky.radiance = 0.8F * glm::vec3(0.85F, 0.93F, 1.0F);
+  rig.suns.push_back({.to_sun = sun_direction(40, 50, up), .irradiance = glm::vec3(3)});
+  rig.sky = {.radiance = 0.8F * glm::vec3(0.85F, 0.93F, 1.0F), .up = up};
   return rig;
 }
 

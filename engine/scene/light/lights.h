@@ -21,8 +21,16 @@ struct Sun {
   float angular_radius = 0.00465f;  ///< radians, at most pi / 2; 0 gives sharp shadows
 };
 
-/// Returns the unit direction towards a sun. Azimuth 0 is +z and 90 is +x; elevation 90 is +y.
-[[nodiscard]] glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees);
+/// Returns the unit direction towards a sun.
+///
+///     up    azimuth 0     azimuth 90
+///     +y    +z            +x
+///     +z    +y, north     +x, east: as a compass has it
+///     +x    +y            +z
+///
+/// @param up  the axis that points up: elevation 90
+[[nodiscard]] glm::vec3 sun_direction(double azimuth_degrees, double elevation_degrees,
+                                      const glm::vec3& up = {0, 1, 0});
 
 /// The maximum coordinate of a point light, scene units. Its square is still a finite double.
 inline constexpr double kMaxLightDistance = 1e150;
@@ -98,7 +106,8 @@ void check_sky(const Sky& sky, const char* field);
 void check_lights(const LightRig& rig);
 
 /// Returns the lights for a scene that brings none of its own: a sun and a bluish sky.
-[[nodiscard]] LightRig default_rig();
+/// @param up  the axis that points up
+[[nodiscard]] LightRig default_rig(const glm::vec3& up = {0, 1, 0});
 
 /// Returns the lights of a cloud that gives no light of its own: a white sky, under which a surface
 /// that nothing covers has the colour of its albedo.
