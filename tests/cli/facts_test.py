@@ -203,7 +203,9 @@ class Facts(ProgramTest):
         self.assertRegex(text, r"^read\nread: [0-9.]+ s\nsample and light\n")
 
     def test_a_terminal_shows_a_bar_that_goes_and_a_quiet_one_nothing(self):
-        command = ["ptcshade", self.box, "-o", self.here / "o.ply", "--solid-angle", "0.001", "--parallax", "0.02",
+        dense = self.here / "dense.ptcx"  # shaded in several times the 0.1 s after which a bar is drawn
+        self.succeed("ptcbuild", self.mesh, "--points", "8000", "-o", dense)
+        command = ["ptcshade", dense, "-o", self.here / "o.ply", "--solid-angle", "0.001", "--parallax", "0.02",
                    "--resolution", "64", "--threads", "1"]
         code, shown = run_on_terminal(*command)
         self.assertEqual(code, 0, shown)

@@ -195,7 +195,8 @@ class Place:
         if run.code > 0 and not re.search(f"^{self.scenario.command[0]}: ", run.errors, re.M):
             wrong.append("no message")
         names = r"\.(.+\.tmp-\d+-\d+|ptcx-\d+-\d+\.ptcx)"
-        kept = r"o\.ptcx\.resume(-.+)?" if self.scenario.keeps and run.code != 0 else "$^"
+        keeps = self.scenario.keeps and (run.code != 0 or (may_leave and run.call))
+        kept = r"o\.ptcx\.resume(-.+)?" if keeps else "$^"
         left = [name for name in self.leftovers()
                 if not (may_leave and re.fullmatch(names, name)) and not re.fullmatch(kept, name)]
         if left:

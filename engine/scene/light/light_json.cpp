@@ -198,9 +198,11 @@ SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory) {
   std::error_code absent;
   const bool is_there = std::filesystem::exists(recorded, absent);
   if (!is_there && !std::filesystem::exists(beside, absent)) {
-    throw DataError("the sky picture " + recorded.string() +
-                    " that lit the scene does not exist, and neither does " + beside.string() +
-                    ": put it there, or give a sky");
+    const bool elsewhere = std::filesystem::absolute(beside).lexically_normal() !=
+                           std::filesystem::absolute(recorded).lexically_normal();
+    throw DataError("the sky picture " + recorded.string() + " that lit the scene does not exist" +
+                    (elsewhere ? ", and neither does " + beside.string() : "") +
+                    ": put it there, or give a sky (`--sky` of ptcshade, ptcrender or ptclight)");
   }
   // Read it, and compare its digest with the recorded one.
   sky.map = std::make_shared<const Image>(read_image(is_there ? recorded : beside));
