@@ -1,6 +1,7 @@
 #include "engine/pipeline/budgets.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "engine/trace/disc_tracer.h"
@@ -35,6 +36,14 @@ void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {
   const std::uint64_t triangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]);
   const std::uint64_t vertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);
   budget.charge("the mesh", mesh.triangles.size() * triangle + mesh.positions.size() * vertex);
+  std::set<const Image*> textures{nullptr};
+  std::uint64_t pixels = 0;
+  for (const Material& material : mesh.materials) {
+    for (const Image* texture : {material.texture.get(), material.emission_texture.get()}) {
+      if (textures.insert(texture).second) pixels += texture->pixels.size();
+    }
+  }
+  if (pixels > 0) budget.charge("textures", pixels * sizeof(glm::vec3));
   if (rays) budget.charge("rays at the mesh", rays->bytes());
 }
 

@@ -373,8 +373,34 @@ TEST_CASE("relight: emitters of a cloud light its other points, once", "[integra
   // Receivers of the scene itself do not gather it again
   CHECK(lit_by_emitters(ContainerReader(dir / "lit.ptcx")));
   Progress silent;
-  ShadeRequest shade{{.scene = dir / "lit.ptcx"}};
-  shade_container(shade, dir / "shaded.ply", silent);
+  const auto irradiance = [&](const std::filesystem::path& scene) {
+    ShadeRequest request{{.scene = scene}};
+    request.check = {.receivers = 500, .rays = 64};
+    return shade_container(request, dir / "shaded.ply", silent).check->discs.irradiance_mean;
+  };
+  CHECK(irradiance(dir / "lit.ptcx") < 0.1 * irradiance(dir / "cloud.ptcx"));
+
+  // A file of points keeps both, and a scene that is built from it counts the lamp once, too
+  container_to_points(ContainerReader(dir / "lit.ptcx"), dir / "lit.ply", {}, silent);
+  build_container({.inputs = {dir / "lit.ply"}}, dir / "again.ptcx", silent);
+  CHECK(lit_by_emitters(ContainerReader(dir / "again.ptcx")));
+  CHECK(irradiance(dir / "again.ptcx") == Approx(irradiance(dir / "lit.ptcx")).epsilon(0.01));
+}
+
+TEST_CASE("relight: a cloud that emits and waits for light still waits as a file of points",
+          "[integration][relight]") {
+  const TemporaryDirectory dir;
+  std::ofstream(dir / "cloud.xyz") << "x y z nx ny nz radius emission_r emission_g emission_b\n"
+                                      "0 0 0 0 0 1 1 0 0 0\n0 0 1 0 0 -1 1 2 2 2\n";
+  Progress silent;
+  build_container({.inputs = {dir / "cloud.xyz"}}, dir / "cloud.ptcx", silent);
+  const ContainerReader cloud(dir / "cloud.ptcx");
+  CHECK_FALSE(lit_by_emitters(cloud));
+  CHECK(sky_is_gathered(cloud));
+  container_to_points(cloud, dir / "cloud.ply", {}, silent);
+  build_container({.inputs = {dir / "cloud.ply"}}, dir / "again.ptcx", silent);
+  CHECK_FALSE(lit_by_emitters(ContainerReader(dir / "again.ptcx")));
+  CHECK(sky_is_gathered(ContainerReader(dir / "again.ptcx")));
 }
 
 TEST_CASE("relight: the channels of a shading go, because they are of other light",

@@ -66,6 +66,25 @@ TEST_CASE("obj: millimetres are kept ten million metres from the origin", "[io][
   CHECK(static_cast<double>(mesh.positions[1].x) == Approx(0.003).epsilon(1e-6));
 }
 
+TEST_CASE("obj: an emission texture times Ke 0 0 0 is dark and told, and dark meshes do not emit",
+          "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  write_png(scratch.path() / "a.png", {1, 1, {glm::vec3(1, 0, 0)}});
+  scratch.file("a.mtl",
+               "newmtl first\nKe 0 0 0\nmap_Ke a.png\nnewmtl unused\nKe 1 1 1\n"
+               "newmtl last\nmap_Ke a.png\nKe 0 0 0\n");
+  const std::string head = kSquare + "mtllib a.mtl\nusemtl first\nf 1 2 3\nusemtl last\nf 1 2 3\n";
+  const MeshFile file = read(scratch, head);
+  REQUIRE(file.warnings.size() == 1);
+  CHECK_THAT(file.warnings[0], Catch::Contains("2 materials emit nothing") &&
+                                   Catch::Contains("first") && Catch::Contains("last"));
+  CHECK_FALSE(file.mesh.emits());
+  CHECK(read(scratch, head + "usemtl unused\nf 1 3 4\n").mesh.emits());
+  Mesh unused = file.mesh;
+  unused.materials.push_back({.name = "unused", .emission = glm::vec3(1)});
+  CHECK_FALSE(unused.emits());
+}
+
 TEST_CASE("obj: materials come from the library, textures from files next to it", "[io][mesh]") {
   const test::TemporaryDirectory scratch;
   write_png(scratch.path() / "my red.png", {1, 1, {glm::vec3(1, 0, 0)}});

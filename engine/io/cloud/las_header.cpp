@@ -20,6 +20,7 @@
 #include <cstring>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/laz/layout.h"
 #include "format/bytes.h"
 
@@ -29,8 +30,6 @@ namespace {
 constexpr std::size_t kHeaderBytes = 227;    // of versions 1.0 to 1.2
 constexpr std::size_t kHeaderBytes13 = 235;  // of version 1.3
 constexpr std::size_t kHeaderBytes14 = 375;  // of version 1.4; later ones have more
-constexpr std::uint64_t kVlrHeader = 54;
-constexpr std::uint64_t kEvlrHeader = 60;
 constexpr std::uint64_t kMaxPayload = std::uint64_t{1} << 20;
 constexpr std::size_t kMaxRecordBytes = 2048;
 constexpr unsigned kMaxMinor = 5;
@@ -161,7 +160,7 @@ class HeaderReader {
     const auto count = load<std::uint32_t>(bytes_.data(), 100);
     std::uint64_t offset = header_bytes_;
     for (std::uint32_t i = 0; i < count; ++i)
-      offset = read_record(offset, header_.points_offset, kVlrHeader, "the points");
+      offset = read_record(offset, header_.points_offset, kVlrHeaderBytes, "the points");
   }
 
   void read_evlrs() {
@@ -169,7 +168,7 @@ class HeaderReader {
     if (offset < header_.points_offset || offset > file_.size())
       fail(235, "the extended records begin before the points or after the end of the file");
     for (std::uint32_t i = 0; i < evlr_count(); ++i)
-      offset = read_record(offset, file_.size(), kEvlrHeader, "the end of the file");
+      offset = read_record(offset, file_.size(), kEvlrHeaderBytes, "the end of the file");
   }
 
   // Reads the header of a record, which lies before `end`, and returns where it ends.
@@ -177,10 +176,10 @@ class HeaderReader {
                             const char* what_follows) {
     if (header_bytes > end - offset)
       fail(offset, std::string("a record's header goes on past ") + what_follows);
-    std::array<std::byte, kEvlrHeader> header;
+    std::array<std::byte, kEvlrHeaderBytes> header;
     file_.read_at(offset, std::span(header).first(static_cast<std::size_t>(header_bytes)));
     LasRecord record;
-    record.extended = header_bytes == kEvlrHeader;
+    record.extended = header_bytes == kEvlrHeaderBytes;
     record.user = name_at(header, 2, 16);
     record.number = load<std::uint16_t>(header.data(), 18);
     record.offset = offset;

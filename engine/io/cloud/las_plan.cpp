@@ -136,7 +136,8 @@ void choose_steps(const PointWriteInfo& info, Head& head) {
 
 // Says whether a record describes how points are stored in the file that it comes from.
 bool is_about_storage(std::string_view user, unsigned id) {
-  if (user == "LASF_Spec") return id == 4 || (id >= 100 && id < 355);  // extra bytes, waveforms
+  if (user == "LASF_Spec")  // extra bytes, descriptors and packets of waveforms
+    return id == 4 || (id >= 100 && id < 355) || id == 65535;
   return user == "laszip encoded" || user == "copc";
 }
 

@@ -110,8 +110,9 @@ Bounds Mesh::bounds() const {
 }
 
 bool Mesh::emits() const {
-  return std::ranges::any_of(materials,
-                             [](const Material& m) { return m.emission != glm::vec3(0); });
+  const auto emits = [](const Material& m) { return m.emission != glm::vec3(0); };
+  if (std::ranges::none_of(materials, emits)) return false;
+  return std::ranges::any_of(material_of, [&](std::size_t m) { return emits(materials[m]); });
 }
 
 MeshFile read_mesh(const std::filesystem::path& path) {

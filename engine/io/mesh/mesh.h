@@ -49,7 +49,7 @@ struct Mesh {
 
   /// Returns the box around all vertices in world coordinates.
   [[nodiscard]] Bounds bounds() const;
-  /// Returns whether a material emits light.
+  /// Returns whether a triangle has a material that emits light.
   [[nodiscard]] bool emits() const;
 };
 

@@ -21,6 +21,9 @@ inline constexpr WarningKind kTextureLeftOut{
     "textures are left out and the plain colours of their materials are used"};
 inline constexpr WarningKind kEmissionAveraged{"an emission texture is replaced by its mean",
                                                "emission textures are replaced by their means"};
+inline constexpr WarningKind kEmissionDark{
+    "a material emits nothing, because its emission texture is multiplied by Ke 0 0 0",
+    "materials emit nothing, because their emission textures are multiplied by Ke 0 0 0"};
 inline constexpr WarningKind kColourLeftOut{
     "a colour that is not R G B is left out and the default of its material is used",
     "colours that are not R G B are left out and the defaults of their materials are used"};

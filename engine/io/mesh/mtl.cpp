@@ -30,14 +30,21 @@ class MtlReader {
         set(keyword, words);
       }
     }
+    end();
   }
 
  private:
   void begin(const std::string& name) {
+    end();
     const auto [at, is_new] = materials_.try_emplace(name);
     current_ = is_new ? &at->second : nullptr;
     if (is_new) current_->name = name;
     emission_given_ = false;
+  }
+
+  void end() {
+    if (current_ && current_->emission_texture && current_->emission == glm::vec3(0))
+      warnings_.add(kEmissionDark, current_->name);
   }
 
   void set(std::string_view keyword, Words& words) {

@@ -25,6 +25,7 @@
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/unknown_values.h"
+#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/run.h"
 #include "engine/pipeline/scene_record.h"
@@ -242,6 +243,9 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
                    (waiting && lit) || (has_clouds && lamps && !scene);
   inputs.rays_at_emitters = inputs.emitters && request.sampling.lights.area_rays > 0 && !several;
   if (several) inputs.clouds.text.erase(kEmittersKey);
+  // In other files radiance is all the light that a point reflects, that of emitters included
+  if (clouds.emits && !clouds.unlit && !clouds.has_container && !meshes && !has_scene)
+    inputs.clouds.text[kEmittersKey] = "baked";
 }
 
 BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
@@ -302,6 +306,7 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   }
   join_texts(text, named_by, file.info.text, name, progress);
   unlit |= !file.info.has_radiance;
+  has_container |= is_container(path);
   coloured |= file.info.has_albedo;
   Cloud& cloud = files.emplace_back(Cloud{path});
   note_scan(file.info, cloud);

@@ -59,6 +59,7 @@ struct Clouds {
   /// How the points are completed, without the resources; empty when all have normals and radii.
   std::optional<ScanOptions> scan;
   bool unlit = false;                ///< one of the files gives no radiance
+  bool has_container = false;        ///< one of the files is a container
   bool coloured = false;             ///< one of the files gives colours
   bool emits = false;                ///< a point emits light
   std::vector<glm::dvec3> scanners;  ///< of all files, scene units

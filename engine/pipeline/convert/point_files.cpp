@@ -172,14 +172,15 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
   const Superblock& superblock = container.superblock();
   const auto& [low, high] = std::pair(superblock.bounds_low, superblock.bounds_high);
   const Selection& selection = options.selection;
-  PointWriteInfo info{.count = superblock.points,
-                      .text = container.meta().text,
-                      .has_normals = true,
-                      .has_radius = true,
-                      .has_radiance = superblock.flux != std::array<double, 3>{},
-                      .has_albedo = !selection.level && has_colours(container.meta().text),
-                      .emits = container.header().point_bytes != kPointBytes && !selection.level,
-                      .colour_from = options.colour_from};
+  PointWriteInfo info{
+      .count = superblock.points,
+      .text = container.meta().text,
+      .has_normals = true,
+      .has_radius = true,
+      .has_radiance = superblock.flux != std::array<double, 3>{} && !sky_is_gathered(container),
+      .has_albedo = !selection.level && has_colours(container.meta().text),
+      .emits = container.header().point_bytes != kPointBytes && !selection.level,
+      .colour_from = options.colour_from};
   if (!options.las_records.empty()) info.text[kLasRecordsKey] = options.las_records;
   info.bounds = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
   if (!selection.level) {

@@ -125,9 +125,8 @@ class Lighting {
   /// Gives the rest of the budget to the page cache, then shades the bounces before the last.
   /// @param budget    already charged with everything else that the caller takes
   /// @param sky       sky that lights the receivers
-  /// @param emission  whether receivers gather what surfaces emit; false where the light of
-  /// emitters
-  ///                  reaches them otherwise
+  /// @param emission  whether receivers gather what surfaces emit; false where rays bring the light
+  ///                  of emitters
   /// @param variants  as ShadeOptions::variants
   /// @param target    output of the run; its directory gets temporary files when the request names
   ///                  no directories for them

@@ -57,8 +57,7 @@ struct TuningReport {
 /// Compares pilots with rays at the same surfels and finds the cheapest setting that meets `asked`.
 /// The result depends on neither threads nor memory cap.
 /// @param options   options of the run. Of its gather, only the sides and the light that it is
-/// about
-///                  count. Its cache_bytes are the cap of the rays too
+///                  about count. Its cache_bytes are the cap of the rays too
 /// @param asked     relative error, above 0 and at most 1
 /// @param compared  gets the receivers of the pilots that were compared
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by

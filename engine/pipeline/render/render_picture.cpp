@@ -118,8 +118,9 @@ void make_mesh_view(Subject& subject, const RenderRequest& request, const Contai
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
   return_freed_memory();  // that reading the files and building the ray scene took
   // The light that emitters gave to surfaces is in their radiance already, or else is gathered
-  subject.rays_at_emitters = lit_by_emitters(scene) && subject.mesh.emits();
   LightSampling sampling = request.light_sampling;
+  subject.rays_at_emitters =
+      lit_by_emitters(scene) && subject.mesh.emits() && sampling.area_rays > 0;
   if (!subject.rays_at_emitters) sampling.area_rays = 0;
   subject.view =
       view_mesh(*subject.rays, *subject.light, sampling, subject.camera, subject.side,
@@ -359,7 +360,8 @@ LightingReport render_container(const RenderRequest& request,
   film.write(targets, request.exposure);
 
   // Compare some of the pixels with rays
-  const LightSampling sampling{.sun_rays = 1, .area_rays = 1, .sky_rays = 1};
+  const unsigned area_rays = lit_by_emitters(lighting.scene()) ? 1 : 0;
+  const LightSampling sampling{.sun_rays = 1, .area_rays = area_rays, .sky_rays = 1};
   lighting.check({.mesh = subject.rays.get(),
                   .light = subject.light.get(),
                   .paths = {.sampling = sampling,

@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <limits>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "engine/scene/sampling/sub_triangle.h"
 #include "engine/scene/texture.h"
@@ -15,7 +17,8 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kMaxPieces = 65536;  // of all textured triangles
-// A piece is cut while its radiance varies by more than this share of that of a white texel
+// A piece is cut while its radiance varies by more than this share of its material's brightest
+// texel
 constexpr float kEven = 0.01F;
 // Texels of a piece that is looked at as a whole, and the most samples along its edges
 constexpr double kTexels = 256;
@@ -31,10 +34,13 @@ struct Range {
 /// Cuts one triangle.
 class Cutter {
  public:
-  Cutter(const Mesh& mesh, std::uint32_t triangle, unsigned depth, std::vector<Emitter>& out)
+  /// @param brightest  the largest values of the emission texture
+  Cutter(const Mesh& mesh, std::uint32_t triangle, const glm::vec3& brightest, unsigned depth,
+         std::vector<Emitter>& out)
       : mesh_(mesh),
         corners_(mesh.triangles[triangle]),
         material_(mesh.materials[mesh.material_of[triangle]]),
+        even_(kEven * material_.emission * brightest),
         depth_(depth),
         out_(out) {
     cut(whole_triangle(mesh, triangle), 0);
@@ -80,16 +86,15 @@ class Cutter {
   }
 
   void cut(const SubTriangle& part, unsigned depth) {
-    const double count = texels(part);
-    const Range range = look(part, count);
-    const glm::vec3 spread = range.high - range.low;
-    const glm::vec3 most = kEven * material_.emission;
-    const bool varies = spread.x > most.x || spread.y > most.y || spread.z > most.z;
-    if (depth < depth_ && (count > kTexels || (varies && count > kLeast))) {
+    const auto halve = [&] {
       cut(part.half(false), depth + 1);
       cut(part.half(true), depth + 1);
-      return;
-    }
+    };
+    const double count = texels(part);
+    if (depth < depth_ && count > kTexels) return halve();
+    const Range range = look(part, count);
+    const bool varies = glm::any(glm::greaterThan(range.high - range.low, even_));
+    if (depth < depth_ && varies && count > kLeast) return halve();
     const glm::vec3 radiance(range.mean);
     if (radiance == glm::vec3(0)) return;
     out_.push_back(
@@ -100,9 +105,17 @@ class Cutter {
   const Mesh& mesh_;
   const std::array<std::uint32_t, 3>& corners_;
   const Material& material_;
+  glm::vec3 even_;  ///< the most by which the radiance of a piece varies
   unsigned depth_;
   std::vector<Emitter>& out_;
 };
+
+/// Returns the largest value of each channel.
+glm::vec3 brightest(const Image& image) {
+  glm::vec3 most(0);
+  for (const glm::vec3& pixel : image.pixels) most = glm::max(most, pixel);
+  return most;
+}
 
 }  // namespace
 
@@ -115,13 +128,19 @@ std::vector<Emitter> emitters_of(const Mesh& mesh) {
       static_cast<std::size_t>(std::ranges::count_if(mesh.material_of, is_textured));
   unsigned depth = 0;
   while (textured > 0 && (textured << (depth + 1)) <= kMaxPieces) ++depth;
+  std::vector<glm::vec3> most(mesh.materials.size());
+  for (std::size_t i = 0; textured > 0 && i < most.size(); ++i) {
+    const Material& m = mesh.materials[i];
+    if (m.emission != glm::vec3(0) && m.emission_texture) most[i] = brightest(*m.emission_texture);
+  }
   std::vector<Emitter> emitters;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const glm::vec3& radiance = mesh.materials[mesh.material_of[i]].emission;
+    const std::uint16_t material = mesh.material_of[i];
+    const glm::vec3& radiance = mesh.materials[material].emission;
     if (radiance == glm::vec3(0)) continue;
     const auto& c = mesh.triangles[i];
-    if (is_textured(mesh.material_of[i])) {
-      Cutter(mesh, static_cast<std::uint32_t>(i), depth, emitters);
+    if (is_textured(material)) {
+      Cutter(mesh, static_cast<std::uint32_t>(i), most[material], depth, emitters);
     } else {
       emitters.push_back(
           {{mesh.positions[c[0]], mesh.positions[c[1]], mesh.positions[c[2]]}, radiance});

@@ -202,7 +202,7 @@ SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory) {
                            std::filesystem::absolute(recorded).lexically_normal();
     throw DataError("the sky picture " + recorded.string() + " that lit the scene does not exist" +
                     (elsewhere ? ", and neither does " + beside.string() : "") +
-                    ": put it there, or give a sky (`--sky` of ptcshade, ptcrender or ptclight)");
+                    ": put it there, or give a sky to what shades the scene or lights it anew");
   }
   // Read it, and compare its digest with the recorded one.
   sky.map = std::make_shared<const Image>(read_image(is_there ? recorded : beside));

@@ -36,8 +36,8 @@ void check_sampling(const SamplingOptions& options);
 /// @throws RequestError when count is 0
 [[nodiscard]] double spacing_for(const Mesh& mesh, std::uint64_t count);
 
-/// Makes a stream of surfels that are spread evenly over a mesh and lit: radiance = emission +
-/// albedo / pi * irradiance.
+/// Makes a stream of surfels that are spread evenly over a mesh and lit: radiance =
+/// albedo / pi * irradiance of the lamps and emitters; what a surfel emits is kept apart.
 ///
 /// Each surfel stands for a compact patch of surface of about spacing^2. The patches are Voronoi
 /// cells whose middles are nearly regular, whatever the tessellation (see clusters.h). A surfel
