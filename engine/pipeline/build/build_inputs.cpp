@@ -232,6 +232,9 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
   const bool several = files + (meshes ? 1 : 0) + (has_scene ? 1 : 0) > 1;
   // Emitters light by rays what they were built with: other points would stay without their light
   const bool baked = clouds.text.contains(kEmittersKey) || (has_scene && lit_by_emitters(*scene));
+  // Radiance in other files is all the light that a point reflects, that of emitters included
+  const bool whole = !clouds.unlit && !clouds.has_container && !meshes;
+  const bool counted = whole && (has_scene ? lit_by_emitters(*scene) : clouds.emits);
   // Points that wait for the sky alone may stand beside others that were lit
   const bool scene_waits = has_scene && sky_is_gathered(*scene);
   const bool waiting = (has_clouds && clouds.unlit) || scene_waits,
@@ -239,13 +242,11 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
   const bool lamps =
       request.lights && !(request.lights->suns.empty() && request.lights->points.empty() &&
                           request.lights->spots.empty());
-  inputs.relight = (several && baked) || (several && inputs.emitters && !has_clouds) ||
+  inputs.relight = (several && baked && !counted) || (several && inputs.emitters && !has_clouds) ||
                    (waiting && lit) || (has_clouds && lamps && !scene);
   inputs.rays_at_emitters = inputs.emitters && request.sampling.lights.area_rays > 0 && !several;
   if (several) inputs.clouds.text.erase(kEmittersKey);
-  // In other files radiance is all the light that a point reflects, that of emitters included
-  if (clouds.emits && !clouds.unlit && !clouds.has_container && !meshes && !has_scene)
-    inputs.clouds.text[kEmittersKey] = "baked";
+  if (counted) inputs.clouds.text[kEmittersKey] = "baked";
 }
 
 BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
