@@ -326,6 +326,17 @@ void add_tolerate_damage(CLI::App& app, bool& tolerate) {
       ->group("Quality");
 }
 
+void add_light_groups(CLI::App& app, bool& groups, const std::string& where) {
+  app.add_flag("--light-groups", groups,
+               "Keep the light of each group of lights apart, in " + where +
+                   " light_NAME\n"
+                   "ptclight, ptcbuild and ptcrender name groups with --light-group; all other "
+                   "light is light_rest. The sum is all light, so that groups can be weighted and "
+                   "coloured anew without another run. A run takes as long as one run for each "
+                   "group.")
+      ->group("Lights");
+}
+
 void add_check_options(CLI::App& app, CheckRequest& check) {
   add_integer(app, "--check", check.receivers, 0, 10'000'000,
               "Number of receivers to compare with traced rays\n"

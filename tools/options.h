@@ -77,6 +77,9 @@ void add_estimate_option(CLI::App& app, bool& estimate);
 
 /// Declares --tolerate-damage.
 void add_tolerate_damage(CLI::App& app, bool& tolerate);
+/// Adds --light-groups.
+/// @param where  what each group gets: a channel or a layer
+void add_light_groups(CLI::App& app, bool& groups, const std::string& where);
 
 /// Declares --check N and --check-rays N.
 void add_check_options(CLI::App& app, CheckRequest& check);

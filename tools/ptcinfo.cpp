@@ -219,7 +219,7 @@ std::string counted(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-/// The lights of the record: "1 sun, 0 point lights, 0 spot lights, a sky".
+/// The lights of the record: "1 sun, 0 point lights, 0 spot lights, a sky; in groups: key rest".
 std::string lights_text(const ordered_json& record, bool emitters) {
   try {
     const ptc::LightRig rig = ptc::light_rig_from_json(record.get<std::string>());
@@ -231,7 +231,12 @@ std::string lights_text(const ordered_json& record, bool emitters) {
     } else {
       text += rig.sky.radiance == glm::vec3(0) ? ", no sky" : ", a sky";
     }
-    return text + (emitters ? ", and materials that emit" : "");
+    if (emitters) text += ", and materials that emit";
+    const std::vector<std::string> groups = ptc::light_groups(rig, emitters);
+    if (std::ranges::all_of(groups, &std::string::empty)) return text;
+    text += "; in groups:";
+    for (const std::string& group : groups) text += ' ' + (group.empty() ? ptc::kRestGroup : group);
+    return text;
   } catch (const ptc::DataError&) {
     return "the record cannot be read: " + quoted(record);
   }

@@ -76,6 +76,7 @@ int main(int argc, char** argv) {
       "The picture has latitudes and longitudes; its upper edge is up: +y, or what the scene "
       "says.");
   ptc::add_bounces(app, request.bounces)->group("Lights");
+  ptc::add_light_groups(app, request.light_groups, "a channel");
   ptc::Preset preset = ptc::Preset::none;
   ptc::add_preset(app, preset);
   ptc::add_surroundings(app, request.gather.around);

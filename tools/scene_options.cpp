@@ -159,6 +159,15 @@ void LightArguments::declare(CLI::App& app) {
       ->type_name("X,Y,...,LIGHT")
       ->group(kGroup);
   declare_sky(app);
+  app_ = &app;
+  add_repeated(
+      app, "--light-group", [this](const std::vector<std::string>& v) { set_groups(v); },
+      "Group of the lights that follow; repeatable\n"
+      "ptcshade and ptcrender keep the light of each group apart with --light-groups. The name is "
+      "1 "
+      "to 32 letters, digits and underscores.")
+      ->type_name("NAME")
+      ->group(kGroup);
 }
 
 void LightArguments::declare_sky(CLI::App& app) {
@@ -234,8 +243,40 @@ void LightArguments::set_spots(const std::vector<std::string>& values) {
   }
 }
 
+void LightArguments::set_groups(const std::vector<std::string>& values) {
+  groups_ = values;
+  for (const std::string& name : values) {
+    if (!is_group_name(name)) {
+      refuse("--light-group", name,
+             "1 to 32 letters, digits and underscores, and not rest, which is all other light");
+    }
+  }
+}
+
+void LightArguments::assign_groups(LightRig& rig) const {
+  if (groups_.empty()) return;
+  std::size_t group = 0, sun = 0, point = 0, spot = 0;
+  bool used = false;  // the group has a light
+  for (const CLI::Option* const option : app_->parse_order()) {
+    const std::string name = option->get_name();
+    const std::string of = group > 0 ? groups_[group - 1] : "";
+    if (name == "--light-group") {
+      if (group > 0 && !used) break;
+      ++group;
+      used = false;
+      continue;
+    }
+    if (name == "--sun") rig.suns[sun++].group = of;
+    if (name == "--point") rig.points[point++].group = of;
+    if (name == "--spot") rig.spots[spot++].group = of;
+    if (name == "--sky") rig.sky.group = of;
+    used |= name == "--sun" || name == "--point" || name == "--spot" || name == "--sky";
+  }
+  if (!used) refuse("--light-group", groups_[group - 1], "a light after the name of its group");
+}
+
 bool LightArguments::given() const noexcept {
-  return !suns_.empty() || !points_.empty() || !spots_.empty() || sky_given();
+  return !suns_.empty() || !points_.empty() || !spots_.empty() || !groups_.empty() || sky_given();
 }
 
 LightRig LightArguments::rig(const glm::vec3& up) const {
@@ -246,6 +287,7 @@ LightRig LightArguments::rig(const glm::vec3& up) const {
                         .irradiance = sun.irradiance * sun_colour_,
                         .angular_radius = static_cast<float>(glm::radians(sun_degrees_ / 2))});
   }
+  assign_groups(rig);
   return rig;
 }
 

@@ -18,13 +18,13 @@ namespace ptc {
 /// The values of --sun, --point, --spot, --sky and the options that modify them.
 class LightArguments {
  public:
-  /// Declares the options of suns, point lights, spot lights and the sky. This object must outlive
-  /// the parsing.
+  /// Declares the options of suns, point lights, spot lights and the sky, and of their groups. This
+  /// object must outlive the parsing, and `app` this object.
   void declare(CLI::App& app);
   /// Declares --sky and --sky-scale alone.
   void declare_sky(CLI::App& app);
 
-  /// True when any light was given.
+  /// True when any light, or a group, was given.
   [[nodiscard]] bool given() const noexcept;
   /// True when --sky was given.
   [[nodiscard]] bool sky_given() const noexcept { return !sky_.empty(); }
@@ -39,7 +39,11 @@ class LightArguments {
   void set_suns(const std::vector<std::string>& values);
   void set_points(const std::vector<std::string>& values);
   void set_spots(const std::vector<std::string>& values);
+  void set_groups(const std::vector<std::string>& values);
+  /// Gives each light the last group that was named before it.
+  void assign_groups(LightRig& rig) const;
 
+  const CLI::App* app_ = nullptr;
   struct SunPlace {
     double azimuth, elevation;  ///< degrees
     float irradiance;           ///< W/m^2
@@ -47,6 +51,7 @@ class LightArguments {
   std::vector<SunPlace> suns_;
   std::vector<PointLight> points_;
   std::vector<SpotLight> spots_;
+  std::vector<std::string> groups_;  ///< one for each --light-group
   glm::vec3 sun_colour_{1};
   double sun_degrees_ = 0.533;
   std::string sky_;

@@ -57,6 +57,28 @@ class Facts(ProgramTest):
         for vector in VECTORS.glob("good/*.ptcx"):
             self.assertIn("\n  bounds    ", self.succeed("ptcinfo", vector, "--memory", "1G").stdout)
 
+    def test_lights_take_the_group_that_was_named_before_them(self):
+        scene = self.here / "o.ptcx"
+        self.succeed("ptclight", self.scene, "--point", "0,3,0,1", "--light-group", "a", "--sun", "30,60", "--point", "0,4,0,1",
+                     "--light-group", "b_2", "--spot", "0,2,0,0,-1,0,40,0.2,1", "--sky", "0.5", "--sun", "60,30", "-o", scene)
+        lights = json.loads(json.loads(self.succeed("ptcinfo", scene, "--json").stdout)["text"]["lights"])
+        self.assertEqual([light.get("group") for light in lights["suns"]], ["a", "b_2"])
+        self.assertEqual([light.get("group") for light in lights["points"]], [None, "a"])
+        self.assertEqual([light.get("group") for light in lights["spots"] + [lights["sky"]]], ["b_2", "b_2"])
+        self.assertIn("a sky; in groups: a b_2 rest\n", self.succeed("ptcinfo", scene).stdout)
+        out = self.here / "o.ply"
+        self.succeed("ptcshade", scene, "--light-groups", "-o", out)
+        names, shaded = read_ply(out)
+        for axis in "rgb":
+            for point in (dict(zip(names, values)) for values in shaded):
+                together = sum(point[f"light_{group}_{axis}"] for group in ("a", "b_2", "rest"))
+                self.assertAlmostEqual(together, point[f"radiance_{axis}"] + point[f"indirect_{axis}"], delta=0.01)
+        for wrong, told in ((["--light-group", "a"], "expects a light after the name of its group, not 'a'"),
+                            (["--light-group", "a", "--light-group", "b", "--sun", "3,4"], "expects a light after the name of its group, not 'a'"),
+                            (["--sun", "3,4", "--light-group", "b"], "expects a light after the name of its group, not 'b'"),
+                            (["--light-group", "rest", "--sun", "3,4"], "and not rest")):
+            self.assertIn(told, self.fail_with(2, "ptclight", self.scene, *wrong, "-o", scene))
+
     def test_lights_are_recorded_in_watts_whatever_their_unit(self):
         scene = self.here / "o.ptcx"
 

@@ -28,6 +28,10 @@ LightRig random_rig(Random& random) {
     rig.spots.push_back({random.in_box(-1e9, 1e9), random.direction(), random_light(random),
                          outer * static_cast<float>(random.between(0, 1)), outer});
   }
+  rig.suns[1].group = "key";
+  rig.points[2].group = "Key_2";
+  rig.spots[0].group = "key";
+  rig.sky.group = std::string(32, 'z');
   rig.sky.radiance = random_light(random);
   rig.sky.up = random.direction();
   rig.sky.map_path =
@@ -57,13 +61,42 @@ TEST_CASE("light rig: a rig written as JSON is read back exactly", "[scene][ligh
       CHECK(back.spots[k].intensity == rig.spots[k].intensity);
       CHECK(back.spots[k].inner_angle == rig.spots[k].inner_angle);
       CHECK(back.spots[k].outer_angle == rig.spots[k].outer_angle);
+      CHECK(back.suns[k].group == rig.suns[k].group);
+      CHECK(back.points[k].group == rig.points[k].group);
+      CHECK(back.spots[k].group == rig.spots[k].group);
     }
     CHECK(back.sky.radiance == rig.sky.radiance);
     CHECK(back.sky.up == rig.sky.up);
+    CHECK(back.sky.group == rig.sky.group);
     CHECK(back.sky.map_path == rig.sky.map_path);
     CHECK(!back.sky.map);
     CHECK(to_json(back) == to_json(rig));
   }
+}
+
+TEST_CASE("light rig: groups are told apart, and one is left when the others are switched off",
+          "[scene][lights]") {
+  LightRig rig;
+  rig.suns = {{.group = "b"}, {.irradiance = glm::vec3(0), .group = "dark"}, {}};
+  rig.points = {{.group = "a"}};
+  rig.sky = {.radiance = glm::vec3(1), .group = "b"};
+  CHECK(light_groups(rig, false) == std::vector<std::string>{"b", "a", ""});
+  rig.suns.pop_back();
+  CHECK(light_groups(rig, false) == std::vector<std::string>{"b", "a"});
+  CHECK(light_groups(rig, true) == std::vector<std::string>{"b", "a", ""});
+  CHECK(light_groups({}, false).empty());
+  const LightRig b = only_group(rig, "b"), rest = only_group(rig, "");
+  CHECK(b.suns[0].irradiance == rig.suns[0].irradiance);
+  CHECK(b.points[0].intensity == glm::vec3(0));
+  CHECK(b.sky.radiance == glm::vec3(1));
+  CHECK(light_groups(b, false) == std::vector<std::string>{"b"});
+  CHECK(light_groups(rest, false).empty());
+  for (const char* name : {"", "rest", "a b", "a.b", "\xC3\xA4"}) CHECK_FALSE(is_group_name(name));
+  CHECK_FALSE(is_group_name(std::string(33, 'a')));
+  for (const std::string& name : {std::string("Rest"), std::string("_1"), std::string(32, 'a')})
+    CHECK(is_group_name(name));
+  CHECK_THROWS_AS(light_rig_from_json(R"({"sky": {"group": "a b"}})"), DataError);
+  CHECK_THROWS_AS(light_rig_from_json(R"({"suns": [{"group": 1}]})"), DataError);
 }
 
 TEST_CASE("light rig: an empty object is a rig without lights", "[scene][lights]") {

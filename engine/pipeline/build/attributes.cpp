@@ -147,7 +147,7 @@ void AttributePlan::set_no_value(std::size_t channel, std::uint64_t bits) {
 std::size_t AttributePlan::join(const Channel& channel, bool taken, const Input& input) {
   // Look for the same channel of an earlier input, then for a name that is free
   Channel wanted = channel;
-  const std::vector<Channel> added = shading_channels(true);
+  const std::vector<Channel> added = shading_channels({.estimates = true});
   for (unsigned number = 2;; ++number) {
     const bool reserved = std::ranges::find(added, wanted.name, &Channel::name) != added.end() &&
                           !(input.shaded && is_shading(wanted));

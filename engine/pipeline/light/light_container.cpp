@@ -71,15 +71,16 @@ class Rises {
 class LitPoints : public PointStream {
  public:
   /// @param sky  null: the sky is black
-  LitPoints(const ContainerReader& scene, DiscLight* lights, Shader* sky, float lift,
-            LightReport& report, Progress& progress)
+  LitPoints(const ContainerReader& scene, DiscLight* lights, Shader* sky,
+            const LightRequest& request, LightReport& report, Progress& progress)
       : frame_(scene.header().frame),
         all_(scene.superblock().points),
         points_(scene),
         rises_(scene),
         lights_(lights),
         sky_(sky),
-        lift_(lift),
+        lift_(request.lift),
+        emission_(request.emission),
         report_(report),
         progress_(progress),
         records_(kBatch),
@@ -126,6 +127,7 @@ class LitPoints : public PointStream {
     // Set what they reflect
     for (std::size_t i = 0; i < count_; ++i) {
       PointRecord& record = records_[i];
+      if (!emission_) record.emission = {};
       const glm::vec3 light = direct_[i] + (sky_ ? shading_[i].sky : glm::vec3(0));
       for (int c = 0; c < 3; ++c) {
         const float reflects = static_cast<float>(record.albedo[static_cast<std::size_t>(c)]) *
@@ -144,6 +146,7 @@ class LitPoints : public PointStream {
   DiscLight* lights_;
   Shader* sky_;
   float lift_;
+  bool emission_;
   LightReport& report_;
   Progress& progress_;
   std::vector<PointRecord> records_;
@@ -202,9 +205,10 @@ void check_scene(const ContainerReader& scene, const Meta& meta) {
 Uuid lit_uuid(const ContainerReader& scene, const LightRequest& request, const std::string& rig) {
   const GatherOptions& g = request.gather;
   std::string text(reinterpret_cast<const char*>(scene.header().uuid.data()), sizeof(Uuid));
-  text += fmt::format("lit {} {} {} {} {} {} {} {} {}", g.solid_angle, g.parallax, g.inflation,
+  text += fmt::format("lit {} {} {} {} {} {} {} {} {} {}", g.solid_angle, g.parallax, g.inflation,
                       g.resolution, static_cast<int>(g.sides), request.lift,
-                      request.light_sampling.sun_rays, request.light_sampling.area_rays, rig);
+                      request.light_sampling.sun_rays, request.light_sampling.area_rays,
+                      request.emission, rig);
   return uuid_of(std::as_bytes(std::span(text)));
 }
 
@@ -217,7 +221,8 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   const ContainerReader scene(request.scene);
   const LightRig rig =
       normalised(request.lights ? *request.lights : recorded_lights(scene, progress));
-  const bool emits = scene.superblock().points > 0 && scene.header().point_bytes != kPointBytes;
+  const bool emits = request.emission && scene.superblock().points > 0 &&
+                     scene.header().point_bytes != kPointBytes;
   const Meta planned = lit_meta(scene, rig, true);
   check_scene(scene, planned);
   if (planned.channels.size() < scene.meta().channels.size())
@@ -271,7 +276,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   {
     const Superblock& from = scene.superblock();
     const Stage stage(report.seconds, progress, "light", from.points, "points");
-    LitPoints points(scene, lights.get(), shader.get(), request.lift, report, progress);
+    LitPoints points(scene, lights.get(), shader.get(), request, report, progress);
     const std::unique_ptr<PointStream> rounded =
         is_rounded(like.profile) ? round_points(points, scene.header().frame.unit(), executor)
                                  : nullptr;

@@ -27,6 +27,7 @@ struct LightRequest : LightingRequest {
   /// Lights in place of those that lit the scene; empty: those that its container records.
   std::optional<LightRig> lights;
   LightSampling light_sampling;  ///< shadow rays of each surfel; sky_rays is not used
+  bool emission = true;          ///< false: the points of the target emit nothing
   /// The open file that the target may replace, as WriterOptions::source; null: that of the scene.
   const InputFile* replaces = nullptr;
 };

@@ -3,7 +3,9 @@
 // the errors of the samples have the same sign or not.
 #include "engine/pipeline/render/film.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "engine/io/image/image.h"
@@ -54,6 +56,20 @@ void Film::add(std::size_t pixel, const ErrorEstimate& estimate, float weight) {
   irradiance_error_[pixel] += weight * estimate.irradiance * estimate.irradiance;
 }
 
+void Film::add_group(const std::string& layer, const Film& group) {
+  const auto add = [](std::vector<glm::vec3>& to, const std::vector<glm::vec3>& light) {
+    std::ranges::transform(to, light, to.begin(), std::plus<>());
+  };
+  add(beauty_, group.beauty_);
+  add(direct_, group.direct_);
+  add(indirect_, group.indirect_);
+  bent_normal_ = group.bent_normal_;
+  albedo_ = group.albedo_;
+  occlusion_ = group.occlusion_;
+  alpha_ = group.alpha_;
+  groups_.emplace_back(layer, group.beauty_);
+}
+
 void Film::finish() {
   for (auto* layer : {&occlusion_error_, &irradiance_error_}) {
     for (float& value : *layer) value = std::sqrt(value);
@@ -83,6 +99,8 @@ void Film::write_exr(const std::filesystem::path& target) const {
     layers.push_back({"occlusion_error", Kind::scalar, true, occlusion_error_});
     layers.push_back({"irradiance_error", Kind::scalar, true, irradiance_error_});
   }
+  for (const auto& [name, light] : groups_)
+    layers.push_back({name, Kind::colour, false, flatten(light)});
   ptc::write_exr(target, width_, height_, layers);
 }
 

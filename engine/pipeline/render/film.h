@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -37,8 +38,13 @@ class Film {
   /// @param estimates      adds the layers occlusion_error and irradiance_error
   Film(unsigned width, unsigned height, bool estimates);
 
+  [[nodiscard]] unsigned width() const noexcept { return width_; }    ///< pixels
+  [[nodiscard]] unsigned height() const noexcept { return height_; }  ///< pixels
+
   /// Returns the bytes of memory that a pixel takes.
   [[nodiscard]] static std::uint64_t pixel_bytes(bool estimates) noexcept;
+  /// The bytes of memory that a pixel takes for each group of lights.
+  static constexpr std::uint64_t kGroupBytes = sizeof(glm::vec3);
 
   /// Adds a sample that meets a surface.
   /// @param pixel   y * width + x
@@ -52,6 +58,12 @@ class Film {
   void add_sky(std::size_t pixel, const glm::vec3& radiance, float weight) {
     beauty_[pixel] += weight * radiance;
   }
+
+  /// Adds a picture of what one group of lights brings. Its beauty becomes a layer, light adds up,
+  /// and what all groups have in common is kept.
+  /// @param layer  name of the group's layer
+  /// @pre same size, no estimates
+  void add_group(const std::string& layer, const Film& group);
 
   /// Completes the layers of estimates: mean squares become root mean squares. Nothing can be added
   /// afterwards.
@@ -69,6 +81,7 @@ class Film {
   unsigned width_, height_;
   std::vector<glm::vec3> beauty_, direct_, indirect_, bent_normal_, albedo_;
   std::vector<float> occlusion_, alpha_;
+  std::vector<std::pair<std::string, std::vector<glm::vec3>>> groups_;  ///< layers by name
   /// Mean squares until finish(), root mean squares afterwards; empty without estimates.
   std::vector<float> occlusion_error_, irradiance_error_;
 };

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -24,9 +25,11 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/light/built_scene.h"
+#include "engine/pipeline/light/group_scenes.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/shade/shading_channels.h"
 #include "engine/shade/lift.h"
 
 namespace ptc {
@@ -85,12 +88,21 @@ bool overlap(const Bounds& box, const Superblock& scene) {
   return true;
 }
 
+/// What a run renders when light is kept apart.
+struct Part {
+  bool emission = true;          ///< whether the meshes emit
+  std::uint64_t held_bytes = 0;  ///< for each pixel, of the pictures of other parts
+};
+
 /// Loads the meshes and finds the camera.
-void load_subject(Subject& subject, const RenderRequest& request, const ContainerReader& scene,
-                  Progress& progress) {
+void load_subject(Subject& subject, const RenderRequest& request, const Part& part,
+                  const ContainerReader& scene, Progress& progress) {
   std::vector<MeshCamera> cameras;
   subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, progress,
                              &cameras, "meshes");
+  if (!part.emission) {
+    for (Material& material : subject.mesh.materials) material.emission = glm::vec3(0);
+  }
   if (!subject.mesh.triangles.empty() && !overlap(subject.mesh.bounds(), scene.superblock())) {
     progress.note(
         "the meshes lie outside of the scene: is this the container that was built from them?");
@@ -137,11 +149,13 @@ void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
 }
 
 /// Returns a budget that is charged with everything that rendering takes besides the gather.
-MemoryBudget picture_budget(const RenderRequest& request, const Subject& subject) {
+MemoryBudget picture_budget(const RenderRequest& request, const Part& part,
+                            const Subject& subject) {
   MemoryBudget budget = budget_of(request.run.memory_bytes, "this picture");
   const std::uint64_t receiver = kReceiverBytes + (request.estimate ? kEstimateBytes : 0);
   budget.charge("a tile", std::uint64_t{kTileSide} * kTileSide * receiver);
-  budget.charge("the picture", subject.pixels() * Film::pixel_bytes(request.estimate));
+  budget.charge("the picture",
+                subject.pixels() * (Film::pixel_bytes(request.estimate) + part.held_bytes));
   if (subject.rays) {
     charge_mesh(budget, subject.mesh, subject.rays.get());
   } else {
@@ -298,8 +312,8 @@ void check_names(const RenderRequest& request, std::span<const PictureTarget> ta
 }
 
 /// @throws RequestError when there is no target, when the ending of one is neither .exr nor .png,
-///         when a layer is unknown, or when estimates have no .exr to go to
-void check_targets(std::span<const PictureTarget> targets, bool estimate) {
+///         when a layer is unknown, or when estimates or groups have no .exr to go to
+void check_targets(std::span<const PictureTarget> targets, bool estimate, bool groups) {
   if (targets.empty()) throw RequestError("targets", "no picture to write is named");
   bool exr = false;
   for (const PictureTarget& target : targets) {
@@ -313,6 +327,11 @@ void check_targets(std::span<const PictureTarget> targets, bool estimate) {
     }
     exr |= ending == ".exr";
   }
+  if (groups && !exr) {
+    throw RequestError("light_groups",
+                       "`light_groups` adds layers, which only an .exr has: name "
+                       "an .exr as output");
+  }
   if (estimate && !exr) {
     throw RequestError("estimate",
                        "`estimate` adds layers, which only an .exr has: name an .exr as output");
@@ -322,15 +341,17 @@ void check_targets(std::span<const PictureTarget> targets, bool estimate) {
 /// Checks what can be checked before any file is read.
 /// @throws RequestError
 void check_request(const RenderRequest& request, std::span<const PictureTarget> targets) {
-  check_targets(targets, request.estimate);
+  check_targets(targets, request.estimate, request.light_groups);
   if (request.lights) check_lights(*request.lights);
   if (request.camera) check_camera(*request.camera, "camera");
   static_cast<void>(side_of(request.samples));
 }
 
-/// Renders a picture of a container.
-LightingReport render_container(const RenderRequest& request,
-                                std::span<const PictureTarget> targets, Progress& progress) {
+/// Renders a container.
+/// @param done  gets the film when all samples are in it
+LightingReport render_part(const RenderRequest& request, std::span<const PictureTarget> targets,
+                           const Part& part, const std::function<void(Film&)>& done,
+                           Progress& progress) {
   // Open the scene and load what the camera sees
   LightingReport report;
   Subject subject{.side = side_of(request.samples)};
@@ -338,26 +359,25 @@ LightingReport render_container(const RenderRequest& request,
   const LightRig lights =
       request.lights ? *request.lights : recorded_lights(lighting.scene(), progress);
   check_names(request, targets, lights.sky.map_path);
-  load_subject(subject, request, lighting.scene(), progress);
+  load_subject(subject, request, part, lighting.scene(), progress);
   const bool sees_mesh = !subject.mesh.triangles.empty();
   if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
 
   // Divide the memory, shade earlier bounces, choose the settings
   const bool by_emitters = sees_mesh ? subject.rays_at_emitters : lit_by_emitters(lighting.scene());
-  lighting.prepare(picture_budget(request, subject), lights.sky, !by_emitters,
+  lighting.prepare(picture_budget(request, part, subject), lights.sky, !by_emitters,
                    std::min(request.samples, kMaxVariants), targets.front().path);
   if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
   Film film(subject.camera.width, subject.camera.height, request.estimate);
   lighting.tune([&] { return pilots_of(subject, lighting.executor()); });
 
-  // Render all samples into the film and write it
+  // Render all samples into the film
   {
     const Stage stage(report.seconds, progress, "render", subject.samples(), "samples");
     TileRenderer(subject, lights.sky, lighting, film).render_all(progress);
   }
   lighting.finish();  // frees the page cache, so that there is room for copies of the layers
-  film.finish();
-  film.write(targets, request.exposure);
+  done(film);
 
   // Compare some of the pixels with rays
   const unsigned area_rays = lit_by_emitters(lighting.scene()) ? 1 : 0;
@@ -368,6 +388,51 @@ LightingReport render_container(const RenderRequest& request,
                             .bounces = request.bounces,
                             .emission = !subject.rays_at_emitters}});
   return report;
+}
+
+/// Renders the light of each group of lights apart, into layers whose sum is the beauty.
+LightingReport render_groups(const RenderRequest& request, std::span<const PictureTarget> targets,
+                             Progress& progress) {
+  const ContainerReader scene(request.scene);
+  const LightRig rig = request.lights ? *request.lights : recorded_lights(scene, progress);
+  check_names(request, targets, rig.sky.map_path);
+  const bool emits = scene.header().point_bytes != kPointBytes;
+  const std::vector<std::string> groups = groups_of(request, rig, emits);
+  LightingReport report;
+  std::unique_ptr<Film> sum;
+  Progress silent;
+  for (const std::string& group : groups) {
+    const bool rest = group.empty();
+    RenderRequest one = request;
+    one.lights = only_group(rig, group);
+    const RelitScene lit(request, *one.lights, rest, targets.front().path, report.seconds, silent);
+    one.scene = lit.path();
+    const Part part{.emission = rest,
+                    .held_bytes = Film::pixel_bytes(false) + groups.size() * Film::kGroupBytes};
+    add_costs(report, render_part(
+                          one, targets, part,
+                          [&](Film& film) {
+                            if (!sum)
+                              sum = std::make_unique<Film>(film.width(), film.height(), false);
+                            sum->add_group(group_channel(group), film);
+                          },
+                          progress));
+  }
+  sum->write(targets, request.exposure);
+  return report;
+}
+
+/// Renders a picture of a container.
+LightingReport render_container(const RenderRequest& request,
+                                std::span<const PictureTarget> targets, Progress& progress) {
+  if (request.light_groups) return render_groups(request, targets, progress);
+  return render_part(
+      request, targets, {},
+      [&](Film& film) {
+        film.finish();
+        film.write(targets, request.exposure);
+      },
+      progress);
 }
 
 }  // namespace

@@ -51,6 +51,10 @@ struct RenderRequest : LightingRequest {
   /// Shadow rays of each sample at a mesh. Its emitters are asked where they lit the surfels, too;
   /// else the gather brings their light, and no ray is cast at them.
   LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
+  /// Keeps the light of each group of lights apart, in a layer for each of an .exr. The scene is
+  /// lit and rendered once for each; `error`, `estimate`, `check` and `tolerate_damage` keep their
+  /// defaults then.
+  bool light_groups = false;
   float exposure = 0;  ///< stops by which a .png of light is brightened
 };
 
@@ -66,6 +70,8 @@ struct RenderRequest : LightingRequest {
 ///   alpha              1   share of the samples that meet a surface
 ///   occlusion_error    1   only with LightingRequest::estimate
 ///   irradiance_error   1   only with LightingRequest::estimate, W / m^2
+///   light_NAME         3   only with `light_groups`: the beauty that is due to a group; the sum of
+///                          all is the beauty
 ///
 /// An .exr gets all layers, a .png one of them. Each layer is the mean over the samples of a pixel,
 /// except that the layers of estimates are root mean squares, which are upper bounds on the error

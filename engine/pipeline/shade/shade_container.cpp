@@ -29,6 +29,7 @@
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/shade/shaded_groups.h"
 #include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/pipeline/shade/shading_channels.h"
 #include "engine/pipeline/temporary_container.h"
@@ -278,7 +279,7 @@ void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, S
   while (const std::size_t count = cursor.next(surfels, &rows)) {
     lifting.place(std::span(surfels).first(count), rows, batch);
     const LitReceivers lit = lighting.shade(std::span(batch).first(count));
-    sink.write(std::span(surfels).first(count), rows, lit.shading, lit.estimates);
+    sink.write(std::span(surfels).first(count), rows, lit.shading, lit.estimates, {});
   }
 }
 
@@ -286,6 +287,13 @@ void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, S
 /// @param las_records  BuildReport::las_records of the scene; empty: what its container keeps
 LightingReport shade_points(const ShadeRequest& request, const std::filesystem::path& target,
                             const std::string& las_records, Progress& progress) {
+  if (request.light_groups) {
+    const auto one = [&](const ShadeRequest& group, const std::filesystem::path& path) {
+      return shade_points(group, path, "", progress);
+    };
+    return shade_groups(request, target, settings_text(request, request.gather) + " groups",
+                        las_records, one, progress);
+  }
   // Open the scene and the receivers
   LightingReport report;
   check_target(request, target);
@@ -293,7 +301,8 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   Lighting lighting(request, report, progress);
   const OpenReceivers receivers(request, target, lighting, progress);
   check_count(receivers, target);
-  check_shaded_sink(target, receivers.container, request.estimate);
+  const ShadedExtras extras{.estimates = request.estimate};
+  check_shaded_sink(target, receivers.container, extras);
   const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene(), progress).sky;
 
   // Divide the memory, shade earlier bounces, choose the settings
@@ -313,7 +322,7 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   if (!records.empty()) info.text[kLasRecordsKey] = records;
   note_changed_values(target, info, progress);
   const std::unique_ptr<ShadedSink> sink =
-      make_shaded_sink(target, receivers.container, info, request.estimate);
+      make_shaded_sink(target, receivers.container, info, extras);
   {
     const Stage stage(report.seconds, progress, "shade", receivers.points, "points");
     shade_all(receivers, request.lift, lighting, *sink);
@@ -334,7 +343,7 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
   if (!request.colour_from.empty()) {
     PointWriteInfo info =
         shaded_points(ContainerReader(request.scene), 0, "", request.colour_from, std::nullopt);
-    const std::vector<Channel> added = shading_channels(request.estimate);
+    const std::vector<Channel> added = shading_channels({.estimates = request.estimate});
     info.channels.insert(info.channels.end(), added.begin(), added.end());
     check_colour_from(output_format(target).value(), info);
   }

@@ -36,6 +36,9 @@ struct ShadeRequest : LightingRequest {
   /// The channel that viewers shall show as colour in a file of points; empty: the albedo
   /// (PointWriteInfo::colour_from).
   std::string colour_from;
+  /// Keeps the light of each group of lights apart, in a channel for each: `count` and `sky` keep
+  /// their defaults then, as do `error`, `estimate`, `check` and `tolerate_damage`.
+  bool light_groups = false;
   /// Sky that lights the receivers; empty: the sky that the scene was built with.
   std::optional<Sky> sky;
 };
@@ -50,6 +53,8 @@ struct ShadeRequest : LightingRequest {
 ///   indirect           3   albedo / pi * (irradiance + sky): the radiance that leaves
 ///   occlusion_error    1   estimated error, only with LightingRequest::estimate
 ///   irradiance_error   1   estimated error, W / m^2, only with LightingRequest::estimate
+///   light_NAME         3   only with `light_groups`: all radiance of a point that is due to a
+///   group
 ///
 /// A .ptcx is a copy of the receivers' container with these channels, stored as halves; channels of
 /// an earlier shading are replaced. A file of points, such as a .las or .ply, has the points with

@@ -1,7 +1,7 @@
 // Shaded points as columns of a PLY, or as attribute pages of a container.
 //
-// A container is copied page by page, without decoding, and gets one attribute page for each point
-// page. Its payload holds one column of halves for each component:
+// A container is copied page by page, without decoding, and gets an attribute page for each point
+// page, and more with groups of lights. Its payload holds one column of halves for each component:
 //
 //   copied pages, without meta page    | new attribute pages                    | meta page
 //   point and node pages, old channels | occlusion occlusion ... bent_normal.x bent_normal.x ...
@@ -19,7 +19,6 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/point_writer.h"
 #include "engine/pipeline/convert/point_files.h"
-#include "engine/pipeline/shade/shading_channels.h"
 #include "engine/store/commit.h"
 #include "engine/store/writer.h"
 #include "format/point_page.h"
@@ -28,44 +27,76 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kPlainFloats = 1 + 3 + 3 + 3 + 3;  // values of a point without estimates
-constexpr std::size_t kFloats = kPlainFloats + 2;        // and with both of them
+constexpr std::size_t kLightBytes = 3 * 2;  // of a group of lights in a container
 
-std::size_t floats_of(bool estimates) noexcept {
-  return estimates ? kFloats : kPlainFloats;
+std::size_t floats_of(const ShadedExtras& extras) {
+  std::size_t floats = 0;
+  for (const Channel& channel : shading_channels(extras)) floats += channel.components;
+  return floats;
 }
 
-using ShadedValues = std::array<float, kFloats>;
-
-/// Returns the values of a shaded surfel in the order of the channels. The radiance that leaves is
+/// Appends the values of shaded surfels, in the order of the channels. The radiance that leaves is
 /// albedo / pi times the irradiance.
-ShadedValues values_of(const Shading& s, const glm::vec3& albedo, const ErrorEstimate& estimate) {
-  const glm::vec3 out = albedo * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float>;
-  return {s.occlusion,
-          s.bent_normal.x,
-          s.bent_normal.y,
-          s.bent_normal.z,
-          s.irradiance.r,
-          s.irradiance.g,
-          s.irradiance.b,
-          s.sky.r,
-          s.sky.g,
-          s.sky.b,
-          out.r,
-          out.g,
-          out.b,
-          estimate.occlusion,
-          estimate.irradiance};
-}
+class ShadedValues {
+ public:
+  ShadedValues(std::span<const Surfel> surfels, std::span<const Shading> shading,
+               std::span<const ErrorEstimate> estimates, std::span<const glm::vec3> groups)
+      : surfels_(surfels),
+        shading_(shading),
+        estimates_(estimates),
+        groups_(groups),
+        group_count_(groups.size() / std::max<std::size_t>(1, surfels.size())) {}
+
+  void append(std::size_t i, std::vector<float>& to) const {
+    const Shading& s = shading_[i];
+    to.push_back(s.occlusion);
+    for (const glm::vec3& v :
+         {s.bent_normal, s.irradiance, s.sky,
+          surfels_[i].albedo * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float>})
+      to.insert(to.end(), {v.x, v.y, v.z});
+    if (!estimates_.empty()) {
+      to.push_back(estimates_[i].occlusion);
+      to.push_back(estimates_[i].irradiance);
+    }
+    for (std::size_t k = 0; k < group_count_; ++k) {
+      const glm::vec3& v = groups_[i * group_count_ + k];
+      to.insert(to.end(), {v.x, v.y, v.z});
+    }
+  }
+
+ private:
+  std::span<const Surfel> surfels_;
+  std::span<const Shading> shading_;
+  std::span<const ErrorEstimate> estimates_;
+  std::span<const glm::vec3> groups_;
+  std::size_t group_count_;
+};
 
 /// Returns the record of a container with the channels of its shading, in place of those of an
-/// earlier one.
-Meta shaded_meta(const ContainerReader& from, const std::string& settings, bool estimates) {
+/// earlier one. Groups of lights come last, as many in a group of channels as fit.
+Meta shaded_meta(const ContainerReader& from, const std::string& settings,
+                 const ShadedExtras& extras) {
   Meta meta = from.meta();
   std::erase_if(meta.channels,
                 [&](const Channel& c) { return holds_shading(from.meta().channels, c.group); });
-  const std::vector<Channel> added = shading_channels(estimates);
+  std::vector<Channel> added = shading_channels(extras);
+  const std::vector<Channel> lights(added.end() - static_cast<std::ptrdiff_t>(extras.groups.size()),
+                                    added.end());
+  added.resize(added.size() - lights.size());
   meta.channels.insert(meta.channels.begin(), added.begin(), added.end());
+  std::size_t left = 0;
+  for (Channel light : lights) {
+    unsigned group = meta.channels.back().group;
+    if (left < kLightBytes) {
+      ++group;
+      left = kPointBytes;
+    }
+    left -= kLightBytes;
+    if (group > kMaxGroup)
+      throw DataError(from.path().string() + ": its channels leave no room for groups of lights");
+    light.group = static_cast<std::uint8_t>(group);
+    meta.channels.push_back(std::move(light));
+  }
   meta.text["shading"] = settings;
   return meta;
 }
@@ -74,9 +105,9 @@ Meta shaded_meta(const ContainerReader& from, const std::string& settings, bool 
 class PointSink : public ShadedSink {
  public:
   PointSink(const std::filesystem::path& target, OutputFormat format, PointWriteInfo info,
-            bool estimates)
-      : floats_(floats_of(estimates)) {
-    for (Channel channel : shading_channels(estimates)) {
+            const ShadedExtras& extras)
+      : floats_(floats_of(extras)) {
+    for (Channel channel : shading_channels(extras)) {
       channel.type = ChannelType::f32;
       info.channels.push_back(std::move(channel));
     }
@@ -84,16 +115,18 @@ class PointSink : public ShadedSink {
   }
 
   void write(std::span<const Surfel> surfels, std::span<const std::byte> rows,
-             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates) override {
+             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates,
+             std::span<const glm::vec3> groups) override {
     const std::size_t row_bytes = rows.size() / surfels.size();
     const std::size_t added = floats_ * sizeof(float);
     joined_.resize(surfels.size() * (row_bytes + added));
     std::byte* to = joined_.data();
+    const ShadedValues values(surfels, shading, estimates, groups);
     for (std::size_t i = 0; i < surfels.size(); ++i) {
-      const ShadedValues v = values_of(shading[i], surfels[i].albedo,
-                                       estimates.empty() ? ErrorEstimate{} : estimates[i]);
+      values_.clear();
+      values.append(i, values_);
       to = std::copy_n(rows.data() + i * row_bytes, row_bytes, to);
-      std::memcpy(to, v.data(), added);
+      std::memcpy(to, values_.data(), added);
       to += added;
     }
     writer_->write(surfels, joined_);
@@ -103,33 +136,37 @@ class PointSink : public ShadedSink {
  private:
   std::size_t floats_;  // values that shading adds to a point
   std::unique_ptr<PointWriter> writer_;
+  std::vector<float> values_;      // of a point
   std::vector<std::byte> joined_;  // rows of a block
 };
 
-/// A copy of the receivers' container with one attribute page more for each point page. Channels of
-/// an earlier shading are left out.
+/// A copy of the receivers' container with an attribute page more for each point page, and one for
+/// each five groups of lights. Channels of an earlier shading are left out.
 class ContainerSink : public ShadedSink {
  public:
   ContainerSink(const std::filesystem::path& target, const ContainerReader& from,
-                const std::string& settings, bool estimates)
+                const std::string& settings, const ShadedExtras& extras)
       : from_(from),
-        floats_(floats_of(estimates)),
-        meta_(shaded_meta(from, settings, estimates)),
+        floats_(floats_of(extras)),
+        meta_(shaded_meta(from, settings, extras)),
         writer_(target, {.page_shift = from.header().page_shift,
                          .uuid = uuid_for(from, settings),
                          .frame = from.header().frame,
                          .point_bytes = from.header().point_bytes,
                          .source = &from.file()}) {
     assert(settings.size() <= kMaxSettingsBytes);
+    for (const Channel& channel : shading_channels(extras))
+      added_.push_back(*std::ranges::find(meta_.channels, channel.name, &Channel::name));
     copy_pages();
   }
 
   void write(std::span<const Surfel> surfels, std::span<const std::byte> /*rows*/,
-             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates) override {
+             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates,
+             std::span<const glm::vec3> groups) override {
+    const ShadedValues values(surfels, shading, estimates, groups);
     for (std::size_t i = 0; i < surfels.size(); ++i) {
-      values_.push_back(values_of(shading[i], surfels[i].albedo,
-                                  estimates.empty() ? ErrorEstimate{} : estimates[i]));
-      if (values_.size() == page_points()) flush();
+      values.append(i, values_);
+      if (values_.size() == page_points() * floats_) flush();
     }
   }
 
@@ -175,18 +212,25 @@ class ContainerSink : public ShadedSink {
     }
   }
 
-  /// Writes the collected values as one attribute page, column by column.
+  /// Writes the collected values as one attribute page for each group, column by column.
   void flush() {
-    const std::size_t count = values_.size();
-    std::vector<std::byte> payload(count * floats_ * 2);
-    for (std::size_t c = 0; c < floats_; ++c) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const std::uint16_t half = encode_half(values_[i][c]);
-        std::memcpy(payload.data() + 2 * (c * count + i), &half, 2);
+    const std::size_t count = values_.size() / floats_;
+    std::size_t first = 0;  // value of the first channel
+    for (std::size_t begin = 0, end = 0; begin < added_.size(); begin = end) {
+      std::size_t floats = 0;
+      for (; end < added_.size() && added_[end].group == added_[begin].group; ++end)
+        floats += added_[end].components;
+      std::vector<std::byte> payload(count * floats * 2);
+      for (std::size_t c = 0; c < floats; ++c) {
+        for (std::size_t i = 0; i < count; ++i) {
+          const std::uint16_t half = encode_half(values_[i * floats_ + first + c]);
+          std::memcpy(payload.data() + 2 * (c * count + i), &half, 2);
+        }
       }
+      writer_.write_attributes(added_[begin].group, payload, static_cast<std::uint32_t>(count),
+                               meta_.channels);
+      first += floats;
     }
-    writer_.write_attributes(kShadingGroup, payload, static_cast<std::uint32_t>(count),
-                             meta_.channels);
     written_ += count;
     values_.clear();
   }
@@ -194,8 +238,9 @@ class ContainerSink : public ShadedSink {
   const ContainerReader& from_;
   std::size_t floats_;  // values of one point
   Meta meta_;
+  std::vector<Channel> added_;  // of meta_, what shading adds
   ContainerWriter writer_;
-  std::vector<ShadedValues> values_;
+  std::vector<float> values_;  // of the points of a page, point after point
   std::uint64_t written_ = 0;
 };
 
@@ -213,16 +258,18 @@ PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t poi
   return info;
 }
 
-std::uint64_t sink_bytes(const std::filesystem::path& target,
-                         const ContainerReader& receivers) noexcept {
+std::uint64_t sink_bytes(const std::filesystem::path& target, const ContainerReader& receivers,
+                         std::size_t groups) noexcept {
   if (output_format(target)) return 0;
-  // There is at most one attribute page for each page
-  return ContainerWriter::memory_bytes(2 * std::uint64_t{receivers.page_count()},
-                                       receivers.header().page_shift, 1);
+  // There is at most one attribute page of each group of channels for each page
+  return ContainerWriter::memory_bytes(
+      (2 + (groups + kPointBytes / kLightBytes - 1) / (kPointBytes / kLightBytes)) *
+          std::uint64_t{receivers.page_count()},
+      receivers.header().page_shift, 1);
 }
 
 void check_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
-                       bool estimates) {
+                       const ShadedExtras& extras) {
   if (output_format(target)) return;
   at_offset(receivers.file(), 0, [&] { check_copyable(receivers.header()); });
   const std::string file = receivers.path().string();
@@ -231,7 +278,7 @@ void check_shaded_sink(const std::filesystem::path& target, const ContainerReade
                     ": a scene of parts cannot be written with its shading: make it one file first "
                     "with ptcconvert, or name a .ply as output");
   }
-  for (const Channel& added : shading_channels(estimates)) {
+  for (const Channel& added : shading_channels(extras)) {
     const auto clashes = [&](const Channel& c) {
       return c.name == added.name && !holds_shading(receivers.meta().channels, c.group);
     };
@@ -241,8 +288,7 @@ void check_shaded_sink(const std::filesystem::path& target, const ContainerReade
   }
   const std::string settings(kMaxSettingsBytes, ' ');
   const std::size_t bytes =
-      encode_meta(shaded_meta(receivers, settings, estimates), receivers.header().point_bytes)
-          .size();
+      encode_meta(shaded_meta(receivers, settings, extras), receivers.header().point_bytes).size();
   const std::size_t most = payload_limit(receivers.header().page_shift);
   if (bytes <= most) return;
   throw DataError(fmt::format(
@@ -254,10 +300,11 @@ void check_shaded_sink(const std::filesystem::path& target, const ContainerReade
 
 std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
                                              const ContainerReader& receivers,
-                                             const PointWriteInfo& info, bool estimates) {
+                                             const PointWriteInfo& info,
+                                             const ShadedExtras& extras) {
   if (const auto format = output_format(target))
-    return std::make_unique<PointSink>(target, *format, info, estimates);
-  return std::make_unique<ContainerSink>(target, receivers, info.text.at("shading"), estimates);
+    return std::make_unique<PointSink>(target, *format, info, extras);
+  return std::make_unique<ContainerSink>(target, receivers, info.text.at("shading"), extras);
 }
 
 }  // namespace ptc

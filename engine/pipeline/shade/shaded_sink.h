@@ -13,6 +13,7 @@
 #include "engine/base/surfel.h"
 #include "engine/io/cloud/point_writer.h"
 #include "engine/pipeline/quality/estimate.h"
+#include "engine/pipeline/shade/shading_channels.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
 
@@ -31,10 +32,12 @@ class ShadedSink {
   ///                   points
   /// @param shading    one result for each surfel
   /// @param estimates  one for each surfel; empty when the sink was made without estimates
+  /// @param groups     radiance of each surfel in each group of lights, surfel after surfel; empty
+  ///                   when the sink was made without groups
   /// @throws std::system_error
   virtual void write(std::span<const Surfel> surfels, std::span<const std::byte> rows,
-                     std::span<const Shading> shading,
-                     std::span<const ErrorEstimate> estimates) = 0;
+                     std::span<const Shading> shading, std::span<const ErrorEstimate> estimates,
+                     std::span<const glm::vec3> groups) = 0;
   /// Completes and publishes the file. @throws std::system_error
   virtual void finish() = 0;
 };
@@ -52,27 +55,29 @@ class ShadedSink {
 
 /// Checks that the points of a container can be shaded into a target: a copy of the container has
 /// room for the names and the record of the shading. It is called before work begins.
-/// @param estimates  points come with estimated errors
+/// @param extras  what comes with the light of the points
 /// @throws DataError when a channel of the receivers has the name of one that shading adds, or the
 ///         record does not fit a page of the receivers
 void check_shaded_sink(const std::filesystem::path& target, const ContainerReader& receivers,
-                       bool estimates);
+                       const ShadedExtras& extras);
 
 /// Makes a sink for a file of points or a .ptcx, by the ending of the target.
 /// @param receivers  container of the points that are shaded; a .ptcx copies its pages, so it must
 ///                   outlive the sink
 /// @param info       from shaded_points()
-/// @param estimates  points come with estimated errors
+/// @param extras     what comes with the light of the points
 /// @pre check_shaded_sink()
 /// @throws RequestError when the format cannot hold the points; std::system_error
 [[nodiscard]] std::unique_ptr<ShadedSink> make_shaded_sink(const std::filesystem::path& target,
                                                            const ContainerReader& receivers,
                                                            const PointWriteInfo& info,
-                                                           bool estimates);
+                                                           const ShadedExtras& extras);
 
 /// Returns the bytes of memory that a sink needs for the pages and the directory of a .ptcx; 0 for
 /// a file of points.
+/// @param groups  number of groups of lights
 [[nodiscard]] std::uint64_t sink_bytes(const std::filesystem::path& target,
-                                       const ContainerReader& receivers) noexcept;
+                                       const ContainerReader& receivers,
+                                       std::size_t groups = 0) noexcept;
 
 }  // namespace ptc

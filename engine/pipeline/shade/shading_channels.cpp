@@ -3,19 +3,24 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "engine/io/cloud/point_rows.h"
+#include "engine/scene/light/lights.h"
 
 namespace ptc {
 namespace {
+
+/// What the names of groups' channels begin with.
+constexpr std::string_view kGroupPrefix = "light_";
 
 Channel number(const char* name, const char* unit) {
   return {.name = name, .unit = unit};
 }
 
-Channel colour(const char* name, const char* unit) {
-  return {.name = name,
+Channel colour(std::string name, const char* unit) {
+  return {.name = std::move(name),
           .components = 3,
           .role = ChannelRole::colour,
           .colour_space = ColourSpace::rec709,
@@ -46,27 +51,36 @@ bool join_columns(const Channel& added, std::size_t first, std::vector<Channel>&
 
 }  // namespace
 
-std::vector<Channel> shading_channels(bool estimates) {
+std::string group_channel(const std::string& group) {
+  return std::string(kGroupPrefix) + (group.empty() ? kRestGroup : group);
+}
+
+std::vector<Channel> shading_channels(const ShadedExtras& extras) {
   std::vector<Channel> channels{
       number("occlusion", "1"),
       {.name = "bent_normal", .components = 3, .role = ChannelRole::direction, .unit = "1"},
       colour("irradiance", "W/m^2"),
       colour("sky", "W/m^2"),
       colour("indirect", "W/(m^2 sr)")};
-  if (!estimates) return channels;
-  channels.push_back(number("occlusion_error", "1"));
-  channels.push_back(number("irradiance_error", "W/m^2"));
+  if (extras.estimates) {
+    channels.push_back(number("occlusion_error", "1"));
+    channels.push_back(number("irradiance_error", "W/m^2"));
+  }
+  for (const std::string& group : extras.groups)
+    channels.push_back(colour(group_channel(group), "W/(m^2 sr)"));
   return channels;
 }
 
 bool is_shading(const Channel& channel) {
-  return std::ranges::any_of(shading_channels(true), [&](const Channel& added) {
+  if (channel.name.starts_with(kGroupPrefix))
+    return channel.components == 3 && channel.role == ChannelRole::colour;
+  return std::ranges::any_of(shading_channels({.estimates = true}), [&](const Channel& added) {
     return channel.name == added.name && channel.components == added.components;
   });
 }
 
 bool have_shading(std::span<const Channel> channels) {
-  return std::ranges::all_of(shading_channels(false), [&](const Channel& added) {
+  return std::ranges::all_of(shading_channels({}), [&](const Channel& added) {
     const auto found = std::ranges::find(channels, added.name, &Channel::name);
     return found != channels.end() && is_shading(*found);
   });
@@ -74,7 +88,7 @@ bool have_shading(std::span<const Channel> channels) {
 
 std::vector<Channel> join_shading(std::vector<Channel> channels) {
   std::vector<Channel> joined = channels;
-  const std::vector<Channel> added = shading_channels(true);
+  const std::vector<Channel> added = shading_channels({.estimates = true});
   const auto starts = [&](const Channel& channel) { return channel.name == added[0].name; };
   auto at = static_cast<std::size_t>(std::ranges::find_if(joined, starts) - joined.begin());
   for (const Channel& channel : added) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "format/schema.h"
@@ -12,8 +13,19 @@ namespace ptc {
 /// The group of the channels that shading adds.
 inline constexpr std::uint8_t kShadingGroup = 1;
 
-/// Returns the channels that shading adds to a point, all of kShadingGroup and of type half.
-[[nodiscard]] std::vector<Channel> shading_channels(bool estimates);
+/// What a shading adds to a point besides its light.
+struct ShadedExtras {
+  bool estimates = false;           ///< estimated errors
+  std::vector<std::string> groups;  ///< names of groups of lights; empty: the rest
+};
+
+/// Returns the name of the channel or layer of a group of lights.
+/// @param group  empty: the rest
+[[nodiscard]] std::string group_channel(const std::string& group);
+
+/// Returns the channels that shading adds to a point, of type half: those of kShadingGroup, then
+/// one for each group of lights, whose groups of channels the container chooses.
+[[nodiscard]] std::vector<Channel> shading_channels(const ShadedExtras& extras);
 
 /// Says whether a channel has the name and the components of one that shading adds.
 [[nodiscard]] bool is_shading(const Channel& channel);

@@ -54,12 +54,25 @@ void make_unit(glm::vec3& direction, const char* name, const JsonFields& fields)
   if (std::abs(length - 1) > 1e-5) direction = glm::vec3(wide / length);
 }
 
+// Reads the name of a light's group. @throws DataError when it is none
+void read_group(JsonFields& fields, std::string& group) {
+  fields.read("group", group);
+  if (!group.empty() && !is_group_name(group)) fields.fail("group is not the name of a group");
+}
+
+// Adds the name of a light's group, if it has one.
+Json with_group(Json light, const std::string& group) {
+  if (!group.empty()) light["group"] = group;
+  return light;
+}
+
 Sun read_sun(const Json& json, const std::string& where) {
   JsonFields fields(json, where);
   Sun sun;
   fields.read("to_sun", sun.to_sun, kFinite);
   fields.read("irradiance", sun.irradiance, kLight);
   fields.read("angular_radius", sun.angular_radius, kAngle);
+  read_group(fields, sun.group);
   fields.finish();
   make_unit(sun.to_sun, "to_sun", fields);
   return sun;
@@ -70,6 +83,7 @@ PointLight read_point(const Json& json, const std::string& where) {
   PointLight point;
   fields.read("position", point.position, kPlace);
   fields.read("intensity", point.intensity, kLight);
+  read_group(fields, point.group);
   fields.finish();
   return point;
 }
@@ -82,6 +96,7 @@ SpotLight read_spot(const Json& json, const std::string& where) {
   fields.read("intensity", spot.intensity, kLight);
   fields.read("inner_angle", spot.inner_angle, kAngle);
   fields.read("outer_angle", spot.outer_angle, kAngle);
+  read_group(fields, spot.group);
   fields.finish();
   make_unit(spot.direction, "direction", fields);
   if (spot.outer_angle == 0) fields.fail("outer_angle must be above 0");
@@ -114,6 +129,7 @@ Sky read_sky(const Json& json, const std::string& where) {
   fields.read("map_xxh3", digest);
   if (!digest.empty()) sky.map_xxh3 = parse_digest(digest, fields);
   fields.read("up", sky.up, kFinite);
+  read_group(fields, sky.group);
   fields.finish();
   make_unit(sky.up, "up", fields);
   return sky;
@@ -137,25 +153,30 @@ std::string to_json(const LightRig& rig) {
   // Write the suns, the point lights and the spot lights.
   Json suns = Json::array();
   for (const Sun& sun : rig.suns) {
-    suns.push_back({{"to_sun", to_json_array(sun.to_sun)},
-                    {"irradiance", to_json_array(sun.irradiance)},
-                    {"angular_radius", sun.angular_radius}});
+    suns.push_back(with_group({{"to_sun", to_json_array(sun.to_sun)},
+                               {"irradiance", to_json_array(sun.irradiance)},
+                               {"angular_radius", sun.angular_radius}},
+                              sun.group));
   }
   Json points = Json::array();
   for (const PointLight& point : rig.points) {
-    points.push_back({{"position", to_json_array(point.position)},
-                      {"intensity", to_json_array(point.intensity)}});
+    points.push_back(with_group({{"position", to_json_array(point.position)},
+                                 {"intensity", to_json_array(point.intensity)}},
+                                point.group));
   }
   Json spots = Json::array();
   for (const SpotLight& spot : rig.spots) {
-    spots.push_back({{"position", to_json_array(spot.position)},
-                     {"direction", to_json_array(spot.direction)},
-                     {"intensity", to_json_array(spot.intensity)},
-                     {"inner_angle", spot.inner_angle},
-                     {"outer_angle", spot.outer_angle}});
+    spots.push_back(with_group({{"position", to_json_array(spot.position)},
+                                {"direction", to_json_array(spot.direction)},
+                                {"intensity", to_json_array(spot.intensity)},
+                                {"inner_angle", spot.inner_angle},
+                                {"outer_angle", spot.outer_angle}},
+                               spot.group));
   }
   // Write the sky, its map by path and digest.
-  Json sky{{"radiance", to_json_array(rig.sky.radiance)}, {"up", to_json_array(rig.sky.up)}};
+  Json sky =
+      with_group({{"radiance", to_json_array(rig.sky.radiance)}, {"up", to_json_array(rig.sky.up)}},
+                 rig.sky.group);
   if (!is_utf8(rig.sky.map_path)) {
     throw RequestError("lights",
                        "the name of the sky's picture is not UTF-8, so the lights cannot be "

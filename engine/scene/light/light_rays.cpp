@@ -31,7 +31,12 @@ LightRays::LightRays(LightRig rig, std::vector<Emitter> emitters, const glm::dve
     : rig_(std::move(rig)), area_(std::move(emitters)), origin_(origin), closest_(closest) {}
 
 bool LightRays::empty() const noexcept {
-  return rig_.suns.empty() && rig_.points.empty() && rig_.spots.empty() && area_.empty();
+  const glm::vec3 dark(0);
+  return area_.empty() &&
+         std::ranges::all_of(rig_.suns, [&](const Sun& s) { return s.irradiance == dark; }) &&
+         std::ranges::all_of(rig_.points,
+                             [&](const PointLight& p) { return p.intensity == dark; }) &&
+         std::ranges::all_of(rig_.spots, [&](const SpotLight& s) { return s.intensity == dark; });
 }
 
 // The disc of the sun has one radiance, so directions are drawn with a density in proportion to the
@@ -41,7 +46,8 @@ bool LightRays::empty() const noexcept {
 void LightRays::add_sun(const Sun& sun, const glm::vec3& normal, const SquarePoints& points,
                         unsigned rays, std::uint32_t turn, std::vector<LightRay>& out) const {
   const float widest = std::sin(std::min(sun.angular_radius, 0.5f * kPi));
-  if (rays == 0 || glm::dot(normal, sun.to_sun) <= -widest) return;
+  if (rays == 0 || sun.irradiance == glm::vec3(0)) return;
+  if (glm::dot(normal, sun.to_sun) <= -widest) return;
   if (widest == 0) rays = 1;
   const Basis frame(sun.to_sun);
   for (std::uint32_t i = 0; i < rays; ++i) {
@@ -60,7 +66,7 @@ void LightRays::add_point(const PointLight& point, const glm::dvec3& position,
                           const glm::vec3& normal, std::vector<LightRay>& out) const {
   const glm::dvec3 offset = point.position - position;
   const double distance = glm::length(offset);
-  if (!(distance > closest_)) return;
+  if (!(distance > closest_) || point.intensity == glm::vec3(0)) return;
   const double cosine = glm::dot(glm::dvec3(normal), offset) / distance;
   if (cosine <= 0) return;
   out.push_back(

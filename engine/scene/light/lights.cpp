@@ -1,5 +1,6 @@
 #include "engine/scene/light/lights.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <glm/common.hpp>
@@ -62,6 +63,40 @@ double spot_share(const SpotLight& spot, const glm::dvec3& place) noexcept {
   return linear * linear;
 }
 
+bool is_group_name(std::string_view text) noexcept {
+  constexpr std::string_view kLetters =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
+  return !text.empty() && text.size() <= 32 && text != kRestGroup &&
+         text.find_first_not_of(kLetters) == std::string_view::npos;
+}
+
+std::vector<std::string> light_groups(const LightRig& rig, bool emitters) {
+  std::vector<std::string> groups;
+  bool rest = emitters;
+  const auto add = [&](const glm::vec3& light, const std::string& group) {
+    if (light == glm::vec3(0)) return;
+    rest |= group.empty();
+    if (!group.empty() && std::ranges::find(groups, group) == groups.end()) groups.push_back(group);
+  };
+  for (const Sun& sun : rig.suns) add(sun.irradiance, sun.group);
+  for (const PointLight& point : rig.points) add(point.intensity, point.group);
+  for (const SpotLight& spot : rig.spots) add(spot.intensity, spot.group);
+  add(rig.sky.radiance, rig.sky.group);
+  if (rest) groups.emplace_back();
+  return groups;
+}
+
+LightRig only_group(LightRig rig, const std::string& group) {
+  const auto keep = [&](glm::vec3& light, const std::string& of) {
+    if (of != group) light = glm::vec3(0);
+  };
+  for (Sun& sun : rig.suns) keep(sun.irradiance, sun.group);
+  for (PointLight& point : rig.points) keep(point.intensity, point.group);
+  for (SpotLight& spot : rig.spots) keep(spot.intensity, spot.group);
+  keep(rig.sky.radiance, rig.sky.group);
+  return rig;
+}
+
 void check_sky(const Sky& sky, const char* field) {
   require_request(has_direction(sky.up), field,
                   "the upward direction of the sky is zero or not finite");
@@ -75,6 +110,15 @@ void check_sky(const Sky& sky, const char* field) {
 
 void check_lights(const LightRig& rig) {
   constexpr char kField[] = "lights";
+  const auto check_group = [&](const std::string& group) {
+    require_request(group.empty() || is_group_name(group), kField,
+                    "the name of a light's group is not 1 to 32 letters, digits and underscores, "
+                    "or is that of the rest");
+  };
+  for (const Sun& sun : rig.suns) check_group(sun.group);
+  for (const PointLight& point : rig.points) check_group(point.group);
+  for (const SpotLight& spot : rig.spots) check_group(spot.group);
+  check_group(rig.sky.group);
   for (const Sun& sun : rig.suns) {
     require_request(has_direction(sun.to_sun), kField,
                     "the direction of a sun is zero or not finite");

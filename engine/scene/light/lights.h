@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -19,6 +20,7 @@ struct Sun {
   glm::vec3 to_sun{0, 1, 0};        ///< unit, from the scene towards the middle of the sun
   glm::vec3 irradiance{3};          ///< on a surface that faces the sun, W/m^2
   float angular_radius = 0.00465f;  ///< radians, at most pi / 2; 0 gives sharp shadows
+  std::string group;                ///< of LightRig
 };
 
 /// Returns the unit direction towards a sun.
@@ -39,6 +41,7 @@ inline constexpr double kMaxLightDistance = 1e150;
 struct PointLight {
   glm::dvec3 position{0};  ///< scene units, each coordinate at most kMaxLightDistance
   glm::vec3 intensity{1};  ///< W/sr
+  std::string group;       ///< of LightRig
 };
 
 /// A lamp without extent that shines into a cone (spec/shading.md#spots).
@@ -48,6 +51,7 @@ struct SpotLight {
   glm::vec3 intensity{1};          ///< within the inner cone, W/sr
   float inner_angle = 0;           ///< radians, from the axis; at most `outer_angle`
   float outer_angle = 0.7853982f;  ///< radians, from the axis; above 0, at most pi / 2
+  std::string group;               ///< of LightRig
 };
 
 /// Returns the share of a spot light's intensity that goes towards a place: 1 within the inner
@@ -77,6 +81,7 @@ struct Sky {
   std::string map_path;
   std::uint64_t map_xxh3 = 0;  ///< image_xxh3() of the map when it was recorded; 0: unknown
   glm::vec3 up{0, 1, 0};       ///< unit; the direction of the map's upper border
+  std::string group;           ///< of LightRig
 
   /// Returns the radiance that arrives from a direction, W/(m^2 sr).
   /// @param direction  unit, away from the surface
@@ -88,12 +93,31 @@ struct Sky {
 [[nodiscard]] std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky);
 
 /// All lights of a scene except its area lights, which are the emissive triangles of its mesh.
+///
+/// Lights may be in groups, whose light is kept apart (spec/shading.md#light-groups): each names
+/// its own, and an empty name stands for the group of the rest.
 struct LightRig {
   std::vector<Sun> suns;           ///< any number
   std::vector<PointLight> points;  ///< any number
   std::vector<SpotLight> spots;    ///< any number
   Sky sky;
 };
+
+/// The name that the group of the rest has in channels and layers.
+inline constexpr const char* kRestGroup = "rest";
+
+/// Says whether a text can name a group: 1 to 32 letters, digits and underscores, but not the name
+/// of the rest.
+[[nodiscard]] bool is_group_name(std::string_view text) noexcept;
+
+/// Returns the groups of the lights that shine, in the order of their first lights; the empty name
+/// of the rest is last.
+/// @param emitters  whether surfaces emit, which belongs to the rest
+[[nodiscard]] std::vector<std::string> light_groups(const LightRig& rig, bool emitters);
+
+/// Returns the rig with the lights of all other groups switched off. They keep their places, so
+/// that each light takes the same sample points with others and without.
+[[nodiscard]] LightRig only_group(LightRig rig, const std::string& group);
 
 /// Checks the numbers of a sky.
 /// @param field  the member of the request that holds the sky, for the error
@@ -121,6 +145,7 @@ void check_lights(const LightRig& rig);
 ///  "spots": [{"position": [x, y, z], "direction": [x, y, z], "intensity": [r, g, b],
 ///             "inner_angle": a, "outer_angle": a}, ...],
 ///  "sky": {"radiance": [r, g, b], "map": "path", "map_xxh3": "16 hex digits", "up": [x, y, z]}}
+/// A light of a group has a member "group" with its name.
 /// A rig without spot lights has no member "spots", so that versions of PTCX that do not know them
 /// read it. A sky with a map gets the digest of that map, not Sky::map_xxh3.
 /// @throws RequestError when a number is not finite or the path is not UTF-8

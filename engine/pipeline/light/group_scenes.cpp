@@ -1,0 +1,55 @@
+#include "engine/pipeline/light/group_scenes.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/pipeline/temporary_container.h"
+
+namespace ptc {
+
+std::vector<std::string> groups_of(const LightingRequest& request, const LightRig& rig,
+                                   bool emits) {
+  const auto excludes = [](bool given, const char* field) {
+    if (!given) return;
+    throw RequestError(field, fmt::format("`light_groups` excludes `{}`: ask for it in a run "
+                                          "without groups",
+                                          field));
+  };
+  excludes(request.error.has_value(), "error");
+  excludes(request.estimate, "estimate");
+  excludes(request.check.receivers > 0, "check");
+  excludes(request.tolerate_damage, "tolerate_damage");
+  std::vector<std::string> groups = light_groups(rig, emits);
+  require_request(std::ranges::any_of(groups, [](const std::string& g) { return !g.empty(); }),
+                  "light_groups",
+                  "no light of the scene is in a group: name groups where the lights are given");
+  return groups;
+}
+
+RelitScene::RelitScene(const LightingRequest& request, const LightRig& rig, bool emission,
+                       const std::filesystem::path& target, StageSeconds& seconds,
+                       Progress& progress)
+    : path_(temporary_container_path(roomiest_temp_dir(request.run, target))), name_(path_) {
+  LightRequest lighting{{.scene = request.scene,
+                         .lift = request.lift,
+                         .back_end = request.back_end,
+                         .run = request.run}};
+  lighting.lights = rig;
+  lighting.emission = emission;
+  const LightReport report = light_container(lighting, path_, progress);
+  seconds.insert(seconds.end(), report.seconds.begin(), report.seconds.end());
+}
+
+void add_costs(LightingReport& report, const LightingReport& group) {
+  report.receivers = group.receivers;
+  report.bounces = group.bounces;
+  report.shade_cpu_seconds += group.shade_cpu_seconds;
+  report.bounce_cpu_seconds += group.bounce_cpu_seconds;
+  report.gather.add(group.gather);
+  report.cache = group.cache;
+  report.seconds.insert(report.seconds.end(), group.seconds.begin(), group.seconds.end());
+}
+
+}  // namespace ptc
