@@ -88,6 +88,7 @@ measure instructions instructions -- --points 10k --receivers 4096 --checked 10 
 measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
 measure mutations mutations -- --every 10007
+measure relight relight fractal window city "$mesh+backdrop" -- fractal --points 4k --checked 50 "${once[@]}"
 measure remote remote -- --points 20k
 measure scale scale --points 2M --points 6M --points 20M --memory 1G -- --points 20k --points 40k --receivers 100 "${once[@]}"
 measure scale-1700m scale --points 20M --points 200M --points 1700M --repeats 1 --memory 2G -- \

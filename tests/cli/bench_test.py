@@ -164,6 +164,21 @@ class Bench(ProgramTest):
         self.assertLess(rows[0]["holes"], 0.01)
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["specks.csv", "specks.json"])
 
+    def test_new_light_is_compared_with_the_mesh(self):
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "relight", "fractal", "--quick", "-o", charts)
+        rows = json.loads((charts / "relight.json").read_text())["rows"]
+        sun = [("ptclight", f"{n} rays") for n in (4, 16, 64)] + [("embree-mesh", f"{n} rays") for n in (4, 16, 64)]
+        sky = [("ptclight", "0.06 sr, 0.3 rad, R 32"), ("ptclight", "default")] + sun[3:]
+        self.assertEqual([(r["light"], r["method"], r["setting"]) for r in rows],
+                         [(light, *method) for light, methods in (("sun", sun), ("sun of 11 degrees", sun), ("sky", sky))
+                          for method in methods])
+        for row in rows:
+            self.assertEqual(row["scene"], "fractal")
+            self.assertLess(abs(row["mean"]), 0.05)
+            self.assertLess(row["rms"], 0.4 if row["light"] == "sun" else 0.3)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["relight.csv", "relight.json", "relight.png", "relight.svg"])
+
     def test_points_are_written_and_read_in_every_format(self):
         charts = self.here / "charts"
         cloud = self.here / "more.xyz"

@@ -49,6 +49,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_instructions_experiment();
 [[nodiscard]] Experiment make_model_experiment();
 [[nodiscard]] Experiment make_mutations_experiment();
+[[nodiscard]] Experiment make_relight_experiment();
 [[nodiscard]] Experiment make_remote_experiment();
 [[nodiscard]] Experiment make_scale_experiment();
 [[nodiscard]] Experiment make_scan_experiment();
