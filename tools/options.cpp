@@ -333,7 +333,7 @@ void add_light_groups(CLI::App& app, bool& groups, const std::string& where) {
                    "ptclight, ptcbuild and ptcrender name groups with --light-group; all other "
                    "light is light_rest. The sum is all light, so that groups can be weighted and "
                    "coloured anew without another run. A run takes as long as one run for each "
-                   "group.")
+                   "group, and disk space for a copy of the scene for each.")
       ->group("Lights");
 }
 

@@ -155,7 +155,7 @@ ordered_json facts_of(const GatherCounts& counts) {
 
 ordered_json facts_of(const StageSeconds& seconds) {
   ordered_json json = ordered_json::object();
-  for (const auto& [stage, time] : seconds) json[stage] = time;
+  for (const auto& [stage, time] : seconds) json[stage] = json.value(stage, 0.0) + time;
   json["total"] = total_seconds(seconds);
   return json;
 }

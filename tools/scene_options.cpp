@@ -164,8 +164,7 @@ void LightArguments::declare(CLI::App& app) {
       app, "--light-group", [this](const std::vector<std::string>& v) { set_groups(v); },
       "Group of the lights that follow; repeatable\n"
       "ptcshade and ptcrender keep the light of each group apart with --light-groups. The name is "
-      "1 "
-      "to 32 letters, digits and underscores.")
+      "1 to 25 letters from a to z, digits and underscores.")
       ->type_name("NAME")
       ->group(kGroup);
 }
@@ -247,8 +246,10 @@ void LightArguments::set_groups(const std::vector<std::string>& values) {
   groups_ = values;
   for (const std::string& name : values) {
     if (!is_group_name(name)) {
-      refuse("--light-group", name,
-             "1 to 32 letters, digits and underscores, and not rest, which is all other light");
+      refuse(
+          "--light-group", name,
+          "1 to 25 letters from a to z, digits and underscores, and not rest, which is all other "
+          "light");
     }
   }
 }

@@ -72,7 +72,8 @@ class Facts(ProgramTest):
         for axis in "rgb":
             for point in (dict(zip(names, values)) for values in shaded):
                 together = sum(point[f"light_{group}_{axis}"] for group in ("a", "b_2", "rest"))
-                self.assertAlmostEqual(together, point[f"radiance_{axis}"] + point[f"indirect_{axis}"], delta=0.01)
+                bounced = point[f"albedo_{axis}"] / math.pi * point[f"irradiance_{axis}"]
+                self.assertAlmostEqual(together, point[f"radiance_{axis}"] + bounced, delta=0.01)
         for wrong, told in ((["--light-group", "a"], "expects a light after the name of its group, not 'a'"),
                             (["--light-group", "a", "--light-group", "b", "--sun", "3,4"], "expects a light after the name of its group, not 'a'"),
                             (["--sun", "3,4", "--light-group", "b"], "expects a light after the name of its group, not 'b'"),

@@ -14,7 +14,7 @@ from programs import BIN, SMALL_PICTURE, ProgramTest, ball, run, write_ply
 class SystemFailure(ProgramTest):
     def test_outputs_that_cannot_be_opened(self):
         for program, operands, name in (("ptcbuild", [self.cloud, "-o"], "o.ptcx"),
-                                        ("ptclight", [self.scene, "-o"], "o.ptcx"),
+                                        ("ptclight", [self.scene, "--sun", "30,60", "-o"], "o.ptcx"),
                                         ("ptcshade", [self.scene, "-o"], "o.ply"),
                                         ("ptcrender", [self.scene, *SMALL_PICTURE, "-o"], "o.png"),
                                         ("ptcconvert", [self.scene], "o.ply")):
@@ -33,7 +33,7 @@ class SystemFailure(ProgramTest):
                                        ("ptcbuild", [*spilling, "--memory=106M"], 1024), ("ptcbuild", [*spilling, "--memory=300M", "--resume"], 1024),
                                        ("ptcbuild", [self.cloud, "--resume", "-o", self.here / "o.ptcx"], 0),
                                        ("ptcbuild", [self.cloud, "--append", self.scene, "-o", self.here / "o.ptcx"], 8),
-                                       ("ptclight", [self.scene, "-o", self.here / "o.ptcx"], 8),
+                                       ("ptclight", [self.scene, "--sun", "30,60", "-o", self.here / "o.ptcx"], 8),
                                        ("ptcshade", [self.scene, "-o", self.here / "o.ply"], 8),
                                        ("ptcshade", [self.scene, "-o", self.here / "o.ptcx"], 8),
                                        ("ptcshade", [self.scene, "-o", self.here / "o.ply", "--bounces", "2"], 8),

@@ -285,7 +285,7 @@ TEST_CASE("relight: threads, caps and back ends change no byte", "[integration][
   rig.sky.radiance = glm::vec3(0.5F);
   relight(dir / "scene.ptcx", dir / "one.ptcx", rig, {.threads = 1});
   relight(dir / "scene.ptcx", dir / "three.ptcx", rig, {.threads = 3});
-  relight(dir / "scene.ptcx", dir / "small.ptcx", rig, {.memory_bytes = 120U << 20, .threads = 2});
+  relight(dir / "scene.ptcx", dir / "small.ptcx", rig, {.memory_bytes = 130U << 20, .threads = 2});
   LightRequest mapped{{.scene = dir / "scene.ptcx", .back_end = BackEnd::mmap}};
   mapped.lights = rig;
   Progress silent;
@@ -422,6 +422,45 @@ TEST_CASE("relight: the channels of a shading go, because they are of other ligh
   CHECK(lit.groups().empty());
   REQUIRE(notes.texts.size() == 1);
   CHECK(notes.texts[0].find("other light") != std::string::npos);
+}
+
+TEST_CASE("relight: without lights the inputs' own shine, and without any the run is refused",
+          "[integration][relight]") {
+  const TemporaryDirectory dir;
+  std::vector<Surfel> surfels;
+  add_sphere(surfels, {0, 0, 0}, 1, 0.2, glm::vec3(1));
+  write_scene(dir / "dark.ptcx", surfels);
+  relight(dir / "dark.ptcx", dir / "lit.ptcx", one_sun({0, 1, 0}));
+  // Two containers, of which one records a sun
+  LightRequest request{{.scene = dir / "lit.ptcx", .joined = {dir / "dark.ptcx"}}};
+  Progress silent;
+  light_container(request, dir / "both.ptcx", silent);
+  CHECK(ContainerReader(dir / "both.ptcx").meta().text.at(kLightsKey) ==
+        ContainerReader(dir / "lit.ptcx").meta().text.at(kLightsKey));
+  double most = 0;
+  for (const double light : irradiances(dir / "both.ptcx")) most = std::max(most, light);
+  CHECK(most == Approx(3).epsilon(0.05));
+  // None records anything
+  request = {{.scene = dir / "dark.ptcx"}};
+  CHECK_THROWS_WITH(light_container(request, dir / "none.ptcx", silent),
+                    Catch::Contains("no light is given"));
+  CHECK_FALSE(std::filesystem::exists(dir / "none.ptcx"));
+}
+
+TEST_CASE("relight: very many rays of a surfel are traced in parts", "[integration][relight]") {
+  const TemporaryDirectory dir;
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, 0.5, glm::vec3(0));
+  for (Surfel& s : surfels) s.albedo = glm::vec3(0.5F);
+  write_scene(dir / "plane.ptcx", surfels);
+  LightRequest request{{.scene = dir / "plane.ptcx"}};
+  request.light_sampling.sun_rays = 40'000;
+  request.lights = one_sun({1, 1, 0}, 0.1F);
+  Progress silent;
+  const LightReport report = light_container(request, dir / "lit.ptcx", silent);
+  CHECK(report.rays == 40'000 * surfels.size());
+  for (const double light : irradiances(dir / "lit.ptcx"))
+    CHECK(light == Approx(3 / std::sqrt(2.0)).epsilon(0.005));
 }
 
 TEST_CASE("relight: a cap that is too small is refused, and the target stays",

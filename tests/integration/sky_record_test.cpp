@@ -145,6 +145,25 @@ TEST_CASE("sky record: a missing picture is an error that names it, and no outpu
   CHECK_FALSE(std::filesystem::exists(lit.dir / "more.ptcx"));
 }
 
+TEST_CASE("sky record: a cloud that joins a lit container is lit by its picture, too",
+          "[integration][sky]") {
+  const Lit lit;
+  std::ofstream(lit.dir / "cloud.xyz") << "0.5 2 0.5 0 1 0 0.1\n0.6 2 0.5 1 0 0 0.1\n";
+  Notes notes;
+  build_container({.inputs = {lit.scene(), lit.dir / "cloud.xyz"}}, lit.dir / "joined.ptcx", notes);
+  CHECK_FALSE(sky_is_gathered(ContainerReader(lit.dir / "joined.ptcx")));
+  light_container({{.scene = lit.dir / "joined.ptcx"}}, lit.dir / "again.ptcx", notes);
+  const std::vector<Surfel> once = points_of(lit.dir / "joined.ptcx"),
+                            again = points_of(lit.dir / "again.ptcx");
+  REQUIRE(once.size() == again.size());
+  float most = 0;
+  for (std::size_t i = 0; i < once.size(); ++i) {
+    CHECK(once[i].radiance == again[i].radiance);
+    if (once[i].position.y > 1.5) most = std::max(most, once[i].radiance.g);
+  }
+  CHECK(most > 0);
+}
+
 TEST_CASE("sky record: a picture that changed since the build is noted", "[integration][sky]") {
   Lit lit;
   write_sky(lit.picture(), 5);

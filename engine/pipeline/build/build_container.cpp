@@ -330,6 +330,11 @@ class Build {
           "them are there: build without `resume`");
     }
     rig_ = inputs.lights;
+    if (inputs.clouds.lights_differ && !request_.lights) {
+      progress_.note("the inputs record different lights: those of " +
+                     inputs.clouds.named_by.at(kLightsKey) +
+                     " light all points; give lights to light them otherwise");
+    }
     // The picture of a scene's sky is not loaded where no mesh needs it
     if (scene_ && !has_meshes()) rig_ = recorded_lights(*scene_, progress_);
     unlit_path_ = temporary_container_path(roomiest_temp_dir(request_.run, target_));

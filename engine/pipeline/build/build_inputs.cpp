@@ -238,7 +238,7 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
   // Points that wait for the sky alone may stand beside others that were lit
   const bool scene_waits = has_scene && sky_is_gathered(*scene);
   const bool waiting = (has_clouds && clouds.unlit) || scene_waits,
-             lit = meshes || (has_scene && !scene_waits);
+             lit = meshes || clouds.has_lit_container || (has_scene && !scene_waits);
   const bool lamps =
       request.lights && !(request.lights->suns.empty() && request.lights->points.empty() &&
                           request.lights->spots.empty());
@@ -247,6 +247,17 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
   inputs.rays_at_emitters = inputs.emitters && request.sampling.lights.area_rays > 0 && !several;
   if (several) inputs.clouds.text.erase(kEmittersKey);
   if (counted) inputs.clouds.text[kEmittersKey] = "baked";
+}
+
+/// Reads the picture of the sky that an input recorded, from where it was or next to that input.
+void load_recorded_sky(const BuildRequest& request, BuildInputs& inputs) {
+  const auto name = inputs.clouds.named_by.find(kLightsKey);
+  if (name == inputs.clouds.named_by.end()) return;
+  const auto of = std::ranges::find_if(request.inputs, [&](const std::filesystem::path& input) {
+    return input.filename().string() == name->second;
+  });
+  if (of != request.inputs.end())
+    static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(*of)));
 }
 
 BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
@@ -280,9 +291,12 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   }
   inputs.emitters = mesh.emits();
   plan_light(request, scene, !mesh.triangles.empty(), inputs);
-  if (mesh.triangles.empty()) return inputs;
+  if (mesh.triangles.empty()) {
+    if (inputs.relight && !request.lights) load_recorded_sky(request, inputs);
+    return inputs;
+  }
   if (!request.lights && !inputs.clouds.text[kLightsKey].empty()) {
-    static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(request.inputs.front())));
+    load_recorded_sky(request, inputs);
   } else if (!request.lights && !inputs.emitters) {
     inputs.lights = default_rig(up_of(inputs.clouds.text));
   }
@@ -305,9 +319,14 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   if (from == BoundsFrom::files) {
     for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
   }
+  if (const auto lights = file.info.text.find(kLightsKey); lights != file.info.text.end()) {
+    const auto first = text.find(kLightsKey);
+    lights_differ |= first != text.end() && first->second != lights->second;
+  }
   join_texts(text, named_by, file.info.text, name, progress);
   unlit |= !file.info.has_radiance;
-  has_container |= is_container(path);
+  const bool contained = is_container(path);
+  has_container |= contained;
   coloured |= file.info.has_albedo;
   Cloud& cloud = files.emplace_back(Cloud{path});
   note_scan(file.info, cloud);
@@ -325,6 +344,7 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
     read_points(file, alone, cloud, progress);
   }
   points += cloud.points;
+  has_lit_container |= contained && file.info.has_radiance && cloud.points > 0;
 }
 
 void Clouds::shorten_records(Progress& progress) {

@@ -60,6 +60,8 @@ struct Clouds {
   std::optional<ScanOptions> scan;
   bool unlit = false;                ///< one of the files gives no radiance
   bool has_container = false;        ///< one of the files is a container
+  bool has_lit_container = false;    ///< one of the files is a container whose points have light
+  bool lights_differ = false;        ///< the files record different lights; the first ones count
   bool coloured = false;             ///< one of the files gives colours
   bool emits = false;                ///< a point emits light
   std::vector<glm::dvec3> scanners;  ///< of all files, scene units

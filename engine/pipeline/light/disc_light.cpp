@@ -15,6 +15,7 @@ namespace {
 
 constexpr unsigned kPlaces = 4;           // of a surfel that are lit
 constexpr std::size_t kNeighbours = 64;   // surfels whose rays are traced together
+constexpr std::size_t kRays = 8192;       // that are traced at the latest when there are so many
 constexpr float kQuarter = 0.353553391F;  // of the edge of the square that a disc of radius 1 has
 
 /// Returns a share of the rays of a surfel, rounded up.
@@ -26,6 +27,19 @@ unsigned share(unsigned rays) {
 glm::vec3 quarter(const Surfel& surfel, const Basis& basis, unsigned place) {
   const float step = kQuarter * surfel.radius;
   return basis.x * ((place & 1) != 0 ? step : -step) + basis.y * ((place & 2) != 0 ? step : -step);
+}
+
+/// Calls visit(point) for each point of a container that emits.
+template <class Visit>
+void for_each_emitting(const ContainerReader& container, const Visit& visit) {
+  if (container.header().point_bytes == kPointBytes) return;
+  ContainerPoints points(container);
+  std::vector<PointRecord> block(DiscLight::kBlock);
+  while (const std::size_t count = points.next(block)) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (block[i].emission != Half3{} && block[i].radius > 0) visit(block[i]);
+    }
+  }
 }
 
 }  // namespace
@@ -41,6 +55,19 @@ struct DiscLight::Worker {
   std::vector<std::uint32_t> surfels;  ///< the surfel of each ray
   std::vector<std::uint8_t> hidden;    ///< for each ray
   std::uint64_t count = 0;             ///< rays so far
+
+  /// Adds what the rays bring that nothing hides, and forgets them.
+  void bring(std::span<glm::vec3> out) {
+    hidden.resize(rays.size());
+    tracer.test(rays, hidden);
+    count += rays.size();
+    for (std::size_t ray = 0; ray < rays.size(); ++ray) {
+      if (hidden[ray] == 0) out[surfels[ray]] += brings[ray];
+    }
+    rays.clear();
+    brings.clear();
+    surfels.clear();
+  }
 };
 
 DiscLight::DiscLight(const SceneView& view, PageCache& cache, const LightRays& rays,
@@ -54,6 +81,13 @@ DiscLight::DiscLight(const SceneView& view, PageCache& cache, const LightRays& r
       workers_(executor.threads()) {}
 
 DiscLight::~DiscLight() = default;
+
+std::uint64_t DiscLight::thread_bytes(const LightRig& rig, const LightSampling& sampling) noexcept {
+  const std::uint64_t place = rig.suns.size() * std::uint64_t{share(sampling.sun_rays)} +
+                              rig.points.size() + rig.spots.size() + share(sampling.area_rays);
+  // Of a ray there are what is drawn, what is traced and its order, in vectors that grow by halves
+  return ShadowTracer::kBytes + 2 * (kRays + place) * (sizeof(LightRay) + 64);
+}
 
 std::uint64_t DiscLight::rays() const noexcept {
   std::uint64_t sum = 0;
@@ -77,10 +111,7 @@ void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
                                 SceneScale::kMaxDistance);
   own.tracer.begin(middle, static_cast<float>(reach));
   for (std::size_t from = 0; from < surfels.size(); from += kNeighbours) {
-    // Draw the rays of some neighbours
-    own.rays.clear();
-    own.brings.clear();
-    own.surfels.clear();
+    // Draw the rays of some neighbours, and trace them
     const std::size_t to = std::min(from + kNeighbours, surfels.size());
     for (std::size_t i = from; i < to; ++i) {
       const Surfel& surfel = surfels[i];
@@ -105,15 +136,10 @@ void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
           own.brings.push_back(ray.irradiance / static_cast<float>(kPlaces));
           own.surfels.push_back(static_cast<std::uint32_t>(i));
         }
+        if (own.rays.size() >= kRays) own.bring(out);
       }
     }
-    // Sum up what nothing hides
-    own.hidden.resize(own.rays.size());
-    own.tracer.test(own.rays, own.hidden);
-    own.count += own.rays.size();
-    for (std::size_t ray = 0; ray < own.rays.size(); ++ray) {
-      if (own.hidden[ray] == 0) out[own.surfels[ray]] += own.brings[ray];
-    }
+    own.bring(out);
   }
 }
 
@@ -128,25 +154,26 @@ void DiscLight::irradiance(std::span<const Surfel> surfels, std::span<const floa
   });
 }
 
+std::uint64_t count_emitting(const ContainerReader& container) {
+  std::uint64_t count = 0;
+  for_each_emitting(container, [&](const PointRecord&) { ++count; });
+  return count;
+}
+
 std::vector<Emitter> emitting_surfels(const ContainerReader& container, const glm::dvec3& origin,
-                                      float lift) {
+                                      float lift, std::uint64_t count) {
   std::vector<Emitter> emitters;
-  if (container.header().point_bytes == kPointBytes) return emitters;
+  emitters.reserve(2 * count);
   const Frame& frame = container.header().frame;
-  ContainerPoints points(container);
-  std::vector<PointRecord> block(DiscLight::kBlock);
-  while (const std::size_t count = points.next(block)) {
-    for (std::size_t i = 0; i < count; ++i) {
-      if (block[i].emission == Half3{} || !(block[i].radius > 0)) continue;
-      const Surfel surfel = to_surfel(block[i], frame);
-      const Basis basis(surfel.normal);
-      const glm::vec3 centre(lifted(surfel, lift, frame).position - origin);
-      // The corners of its cell lie on the rim of the disc
-      const glm::vec3 a = basis.x * surfel.radius, b = basis.y * surfel.radius;
-      emitters.push_back({{centre + a, centre + b, centre - a}, surfel.emission});
-      emitters.push_back({{centre - a, centre - b, centre + a}, surfel.emission});
-    }
-  }
+  for_each_emitting(container, [&](const PointRecord& point) {
+    const Surfel surfel = to_surfel(point, frame);
+    const Basis basis(surfel.normal);
+    const glm::vec3 centre(lifted(surfel, lift, frame).position - origin);
+    // The corners of its cell lie on the rim of the disc
+    const glm::vec3 a = basis.x * surfel.radius, b = basis.y * surfel.radius;
+    emitters.push_back({{centre + a, centre + b, centre - a}, surfel.emission});
+    emitters.push_back({{centre - a, centre - b, centre + a}, surfel.emission});
+  });
   return emitters;
 }
 

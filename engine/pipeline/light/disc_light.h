@@ -31,13 +31,14 @@ namespace ptc {
 ///     +-------+
 ///
 /// Results depend on the surfels, their numbers and the rays alone.
-/// Memory: ShadowTracer::kBytes and about 256 KiB for each thread.
+/// Memory: thread_bytes() for each thread.
 class DiscLight {
  public:
   /// Surfels that one thread lights together, at least.
   static constexpr std::size_t kBlock = 4096;
-  /// Memory for each thread, bytes.
-  static constexpr std::uint64_t kBytes = ShadowTracer::kBytes + (std::uint64_t{1} << 18);
+  /// Returns the bytes of memory for each thread.
+  [[nodiscard]] static std::uint64_t thread_bytes(const LightRig& rig,
+                                                  const LightSampling& sampling) noexcept;
 
   /// @param view, cache  must outlive this; of the same container
   /// @param rays         must outlive this
@@ -73,13 +74,19 @@ class DiscLight {
   std::vector<std::unique_ptr<Worker>> workers_;  ///< by thread, made when first needed
 };
 
+/// Returns the number of surfels of a container that emit.
+/// @throws FormatError when a page is damaged; std::system_error
+[[nodiscard]] std::uint64_t count_emitting(const ContainerReader& container);
+
 /// Returns the emitting surfels of a container as triangles: two for the square cell of each, at
 /// the height of a receiver, so that rays which end there do not meet the surfel itself.
 /// @param origin  to which they are relative, scene units
 /// @param lift    height over the radius of a surfel
+/// @param count   count_emitting()
 /// @throws FormatError when a page is damaged; std::system_error
 /// Memory: 48 bytes for each triangle.
 [[nodiscard]] std::vector<Emitter> emitting_surfels(const ContainerReader& container,
-                                                    const glm::dvec3& origin, float lift);
+                                                    const glm::dvec3& origin, float lift,
+                                                    std::uint64_t count);
 
 }  // namespace ptc

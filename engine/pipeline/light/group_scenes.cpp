@@ -9,6 +9,10 @@
 
 namespace ptc {
 
+bool may_emit(const ContainerReader& scene) {
+  return scene.header().point_bytes != kPointBytes;
+}
+
 std::vector<std::string> groups_of(const LightingRequest& request, const LightRig& rig,
                                    bool emits) {
   const auto excludes = [](bool given, const char* field) {
@@ -29,13 +33,16 @@ std::vector<std::string> groups_of(const LightingRequest& request, const LightRi
 }
 
 RelitScene::RelitScene(const LightingRequest& request, const LightRig& rig, bool emission,
-                       const std::filesystem::path& target, StageSeconds& seconds,
-                       Progress& progress)
+                       const LightSampling& sampling, const std::filesystem::path& target,
+                       StageSeconds& seconds, Progress& progress)
     : path_(temporary_container_path(roomiest_temp_dir(request.run, target))), name_(path_) {
   LightRequest lighting{{.scene = request.scene,
+                         .gather = request.gather,
                          .lift = request.lift,
                          .back_end = request.back_end,
                          .run = request.run}};
+  lighting.gather.around = {};
+  lighting.light_sampling = sampling;
   lighting.lights = rig;
   lighting.emission = emission;
   const LightReport report = light_container(lighting, path_, progress);

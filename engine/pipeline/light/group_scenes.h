@@ -19,8 +19,11 @@
 
 namespace ptc {
 
+/// Says whether points of a scene may emit.
+[[nodiscard]] bool may_emit(const ContainerReader& scene);
+
 /// The groups of a scene's lights, with the empty name of the rest at the end where there is one.
-/// @param emits  whether something emits that is not among the scene's points
+/// @param emits  whether points or meshes emit
 /// @throws RequestError when no light is in a group, or the request asks for what is not measured
 ///         for groups: an error, estimates, a check, or a run past damaged pages
 [[nodiscard]] std::vector<std::string> groups_of(const LightingRequest& request,
@@ -29,12 +32,14 @@ namespace ptc {
 /// A temporary container of a scene's points that other lights light (light_container()).
 class RelitScene {
  public:
-  /// @param request   its scene is lit, with its resources, lift and back end
+  /// @param request   its scene is lit, with its resources, gather, lift and back end
   /// @param emission  whether points that emit do so
+  /// @param sampling  shadow rays of each point
   /// @param target    output of the run, as for roomiest_temp_dir()
   /// @throws as light_container()
   RelitScene(const LightingRequest& request, const LightRig& rig, bool emission,
-             const std::filesystem::path& target, StageSeconds& seconds, Progress& progress);
+             const LightSampling& sampling, const std::filesystem::path& target,
+             StageSeconds& seconds, Progress& progress);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 

@@ -229,16 +229,16 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
     progress.note(
         "the channels of an earlier shading are left out, because they are of other light");
 
-  // Collect what emits
-  const glm::dvec3 origin(scene.superblock().bounds_low[0], scene.superblock().bounds_low[1],
-                          scene.superblock().bounds_low[2]);
-  std::vector<Emitter> emitters;
-  if (emits && request.light_sampling.area_rays > 0)
-    emitters = emitting_surfels(scene, origin, request.lift);
-  report.emitters = emitters.size();
-  const LightRays rays(rig, std::move(emitters), origin, 0);
+  const std::uint64_t emitting =
+      emits && request.light_sampling.area_rays > 0 ? count_emitting(scene) : 0;
+  report.emitters = 2 * emitting;
+  if (!request.lights && emitting == 0 && light_groups(rig, false).empty()) {
+    throw RequestError("lights", scene.path().string() +
+                                     ": no light is given, the scene records none, and nothing "
+                                     "emits: give a light");
+  }
 
-  // Divide the memory
+  // Divide the memory, and collect what emits
   MemoryBudget budget = budget_of(request.run.memory_bytes, "lighting");
   budget.charge("emitters", 160 * report.emitters);
   budget.charge("the output's directory",
@@ -246,8 +246,12 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                                               executor.threads()) +
                     held_pages_bytes(scene.header().page_shift));
   const auto sky = sky_function(rig.sky);
-  const bool by_rays = !rays.empty();
-  if (by_rays) budget.charge("shadow rays", DiscLight::kBytes * executor.threads());
+  const bool by_rays = emitting > 0 || !LightRays(rig, {}, {}, 0).empty();
+  if (by_rays) {
+    budget.charge("shadow rays",
+                  executor.threads() * DiscLight::thread_bytes(rig, request.light_sampling));
+  }
+  budget.require();
   const unsigned readers = executor.threads() * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));
   std::unique_ptr<PageCache> cache;
   if (readers > 0) {
@@ -257,6 +261,13 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                             .threads = readers,
                             .back_end = request.back_end});
   }
+
+  const glm::dvec3 origin(scene.superblock().bounds_low[0], scene.superblock().bounds_low[1],
+                          scene.superblock().bounds_low[2]);
+  const LightRays rays(rig,
+                       emitting > 0 ? emitting_surfels(scene, origin, request.lift, emitting)
+                                    : std::vector<Emitter>(),
+                       origin, 0);
 
   // Light all points into the target
   const SceneView view(scene);
@@ -297,7 +308,8 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   if (lights) report.rays = lights->rays();
   if (shader) report.gather = shader->counts();
   lights.reset();
-  if (shader) report.cache = shader->cache_statistics();
+  shader.reset();
+  if (cache) report.cache = cache->statistics();
   return report;
 }
 
@@ -308,9 +320,10 @@ LightReport light_container(const LightRequest& request, const std::filesystem::
   check_ranges(request);
   if (request.lights) check_lights(*request.lights);
   if (is_container_alone(request)) return light_points(request, target, progress);
-  // Build a temporary container of clouds and meshes, without light
-  const BuiltScene scene(request, {.lights = LightRig{}, .note_lost_records = true}, target,
-                         progress);
+  // Build a temporary container of clouds and meshes, without light, unless the inputs say which
+  std::optional<LightRig> unlit;
+  if (request.lights) unlit.emplace();
+  const BuiltScene scene(request, {.lights = unlit, .note_lost_records = true}, target, progress);
   LightRequest lighting = request;
   lighting.scene = scene.path();
   lighting.joined.clear();

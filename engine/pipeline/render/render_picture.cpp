@@ -396,27 +396,35 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
   const ContainerReader scene(request.scene);
   const LightRig rig = request.lights ? *request.lights : recorded_lights(scene, progress);
   check_names(request, targets, rig.sky.map_path);
-  const bool emits = scene.header().point_bytes != kPointBytes;
+  Progress silent;
+  const bool emits =
+      may_emit(scene) ||
+      load_meshes(request.meshes, request.mesh.get(), false, silent, nullptr, "meshes").emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
+  const std::uint64_t sum_bytes = Film::pixel_bytes(false) + groups.size() * Film::kGroupBytes;
   LightingReport report;
   std::unique_ptr<Film> sum;
-  Progress silent;
+  std::uint64_t held = ContainerReader::kPageBytes * scene.page_count();
   for (const std::string& group : groups) {
+    // Light the scene with what the sum leaves of the memory
     const bool rest = group.empty();
     RenderRequest one = request;
     one.lights = only_group(rig, group);
-    const RelitScene lit(request, *one.lights, rest, targets.front().path, report.seconds, silent);
+    one.run.memory_bytes -= std::min(held, one.run.memory_bytes - 1);
+    const RelitScene lit(one, *one.lights, rest, request.light_sampling, targets.front().path,
+                         report.seconds, silent);
+    // Render it, and add the picture to the sum
+    one.run = request.run;
     one.scene = lit.path();
-    const Part part{.emission = rest,
-                    .held_bytes = Film::pixel_bytes(false) + groups.size() * Film::kGroupBytes};
-    add_costs(report, render_part(
-                          one, targets, part,
-                          [&](Film& film) {
-                            if (!sum)
-                              sum = std::make_unique<Film>(film.width(), film.height(), false);
-                            sum->add_group(group_channel(group), film);
-                          },
-                          progress));
+    const auto add = [&](const Film& film) {
+      if (!sum) {
+        sum = std::make_unique<Film>(film.width(), film.height(), false);
+        held += sum_bytes * film.width() * film.height();
+      }
+      sum->add_group(group_channel(group), film);
+    };
+    const Part part{.emission = rest, .held_bytes = sum_bytes};
+    add_costs(report, render_part(one, targets, part, add, progress));
   }
   sum->write(targets, request.exposure);
   return report;

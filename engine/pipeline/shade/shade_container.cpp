@@ -27,6 +27,7 @@
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/pipeline/light/built_scene.h"
+#include "engine/pipeline/light/group_scenes.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shaded_groups.h"
@@ -287,6 +288,7 @@ void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, S
 /// @param las_records  BuildReport::las_records of the scene; empty: what its container keeps
 LightingReport shade_points(const ShadeRequest& request, const std::filesystem::path& target,
                             const std::string& las_records, Progress& progress) {
+  check_target(request, target);
   if (request.light_groups) {
     const auto one = [&](const ShadeRequest& group, const std::filesystem::path& path) {
       return shade_points(group, path, "", progress);
@@ -296,7 +298,6 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   }
   // Open the scene and the receivers
   LightingReport report;
-  check_target(request, target);
   if (request.sky) check_sky(*request.sky, "sky");
   Lighting lighting(request, report, progress);
   const OpenReceivers receivers(request, target, lighting, progress);
@@ -343,7 +344,12 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
   if (!request.colour_from.empty()) {
     PointWriteInfo info =
         shaded_points(ContainerReader(request.scene), 0, "", request.colour_from, std::nullopt);
-    const std::vector<Channel> added = shading_channels({.estimates = request.estimate});
+    ShadedExtras extras{.estimates = request.estimate};
+    if (request.light_groups) {
+      const ContainerReader scene(request.scene);
+      extras.groups = groups_of(request, recorded_lights(scene, progress), may_emit(scene));
+    }
+    const std::vector<Channel> added = shading_channels(extras);
     info.channels.insert(info.channels.end(), added.begin(), added.end());
     check_colour_from(output_format(target).value(), info);
   }

@@ -54,7 +54,7 @@ struct ShadeRequest : LightingRequest {
 ///   occlusion_error    1   estimated error, only with LightingRequest::estimate
 ///   irradiance_error   1   estimated error, W / m^2, only with LightingRequest::estimate
 ///   light_NAME         3   only with `light_groups`: all radiance of a point that is due to a
-///   group
+///                          group, W / (m^2 sr)
 ///
 /// A .ptcx is a copy of the receivers' container with these channels, stored as halves; channels of
 /// an earlier shading are replaced. A file of points, such as a .las or .ply, has the points with

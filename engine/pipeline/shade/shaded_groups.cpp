@@ -6,6 +6,7 @@
 //   scene of all lamps: the points' own light ----------------------+
 #include "engine/pipeline/shade/shaded_groups.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cstring>
 #include <deque>
@@ -18,6 +19,7 @@
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/convert/container_source.h"
+#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/pipeline/light/group_scenes.h"
 #include "engine/pipeline/scene_record.h"
@@ -101,8 +103,10 @@ void add_up(const ContainerReader& base, std::deque<ShadedGroup>& groups, bool o
           sums[i].irradiance += s.irradiance;
           sums[i].sky += s.sky;
         }
+        // What the scene's own points reflect of the sky is in their own light
+        const glm::vec3 arrives = own ? s.irradiance : s.irradiance + s.sky;
         lights[i * groups.size() + g] =
-            groups[g].albedo(i) * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float> +
+            groups[g].albedo(i) * arrives * std::numbers::inv_pi_v<float> +
             (own ? groups[g].own(i) : glm::vec3(0));
       }
     }
@@ -125,42 +129,54 @@ LightingReport shade_groups(
   const std::filesystem::path directory = roomiest_temp_dir(request.run, target);
   const ContainerReader scene(request.scene);
   const LightRig rig = recorded_lights(scene, progress);
-  const bool emits = scene.header().point_bytes != kPointBytes;
   const bool own = request.receivers.empty();
   LightingReport report;
   Progress silent;
 
   // Shade the receivers under the lights of each group
-  ShadedExtras extras{.groups = groups_of(request, rig, emits)};
+  const ShadedExtras extras{.groups = groups_of(request, rig, may_emit(scene))};
+  if (own) {
+    check_shaded_sink(target, scene, extras);
+  } else if (is_container(request.receivers)) {
+    check_shaded_sink(target, ContainerReader(request.receivers), extras);
+  }
+  ShadeRequest one = request;  // with what the containers that are open leave of the memory
+  one.light_groups = one.original_order = false;
+  const auto hold = [&](const ContainerReader& container) {
+    const std::uint64_t held = ContainerReader::kPageBytes * container.page_count();
+    one.run.memory_bytes -= std::min(held, one.run.memory_bytes - 1);
+  };
+  hold(scene);
   std::deque<ShadedGroup> groups;
   for (const std::string& group : extras.groups) {
     const bool rest = group.empty();
-    const RelitScene lit(request, only_group(rig, group), rest, target, report.seconds, silent);
-    ShadeRequest one = request;
+    one.scene = request.scene;
+    const RelitScene lit(one, only_group(rig, group), rest, {}, target, report.seconds, silent);
     one.scene = lit.path();
-    one.light_groups = one.original_order = false;
     groups.emplace_back(make_temporary_container(directory,
                                                  [&](const std::filesystem::path& path) {
                                                    add_costs(report, shade(one, path));
                                                  }),
                         rest);
+    hold(groups.back().container());
   }
 
   // Add them up
   std::unique_ptr<ContainerReader> lit;
   if (own) {
-    const RelitScene all(request, rig, true, target, report.seconds, silent);
+    one.scene = request.scene;
+    const RelitScene all(one, rig, true, {}, target, report.seconds, silent);
     lit = std::make_unique<ContainerReader>(all.path());
   }
   const ContainerReader& base = own ? *lit : groups.front().container();
   MemoryBudget budget = budget_of(request.run.memory_bytes, "groups of lights");
   for (const ShadedGroup& group : groups) charge_directory(budget, group.container());
   budget.charge("the output's directory", sink_bytes(target, base, groups.size()));
-  check_shaded_sink(target, base, extras);
   const std::uint64_t points = base.superblock().points;
   PointWriteInfo info =
       shaded_points(base, points, settings, request.colour_from, output_format(target));
-  if (!las_records.empty()) info.text[kLasRecordsKey] = las_records;
+  if (own && !las_records.empty()) info.text[kLasRecordsKey] = las_records;
+  note_changed_values(target, info, progress);
   const std::unique_ptr<ShadedSink> sink = make_shaded_sink(target, base, info, extras);
   {
     const Stage stage(report.seconds, progress, "add up", points, "points");

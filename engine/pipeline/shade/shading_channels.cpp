@@ -14,6 +14,7 @@ namespace {
 
 /// What the names of groups' channels begin with.
 constexpr std::string_view kGroupPrefix = "light_";
+constexpr const char* kRadianceUnit = "W/(m^2 sr)";
 
 Channel number(const char* name, const char* unit) {
   return {.name = name, .unit = unit};
@@ -49,6 +50,12 @@ bool join_columns(const Channel& added, std::size_t first, std::vector<Channel>&
   return true;
 }
 
+/// Says whether a channel is the light of a group. One of another program has no such unit.
+bool is_group(const Channel& channel) {
+  return channel.name.starts_with(kGroupPrefix) && channel.components == 3 &&
+         channel.role == ChannelRole::colour && channel.unit == kRadianceUnit;
+}
+
 }  // namespace
 
 std::string group_channel(const std::string& group) {
@@ -61,19 +68,18 @@ std::vector<Channel> shading_channels(const ShadedExtras& extras) {
       {.name = "bent_normal", .components = 3, .role = ChannelRole::direction, .unit = "1"},
       colour("irradiance", "W/m^2"),
       colour("sky", "W/m^2"),
-      colour("indirect", "W/(m^2 sr)")};
+      colour("indirect", kRadianceUnit)};
   if (extras.estimates) {
     channels.push_back(number("occlusion_error", "1"));
     channels.push_back(number("irradiance_error", "W/m^2"));
   }
   for (const std::string& group : extras.groups)
-    channels.push_back(colour(group_channel(group), "W/(m^2 sr)"));
+    channels.push_back(colour(group_channel(group), kRadianceUnit));
   return channels;
 }
 
 bool is_shading(const Channel& channel) {
-  if (channel.name.starts_with(kGroupPrefix))
-    return channel.components == 3 && channel.role == ChannelRole::colour;
+  if (is_group(channel)) return true;
   return std::ranges::any_of(shading_channels({.estimates = true}), [&](const Channel& added) {
     return channel.name == added.name && channel.components == added.components;
   });
@@ -93,6 +99,12 @@ std::vector<Channel> join_shading(std::vector<Channel> channels) {
   auto at = static_cast<std::size_t>(std::ranges::find_if(joined, starts) - joined.begin());
   for (const Channel& channel : added) {
     if (join_columns(channel, at, joined)) ++at;
+  }
+  while (at < joined.size() && joined[at].name.starts_with(kGroupPrefix) &&
+         joined[at].name.ends_with("_r")) {
+    const std::string name = joined[at].name.substr(0, joined[at].name.size() - 2);
+    if (!join_columns(colour(name, kRadianceUnit), at, joined)) break;
+    ++at;
   }
   return have_shading(joined) ? joined : channels;
 }

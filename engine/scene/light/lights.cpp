@@ -64,9 +64,10 @@ double spot_share(const SpotLight& spot, const glm::dvec3& place) noexcept {
 }
 
 bool is_group_name(std::string_view text) noexcept {
-  constexpr std::string_view kLetters =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
-  return !text.empty() && text.size() <= 32 && text != kRestGroup &&
+  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789_";
+  constexpr std::size_t kMost =
+      25;  // the name of a channel has at most 31, and begins with "light_"
+  return !text.empty() && text.size() <= kMost && text != kRestGroup &&
          text.find_first_not_of(kLetters) == std::string_view::npos;
 }
 
@@ -112,8 +113,8 @@ void check_lights(const LightRig& rig) {
   constexpr char kField[] = "lights";
   const auto check_group = [&](const std::string& group) {
     require_request(group.empty() || is_group_name(group), kField,
-                    "the name of a light's group is not 1 to 32 letters, digits and underscores, "
-                    "or is that of the rest");
+                    "the name of a light's group is not 1 to 25 letters from a to z, digits and "
+                    "underscores, or is that of the rest");
   };
   for (const Sun& sun : rig.suns) check_group(sun.group);
   for (const PointLight& point : rig.points) check_group(point.group);

@@ -106,8 +106,8 @@ struct LightRig {
 /// The name that the group of the rest has in channels and layers.
 inline constexpr const char* kRestGroup = "rest";
 
-/// Says whether a text can name a group: 1 to 32 letters, digits and underscores, but not the name
-/// of the rest.
+/// Says whether a text can name a group: 1 to 25 letters from a to z, digits and underscores, but
+/// not the name of the rest.
 [[nodiscard]] bool is_group_name(std::string_view text) noexcept;
 
 /// Returns the groups of the lights that shine, in the order of their first lights; the empty name

@@ -23,6 +23,7 @@
 #include "engine/ptc.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/ray_scene.h"
+#include "engine/shade/reference/cosine_rays.h"
 #include "engine/store/container_points.h"
 #include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
@@ -150,11 +151,19 @@ std::vector<Surfel> some_surfels(const ContainerReader& container, std::uint64_t
   return some;
 }
 
-/// The surfels whose irradiance is told by what they reflect.
-std::vector<std::size_t> bright(std::span<const Surfel> surfels) {
+/// The surfels that something sees from four radii away, and whose irradiance is told by what they
+/// reflect. Others lie inside of walls and roofs.
+std::vector<std::size_t> visible(std::span<const Surfel> surfels, const RayScene& mesh) {
   std::vector<std::size_t> places;
+  std::vector<glm::vec3> directions;
   for (std::size_t i = 0; i < surfels.size(); ++i) {
-    if (surfels[i].albedo.g > 0.1F) places.push_back(i);
+    const Surfel& s = surfels[i];
+    const glm::dvec3 from = s.position + glm::dvec3(0.15F * s.radius * s.normal);
+    cosine_directions(s.normal, 64, i, directions);
+    const bool seen = std::ranges::any_of(directions, [&](const glm::vec3& d) {
+      return !mesh.closest(from, d, 0, 4 * static_cast<double>(s.radius));
+    });
+    if (seen && s.albedo.g > 0.1F) places.push_back(i);
   }
   return places;
 }
@@ -172,11 +181,11 @@ std::vector<RelightRow> measure_relight(const SceneChoice& choice, const Relight
   const ContainerReader container(built.path());
   const std::uint64_t all = container.superblock().points;
   const std::vector<Surfel> sample = some_surfels(container, options.checked);
-  const std::vector<std::size_t> places = bright(sample);
+  const RayScene mesh(made.mesh);
+  const std::vector<std::size_t> places = visible(sample, mesh);
   std::vector<Surfel> checked;
   for (const std::size_t i : places) checked.push_back(sample[i]);
   const std::vector<Surfel> timed_surfels = some_surfels(container, options.timed);
-  const RayScene mesh(made.mesh);
 
   std::vector<RelightRow> rows;
   for (const Light& light : lights_to_measure()) {

@@ -14,6 +14,7 @@ constexpr char kReading[] =
     "embree-mesh is single rays of Embree at the mesh in memory, as a build casts them. Errors are "
     "shares of the mean irradiance of many rays at the mesh: mean, root mean square (RMS), and RMS "
     "away from the borders of shadows, where light is even to 5 % within 2.5 radii of the surfel. "
+    "Surfels inside of walls and roofs, which nothing sees from four radii away, are left out. "
     "The irradiance of a surfel is the mean over four places of its square cell for all of them. "
     "CPU times are those of rays and gather; wall times of ptclight are those of the whole run, "
     "which writes a container.";
