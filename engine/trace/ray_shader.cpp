@@ -9,22 +9,7 @@
 namespace ptc {
 namespace {
 
-// Cells of the square of rays whose directions make a tile.
-constexpr unsigned kTileWidth = 8, kTileHeight = DiscTracer::kTile / kTileWidth;
-
-/// Returns the cells of a square, tile after tile.
-std::vector<std::uint32_t> tile_order(unsigned side) {
-  std::vector<std::uint32_t> order;
-  order.reserve(std::size_t{side} * side);
-  for (unsigned y = 0; y < side; y += kTileHeight) {
-    for (unsigned x = 0; x < side; x += kTileWidth) {
-      for (unsigned j = y; j < std::min(side, y + kTileHeight); ++j) {
-        for (unsigned i = x; i < std::min(side, x + kTileWidth); ++i) order.push_back(j * side + i);
-      }
-    }
-  }
-  return order;
-}
+static_assert(DiscTracer::kTile == kDirectionTile);
 
 std::unique_ptr<PageCache> make_cache(const ContainerReader& scene, const RayOptions& options,
                                       unsigned threads) {
@@ -50,9 +35,9 @@ RayOptions ray_options(const ShadeOptions& options) {
 /// What a thread needs.
 struct RayShader::Worker {
   DiscTracer tracer;
-  std::vector<glm::vec3> directions, tiles;  ///< in the order of the square, and of its tiles
-  std::vector<RayHit> hits;                  ///< in the order of tiles
-  std::vector<DiscHit> seen;                 ///< in the order of the square
+  std::vector<glm::vec3> directions;
+  std::vector<RayHit> hits;
+  std::vector<DiscHit> seen;
 };
 
 RayShader::RayShader(const ContainerReader& scene, const RayOptions& options,
@@ -81,8 +66,6 @@ void RayShader::trace(std::span<const Receiver> receivers, unsigned rays, std::u
   std::vector<std::size_t> along(receivers.size());
   std::iota(along.begin(), along.end(), std::size_t{0});
   std::ranges::stable_sort(along, {}, [&](std::size_t i) { return keys[i]; });
-  const unsigned side = square_side(rays);
-  const std::vector<std::uint32_t> order = tile_order(side);
   const RaysFor wanted = options_.bleeding ? RaysFor::nearest : RaysFor::any;
 
   executor_.for_each(along.size(), [&](std::size_t place, unsigned thread) {
@@ -90,20 +73,17 @@ void RayShader::trace(std::span<const Receiver> receivers, unsigned rays, std::u
     const std::size_t index = along[place];
     const Receiver& receiver = receivers[index];
     Worker& own = worker(thread);
-    cosine_directions(receiver.normal, side, seed + index, own.directions);
-    own.tiles.resize(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) own.tiles[i] = own.directions[order[i]];
-    own.hits.assign(order.size(), RayHit{});
+    cosine_directions(receiver.normal, rays, seed + index, own.directions);
+    own.hits.assign(rays, RayHit{});
     own.tracer.begin(receiver.position, receiver.normal);
-    own.tracer.meet(own.tiles, wanted, own.hits);
+    own.tracer.meet(own.directions, wanted, own.hits);
     // Sum up what they see
-    own.seen.assign(order.size(), DiscHit{});
-    for (std::size_t i = 0; i < order.size(); ++i) {
+    own.seen.assign(rays, DiscHit{});
+    for (std::size_t i = 0; i < rays; ++i) {
       const RayHit& hit = own.hits[i];
       if (hit.met())
-        own.seen[order[i]] = {hit.depth, options_.bleeding
-                                             ? own.tracer.radiance(hit, options_.emission)
-                                             : glm::vec3(0)};
+        own.seen[i] = {hit.depth, options_.bleeding ? own.tracer.radiance(hit, options_.emission)
+                                                    : glm::vec3(0)};
     }
     results[index] = sum_rays(receiver, own.directions, own.seen, options_.sky);
     progress.advance(1);

@@ -36,15 +36,16 @@ struct RayOptions {
 /// Shades receivers by rays through the octree: the reference for a gather's own error.
 ///
 /// Results depend on the receivers, the number of rays and the seed alone.
-/// Memory: RayOptions::memory_bytes, and 56 bytes for each ray of a receiver and thread.
+/// Memory: RayOptions::memory_bytes, and 44 bytes for each ray of a receiver and thread.
 class RayShader {
  public:
   /// @param scene, executor  must outlive this
   RayShader(const ContainerReader& scene, const RayOptions& options, const Executor& executor);
   ~RayShader();
 
-  /// Traces stratified, cosine-distributed rays from receivers. Receiver i takes `seed` + i.
-  /// @param rays      number of rays for each receiver, rounded down to a square number
+  /// Traces cosine-distributed rays from receivers, those of cosine_directions(). Receiver i takes
+  /// `seed` + i.
+  /// @param rays      number of rays for each receiver, best a power of 4
   /// @param results   as many as receivers, in their order
   /// @param progress  advances by one for each receiver
   /// @throws FormatError when a page is damaged; std::system_error

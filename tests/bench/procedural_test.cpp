@@ -8,8 +8,8 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/ray_scene.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 
 using namespace ptc;
 using namespace ptc::bench;

@@ -5,8 +5,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "engine/base/low_discrepancy.h"
 #include "engine/parallel/thread_pool.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 #include "tools/bench/experiments/window.h"
 
 using namespace ptc;

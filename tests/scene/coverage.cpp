@@ -8,7 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/base/low_discrepancy.h"
 #include "tests/scene/meshes.h"
 
 namespace ptc {

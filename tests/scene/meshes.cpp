@@ -5,8 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/directions.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 
 namespace ptc {
 

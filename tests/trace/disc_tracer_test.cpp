@@ -190,7 +190,7 @@ TEST_CASE("trace: what a ray meets does not depend on the rays beside it", "[tra
   std::vector<glm::vec3> directions;
   std::size_t met = 0, doubled = 0;
   for (const Receiver& receiver : scene.receivers) {
-    cosine_directions(receiver.normal, 8, 3, directions);
+    cosine_directions(receiver.normal, 64, 3, directions);
     std::vector<RayHit> together(directions.size()), alone(directions.size());
     tracer.begin(receiver.position, receiver.normal);
     tracer.meet(directions, RaysFor::nearest, together);

@@ -76,7 +76,7 @@ struct RungError {
 
 /// Compares pilots with rays at every setting of the ladder.
 /// @param options  as for tune()
-/// @param rays     number of rays of each of the two results of a receiver, a square number
+/// @param rays     number of rays of each of the two results of a receiver
 /// @return         one row for each setting, in the order of ladder()
 [[nodiscard]] std::vector<RungError> climb(const ContainerReader& scene,
                                            const ShadeOptions& options,

@@ -6,8 +6,8 @@
 
 #include <glm/vec3.hpp>
 
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/light/emitters.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 
 namespace ptc {
 

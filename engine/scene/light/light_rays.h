@@ -7,9 +7,9 @@
 
 #include <glm/vec3.hpp>
 
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/light/area_lights.h"
 #include "engine/scene/light/lights.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 
 namespace ptc {
 

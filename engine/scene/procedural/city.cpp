@@ -23,9 +23,9 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/procedural/city_block.h"
 #include "engine/scene/sampling/directions.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 
 namespace ptc {
 namespace {

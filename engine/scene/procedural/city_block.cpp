@@ -22,7 +22,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/base/low_discrepancy.h"
 
 namespace ptc {
 namespace {

@@ -34,7 +34,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/base/low_discrepancy.h"
 
 namespace ptc {
 namespace {

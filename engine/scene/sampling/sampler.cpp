@@ -30,9 +30,9 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/clusters.h"
 #include "engine/scene/sampling/directions.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 #include "engine/scene/sampling/spacing_field.h"
 #include "engine/scene/sampling/surface_patches.h"
 #include "engine/scene/sampling/surroundings.h"

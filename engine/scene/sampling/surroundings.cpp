@@ -22,8 +22,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/directions.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 #include "engine/scene/step_off.h"
 
 namespace ptc {

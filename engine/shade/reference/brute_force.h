@@ -63,7 +63,7 @@ class DiscRays {
   ~DiscRays();
 
   /// Traces stratified cosine rays from a receiver. The result is deterministic in `seed`.
-  /// @param rays  number of rays, rounded down to a square number
+  /// @param rays  number of rays, best a power of 4
   [[nodiscard]] Shading trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const;
 
  private:

@@ -24,16 +24,17 @@ struct DiscHit {
   [[nodiscard]] bool met() const noexcept { return depth < std::numeric_limits<float>::infinity(); }
 };
 
-/// Returns the side of the largest square grid of at most this many rays.
-[[nodiscard]] unsigned square_side(std::size_t rays) noexcept;
-
-/// Makes cosine-distributed directions above a normal, one in each cell of a square grid, of which
-/// neighbouring cells have neighbouring directions (the concentric map of Shirley and Chiu 1997).
-/// The same seed gives the same directions.
-/// @param side        of the square
-/// @param directions  receives side * side of them, row after row of the grid
-void cosine_directions(const glm::vec3& normal, unsigned side, std::uint64_t seed,
+/// Makes cosine-distributed directions above a normal: points of SquarePoints, taken to the disc by
+/// the concentric map of Shirley and Chiu 1997. They are in the order of tiles of the square, so
+/// that neighbours in the list have neighbouring directions; of a power of 4 from 64 on, each tile
+/// has kDirectionTile of them. The same seed gives the same directions.
+/// @param count       number of directions
+/// @param directions  receives them
+void cosine_directions(const glm::vec3& normal, std::size_t count, std::uint64_t seed,
                        std::vector<glm::vec3>& directions);
+
+/// Directions that lie close together.
+inline constexpr std::size_t kDirectionTile = 32;
 
 /// Sums up what the rays of a receiver have met.
 /// @param directions  of cosine_directions()

@@ -171,7 +171,7 @@ DiscRays::~DiscRays() = default;
 
 Shading DiscRays::trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const {
   std::vector<glm::vec3> directions;
-  cosine_directions(receiver.normal, square_side(rays), seed, directions);
+  cosine_directions(receiver.normal, rays, seed, directions);
   const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, receiver.position);
   std::vector<DiscHit> hits(directions.size());
   for (std::size_t i = 0; i < hits.size(); ++i) hits[i] = impl_->meet(from, directions[i]);

@@ -24,8 +24,8 @@
 #include <embree3/rtcore.h>
 #include <glm/geometric.hpp>
 
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/directions.h"
-#include "engine/scene/sampling/low_discrepancy.h"
 #include "tools/bench/references/lightmap.h"
 
 namespace ptc::bench {

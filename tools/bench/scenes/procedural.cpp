@@ -25,7 +25,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/base/low_discrepancy.h"
 
 namespace ptc::bench {
 namespace {

@@ -1,5 +1,5 @@
 // Low-discrepancy sample points.
-#include "engine/scene/sampling/low_discrepancy.h"
+#include "engine/base/low_discrepancy.h"
 
 #include <cmath>
 #include <set>
@@ -10,7 +10,7 @@
 using namespace ptc;
 
 TEST_CASE("square points: of 2^k points, one falls into each elementary box of every shape",
-          "[scene][sampling]") {
+          "[base][sampling]") {
   for (const std::uint64_t seed : {0u, 1u, 12345u}) {
     const SquarePoints points(seed);
     for (unsigned k = 0; k <= 6; ++k) {
@@ -32,7 +32,7 @@ TEST_CASE("square points: of 2^k points, one falls into each elementary box of e
 }
 
 TEST_CASE("square points: the third coordinate is stratified and follows neither of the others",
-          "[scene][sampling]") {
+          "[base][sampling]") {
   const SquarePoints points(7);
   for (unsigned k = 0; k <= 8; ++k) {
     std::set<int> boxes;
@@ -51,7 +51,7 @@ TEST_CASE("square points: the third coordinate is stratified and follows neither
   CHECK(std::abs(with_y) < 0.01);
 }
 
-TEST_CASE("square points: neighbouring seeds give unrelated points", "[scene][sampling]") {
+TEST_CASE("square points: neighbouring seeds give unrelated points", "[base][sampling]") {
   double distance = 0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     const glm::vec2 a = SquarePoints(seed).square(0);
