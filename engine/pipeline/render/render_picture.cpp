@@ -179,14 +179,12 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
   // Choose the size of a window; multiples of the shares kGolden cover the plane evenly (Roberts
   // 2018)
   constexpr double kGolden[2] = {0.7548776662466927, 0.5698402909980532};
-  constexpr std::uint64_t kMaxWidth = 16;
+  constexpr unsigned kMaxSide = 32;
   const Camera& camera = subject.camera;
   const unsigned side = subject.side;
   const PilotPlan plan = plan_pilots(subject.samples());
-  const auto width =
-      static_cast<unsigned>(std::min<std::uint64_t>({kMaxWidth, camera.width, plan.receivers}));
-  const auto height =
-      static_cast<unsigned>(std::min<std::uint64_t>(camera.height, plan.receivers / width));
+  const unsigned width = std::min(kMaxSide, camera.width),
+                 height = std::min(kMaxSide, camera.height);
 
   // Find what the windows see, in twice as many as are wanted: some may see nothing
   std::vector<Pilot> pilots(2 * plan.count);
@@ -198,7 +196,9 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
     const unsigned x0 = place(0, camera.width - width), y0 = place(1, camera.height - height);
     pilots[i].variant = static_cast<unsigned>(i / 2) % (side * side);
     for (unsigned y = y0; y < y0 + height; ++y) {
-      for (unsigned x = x0; x < x0 + width; ++x) {
+      for (unsigned column = 0; column < width; ++column) {
+        // Begin each row elsewhere, so that those that are compared lie all over the window
+        const unsigned x = x0 + (column + width / 2 + 5 * (y - y0)) % width;
         const auto [sx, sy] = sample_at(x, y, pilots[i].variant, side);
         if (const auto hit = subject.view->at(sx, sy)) {
           pilots[i].receivers.push_back(receiver_at(*hit));
